@@ -1,0 +1,45 @@
+"""Errors of the project; the command line turns each into its message and its exit code, without a trace.
+
+    HilError          1   something went wrong that the user can act on
+    └── InputError    2   a file or an argument is wrong; the message says what, where, what is allowed
+        └── FieldError    the same, at one field of a model whose file is known to the caller only
+"""
+
+from __future__ import annotations
+
+FieldPath = tuple[str | int, ...]
+
+
+class HilError(Exception):
+    """Base of all errors raised on purpose."""
+
+    exit_code = 1
+
+
+class InputError(HilError):
+    """A file or an argument is wrong."""
+
+    exit_code = 2
+
+
+class FieldError(InputError, ValueError):
+    """A value inside a model is wrong; `field` is its path, such as ("segments", 3, "to_m").
+
+    Raised by validators and planners. It is a ValueError so that pydantic collects it, and
+    `hil.yamlfile.load_model` puts the file and the line in front.
+    """
+
+    def __init__(self, field: FieldPath, message: str) -> None:
+        super().__init__(f"{field_name(field)}: {message}" if field else message)
+        self.field = field
+        self.message = message
+
+    def inside(self, *outer: str | int) -> FieldError:
+        """The same error seen from the model that contains this one."""
+        return FieldError((*outer, *self.field), self.message)
+
+
+def field_name(field: FieldPath) -> str:
+    """("segments", 3, "to_m") -> "segments[3].to_m"."""
+    text = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in field)
+    return text.removeprefix(".")

@@ -1,0 +1,196 @@
+"""The twin of an axis in the time domain: its physics, its active mechanisms, its simulation.
+
+`Twin` packs a chain's modes, friction and mechanisms into the arrays of the compiled kernel. The
+same arrays and kernel serve offline simulation in closed loop and the live twin in the control loop.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hil import control
+from hil.twin import kernel, stages
+from hil.twin.chain import Chain
+from hil.twin.library import BY_ID, LIBRARY
+from hil.twin.mechanism import PARAMETERS, WIDTH, Stage
+from hil.twin.modal import Modal, discretise, modal, truncate
+
+FloatArray = NDArray[np.float64]
+
+# Internal steps per control tick. Fine: 20 us at 1 ms, so that the friction impulse of the step in
+# which the motor reverses is right to Fc x 20 us, 0.003 N m of velocity-loop torque on the reference
+# axis, below its current noise. Coarse: sliding friction is constant over a step, modes are exact.
+FINE_STEPS = 50
+COARSE_STEPS = 5
+# The step is fine while the motor could reverse within two ticks at this acceleration [rad/s^2].
+_REVERSAL_ACCELERATION = 1000.0
+
+_INDEX = {mechanism.id: index for index, mechanism in enumerate(LIBRARY)}
+
+
+@dataclass(frozen=True)
+class Active:
+    """A mechanism that is on: its id, its parameters in the library's order, its variant."""
+
+    effect: str
+    values: tuple[float, ...]
+    variant: int = 0
+
+
+@dataclass(frozen=True)
+class Physics:
+    """What the nominal twin knows of an axis, in motor units (rad, N m; on a linear axis m, N)."""
+
+    chain: Chain
+    coulomb_n_m: float
+    viscous_n_m_s_rad: float
+    linear: bool = False
+    angle_per_unit: float = 1.0     # motor angle per motor unit: 1, or 2 pi / screw lead on a linear axis
+
+
+class Response(NamedTuple):
+    """What the twin answers with, each (n,): SI values in the units of the axis."""
+
+    motor_position: FloatArray
+    table_position_m: FloatArray
+    torque_command: FloatArray
+    torque: FloatArray
+
+
+class Start(NamedTuple):
+    """Where a simulation starts: table position, velocity, and the torque of the integrator."""
+
+    position_m: float = 0.0
+    velocity_m_s: float = 0.0
+    torque: float = 0.0
+    tick: int = 0
+
+
+@dataclass(frozen=True)
+class Twin:
+    """An axis with its control law and its active mechanisms.
+
+    `modes` keeps only the lowest modes of the chain (None: all). `fine_steps` and `coarse_steps` are
+    internal steps per control tick; equal values give a fixed step.
+    """
+
+    physics: Physics
+    gains: control.Gains
+    active: Sequence[Active] = ()
+    modes: int | None = None
+    coarse_steps: int = COARSE_STEPS
+    fine_steps: int = FINE_STEPS
+
+    @cached_property
+    def modal(self) -> Modal:
+        """Modes of the chain, with those mechanisms that change the chain."""
+        chain = self.physics.chain
+        for active in self.active:
+            mechanism = BY_ID[active.effect]
+            if mechanism.stage is Stage.CHAIN:
+                chain = mechanism.contribution(chain, active.values)
+        modes = modal(chain)
+        return modes if self.modes is None else truncate(modes, self.modes)
+
+    @cached_property
+    def _modes(self) -> FloatArray:
+        modes = self.modal
+        rows = np.empty((kernel.MODE_ROWS, modes.frequency_rad_s.size))
+        period = self.gains.period_s
+        rows[kernel.COARSE:kernel.COARSE + 6] = discretise(modes, period / self.coarse_steps)
+        rows[kernel.FINE:kernel.FINE + 6] = discretise(modes, period / self.fine_steps)
+        rows[kernel.SHAPE_MOTOR] = modes.shape[modes.motor]
+        rows[kernel.SHAPE_TABLE] = modes.shape[modes.table]
+        rows[kernel.SHAPE_SPRING] = modes.transmission
+        return rows
+
+    @cached_property
+    def _constants(self) -> FloatArray:
+        constants = np.zeros(kernel.CONSTANTS)
+        physics, chain, ratio = self.physics, self.physics.chain, self.gains.ratio_m_rad
+        constants[kernel.PERIOD] = self.gains.period_s
+        constants[kernel.RATIO] = ratio
+        constants[kernel.ANGLE_PER_UNIT] = physics.angle_per_unit
+        constants[kernel.COULOMB] = physics.coulomb_n_m
+        constants[kernel.VISCOUS] = physics.viscous_n_m_s_rad
+        constants[kernel.SPRING] = chain.transmission_stiffness_n_m_rad
+        elastic = self.modal.frequency_rad_s[self.modal.frequency_rad_s > 0.0]
+        if elastic.size:
+            damping = self.modal.damping_ratio[self.modal.frequency_rad_s > 0.0][0]
+            constants[kernel.DAMPER] = 2.0 * damping * chain.transmission_stiffness_n_m_rad / elastic[0]
+        constants[kernel.COARSE_STEPS] = self.coarse_steps
+        constants[kernel.FINE_STEPS] = self.fine_steps
+        constants[kernel.SLOW_VELOCITY] = (
+            2.0 * self.gains.period_s * _REVERSAL_ACCELERATION / physics.angle_per_unit)
+        bends = any(BY_ID[active.effect].stage is Stage.TRANSMISSION for active in self.active)
+        constants[kernel.ALWAYS_FINE] = float(bends and elastic.size > 1)
+        return constants
+
+    @cached_property
+    def _mechanisms(self) -> tuple[FloatArray, NDArray[np.int64]]:
+        values = np.zeros((len(LIBRARY), PARAMETERS))
+        codes = np.zeros(kernel.CODES, dtype=np.int64)
+        for active in self.active:
+            mechanism, index = BY_ID[active.effect], _INDEX[active.effect]
+            stage = stages.stage_of(mechanism, active.variant)
+            if stage not in stages.KERNEL_STAGES:
+                continue
+            values[index, :len(active.values)] = active.values
+            values[index, PARAMETERS - 1] = active.variant
+            codes[index] = active.variant + 1
+            codes[len(LIBRARY) + stages.KERNEL_STAGES.index(stage)] = 1
+        return values, codes
+
+    @cached_property
+    def _gains(self) -> control.Gains:
+        """The gains, with the velocity filter of an active mechanism."""
+        gains = self.gains
+        for active in self.active:
+            if BY_ID[active.effect].stage is Stage.VELOCITY_FILTER:
+                gains = gains._replace(filter_coefficient=1.0 - math.exp(-gains.period_s / max(active.values[0], 1e-9)))
+        return gains
+
+    def state(self, start: Start = Start()) -> tuple[FloatArray, FloatArray]:
+        """Modal state (2, modes) and memory of an axis that moves as one body at `start`."""
+        modes, ratio = self.modal, self.gains.ratio_m_rad
+        delta = np.zeros((2, modes.frequency_rad_s.size))
+        rigid = modes.shape[modes.motor, 0]
+        delta[0, 0] = start.position_m / ratio / rigid
+        delta[1, 0] = start.velocity_m_s / ratio / rigid
+        return delta, np.zeros((len(LIBRARY) + 1, WIDTH))
+
+    def arrays(self) -> tuple[FloatArray, FloatArray, FloatArray, NDArray[np.int64]]:
+        """Constants, modes, mechanism values and codes, as the kernel takes them."""
+        return self._constants, self._modes, *self._mechanisms
+
+    def simulate(self, position_command_m: FloatArray, velocity_command_m_s: FloatArray,
+                 start: Start = Start()) -> Response:
+        """The axis in closed loop over set-points (n,), one per control tick, from `start`."""
+        delta, memory = self.state(start)
+        ratio = self.gains.ratio_m_rad
+        state = control.init(start.position_m / ratio, start.velocity_m_s / ratio, start.torque,
+                             self.gains.period_s, start.tick)
+        channels = kernel.closed_loop(self._gains, state, position_command_m, velocity_command_m_s,
+                                      *self.arrays(), delta, memory)
+        return self._channels(Response(*channels))
+
+    def drive(self, torque_command: FloatArray, start: Start = Start()) -> Response:
+        """The axis without its controller under a given torque command (n,), from `start`."""
+        delta, memory = self.state(start)
+        motor, table, torque = kernel.open_loop(torque_command, *self.arrays(), delta, memory)
+        return self._channels(Response(motor, table, torque_command, torque))
+
+    def _channels(self, response: Response) -> Response:
+        for active in self.active:
+            mechanism = BY_ID[active.effect]
+            if mechanism.stage is Stage.CHANNEL:
+                response = Response(*mechanism.contribution(
+                    tuple(response), active.values, active.variant, self.gains.period_s))
+        return response

@@ -1,0 +1,253 @@
+"""The compiled stepping kernel: modal states, friction, active mechanisms, controller.
+
+Each internal step h moves every modal oscillator exactly under the torques held over the step
+(Eq. 8 of the source), then lets contact friction act as an impulse:
+
+    v* = velocity after the step without friction,  G = velocity gained per unit of torque over h
+    stuck    F = v* / G                 where |F - bias| <= Fc
+    sliding  v = (v* - G (bias +- Fc + drag)) / (1 + G c)
+
+so that sticking is exact and needs no smoothed sign function (time stepping after Moreau; Stewart and
+Trinkle 1996). Position-dependent torques are taken at the predicted middle of the step, which makes
+them second order. While the motor is slow the step is fine, for the reversals; else it is coarse.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from hil import control
+from hil.twin import stages
+from hil.twin.library import LIBRARY
+from hil.twin.mechanism import Moment
+
+MECHANISMS = len(LIBRARY)
+
+# Rows of `modes` (MODE_ROWS, n): exact discretisation for the coarse and the fine step, then shapes.
+COARSE, FINE, SHAPE_MOTOR, SHAPE_TABLE, SHAPE_SPRING, MODE_ROWS = 0, 6, 12, 13, 14, 15
+
+# Entries of `constants`.
+(PERIOD, RATIO, ANGLE_PER_UNIT, COULOMB, VISCOUS, SPRING, DAMPER, COARSE_STEPS, FINE_STEPS, SLOW_VELOCITY,
+ ALWAYS_FINE, CONSTANTS) = range(12)
+
+# Entries of `codes`: variant + 1 of each mechanism (0: off), then whether each stage is entered.
+(ON_CURRENT, ON_TORQUE, ON_MOTOR_TORQUE, ON_COULOMB, ON_FRICTION_SCALE, ON_DRAG, ON_BIAS, ON_BRISTLE,
+ ON_TABLE_SHARE, ON_TRANSMISSION, ON_TABLE_FORCE, ON_MOTOR_READING, ON_TABLE_READING, CODES) = range(
+    MECHANISMS, MECHANISMS + 14)
+
+# Rows of `memory` (MECHANISMS + 1, WIDTH): each mechanism's own, then the kernel's.
+OWN = MECHANISMS
+CLOCK, BRISTLE_DEFLECTION, SPRING_EXTRA = 0, 1, 2
+
+_current, _torque, _motor_torque = stages.current, stages.torque, stages.motor_torque
+_coulomb, _friction_scale, _drag, _bias = stages.coulomb, stages.friction_scale, stages.drag, stages.bias
+_bristle, _table_share, _transmission = stages.bristle, stages.table_share, stages.transmission
+_table_force, _motor_reading, _table_reading = stages.table_force, stages.motor_reading, stages.table_reading
+_control_step = control.step
+_REASSOCIATE = {"reassoc", "nsz", "contract", "arcp"}
+
+
+@njit(fastmath=_REASSOCIATE)
+def _contact(free, gain, bound, viscous, shift, opposing):  # type: ignore[no-untyped-def]
+    """Friction torque of a rigid contact that meets velocity `free`; see the module's equations."""
+    stop = free / gain
+    if abs(stop - shift) <= bound:
+        return stop
+    sign = 1.0 if stop > shift else -1.0
+    steady = shift + sign * bound + opposing
+    return steady + viscous * (free - gain * steady) / (1.0 + gain * viscous)
+
+
+@njit(fastmath=_REASSOCIATE)
+def _bristle_contact(free, gain, bound, viscous, shift, opposing, stiffness, deflection, step):  # type: ignore[no-untyped-def]
+    """Friction torque and new deflection of an elastic contact (Dahl 1968), implicit in velocity.
+
+    dz/dt = v (1 - sign(v) K z / Fc),  F = K z + c v + shift + drag
+    """
+    pull = stiffness * deflection
+    sign = 1.0 if free - gain * (pull + shift) > 0.0 else -1.0
+    yielding = 1.0 - sign * pull / bound if bound > 0.0 else 0.0
+    yielding = max(yielding, 0.0)
+    steady = pull + shift + opposing
+    velocity = (free - gain * steady) / (1.0 + gain * (stiffness * step * yielding + viscous))
+    after = deflection + step * velocity * yielding
+    limit = bound / stiffness
+    after = min(max(after, -limit), limit)
+    return stiffness * after + shift + opposing + viscous * velocity, after
+
+
+def _build_advance(digest: str) -> Callable[..., Any]:
+    @njit(cache=True, fastmath=_REASSOCIATE)
+    def advance(command, constants, modes, values, codes, delta, memory):  # type: ignore[no-untyped-def]
+        """Move the axis by one control period under a held torque command; mean measured torque."""
+        assert digest
+        n = delta.shape[1]
+        own = memory[OWN]
+        ratio, period = constants[RATIO], constants[PERIOD]
+        position = speed = table = table_speed = stretch = stretch_rate = 0.0
+        for i in range(n):
+            position += modes[SHAPE_MOTOR, i] * delta[0, i]
+            speed += modes[SHAPE_MOTOR, i] * delta[1, i]
+            table += modes[SHAPE_TABLE, i] * delta[0, i]
+            table_speed += modes[SHAPE_TABLE, i] * delta[1, i]
+            stretch += modes[SHAPE_SPRING, i] * delta[0, i]
+            stretch_rate += modes[SHAPE_SPRING, i] * delta[1, i]
+        fine = constants[ALWAYS_FINE] > 0.0 or abs(speed) < constants[SLOW_VELOCITY]
+        first = FINE if fine else COARSE
+        steps = int(constants[FINE_STEPS]) if fine else int(constants[COARSE_STEPS])
+        h = period / steps
+        gain = cross = table_gain = 0.0
+        for i in range(n):
+            gain += modes[SHAPE_MOTOR, i] * modes[first + 5, i] * modes[SHAPE_MOTOR, i]
+            cross += modes[SHAPE_MOTOR, i] * modes[first + 5, i] * modes[SHAPE_TABLE, i]
+            table_gain += modes[SHAPE_TABLE, i] * modes[first + 5, i] * modes[SHAPE_TABLE, i]
+        measured = 0.0
+        for j in range(steps):
+            at = Moment(own[CLOCK] + j * h, j * h, period, h,
+                        (position + 0.5 * h * speed) * constants[ANGLE_PER_UNIT], speed,
+                        (table + 0.5 * h * table_speed) * ratio, ratio)
+            made = command
+            if codes[ON_CURRENT]:
+                made = _current(made, at, values, codes, memory)
+            measured += made
+            drive = made
+            if codes[ON_TORQUE]:
+                drive = _torque(drive, at, values, codes, memory)
+            if codes[ON_MOTOR_TORQUE]:
+                drive = _motor_torque(drive, at, values, codes, memory)
+            push = 0.0
+            if codes[ON_TABLE_FORCE]:
+                push = _table_force(0.0, at, values, codes, memory) * ratio
+            spring = 0.0
+            if codes[ON_TRANSMISSION]:
+                bent = stretch + 0.5 * h * stretch_rate
+                effective = _transmission(bent, at, values, codes, memory)
+                extra = effective - bent
+                rate = -stretch_rate if effective == 0.0 else (extra - own[SPRING_EXTRA]) / h
+                own[SPRING_EXTRA] = extra
+                spring = -(constants[SPRING] * extra + constants[DAMPER] * rate)
+
+            free = table_free = 0.0
+            for i in range(n):
+                g = (modes[SHAPE_MOTOR, i] * drive + modes[SHAPE_TABLE, i] * push
+                     + modes[SHAPE_SPRING, i] * spring)
+                d, v = delta[0, i], delta[1, i]
+                delta[0, i] = modes[first, i] * d + modes[first + 1, i] * v + modes[first + 4, i] * g
+                moved = modes[first + 2, i] * d + modes[first + 3, i] * v + modes[first + 5, i] * g
+                delta[1, i] = moved
+                free += modes[SHAPE_MOTOR, i] * moved
+                table_free += modes[SHAPE_TABLE, i] * moved
+
+            bound, viscous = constants[COULOMB], constants[VISCOUS]
+            shift = opposing = share = stiffness = 0.0
+            if codes[ON_COULOMB]:
+                bound = max(_coulomb(bound, at, values, codes, memory), 0.0)
+            if codes[ON_FRICTION_SCALE]:
+                scale = max(_friction_scale(1.0, at, values, codes, memory), 0.0)
+                bound *= scale
+                viscous *= scale
+            if codes[ON_DRAG]:
+                opposing = _drag(0.0, at, values, codes, memory)
+            if codes[ON_BIAS]:
+                shift = _bias(0.0, at, values, codes, memory)
+            if codes[ON_TABLE_SHARE]:
+                share = _table_share(0.0, at, values, codes, memory)
+            if codes[ON_BRISTLE]:
+                stiffness = _bristle(0.0, at, values, codes, memory)
+            rest = 1.0 - share
+            if stiffness > 0.0:
+                friction, own[BRISTLE_DEFLECTION] = _bristle_contact(
+                    free, gain, rest * bound, rest * viscous, shift, opposing, stiffness,
+                    own[BRISTLE_DEFLECTION], h)
+            else:
+                friction = _contact(free, gain, rest * bound, rest * viscous, shift, opposing)
+            guide = 0.0
+            if share > 0.0:
+                guide = _contact(table_free - cross * friction, table_gain, share * bound, share * viscous,
+                                 0.0, 0.0)
+
+            position = speed = table = table_speed = stretch = stretch_rate = 0.0
+            for i in range(n):
+                g = modes[SHAPE_MOTOR, i] * friction + modes[SHAPE_TABLE, i] * guide
+                d = delta[0, i] - modes[first + 4, i] * g
+                v = delta[1, i] - modes[first + 5, i] * g
+                delta[0, i] = d
+                delta[1, i] = v
+                position += modes[SHAPE_MOTOR, i] * d
+                speed += modes[SHAPE_MOTOR, i] * v
+                table += modes[SHAPE_TABLE, i] * d
+                table_speed += modes[SHAPE_TABLE, i] * v
+                stretch += modes[SHAPE_SPRING, i] * d
+                stretch_rate += modes[SHAPE_SPRING, i] * v
+        own[CLOCK] += period
+        return measured / steps
+
+    return advance
+
+
+def _build_read(digest: str) -> Callable[..., Any]:
+    @njit(cache=True, fastmath=_REASSOCIATE)
+    def read(constants, modes, values, codes, delta, memory):  # type: ignore[no-untyped-def]
+        """What the two encoders read: motor position (rad, or m) and table position (m)."""
+        assert digest
+        position = table = 0.0
+        for i in range(delta.shape[1]):
+            position += modes[SHAPE_MOTOR, i] * delta[0, i]
+            table += modes[SHAPE_TABLE, i] * delta[0, i]
+        table *= constants[RATIO]
+        if codes[ON_MOTOR_READING] or codes[ON_TABLE_READING]:
+            at = Moment(memory[OWN, CLOCK], 0.0, constants[PERIOD], 0.0, position * constants[ANGLE_PER_UNIT],
+                        0.0, table, constants[RATIO])
+            if codes[ON_MOTOR_READING]:
+                position = _motor_reading(position, at, values, codes, memory)
+            if codes[ON_TABLE_READING]:
+                table = _table_reading(table, at, values, codes, memory)
+        return position, table
+
+    return read
+
+
+def _build_closed_loop(digest: str) -> Callable[..., Any]:
+    @njit(cache=True, fastmath=_REASSOCIATE)
+    def closed_loop(gains, state, position_command, velocity_command, constants, modes, values, codes,  # type: ignore[no-untyped-def]
+                    delta, memory):
+        """Controller and axis from tick to tick: motor, table, torque command, torque, each (n,)."""
+        assert digest
+        n = position_command.size
+        motor, table, command, torque = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
+        for k in range(n):
+            motor[k], table[k] = read(constants, modes, values, codes, delta, memory)
+            inputs = control.Inputs(position_command[k], velocity_command[k], motor[k], table[k])
+            state, outputs = _control_step(gains, state, inputs)
+            command[k] = outputs.torque_n_m
+            torque[k] = advance(command[k], constants, modes, values, codes, delta, memory)
+        return motor, table, command, torque
+
+    return closed_loop
+
+
+def _build_open_loop(digest: str) -> Callable[..., Any]:
+    @njit(cache=True, fastmath=_REASSOCIATE)
+    def open_loop(torque_in, constants, modes, values, codes, delta, memory):  # type: ignore[no-untyped-def]
+        """The axis driven by a given torque command (n,): motor, table, torque, each (n,)."""
+        assert digest
+        n = torque_in.size
+        motor, table, torque = np.empty(n), np.empty(n), np.empty(n)
+        for k in range(n):
+            motor[k], table[k] = read(constants, modes, values, codes, delta, memory)
+            torque[k] = advance(torque_in[k], constants, modes, values, codes, delta, memory)
+        return motor, table, torque
+
+    return open_loop
+
+
+# Bound into each kernel, so that numba's cache knows when a mechanism compiled into it has changed.
+_DIGEST = stages.library_digest()
+advance = _build_advance(_DIGEST)
+read = _build_read(_DIGEST)
+closed_loop = _build_closed_loop(_DIGEST)
+open_loop = _build_open_loop(_DIGEST)

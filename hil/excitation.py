@@ -1,8 +1,8 @@
 """Chirp and multisine: position set-points for frequency responses, in closed form.
 
-Both are sums or sweeps of x = Im z with complex z, so that derivatives are exact, times a window that rises and
-falls by a polynomial with three continuous derivatives (the jerk starts and ends at zero). They may ride on a
-constant feed, which keeps friction sliding.
+Both are x = Im z with complex z, so that derivatives are exact, times a window that rises and falls by a
+polynomial with three continuous derivatives (the jerk starts and ends at zero). They may ride on a constant
+feed, which keeps friction sliding.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ MISSED_PEAK = 1.0025
 
 
 class Spectrum(StrEnum):
-    """What stays equal over the band; the position amplitude falls with the frequency to the power 0, 1, 2."""
+    """What stays equal over the band; the position amplitude falls with f to the power 0, 1, 2."""
 
     CONSTANT_DISPLACEMENT = "constant_displacement"
     CONSTANT_VELOCITY = "constant_velocity"
@@ -42,7 +42,7 @@ class Signal(Protocol):
     def highest_frequency_hz(self) -> float: ...
 
     def derivatives(self, time_s: Array) -> list[Array]:
-        """x, x', x'', x''' of the signal with the amplitude 1."""
+        """x, x', x'', x''' of the signal in its own unit."""
 
 
 @dataclass(frozen=True)
@@ -112,34 +112,35 @@ class Wave:
     phase: Phase
     position_m: float
     feed_m_s: float
-    amplitude_m: float
+    scale_m: float   # metres per unit of the signal
     fade_s: float   # rise and fall of the window
     signal: Signal
 
     def at(self, time_s: Array) -> Motion:
         x, x1, x2, x3 = self.signal.derivatives(time_s)
         w, w1, w2, w3 = _window(time_s, self.duration_s, self.fade_s)
-        amplitude = self.amplitude_m
-        return Motion(self.position_m + self.feed_m_s * time_s + amplitude * w * x,   # Leibniz' rule
-                      self.feed_m_s + amplitude * (w1 * x + w * x1),
-                      amplitude * (w2 * x + 2 * w1 * x1 + w * x2),
-                      amplitude * (w3 * x + 3 * w2 * x1 + 3 * w1 * x2 + w * x3))
+        return Motion(self.position_m + self.feed_m_s * time_s + self.scale_m * w * x,   # Leibniz' rule
+                      self.feed_m_s + self.scale_m * (w1 * x + w * x1),
+                      self.scale_m * (w2 * x + 2 * w1 * x1 + w * x2),
+                      self.scale_m * (w3 * x + 3 * w2 * x1 + 3 * w1 * x2 + w * x3))
 
 
 def excitation(start_m: float, signal: Signal, duration_s: float, fade_s: float, amplitude_m: float,
                feed_m_s: float, limits: MotionLimits) -> Move:
     """The signal, on the constant feed feed_m_s (0 for standstill), with ramps to it and from it.
 
-    The amplitude is lowered where velocity, acceleration or jerk would pass a limit, and a note says so.
+    amplitude_m is the largest displacement. It is lowered where velocity, acceleration or jerk would pass a
+    limit, and a note says so.
     """
     room_m_s = limits.velocity_m_s - abs(feed_m_s)
     if room_m_s <= 0:
         raise FieldError(("base_feed_m_s",), f"given {feed_m_s:.6g}, allowed less than "
                          f"{limits.velocity_m_s:.6g} m/s in magnitude; lower the feed")
-    unit = Wave(duration_s, Phase.EXCITATION, 0.0, 0.0, 1.0, fade_s, signal)
+    wave = Wave(duration_s, Phase.EXCITATION, 0.0, 0.0, 1.0, fade_s, signal)
     samples = math.ceil(duration_s * signal.highest_frequency_hz * SAMPLES_PER_PERIOD) + 1
-    peaks = [float(np.abs(values).max()) * MISSED_PEAK for values in unit.at(np.linspace(0, duration_s, samples))]
-    allowed_m = min(room_m_s / peaks[1], limits.acceleration_m_s2 / peaks[2], limits.jerk_m_s3 / peaks[3])
+    largest_m, *peaks = (float(np.abs(values).max()) for values in wave.at(np.linspace(0, duration_s, samples)))
+    allowed = (room_m_s, limits.acceleration_m_s2, limits.jerk_m_s3)
+    allowed_m = largest_m * min(limit / (MISSED_PEAK * peak) for limit, peak in zip(allowed, peaks, strict=True))
     notes: tuple[str, ...] = ()
     if allowed_m < amplitude_m:
         notes = (f"amplitude lowered from {amplitude_m * 1e6:.4g} um to {allowed_m * 1e6:.4g} um "
@@ -148,7 +149,7 @@ def excitation(start_m: float, signal: Signal, duration_s: float, fade_s: float,
 
     ramp_s = ramp_duration_s(abs(feed_m_s), limits)
     wave_m = start_m + feed_m_s * ramp_s / 2
-    wave = replace(unit, position_m=wave_m, feed_m_s=feed_m_s, amplitude_m=amplitude_m)
+    wave = replace(wave, position_m=wave_m, feed_m_s=feed_m_s, scale_m=amplitude_m / largest_m)
     end_m = wave_m + feed_m_s * duration_s
     pieces: tuple[Piece, ...] = (wave,)
     if feed_m_s:

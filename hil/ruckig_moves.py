@@ -16,7 +16,7 @@ from typing import NamedTuple
 import ruckig
 
 from hil.errors import HilError, InputError
-from hil.moves import Cubic, MotionLimits, Move, Phase
+from hil.moves import Cubic, MotionLimits, Move, Phase, Piece
 
 END_TOLERANCE_M = 1e-10
 
@@ -36,8 +36,8 @@ class State(NamedTuple):
 def point_to_point(state: State, target_m: float, limits: MotionLimits) -> Move:
     """Time-optimal motion from any state to rest at target_m.
 
-    Some states far beyond their limits ruckig cannot solve in one go; then the axis stops first and a note says
-    so. Raises InputError for a number that is not finite.
+    Some states far beyond their limits ruckig cannot solve in one go; then the axis stops first and a note
+    says so. Raises InputError for a number that is not finite.
     """
     order = _order(state, limits)
     order.target_position = [_finite("target_m", target_m)]

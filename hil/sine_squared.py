@@ -2,11 +2,12 @@
 
     v(t) = V sin^2(pi t / (2 Tr)),  0 <= t <= Tr        ("square sine shape", Sec. 3.3 of the source)
 
-ruckig cannot make this ramp: its jerk is -J, 0 or +J, and the jerk of this ramp is a cosine. It is a rectangular
-velocity V of the length Tr + Tc convolved with the half sine pi/(2 Tr) sin(pi t/Tr), 0 <= t <= Tr, since the
-running integral of that kernel is (1 - cos(pi t/Tr))/2 = sin^2(pi t/(2 Tr)).
+ruckig cannot make this ramp: its jerk is -J, 0 or +J, and the jerk of this ramp is a cosine. The move is a
+rectangular velocity V of the length Tr + Tc convolved with the half sine pi/(2 Tr) sin(pi t/Tr),
+0 <= t <= Tr, since the running integral of that kernel is (1 - cos(pi t/Tr))/2 = sin^2(pi t/(2 Tr)).
 
-Over a step dv in the time Tr the peaks are a = pi dv/(2 Tr) in the middle and j = pi^2 dv/(2 Tr^2) at both ends.
+Over a step dv in the time Tr the peaks are a = pi dv/(2 Tr) in the middle and j = pi^2 dv/(2 Tr^2) at
+both ends.
 """
 
 from __future__ import annotations
@@ -45,8 +46,8 @@ def sine_squared(start_m: float, end_m: float, limits: MotionLimits) -> Move:
     if constant_s < 0:
         ramp_s, constant_s = bell_duration_s(stroke, limits) / 2, 0.0
         feed = min(feed, stroke / ramp_s)
-        notes = (f"feed lowered from {_feed(limits.velocity_m_s)} to {_feed(feed)}: over {stroke * 1e3:.6g} mm "
-                 f"{limits.acceleration_m_s2:.6g} m/s^2 and {limits.jerk_m_s3:.6g} m/s^3 allow no more",)
+        notes = (f"feed lowered from {_feed(limits.velocity_m_s)} to {_feed(feed)}: over "
+                 f"{stroke * 1e3:.6g} mm {limits.acceleration_m_s2:.6g} m/s^2 and {limits.jerk_m_s3:.6g} m/s^3 allow no more",)
     velocity = math.copysign(feed, end_m - start_m)
     ramp_m = velocity * ramp_s / 2
     pieces: list[Piece] = [Ramp(ramp_s, Phase.ACCELERATION, start_m, 0.0, velocity)]

@@ -5,7 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import pi
 
+import numpy as np
+from numpy.typing import NDArray
+
 from hil.twin import elasticity
+
+FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -53,17 +58,39 @@ class SevenDof:
     def screw_torsion_n_m_rad(self, nut_position_m: float | None = None) -> float:
         """k_t3 = G J / L: only the screw between the front bearing and the nut is twisted (Sec. 3.1)."""
         front, _ = self.screw_lengths_m(nut_position_m)
-        return elasticity.torsional_stiffness(self.screw_torsional_rigidity_n_m2, 1.0, front)
+        return elasticity.torsional_stiffness(self.screw_torsional_rigidity_n_m2, front)
 
     def screw_axial_n_m(self, nut_position_m: float | None = None) -> float:
         """k_a4 by Eq. 18: each bearing in series with its side of the screw, the sides in parallel."""
         front, back = self.screw_lengths_m(nut_position_m)
         return elasticity.supported_screw_stiffness(
             self.front_bearing_stiffness_n_m,
-            elasticity.axial_stiffness(self.screw_axial_rigidity_n, 1.0, front),
+            elasticity.axial_stiffness(self.screw_axial_rigidity_n, front),
             self.back_bearing_stiffness_n_m,
-            elasticity.axial_stiffness(self.screw_axial_rigidity_n, 1.0, back),
+            elasticity.axial_stiffness(self.screw_axial_rigidity_n, back),
         )
+
+    def reduced(self, nut_position_m: float | None = None) -> tuple[FloatArray, FloatArray]:
+        """Inertias J_1..J_7 [kg m^2] and stiffnesses k_t1..k_t6 [N m/rad] at the motor shaft (Eq. 13)."""
+        r2 = (self.lead_m / (2.0 * pi)) ** 2
+        inertias = np.array([
+            self.motor_inertia_kg_m2,
+            self.coupling_motor_side_inertia_kg_m2,
+            self.coupling_screw_side_inertia_kg_m2,
+            self.screw_inertia_kg_m2,
+            self.screw_mass_kg * r2,
+            self.nut_mass_kg * r2,
+            self.table_mass_kg * r2,
+        ])
+        stiffnesses = np.array([
+            self.motor_shaft_stiffness_n_m_rad,
+            self.coupling_stiffness_n_m_rad,
+            self.screw_torsion_n_m_rad(nut_position_m),
+            self.screw_axial_n_m(nut_position_m) * r2,
+            self.nut_stiffness_n_m * r2,
+            self.nut_support_stiffness_n_m * r2,
+        ])
+        return inertias, stiffnesses
 
 
 _SPAN_M = 0.42
@@ -117,21 +144,13 @@ class EquivalentTwoMass:
 
 def equivalent_two_mass(parameters: SevenDof, nut_position_m: float | None = None) -> EquivalentTwoMass:
     """The 2-dof model that stands for a 7-dof one (Eq. 22-23); the screw's axial mass m5 is left out."""
-    p = parameters
-    r2 = (p.lead_m / (2.0 * pi)) ** 2
-    torsion, axial = p.screw_torsion_n_m_rad(nut_position_m) / r2, p.screw_axial_n_m(nut_position_m)
-    others = (
-        p.motor_shaft_stiffness_n_m_rad / r2,
-        p.coupling_stiffness_n_m_rad / r2,
-        p.nut_stiffness_n_m,
-        p.nut_support_stiffness_n_m,
-    )
-    turning = (
-        p.coupling_motor_side_inertia_kg_m2 + p.coupling_screw_side_inertia_kg_m2 + p.screw_inertia_kg_m2
-    )
+    r2 = (parameters.lead_m / (2.0 * pi)) ** 2
+    inertias, stiffnesses = parameters.reduced(nut_position_m)
+    torsion, axial = stiffnesses[2], stiffnesses[3]
+    others = stiffnesses[[0, 1, 4, 5]]
     return EquivalentTwoMass(
-        motor_mass_kg=p.motor_inertia_kg_m2 / r2,
-        table_mass_kg=p.nut_mass_kg + p.table_mass_kg + turning / r2,
-        stiffness_parallel_n_m=elasticity.in_series(torsion + axial, *others),
-        stiffness_series_n_m=elasticity.in_series(torsion, axial, *others),
+        motor_mass_kg=float(inertias[0] / r2),
+        table_mass_kg=float((inertias[5:].sum() + inertias[1:4].sum()) / r2),
+        stiffness_parallel_n_m=float(elasticity.in_series(torsion + axial, *others) / r2),
+        stiffness_series_n_m=float(elasticity.in_series(torsion, axial, *others) / r2),
     )

@@ -14,16 +14,14 @@ from dataclasses import dataclass
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 
-from hil.twin.ballscrew import RECONSTRUCTED_TABLE_1, SevenDof
+from hil.twin.ballscrew import RECONSTRUCTED_TABLE_1, FloatArray, SevenDof
 
 __all__ = [
     "LINEAR_LEAD_M", "RECONSTRUCTED_TABLE_1", "Chain", "FloatArray", "SevenDof",
     "one_mass", "serial_chain", "seven_dof", "two_mass",
 ]
 
-FloatArray = NDArray[np.float64]
 LINEAR_LEAD_M = 2.0 * pi
 """Lead of an axis without a screw: r = 1, so that motor and table share metres and newtons."""
 
@@ -131,8 +129,6 @@ def seven_dof(parameters: SevenDof, damping_ratio: float, nut_position_m: float 
     `damping_ratio` holds for all six elastic modes. The default nut position is the reference.
     Raises ValueError where the nut lies outside the bearings.
     """
-    p = parameters
-    r2 = (p.lead_m / (2.0 * pi)) ** 2
     spring = np.array([
         [1, -1, 0, 0, 0, 0, 0],
         [0, 1, -1, 0, 0, 0, 0],
@@ -141,31 +137,16 @@ def seven_dof(parameters: SevenDof, damping_ratio: float, nut_position_m: float 
         [0, 0, 0, 1, 1, -1, 0],
         [0, 0, 0, 0, 0, 1, -1],
     ], dtype=float)
-    stiffness = np.array([
-        p.motor_shaft_stiffness_n_m_rad,
-        p.coupling_stiffness_n_m_rad,
-        p.screw_torsion_n_m_rad(nut_position_m),
-        p.screw_axial_n_m(nut_position_m) * r2,
-        p.nut_stiffness_n_m * r2,
-        p.nut_support_stiffness_n_m * r2,
-    ])
+    inertias, stiffnesses = parameters.reduced(nut_position_m)
     return Chain(
-        inertia_kg_m2=np.diag([
-            p.motor_inertia_kg_m2,
-            p.coupling_motor_side_inertia_kg_m2,
-            p.coupling_screw_side_inertia_kg_m2,
-            p.screw_inertia_kg_m2,
-            p.screw_mass_kg * r2,
-            p.nut_mass_kg * r2,
-            p.table_mass_kg * r2,
-        ]),
-        stiffness_n_m_rad=spring.T @ (stiffness[:, None] * spring),
-        lead_m=p.lead_m,
+        inertia_kg_m2=np.diag(inertias),
+        stiffness_n_m_rad=spring.T @ (stiffnesses[:, None] * spring),
+        lead_m=parameters.lead_m,
         damping_ratio=_elastic_damping(damping_ratio, 7),
         names=("motor", "coupling, motor side", "coupling, screw side", "screw at nut", "screw, axial", "nut",
                "table"),
         motor=0,
         table=6,
         transmission=spring[4],
-        transmission_stiffness_n_m_rad=float(stiffness[4]),
+        transmission_stiffness_n_m_rad=float(stiffnesses[4]),
     )

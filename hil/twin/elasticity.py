@@ -11,19 +11,19 @@ STEEL_YOUNG_PA = 2.06e11
 STEEL_SHEAR_PA = 7.93e10
 
 
-def torsional_stiffness(shear_modulus_pa: float, polar_moment_m4: float, length_m: float) -> float:
-    """K = G J / L [N m/rad] of a bar in torsion (appendix)."""
-    return shear_modulus_pa * polar_moment_m4 / length_m
+def torsional_stiffness(rigidity_n_m2: float, length_m: float) -> float:
+    """K = G J / L [N m/rad] of a bar in torsion with rigidity G J."""
+    return rigidity_n_m2 / length_m
 
 
-def axial_stiffness(young_modulus_pa: float, area_m2: float, length_m: float) -> float:
-    """K = E A / L [N/m] of a bar in tension or compression (appendix)."""
-    return young_modulus_pa * area_m2 / length_m
+def axial_stiffness(rigidity_n: float, length_m: float) -> float:
+    """K = E A / L [N/m] of a bar in tension or compression with rigidity E A."""
+    return rigidity_n / length_m
 
 
-def flexural_stiffness(young_modulus_pa: float, axial_moment_m4: float, length_m: float) -> float:
-    """K = 3 E I / L^3 [N/m] of a cantilever loaded at its end (appendix)."""
-    return 3.0 * young_modulus_pa * axial_moment_m4 / length_m**3
+def flexural_stiffness(rigidity_n_m2: float, length_m: float) -> float:
+    """K = 3 E I / L^3 [N/m] of a cantilever with rigidity E I, loaded at its end."""
+    return 3.0 * rigidity_n_m2 / length_m**3
 
 
 def round_area(diameter_m: float) -> float:

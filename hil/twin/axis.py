@@ -32,6 +32,7 @@ COARSE_STEPS = 5
 # The step is fine while the motor could reverse within two ticks at this acceleration [rad/s^2].
 _REVERSAL_ACCELERATION = 1000.0
 
+_NOTHING = np.empty(0)
 _INDEX = {mechanism.id: index for index, mechanism in enumerate(LIBRARY)}
 
 
@@ -109,6 +110,8 @@ class Twin:
         rows[kernel.SHAPE_MOTOR] = modes.shape[modes.motor]
         rows[kernel.SHAPE_TABLE] = modes.shape[modes.table]
         rows[kernel.SHAPE_SPRING] = modes.transmission
+        inertia = self.physics.chain.inertia_kg_m2
+        rows[kernel.TABLE_IMPULSE] = modes.shape[modes.table] * inertia[modes.table, modes.table]
         return rows
 
     @cached_property
@@ -171,14 +174,17 @@ class Twin:
         return self._constants, self._modes, *self._mechanisms
 
     def simulate(self, position_command_m: FloatArray, velocity_command_m_s: FloatArray,
-                 start: Start = Start()) -> Response:
-        """The axis in closed loop over set-points (n,), one per control tick, from `start`."""
+                 start: Start = Start(), measured_table_m: FloatArray = _NOTHING) -> Response:
+        """The axis in closed loop over set-points (n,), one per control tick, from `start`.
+
+        `measured_table_m` (n,) holds a table that floats in a gap, see `kernel.closed_loop`.
+        """
         delta, memory = self.state(start)
         ratio = self.gains.ratio_m_rad
         state = control.init(start.position_m / ratio, start.velocity_m_s / ratio, start.torque,
                              self.gains.period_s, start.tick)
         channels = kernel.closed_loop(self._gains, state, position_command_m, velocity_command_m_s,
-                                      *self.arrays(), delta, memory)
+                                      measured_table_m, *self.arrays(), delta, memory)
         return self._channels(Response(*channels))
 
     def drive(self, torque_command: FloatArray, start: Start = Start()) -> Response:

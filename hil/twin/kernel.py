@@ -28,7 +28,7 @@ from hil.twin.mechanism import Moment
 MECHANISMS = len(LIBRARY)
 
 # Rows of `modes` (MODE_ROWS, n): exact discretisation for the coarse and the fine step, then shapes.
-COARSE, FINE, SHAPE_MOTOR, SHAPE_TABLE, SHAPE_SPRING, MODE_ROWS = 0, 6, 12, 13, 14, 15
+COARSE, FINE, SHAPE_MOTOR, SHAPE_TABLE, SHAPE_SPRING, TABLE_IMPULSE, MODE_ROWS = 0, 6, 12, 13, 14, 15, 16
 
 # Entries of `constants`.
 (PERIOD, RATIO, ANGLE_PER_UNIT, COULOMB, VISCOUS, SPRING, DAMPER, COARSE_STEPS, FINE_STEPS, SLOW_VELOCITY,
@@ -41,12 +41,16 @@ COARSE, FINE, SHAPE_MOTOR, SHAPE_TABLE, SHAPE_SPRING, MODE_ROWS = 0, 6, 12, 13, 
 
 # Rows of `memory` (MECHANISMS + 1, WIDTH): each mechanism's own, then the kernel's.
 OWN = MECHANISMS
-CLOCK, BRISTLE_DEFLECTION, SPRING_EXTRA = 0, 1, 2
+CLOCK, BRISTLE_DEFLECTION, SPRING_EXTRA, FLOATING = 0, 1, 2, 3
 
 _current, _torque, _motor_torque = stages.current, stages.torque, stages.motor_torque
 _coulomb, _friction_scale, _drag, _bias = stages.coulomb, stages.friction_scale, stages.drag, stages.bias
 _bristle, _table_share, _transmission = stages.bristle, stages.table_share, stages.transmission
 _table_force, _motor_reading, _table_reading = stages.table_force, stages.motor_reading, stages.table_reading
+# Time constant of the observer that holds a floating table: long against a 2 ms table-encoder count at creep,
+# short against a flight through the gap (tens of ms).
+OBSERVER_S = 0.008
+
 _control_step = control.step
 _REASSOCIATE = {"reassoc", "nsz", "contract", "arcp"}
 
@@ -127,7 +131,9 @@ def _build_advance(digest: str) -> Callable[..., Any]:
                 bent = stretch + 0.5 * h * stretch_rate
                 effective = _transmission(bent, at, values, codes, memory)
                 extra = effective - bent
-                rate = -stretch_rate if effective == 0.0 else (extra - own[SPRING_EXTRA]) / h
+                floating = effective == 0.0
+                rate = -stretch_rate if floating else (extra - own[SPRING_EXTRA]) / h
+                own[FLOATING] = 1.0 if floating else 0.0
                 own[SPRING_EXTRA] = extra
                 spring = -(constants[SPRING] * extra + constants[DAMPER] * rate)
 
@@ -211,11 +217,25 @@ def _build_read(digest: str) -> Callable[..., Any]:
     return read
 
 
+@njit
+def _hold_floating_table(error, period, modes, delta):  # type: ignore[no-untyped-def]
+    """Correct the table's state by the error of its position [motor units] (Luenberger observer)."""
+    shift = 2.0 * period / OBSERVER_S * error
+    kick = period / OBSERVER_S**2 * error
+    for i in range(delta.shape[1]):
+        delta[0, i] += modes[TABLE_IMPULSE, i] * shift
+        delta[1, i] += modes[TABLE_IMPULSE, i] * kick
+
+
 def _build_closed_loop(digest: str) -> Callable[..., Any]:
     @njit(cache=True, fastmath=_REASSOCIATE)
-    def closed_loop(gains, state, position_command, velocity_command, constants, modes, values, codes,  # type: ignore[no-untyped-def]
-                    delta, memory):
-        """Controller and axis from tick to tick: motor, table, torque command, torque, each (n,)."""
+    def closed_loop(gains, state, position_command, velocity_command, measured_table, constants, modes,  # type: ignore[no-untyped-def]
+                    values, codes, delta, memory):
+        """Controller and axis from tick to tick: motor, table, torque command, torque, each (n,).
+
+        Where `measured_table` (n,) is given (else empty), it holds a table that floats in a gap:
+        its flight is nobody's to predict from the commands, a bounce early or late would stay for good.
+        """
         assert digest
         n = position_command.size
         motor, table, command, torque = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
@@ -224,6 +244,9 @@ def _build_closed_loop(digest: str) -> Callable[..., Any]:
             inputs = control.Inputs(position_command[k], velocity_command[k], motor[k], table[k])
             state, outputs = _control_step(gains, state, inputs)
             command[k] = outputs.torque_n_m
+            if measured_table.size and memory[OWN, FLOATING] > 0.0:
+                error = (measured_table[k] - table[k]) / constants[RATIO]
+                _hold_floating_table(error, constants[PERIOD], modes, delta)
             torque[k] = advance(command[k], constants, modes, values, codes, delta, memory)
         return motor, table, command, torque
 

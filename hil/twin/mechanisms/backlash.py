@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import MutableSequence, Sequence
+
 from numba import njit
-from numpy.typing import NDArray
 
 from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Stage
 
 
 @njit
-def _free_play(value: float, at: Moment, parameters: NDArray[np.float64], memory: NDArray[np.float64]) -> float:
+def _free_play(
+    value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]
+) -> float:
     half = 0.5 * parameters[0] / at.ratio_m
     if value > half:
         return value - half

@@ -1,0 +1,34 @@
+"""Cogging torque: the magnets pull towards the teeth, whatever the current."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import MutableSequence, Sequence
+
+from numba import njit
+
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Stage
+
+
+@njit
+def _cogging(
+    value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]
+) -> float:
+    return value + parameters[0] * math.sin(parameters[1] * at.angle_rad + parameters[2])
+
+
+MECHANISM = Mechanism(
+    id="cogging_torque",
+    block=Block.MOTOR_SIDE,
+    element="motor magnets and teeth",
+    sentence="The motor cogs with {amplitude_n_m}, {cycles_per_rev} times per revolution.",
+    equation="T = u + A sin(n theta + phi)",
+    source="Jahns and Soong, IEEE Trans. Industrial Electronics 43 (1996) 321, cogging torque",
+    parameters=(
+        Parameter("amplitude_n_m", Dimension.TORQUE, 0.0, 1e3),
+        Parameter("cycles_per_rev", Dimension.COUNT, 1.0, 200.0),
+        Parameter("phase_rad", Dimension.ANGLE, -2.0 * math.pi, 2.0 * math.pi),
+    ),
+    stage=Stage.MOTOR_TORQUE,
+    contribution=_cogging,
+)

@@ -1,0 +1,32 @@
+"""Constant load: a weight, which the motor has to hold.
+
+A positive load pulls the axis in the negative direction: it takes a positive motor torque to hold it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import MutableSequence, Sequence
+
+from numba import njit
+
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Stage
+
+
+@njit
+def _load(
+    value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]
+) -> float:
+    return value - parameters[0]
+
+
+MECHANISM = Mechanism(
+    id="constant_load",
+    block=Block.MOTOR_SIDE,
+    element="weight or counterbalance of the axis",
+    sentence="A constant load of {load_torque_n_m}, such as a weight, acts on the axis, also at standstill.",
+    equation="T = u - T_load",
+    source="Groß, Hamann and Wiegärtner, Electrical Feed Drives in Automation (2001), weight of an axis",
+    parameters=(Parameter("load_torque_n_m", Dimension.TORQUE, -1e4, 1e4),),
+    stage=Stage.MOTOR_TORQUE,
+    contribution=_load,
+)

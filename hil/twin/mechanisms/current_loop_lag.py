@@ -1,0 +1,44 @@
+"""Current loop lag: the current follows its command late."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import MutableSequence, Sequence
+
+from numba import njit
+
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Stage
+
+
+@njit
+def _lagging_current(
+    value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]
+) -> float:
+    # memory: the torque at the end of the last step, and whether there was one
+    if memory[1] == 0.0:
+        memory[0] = value
+        memory[1] = 1.0
+    time_constant_s = parameters[0]
+    behind = memory[0] - value
+    if time_constant_s <= 0.0:
+        memory[0] = value
+        return value
+    # exact for a command held over the step; what acts is the mean over the step
+    gone = -math.expm1(-at.step_s / time_constant_s)
+    memory[0] = value + behind * (1.0 - gone)
+    return value + behind * gone * time_constant_s / at.step_s
+
+
+MECHANISM = Mechanism(
+    id="current_loop_lag",
+    block=Block.DRIVE,
+    element="current loop of the drive",
+    sentence="The motor current follows its command with a time constant of {time_constant_s}.",
+    equation="tau dT/dt = u - T",
+    source="Leonhard, Control of Electrical Drives, 3rd ed. (2001), current loop as an equivalent lag",
+    parameters=(Parameter("time_constant_s", Dimension.TIME, 1e-5, 0.05),),
+    stage=Stage.CURRENT,
+    contribution=_lagging_current,
+    variants=("measured", "hidden"),
+    second_stage=Stage.TORQUE,
+)

@@ -1,0 +1,38 @@
+"""Torque dead zone: the drive answers small commands with no torque."""
+
+from __future__ import annotations
+
+from collections.abc import MutableSequence, Sequence
+
+from numba import njit
+
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Stage
+
+_GATE = 2.0        # from this variant on, the torque outside the zone is unchanged
+
+
+@njit
+def _dead_zone(
+    value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]
+) -> float:
+    half_width = parameters[0]
+    if abs(value) <= half_width:
+        return 0.0
+    if parameters[3] >= _GATE:
+        return value
+    return value - half_width if value > 0.0 else value + half_width
+
+
+MECHANISM = Mechanism(
+    id="torque_dead_zone",
+    block=Block.DRIVE,
+    element="servo amplifier",
+    sentence="The drive gives no torque for commands below {half_width_n_m}.",
+    equation="T = 0 for |u| <= w, else u - w sign(u); as a gate: else u",
+    source="Tao and Kokotović, Adaptive Control of Systems with Actuator and Sensor Nonlinearities (1996)",
+    parameters=(Parameter("half_width_n_m", Dimension.TORQUE, 0.0, 1e3),),
+    stage=Stage.CURRENT,
+    contribution=_dead_zone,
+    variants=("measured", "hidden", "measured gate", "hidden gate"),
+    second_stage=Stage.TORQUE,
+)

@@ -1,0 +1,34 @@
+"""Torque ripple: the torque constant is periodic in the motor angle."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import MutableSequence, Sequence
+
+from numba import njit
+
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Stage
+
+
+@njit
+def _rippling_torque(
+    value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]
+) -> float:
+    return value * (1.0 + parameters[0] * math.sin(parameters[1] * at.angle_rad + parameters[2]))
+
+
+MECHANISM = Mechanism(
+    id="torque_ripple",
+    block=Block.DRIVE,
+    element="motor windings and current measurement",
+    sentence="The torque per ampere varies by a share of {fraction}, {cycles_per_rev} times per revolution.",
+    equation="T = u (1 + a sin(n theta + phi))",
+    source="Jahns and Soong, IEEE Trans. Industrial Electronics 43 (1996) 321, ripple torque",
+    parameters=(
+        Parameter("fraction", Dimension.RATIO, 0.0, 0.5),
+        Parameter("cycles_per_rev", Dimension.COUNT, 1.0, 200.0),
+        Parameter("phase_rad", Dimension.ANGLE, -2.0 * math.pi, 2.0 * math.pi),
+    ),
+    stage=Stage.TORQUE,
+    contribution=_rippling_torque,
+)

@@ -14,7 +14,6 @@ them second order. While the motor is slow the step is fine, for the reversals; 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -84,7 +83,7 @@ def _bristle_contact(free, gain, bound, viscous, shift, opposing, stiffness, def
     return stiffness * after + shift + opposing + viscous * velocity, after
 
 
-def _build_advance(digest: str) -> Callable[..., Any]:
+def _build_advance(digest: str) -> Any:
     @njit(cache=True, fastmath=_REASSOCIATE)
     def advance(command, constants, modes, values, codes, delta, memory):  # type: ignore[no-untyped-def]
         """Move the axis by one control period under a held torque command; mean measured torque."""
@@ -195,7 +194,7 @@ def _build_advance(digest: str) -> Callable[..., Any]:
     return advance
 
 
-def _build_read(digest: str) -> Callable[..., Any]:
+def _build_read(digest: str) -> Any:
     @njit(cache=True, fastmath=_REASSOCIATE)
     def read(constants, modes, values, codes, delta, memory):  # type: ignore[no-untyped-def]
         """What the two encoders read: motor position (rad, or m) and table position (m)."""
@@ -227,7 +226,7 @@ def _hold_floating_table(error, period, modes, delta):  # type: ignore[no-untype
         delta[1, i] += modes[TABLE_IMPULSE, i] * kick
 
 
-def _build_closed_loop(digest: str) -> Callable[..., Any]:
+def _build_closed_loop(digest: str) -> Any:
     @njit(cache=True, fastmath=_REASSOCIATE)
     def closed_loop(gains, state, position_command, velocity_command, measured_table, constants, modes,  # type: ignore[no-untyped-def]
                     values, codes, delta, memory):
@@ -253,7 +252,7 @@ def _build_closed_loop(digest: str) -> Callable[..., Any]:
     return closed_loop
 
 
-def _build_open_loop(digest: str) -> Callable[..., Any]:
+def _build_open_loop(digest: str) -> Any:
     @njit(cache=True, fastmath=_REASSOCIATE)
     def open_loop(torque_in, constants, modes, values, codes, delta, memory):  # type: ignore[no-untyped-def]
         """The axis driven by a given torque command (n,): motor, table, torque, each (n,)."""

@@ -8,7 +8,6 @@ active mechanism is not entered at all.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +32,7 @@ def stage_of(mechanism: Mechanism, variant: int) -> Stage:
     return mechanism.stage
 
 
-def _compose(entries: list[tuple[Callable[..., Any], int, int]]) -> Callable[..., Any]:
+def _compose(entries: list[tuple[Any, int, int]]) -> Any:
     """A compiled `(value, at, values, codes, memory) -> value` that runs the entries in order.
 
     An entry is (contribution, index of the mechanism, parity of the variants that enter here, or -1
@@ -42,14 +41,14 @@ def _compose(entries: list[tuple[Callable[..., Any], int, int]]) -> Callable[...
     if not entries:
 
         @njit
-        def nothing(value: float, at: Any, values: Any, codes: Any, memory: Any) -> float:
+        def nothing(value: float, at: Any, values: Any, codes: Any, memory: Any) -> Any:
             return value
 
         return nothing
     (contribution, index, parity), rest = entries[0], _compose(entries[1:])
 
     @njit
-    def chained(value: float, at: Any, values: Any, codes: Any, memory: Any) -> float:
+    def chained(value: float, at: Any, values: Any, codes: Any, memory: Any) -> Any:
         code = codes[index]
         if code != 0 and (parity < 0 or (code - 1) % 2 == parity):
             value = contribution(value, at, values[index], memory[index])
@@ -58,7 +57,7 @@ def _compose(entries: list[tuple[Callable[..., Any], int, int]]) -> Callable[...
     return chained
 
 
-def _stage(stage: Stage) -> Callable[..., Any]:
+def _stage(stage: Stage) -> Any:
     entries = []
     for index, mechanism in enumerate(LIBRARY):
         if mechanism.second_stage is None:

@@ -1,0 +1,192 @@
+"""What a drive, an encoder and a bus look like to the loop above them, and the tree of driver errors.
+
+One tick of a loop at `now_s` (time = tick x period; nothing here reads a clock, and nothing here blocks):
+
+    master.sync(now_s)                      # SYNC: every node latches its position and answers; heartbeat when due
+    master.poll(now_s)                      # take in what has arrived; repeat until the samples are fresh
+    drive_sample = drive.read(now_s)        # motor position and torque of this SYNC
+    encoder_sample = encoder.read(now_s)    # table position of this SYNC
+    drive.command(now_s, torque_n_m)        # set-point and controlword; acts until the next command
+
+Before it, once and blocking: `drive.set_up()`, `encoder.set_up()`, `master.start(now_s)`. To arm, set
+`drive.goal = DriveGoal.ENABLED` and go on ticking until `sample.enabled`; to disarm set another goal. The samples carry
+a `condition`: anything but `Condition.OK` names what is wrong, in bits; `drive.check()` and `encoder.check()` raise the
+same as an error with the text a person needs.
+
+    DriverError                     what, where, given, allowed, advice
+    ├── BusError                    the bus cannot be opened, is closed or off
+    ├── ConfigurationError          a device refuses a setting or reads back another one
+    │   └── IdentityError           another device than the one described
+    ├── DriveFault                  the drive tripped: EMCY, fault state, lost heartbeat, stale data
+    ├── EncoderError                the encoder reports an alarm, is stale, or its line is gone
+    └── ResponseTimeout             a device does not answer during set-up
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum, IntFlag
+from typing import NamedTuple, Protocol
+
+from drivers.cia402 import DriveState
+
+__all__ = [
+    "BusError",
+    "Condition",
+    "ConfigurationError",
+    "Drive",
+    "DriveFault",
+    "DriveGoal",
+    "DriveSample",
+    "DriverError",
+    "Encoder",
+    "EncoderError",
+    "EncoderSample",
+    "IdentityError",
+    "PlantLike",
+    "ResponseTimeout",
+    "ServoLike",
+]
+
+
+class DriverError(Exception):
+    """Root of all driver errors: says what, where, what was given, what is allowed and what to do."""
+
+    def __init__(self, what: str, *, where: str, given: str = "", allowed: str = "", advice: str = "") -> None:
+        self.what, self.where, self.given, self.allowed, self.advice = what, where, given, allowed, advice
+        parts = [f"{where}: {what}"]
+        parts += [f"{label} {text}" for label, text in (("given:", given), ("allowed:", allowed)) if text]
+        super().__init__("; ".join(parts) + (f". {advice}" if advice else ""))
+
+
+class BusError(DriverError):
+    """The bus cannot be opened, was closed, or is off."""
+
+
+class ConfigurationError(DriverError):
+    """A device refuses a setting, or reads back another value than was written."""
+
+
+class IdentityError(ConfigurationError):
+    """Object 0x1018 belongs to another device than the one described."""
+
+
+class DriveFault(DriverError):
+    """The drive tripped."""
+
+
+class EncoderError(DriverError):
+    """The encoder reports an alarm, is stale, or its line is gone."""
+
+
+class ResponseTimeout(DriverError):
+    """A device did not answer during set-up."""
+
+
+class Condition(IntFlag):
+    """What is wrong with a device, as seen from the loop; several bits may be set."""
+
+    OK = 0
+    LATE = 1            # no answer to the last SYNC yet: the sample is one or more cycles old
+    STALE = 2           # more answers missed in a row than the settings allow
+    HEARTBEAT_LOST = 4  # heartbeat consumer time-out
+    EMERGENCY = 8       # an EMCY with a non-zero error code is active
+    FAULT = 16          # drive in FAULT or FAULT REACTION ACTIVE
+    BUS_PASSIVE = 32    # error frames drove the controller to error passive
+    BUS_OFF = 64        # the controller left the bus
+    NOT_OPERATIONAL = 128  # the node rebooted or left NMT operational by itself
+    ALARM = 256         # encoder: device alarm
+    CORRUPT = 512       # encoder: frames with a wrong checksum since the last read
+    LINE_LOST = 1024    # encoder: the serial line is gone
+    DISABLED = 2048     # the drive left OPERATION ENABLED by itself
+
+
+class DriveGoal(IntEnum):
+    """What the loop wants of the drive; the controlwords follow from it and from the statusword."""
+
+    DISABLED = 0     # power stage off, READY TO SWITCH ON
+    ENABLED = 1      # OPERATION ENABLED
+    QUICK_STOP = 2   # decelerate on the quick-stop ramp, then off
+
+
+class DriveSample(NamedTuple):
+    """One answer of the drive to one SYNC. A named tuple: made in a third of a frozen dataclass's time.
+
+    motor_position_rad and torque_n_m (linear drives: m and N) were latched at the SYNC sent at `time_s`; torque is the
+    mean since the SYNC before. `age_cycles` = 0 means: belongs to the latest SYNC.
+    """
+
+    time_s: float
+    age_cycles: int
+    state: DriveState
+    motor_position_rad: float
+    torque_n_m: float
+    statusword: int
+    condition: Condition
+    enabled: bool
+
+
+class EncoderSample(NamedTuple):
+    """One position of a linear encoder, unwrapped, in metres; `time_s` is the instant it was latched (CANopen) or
+    received (serial line); `age_cycles` as in `DriveSample` (serial line: reads without a new frame)."""
+
+    time_s: float
+    age_cycles: int
+    position_m: float
+    counts: int
+    condition: Condition
+
+
+class Drive(Protocol):
+    """One axis behind a drive. `command` takes N m (CST), rad/s (CSV) or rad (CSP), linear axes N, m/s, m."""
+
+    goal: DriveGoal
+
+    def read(self, now_s: float) -> DriveSample: ...
+
+    def command(self, now_s: float, setpoint: float) -> None: ...
+
+    def check(self) -> None:
+        """Raise `DriveFault` if the drive tripped; the text says why."""
+
+
+class Encoder(Protocol):
+    """One linear encoder."""
+
+    def read(self, now_s: float) -> EncoderSample: ...
+
+    def check(self) -> None:
+        """Raise `EncoderError` if the encoder cannot be trusted; the text says why."""
+
+
+class PlantLike(Protocol):
+    """What a simulated drive and encoder move and read (sensors as the devices would digitise them)."""
+
+    @property
+    def motor_position_rad(self) -> float: ...
+
+    @property
+    def table_position_m(self) -> float: ...
+
+    @property
+    def torque_n_m(self) -> float:
+        """Measured torque, mean over the last period."""
+
+    def advance(self, torque_command_n_m: float, period_s: float) -> None:
+        """Hold the torque command for one period."""
+
+
+@dataclass(frozen=True, slots=True)
+class ServoTarget:
+    """What the loops inside a simulated drive follow."""
+
+    velocity_rad_s: float
+    position_rad: float | None = None  # None: velocity loop only
+
+
+class ServoLike(Protocol):
+    """Loops inside a simulated drive (CSV, CSP, quick stop, homing): target and motor position -> torque."""
+
+    def reset(self, motor_position_rad: float) -> None: ...
+
+    def torque(self, target: ServoTarget, motor_position_rad: float, period_s: float) -> float: ...

@@ -1,0 +1,183 @@
+"""CAN ports: what drives, encoders and simulated nodes send and listen on, and how a real one is opened.
+
+Every port, simulated or real, does four things: `listen` to a COB-ID, `send` a frame, `poll` for what has arrived, and
+report its `health`. Time is handed in; nothing here reads a clock. `PythonCanPort` stands on any python-can bus
+(socketcan, virtual, udp_multicast); the in-process bus of `drivers.inprocess` offers the same without threads.
+
+Error frames are counted and decoded here, since the canopen package drops them and a bus-off would stay invisible.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any, Final, Protocol
+
+import can
+
+from drivers.base import BusError
+
+Listener = Callable[[int, bytes, float], None]  # COB-ID, data, time_s
+"""Called once per frame; canopen's own callbacks have the same form."""
+
+
+class BusState(IntEnum):
+    """Error state of a CAN controller, ISO 11898-1."""
+
+    ACTIVE = 0
+    PASSIVE = 1
+    OFF = 2
+
+
+@dataclass(slots=True)
+class BusHealth:
+    """What a controller knows about its bus; counters since it was opened."""
+
+    state: BusState = BusState.ACTIVE
+    error_frames: int = 0
+    frames_lost: int = 0  # frames this port could not send
+    last_error: str = ""
+
+
+class CanPort(Protocol):
+    """One connection to a CAN bus."""
+
+    health: BusHealth
+
+    def listen(self, can_id: int | None, listener: Listener) -> None:
+        """Call `listener` for each frame with this identifier; None: for every frame."""
+
+    def ignore(self, can_id: int | None, listener: Listener) -> None:
+        """Undo `listen`."""
+
+    def send(self, can_id: int, data: bytes, now_s: float) -> None:
+        """Send a frame. A port whose controller is off counts it as lost: the loop goes on and sees `health`."""
+
+    def poll(self, now_s: float, timeout_s: float = 0.0) -> None:
+        """Hand what has arrived to the listeners; waits up to timeout_s for a first frame, 0 never waits."""
+
+    def close(self) -> None: ...
+
+
+@dataclass(frozen=True, slots=True)
+class BusConfig:
+    """How to open a bus: python-can's interface name, channel and bit rate."""
+
+    interface: str = "virtual"
+    channel: str = "hil"
+    bitrate: int = 1_000_000
+
+    INTERFACES = ("virtual", "udp_multicast", "socketcan")
+
+
+# Error classes of socketcan (linux/can/error.h): bits of the identifier of an error frame, and of data[1].
+_ERR_CLASS: Final = {
+    0x001: "transmit time-out", 0x002: "arbitration lost", 0x004: "controller problem", 0x008: "protocol violation",
+    0x010: "transceiver", 0x020: "no acknowledge", 0x040: "bus off", 0x080: "bus error", 0x100: "restarted",
+}  # fmt: skip
+_BUS_OFF, _RESTARTED, _CONTROLLER = 0x040, 0x100, 0x004
+_PASSIVE, _BACK_TO_ACTIVE = 0x30, 0x40
+
+
+def open_bus(config: BusConfig) -> can.BusABC:
+    """Open a python-can bus. BusError says which interface and why."""
+    where = f"bus {config.interface}:{config.channel}"
+    if config.interface not in BusConfig.INTERFACES:
+        raise BusError("unknown interface", where=where, given=config.interface,
+                       allowed=", ".join(BusConfig.INTERFACES))  # fmt: skip
+    options: dict[str, Any] = {"bitrate": config.bitrate} if config.interface == "socketcan" else {}
+    try:
+        return can.Bus(interface=config.interface, channel=config.channel, **options)
+    except (can.CanError, OSError, ValueError) as error:
+        advice = "Is the interface up (ip link set can0 up type can bitrate 1000000)?"
+        raise BusError(
+            f"cannot be opened ({error})", where=where, allowed="an existing channel",
+            advice=advice if config.interface == "socketcan" else "",
+        ) from error  # fmt: skip
+
+
+class PythonCanPort:
+    """A python-can bus as a `CanPort`. Standard frames only; remote frames are ignored (CiA 301 advises against them)."""
+
+    __slots__ = ("_all", "_bus", "_listeners", "health")
+
+    def __init__(self, bus: can.BusABC) -> None:
+        self._bus = bus
+        self._listeners: dict[int, list[Listener]] = {}
+        self._all: list[Listener] = []
+        self.health = BusHealth()
+
+    def listen(self, can_id: int | None, listener: Listener) -> None:
+        (self._all if can_id is None else self._listeners.setdefault(can_id, [])).append(listener)
+
+    def ignore(self, can_id: int | None, listener: Listener) -> None:
+        (self._all if can_id is None else self._listeners.get(can_id, [])).remove(listener)
+
+    def send(self, can_id: int, data: bytes, now_s: float) -> None:
+        try:
+            self._bus.send(can.Message(arbitration_id=can_id, data=data, is_extended_id=False))
+        except can.CanError as error:
+            self.health.frames_lost += 1
+            self.health.last_error = str(error)
+
+    def poll(self, now_s: float, timeout_s: float = 0.0) -> None:
+        message = self._receive(timeout_s)
+        while message is not None:
+            if message.is_error_frame:
+                self._on_error_frame(message)
+            elif not message.is_remote_frame:
+                data = bytes(message.data)
+                for listener in self._listeners.get(message.arbitration_id, ()):
+                    listener(message.arbitration_id, data, now_s)
+                for listener in self._all:
+                    listener(message.arbitration_id, data, now_s)
+            message = self._receive(0.0)
+
+    def _receive(self, timeout_s: float) -> can.Message | None:
+        try:
+            return self._bus.recv(timeout_s)
+        except (can.CanError, OSError, ValueError) as error:
+            raise BusError(f"receiving failed ({error})", where=f"bus {self._bus.channel_info}",
+                           advice="Was the interface taken down or the bus closed?") from error  # fmt: skip
+
+    def _on_error_frame(self, message: can.Message) -> None:
+        bits, data, health = message.arbitration_id, message.data, self.health
+        health.error_frames += 1
+        health.last_error = ", ".join(text for bit, text in _ERR_CLASS.items() if bits & bit) or "error frame"
+        if bits & _BUS_OFF:
+            health.state = BusState.OFF
+        elif bits & _RESTARTED:
+            health.state = BusState.ACTIVE
+        elif bits & _CONTROLLER and len(data) > 1:
+            if data[1] & _PASSIVE:
+                health.state = BusState.PASSIVE
+            elif data[1] & _BACK_TO_ACTIVE:
+                health.state = BusState.ACTIVE
+
+    def close(self) -> None:
+        self._bus.shutdown()
+
+
+class PumpedPort:
+    """A port whose far end lives in this thread: `poll` first lets the simulated nodes serve theirs.
+
+    So a loop and its simulated nodes share a python-can bus without a second Python thread, in any time.
+    """
+
+    __slots__ = ("_nodes", "_port", "health", "ignore", "listen", "send")
+
+    def __init__(self, port: CanPort, *nodes: CanPort) -> None:
+        self._port, self._nodes = port, nodes
+        self.health = port.health
+        self.listen, self.ignore, self.send = port.listen, port.ignore, port.send
+
+    def poll(self, now_s: float, timeout_s: float = 0.0) -> None:
+        for node in self._nodes:
+            node.poll(now_s)
+        self._port.poll(now_s)
+
+    def close(self) -> None:
+        self._port.close()
+
+

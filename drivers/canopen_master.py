@@ -1,0 +1,61 @@
+"""The master's part of CANopen in the loop: SYNC, its own heartbeat, NMT commands, polling the bus.
+
+SYNC and heartbeat are sent by the loop itself, never by `send_periodic`: on socketcan that runs in the kernel and would go
+on feeding the drive's watchdog after this process hangs.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from drivers.bus import BusHealth, CanPort
+from drivers.canopen_setup import SetupNetwork
+
+SYNC: Final = 0x080
+NMT_START: Final = 1
+NMT_STOP: Final = 2
+NMT_PRE_OPERATIONAL: Final = 128
+NMT_RESET_NODE: Final = 129
+_OPERATIONAL: Final = b"\x05"
+
+
+class CanopenMaster:
+    """One master on one port; drives and encoders of the bus share it.
+
+    node_id: of the master, for its heartbeat. heartbeat_s: its period; consumers are set to three of them.
+    """
+
+    __slots__ = ("_heartbeat_due_s", "_heartbeat_id", "_send", "health", "heartbeat_s", "network", "node_id",
+                 "poll", "port", "sync_time_s", "syncs")  # fmt: skip
+
+    def __init__(self, port: CanPort, *, node_id: int = 1, heartbeat_s: float = 0.02) -> None:
+        self.port, self.node_id, self.heartbeat_s = port, node_id, heartbeat_s
+        self.network = SetupNetwork(port)
+        self.poll = port.poll
+        self._send = port.send
+        self._heartbeat_id = 0x700 + node_id
+        self._heartbeat_due_s = 0.0
+        self.health: BusHealth = port.health
+        self.syncs = 0          # SYNCs sent; samples count their age by it
+        self.sync_time_s = 0.0  # when the last one was sent
+
+    def nmt(self, command: int, node_id: int = 0, now_s: float | None = None) -> None:
+        """NMT command to one node, 0: to all."""
+        self.port.send(0x000, bytes([command, node_id]), self.network.time_s if now_s is None else now_s)
+
+    def start(self, now_s: float) -> None:
+        """All nodes operational; first heartbeat. From here on call `sync` every period."""
+        self.nmt(NMT_START, now_s=now_s)
+        self._heartbeat_due_s = now_s + self.heartbeat_s
+        self._send(self._heartbeat_id, _OPERATIONAL, now_s)
+
+    def sync(self, now_s: float) -> None:
+        """Heartbeat when due, then SYNC."""
+        if now_s >= self._heartbeat_due_s:
+            self._heartbeat_due_s += self.heartbeat_s
+            if self._heartbeat_due_s <= now_s:  # the loop stood still: no burst to catch up
+                self._heartbeat_due_s = now_s + self.heartbeat_s
+            self._send(self._heartbeat_id, _OPERATIONAL, now_s)
+        self.syncs += 1
+        self.sync_time_s = now_s
+        self._send(SYNC, b"", now_s)

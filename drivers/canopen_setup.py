@@ -1,0 +1,210 @@
+"""Before the loop: SDO, NMT and object dictionary by the canopen package, without its threads.
+
+canopen's Network normally reads the bus in a Notifier thread, which an exception ends silently. Here whoever waits for an
+SDO response pumps the port himself: one thread, the same on real and simulated buses. Every write is read back.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import canopen
+from canopen.objectdictionary import ODVariable, datatypes
+from canopen.sdo import SdoAbortedError, SdoClient, SdoCommunicationError
+
+from drivers.base import ConfigurationError, IdentityError, ResponseTimeout
+from drivers.bus import CanPort
+from drivers.pdo import PDO_INVALID, PDO_NO_RTR, Entry, layout
+
+EDS_FOLDER: Final = Path(__file__).parent / "eds"
+RESPONSE_TIMEOUT_S: Final = 0.5
+_PUMP_S: Final = 0.001
+
+
+class SetupNetwork(canopen.Network):
+    """canopen's Network on a `CanPort`. `time_s` is the set-up's own time: it moves while a response is awaited."""
+
+    def __init__(self, port: CanPort) -> None:
+        self.port = port
+        self.time_s = 0.0
+        super().__init__()
+
+    def subscribe(self, can_id: int, callback: Callable[[int, bytes, float], None]) -> None:
+        super().subscribe(can_id, callback)
+        self.port.listen(can_id, callback)
+
+    def unsubscribe(self, can_id: int, callback: Callable[[int, bytes, float], None] | None = None) -> None:
+        for gone in [callback] if callback else list(self.subscribers[can_id]):
+            self.port.ignore(can_id, gone)
+        super().unsubscribe(can_id, callback)
+
+    def send_message(self, can_id: int, data: bytes, remote: bool = False) -> None:
+        self.port.send(can_id, bytes(data), self.time_s)
+
+    def pump(self) -> None:
+        """Take in what has arrived; waits up to a millisecond on a real bus, passes one on a simulated bus."""
+        self.time_s += _PUMP_S
+        self.port.poll(self.time_s, _PUMP_S)
+
+
+class _PumpedSdoClient(SdoClient):  # type: ignore[misc]  # canopen is not typed
+    """canopen's SDO client, waiting by pumping the port."""
+
+    def read_response(self) -> bytes:
+        deadline_s = self.network.time_s + RESPONSE_TIMEOUT_S
+        while self.responses.empty():
+            if self.network.time_s >= deadline_s:
+                raise SdoCommunicationError("No SDO response received")
+            self.network.pump()
+        response: bytes = self.responses.get_nowait()
+        if response[0] == 0x80:
+            raise SdoAbortedError(struct.unpack_from("<L", response, 4)[0])
+        return response
+
+
+class _PumpedNode(canopen.RemoteNode):  # type: ignore[misc]
+    """canopen's RemoteNode with the pumped client."""
+
+    def add_sdo(self, rx_cobid: int, tx_cobid: int) -> SdoClient:
+        client = _PumpedSdoClient(rx_cobid, tx_cobid, self.object_dictionary)
+        self.sdo_channels.append(client)
+        if self.has_network():
+            self.network.subscribe(client.tx_cobid, client.on_response)
+        return client
+
+
+class DeviceSetup:
+    """Configures one node by SDO. Errors name node, object, value and what the device said.
+
+    Raises ResponseTimeout (no answer), ConfigurationError (refused, or reads back differently), IdentityError.
+    """
+
+    def __init__(self, network: SetupNetwork, node_id: int, eds: Path) -> None:
+        self._node = _PumpedNode(node_id, str(eds))
+        self._network = network
+        self.node_id, self.eds = node_id, eds
+        self.dictionary = self._node.object_dictionary
+
+    def __enter__(self) -> DeviceSetup:
+        self._node.associate_network(self._network)
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self._node.remove_network()
+
+    def read(self, index: int, subindex: int = 0) -> int:
+        """An integer object."""
+        variable = self._variable(index, subindex)
+        value = variable.decode_raw(self._transfer(index, subindex, lambda: self._node.sdo.upload(index, subindex)))
+        return int(value)
+
+    def has(self, index: int, subindex: int = 0) -> bool:
+        """Whether the EDS knows the object."""
+        return self.dictionary.get_variable(index, subindex) is not None
+
+    def write(self, index: int, subindex: int, value: int, *, read_back: tuple[int, int] | None = None) -> None:
+        """Write, then read the same object (or `read_back`) and compare."""
+        self.write_only(index, subindex, value)
+        where = read_back or (index, subindex)
+        got = self.read(*where)
+        if got != value:
+            raise ConfigurationError(
+                "reads back another value than was written", where=self._where(*where),
+                given=f"{value} (0x{value & 0xFFFFFFFF:X})", allowed=f"the drive keeps {got} (0x{got & 0xFFFFFFFF:X})",
+                advice="The device does not support this setting.",
+            )  # fmt: skip
+
+    def write_only(self, index: int, subindex: int, value: int) -> None:
+        """Write without reading back."""
+        data = self._variable(index, subindex).encode_raw(value)
+        self._transfer(index, subindex, lambda: self._node.sdo.download(index, subindex, data), value)
+
+    def check_identity(self, profile: int, serial_number: int | None = None) -> None:
+        """Device profile (0x1000), vendor, product, major revision (0x1018) as in the EDS; serial number if given."""
+        information = self.dictionary.device_information
+        expected = [
+            ("device profile", 0x1000, 0, 0xFFFF, profile),
+            ("vendor-ID", 0x1018, 1, 0xFFFFFFFF, information.vendor_number),
+            ("product code", 0x1018, 2, 0xFFFFFFFF, information.product_number),
+            ("major revision", 0x1018, 3, 0xFFFF0000, information.revision_number),
+            ("serial number", 0x1018, 4, 0xFFFFFFFF, serial_number),
+        ]
+        for name, index, subindex, mask, value in expected:
+            if value is None:
+                continue
+            got = self.read(index, subindex) & mask
+            if got != value & mask:
+                raise IdentityError(
+                    f"another {name} than described", where=self._where(index, subindex), given=f"0x{got:X}",
+                    allowed=f"0x{value & mask:X} ({self.eds.name})",
+                    advice="Check node-ID and wiring, or give the EDS of the device that is connected.",
+                )  # fmt: skip
+
+    def map_pdo(self, communication: int, entries: Sequence[Entry], transmission_type: int, cob_id: int) -> None:
+        """Write a PDO as CiA 301 prescribes (invalid, number 0, entries, number, type, valid), reading each back."""
+        layout(entries)
+        mapping = communication + 0x200
+        flags = 0 if communication < 0x1800 else PDO_NO_RTR
+        self.write_only(communication, 1, cob_id | flags | PDO_INVALID)
+        self.write_only(mapping, 0, 0)
+        for k, entry in enumerate(entries, start=1):
+            self.write(mapping, k, entry.word)
+        self.write(mapping, 0, len(entries))
+        self.write(communication, 2, transmission_type)
+        self.write(communication, 1, cob_id | flags)
+
+    def disable_pdos(self) -> None:
+        """All PDOs the EDS knows: invalid, so that nothing unexpected moves or loads the bus."""
+        for index in (*range(0x1400, 0x1404), *range(0x1800, 0x1804)):
+            if self.has(index, 1):
+                self.write_only(index, 1, self.read(index, 1) | PDO_INVALID)
+
+    def set_interpolation_time(self, period_s: float) -> None:
+        """0x60C2: value x 10^index seconds; exact or refused."""
+        for exponent in range(0, -7, -1):
+            value = round(period_s / 10.0**exponent)
+            if 1 <= value <= 255 and abs(value * 10.0**exponent - period_s) < 1e-9 * period_s:
+                self.write(0x60C2, 2, exponent)
+                self.write(0x60C2, 1, value)
+                return
+        raise ConfigurationError(
+            "the period cannot be expressed", where=self._where(0x60C2, 1), given=f"{period_s} s",
+            allowed="1..255 x 10^n s", advice="Choose a period of 1, 2, 4 or 5 ms, or 500 or 250 us.",
+        )  # fmt: skip
+
+    def entry(self, index: int, subindex: int = 0) -> Entry:
+        """Mapping entry of an object, its length from the EDS."""
+        variable = self._variable(index, subindex)
+        return Entry(index, subindex, len(variable), variable.data_type in datatypes.SIGNED_TYPES)
+
+    def _variable(self, index: int, subindex: int) -> ODVariable:
+        variable = self.dictionary.get_variable(index, subindex)
+        if variable is None:
+            raise ConfigurationError(
+                "the EDS does not know the object", where=self._where(index, subindex), given=self.eds.name,
+                advice="Give the EDS of the device that is connected.",
+            )  # fmt: skip
+        return variable
+
+    def _where(self, index: int, subindex: int) -> str:
+        variable = self.dictionary.get_variable(index, subindex)
+        name = f" ({variable.name})" if variable is not None else ""
+        return f"node {self.node_id}, object 0x{index:04X}:{subindex:02X}{name}"
+
+    def _transfer(self, index: int, subindex: int, action: Callable[[], Any], value: int | None = None) -> Any:
+        try:
+            return action()
+        except SdoAbortedError as error:
+            raise ConfigurationError(
+                f"the device refuses ({error})", where=self._where(index, subindex),
+                given="" if value is None else f"{value} (0x{value & 0xFFFFFFFF:X})",
+                advice="See the device's manual for what it accepts in this state.",
+            ) from error  # fmt: skip
+        except SdoCommunicationError as error:
+            raise ResponseTimeout(
+                "no SDO answer", where=self._where(index, subindex), given=f"{RESPONSE_TIMEOUT_S} s",
+                advice="Is the device powered, its node-ID and bit rate right, the bus terminated?",
+            ) from error  # fmt: skip

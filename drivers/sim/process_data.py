@@ -1,0 +1,155 @@
+"""PDOs of a simulated node: communication and mapping parameters (CiA 301, 7.5.2.35 ff.) compiled to struct packers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from operator import itemgetter
+from struct import Struct
+from typing import Any, Final
+
+from drivers.bus import CanPort
+from drivers.pdo import PDO_INVALID, layout
+from drivers.sim.dictionary import Dictionary, Item, key_of
+from drivers.sim.sdo_server import AbortCode, SdoAbort
+
+RPDO_COMMUNICATION, RPDO_MAPPING = 0x1400, 0x1600
+TPDO_COMMUNICATION, TPDO_MAPPING = 0x1800, 0x1A00
+_LENGTH_TOO_SHORT: Final = 0x8210  # EMCY: PDO not processed due to length error
+_LENGTH_EXCEEDED: Final = 0x8220   # EMCY: PDO length exceeded
+
+
+@dataclass(slots=True)
+class _Pdo:
+    cob_id: int
+    transmission_type: int
+    packer: Struct
+    keys: tuple[int, ...]
+    get: Callable[[dict[int, Any]], Any]
+    pending: bytes = b""   # synchronous RPDO: waits for the SYNC; event-driven TPDO: sent last
+    syncs: int = 0
+
+
+class ProcessData:
+    """Takes RPDOs into the dictionary's values and sends TPDOs from them.
+
+    received(now_s): called after an RPDO was taken in; emergency(code, register, now_s): CiA 301 length errors.
+    """
+
+    def __init__(
+        self,
+        dictionary: Dictionary,
+        port: CanPort,
+        received: Callable[[float], None],
+        emergency: Callable[[int, int, float], None],
+    ) -> None:
+        self._dictionary, self._values, self._port = dictionary, dictionary.values, port
+        self._received, self._emergency = received, emergency
+        self._rpdos: dict[int, _Pdo] = {}
+        self._tpdos: list[_Pdo] = []
+        self._operational = False
+        for index in {key >> 8 for key in dictionary.items}:
+            if RPDO_COMMUNICATION <= index < RPDO_MAPPING or TPDO_COMMUNICATION <= index < TPDO_MAPPING:
+                dictionary.on_write(index, self._on_communication)
+            elif RPDO_MAPPING <= index < TPDO_COMMUNICATION or TPDO_MAPPING <= index < TPDO_MAPPING + 0x200:
+                dictionary.on_write(index, self._on_mapping)
+
+    def configure(self, *, operational: bool) -> None:
+        """Compile the PDOs that are valid now; none outside NMT operational."""
+        for cob_id in self._rpdos:
+            self._port.ignore(cob_id, self._on_rpdo)
+        self._operational = operational
+        self._rpdos, self._tpdos = {}, []
+        if not operational:
+            return
+        self._rpdos = {pdo.cob_id: pdo for pdo in self._compile(RPDO_COMMUNICATION, RPDO_MAPPING)}
+        self._tpdos = self._compile(TPDO_COMMUNICATION, TPDO_MAPPING)
+        for cob_id in self._rpdos:
+            self._port.listen(cob_id, self._on_rpdo)
+
+    def _compile(self, communication: int, mapping: int) -> list[_Pdo]:
+        pdos = []
+        for n in range(4):
+            if key_of(communication + n, 1) not in self._values:
+                continue
+            cob_id = self._dictionary.number(communication + n, 1)
+            items = self._mapped(mapping + n, self._dictionary.number(mapping + n))
+            if cob_id & PDO_INVALID or not items:
+                continue
+            keys = tuple(key_of(item.index, item.subindex) for item in items)
+            # itemgetter of one key would return the bare value.
+            get = itemgetter(*keys) if len(keys) > 1 else _tuple_getter(keys[0])
+            packer = layout([item.entry for item in items])
+            pdos.append(
+                _Pdo(cob_id & 0x7FF, self._dictionary.number(communication + n, 2), packer, keys, get)
+            )
+        return pdos
+
+    def _mapped(self, index: int, count: int) -> list[Item]:
+        words = [self._dictionary.number(index, k) for k in range(1, count + 1)]
+        return [self._dictionary.item(word >> 16, word >> 8 & 0xFF) for word in words]
+
+    # -- hooks: what CiA 301 lets a master write --------------------------------------------------------------------
+
+    def _on_communication(self, index: int, subindex: int, value: int) -> None:
+        if subindex == 2 and 240 < value < 254:
+            raise SdoAbort(AbortCode.INVALID_VALUE)
+        self._dictionary.values[key_of(index, subindex)] = value
+        self.configure(operational=self._operational)
+
+    def _on_mapping(self, index: int, subindex: int, value: int) -> None:
+        """The mapping changes only while the PDO is invalid; entries only while their number is 0."""
+        if not self._dictionary.number(index - 0x200, 1) & PDO_INVALID:
+            raise SdoAbort(AbortCode.NOT_IN_THIS_STATE)
+        if subindex == 0:
+            if key_of(index, value) not in self._values:
+                raise SdoAbort(AbortCode.PDO_TOO_LONG)
+            if sum(item.entry.bits for item in self._mapped(index, value)) > 64:
+                raise SdoAbort(AbortCode.PDO_TOO_LONG)
+            return
+        if self._dictionary.number(index):
+            raise SdoAbort(AbortCode.NOT_IN_THIS_STATE)
+        item = self._dictionary.item(value >> 16, value >> 8 & 0xFF)
+        allowed = item.mappable and (item.writable or index >= TPDO_MAPPING)
+        if not allowed or not item.code or item.entry.bits != value & 0xFF:
+            raise SdoAbort(AbortCode.NOT_MAPPABLE)
+
+    # -- in the loop ------------------------------------------------------------------------------------------------
+
+    def _on_rpdo(self, can_id: int, data: bytes, now_s: float) -> None:
+        pdo = self._rpdos[can_id]
+        size = pdo.packer.size
+        if len(data) != size:
+            short = len(data) < size
+            self._emergency(_LENGTH_TOO_SHORT if short else _LENGTH_EXCEEDED, 0x11, now_s)
+            if short:
+                return
+            data = data[:size]
+        if pdo.transmission_type <= 240:
+            pdo.pending = data
+            return
+        self._values.update(zip(pdo.keys, pdo.packer.unpack(data), strict=True))
+        self._received(now_s)
+
+    def on_sync(self, now_s: float) -> None:
+        """Synchronous RPDOs act now; the TPDOs that are due go out."""
+        for pdo in self._rpdos.values():
+            if pdo.pending:
+                self._values.update(zip(pdo.keys, pdo.packer.unpack(pdo.pending), strict=True))
+                pdo.pending = b""
+                self._received(now_s)
+        for pdo in self._tpdos:
+            data = pdo.packer.pack(*pdo.get(self._values))
+            if pdo.transmission_type != 1:  # every n-th SYNC, or (0, 254, 255) on change
+                pdo.syncs += 1
+                if 1 < pdo.transmission_type <= 240:
+                    if pdo.syncs % pdo.transmission_type:
+                        continue
+                elif data == pdo.pending:
+                    continue
+                pdo.pending = data
+            self._port.send(pdo.cob_id, data, now_s)
+
+
+def _tuple_getter(key: int) -> Callable[[dict[int, Any]], tuple[Any]]:
+    return lambda values: (values[key],)

@@ -1,0 +1,57 @@
+"""Channel time skew: one recorded channel is late against the others."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hil.twin.mechanism import Block, Dimension, Mechanism, Parameter, Stage
+
+Channels = tuple[NDArray[np.float64], ...]   # motor position, table position, torque command, torque
+
+_VARIANTS = {"table_position": 1, "torque": 3, "motor_position": 0}   # name: index in Channels
+
+
+def _skewed(channels: Channels, parameters: Sequence[float], variant: int, period_s: float) -> Channels:
+    """The channels, each (n,), with that of the variant late by the delay; its ends are held."""
+    late = tuple(_VARIANTS.values())[variant]
+    return tuple(
+        _delayed(channel, parameters[0] / period_s) if index == late else channel
+        for index, channel in enumerate(channels)
+    )
+
+
+def _delayed(samples: NDArray[np.float64], periods: float) -> NDArray[np.float64]:
+    """Samples (n,) later by a number of periods: cubic convolution, continuous in delay and slope."""
+    whole = math.floor(periods)
+    f = periods - whole
+    # weights of the samples 1 after to 2 before the whole delay (Keys, a = -1/2)
+    weights = (
+        0.5 * f * (-1.0 + f * (2.0 - f)),
+        1.0 + 0.5 * f * f * (3.0 * f - 5.0),
+        0.5 * f * (1.0 + f * (4.0 - 3.0 * f)),
+        0.5 * f * f * (f - 1.0),
+    )
+    last = samples.size - 1
+    nearest = np.arange(samples.size) - whole
+    late = np.zeros(samples.size)
+    for before, weight in zip((-1, 0, 1, 2), weights, strict=True):
+        late += weight * samples[np.clip(nearest - before, 0, last)]
+    return late
+
+
+MECHANISM = Mechanism(
+    id="channel_time_skew",
+    block=Block.SENSOR,
+    element="time stamps of a channel",
+    sentence="The channel is recorded {delay_s} late against the others.",
+    equation="y_recorded(t) = y(t - delay)",
+    source="Keys, IEEE Trans. Acoustics, Speech, and Signal Processing 29 (1981) 1153, cubic convolution",
+    parameters=(Parameter("delay_s", Dimension.TIME, -0.01, 0.01),),
+    stage=Stage.CHANNEL,
+    contribution=_skewed,
+    variants=tuple(_VARIANTS),
+)

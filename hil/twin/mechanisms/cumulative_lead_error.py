@@ -1,0 +1,30 @@
+"""Cumulative lead error: an error of the lead that grows along the travel."""
+
+from __future__ import annotations
+
+from collections.abc import MutableSequence, Sequence
+
+from numba import njit
+
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Stage
+
+
+@njit
+def _longer_lead(
+    value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]
+) -> float:
+    # the motor position is the table's, but for deflections of the order of the error
+    return value + parameters[0] * at.table_position_m / at.ratio_m
+
+
+MECHANISM = Mechanism(
+    id="cumulative_lead_error",
+    block=Block.TRANSMISSION,
+    element="ball screw",
+    sentence="The lead is wrong: the table goes {slope_m_m} too far for each metre of travel.",
+    equation="x = (1 + s) r theta",
+    source="ISO 3408-3:2006, mean travel deviation",
+    parameters=(Parameter("slope_m_m", Dimension.RATIO, -5e-3, 5e-3),),
+    stage=Stage.TRANSMISSION,
+    contribution=_longer_lead,
+)

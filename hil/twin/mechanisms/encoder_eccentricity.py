@@ -1,0 +1,36 @@
+"""Encoder eccentricity: the motor encoder errs once per revolution.
+
+On a linear axis, which has its motor encoder read as metres, the amplitude is in metres too.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import MutableSequence, Sequence
+
+from numba import njit
+
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Stage
+
+
+@njit
+def _eccentric_reading(
+    value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]
+) -> float:
+    return value + parameters[0] * math.sin(at.angle_rad + parameters[1])
+
+
+MECHANISM = Mechanism(
+    id="encoder_eccentricity",
+    block=Block.SENSOR,
+    element="motor encoder",
+    sentence="The motor encoder sits off centre: it errs by {amplitude_rad} once per revolution.",
+    equation="theta_read = theta + A sin(theta + phi), A = eccentricity / graduation radius",
+    source="Heidenhain, Angle Encoders without Integral Bearing (catalogue), eccentricity of the graduation",
+    parameters=(
+        Parameter("amplitude_rad", Dimension.ANGLE, 0.0, 0.1),
+        Parameter("phase_rad", Dimension.ANGLE, -2.0 * math.pi, 2.0 * math.pi),
+    ),
+    stage=Stage.MOTOR_READING,
+    contribution=_eccentric_reading,
+)

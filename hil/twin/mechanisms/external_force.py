@@ -1,0 +1,38 @@
+"""External force: something pushes the table during a window of time."""
+
+from __future__ import annotations
+
+from collections.abc import MutableSequence, Sequence
+
+from numba import njit
+
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Stage
+
+
+@njit
+def _push(
+    value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]
+) -> float:
+    force_n, start_s, end_s = parameters[0], parameters[1], parameters[2]
+    if at.step_s <= 0.0:
+        return value + force_n if start_s <= at.time_s < end_s else value
+    # the mean over this step, so that the answer is continuous in start and end
+    overlap_s = min(end_s, at.time_s + at.step_s) - max(start_s, at.time_s)
+    return value + force_n * max(overlap_s, 0.0) / at.step_s
+
+
+MECHANISM = Mechanism(
+    id="external_force",
+    block=Block.TABLE,
+    element="surroundings of the table",
+    sentence="From {start_s} to {end_s} a force of {force_n} pushes the table in positive direction.",
+    equation="F_table = F for start <= t < end, else 0",
+    source="Newton's second law; such as the pneumatic cylinder that loads the table of the source's test bench",
+    parameters=(
+        Parameter("force_n", Dimension.FORCE, -1e5, 1e5),
+        Parameter("start_s", Dimension.TIME, 0.0, 1e5),
+        Parameter("end_s", Dimension.TIME, 0.0, 1e5),
+    ),
+    stage=Stage.TABLE_FORCE,
+    contribution=_push,
+)

@@ -1,0 +1,36 @@
+"""Friction drift: friction changes as the axis warms up."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import MutableSequence, Sequence
+
+from numba import njit
+
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Stage
+
+
+@njit
+def _warming(
+    value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]
+) -> float:
+    fraction, time_constant_s = parameters[0], parameters[1]
+    if time_constant_s <= 0.0:
+        return value * (1.0 + fraction)
+    return value * (1.0 - fraction * math.expm1(-at.time_s / time_constant_s))
+
+
+MECHANISM = Mechanism(
+    id="friction_drift",
+    block=Block.MOTOR_SIDE,
+    element="lubricant of nut and bearings",
+    sentence="Friction changes by a share of {fraction} while the axis runs, within about {time_constant_s}.",
+    equation="F(t) = F (1 + a (1 - exp(-t/tau)))",
+    source="Bittencourt and Gunnarsson, ASME J. Dynamic Systems, Measurement, and Control 134 (2012) 051013",
+    parameters=(
+        Parameter("fraction", Dimension.RATIO, -0.95, 5.0),
+        Parameter("time_constant_s", Dimension.TIME, 1.0, 1e4),
+    ),
+    stage=Stage.FRICTION_SCALE,
+    contribution=_warming,
+)

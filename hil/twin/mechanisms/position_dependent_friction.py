@@ -1,0 +1,37 @@
+"""Position-dependent friction: friction varies along the travel."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import MutableSequence, Sequence
+
+from numba import njit
+
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Stage
+
+
+@njit
+def _level_along_travel(
+    value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]
+) -> float:
+    fraction, period_m, phase_rad = parameters[0], parameters[1], parameters[2]
+    if period_m <= 0.0:
+        return value
+    return value * (1.0 + fraction * math.sin(2.0 * math.pi * at.table_position_m / period_m + phase_rad))
+
+
+MECHANISM = Mechanism(
+    id="position_dependent_friction",
+    block=Block.MOTOR_SIDE,
+    element="ball nut and screw",
+    sentence="Friction varies by a share of {fraction} along the travel, with a period of {period_m}.",
+    equation="F = Fc (1 + a sin(2 pi x / p + phi))",
+    source="Armstrong-Hélouvry, Control of Machines with Friction (1991), position-dependent friction",
+    parameters=(
+        Parameter("fraction", Dimension.RATIO, 0.0, 1.0),
+        Parameter("period_m", Dimension.LENGTH, 1e-3, 1.0),
+        Parameter("phase_rad", Dimension.ANGLE, -2.0 * math.pi, 2.0 * math.pi),
+    ),
+    stage=Stage.COULOMB,
+    contribution=_level_along_travel,
+)

@@ -1,0 +1,29 @@
+"""Position-dependent stiffness: the screw is stiffer or softer with the position of its nut."""
+
+from __future__ import annotations
+
+from collections.abc import MutableSequence, Sequence
+
+from numba import njit
+
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Stage
+
+
+@njit
+def _stiffness_along_travel(
+    value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]
+) -> float:
+    return value * max(1.0 + parameters[0] * at.table_position_m, 0.0)
+
+
+MECHANISM = Mechanism(
+    id="position_dependent_stiffness",
+    block=Block.TRANSMISSION,
+    element="screw between bearing and nut",
+    sentence="The stiffness of the screw changes by a share of {relative_slope} for each metre of travel.",
+    equation="T = k max(1 + s x, 0) q",
+    source="Zaeh, Oertli and Milberg, CIRP Annals 53 (2004) 289, screw stiffness over the position of its nut",
+    parameters=(Parameter("relative_slope", Dimension.PER_LENGTH, -10.0, 10.0),),
+    stage=Stage.TRANSMISSION,
+    contribution=_stiffness_along_travel,
+)

@@ -1,0 +1,29 @@
+"""Table-side friction: part of the friction acts on the guideway, behind the compliance."""
+
+from __future__ import annotations
+
+from collections.abc import MutableSequence, Sequence
+
+from numba import njit
+
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Stage
+
+
+@njit
+def _share_on_table(
+    value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]
+) -> float:
+    return value + parameters[0]
+
+
+MECHANISM = Mechanism(
+    id="table_side_friction",
+    block=Block.TABLE,
+    element="guideways",
+    sentence="A share of {share} of the friction acts on the table, not on the motor.",
+    equation="F_table = s F, F_motor = (1 - s) F",
+    source="Altintas, Verl, Brecher, Uriarte and Pritschow, Machine tool feed drives, CIRP Annals 60 (2011) 779",
+    parameters=(Parameter("share", Dimension.RATIO, 0.0, 1.0),),
+    stage=Stage.TABLE_SHARE,
+    contribution=_share_on_table,
+)

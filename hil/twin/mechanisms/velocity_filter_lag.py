@@ -1,0 +1,29 @@
+"""Velocity filter lag: the controller filters its velocity feedback."""
+
+from __future__ import annotations
+
+from collections.abc import MutableSequence, Sequence
+
+from numba import njit
+
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Stage
+
+
+@njit
+def _time_constant(
+    value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]
+) -> float:
+    return value + parameters[0]
+
+
+MECHANISM = Mechanism(
+    id="velocity_filter_lag",
+    block=Block.CONTROLLER,
+    element="velocity feedback of the controller",
+    sentence="The controller filters its velocity feedback with a time constant of {time_constant_s}.",
+    equation="tau dv_f/dt = v - v_f",
+    source="Brown, Schneider and Mulligan, IEEE Trans. Industrial Electronics 39 (1992) 11, filtered differences",
+    parameters=(Parameter("time_constant_s", Dimension.TIME, 1e-5, 0.05),),
+    stage=Stage.VELOCITY_FILTER,
+    contribution=_time_constant,
+)

@@ -138,9 +138,10 @@ def excitation(start_m: float, signal: Signal, duration_s: float, fade_s: float,
                          f"{limits.velocity_m_s:.6g} m/s in magnitude; lower the feed")
     wave = Wave(duration_s, Phase.EXCITATION, 0.0, 0.0, 1.0, fade_s, signal)
     samples = math.ceil(duration_s * signal.highest_frequency_hz * SAMPLES_PER_PERIOD) + 1
-    largest_m, *peaks = (float(np.abs(values).max()) for values in wave.at(np.linspace(0, duration_s, samples)))
-    allowed = (room_m_s, limits.acceleration_m_s2, limits.jerk_m_s3)
-    allowed_m = largest_m * min(limit / (MISSED_PEAK * peak) for limit, peak in zip(allowed, peaks, strict=True))
+    motion = wave.at(np.linspace(0, duration_s, samples))
+    largest_m, *peaks = (float(np.abs(values).max()) for values in motion)
+    allowed = zip((room_m_s, limits.acceleration_m_s2, limits.jerk_m_s3), peaks, strict=True)
+    allowed_m = largest_m * min(limit / (MISSED_PEAK * peak) for limit, peak in allowed)
     notes: tuple[str, ...] = ()
     if allowed_m < amplitude_m:
         notes = (f"amplitude lowered from {amplitude_m * 1e6:.4g} um to {allowed_m * 1e6:.4g} um "

@@ -76,10 +76,6 @@ class Cubic:
         p, v, a, j, t = self.position_m, self.velocity_m_s, self.acceleration_m_s2, self.jerk_m_s3, time_s
         return Motion(p + t * (v + t * (a / 2 + t * j / 6)), v + t * (a + t * j / 2), a + t * j, j + 0 * t)
 
-    @property
-    def end_m(self) -> float:
-        return float(self.at(np.array(self.duration_s)).position_m)
-
 
 @dataclass(frozen=True)
 class Ramp:
@@ -113,6 +109,11 @@ class Move:
     @property
     def duration_s(self) -> float:
         return math.fsum(piece.duration_s for piece in self.pieces)
+
+
+def end_m(piece: Piece) -> float:
+    """Position [m] at the end of a piece."""
+    return float(piece.at(np.array(piece.duration_s)).position_m)
 
 
 def dwell(start_m: float, duration_s: float) -> Move:

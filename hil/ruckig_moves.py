@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 import ruckig
 
-from hil.errors import HilError, InputError
-from hil.moves import Cubic, MotionLimits, Move, Phase, Piece
+from hil.errors import FieldError, HilError, InputError
+from hil.moves import Cubic, MotionLimits, Move, Phase, Piece, end_m
 
 END_TOLERANCE_M = 1e-10
 
@@ -37,7 +37,7 @@ def point_to_point(state: State, target_m: float, limits: MotionLimits) -> Move:
     """Time-optimal motion from any state to rest at target_m.
 
     Some states far beyond their limits ruckig cannot solve in one go; then the axis stops first and a note
-    says so. Raises InputError for a number that is not finite.
+    says so. Raises InputError for a number that is not finite, HilError when ruckig finds no move from rest.
     """
     order = _order(state, limits)
     order.target_position = [_finite("target_m", target_m)]
@@ -45,10 +45,12 @@ def point_to_point(state: State, target_m: float, limits: MotionLimits) -> Move:
         pieces: tuple[Piece, ...] = _solve(order)
         notes: tuple[str, ...] = ()
     except _Unsolved:
+        if not (state.velocity_m_s or state.acceleration_m_s2):
+            raise
         pieces, notes = stop(state, limits).pieces, ("stops first: ruckig finds no direct way to the target",)
     # ruckig itself accepts 1e-8 m; a second, tiny move from the rest reached closes what is left
-    if pieces and abs(pieces[-1].end_m - target_m) > END_TOLERANCE_M:
-        pieces += point_to_point(State(pieces[-1].end_m), target_m, limits).pieces
+    if pieces and abs(end_m(pieces[-1]) - target_m) > END_TOLERANCE_M * max(1.0, abs(target_m)):
+        pieces += point_to_point(State(end_m(pieces[-1])), target_m, limits).pieces
     return Move(pieces, target_m, notes)
 
 
@@ -63,21 +65,21 @@ def velocity_step(state: State, velocity_m_s: float, limits: MotionLimits) -> Mo
     order.control_interface = ruckig.ControlInterface.Velocity
     order.target_velocity = [_finite("velocity_m_s", velocity_m_s)]
     pieces = _solve(order)
-    return Move(pieces, pieces[-1].end_m if pieces else state.position_m)
+    return Move(pieces, end_m(pieces[-1]) if pieces else state.position_m)
 
 
 def jog(start_m: float, velocity_m_s: float, duration_s: float, limits: MotionLimits) -> Move:
     """Velocity for a duration, counted from rest to the beginning of the stop, as a jog key is held.
 
-    Raises InputError when the velocity is not reached within the duration.
+    Raises FieldError when the velocity is not reached within the duration.
     """
     speed_up = velocity_step(State(start_m), velocity_m_s, limits)
     constant_s = duration_s - speed_up.duration_s
     if constant_s < 0:
-        raise InputError(f"given a jog of {duration_s:.6g} s, allowed at least {speed_up.duration_s:.6g} s "
-                         f"to reach {velocity_m_s:.6g} m/s; raise duration_s or lower the velocity")
+        raise FieldError(("duration_s",), f"given {duration_s:.6g} s, allowed at least {speed_up.duration_s:.6g} s "
+                         f"to reach {velocity_m_s:.6g} m/s; raise it or lower the velocity")
     constant = Cubic(constant_s, Phase.CONSTANT_FEED, speed_up.end_m, velocity_m_s)
-    slow_down = stop(State(constant.end_m, velocity_m_s), limits)
+    slow_down = stop(State(end_m(constant), velocity_m_s), limits)
     return Move((*speed_up.pieces, constant, *slow_down.pieces), slow_down.end_m)
 
 

@@ -47,7 +47,8 @@ def sine_squared(start_m: float, end_m: float, limits: MotionLimits) -> Move:
         ramp_s, constant_s = bell_duration_s(stroke, limits) / 2, 0.0
         feed = min(feed, stroke / ramp_s)
         notes = (f"feed lowered from {_feed(limits.velocity_m_s)} to {_feed(feed)}: over "
-                 f"{stroke * 1e3:.6g} mm {limits.acceleration_m_s2:.6g} m/s^2 and {limits.jerk_m_s3:.6g} m/s^3 allow no more",)
+                 f"{stroke * 1e3:.6g} mm {limits.acceleration_m_s2:.6g} m/s^2 and "
+                 f"{limits.jerk_m_s3:.6g} m/s^3 allow no more",)
     velocity = math.copysign(feed, end_m - start_m)
     ramp_m = velocity * ramp_s / 2
     pieces: list[Piece] = [Ramp(ramp_s, Phase.ACCELERATION, start_m, 0.0, velocity)]

@@ -1,0 +1,163 @@
+"""Catalogue of what a simulated axis can conceal: ids, parameters, units, allowed ranges, forms.
+
+On a linear axis read N for n_m, m for rad, N s/m for n_m_s_rad; angles of the screw stay angles.
+The equations stand in contact.py (friction, nut) and kernel.py (drive, sensors, table).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from math import inf, isfinite
+from types import MappingProxyType
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """Allowed range [low, high] and, where it may be left out, its default."""
+
+    low: float = -inf
+    high: float = inf
+    default: float | None = None
+
+
+@dataclass(frozen=True)
+class Definition:
+    """Physics in one sentence, parameters by name, forms (the first is the default)."""
+
+    physics: str
+    parameters: Mapping[str, Parameter]
+    forms: tuple[str, ...] = ("",)
+
+
+_ANY = Parameter()
+_POSITIVE = Parameter(low=1e-12)
+_AT_LEAST_0 = Parameter(low=0.0)
+_PHASE = Parameter()
+_PHASE_0 = Parameter(default=0.0)
+_OFF = Parameter(default=0.0)
+_DELAY = Parameter(low=0.0, high=0.1)
+_DRIVE_FORMS = ("visible", "hidden")  # hidden: the measured current does not show it
+
+CATALOGUE: Mapping[str, Definition] = MappingProxyType({
+    # motor side
+    "asymmetric_friction": Definition(
+        "friction = F sign(v) + offset while sliding; it holds within [-F + offset, F + offset]",
+        {"offset_torque_n_m": _ANY}),
+    "constant_load": Definition("constant torque against positive motion (weight)", {"load_torque_n_m": _ANY}),
+    "stribeck_friction": Definition(
+        "F(v) = Fc + (Fs - Fc) s(v/vs); s = exp(-u^2), exp(-|u|) or 1 - 2/pi atan|u|",
+        {"static_torque_n_m": _AT_LEAST_0, "stribeck_velocity_rad_s": _POSITIVE},
+        ("gaussian", "exponential", "atan")),
+    "presliding_hysteresis": Definition(
+        "elastic micro-motion before sliding; damping (lugre only, < 0: chosen for half-critical motor motion)",
+        {"stiffness_n_m_rad": _POSITIVE, "damping_n_m_s_rad": Parameter(default=-1.0)},
+        ("dahl", "lugre", "gms")),
+    "position_dependent_friction": Definition(
+        "Coulomb and static friction times 1 + fraction sin(2 pi x / period + phase)",
+        {"fraction": Parameter(-1.0, 1.0), "period_m": _POSITIVE, "phase_rad": _PHASE_0}),
+    "nonlinear_viscous_friction": Definition("drag quadratic v |v|", {"quadratic_n_m_s2_rad2": _AT_LEAST_0}),
+    "friction_drift": Definition(
+        "all friction times 1 + fraction (1 - exp(-t / time_constant))",
+        {"fraction": Parameter(low=-1.0), "time_constant_s": _POSITIVE}),
+    "cogging_torque": Definition(
+        "motor torque + amplitude sin(cycles theta + phase)",
+        {"amplitude_n_m": _AT_LEAST_0, "cycles_per_rev": _POSITIVE, "phase_rad": _PHASE}),
+    # table
+    "table_side_friction": Definition(
+        "this share of the Coulomb and viscous friction acts on the table", {"share": Parameter(0.0, 1.0)}),
+    "structural_mode": Definition(
+        "attached: a mass on a spring on the table; base: the machine base under the axis yields",
+        {"frequency_hz": _POSITIVE, "damping_ratio": Parameter(0.0, 2.0),
+         "mass_ratio": Parameter(1e-6, 1e3, default=0.2)},
+        ("attached", "base")),
+    "external_force": Definition(
+        "force on the table while start <= t < end", {"force_n": _ANY, "start_s": _ANY, "end_s": _ANY}),
+    "spring_load": Definition(
+        "-stiffness (x - rest) on the table", {"stiffness_n_m": _AT_LEAST_0, "rest_position_m": _ANY}),
+    # transmission
+    "backlash": Definition("no force within +-gap/2 of stretch; contacts push only", {"gap_m": _AT_LEAST_0}),
+    "preload_loss": Definition(
+        "stiffness times stiffness_ratio within +-zone/2 of stretch, full beyond, force continuous",
+        {"zone_m": _AT_LEAST_0, "stiffness_ratio": Parameter(0.0, 1.0)}),
+    "position_dependent_stiffness": Definition(
+        "k (1 + relative_slope x), x the table position; relative_slope in 1/m", {"relative_slope": _ANY}),
+    "periodic_lead_error": Definition(
+        "table = r theta + sum over harmonics h of amplitude_h sin(h theta + phase_h)",
+        {"amplitude_m": _AT_LEAST_0, "phase_rad": _PHASE, "amplitude_2_m": _OFF, "phase_2_rad": _OFF,
+         "amplitude_3_m": _OFF, "phase_3_rad": _OFF}),
+    "cumulative_lead_error": Definition("table = r theta (1 + slope)", {"slope_m_m": _ANY}),
+    "thermal_growth": Definition(
+        "table = r theta (1 + relative_growth (1 - exp(-t / time_constant)))",
+        {"relative_growth": _ANY, "time_constant_s": _POSITIVE}),
+    # drive
+    "torque_ripple": Definition(
+        "torque times 1 + fraction sin(cycles theta + phase), unseen by the current",
+        {"fraction": Parameter(0.0, 1.0), "cycles_per_rev": _POSITIVE, "phase_rad": _PHASE_0}),
+    "torque_constant_saturation": Definition(
+        "torque = u (1 - c u^2), unseen by the current, held at its maximum beyond it",
+        {"coefficient_1_n2_m2": _AT_LEAST_0}),
+    "torque_saturation": Definition("torque within +-limit", {"limit_n_m": _AT_LEAST_0}, _DRIVE_FORMS),
+    "torque_dead_zone": Definition(
+        "0 within +-half_width, else the command less half_width", {"half_width_n_m": _AT_LEAST_0}, _DRIVE_FORMS),
+    "current_loop_lag": Definition("first-order lag of the torque", {"time_constant_s": _POSITIVE}, _DRIVE_FORMS),
+    "transport_delay": Definition("the command acts late", {"delay_s": _DELAY}, _DRIVE_FORMS),
+    # controller
+    "velocity_filter_lag": Definition(
+        "first-order filter on the velocity feedback", {"time_constant_s": _POSITIVE}),
+    # sensor
+    "channel_time_skew": Definition(
+        "one recorded channel is late; the control loop sees it in time",
+        {"delay_s": _DELAY}, ("table_position", "motor_position", "torque")),
+    "encoder_eccentricity": Definition(
+        "motor encoder reads theta + amplitude sin(theta + phase)",
+        {"amplitude_rad": _AT_LEAST_0, "phase_rad": _PHASE}),
+    "scale_interpolation_error": Definition(
+        "linear encoder reads x + amplitude sin(2 pi x / period + phase)",
+        {"amplitude_m": _AT_LEAST_0, "period_m": _POSITIVE, "phase_rad": _PHASE_0}),
+})  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Effect:
+    """One concealed piece of physics. Raises ValueError for an unknown id, parameter or form, a missing
+    parameter, or a value out of range; the message lists what is allowed."""
+
+    id: str
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    form: str = ""
+
+    def __post_init__(self) -> None:
+        if self.id not in CATALOGUE:
+            raise ValueError(f"effect {self.id!r}: unknown; allowed: {', '.join(CATALOGUE)}")
+        definition = CATALOGUE[self.id]
+        allowed = definition.parameters
+        unknown = sorted(set(self.parameters) - set(allowed))
+        missing = sorted(name for name, p in allowed.items() if p.default is None and name not in self.parameters)
+        if unknown or missing:
+            fault = f"unknown {', '.join(unknown)}" if unknown else f"missing {', '.join(missing)}"
+            raise ValueError(f"effect {self.id}: parameter {fault}; allowed: {', '.join(allowed)}")
+        for name, value in self.parameters.items():
+            low, high = allowed[name].low, allowed[name].high
+            if not isfinite(value) or not low <= value <= high:
+                raise ValueError(f"effect {self.id}: {name} must be in [{low:g}, {high:g}], got {value!r}")
+        if self.form and self.form not in definition.forms:
+            choices = ", ".join(form for form in definition.forms if form) or "none"
+            raise ValueError(f"effect {self.id}: unknown form {self.form!r}; allowed: {choices}")
+        defaults = {name: p.default for name, p in allowed.items() if p.default is not None}
+        object.__setattr__(self, "parameters", {**defaults, **self.parameters})  # a dict can be pickled
+
+    @property
+    def form_index(self) -> int:
+        """Index of the form within the catalogue's forms; 0 is the default."""
+        return CATALOGUE[self.id].forms.index(self.form) if self.form else 0
+
+
+def by_id(effects: Sequence[Effect]) -> dict[str, Effect]:
+    """Effects by id. Raises ValueError when one is given twice."""
+    found: dict[str, Effect] = {}
+    for effect in effects:
+        if effect.id in found:
+            raise ValueError(f"effect {effect.id}: given twice; give each effect once")
+        found[effect.id] = effect
+    return found

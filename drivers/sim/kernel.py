@@ -1,0 +1,279 @@
+"""Time stepping of the simulated axis in natural coordinates; compiled, no allocation.
+
+Leapfrog with friction as an impulse (Moreau's time stepping, diagonal M): positions at t_k, velocities at t_k-1/2,
+
+    M (v_k+1/2 - v_k-1/2) = h f(q_k, v_k-1/2) - friction impulse,     q_k+1 = q_k + h v_k+1/2
+
+second order in h for springs and torque, exact rest in stiction. A torque that changes at t_k acts with its mean there.
+"""
+
+from __future__ import annotations
+
+from math import exp, pi, sin, sqrt
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from drivers.sim.contact import bristle_torque, coulomb_impulse, friction_law, lead_error, nut_force
+from drivers.sim.layout import CHANNEL_LINE, COMMAND_LINE
+from drivers.sim.sensors import normal, quantise
+
+MOTOR_SIDE, TABLE_SIDE = 0, 1
+
+
+@njit(cache=True)
+def push(line: Any, tick: int, value: float) -> None:
+    """Store the value of this tick in a ring."""
+    line[tick % line.size] = value
+
+
+@njit(cache=True)
+def delayed(line: Any, tick: int, delay_steps: float) -> float:
+    """Value `delay_steps` before the tick, linear between ticks."""
+    whole = int(delay_steps)
+    part = delay_steps - whole
+    value: float = (1.0 - part) * line[(tick - whole) % line.size] + part * line[(tick - whole - 1) % line.size]
+    return value
+
+
+@njit(cache=True)
+def clip(value: float, limit: float) -> float:
+    return min(max(value, -limit), limit)
+
+
+@njit(cache=True)
+def lag(value: float, output: float, ratio: float) -> tuple[float, float]:
+    """Mean over one step and end of y' = (value - y) / tau from y = output; ratio = step / tau."""
+    gain = 1.0 - exp(-ratio)
+    return value + (output - value) * gain / ratio, output + gain * (value - output)
+
+
+@njit(cache=True)
+def drive_torque(p: Any, s: Any, lines: Any, command: float) -> tuple[float, float]:
+    """Measured current (x nominal torque constant) and torque of the drive for a command, both in the motor's unit.
+
+    delay -> limit -> dead zone -> first-order lag. Form 1 (hidden): the current does not show that stage.
+    """
+    current = torque = command
+    e = p.transport_delay
+    if e.on:
+        push(lines[COMMAND_LINE], s.tick, command)
+        torque = delayed(lines[COMMAND_LINE], s.tick, e.delay_s / p.step_s)
+        if e.form == 0:
+            current = torque
+    if p.torque_saturation.on:
+        limit = p.torque_saturation.limit_n_m
+        torque = clip(torque, limit)
+        if p.torque_saturation.form == 0:
+            current = clip(current, limit)
+    if p.torque_dead_zone.on:
+        width = p.torque_dead_zone.half_width_n_m
+        torque -= clip(torque, width)
+        if p.torque_dead_zone.form == 0:
+            current -= clip(current, width)
+    if p.current_loop_lag.on:
+        ratio = p.step_s / p.current_loop_lag.time_constant_s
+        torque, s.lag_torque = lag(torque, s.lag_torque, ratio)
+        if p.current_loop_lag.form == 0:
+            current, s.lag_current = lag(current, s.lag_current, ratio)
+    return current, torque
+
+
+@njit(cache=True)
+def angle_torque(p: Any, torque: float, angle: float) -> float:
+    """Torque of the motor from its current: saturated torque constant, ripple, cogging."""
+    saturation = p.torque_constant_saturation.coefficient_1_n2_m2
+    if saturation > 0.0:
+        u = clip(torque, 1.0 / sqrt(3.0 * saturation))  # u (1 - c u^2) is greatest here
+        torque = u * (1.0 - saturation * u * u)
+    e = p.torque_ripple
+    torque *= 1.0 + e.fraction * sin(e.cycles_per_rev * angle + e.phase_rad)
+    g = p.cogging_torque
+    torque += g.amplitude_n_m * sin(g.cycles_per_rev * angle + g.phase_rad)
+    return torque
+
+
+@njit(cache=True)
+def nut(p: Any, s: Any, time_s: float) -> None:
+    """Add the forces of the screw-nut contact: by virtual work on screw (and its axial motion) and table side."""
+    q, v, force = s.position, s.velocity, s.force
+    screw = p.nut_screw
+    error = slope = 0.0
+    if p.lead_errors:
+        error, slope = lead_error(p, q[screw], time_s)
+    stretch = q[screw] + error - q[p.nut_table]
+    if p.nut_axial >= 0:
+        stretch += q[p.nut_axial]
+    rate = slope * v[screw]
+    for i in range(p.masses):
+        rate += p.nut_rate[i] * v[i]
+    if p.varied_nut:
+        stiffness = p.nut_stiffness
+        if p.screw_springs == 0:
+            stiffness *= 1.0 + p.position_dependent_stiffness.relative_slope * q[p.table]
+        elastic, damping = nut_force(p, stiffness, stretch, rate)
+    else:
+        elastic, damping = p.nut_stiffness * stretch, p.nut_damping * rate
+    force[screw] -= elastic * (1.0 + slope) + damping * slope
+    force[p.nut_table] += elastic
+    if p.nut_axial >= 0:
+        force[p.nut_axial] -= elastic
+    for i in range(p.masses):
+        force[i] -= damping * p.nut_rate[i]
+
+
+@njit(cache=True)
+def springs(p: Any, s: Any) -> None:
+    """Add the forces of the linear springs and of the damping matrix."""
+    q, v, force = s.position, s.velocity, s.force
+    for i in range(p.springs):
+        a, b = p.spring_first[i], p.spring_second[i]
+        stretch, rate = q[a], v[a]
+        if b >= 0:
+            stretch, rate = stretch - q[b], rate - v[b]
+        stiffness = p.spring_stiffness[i]
+        if p.spring_on_screw[i]:
+            stiffness *= 1.0 + p.position_dependent_stiffness.relative_slope * q[p.table]
+        f = stiffness * stretch + p.spring_damping[i] * rate
+        force[a] -= f
+        if b >= 0:
+            force[b] += f
+    if p.full_damping:
+        for i in range(p.masses):
+            for j in range(p.masses):
+                force[i] -= p.damping[i, j] * v[j]
+
+
+@njit(cache=True)
+def kick(p: Any, s: Any, index: int, side: int, share: float, time_s: float) -> None:
+    """New velocity of a mass under its force and its share of the friction."""
+    h, ratio, mass = p.step_s, p.drive_ratio, p.mass[index]
+    speed = s.velocity[index] / ratio
+    if p.varied_friction:
+        bound, offset, drag = friction_law(p, speed, s.position[index], time_s)
+        bound, offset, drag = share * bound, share * offset, share * drag
+    else:
+        bound, offset, drag = share * p.coulomb, 0.0, share * p.viscous * speed
+    force = s.force[index] - drag / ratio
+    if p.presliding_hysteresis.on:
+        force -= bristle_torque(p, s.bristle[side], share, h * speed, h, bound, offset) / ratio
+        s.velocity[index] += h / mass * force
+    else:
+        free = mass * s.velocity[index] + h * force
+        s.velocity[index] = (free - coulomb_impulse(free, h, bound / ratio, offset / ratio)) / mass
+
+
+@njit(cache=True)
+def sample(p: Any, s: Any, lines: Any) -> None:
+    """Digitise both encoders at this tick into s."""
+    instant = p.sampling_jitter_s * normal(s) if p.sampling_jitter_s > 0.0 else 0.0
+    motor = motor_truth(p, s) + instant * s.velocity[0] / p.drive_ratio
+    table = table_truth(p, s) + instant * s.velocity[p.table]
+    motor_late, table_late = motor, table
+    skew = p.channel_time_skew
+    if skew.on and skew.form < 2:
+        late = delayed(lines[CHANNEL_LINE], s.tick, skew.delay_s / p.step_s)
+        if skew.form == 0:
+            table_late = late
+        else:
+            motor_late = late
+    noise_motor = p.motor_noise * normal(s) if p.motor_noise > 0.0 else 0.0
+    noise_table = p.table_noise * normal(s) if p.table_noise > 0.0 else 0.0
+    s.motor_seen = quantise(motor + noise_motor, p.motor_resolution)
+    s.table_seen = quantise(table + noise_table, p.table_resolution)
+    s.motor_recorded = quantise(motor_late + noise_motor, p.motor_resolution)
+    s.table_recorded = quantise(table_late + noise_table, p.table_resolution)
+
+
+@njit(cache=True)
+def motor_truth(p: Any, s: Any) -> float:
+    """What the motor encoder would read without resolution and noise."""
+    e = p.encoder_eccentricity
+    reading: float = s.position[0] / p.drive_ratio + p.motor_offset
+    if e.on:
+        reading += e.amplitude_rad * sin(s.position[0] / p.screw_ratio + e.phase_rad)
+    return reading
+
+
+@njit(cache=True)
+def table_truth(p: Any, s: Any) -> float:
+    """What the linear encoder, fixed to the machine base, would read without resolution and noise."""
+    e = p.scale_interpolation_error
+    reading: float = s.position[p.table] + p.table_offset
+    if p.base >= 0:
+        reading -= s.position[p.base]
+    if e.on:
+        reading += e.amplitude_m * sin(2.0 * pi * reading / e.period_m + e.phase_rad)
+    return reading
+
+
+@njit(cache=True)
+def advance(p: Any, s: Any, lines: Any, command: float, steps: int) -> None:
+    """Hold the torque command for `steps` internal steps; then measure."""
+    h = p.step_s
+    q, v, force = s.position, s.velocity, s.force
+    skew = p.channel_time_skew
+    motor_share = 1.0 - p.table_side_friction.share
+    measured = 0.0
+    for _ in range(steps):
+        time_s = s.tick * h
+        current = torque = command
+        if p.drive_path:
+            current, torque = drive_torque(p, s, lines, command)
+        if skew.on and skew.form == 2:
+            push(lines[CHANNEL_LINE], s.tick, current)
+            current = delayed(lines[CHANNEL_LINE], s.tick, skew.delay_s / h)
+        measured += current
+        acting = 0.5 * (s.torque + torque)
+        s.torque = torque
+        if p.angle_torque:
+            acting = angle_torque(p, acting, q[0] / p.screw_ratio)
+        for i in range(p.masses):
+            force[i] = 0.0
+        force[0] = (acting - p.constant_load.load_torque_n_m) / p.drive_ratio
+        if p.springs or p.full_damping:
+            springs(p, s)
+        if p.has_nut:
+            nut(p, s, time_s)
+        if p.table_force:
+            e = p.external_force
+            if e.start_s <= time_s < e.end_s:
+                force[p.table] += e.force_n
+            force[p.table] -= p.spring_load.stiffness_n_m * (q[p.table] - p.spring_load.rest_position_m)
+        kick(p, s, 0, MOTOR_SIDE, motor_share, time_s)
+        last = p.masses
+        for i in range(1, last):
+            if i == p.table and motor_share < 1.0:
+                kick(p, s, i, TABLE_SIDE, 1.0 - motor_share, time_s)
+            else:
+                v[i] += h / p.mass[i] * force[i]
+        for i in range(last):
+            q[i] += h * v[i]
+        s.tick += 1
+        if skew.on and skew.form < 2:
+            push(lines[CHANNEL_LINE], s.tick, table_truth(p, s) if skew.form == 0 else motor_truth(p, s))
+    if p.torque_noise > 0.0:
+        rho = p.torque_noise_correlation
+        s.torque_noise = rho * s.torque_noise + sqrt(1.0 - rho * rho) * p.torque_noise * normal(s)
+    s.torque_recorded = measured / steps + s.torque_noise
+    sample(p, s, lines)
+
+
+@njit(cache=True)
+def begin(p: np.ndarray, s: np.ndarray, lines: np.ndarray) -> None:
+    """Fill the line of a late position channel with what it reads at the start, and sample."""
+    if p[0].channel_time_skew.form == 0:
+        lines[CHANNEL_LINE, :] = table_truth(p[0], s[0])
+    elif p[0].channel_time_skew.form == 1:
+        lines[CHANNEL_LINE, :] = motor_truth(p[0], s[0])
+    sample(p[0], s[0], lines)
+
+
+@njit(cache=True)
+def advance_period(
+    p: np.ndarray, s: np.ndarray, lines: np.ndarray, command: float, steps: int
+) -> tuple[float, float, float]:
+    """advance() on arrays of one record each; returns the recorded motor position, table position and torque."""
+    advance(p[0], s[0], lines, command, steps)
+    return s[0].motor_recorded, s[0].table_recorded, s[0].torque_recorded

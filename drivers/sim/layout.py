@@ -1,0 +1,74 @@
+"""Records the compiled kernels work on: parameters of one simulated axis and its state.
+
+Every effect of the catalogue is a nested record named by its id, holding `on`, `form` and its parameters; switched
+off it is all zeros. Adding an effect: one entry in effects.CATALOGUE and its term in a kernel.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.sim.axis import MAX_MASSES
+from drivers.sim.contact import GMS_ELEMENTS
+from drivers.sim.effects import CATALOGUE
+
+SPRING_ROWS = MAX_MASSES
+LINES = 2  # delay lines: torque command, recorded channel
+COMMAND_LINE, CHANNEL_LINE = 0, 1
+
+_SCALARS = (
+    "step_s", "drive_ratio", "screw_ratio", "coulomb", "viscous", "bristle_damping", "nut_stiffness", "nut_damping",
+    "motor_resolution", "table_resolution", "motor_offset", "table_offset", "motor_noise", "table_noise",
+    "torque_noise", "torque_noise_correlation", "sampling_jitter_s",
+)  # fmt: skip
+_INDICES = (
+    "masses", "springs", "table", "base", "nut_screw", "nut_axial", "nut_table", "has_nut", "screw_springs",
+    "full_damping", "varied_friction", "varied_nut", "lead_errors", "drive_path", "angle_torque", "table_force",
+)  # fmt: skip
+
+PARAMETERS = np.dtype(
+    [(name, np.float64) for name in _SCALARS]
+    + [(name, np.int64) for name in _INDICES]
+    + [
+        ("mass", np.float64, (MAX_MASSES,)),
+        ("nut_rate", np.float64, (MAX_MASSES,)),  # weights of the velocities in the nut's damper
+        ("spring_first", np.int64, (SPRING_ROWS,)),
+        ("spring_second", np.int64, (SPRING_ROWS,)),
+        ("spring_on_screw", np.int64, (SPRING_ROWS,)),
+        ("spring_stiffness", np.float64, (SPRING_ROWS,)),
+        ("spring_damping", np.float64, (SPRING_ROWS,)),
+        ("damping", np.float64, (MAX_MASSES, MAX_MASSES)),  # what is not in the nut and the springs
+    ]
+    + [
+        (effect, np.dtype([("on", np.int64), ("form", np.int64)] + [(p, np.float64) for p in entry.parameters]))
+        for effect, entry in CATALOGUE.items()
+    ],
+    align=True,
+)
+
+STATE = np.dtype(
+    [
+        ("tick", np.int64),  # internal steps since the start: time = tick x step
+        ("random", np.uint64),
+        ("position", np.float64, (MAX_MASSES,)),  # at the tick
+        ("velocity", np.float64, (MAX_MASSES,)),  # half a step before it
+        ("force", np.float64, (MAX_MASSES,)),
+        ("bristle", np.float64, (2, GMS_ELEMENTS)),  # motor side, table side
+        ("lag_current", np.float64),
+        ("lag_torque", np.float64),
+        ("torque", np.float64),  # what acted during the last step
+        ("torque_noise", np.float64),
+        ("motor_seen", np.float64),  # motor encoder as the control loop sees it
+        ("table_seen", np.float64),
+        ("motor_recorded", np.float64),
+        ("table_recorded", np.float64),
+        ("torque_recorded", np.float64),
+    ],
+    align=True,
+)
+
+
+def one(dtype: np.dtype[np.void]) -> NDArray[np.void]:
+    """Array of one zeroed record; kernels take it and work on its first item."""
+    return np.zeros(1, dtype)

@@ -1,0 +1,37 @@
+# make          set everything up and run the demo on the simulated bus
+# make test     set everything up and run every check
+# make test-long, make peers, make clean
+PYTHON ?= python3.11
+BIN := .venv/bin
+INSTALLED := .venv/.installed
+
+.PHONY: all setup test test-long peers clean
+
+all: setup
+	$(BIN)/hil demo
+
+setup: $(INSTALLED)
+
+$(INSTALLED): requirements.lock pyproject.toml
+	@command -v $(PYTHON) >/dev/null || { echo "$(PYTHON) not found: install Python 3.11 or give PYTHON=..."; exit 2; }
+	$(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements.lock
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps -e .
+	@touch $(INSTALLED)
+
+test: setup
+	$(BIN)/ruff check
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+	$(BIN)/pytest -n 2 -m "not long"
+
+test-long: setup
+	$(BIN)/pytest -n 2
+
+# what hil bench and hil prove measure the project against; not needed to run it
+peers: setup
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements-peers.lock
+
+clean:
+	rm -rf .venv build runs out *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis .import_linter_cache
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -98,7 +98,8 @@ def open_bus(config: BusConfig) -> can.BusABC:
 
 
 class PythonCanPort:
-    """A python-can bus as a `CanPort`. Standard frames only; remote frames are ignored (CiA 301 advises against them)."""
+    """A python-can bus as a `CanPort`. Standard frames only; remote frames are ignored (CiA 301
+    advises against them)."""
 
     __slots__ = ("_all", "_bus", "_listeners", "health")
 

@@ -1,4 +1,4 @@
-"""A real (or simulated) CiA 402 drive as the loop sees it: set up by SDO and read back, then one RPDO and one TPDO a cycle.
+"""A CiA 402 drive as the loop sees it: set up by SDO and read back, then one RPDO and one TPDO a cycle.
 
 RPDO1 carries controlword and target of the mode, TPDO1 statusword, position and torque; both packed by `struct`. What
 is wrong shows in `DriveSample.condition`. A condition that forbids motion sets the goal to QUICK_STOP and stays until
@@ -34,6 +34,8 @@ TRIPPING: Final = (
     | Condition.BUS_OFF | Condition.NOT_OPERATIONAL
 )  # fmt: skip
 _OPERATIONAL: Final = 5
+# Bound once: looking a member up in its enumeration costs the loop.
+_OK, _ENABLED_STATE, _ENABLED = Condition.OK, DriveState.OPERATION_ENABLED, DriveGoal.ENABLED
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +76,7 @@ class CanopenDrive:
         self.controlword_bits = 0            # mode-specific bits (homing start), or-ed in while enabled
         self.malformed_frames = 0
         node_id = settings.node_id
+        self._health, self._send = master.health, master.port.send
         self._name = f"drive node {node_id}"
         self._rpdo_id, self._tpdo_id = 0x200 + node_id, 0x180 + node_id
         self._pack = layout([_CONTROLWORD, _TARGET[settings.mode]]).pack
@@ -89,7 +92,7 @@ class CanopenDrive:
         self._sample_time_s = 0.0
         self._controlword = 0
         self._was_enabled = self._reset_requested = False
-        self._latched = Condition.OK
+        self._latched = 0  # Condition bits; an int, for a flag's truth is tested in Python code
         self._heartbeat_deadline_s = math.inf  # until the first heartbeat
         master.port.listen(self._tpdo_id, self._on_tpdo)
         master.port.listen(0x080 + node_id, self._on_emergency)
@@ -133,7 +136,7 @@ class CanopenDrive:
             self._raw_counts = self._counts = device.read(0x6064)
             self._statusword = device.read(0x6041)
         self._answered = master.syncs
-        self._latched = self.tripped = Condition.OK
+        self._latched, self.tripped = 0, Condition.OK
         self.goal = DriveGoal.DISABLED
         self._was_enabled = False
         self._heartbeat_deadline_s = math.inf
@@ -187,17 +190,17 @@ class CanopenDrive:
         age = self._master.syncs - self._answered
         statusword = self._statusword
         state = STATE_BY_STATUS[statusword & 0x7F]
-        enabled = state is DriveState.OPERATION_ENABLED
-        if age or not enabled or self._latched or self._master.health.state or now_s > self._heartbeat_deadline_s:
+        enabled = state is _ENABLED_STATE
+        if age or not enabled or self._latched or self._health.state or now_s > self._heartbeat_deadline_s:
             condition = self._diagnose(age, state, now_s)
         else:
-            condition = Condition.OK
+            condition = _OK
             self._was_enabled = True
         return DriveSample(self._sample_time_s, age, state, self._counts * self._rad_per_count,
                            self._torque * self._n_m_per_mille, statusword, condition, enabled)  # fmt: skip
 
     def _diagnose(self, age: int, state: DriveState, now_s: float) -> Condition:
-        condition = self._latched
+        condition = Condition(self._latched)
         if age:
             condition |= Condition.LATE
         if age > self.settings.missed_answers_allowed:
@@ -208,7 +211,7 @@ class CanopenDrive:
             condition |= Condition.FAULT
         if self._was_enabled and self.goal is DriveGoal.ENABLED and state is not DriveState.OPERATION_ENABLED:
             condition |= Condition.DISABLED
-        bus = self._master.health.state
+        bus = self._health.state
         if bus is BusState.PASSIVE:
             condition |= Condition.BUS_PASSIVE
         elif bus is BusState.OFF:
@@ -221,10 +224,12 @@ class CanopenDrive:
         return condition
 
     def command(self, now_s: float, setpoint: float) -> None:
-        """Send controlword and set-point: N m (CST), rad/s (CSV), rad (CSP). Until the drive reports OPERATION ENABLED the
-        target is where it stands (CSP) or zero: enabling never jumps."""
+        """Send controlword and set-point: N m (CST), rad/s (CSV), rad (CSP).
+
+        Until the drive reports OPERATION ENABLED the target is where it stands (CSP) or zero: enabling never jumps.
+        """
         state = STATE_BY_STATUS[self._statusword & 0x7F]
-        if state is DriveState.OPERATION_ENABLED and self.goal is DriveGoal.ENABLED:
+        if state is _ENABLED_STATE and self.goal is _ENABLED:
             controlword = ENABLE_OPERATION | self.controlword_bits
             target = saturate(round(setpoint * self._target_per_unit), self._target_bits)
             if self._holds_position:  # the drive counts modulo 2^32
@@ -239,12 +244,12 @@ class CanopenDrive:
                 self._reset_requested = False
             target = self._raw_counts if self._holds_position else 0
         self._controlword = controlword
-        self._master.port.send(self._rpdo_id, self._pack(controlword, target), now_s)
+        self._send(self._rpdo_id, self._pack(controlword, target), now_s)
 
     def reset_fault(self) -> None:
         """Forget what tripped the drive and give one rising edge of the fault-reset bit; the goal becomes DISABLED."""
         self.goal = DriveGoal.DISABLED
-        self.tripped = self._latched = Condition.OK
+        self._latched, self.tripped = 0, Condition.OK
         self._reset_requested = True
         self._was_enabled = False
 
@@ -255,6 +260,6 @@ class CanopenDrive:
         active = [emergency.text for emergency in self.emergencies if emergency.active]
         names = " | ".join(str(flag.name) for flag in Condition if flag in self.tripped)
         raise DriveFault(
-            f"tripped: {names}", where=self._name, given=active[-1] if active else self._master.health.last_error,
+            f"tripped: {names}", where=self._name, given=active[-1] if active else self._health.last_error,
             advice="Remove the cause, then reset the fault.",
         )

@@ -1,7 +1,7 @@
 """The master's part of CANopen in the loop: SYNC, its own heartbeat, NMT commands, polling the bus.
 
-SYNC and heartbeat are sent by the loop itself, never by `send_periodic`: on socketcan that runs in the kernel and would go
-on feeding the drive's watchdog after this process hangs.
+SYNC and heartbeat are sent by the loop itself, never by `send_periodic`: on socketcan that runs in the kernel and
+would go on feeding the drive's watchdog after this process hangs.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Before the loop: SDO, NMT and object dictionary by the canopen package, without its threads.
 
-canopen's Network normally reads the bus in a Notifier thread, which an exception ends silently. Here whoever waits for an
-SDO response pumps the port himself: one thread, the same on real and simulated buses. Every write is read back.
+canopen's Network normally reads the bus in a Notifier thread, which an exception ends silently. Here whoever waits for
+an SDO response pumps the port himself: one thread, the same on real and simulated buses. Every write is read back.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ RESPONSE_TIMEOUT_S: Final = 0.5
 _PUMP_S: Final = 0.001
 
 
-class SetupNetwork(canopen.Network):
+class SetupNetwork(canopen.Network):  # type: ignore[misc]  # canopen is not typed
     """canopen's Network on a `CanPort`. `time_s` is the set-up's own time: it moves while a response is awaited."""
 
     def __init__(self, port: CanPort) -> None:
@@ -50,7 +50,7 @@ class SetupNetwork(canopen.Network):
         self.port.poll(self.time_s, _PUMP_S)
 
 
-class _PumpedSdoClient(SdoClient):  # type: ignore[misc]  # canopen is not typed
+class _PumpedSdoClient(SdoClient):  # type: ignore[misc]
     """canopen's SDO client, waiting by pumping the port."""
 
     def read_response(self) -> bytes:

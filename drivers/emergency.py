@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-# The longest matching prefix wins: exact codes first, then classes by their upper byte or nibble.
+# The most exact entry wins: whole code, then upper byte, then upper nibble.
 _CODES: Final = {
     0x2310: "continuous over-current", 0x2320: "short circuit or earth leakage", 0x3110: "mains over-voltage",
     0x3120: "mains under-voltage", 0x3210: "DC link over-voltage", 0x3220: "DC link under-voltage",
@@ -13,21 +13,22 @@ _CODES: Final = {
     0x7310: "speed controller fault", 0x7500: "communication", 0x8110: "CAN overrun, objects lost",
     0x8120: "CAN in error passive mode", 0x8130: "life guard or heartbeat error", 0x8140: "recovered from bus off",
     0x8150: "CAN-ID collision", 0x8210: "PDO not processed due to length error", 0x8220: "PDO length exceeded",
-    0x8240: "unexpected SYNC data length", 0x8250: "RPDO time-out", 0x8311: "excess torque", 0x8400: "velocity controller",
-    0x8611: "following error", 0x8612: "reference limit",
+    0x8240: "unexpected SYNC data length", 0x8250: "RPDO time-out", 0x8311: "excess torque",
+    0x8400: "velocity controller", 0x8611: "following error", 0x8612: "reference limit",
 }  # fmt: skip
-_CLASSES: Final = (
-    (0xFF00, 0x0000, "error reset, no error"), (0xFF00, 0x1000, "generic error"), (0xFF00, 0x2100, "current, input side"),
-    (0xFF00, 0x2200, "current inside the device"), (0xFF00, 0x2300, "current, output side"), (0xF000, 0x2000, "current"),
-    (0xFF00, 0x3100, "mains voltage"), (0xFF00, 0x3200, "voltage inside the device"), (0xFF00, 0x3300, "output voltage"),
-    (0xF000, 0x3000, "voltage"), (0xFF00, 0x4100, "ambient temperature"), (0xFF00, 0x4200, "device temperature"),
-    (0xF000, 0x4000, "temperature"), (0xF000, 0x5000, "device hardware"), (0xFF00, 0x6100, "internal software"),
-    (0xFF00, 0x6200, "user software"), (0xFF00, 0x6300, "data set"), (0xF000, 0x6000, "device software"),
-    (0xF000, 0x7000, "additional modules"), (0xFF00, 0x8100, "communication"), (0xFF00, 0x8200, "protocol error"),
-    (0xFF00, 0x8300, "torque control"), (0xFF00, 0x8400, "velocity control"), (0xFF00, 0x8500, "position control"),
-    (0xFF00, 0x8600, "positioning"), (0xF000, 0x8000, "monitoring"), (0xFF00, 0x9000, "external error"),
-    (0xFF00, 0xF000, "additional functions"), (0xFF00, 0xFF00, "device specific"),
-)  # fmt: skip
+_BYTES: Final = {
+    0x00: "error reset, no error", 0x10: "generic error", 0x21: "current, input side",
+    0x22: "current inside the device", 0x23: "current, output side", 0x31: "mains voltage",
+    0x32: "voltage inside the device", 0x33: "output voltage", 0x41: "ambient temperature",
+    0x42: "device temperature", 0x61: "internal software", 0x62: "user software", 0x63: "data set",
+    0x81: "communication", 0x82: "protocol error", 0x83: "torque control", 0x84: "velocity control",
+    0x85: "position control", 0x86: "positioning", 0x90: "external error", 0xF0: "additional functions",
+    0xFF: "device specific",
+}  # fmt: skip
+_NIBBLES: Final = {
+    0x2: "current", 0x3: "voltage", 0x4: "temperature", 0x5: "device hardware", 0x6: "device software",
+    0x7: "additional modules", 0x8: "monitoring",
+}  # fmt: skip
 _REGISTER: Final = ("generic", "current", "voltage", "temperature", "communication", "device profile", "reserved",
                     "manufacturer")  # fmt: skip
 
@@ -48,8 +49,8 @@ class Emergency(NamedTuple):
     @property
     def text(self) -> str:
         """What a person reads."""
-        text = _CODES.get(self.code) or next(
-            (name for mask, value, name in _CLASSES if self.code & mask == value), "unknown class"
+        text = (
+            _CODES.get(self.code) or _BYTES.get(self.code >> 8) or _NIBBLES.get(self.code >> 12) or "unknown class"
         )
         bits = [name for bit, name in enumerate(_REGISTER) if self.register >> bit & 1]
         register = f", error register: {', '.join(bits)}" if bits else ""

@@ -97,7 +97,7 @@ class InProcessBus:
             port.forget_routes()
 
 
-class AsBusABC(can.BusABC):
+class AsBusABC(can.BusABC):  # type: ignore[misc]  # python-can is not typed here
     """Any `CanPort` as a python-can bus, for whoever wants one: canopen's own Network, python-can's loggers."""
 
     def __init__(self, port: CanPort, clock: Callable[[], float] = time.monotonic) -> None:
@@ -116,9 +116,10 @@ class AsBusABC(can.BusABC):
         self._port.send(msg.arbitration_id, bytes(msg.data), self._clock())
 
     def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
+        """Waits in slices: on a modelled bus a frame arrives only when somebody moves the time."""
         self._port.poll(self._clock())
         try:
-            return self._received.get(timeout=timeout), False
+            return self._received.get(timeout=0.005 if timeout is None else min(timeout, 0.005)), False
         except queue.Empty:
             return None, False
 

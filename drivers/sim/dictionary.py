@@ -6,7 +6,7 @@ import struct
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import canopen
 from canopen.objectdictionary import ODVariable, datatypes
@@ -14,7 +14,7 @@ from canopen.objectdictionary import ODVariable, datatypes
 from drivers.pdo import Entry
 from drivers.sim.sdo_server import AbortCode, SdoAbort
 
-Value = int | bytes
+Value = Any  # int, or bytes for strings
 
 _INTEGERS: Final = {
     datatypes.BOOLEAN: "B", datatypes.UNSIGNED8: "B", datatypes.UNSIGNED16: "H", datatypes.UNSIGNED32: "I",
@@ -73,9 +73,7 @@ class Dictionary:
 
     def number(self, index: int, subindex: int = 0) -> int:
         """An integer value."""
-        value = self.values[key_of(index, subindex)]
-        assert isinstance(value, int)
-        return value
+        return int(self.values[key_of(index, subindex)])
 
     def item(self, index: int, subindex: int) -> Item:
         """Description of a variable; `SdoAbort` if there is none."""

@@ -1,8 +1,8 @@
-"""Simulated servo drive on a CANopen bus: CiA 402 states, CST, CSV, CSP, homing, quick stop, faults; a plant behind it.
+"""Simulated servo drive on CANopen: CiA 402 states, CST, CSV, CSP, homing, quick stop, faults; a plant behind it.
 
-The node keeps no time of its own: each SYNC moves the plant by one period with the torque in force since the SYNC before,
-then the positions and torques of that instant go out. A torque that arrives by an event-driven RPDO after SYNC k thus
-acts from SYNC k to k + 1, one by a synchronous RPDO (type 1) from SYNC k + 1 on, as CiA 301 says.
+The node keeps no time of its own: each SYNC moves the plant by one period with the torque in force since the SYNC
+before, then the positions and torques of that instant go out. A torque that arrives by an event-driven RPDO after
+SYNC k thus acts from SYNC k to k + 1, one by a synchronous RPDO (type 1) from SYNC k + 1 on, as CiA 301 says.
 """
 
 from __future__ import annotations
@@ -13,23 +13,29 @@ from pathlib import Path
 from drivers.base import PlantLike, ServoLike, ServoTarget
 from drivers.bus import CanPort
 from drivers.cia402 import Controlword, DriveState, Mode, Statusword
-from drivers.sim.device import EDS_FOLDER, NmtState, SimulatedDevice
+from drivers.sim.device import EDS_FOLDER, SimulatedDevice
 from drivers.sim.dictionary import key_of
+from drivers.sim.internal_motion import Homing, HomingMethod, ramp, step_homing
 from drivers.sim.power_stage import REMOTE, STATUS, next_state
 from drivers.sim.sdo_server import AbortCode, SdoAbort
 
 _CONTROLWORD, _STATUSWORD = key_of(0x6040), key_of(0x6041)
 _MODE, _MODE_DISPLAY = key_of(0x6060), key_of(0x6061)
 _POSITION, _VELOCITY, _TORQUE = key_of(0x6064), key_of(0x606C), key_of(0x6077)
+_MAX_TORQUE = key_of(0x6072)
 _TARGET_TORQUE, _TARGET_POSITION, _TARGET_VELOCITY = key_of(0x6071), key_of(0x607A), key_of(0x60FF)
-_ERROR_CODE = key_of(0x603F)
+_ERROR_CODE, _QUICK_STOP_DECELERATION = key_of(0x603F), key_of(0x6085)
+_FOLLOWING_ERROR, _FOLLOWING_ERROR_WINDOW = key_of(0x60F4), key_of(0x6065)
 
 _SERVO_MODES = (Mode.HOMING, Mode.CYCLIC_SYNC_POSITION, Mode.CYCLIC_SYNC_VELOCITY)
-_AT_REST_RAD_S = 0.05  # a stop ramp has ended
+_STOPPING = (DriveState.QUICK_STOP_ACTIVE, DriveState.FAULT_REACTION_ACTIVE)
+_FOLLOWING_ERROR_CODE = 0x8611  # CiA 402-2
+_AT_REST_RAD_S = 0.5            # a stop ramp has ended: below half a turn in 12 s
+_LOOP_PERIOD_S = 0.001          # of the servo, where the SYNC is slower
 
 
 class SimulatedDrive(SimulatedDevice):
-    """The drive node. `servo`: loops inside the drive; without them only CST is accepted and stops are coasting.
+    """The drive node. `servo`: loops inside the drive; without them only CST is accepted and a stop is coasting.
 
     Positions in increments of 0x608F, torques in 1/1000 of `rated_torque_n_m` (0x6076, mN m): it sets the resolution of
     set-point and measurement. Linear axes: metres for radians, newtons for newton metres, metres per "revolution" 2 pi.
@@ -55,6 +61,7 @@ class SimulatedDrive(SimulatedDevice):
         self.dictionary.on_write(0x6040, self._on_controlword_sdo)
         self.dictionary.on_write(0x6060, self._on_mode)
         self.dictionary.on_write(0x60C2, self._on_interpolation_time)
+        self.dictionary.on_write(0x6098, self._on_homing_method)
         self._power_up()
 
     def _power_up(self) -> None:
@@ -67,8 +74,10 @@ class SimulatedDrive(SimulatedDevice):
         self._torque_n_m = 0.0        # command in force in CST, set when an RPDO arrives
         self._offset_counts = 0       # position = encoder counts - offset, set by homing
         self._counts = round(self.plant.motor_position_rad * self._counts_per_rad)
+        self._last_counts = self._counts
         self._ramp_rad_s = 0.0        # velocity reference of stop ramps
-        self._homing_cycles = -1      # -1: not started
+        self._homing: Homing | None = None
+        self._last_target = 0
         self._fault_present = False
         self._set_state(DriveState.SWITCH_ON_DISABLED)
         self._measure(self._counts)
@@ -86,27 +95,31 @@ class SimulatedDrive(SimulatedDevice):
         self._refresh_drive()
 
     def _refresh_drive(self) -> None:
-        """What follows from state and mode, worked out once here and not every cycle."""
-        mode = self.values[_MODE]
+        """What follows from state and mode, worked out here and not every cycle."""
         enabled = self.state is DriveState.OPERATION_ENABLED
-        self._direct = enabled and mode == Mode.CYCLIC_SYNC_TORQUE
-        self._idle = not enabled and self.state not in (
-            DriveState.QUICK_STOP_ACTIVE, DriveState.FAULT_REACTION_ACTIVE)  # fmt: skip
+        self._direct = enabled and self.values[_MODE] == Mode.CYCLIC_SYNC_TORQUE
+        self._idle = not enabled and self.state not in _STOPPING
         if not self._direct:
             self._torque_n_m = 0.0
-        cyclic = enabled and mode != Mode.HOMING
-        self._status(0, follows=cyclic)
+        self._homing = None
+        self._last_target = self.values[_POSITION]
+        follows = enabled and self.values[_MODE] != Mode.HOMING
+        self._status(Statusword.FOLLOWS_COMMAND if follows else 0)
 
-    def _status(self, extra: int, *, follows: bool = False) -> None:
-        self.values[_STATUSWORD] = STATUS[self.state] | REMOTE | extra | (Statusword.FOLLOWS_COMMAND * follows)
+    def _status(self, extra: int) -> None:
+        self.values[_STATUSWORD] = STATUS[self.state] | REMOTE | int(extra)
 
     def process_rpdo(self, now_s: float) -> None:
         if self.values[_CONTROLWORD] != self._controlword or self.state is DriveState.SWITCHED_ON:
             self._take_controlword(now_s)
         if self._direct:
-            torque_n_m = self.values[_TARGET_TORQUE] * self._n_m_per_mille
-            limit_n_m = self.values[_MAX_TORQUE] * self._n_m_per_mille
-            self._torque_n_m = max(-limit_n_m, min(limit_n_m, torque_n_m))
+            values = self.values
+            torque, limit = values[_TARGET_TORQUE], values[_MAX_TORQUE]
+            if torque > limit:
+                torque = limit
+            elif torque < -limit:
+                torque = -limit
+            self._torque_n_m = torque * self._n_m_per_mille
 
     def _take_controlword(self, now_s: float) -> None:
         controlword, previous = self.dictionary.number(0x6040), self._controlword
@@ -119,10 +132,17 @@ class SimulatedDrive(SimulatedDevice):
             if state is DriveState.QUICK_STOP_ACTIVE:
                 self._start_ramp()
             self._set_state(state)
-        if controlword & ~previous & Controlword.HOMING_START:
-            self._homing_cycles = 0
-        elif not controlword & Controlword.HOMING_START:
-            self._homing_cycles = -1
+        if self.state is DriveState.OPERATION_ENABLED and self.values[_MODE] == Mode.HOMING:
+            self._take_homing_start(bool(controlword & Controlword.HOMING_START))
+
+    def _take_homing_start(self, start: bool) -> None:
+        if not start:
+            self._homing = None
+        elif self._homing is None:
+            number = self.dictionary.number
+            self._homing = Homing(HomingMethod(number(0x6098)), number(0x6099, 2), number(0x609A),
+                                  self._counts_per_rev)  # fmt: skip
+            self._status(0)
 
     def trip(self, code: int, register: int, now_s: float, *, lasting: bool = False) -> None:
         """A fault inside the drive: EMCY, stop ramp, FAULT (transitions 13, 14). lasting: a reset does not clear it
@@ -153,7 +173,12 @@ class SimulatedDrive(SimulatedDevice):
         self._set_state(reaction if powered or reaction is DriveState.QUICK_STOP_ACTIVE else DriveState.FAULT)
 
     def _start_ramp(self) -> None:
-        self._ramp_rad_s = self.values[_VELOCITY] / self._counts_per_rad
+        self._ramp_rad_s = self._velocity_rad_s()
+        if self._servo is not None:
+            self._servo.reset(self.plant.motor_position_rad)
+
+    def _velocity_rad_s(self) -> float:
+        return (self._counts - self._last_counts) / self._counts_per_rad / self.period_s
 
     # -- SDO hooks --------------------------------------------------------------------------------------------------
 
@@ -170,33 +195,99 @@ class SimulatedDrive(SimulatedDevice):
         self.values[_MODE] = self.values[_MODE_DISPLAY] = value
         self._refresh_drive()
 
-    def _on_interpolation_time(self, index: int, subindex: int, value: int) -> None:
-        value_, exponent = (value, self.dictionary.number(0x60C2, 2)) if subindex == 1 else (
-            self.dictionary.number(0x60C2, 1), value)  # fmt: skip
-        if value_ == 0:
+    def _on_homing_method(self, index: int, subindex: int, value: int) -> None:
+        if value not in list(HomingMethod):
             raise SdoAbort(AbortCode.INVALID_VALUE)
-        self.period_s = value_ * 10.0**exponent
+
+    def _on_interpolation_time(self, index: int, subindex: int, value: int) -> None:
+        number = self.dictionary.number
+        units, exponent = (value, number(0x60C2, 2)) if subindex == 1 else (number(0x60C2, 1), value)
+        if units == 0:
+            raise SdoAbort(AbortCode.INVALID_VALUE)
+        self.period_s = units * 10**exponent if exponent >= 0 else units / 10**-exponent
 
     # -- in the loop ------------------------------------------------------------------------------------------------
 
     def process_sync(self, now_s: float) -> None:
-        plant, values = self.plant, self.values
-        torque_n_m = self._torque_n_m if self._direct or self._idle else self._internal_torque()
-        plant.advance(torque_n_m, self.period_s)
+        plant = self.plant
+        if self._direct or self._idle:
+            plant.advance(self._torque_n_m, self.period_s)
+            torque = round(plant.torque_n_m * self._mille_per_n_m)
+        else:
+            torque = round(self._advance_by_servo(now_s) * self._mille_per_n_m)
+        self.values[_TORQUE] = torque if -32768 <= torque <= 32767 else max(-32768, min(32767, torque))
         self._measure(round(plant.motor_position_rad * self._counts_per_rad))
-        torque = round(plant.torque_n_m * self._mille_per_n_m)
-        values[_TORQUE] = torque if -32768 <= torque <= 32767 else max(-32768, min(32767, torque))
 
     def _measure(self, counts: int) -> None:
         """Position with the wrap-around of an INTEGER32, velocity as its difference."""
-        self.values[_VELOCITY] = round((counts - self._counts) / self.period_s)
-        self._counts = counts
-        self.values[_POSITION] = ((counts - self._offset_counts + 0x80000000) & 0xFFFFFFFF) - 0x80000000
+        self._last_counts, self._counts = self._counts, counts
+        self.values[_VELOCITY] = int((counts - self._last_counts) / self.period_s)
+        self.values[_POSITION] = _wrap(counts - self._offset_counts)
 
-    def _internal_torque(self) -> float:
-        """Torque of the loops inside the drive: CSV, CSP, homing, stop ramps."""
-        raise NotImplementedError
+    def _advance_by_servo(self, now_s: float) -> float:
+        """Loops inside the drive (CSV, CSP, homing, stop ramps) in steps of 1 ms; mean measured torque [N m]."""
+        plant, servo = self.plant, self._servo
+        steps = max(1, round(self.period_s / _LOOP_PERIOD_S))
+        step_s = self.period_s / steps
+        limit_n_m = self.values[_MAX_TORQUE] * self._n_m_per_mille
+        target = self._target(now_s)
+        mean_n_m = 0.0
+        for step in range(1, steps + 1):
+            torque_n_m = 0.0
+            if servo is not None and target is not None:
+                position_rad = target.position_rad
+                if position_rad is not None:  # targets of the bus, interpolated linearly between the SYNCs
+                    position_rad -= target.velocity_rad_s * (steps - step) * step_s
+                inner = ServoTarget(target.velocity_rad_s, position_rad)
+                torque_n_m = servo.torque(inner, plant.motor_position_rad, step_s)
+            plant.advance(max(-limit_n_m, min(limit_n_m, torque_n_m)), step_s)
+            mean_n_m += plant.torque_n_m / steps
+        return mean_n_m
+
+    def _target(self, now_s: float) -> ServoTarget | None:
+        """What to follow until the next SYNC; None: power stage off."""
+        if self.state in _STOPPING:
+            return self._stop_target(now_s)
+        mode, values = self.values[_MODE], self.values
+        if mode == Mode.CYCLIC_SYNC_VELOCITY:
+            return ServoTarget(values[_TARGET_VELOCITY] / self._counts_per_rad)
+        if mode == Mode.CYCLIC_SYNC_POSITION:
+            return self._position_target(now_s)
+        if mode == Mode.HOMING and self._homing is not None:
+            return self._homing_target()
+        return ServoTarget(0.0)
+
+    def _stop_target(self, now_s: float) -> ServoTarget | None:
+        deceleration_rad_s2 = self.values[_QUICK_STOP_DECELERATION] / self._counts_per_rad
+        self._ramp_rad_s = ramp(self._ramp_rad_s, 0.0, deceleration_rad_s2, self.period_s)
+        if self._servo is None or (self._ramp_rad_s == 0.0 and abs(self._velocity_rad_s()) < _AT_REST_RAD_S):
+            fault = self.state is DriveState.FAULT_REACTION_ACTIVE
+            self._set_state(DriveState.FAULT if fault else DriveState.SWITCH_ON_DISABLED)
+            return None
+        return ServoTarget(self._ramp_rad_s)
+
+    def _position_target(self, now_s: float) -> ServoTarget | None:
+        values = self.values
+        moved = _wrap(values[_TARGET_POSITION] - self._last_target)
+        self._last_target = values[_TARGET_POSITION]
+        error = _wrap(values[_TARGET_POSITION] - values[_POSITION])  # both wrap: only the difference counts
+        values[_FOLLOWING_ERROR] = error
+        if abs(error) > values[_FOLLOWING_ERROR_WINDOW]:
+            self.trip(_FOLLOWING_ERROR_CODE, 0x21, now_s)
+            self._status(Statusword.FOLLOWING_ERROR)
+            return self._stop_target(now_s)
+        return ServoTarget(moved / self._counts_per_rad / self.period_s, (self._counts + error) / self._counts_per_rad)
+
+    def _homing_target(self) -> ServoTarget:
+        assert self._homing is not None
+        before = self._homing
+        run = self._homing = step_homing(before, self._counts, self._last_counts, self.period_s)
+        if run.attained and not before.attained:
+            self._offset_counts = run.reference - self.dictionary.number(0x607C)
+        self._status(Statusword.HOMING_ATTAINED * run.attained | Statusword.TARGET_REACHED * run.done)
+        return ServoTarget(run.velocity / self._counts_per_rad)
 
 
-_MAX_TORQUE = key_of(0x6072)
-__all__ = ["NmtState", "SimulatedDrive"]
+def _wrap(counts: int) -> int:
+    """As an INTEGER32 holds it."""
+    return ((counts + 0x80000000) & 0xFFFFFFFF) - 0x80000000

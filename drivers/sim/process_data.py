@@ -46,6 +46,7 @@ class ProcessData:
         self._dictionary, self._values, self._port = dictionary, dictionary.values, port
         self._received, self._emergency = received, emergency
         self._rpdos: dict[int, _Pdo] = {}
+        self._synchronous: list[_Pdo] = []  # RPDOs that wait for the SYNC
         self._tpdos: list[_Pdo] = []
         self._operational = False
         for index in {key >> 8 for key in dictionary.items}:
@@ -59,10 +60,11 @@ class ProcessData:
         for cob_id in self._rpdos:
             self._port.ignore(cob_id, self._on_rpdo)
         self._operational = operational
-        self._rpdos, self._tpdos = {}, []
+        self._rpdos, self._synchronous, self._tpdos = {}, [], []
         if not operational:
             return
         self._rpdos = {pdo.cob_id: pdo for pdo in self._compile(RPDO_COMMUNICATION, RPDO_MAPPING)}
+        self._synchronous = [pdo for pdo in self._rpdos.values() if pdo.transmission_type <= 240]
         self._tpdos = self._compile(TPDO_COMMUNICATION, TPDO_MAPPING)
         for cob_id in self._rpdos:
             self._port.listen(cob_id, self._on_rpdo)
@@ -133,7 +135,7 @@ class ProcessData:
 
     def on_sync(self, now_s: float) -> None:
         """Synchronous RPDOs act now; the TPDOs that are due go out."""
-        for pdo in self._rpdos.values():
+        for pdo in self._synchronous:
             if pdo.pending:
                 self._values.update(zip(pdo.keys, pdo.packer.unpack(pdo.pending), strict=True))
                 pdo.pending = b""

@@ -1,0 +1,1 @@
+"""The simulated reality behind the drivers: CANopen nodes, serial line, and the plant they move."""

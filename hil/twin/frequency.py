@@ -45,7 +45,7 @@ def natural_transfer(
     load = np.zeros((len(chain.names), 1))
     load[chain.motor] = 1.0
     dynamic = chain.inertia_kg_m2 * s**2 + damping_n_m_s_rad * s + chain.stiffness_n_m_rad
-    answer = np.linalg.solve(dynamic, load)[..., 0]
+    answer = np.asarray(np.linalg.solve(dynamic, load)[..., 0], dtype=np.complex128)
     tf1 = answer[:, chain.motor]
     return tf1, answer[:, chain.table] / tf1
 

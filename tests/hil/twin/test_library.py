@@ -1,0 +1,152 @@
+"""The library: complete, well-formed, compiled; every mechanism is neutral at zero strength and finite."""
+
+from pathlib import Path
+from string import Formatter
+
+import numpy as np
+import pytest
+from contributions import PERIOD_S, PROPERTY, moments, row
+from hypothesis import given
+from hypothesis import strategies as st
+from numba import float64, typeof
+
+from hil.twin import mechanisms
+from hil.twin.chain import two_mass
+from hil.twin.library import BY_ID, LIBRARY
+from hil.twin.mechanism import PARAMETERS, WIDTH, Block, Dimension, Moment, Stage
+
+# The interface: id, block, and the parameters that a diagnosis reports by these names
+TABLE = {
+    "asymmetric_friction": ("motor_side", ["offset_torque_n_m"]),
+    "constant_load": ("motor_side", ["load_torque_n_m"]),
+    "stribeck_friction": ("motor_side", ["static_torque_n_m", "stribeck_velocity_rad_s"]),
+    "presliding_hysteresis": ("motor_side", ["stiffness_n_m_rad"]),
+    "position_dependent_friction": ("motor_side", ["fraction", "period_m"]),
+    "nonlinear_viscous_friction": ("motor_side", ["quadratic_n_m_s2_rad2"]),
+    "friction_drift": ("motor_side", ["fraction", "time_constant_s"]),
+    "table_side_friction": ("table", ["share"]),
+    "backlash": ("transmission", ["gap_m"]),
+    "preload_loss": ("transmission", ["zone_m", "stiffness_ratio"]),
+    "position_dependent_stiffness": ("transmission", ["relative_slope"]),
+    "periodic_lead_error": ("transmission", ["amplitude_m", "phase_rad"]),
+    "cumulative_lead_error": ("transmission", ["slope_m_m"]),
+    "thermal_growth": ("transmission", ["relative_growth", "time_constant_s"]),
+    "structural_mode": ("table", ["frequency_hz", "damping_ratio"]),
+    "cogging_torque": ("motor_side", ["amplitude_n_m", "cycles_per_rev", "phase_rad"]),
+    "torque_ripple": ("drive", ["fraction", "cycles_per_rev"]),
+    "torque_constant_saturation": ("drive", ["coefficient_1_n2_m2"]),
+    "torque_saturation": ("drive", ["limit_n_m"]),
+    "torque_dead_zone": ("drive", ["half_width_n_m"]),
+    "current_loop_lag": ("drive", ["time_constant_s"]),
+    "transport_delay": ("drive", ["delay_s"]),
+    "velocity_filter_lag": ("controller", ["time_constant_s"]),
+    "channel_time_skew": ("sensor", ["delay_s"]),
+    "encoder_eccentricity": ("sensor", ["amplitude_rad", "phase_rad"]),
+    "scale_interpolation_error": ("sensor", ["amplitude_m", "period_m"]),
+    "external_force": ("table", ["force_n", "start_s", "end_s"]),
+    "spring_load": ("table", ["stiffness_n_m", "rest_position_m"]),
+}
+
+# Parameters at which a mechanism leaves the value 0.7 of its stage, or any value, as it is
+VALUE = 0.7
+NEUTRAL = {
+    "stribeck_friction": {"static_torque_n_m": VALUE, "stribeck_velocity_rad_s": 3.0},
+    "position_dependent_friction": {"fraction": 0.0, "period_m": 0.02, "phase_rad": 1.0},
+    "friction_drift": {"fraction": 0.0, "time_constant_s": 10.0},
+    "preload_loss": {"zone_m": 1e-4, "stiffness_ratio": 1.0},
+    "periodic_lead_error": {"amplitude_m": 0.0, "phase_rad": 1.0},
+    "thermal_growth": {"relative_growth": 0.0, "time_constant_s": 10.0},
+    "cogging_torque": {"amplitude_n_m": 0.0, "cycles_per_rev": 6.0, "phase_rad": 1.0},
+    "torque_ripple": {"fraction": 0.0, "cycles_per_rev": 6.0, "phase_rad": 1.0},
+    "torque_saturation": {"limit_n_m": VALUE},
+    "encoder_eccentricity": {"amplitude_rad": 0.0, "phase_rad": 1.0},
+    "scale_interpolation_error": {"amplitude_m": 0.0, "period_m": 2e-5, "phase_rad": 1.0},
+    "external_force": {"force_n": 0.0, "start_s": 1.0, "end_s": 2.0},
+    "spring_load": {"stiffness_n_m": 0.0, "rest_position_m": 0.1},
+}
+
+STEPPED = [mechanism for mechanism in LIBRARY if mechanism.stage not in (Stage.CHAIN, Stage.CHANNEL)]
+SUFFIX = {
+    Dimension.TORQUE: "_n_m", Dimension.MOTOR_SPEED: "_rad_s", Dimension.MOTOR_STIFFNESS: "_n_m_rad",
+    Dimension.MOTOR_DRAG: "_n_m_s2_rad2", Dimension.INVERSE_TORQUE_SQUARED: "_1_n2_m2", Dimension.ANGLE: "_rad",
+    Dimension.LENGTH: "_m", Dimension.TIME: "_s", Dimension.FORCE: "_n", Dimension.STIFFNESS: "_n_m",
+    Dimension.FREQUENCY: "_hz", Dimension.COUNT: "cycles_per_rev",
+}   # RATIO and PER_LENGTH bear no unit of their own
+
+each = pytest.mark.parametrize("mechanism", LIBRARY, ids=lambda mechanism: mechanism.id)
+each_stepped = pytest.mark.parametrize("mechanism", STEPPED, ids=lambda mechanism: mechanism.id)
+
+
+def test_every_effect_is_there_once_with_its_block_and_parameters() -> None:
+    assert sorted(mechanism.id for mechanism in LIBRARY) == sorted(TABLE)
+    for effect, (block, names) in TABLE.items():
+        assert BY_ID[effect].block == Block(block)
+        assert set(names) <= set(BY_ID[effect].names)
+
+
+def test_one_file_per_mechanism() -> None:
+    files = {path.stem for path in Path(mechanisms.__path__[0]).glob("*.py")} - {"__init__"}
+    assert files == set(BY_ID)
+
+
+@each
+def test_bounds_units_and_text(mechanism) -> None:
+    assert len(mechanism.parameters) < PARAMETERS   # the last of the row is the variant
+    for parameter in mechanism.parameters:
+        assert np.isfinite([parameter.low, parameter.high]).all()
+        assert parameter.low < parameter.high
+        assert parameter.name.endswith(SUFFIX.get(parameter.dimension, ""))
+    named = {field for _, field, _, _ in Formatter().parse(mechanism.sentence) if field is not None}
+    assert named <= set(mechanism.names)
+    assert mechanism.sentence.endswith(".")
+    assert mechanism.element
+    assert mechanism.equation
+    assert mechanism.source
+
+
+@each
+def test_variants_with_a_second_stage_come_in_pairs(mechanism) -> None:
+    assert len(set(mechanism.variants)) == len(mechanism.variants)
+    if mechanism.second_stage is not None:
+        assert mechanism.second_stage is not mechanism.stage
+        assert len(mechanism.variants) % 2 == 0
+
+
+@each_stepped
+def test_compiles_to_the_one_signature(mechanism) -> None:
+    moment = typeof(Moment(*[0.0] * len(Moment._fields)))
+    mechanism.contribution.compile((float64, moment, float64[::1], float64[::1]))
+    assert mechanism.contribution.nopython_signatures[0].return_type == float64
+
+
+@each_stepped
+@given(at=moments)
+@PROPERTY
+def test_neutral_at_zero_strength(mechanism, at) -> None:
+    neutral = NEUTRAL.get(mechanism.id, dict.fromkeys(mechanism.names, 0.0))
+    for variant in range(len(mechanism.variants)):
+        values = row([neutral[name] for name in mechanism.names], variant)
+        first = at._replace(within_s=0.0)
+        assert mechanism.contribution(VALUE, first, values, np.zeros(WIDTH)) == pytest.approx(VALUE, rel=1e-12)
+
+
+def test_neutral_structure_and_skew() -> None:
+    chain = two_mass(335.0, 384.0, 5.64e7, 0.03, 0.01)
+    assert BY_ID["structural_mode"].contribution(chain, (30.0, 0.05, 0.0)) is chain
+    channels = tuple(np.random.default_rng(1).normal(size=(4, 50)))
+    for variant in range(3):
+        np.testing.assert_array_equal(
+            BY_ID["channel_time_skew"].contribution(channels, (0.0,), variant, PERIOD_S), channels)
+
+
+@each_stepped
+@given(data=st.data(), at=moments, value=st.floats(-1e3, 1e3))
+@PROPERTY
+def test_finite_within_bounds_and_at_zero(mechanism, data, at, value) -> None:
+    strategies = [st.floats(p.low, p.high) | st.sampled_from([0.0, p.low, p.high]) for p in mechanism.parameters]
+    values = row(data.draw(st.tuples(*strategies)), data.draw(st.integers(0, len(mechanism.variants) - 1)))
+    memory = np.zeros(WIDTH)
+    for within_s in (0.0, at.step_s, 0.0):
+        out = mechanism.contribution(value, at._replace(within_s=within_s), values, memory)
+        assert np.isfinite(out)
+    assert np.isfinite(memory).all()

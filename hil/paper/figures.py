@@ -56,6 +56,7 @@ def bode_transfer(number: int) -> Figure:
             magnitude.axvline(hz, color=_MODEL_STYLE[name]["color"], linewidth=0.6, alpha=0.4)
     quantity, unit = (("motor angle / torque", "dB re 1 rad/(N m)"), ("table / motor", "dB"))[number - 1]
     phase.yaxis.set_major_locator(MultipleLocator((45.0, 180.0)[number - 1]))
+    phase.set_ylim(top=10.0)
     magnitude.set_title(f"TF$_{number}$: {quantity}; thin lines: eigenfrequencies", loc="left")
     magnitude.set_ylabel(f"magnitude [{unit}]")
     magnitude.legend()

@@ -14,6 +14,7 @@ from matplotlib.ticker import MultipleLocator
 from hil.moves import Motion
 from hil.paper import source
 from hil.paper.tables import bandwidth_hz
+from hil.trajectory import Trajectory
 from hil.twin import frequency
 from hil.twin.chain import RECONSTRUCTED_TABLE_1, FloatArray, seven_dof
 from hil.twin.modal import modal
@@ -113,28 +114,28 @@ def move_over_time(runs: Sequence[tuple[str, source.Run]]) -> Figure:
     axes = figure.subplots(6, 1, sharex=True)
     first = runs[0][1]
     for axis, values in zip(axes[[0, 2, 3, 4]], _kinematics(first.command), strict=True):
-        axis.plot(first.time_s, values, color=COMMAND, linewidth=0.9, label="command", zorder=3)
+        axis.plot(first.command.time_s, values, color=COMMAND, linewidth=0.9, label="command", zorder=3)
     for name, run in runs:
         style = _MODEL_STYLE[name] | {"linewidth": 1.2}
         position, velocity, acceleration, jerk = _kinematics(run.table)
         signals = (position, run.following_error_m * 1e6, velocity, acceleration, jerk, run.response.torque)
         for axis, values in zip(axes, signals, strict=True):
-            axis.plot(run.time_s, values, label=f"{name}, table" if axis is axes[0] else None, **style)
+            axis.plot(run.command.time_s, values, label=f"{name}, table" if axis is axes[0] else None, **style)
     for axis, label in zip(axes, ("position [mm]", "following error [µm]", "velocity [m/min]",
                                   "acceleration [m/s²]", "jerk [m/s³]", "motor torque [N m]"), strict=True):
         axis.set_ylabel(label)
         axis.grid(alpha=0.3)
     peak_m_min = float(np.max(first.command.velocity_m_s)) * 60.0
-    lowered = f" (lowered to {peak_m_min:.1f} m/min by the acceleration limit)" if first.move.notes else ""
+    lowered = f" (lowered to {peak_m_min:.1f} m/min by the acceleration limit)" if first.command.notes else ""
     axes[0].set_title(f"100 mm at {first.feed_m_min:g} m/min{lowered}", loc="left")
     axes[0].legend(loc="upper left")
     axes[-1].set_xlabel("time [s]")
-    axes[-1].set_xlim(first.time_s[0], first.time_s[-1])
+    axes[-1].set_xlim(first.command.time_s[0], first.command.time_s[-1])
     figure.align_ylabels(axes)
     return figure
 
 
-def _kinematics(motion: Motion) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+def _kinematics(motion: Motion | Trajectory) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     return (motion.position_m * 1e3, motion.velocity_m_s * 60.0, motion.acceleration_m_s2, motion.jerk_m_s3)
 
 

@@ -8,10 +8,11 @@ from math import pi
 import numpy as np
 
 from hil.control import Gains, make_gains
-from hil.moves import Motion, MotionLimits, Move, dwell
-from hil.sine_squared import sine_squared
+from hil.moves import Motion
+from hil.profile import Profile
+from hil.trajectory import Trajectory, plan
 from hil.twin.axis import Physics, Response, Twin
-from hil.twin.chain import RECONSTRUCTED_TABLE_1, Chain, seven_dof, two_mass
+from hil.twin.chain import RECONSTRUCTED_TABLE_1, Chain, FloatArray, seven_dof, two_mass
 
 LEAD_M = 0.010
 RATIO_M_RAD = LEAD_M / (2.0 * pi)
@@ -24,8 +25,8 @@ FEEDS_M_MIN = (7.0, 22.0, 30.0)
 
 # Not in the source, or lost with its Table 1 and figures.
 DAMPING_RATIO = 0.03
-ACCELERATION_M_S2 = 2.3
-JERK_M_S3 = 200.0
+ACCELERATION_M_S2 = 2.5
+JERK_M_S3 = 120.0
 
 ASSUMPTIONS = (
     "Inertias and stiffnesses of the 7-dof model are a reconstruction: Table 1 of the source is lost.",
@@ -60,48 +61,39 @@ def gains(velocity_feedforward: float, position_from_table: bool = False) -> Gai
 
 @dataclass(frozen=True)
 class Run:
-    """One simulated move, arrays (n,) at the control period; velocity, acceleration and jerk of the table
-    are central differences of its position."""
+    """One simulated move: set-points and response (n,) at the control period."""
 
     feed_m_min: float
-    move: Move
-    time_s: np.ndarray
-    command: Motion
+    command: Trajectory
     response: Response
 
     @property
     def table(self) -> Motion:
-        """Motion of the table."""
-        period_s = float(self.time_s[1])
+        """Motion of the table; velocity, acceleration and jerk are central differences of its position."""
+        period_s = self.command.period_s
         position = self.response.table_position_m
         velocity = np.gradient(position, period_s)
         acceleration = np.gradient(velocity, period_s)
         return Motion(position, velocity, acceleration, np.gradient(acceleration, period_s))
 
     @property
-    def following_error_m(self) -> np.ndarray:
-        """Position command minus table position."""
+    def following_error_m(self) -> FloatArray:
+        """Position command minus table position (n,)."""
         return self.command.position_m - self.response.table_position_m
 
 
 def simulate(chain: Chain, feed_m_min: float, velocity_feedforward: float = 1.0) -> Run:
     """A 100 mm move of an axis with friction by Eq. 24, from rest, in closed loop."""
     law = gains(velocity_feedforward)
-    limits = MotionLimits(feed_m_min / 60.0, ACCELERATION_M_S2, JERK_M_S3)
-    move = sine_squared(0.0, STROKE_M, limits)
-    command = _sample((dwell(0.0, 0.05), move, dwell(STROKE_M, 0.25)), law.period_s)
+    profile = Profile.model_validate({
+        "schema_version": 1,
+        "limits": {"velocity_m_s": 0.6, "acceleration_m_s2": ACCELERATION_M_S2, "jerk_m_s3": JERK_M_S3},
+        "segments": [
+            {"kind": "dwell", "duration_s": 0.052},
+            {"kind": "sine_squared", "to_m": STROKE_M, "feed_m_s": feed_m_min / 60.0},
+            {"kind": "dwell", "duration_s": 0.252},
+        ],
+    })
+    command = plan(profile, law.period_s)
     twin = Twin(Physics(chain, COULOMB_N_M, VISCOUS_N_M_S_RAD), law)
-    response = twin.simulate(command.position_m, command.velocity_m_s)
-    return Run(feed_m_min, move, np.arange(command.position_m.size) * law.period_s, command, response)
-
-
-def _sample(moves: tuple[Move, ...], period_s: float) -> Motion:
-    """Set-points of moves one after the other, one per period."""
-    pieces = [piece for move in moves for piece in move.pieces]
-    ends_s = np.cumsum([piece.duration_s for piece in pieces])
-    time_s = np.arange(int(ends_s[-1] / period_s)) * period_s
-    which = np.searchsorted(ends_s, time_s, side="right")
-    parts = [
-        piece.at(time_s[which == i] - (ends_s[i] - piece.duration_s)) for i, piece in enumerate(pieces)
-    ]
-    return Motion(*(np.concatenate(channel) for channel in zip(*parts, strict=True)))
+    return Run(feed_m_min, command, twin.simulate(command.position_m, command.velocity_m_s))

@@ -156,7 +156,7 @@ class Encoder(Protocol):
     def read(self, now_s: float) -> EncoderSample: ...
 
     def check(self) -> None:
-        """Raise `EncoderError` if the encoder cannot be trusted; the text says why."""
+        """Raise `EncoderError` if the sample read last cannot be trusted; the text says why."""
 
 
 class PlantLike(Protocol):

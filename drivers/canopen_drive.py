@@ -39,6 +39,16 @@ _OK, _ENABLED_STATE, _ENABLED = Condition.OK, DriveState.OPERATION_ENABLED, Driv
 
 
 @dataclass(frozen=True, slots=True)
+class HomingSettings:
+    """Objects 0x6098, 0x6099, 0x609A, 0x607C."""
+
+    method: int                # CiA 402: 33 and 34 index pulse, 37 where it stands, ...
+    speed_rad_s: float
+    acceleration_rad_s2: float
+    offset_rad: float = 0.0    # the position that the reference is to have
+
+
+@dataclass(frozen=True, slots=True)
 class DriveSettings:
     """How the drive is to run. Rotary: rad and N m; linear drives: m and N."""
 
@@ -52,6 +62,7 @@ class DriveSettings:
     max_torque_n_m: float | None = None    # 0x6072; None: as the drive has it
     quick_stop_rad_s2: float | None = None  # 0x6085; None: as the drive has it
     command_transmission: int = EVENT_DRIVEN  # RPDO: acts at once (255) or at the next SYNC (1)
+    homing: HomingSettings | None = None   # for Mode.HOMING; None: as the drive has it
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,16 +90,14 @@ class CanopenDrive:
         self._health, self._send = master.health, master.port.send
         self._name = f"drive node {node_id}"
         self._rpdo_id, self._tpdo_id = 0x200 + node_id, 0x180 + node_id
-        self._pack = layout([_CONTROLWORD, _TARGET[settings.mode]]).pack
         self._unpack = layout(_FEEDBACK).unpack
-        self._target_bits = _TARGET[settings.mode].bits
-        self._holds_position = settings.mode is Mode.CYCLIC_SYNC_POSITION
+        self._take_mode(settings.mode)
         self._rad_per_count = self._n_m_per_mille = self._target_per_unit = 0.0
         self._statusword = 0
         self._raw_counts = 0   # as the drive counts, wrapping
         self._counts = 0       # unwrapped
         self._torque = 0
-        self._answered = 0     # number of the SYNC answered last
+        self._answered = self._set_up_at = 0  # number of the SYNC answered last
         self._sample_time_s = 0.0
         self._controlword = 0
         self._was_enabled = self._reset_requested = False
@@ -100,12 +109,20 @@ class CanopenDrive:
 
     # -- before the loop --------------------------------------------------------------------------------------------
 
-    def set_up(self) -> None:
-        """Identity, modes, units, mode, limits, watchdogs, PDOs; blocking, with the power stage off.
+    def _take_mode(self, mode: Mode) -> None:
+        self._pack = layout([_CONTROLWORD, _TARGET[mode]]).pack
+        self._target_bits = _TARGET[mode].bits
+        self._holds_position = _TARGET[mode].index == _TARGET[Mode.CYCLIC_SYNC_POSITION].index
 
+    def set_up(self, settings: DriveSettings | None = None) -> None:
+        """Identity, modes, units, mode, limits, watchdogs, PDOs; blocking, switches the power stage off.
+
+        With other settings: the same node in another mode, as from homing to CST; `master.start` again afterwards.
         Raises ResponseTimeout, IdentityError or ConfigurationError; nothing moves in either case.
         """
-        settings, master = self.settings, self._master
+        settings, master = settings or self.settings, self._master
+        self.settings = settings
+        self._take_mode(settings.mode)
         with DeviceSetup(master.network, settings.node_id, settings.eds) as device:
             master.nmt(NMT_PRE_OPERATIONAL, settings.node_id)
             device.check_identity(402, settings.serial_number)
@@ -115,6 +132,7 @@ class CanopenDrive:
                     advice="Choose another mode in the bench description.",
                 )  # fmt: skip
             device.disable_pdos()
+            device.write_only(0x6040, 0, 0)
             device.write_only(0x6060, 0, Mode.NONE)  # a mode left over must not enable on an old target
             self._read_units(device)
             device.write(0x6060, 0, settings.mode, read_back=(0x6061, 0))
@@ -130,16 +148,26 @@ class CanopenDrive:
             device.write(0x1006, 0, round(settings.period_s * 1e6))
             device.write(0x1016, 1, master.node_id << 16 | round(3000 * master.heartbeat_s))
             device.write(0x1017, 0, round(1000 * settings.heartbeat_s))
+            if settings.mode is Mode.HOMING and settings.homing is not None:
+                self._write_homing(device, settings.homing)
             device.map_pdo(0x1400, (_CONTROLWORD, _TARGET[settings.mode]), settings.command_transmission,
                            self._rpdo_id)  # fmt: skip
             device.map_pdo(0x1800, _FEEDBACK, EVERY_SYNC, self._tpdo_id)
             self._raw_counts = self._counts = device.read(0x6064)
             self._statusword = device.read(0x6041)
-        self._answered = master.syncs
+        self._answered = self._set_up_at = master.syncs
         self._latched, self.tripped = 0, Condition.OK
         self.goal = DriveGoal.DISABLED
         self._was_enabled = False
         self._heartbeat_deadline_s = math.inf
+
+    def _write_homing(self, device: DeviceSetup, homing: HomingSettings) -> None:
+        device.write(0x6098, 0, homing.method)
+        speed = round(homing.speed_rad_s / self._rad_per_count)
+        device.write(0x6099, 1, speed)
+        device.write(0x6099, 2, speed)
+        device.write(0x609A, 0, round(homing.acceleration_rad_s2 / self._rad_per_count))
+        device.write(0x607C, 0, round(homing.offset_rad / self._rad_per_count))
 
     def _read_units(self, device: DeviceSetup) -> None:
         counts_per_rev = device.read(0x608F, 1) / device.read(0x608F, 2)
@@ -180,7 +208,7 @@ class CanopenDrive:
 
     def _on_heartbeat(self, can_id: int, data: bytes, now_s: float) -> None:
         self._heartbeat_deadline_s = now_s + 3 * self.settings.heartbeat_s
-        if len(data) == 1 and data[0] & 0x7F != _OPERATIONAL and self._master.syncs > 0:
+        if len(data) == 1 and data[0] & 0x7F != _OPERATIONAL and self._answered != self._set_up_at:
             self._latched |= Condition.NOT_OPERATIONAL  # boot-up (0) included: it lost its configuration
 
     # -- in the loop ------------------------------------------------------------------------------------------------

@@ -1,293 +1,60 @@
-"""Simulated servo drive on CANopen: CiA 402 states, CST, CSV, CSP, homing, quick stop, faults; a plant behind it.
+"""The simulated drive and encoder as a process of their own on a python-can bus, in wall-clock time.
 
-The node keeps no time of its own: each SYNC moves the plant by one period with the torque in force since the SYNC
-before, then the positions and torques of that instant go out. A torque that arrives by an event-driven RPDO after
-SYNC k thus acts from SYNC k to k + 1, one by a synchronous RPDO (type 1) from SYNC k + 1 on, as CiA 301 says.
+    python -m drivers.sim.node --bus udp_multicast --channel 239.74.163.2
 """
 
 from __future__ import annotations
 
-import math
-from pathlib import Path
+import argparse
+import threading
+import time
+from collections.abc import Sequence
 
-from drivers.base import PlantLike, ServoLike, ServoTarget
-from drivers.bus import CanPort
-from drivers.cia402 import Controlword, DriveState, Mode, Statusword
-from drivers.sim.device import EDS_FOLDER, SimulatedDevice
-from drivers.sim.dictionary import key_of
-from drivers.sim.internal_motion import Homing, HomingMethod, ramp, step_homing
-from drivers.sim.power_stage import REMOTE, STATUS, next_state
-from drivers.sim.sdo_server import AbortCode, SdoAbort
+from drivers.bus import BusConfig, CanPort, PythonCanPort, open_bus
+from drivers.sim.axis import two_mass
+from drivers.sim.device import SimulatedDevice
+from drivers.sim.drive_node import SimulatedDrive
+from drivers.sim.encoder_node import SimulatedEncoder
+from drivers.sim.plant import Plant
+from drivers.sim.servo import DriveServo, Servo
 
-_CONTROLWORD, _STATUSWORD = key_of(0x6040), key_of(0x6041)
-_MODE, _MODE_DISPLAY = key_of(0x6060), key_of(0x6061)
-_POSITION, _VELOCITY, _TORQUE = key_of(0x6064), key_of(0x606C), key_of(0x6077)
-_MAX_TORQUE = key_of(0x6072)
-_TARGET_TORQUE, _TARGET_POSITION, _TARGET_VELOCITY = key_of(0x6071), key_of(0x607A), key_of(0x60FF)
-_ERROR_CODE, _QUICK_STOP_DECELERATION = key_of(0x603F), key_of(0x6085)
-_FOLLOWING_ERROR, _FOLLOWING_ERROR_WINDOW = key_of(0x60F4), key_of(0x6065)
-
-_SERVO_MODES = (Mode.HOMING, Mode.CYCLIC_SYNC_POSITION, Mode.CYCLIC_SYNC_VELOCITY)
-_STOPPING = (DriveState.QUICK_STOP_ACTIVE, DriveState.FAULT_REACTION_ACTIVE)
-_FOLLOWING_ERROR_CODE = 0x8611  # CiA 402-2
-_AT_REST_RAD_S = 0.5            # a stop ramp has ended: below half a turn in 12 s
-_LOOP_PERIOD_S = 0.001          # of the servo, where the SYNC is slower
+_WAIT_S = 0.005  # longest sleep between two looks at the timers
 
 
-class SimulatedDrive(SimulatedDevice):
-    """The drive node. `servo`: loops inside the drive; without them only CST is accepted and a stop is coasting.
-
-    Positions in increments of 0x608F, torques in 1/1000 of `rated_torque_n_m` (0x6076, mN m): it sets the resolution of
-    set-point and measurement. Linear axes: metres for radians, newtons for newton metres, metres per "revolution" 2 pi.
-    """
-
-    def __init__(
-        self,
-        port: CanPort,
-        plant: PlantLike,
-        *,
-        node_id: int = 5,
-        servo: ServoLike | None = None,
-        period_s: float = 0.001,
-        rated_torque_n_m: float = 4.0,
-        counts_per_rev: int = 1 << 20,
-        eds: Path = EDS_FOLDER / "servo_drive.eds",
-    ) -> None:
-        self.plant, self._servo, self.period_s = plant, servo, period_s
-        self._rated_torque_mn_m, self._counts_per_rev = round(rated_torque_n_m * 1000), counts_per_rev
-        self.state = DriveState.NOT_READY_TO_SWITCH_ON
-        self._controlword = 0
-        super().__init__(port, eds, node_id)
-        self.dictionary.on_write(0x6040, self._on_controlword_sdo)
-        self.dictionary.on_write(0x6060, self._on_mode)
-        self.dictionary.on_write(0x60C2, self._on_interpolation_time)
-        self.dictionary.on_write(0x6098, self._on_homing_method)
-        self._power_up()
-
-    def _power_up(self) -> None:
-        values = self.values
-        values[key_of(0x6076)] = self._rated_torque_mn_m
-        values[key_of(0x608F, 1)] = self._counts_per_rev
-        self._n_m_per_mille = self._rated_torque_mn_m / 1e6
-        self._mille_per_n_m = 1e6 / self._rated_torque_mn_m
-        self._counts_per_rad = self._counts_per_rev / (2 * math.pi)
-        self._torque_n_m = 0.0        # command in force in CST, set when an RPDO arrives
-        self._offset_counts = 0       # position = encoder counts - offset, set by homing
-        self._counts = round(self.plant.motor_position_rad * self._counts_per_rad)
-        self._last_counts = self._counts
-        self._ramp_rad_s = 0.0        # velocity reference of stop ramps
-        self._homing: Homing | None = None
-        self._last_target = 0
-        self._fault_present = False
-        self._set_state(DriveState.SWITCH_ON_DISABLED)
-        self._measure(self._counts)
-
-    def reset(self, now_s: float) -> None:
-        super().reset(now_s)
-        self._power_up()
-
-    # -- states -----------------------------------------------------------------------------------------------------
-
-    def _set_state(self, state: DriveState) -> None:
-        if state is DriveState.OPERATION_ENABLED and self._servo is not None:
-            self._servo.reset(self.plant.motor_position_rad)
-        self.state = state
-        self._refresh_drive()
-
-    def _refresh_drive(self) -> None:
-        """What follows from state and mode, worked out here and not every cycle."""
-        enabled = self.state is DriveState.OPERATION_ENABLED
-        self._direct = enabled and self.values[_MODE] == Mode.CYCLIC_SYNC_TORQUE
-        self._idle = not enabled and self.state not in _STOPPING
-        if not self._direct:
-            self._torque_n_m = 0.0
-        self._homing = None
-        self._last_target = self.values[_POSITION]
-        follows = enabled and self.values[_MODE] != Mode.HOMING
-        self._status(Statusword.FOLLOWS_COMMAND if follows else 0)
-
-    def _status(self, extra: int) -> None:
-        self.values[_STATUSWORD] = STATUS[self.state] | REMOTE | int(extra)
-
-    def process_rpdo(self, now_s: float) -> None:
-        if self.values[_CONTROLWORD] != self._controlword or self.state is DriveState.SWITCHED_ON:
-            self._take_controlword(now_s)
-        if self._direct:
-            values = self.values
-            torque, limit = values[_TARGET_TORQUE], values[_MAX_TORQUE]
-            if torque > limit:
-                torque = limit
-            elif torque < -limit:
-                torque = -limit
-            self._torque_n_m = torque * self._n_m_per_mille
-
-    def _take_controlword(self, now_s: float) -> None:
-        controlword, previous = self.dictionary.number(0x6040), self._controlword
-        self._controlword = controlword
-        state = next_state(self.state, controlword, previous, cause_gone=not self._fault_present)
-        if state is not self.state:
-            if self.state is DriveState.FAULT:
-                self.values[_ERROR_CODE] = 0
-                self.emergency(0, 0, now_s)
-            if state is DriveState.QUICK_STOP_ACTIVE:
-                self._start_ramp()
-            self._set_state(state)
-        if self.state is DriveState.OPERATION_ENABLED and self.values[_MODE] == Mode.HOMING:
-            self._take_homing_start(bool(controlword & Controlword.HOMING_START))
-
-    def _take_homing_start(self, start: bool) -> None:
-        if not start:
-            self._homing = None
-        elif self._homing is None:
-            number = self.dictionary.number
-            self._homing = Homing(HomingMethod(number(0x6098)), number(0x6099, 2), number(0x609A),
-                                  self._counts_per_rev)  # fmt: skip
-            self._status(0)
-
-    def trip(self, code: int, register: int, now_s: float, *, lasting: bool = False) -> None:
-        """A fault inside the drive: EMCY, stop ramp, FAULT (transitions 13, 14). lasting: a reset does not clear it
-        until `clear_cause`."""
-        self._fault_present = lasting
-        self.values[_ERROR_CODE] = code
-        self.emergency(code, register, now_s)
-        self._react(DriveState.FAULT_REACTION_ACTIVE)
-
-    def clear_cause(self) -> None:
-        """The cause of a lasting fault is gone."""
-        self._fault_present = False
-
-    def communication_lost(self, now_s: float) -> None:
-        """Abort connection option code 0x6007: 0 nothing, 1 fault, 2 disable voltage, 3 quick stop."""
-        option = self.dictionary.number(0x6007)
-        if option == 1:
-            self.values[_ERROR_CODE] = self.dictionary.number(0x1003, 1)
-            self._react(DriveState.FAULT_REACTION_ACTIVE)
-        elif option == 2 and self.state is not DriveState.FAULT:
-            self._set_state(DriveState.SWITCH_ON_DISABLED)
-        elif option == 3 and self.state is DriveState.OPERATION_ENABLED:
-            self._react(DriveState.QUICK_STOP_ACTIVE)
-
-    def _react(self, reaction: DriveState) -> None:
-        powered = self.state in (DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE)
-        self._start_ramp()
-        self._set_state(reaction if powered or reaction is DriveState.QUICK_STOP_ACTIVE else DriveState.FAULT)
-
-    def _start_ramp(self) -> None:
-        self._ramp_rad_s = self._velocity_rad_s()
-        if self._servo is not None:
-            self._servo.reset(self.plant.motor_position_rad)
-
-    def _velocity_rad_s(self) -> float:
-        return (self._counts - self._last_counts) / self._counts_per_rad / self.period_s
-
-    # -- SDO hooks --------------------------------------------------------------------------------------------------
-
-    def _on_controlword_sdo(self, index: int, subindex: int, value: int) -> None:
-        self.values[_CONTROLWORD] = value
-        self._take_controlword(self._last_s)
-
-    def _on_mode(self, index: int, subindex: int, value: int) -> None:
-        known = value in (Mode.NONE, Mode.CYCLIC_SYNC_TORQUE) or (self._servo and value in _SERVO_MODES)
-        if not known:
-            raise SdoAbort(AbortCode.INVALID_VALUE)
-        if self.state is DriveState.OPERATION_ENABLED:
-            raise SdoAbort(AbortCode.NOT_IN_THIS_STATE)
-        self.values[_MODE] = self.values[_MODE_DISPLAY] = value
-        self._refresh_drive()
-
-    def _on_homing_method(self, index: int, subindex: int, value: int) -> None:
-        if value not in list(HomingMethod):
-            raise SdoAbort(AbortCode.INVALID_VALUE)
-
-    def _on_interpolation_time(self, index: int, subindex: int, value: int) -> None:
-        number = self.dictionary.number
-        units, exponent = (value, number(0x60C2, 2)) if subindex == 1 else (number(0x60C2, 1), value)
-        if units == 0:
-            raise SdoAbort(AbortCode.INVALID_VALUE)
-        self.period_s = units * 10**exponent if exponent >= 0 else units / 10**-exponent
-
-    # -- in the loop ------------------------------------------------------------------------------------------------
-
-    def process_sync(self, now_s: float) -> None:
-        plant = self.plant
-        if self._direct or self._idle:
-            plant.advance(self._torque_n_m, self.period_s)
-            torque = round(plant.torque_n_m * self._mille_per_n_m)
-        else:
-            torque = round(self._advance_by_servo(now_s) * self._mille_per_n_m)
-        self.values[_TORQUE] = torque if -32768 <= torque <= 32767 else max(-32768, min(32767, torque))
-        self._measure(round(plant.motor_position_rad * self._counts_per_rad))
-
-    def _measure(self, counts: int) -> None:
-        """Position with the wrap-around of an INTEGER32, velocity as its difference."""
-        self._last_counts, self._counts = self._counts, counts
-        self.values[_VELOCITY] = int((counts - self._last_counts) / self.period_s)
-        self.values[_POSITION] = _wrap(counts - self._offset_counts)
-
-    def _advance_by_servo(self, now_s: float) -> float:
-        """Loops inside the drive (CSV, CSP, homing, stop ramps) in steps of 1 ms; mean measured torque [N m]."""
-        plant, servo = self.plant, self._servo
-        steps = max(1, round(self.period_s / _LOOP_PERIOD_S))
-        step_s = self.period_s / steps
-        limit_n_m = self.values[_MAX_TORQUE] * self._n_m_per_mille
-        target = self._target(now_s)
-        mean_n_m = 0.0
-        for step in range(1, steps + 1):
-            torque_n_m = 0.0
-            if servo is not None and target is not None:
-                position_rad = target.position_rad
-                if position_rad is not None:  # targets of the bus, interpolated linearly between the SYNCs
-                    position_rad -= target.velocity_rad_s * (steps - step) * step_s
-                inner = ServoTarget(target.velocity_rad_s, position_rad)
-                torque_n_m = servo.torque(inner, plant.motor_position_rad, step_s)
-            plant.advance(max(-limit_n_m, min(limit_n_m, torque_n_m)), step_s)
-            mean_n_m += plant.torque_n_m / steps
-        return mean_n_m
-
-    def _target(self, now_s: float) -> ServoTarget | None:
-        """What to follow until the next SYNC; None: power stage off."""
-        if self.state in _STOPPING:
-            return self._stop_target(now_s)
-        mode, values = self.values[_MODE], self.values
-        if mode == Mode.CYCLIC_SYNC_VELOCITY:
-            return ServoTarget(values[_TARGET_VELOCITY] / self._counts_per_rad)
-        if mode == Mode.CYCLIC_SYNC_POSITION:
-            return self._position_target(now_s)
-        if mode == Mode.HOMING and self._homing is not None:
-            return self._homing_target()
-        return ServoTarget(0.0)
-
-    def _stop_target(self, now_s: float) -> ServoTarget | None:
-        deceleration_rad_s2 = self.values[_QUICK_STOP_DECELERATION] / self._counts_per_rad
-        self._ramp_rad_s = ramp(self._ramp_rad_s, 0.0, deceleration_rad_s2, self.period_s)
-        if self._servo is None or (self._ramp_rad_s == 0.0 and abs(self._velocity_rad_s()) < _AT_REST_RAD_S):
-            fault = self.state is DriveState.FAULT_REACTION_ACTIVE
-            self._set_state(DriveState.FAULT if fault else DriveState.SWITCH_ON_DISABLED)
-            return None
-        return ServoTarget(self._ramp_rad_s)
-
-    def _position_target(self, now_s: float) -> ServoTarget | None:
-        values = self.values
-        moved = _wrap(values[_TARGET_POSITION] - self._last_target)
-        self._last_target = values[_TARGET_POSITION]
-        error = _wrap(values[_TARGET_POSITION] - values[_POSITION])  # both wrap: only the difference counts
-        values[_FOLLOWING_ERROR] = error
-        if abs(error) > values[_FOLLOWING_ERROR_WINDOW]:
-            self.trip(_FOLLOWING_ERROR_CODE, 0x21, now_s)
-            self._status(Statusword.FOLLOWING_ERROR)
-            return self._stop_target(now_s)
-        return ServoTarget(moved / self._counts_per_rad / self.period_s, (self._counts + error) / self._counts_per_rad)
-
-    def _homing_target(self) -> ServoTarget:
-        assert self._homing is not None
-        before = self._homing
-        run = self._homing = step_homing(before, self._counts, self._last_counts, self.period_s)
-        if run.attained and not before.attained:
-            self._offset_counts = run.reference - self.dictionary.number(0x607C)
-        self._status(Statusword.HOMING_ATTAINED * run.attained | Statusword.TARGET_REACHED * run.done)
-        return ServoTarget(run.velocity / self._counts_per_rad)
+def serve(port: CanPort, nodes: Sequence[SimulatedDevice], stop: threading.Event) -> None:
+    """Let the nodes on this port answer until `stop` is set."""
+    start_s = time.monotonic()
+    while not stop.is_set():
+        port.poll(time.monotonic() - start_s, _WAIT_S)
+        for node in nodes:
+            node.tick(time.monotonic() - start_s)
 
 
-def _wrap(counts: int) -> int:
-    """As an INTEGER32 holds it."""
-    return ((counts + 0x80000000) & 0xFFFFFFFF) - 0x80000000
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Reference axis behind node 5 (drive) and node 6 (linear encoder), until interrupted."""
+    parser = argparse.ArgumentParser(prog="python -m drivers.sim.node", description=main.__doc__)
+    parser.add_argument("--bus", default="udp_multicast", choices=BusConfig.INTERFACES)
+    parser.add_argument("--channel", default="239.74.163.2", help="as python-can names it")
+    parser.add_argument("--bitrate", type=int, default=1_000_000, help="bit/s, on socketcan")
+    parser.add_argument("--drive", type=int, default=5, help="node-ID of the drive")
+    parser.add_argument("--encoder", type=int, default=6, help="node-ID of the encoder")
+    parser.add_argument("--rated-torque", type=float, default=4.0, help="N m; a thousandth of it is the resolution")
+    parser.add_argument("--seed", type=int, default=0, help="of the sensors' noise")
+    given = parser.parse_args(arguments)
+    axis = two_mass()
+    plant = Plant(axis, seed=given.seed)
+    port = PythonCanPort(open_bus(BusConfig(given.bus, given.channel, given.bitrate)))
+    servo = DriveServo(Servo(), axis.drive_ratio_m_rad)
+    drive = SimulatedDrive(port, plant, node_id=given.drive, servo=servo, rated_torque_n_m=given.rated_torque)
+    encoder = SimulatedEncoder(port, plant, node_id=given.encoder)
+    print(f"drive node {given.drive} and encoder node {given.encoder} on {given.bus}:{given.channel}", flush=True)
+    try:
+        serve(port, (drive, encoder), threading.Event())
+    except KeyboardInterrupt:
+        pass
+    finally:
+        port.close()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,16 +1,11 @@
-"""What the loops inside a simulated drive follow: stop ramps and homing runs, as pure steps from cycle to cycle."""
+"""Homing runs inside a simulated drive, as pure steps from cycle to cycle."""
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from enum import IntEnum
 
-
-def ramp(velocity: float, wanted: float, acceleration: float, period_s: float) -> float:
-    """Velocity one period later, changed by at most acceleration x period (any consistent units)."""
-    step = acceleration * period_s
-    return wanted if abs(wanted - velocity) <= step else velocity + math.copysign(step, wanted - velocity)
+from drivers.sim.drive_loops import ramp
 
 
 class HomingMethod(IntEnum):

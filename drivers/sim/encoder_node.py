@@ -1,0 +1,87 @@
+"""Simulated linear encoder on CANopen (CiA 406, class C2): position 0x6004 after each SYNC, direction, preset, range.
+
+    value = (+-counts + offset) wrapped into the measuring range,   counts = table position / measuring step
+
+On a bus it must stand behind the drive node, which moves the plant at the SYNC.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from drivers.base import PlantLike
+from drivers.bus import CanPort
+from drivers.sim.device import EDS_FOLDER, SimulatedDevice
+from drivers.sim.dictionary import key_of
+
+_POSITION, _OFFSET, _ALARMS = key_of(0x6004), key_of(0x6509), key_of(0x6503)
+_STEP, _RANGE, _PARAMETERS = key_of(0x6005, 1), key_of(0x6002), key_of(0x6000)
+_REVERSED = 0x0008
+_SENSOR_FAULT = 0x7310  # EMCY of the position error alarm
+_POSITION_ERROR = 0x0001  # alarm bit 0
+
+
+class SimulatedEncoder(SimulatedDevice):
+    """The encoder node. range_counts 0: 2^32 (the value wraps as an INTEGER32), else it wraps into 0..range - 1."""
+
+    def __init__(
+        self,
+        port: CanPort,
+        plant: PlantLike,
+        *,
+        node_id: int = 6,
+        step_m: float = 0.5e-6,
+        range_counts: int = 0,
+        eds: Path = EDS_FOLDER / "linear_encoder.eds",
+    ) -> None:
+        self.plant, self._step_m, self._delivered_range = plant, step_m, range_counts
+        super().__init__(port, eds, node_id)
+        self.dictionary.on_write(0x6000, self._on_parameters)
+        self.dictionary.on_write(0x6002, self._on_range)
+        self.dictionary.on_write(0x6003, self._on_preset)
+        self._power_up()
+
+    def _power_up(self) -> None:
+        values = self.values
+        values[_STEP] = values[key_of(0x6501)] = round(self._step_m * 1e9)
+        values[_RANGE] = self._range_counts = self._delivered_range
+        self._refresh(values[_PARAMETERS], 0)
+
+    def reset(self, now_s: float) -> None:
+        super().reset(now_s)
+        self._power_up()
+
+    def _refresh(self, parameters: int, offset: int) -> None:
+        sign = -1 if parameters & _REVERSED else 1
+        self._counts_per_m = sign / self._step_m
+        self.values[_OFFSET] = self._offset = offset
+        self._measure()
+
+    def _on_parameters(self, index: int, subindex: int, value: int) -> None:
+        self._refresh(value, 0)
+
+    def _on_range(self, index: int, subindex: int, value: int) -> None:
+        self._range_counts = value
+        self._measure()
+
+    def _on_preset(self, index: int, subindex: int, value: int) -> None:
+        self._refresh(self.values[_PARAMETERS], value - round(self.plant.table_position_m * self._counts_per_m))
+
+    def _measure(self) -> None:
+        counts = round(self.plant.table_position_m * self._counts_per_m) + self._offset
+        wrap = self._range_counts
+        self.values[_POSITION] = counts % wrap if wrap else ((counts + 0x80000000) & 0xFFFFFFFF) - 0x80000000
+
+    def process_sync(self, now_s: float) -> None:
+        if not self.values[_ALARMS]:  # a blind head repeats its last position
+            self._measure()
+
+    def raise_alarm(self, now_s: float) -> None:
+        """The reading head loses the scale."""
+        self.values[_ALARMS] = _POSITION_ERROR
+        self.emergency(_SENSOR_FAULT, 0x21, now_s)
+
+    def clear_alarm(self, now_s: float) -> None:
+        """The scale is read again."""
+        self.values[_ALARMS] = 0
+        self.emergency(0, 0, now_s)

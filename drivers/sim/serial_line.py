@@ -1,0 +1,62 @@
+"""A serial encoder behind a pseudo-terminal: a plant's table position as binary frames or ASCII read-outs.
+
+Nothing is sent by itself: `send` puts out the position of this instant, at whatever time the caller keeps. Garbage and
+cut frames can be put on the line, and the line can be taken away.
+"""
+
+from __future__ import annotations
+
+import os
+import tty
+
+from drivers.base import PlantLike
+from drivers.serial_encoder import SerialFormat
+from drivers.serial_frames import encode_frame, encode_line
+
+
+class SimulatedSerialEncoder:
+    """`device` is what a `SerialEncoder` opens."""
+
+    def __init__(
+        self, plant: PlantLike, *, step_m: float = 0.5e-6, format: SerialFormat = SerialFormat.BINARY, bits: int = 64
+    ) -> None:
+        self.plant, self._step_m, self._format = plant, step_m, format
+        self._half = 1 << (bits - 1)
+        self._sequence = 0
+        self._last_s: float | None = None
+        self._master, self._slave = os.openpty()
+        tty.setraw(self._slave)
+        os.set_blocking(self._master, False)
+        self.device = os.ttyname(self._slave)
+
+    def send(self, now_s: float, *, status: int = 0) -> None:
+        """One frame; status other than 0: position not valid."""
+        self.put(self.frame(now_s, status))
+
+    def frame(self, now_s: float, status: int = 0) -> bytes:
+        """The bytes of the next frame."""
+        position_m = self.plant.table_position_m
+        if self._format is SerialFormat.ASCII:
+            return encode_line(position_m)
+        counts = round(position_m / self._step_m)
+        counts = (counts + self._half) % (2 * self._half) - self._half
+        elapsed_us = 0xFFFF if self._last_s is None else min(round((now_s - self._last_s) * 1e6), 0xFFFF)
+        self._last_s = now_s
+        self._sequence = (self._sequence + 1) & 0xFF
+        return encode_frame(counts, self._sequence, status, elapsed_us)
+
+    def put(self, data: bytes) -> None:
+        """Any bytes. What nobody reads is lost once the line is full, as on a real one."""
+        try:
+            os.write(self._master, data)
+        except BlockingIOError:
+            return
+
+    def vanish(self) -> None:
+        """Pull the plug."""
+        for descriptor in (self._master, self._slave):
+            if descriptor >= 0:
+                os.close(descriptor)
+        self._master = self._slave = -1
+
+    close = vanish

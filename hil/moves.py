@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from hil.errors import FieldError
 
 Array = NDArray[np.float64]
+MAX_DURATION_S = 3600.0   # of a trajectory, which is held in memory
 
 
 class Phase(IntEnum):
@@ -94,7 +95,7 @@ class Ramp:
         return Motion(self.position_m + self.velocity_m_s * t + half * (t - sine / turn),
                       self.velocity_m_s + half * (1 - cosine),
                       half * turn * sine,
-                      half * turn**2 * cosine)
+                      half * turn * turn * cosine)
 
 
 @dataclass(frozen=True)

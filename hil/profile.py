@@ -16,13 +16,12 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from pydantic import Field, model_validator
 
-from hil.errors import FieldError, FieldPath
+from hil.errors import FieldError, FieldPath, HilError
 from hil.excitation import SAMPLES_PER_PERIOD
-from hil.moves import MotionLimits, Move
+from hil.moves import MAX_DURATION_S, MotionLimits, Move
 from hil.segments import Part, Position, Positive, RepeatSegment, Segment
 from hil.yamlfile import load_model
 
-MAX_DURATION_S = 3600.0
 MAX_MOVES = 100_000
 
 
@@ -73,10 +72,13 @@ class Profile(Part):
         for field, segment in _unrolled(self.segments, ("segments",)):
             try:
                 move = segment.move(position, self.motion_limits)
+                duration_s += self.slots(move) * self.grid_s
             except FieldError as error:
                 raise error.inside(*field) from None
+            except (ArithmeticError, HilError) as error:   # numbers such as 1e-320, which are not zero
+                raise FieldError(field, f"given values that cannot be computed with ({error}), allowed such as "
+                                 "machines have; correct them") from None
             self._check_travel(field, move)
-            duration_s += self.slots(move) * self.grid_s
             if duration_s > MAX_DURATION_S or len(runs) == MAX_MOVES:
                 raise FieldError(field, f"given a profile that is longer than {MAX_DURATION_S:.0f} s or "
                                  f"{MAX_MOVES} moves here, allowed up to that; shorten it")
@@ -93,15 +95,18 @@ class Profile(Part):
         """FieldError when a range of positions is not inside the travel."""
         low = -math.inf if self.position_min_m is None else self.position_min_m
         high = math.inf if self.position_max_m is None else self.position_max_m
-        if lowest_m < low - 1e-9 or highest_m > high + 1e-9:
+        if not low - 1e-9 <= lowest_m <= highest_m <= high + 1e-9:   # neither when they are not a number
             raise FieldError(field, f"given positions from {lowest_m:.6g} to {highest_m:.6g} m, allowed {low:.6g} "
                              f"to {high:.6g} m (position_min_m, position_max_m); move less far or start elsewhere")
 
     def _check_travel(self, field: FieldPath, move: Move) -> None:
+        ends: list[float] = []
         for piece in move.pieces:
             count = 65 + math.ceil(SAMPLES_PER_PERIOD * piece.duration_s * move.highest_frequency_hz)
             positions = piece.at(np.linspace(0.0, piece.duration_s, count)).position_m
-            self.check_position(field, float(positions.min()), float(positions.max()))
+            ends += [float(positions.min()), float(positions.max())]
+        if ends:
+            self.check_position(field, min(ends), max(ends))
 
     @model_validator(mode="after")
     def _can_be_run(self) -> Profile:

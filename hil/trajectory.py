@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hil.errors import FieldError, field_name
-from hil.moves import Array, Cubic, MotionLimits, Move, Phase
+from hil.errors import FieldError, InputError, field_name
+from hil.moves import MAX_DURATION_S, Array, Cubic, Motion, MotionLimits, Move, Phase
 from hil.ruckig_moves import State, point_to_point, stop, time_optimal_duration_s
 
 if TYPE_CHECKING:
@@ -112,21 +112,24 @@ def stop_from(position_m: float, velocity_m_s: float, acceleration_m_s2: float, 
     """Time-optimal stop from any state; ends wherever that is.
 
     A velocity or acceleration beyond its limit is brought back in the shortest time. Raises InputError for
-    values that are not finite.
+    values that are not finite and for a state so far beyond the limits that it takes more than an hour.
     """
     state = State(position_m, velocity_m_s, acceleration_m_s2)
-    return _single("stop", stop(state, limits), state, period_s)
+    return _single("stop", stop(state, limits), state, limits, period_s)
 
 
 def replan(position_m: float, velocity_m_s: float, acceleration_m_s2: float, target_m: float,
            limits: MotionLimits, period_s: float) -> Trajectory:
     """Time-optimal motion from any state to rest at target_m; states beyond the limits as in stop_from."""
     state = State(position_m, velocity_m_s, acceleration_m_s2)
-    return _single("replan", point_to_point(state, target_m, limits), state, period_s)
+    return _single("replan", point_to_point(state, target_m, limits), state, limits, period_s)
 
 
-def _single(name: str, move: Move, state: State, period_s: float) -> Trajectory:
+def _single(name: str, move: Move, state: State, limits: MotionLimits, period_s: float) -> Trajectory:
     _check_period(period_s)
+    if move.duration_s > MAX_DURATION_S:
+        raise InputError(f"{name}: given {state}, from which it takes {move.duration_s:.6g} s within {limits}, "
+                         f"allowed up to {MAX_DURATION_S:.0f} s; raise the limits")
     run = SegmentRun(name, name, 0, 0.0, move.duration_s)
     return _sampled([move], (run,), period_s, move.notes)
 
@@ -134,25 +137,30 @@ def _single(name: str, move: Move, state: State, period_s: float) -> Trajectory:
 def _sampled(moves: Sequence[Move], runs: tuple[SegmentRun, ...], period_s: float,
              notes: tuple[str, ...]) -> Trajectory:
     """Every piece evaluated at the ticks that fall into it; rest after a move until the next one starts."""
-    def tick(instant_s: float) -> int:
-        return math.ceil(instant_s / period_s - 1e-9)   # the first at or after it, but for rounding
-
-    count = tick(runs[-1].end_s) + 1
-    time_s = np.arange(count) * period_s
-    motion: Array = np.zeros((4, count))
-    position, velocity, acceleration, jerk = motion
+    count = _first_tick(runs[-1].end_s / period_s) + 1
+    time_s: Array = np.arange(count, dtype=np.float64) * period_s
+    motion = Motion(*(np.zeros(count) for _ in range(4)))
     segment = np.zeros(count, np.int32)
     phase = np.zeros(count, np.uint8)
     for index, (move, run) in enumerate(zip(moves, runs, strict=True)):
-        end = count if index == len(runs) - 1 else tick(run.end_s)
-        segment[tick(run.start_s):end] = index
-        begin_s = run.start_s
-        for piece in (*move.pieces, Cubic(math.inf, Phase.STANDSTILL, move.end_m)):
-            ticks = slice(tick(begin_s), min(end, tick(min(begin_s + piece.duration_s, time_s[-1] + period_s))))
-            motion[:, ticks] = piece.at(np.clip(time_s[ticks] - begin_s, 0.0, piece.duration_s))
+        start = round(run.start_s / period_s, 9)   # in ticks; whole where the grid is, so that laps are bit-identical
+        end = count if index == len(runs) - 1 else _first_tick(run.end_s / period_s)
+        segment[_first_tick(start):end] = index
+        begin_s = 0.0
+        for piece in (*move.pieces, Cubic(run.end_s - run.start_s, Phase.STANDSTILL, move.end_m)):
+            end_s = begin_s + piece.duration_s
+            ticks = slice(_first_tick(start + begin_s / period_s), min(end, _first_tick(start + end_s / period_s)))
+            within_s = np.clip((np.arange(ticks.start, ticks.stop) - start) * period_s - begin_s, 0.0, piece.duration_s)
+            for whole, part in zip(motion, piece.at(within_s), strict=True):
+                whole[ticks] = part
             phase[ticks] = piece.phase
-            begin_s += piece.duration_s
-    return Trajectory(period_s, time_s, position, velocity, acceleration, jerk, segment, phase, runs, notes)
+            begin_s = end_s
+    return Trajectory(period_s, time_s, *motion, segment, phase, runs, notes)
+
+
+def _first_tick(instant: float) -> int:
+    """The first whole number at or after an instant in ticks, but for rounding."""
+    return math.ceil(instant - 1e-9)
 
 
 def _check_period(period_s: float) -> None:

@@ -37,7 +37,10 @@ def load_model(path: str | Path, model: type[Model]) -> Model:
         return model.model_validate_json(json.dumps(data, default=str), strict=True)
     except ValidationError as error:
         schema = model.model_json_schema()
-        findings = sorted(_finding(detail, root, schema) for detail in error.errors(include_url=False))
+        details = error.errors(include_url=False)
+        # a list is called too short when its items are wrong: keep the innermost finding
+        findings = sorted(_finding(detail, root, schema) for detail in details if not any(
+            other["loc"][:len(detail["loc"])] == detail["loc"] != other["loc"] for other in details))
         lines = [f"{path}:{found.line}: {found.text}" for found in findings[:SHOWN_ERRORS]]
         if len(findings) > SHOWN_ERRORS:
             lines.append(f"{path}: and {len(findings) - SHOWN_ERRORS} more")
@@ -141,7 +144,7 @@ def _finding(detail: ErrorDetails, root: yaml.Node, schema: dict[str, Any]) -> _
     elif kind == "missing":
         given, allowed, todo = "nothing", "a value", "add this key"
     else:
-        allowed = detail["msg"].removeprefix("Input should be ").removeprefix("Input should ")
+        allowed = re.sub(r"^\w+ should (be )?", "", detail["msg"])
     line, field = _locate(root, loc)
     if message is None:
         meaning = _schema_at(schema, loc).get("description")

@@ -1,0 +1,86 @@
+"""The inverse-dynamics fit finds known parameters and reproduces the published ones of EMPS."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from hil.errors import InputError
+from hil.importing import import_recording
+from hil.inverse_dynamics import fit_inverse_dynamics
+from hil.least_squares import solve
+from hil.recording import Recording
+
+EMPS = Path(__file__).parents[2].parent / "shared" / "recordings" / "emps" / "DATA_EMPS.mat"
+
+
+def swinging(rows: int = 20_000, period_s: float = 1e-3, noise_n: float = 0.0, one_way: bool = False) -> Recording:
+    """A mass of 80 kg with 150 N s/m, 12 N, 2 N offset, moved by two sines (and a drift if `one_way`)."""
+    t: NDArray[np.float64] = np.linspace(0.0, (rows - 1) * period_s, rows)
+    w1, w2 = 2 * np.pi * 0.4, 2 * np.pi * 1.1
+    drift = 5.0 if one_way else 0.0
+    position = 0.1 * np.sin(w1 * t) + 0.02 * np.sin(w2 * t) + drift * t
+    velocity = 0.1 * w1 * np.cos(w1 * t) + 0.02 * w2 * np.cos(w2 * t) + drift
+    acceleration = -0.1 * w1**2 * np.sin(w1 * t) - 0.02 * w2**2 * np.sin(w2 * t)
+    force = 80 * acceleration + 150 * velocity + 12 * np.sign(velocity) + 2
+    force += noise_n * np.random.default_rng(3).normal(size=rows)
+    return Recording("swinging", {"time_s": t, "motor_position_m": position, "force_n": force}, period_s)
+
+
+def test_known_parameters_are_found() -> None:
+    fit = fit_inverse_dynamics(swinging(), cut_at_end=49)
+    assert fit.inertia == pytest.approx(80, rel=1e-3)
+    assert fit.viscous == pytest.approx(150, rel=1e-3)
+    assert fit.coulomb == pytest.approx(12, rel=1e-3)
+    assert fit.offset == pytest.approx(2, rel=1e-3)
+
+
+def test_standard_errors_cover_the_error_under_noise() -> None:
+    fit = fit_inverse_dynamics(swinging(noise_n=5.0), cut_at_end=49)
+    for value, error, truth in (
+        (fit.inertia, fit.inertia_std_error, 80), (fit.viscous, fit.viscous_std_error, 150),
+        (fit.coulomb, fit.coulomb_std_error, 12), (fit.offset, fit.offset_std_error, 2),
+    ):
+        assert 0 < error < 0.05 * truth
+        assert abs(value - truth) < 4 * error
+
+
+@pytest.mark.parametrize(("recording", "message"), [
+    (swinging(rows=500), "given 500 rows, allowed 1049 or more"),
+    (swinging(period_s=0.01), "given a period of 0.01 s, allowed less than 0.005 s"),
+    (swinging(one_way=True), "motion in one direction"),
+])
+def test_an_unfit_recording_is_refused(recording: Recording, message: str) -> None:
+    with pytest.raises(InputError, match=f"swinging: .*{message}"):
+        fit_inverse_dynamics(recording)
+
+
+@pytest.mark.skipif(not EMPS.is_file(), reason="the EMPS recording is not beside the project")
+def test_the_published_parameters_of_emps_come_out() -> None:
+    fit = fit_inverse_dynamics(import_recording(EMPS, "emps"))
+    # to the digits printed by Janot, Gautier and Brunot
+    assert fit.inertia == pytest.approx(95.109, abs=5e-4)
+    assert fit.viscous == pytest.approx(203.50, abs=5e-3)
+    assert fit.coulomb == pytest.approx(20.394, abs=1e-3)
+    assert fit.offset == pytest.approx(-3.165, abs=5e-4)
+    assert 100 * fit.relative_error == pytest.approx(4.08, abs=5e-3)
+
+
+@given(seed=st.integers(0, 10_000), scale=st.floats(1e-6, 1e6))
+@settings(max_examples=50)
+def test_least_squares_solves_the_normal_equations_at_any_scale(seed: int, scale: float) -> None:
+    rng = np.random.default_rng(seed)
+    regressors = rng.normal(size=(40, 3)) * np.array([1.0, scale, 1.0])
+    measured = rng.normal(size=40)
+    fit = solve(regressors, measured)
+    residual = measured - regressors @ fit.values
+    assert np.abs(regressors.T @ residual / np.array([1.0, scale, 1.0])).max() < 1e-10
+    covariance = residual @ residual / 37 * np.linalg.inv(regressors.T @ regressors / np.outer(
+        np.array([1.0, scale, 1.0]), np.array([1.0, scale, 1.0])))
+    np.testing.assert_allclose(fit.std_errors * np.array([1.0, scale, 1.0]), np.sqrt(np.diag(covariance)), rtol=1e-8)
+    assert fit.relative_error == pytest.approx(np.linalg.norm(residual) / np.linalg.norm(measured))

@@ -78,10 +78,10 @@ class Profile(Part):
             except (ArithmeticError, HilError) as error:   # numbers such as 1e-320, which are not zero
                 raise FieldError(field, f"given values that cannot be computed with ({error}), allowed such as "
                                  "machines have; correct them") from None
-            self._check_travel(field, move)
             if duration_s > MAX_DURATION_S or len(runs) == MAX_MOVES:
                 raise FieldError(field, f"given a profile that is longer than {MAX_DURATION_S:.0f} s or "
                                  f"{MAX_MOVES} moves here, allowed up to that; shorten it")
+            self._check_travel(field, move)
             runs.append(Run(field, segment.kind, laps[field], position, move))
             laps[field] += 1
             position = move.end_m

@@ -19,6 +19,7 @@ from hil.sine_squared import ramp_duration_s, reversals, sine_squared
 
 Positive = Annotated[float, Field(gt=0)]
 Position = Annotated[float, Field(ge=-100, le=100)]
+MAX_LINE_PERIODS = 1_000_000   # of a multisine, some seconds of computing
 Feed = Annotated[float, Field(gt=0, description="feed [m/s]")]
 
 
@@ -151,8 +152,8 @@ class FeedSweepSegment(_Limited):
 class _Excitation(Part):
     """A signal on the position; the amplitude is lowered where it would pass a limit."""
 
-    start_hz: Positive = Field(le=500, description="begin of the band [Hz]")
-    end_hz: Positive = Field(le=500, description="end of the band [Hz]")
+    start_hz: float = Field(ge=0.01, le=500, description="begin of the band [Hz]")
+    end_hz: float = Field(ge=0.01, le=500, description="end of the band [Hz]")
     amplitude_m: Positive = Field(description="largest displacement [m]")
     spectrum: Spectrum = Field(Spectrum.CONSTANT_VELOCITY, description="what stays equal over the band")
     base_feed_m_s: float = Field(0.0, description="constant feed under it [m/s], keeps friction sliding")
@@ -162,7 +163,7 @@ class ChirpSegment(_Excitation):
     """Exponential sweep over a band."""
 
     kind: Literal["chirp"]
-    duration_s: Positive = Field(le=600, description="length of the sweep [s]; a tenth at each end fades")
+    duration_s: float = Field(ge=0.1, le=120, description="length of the sweep [s]; a tenth at each end fades")
 
     def move(self, start_m: float, limits: MotionLimits) -> Move:
         signal = Chirp(self.start_hz, self.end_hz, self.duration_s, self.spectrum)
@@ -174,16 +175,17 @@ class MultisineSegment(_Excitation):
     """Equidistant lines over a band, all at once, in laps that repeat exactly."""
 
     kind: Literal["multisine"]
-    lap_s: Positive = Field(le=100, description="lap [s]; the lines lie 1/lap_s apart")
+    lap_s: float = Field(ge=0.01, le=100, description="lap [s]; the lines lie 1/lap_s apart")
     laps: int = Field(2, ge=1, le=100, description="whole laps; half a lap before and after them fades")
 
     def move(self, start_m: float, limits: MotionLimits) -> Move:
         signal = Multisine(self.start_hz, self.end_hz, self.lap_s, self.spectrum)
-        if not 0 < len(signal.lines_hz) <= 1000:
-            raise FieldError(("lap_s",), f"given {len(signal.lines_hz)} lines from {self.start_hz:.6g} to "
-                             f"{self.end_hz:.6g} Hz, {1 / self.lap_s:.6g} Hz apart, allowed 1 to 1000; "
-                             "change lap_s or the band")
-        return excitation(start_m, signal, (self.laps + 1) * self.lap_s, self.lap_s / 2, self.amplitude_m,
+        lines, duration_s = len(signal.lines_hz), (self.laps + 1) * self.lap_s
+        if lines == 0 or lines * duration_s * self.end_hz > MAX_LINE_PERIODS:
+            raise FieldError(("lap_s",), f"given {lines} lines from {self.start_hz:.6g} to {self.end_hz:.6g} Hz over "
+                             f"{duration_s:.6g} s, allowed at least one, and lines x time x end_hz up to "
+                             f"{MAX_LINE_PERIODS}; change lap_s or the band")
+        return excitation(start_m, signal, duration_s, self.lap_s / 2, self.amplitude_m,
                           self.base_feed_m_s, limits)
 
 

@@ -112,6 +112,7 @@ class Twin:
         rows[kernel.SHAPE_SPRING] = modes.transmission
         inertia = self.physics.chain.inertia_kg_m2
         rows[kernel.TABLE_IMPULSE] = modes.shape[modes.table] * inertia[modes.table, modes.table]
+        rows[kernel.MOTOR_IMPULSE] = modes.shape[modes.motor] * inertia[modes.motor, modes.motor]
         return rows
 
     @cached_property
@@ -152,7 +153,7 @@ class Twin:
         return values, codes
 
     @cached_property
-    def _gains(self) -> control.Gains:
+    def loop_gains(self) -> control.Gains:
         """The gains, with the velocity filter of an active mechanism."""
         gains = self.gains
         for active in self.active:
@@ -183,7 +184,7 @@ class Twin:
         ratio = self.gains.ratio_m_rad
         state = control.init(start.position_m / ratio, start.velocity_m_s / ratio, start.torque,
                              self.gains.period_s, start.tick)
-        channels = kernel.closed_loop(self._gains, state, position_command_m, velocity_command_m_s,
+        channels = kernel.closed_loop(self.loop_gains, state, position_command_m, velocity_command_m_s,
                                       measured_table_m, *self.arrays(), delta, memory)
         return self._channels(Response(*channels))
 
@@ -192,6 +193,13 @@ class Twin:
         delta, memory = self.state(start)
         motor, table, torque = kernel.open_loop(torque_command, *self.arrays(), delta, memory)
         return self._channels(Response(motor, table, torque_command, torque))
+
+    def observe(self, torque_command: FloatArray, motor: FloatArray, table_m: FloatArray,
+                start: Start = Start()) -> Response:
+        """The axis under a measured torque command (n,), corrected by measured positions; its predictions."""
+        delta, memory = self.state(start)
+        channels = kernel.observe(torque_command, motor, table_m, *self.arrays(), delta, memory)
+        return Response(channels[0], channels[1], torque_command, channels[2])
 
     def _channels(self, response: Response) -> Response:
         for active in self.active:

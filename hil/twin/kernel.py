@@ -27,7 +27,8 @@ from hil.twin.mechanism import Moment
 MECHANISMS = len(LIBRARY)
 
 # Rows of `modes` (MODE_ROWS, n): exact discretisation for the coarse and the fine step, then shapes.
-COARSE, FINE, SHAPE_MOTOR, SHAPE_TABLE, SHAPE_SPRING, TABLE_IMPULSE, MODE_ROWS = 0, 6, 12, 13, 14, 15, 16
+COARSE, FINE, SHAPE_MOTOR, SHAPE_TABLE, SHAPE_SPRING, TABLE_IMPULSE, MOTOR_IMPULSE, MODE_ROWS = (
+    0, 6, 12, 13, 14, 15, 16, 17)
 
 # Entries of `constants`.
 (PERIOD, RATIO, ANGLE_PER_UNIT, COULOMB, VISCOUS, SPRING, DAMPER, COARSE_STEPS, FINE_STEPS, SLOW_VELOCITY,
@@ -84,7 +85,7 @@ def _bristle_contact(free, gain, bound, viscous, shift, opposing, stiffness, def
 
 
 def _build_advance(digest: str) -> Any:
-    @njit(cache=True, fastmath=_REASSOCIATE)
+    @njit(cache=True, nogil=True, fastmath=_REASSOCIATE)
     def advance(command, constants, modes, values, codes, delta, memory):  # type: ignore[no-untyped-def]
         """Move the axis by one control period under a held torque command; mean measured torque."""
         assert digest
@@ -195,7 +196,7 @@ def _build_advance(digest: str) -> Any:
 
 
 def _build_read(digest: str) -> Any:
-    @njit(cache=True, fastmath=_REASSOCIATE)
+    @njit(cache=True, nogil=True, fastmath=_REASSOCIATE)
     def read(constants, modes, values, codes, delta, memory):  # type: ignore[no-untyped-def]
         """What the two encoders read: motor position (rad, or m) and table position (m)."""
         assert digest
@@ -217,17 +218,17 @@ def _build_read(digest: str) -> Any:
 
 
 @njit
-def _hold_floating_table(error, period, modes, delta):  # type: ignore[no-untyped-def]
-    """Correct the table's state by the error of its position [motor units] (Luenberger observer)."""
+def _correct(impulse, error, period, modes, delta):  # type: ignore[no-untyped-def]
+    """Correct the state of one inertia by the error of its position [motor units] (Luenberger observer)."""
     shift = 2.0 * period / OBSERVER_S * error
     kick = period / OBSERVER_S**2 * error
     for i in range(delta.shape[1]):
-        delta[0, i] += modes[TABLE_IMPULSE, i] * shift
-        delta[1, i] += modes[TABLE_IMPULSE, i] * kick
+        delta[0, i] += modes[impulse, i] * shift
+        delta[1, i] += modes[impulse, i] * kick
 
 
 def _build_closed_loop(digest: str) -> Any:
-    @njit(cache=True, fastmath=_REASSOCIATE)
+    @njit(cache=True, nogil=True, fastmath=_REASSOCIATE)
     def closed_loop(gains, state, position_command, velocity_command, measured_table, constants, modes,  # type: ignore[no-untyped-def]
                     values, codes, delta, memory):
         """Controller and axis from tick to tick: motor, table, torque command, torque, each (n,).
@@ -245,15 +246,39 @@ def _build_closed_loop(digest: str) -> Any:
             command[k] = outputs.torque_n_m
             if measured_table.size and memory[OWN, FLOATING] > 0.0:
                 error = (measured_table[k] - table[k]) / constants[RATIO]
-                _hold_floating_table(error, constants[PERIOD], modes, delta)
+                _correct(TABLE_IMPULSE, error, constants[PERIOD], modes, delta)
             torque[k] = advance(command[k], constants, modes, values, codes, delta, memory)
         return motor, table, command, torque
 
     return closed_loop
 
 
+def _build_observe(digest: str) -> Any:
+    @njit(cache=True, nogil=True, fastmath=_REASSOCIATE)
+    def observe(command, measured_motor, measured_table, constants, modes, values, codes, delta, memory):  # type: ignore[no-untyped-def]
+        """The axis under the measured torque command, its state corrected by the measured positions.
+
+        Returns what it predicts before each correction: motor, table, torque, each (n,). A mismatch shows
+        where and when it acts and is then forgotten. `measured_table` is empty without a linear encoder.
+        """
+        assert digest
+        n = command.size
+        motor, table, torque = np.empty(n), np.empty(n), np.empty(n)
+        for k in range(n):
+            motor[k], table[k] = read(constants, modes, values, codes, delta, memory)
+            period = constants[PERIOD]
+            _correct(MOTOR_IMPULSE, measured_motor[k] - motor[k], period, modes, delta)
+            if measured_table.size:
+                error = (measured_table[k] - table[k]) / constants[RATIO]
+                _correct(TABLE_IMPULSE, error, period, modes, delta)
+            torque[k] = advance(command[k], constants, modes, values, codes, delta, memory)
+        return motor, table, torque
+
+    return observe
+
+
 def _build_open_loop(digest: str) -> Any:
-    @njit(cache=True, fastmath=_REASSOCIATE)
+    @njit(cache=True, nogil=True, fastmath=_REASSOCIATE)
     def open_loop(torque_in, constants, modes, values, codes, delta, memory):  # type: ignore[no-untyped-def]
         """The axis driven by a given torque command (n,): motor, table, torque, each (n,)."""
         assert digest
@@ -272,4 +297,5 @@ _DIGEST = stages.library_digest()
 advance = _build_advance(_DIGEST)
 read = _build_read(_DIGEST)
 closed_loop = _build_closed_loop(_DIGEST)
+observe = _build_observe(_DIGEST)
 open_loop = _build_open_loop(_DIGEST)

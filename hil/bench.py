@@ -15,6 +15,7 @@ from pydantic import Field, model_validator
 
 from hil import control as law
 from hil.axis_models import Axis, NotNegative, OneMass, Positive, _Model, model_of
+from hil.bench_hardware import DriveSection, SimulationSection
 from hil.errors import FieldError, InputError
 from hil.twin.axis import Active, Twin
 from hil.twin.library import BY_ID
@@ -150,6 +151,8 @@ class Bench(_Model):
     control: Control
     encoders: Encoders = Encoders()
     mechanisms: tuple[MechanismEntry, ...] = ()
+    drive: DriveSection | None = None
+    simulation: SimulationSection | None = None
 
     @model_validator(mode="before")
     @classmethod
@@ -162,7 +165,8 @@ class Bench(_Model):
             data["axis"] = {key: data.pop(key) for key in list(data) if key not in _SECTIONS}
         if isinstance(data["axis"], dict) and "model" not in data["axis"]:
             data["axis"] = {"model": model_of(set(data["axis"])), **data["axis"]}
-        return data
+        # from here on pydantic takes it for Python's own data, where strictly only a tuple is one
+        return _tuples(data)
 
     @property
     def gains(self) -> law.Gains:
@@ -179,10 +183,27 @@ class Bench(_Model):
         return self.encoders.table is not None and not isinstance(self.axis, OneMass)
 
 
+def _tuples(data: Any) -> Any:
+    if isinstance(data, dict):
+        return {key: _tuples(value) for key, value in data.items()}
+    return tuple(_tuples(value) for value in data) if isinstance(data, list) else data
+
+
 def shipped_benches() -> dict[str, Path]:
     """Name -> file of the benches that come with the package."""
     folder = Path(str(resources.files("hil"))) / "benches"
     return {path.stem: path for path in sorted(folder.glob("*.yaml"))}
+
+
+def bench_path(source: str | Path) -> Path:
+    """The file of a bench: a path, or the name of a shipped one. Raises InputError for a name not shipped."""
+    path = Path(source)
+    if path.suffix in (".yaml", ".yml"):
+        return path
+    shipped = shipped_benches()
+    if str(source) not in shipped:
+        raise InputError(f"{source}: no such bench; give a .yaml file or one of {', '.join(shipped)}")
+    return shipped[str(source)]
 
 
 def load_bench(source: str | Path) -> Bench:
@@ -190,11 +211,6 @@ def load_bench(source: str | Path) -> Bench:
 
     Raises InputError with file, line, field, what was given and what is allowed.
     """
-    path = Path(source)
-    if path.suffix not in (".yaml", ".yml"):
-        shipped = shipped_benches()
-        if str(source) not in shipped:
-            raise InputError(f"{source}: no such bench; give a .yaml file or one of {', '.join(shipped)}")
-        path = shipped[str(source)]
+    path = bench_path(source)
     bench = load_model(path, Bench)
     return bench if bench.name else bench.model_copy(update={"name": path.stem})

@@ -88,6 +88,7 @@ class Twin:
     modes: int | None = None
     coarse_steps: int = COARSE_STEPS
     fine_steps: int = FINE_STEPS
+    slow_velocity: float = 0.02
 
     @cached_property
     def modal(self) -> Modal:
@@ -131,8 +132,7 @@ class Twin:
             constants[kernel.DAMPER] = 2.0 * damping * chain.transmission_stiffness_n_m_rad / elastic[0]
         constants[kernel.COARSE_STEPS] = self.coarse_steps
         constants[kernel.FINE_STEPS] = self.fine_steps
-        constants[kernel.SLOW_VELOCITY] = (
-            2.0 * self.gains.period_s * _REVERSAL_ACCELERATION / physics.angle_per_unit)
+        constants[kernel.SLOW_VELOCITY] = self.slow_velocity
         bends = any(BY_ID[active.effect].stage is Stage.TRANSMISSION for active in self.active)
         constants[kernel.ALWAYS_FINE] = float(bends and elastic.size > 1)
         return constants

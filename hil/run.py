@@ -1,0 +1,159 @@
+"""One run of a profile on a bench: open, set up, prepare for real time, arm, move, record."""
+
+from __future__ import annotations
+
+import contextlib
+import signal
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+from hil.bench import Bench
+from hil.bench_hardware import DriveSection
+from hil.clock import Clock, VirtualClock, WallClock
+from hil.errors import FieldError
+from hil.profile import Profile
+from hil.realtime import Jitter, NotPunctual, check_punctual, measure_jitter, now_text, real_time, report
+from hil.recorder import Recorder, run_metadata
+from hil.rig import Rig
+from hil.session import Ending, Outcome, Session, make_cycle
+from hil.trajectory import Trajectory, plan
+
+WARM_UP_TICKS = 50
+VIRTUAL_START = "virtual time"   # where a recording names the start of a run
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """What came of a run. `recording`: the Parquet file. `jitter` of its ticks, `doubts`: what was overridden."""
+
+    outcome: Outcome
+    recording: Path | None
+    jitter: Jitter
+    notes: tuple[str, ...]
+    doubts: tuple[str, ...]
+
+    @property
+    def complete(self) -> bool:
+        """Whether the profile was run to its end."""
+        return self.outcome.ending is Ending.COMPLETE
+
+
+def run_profile(
+    bench: Bench, profile: Profile, folder: str | Path, name: str, *, virtual: bool = False, force: bool = False,
+    seed: int | None = None, planned: Callable[[Trajectory], None] | None = None, rig: Rig | None = None,
+) -> RunResult:
+    """Run a profile on a bench and record it as `folder`/`name`.parquet.
+
+    virtual: as fast as the machine allows, by a clock that is always on time; simulated benches only. force: arm
+    although jitter or bus load exceed the budget. seed: of the simulated sensors, instead of the bench's. planned: told
+    the trajectory before the axis moves. rig: an opened one, left open.
+
+    Raises InputError for what cannot be run, NotPunctual for a budget exceeded, HilError for devices that fail.
+    """
+    section = bench.drive or DriveSection()
+    if seed is None and bench.simulation is not None:
+        seed = bench.simulation.seed
+    with contextlib.ExitStack() as stack:
+        if rig is None:
+            rig = stack.enter_context(Rig(bench, seed))
+        if virtual and not rig.simulated:
+            raise FieldError(("drive",), "given a real bench in virtual time, allowed the wall clock; leave --virtual")
+        rig.set_up()
+        sample = rig.drive.read(0.0)
+        encoder = rig.encoder.read(0.0) if rig.encoder is not None else None
+        gains = bench.gains
+        start_m = (encoder.position_m if encoder is not None and gains.position_from_table
+                   else gains.ratio_m_rad * sample.motor_position_rad)
+        trajectory = plan(profile, gains.period_s, start_m)
+        _check_travel(trajectory, section)
+        if planned is not None:
+            planned(trajectory)
+        cycle = make_cycle(rig, sample.motor_position_rad)
+        _warm_up(rig, sample.motor_position_rad)
+        doubts = [_refused(force, lambda: _check_bus_load(rig, section))]
+        conditions: dict[str, Any] = {}
+        clock: Clock = VirtualClock()
+        if not virtual:
+            grants = stack.enter_context(real_time())
+            jitter = measure_jitter(gains.period_s)
+            doubts.append(_refused(force, lambda: check_punctual(jitter, section.jitter_p99 * gains.period_s)))
+            conditions = report(grants, jitter)
+            clock = WallClock(gains.period_s)
+        metadata = run_metadata(
+            bench=bench.model_dump(mode="json"), profile=profile.model_dump(mode="json"), seed=seed, commands=sys.argv,
+            start_time=VIRTUAL_START if virtual else now_text())
+        metadata |= {"real_time": conditions, "overridden": [doubt for doubt in doubts if doubt],
+                     "segments": [run._asdict() for run in trajectory.runs], "notes": list(trajectory.notes)}
+        recorder = Recorder(folder, name, cycle.channels, gains.period_s, metadata, lossless=virtual)
+        ended = "failed"
+        try:
+            session = Session(rig, cycle, trajectory, profile.motion_limits, clock, recorder)
+            with _interruptible(session):
+                outcome = session.run()
+            ended = f"{outcome.ending}: {outcome.reason}"
+        except BaseException as error:
+            ended = f"{type(error).__name__}: {error}"
+            raise
+        finally:
+            recording = recorder.close(ended)
+    return RunResult(outcome, recording, Jitter.of(list(outcome.lateness_s), gains.period_s), trajectory.notes,
+                     tuple(doubt for doubt in doubts if doubt))
+
+
+def _check_travel(trajectory: Trajectory, section: DriveSection) -> None:
+    """Raise FieldError for set-points outside the travel of the bench."""
+    if section.travel_m is None:
+        return
+    low, high = float(trajectory.position_m.min()), float(trajectory.position_m.max())
+    if low < section.travel_m[0] or high > section.travel_m[1]:
+        raise FieldError(("segments",), f"given set-points from {low:.6g} to {high:.6g} m, allowed {section.travel_m[0]:g} "
+                         f"to {section.travel_m[1]:g} m (drive.travel_m of the bench); move less far")
+
+
+def _check_bus_load(rig: Rig, section: DriveSection) -> None:
+    load = rig.bus_load()
+    if load > section.bus_load:
+        raise NotPunctual(f"drive.bus_load: SYNC, RPDO, TPDO and encoder take {100 * load:.0f} % of the bus at "
+                          f"{section.bitrate} bit/s, allowed {100 * section.bus_load:.0f} %. The drive was not armed: "
+                          "raise the bit rate or the period, or arm all the same with --force")
+
+
+def _refused(force: bool, check: Callable[[], None]) -> str:
+    """The text of a refusal that is overridden, "" where there is none."""
+    try:
+        check()
+    except NotPunctual as error:
+        if not force:
+            raise
+        return str(error)
+    return ""
+
+
+def _warm_up(rig: Rig, motor_position: float) -> None:
+    """Compile and touch what the loop will run, on a controller of its own."""
+    cycle = make_cycle(rig, motor_position)
+    for tick in range(WARM_UP_TICKS):
+        cycle.step(tick, 0, motor_position, 0.0, 0.0, 0, 0, 0.0, 0.0)
+
+
+@contextlib.contextmanager
+def _interruptible(session: Session) -> Iterator[None]:
+    """ctrl-C and a request to terminate stop the axis instead of the program."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        session.ask_stop()
+
+    before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

@@ -6,6 +6,9 @@ off it is all zeros. Adding an effect: one entry in effects.CATALOGUE and its te
 
 from __future__ import annotations
 
+from pathlib import Path
+from zlib import crc32
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,6 +19,11 @@ from drivers.sim.effects import CATALOGUE
 SPRING_ROWS = MAX_MASSES
 LINES = 2  # delay lines: torque command, recorded channel
 COMMAND_LINE, CHANNEL_LINE = 0, 1
+
+# A compiled kernel's cache knows its own file only, not the files it calls. With the sources' checksum in the
+# name of a field the records change their type with every edit, and stale kernels are never called.
+_SOURCES = [Path(__file__).with_name(f"{name}.py") for name in ("contact", "kernel", "sensors", "servo", "reality")]
+_STAMP = f"sources_{crc32(b''.join(path.read_bytes() for path in _SOURCES)):08x}"
 
 _SCALARS = (
     "step_s", "drive_ratio", "screw_ratio", "coulomb", "viscous", "bristle_damping", "nut_stiffness", "nut_damping",
@@ -28,7 +36,8 @@ _INDICES = (
 )  # fmt: skip
 
 PARAMETERS = np.dtype(
-    [(name, np.float64) for name in _SCALARS]
+    [(_STAMP, np.int64)]
+    + [(name, np.float64) for name in _SCALARS]
     + [(name, np.int64) for name in _INDICES]
     + [
         ("mass", np.float64, (MAX_MASSES,)),

@@ -259,9 +259,11 @@ class CanopenDrive:
         state = STATE_BY_STATUS[self._statusword & 0x7F]
         if state is _ENABLED_STATE and self.goal is _ENABLED:
             controlword = ENABLE_OPERATION | self.controlword_bits
-            target = saturate(round(setpoint * self._target_per_unit), self._target_bits)
+            target = round(setpoint * self._target_per_unit)
             if self._holds_position:  # the drive counts modulo 2^32
                 target = ((target + 0x80000000) & 0xFFFFFFFF) - 0x80000000
+            else:
+                target = saturate(target, self._target_bits)
         else:
             self._was_enabled = False
             controlword = next_controlword(

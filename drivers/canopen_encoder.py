@@ -63,11 +63,11 @@ class CanopenEncoder:
         with DeviceSetup(master.network, settings.node_id, settings.eds) as device:
             master.nmt(NMT_PRE_OPERATIONAL, settings.node_id)
             device.check_identity(406, settings.serial_number)
-            step_m = device.read(0x6005, 1) * 1e-9
+            step_m = device.read(0x6005, 1) / 1e9
             if step_m <= 0 or (settings.step_m is not None and not math.isclose(step_m, settings.step_m)):
                 raise ConfigurationError(
                     "another measuring step than described", where=f"{self._name}, object 0x6005:01",
-                    given=f"{step_m} m", allowed=f"{settings.step_m or '> 0'} m",
+                    given=f"{step_m:g} m", allowed=f"{settings.step_m or '> 0'} m",
                     advice="Correct the bench description or the encoder's settings.",
                 )  # fmt: skip
             self.step_m = step_m

@@ -119,7 +119,7 @@ def _digest() -> str:
     """Of all sources compiled into `cycle`, which numba's cache cannot see."""
     digest = hashlib.sha256(stages.library_digest().encode())
     for module in (control, kernel):
-        digest.update(Path(module.__file__).read_bytes())
+        digest.update(Path(str(module.__file__)).read_bytes())
     return digest.hexdigest()
 
 

@@ -111,8 +111,9 @@ def _check_travel(trajectory: Trajectory, section: DriveSection) -> None:
         return
     low, high = float(trajectory.position_m.min()), float(trajectory.position_m.max())
     if low < section.travel_m[0] or high > section.travel_m[1]:
-        raise FieldError(("segments",), f"given set-points from {low:.6g} to {high:.6g} m, allowed {section.travel_m[0]:g} "
-                         f"to {section.travel_m[1]:g} m (drive.travel_m of the bench); move less far")
+        raise FieldError(("segments",), f"given set-points from {low:.6g} to {high:.6g} m, allowed "
+                         f"{section.travel_m[0]:g} to {section.travel_m[1]:g} m (drive.travel_m of the bench); move "
+                         "less far")
 
 
 def _check_bus_load(rig: Rig, section: DriveSection) -> None:

@@ -107,8 +107,8 @@ class Session:
         self._stops_asked += 1
 
     def run(self) -> Outcome:
-        """Arm, run, stop, disarm. Raises HilError when the drive cannot be armed or a device fails in the loop; whatever
-        is raised, the drive is told to stop first."""
+        """Arm, run, stop, disarm. Raises HilError when the drive cannot be armed or a device fails in the loop;
+        whatever is raised, the drive is told to stop first."""
         try:
             self._clock.start()
             self._master.start(0.0)
@@ -122,7 +122,7 @@ class Session:
             raise
         return Outcome(self._ending, self._reason, rows, tuple(self._lateness_s))
 
-    # -- one tick -----------------------------------------------------------------------------------------------------
+    # -- one tick -------------------------------------------------------------------------------------------------
 
     def _exchange(self) -> tuple[DriveSample, EncoderSample]:
         """Wait for the next tick, send SYNC, take in the answers."""
@@ -160,8 +160,8 @@ class Session:
         start_m = self._trajectory.position_m[0]
         actual_m = self._position_m(sample, seen)
         if abs(actual_m - start_m) > self._rig.section.following_error_m:
-            raise HilError(f"the axis stands at {actual_m:.6f} m, the set-points begin at {start_m:.6f} m: it moved while "
-                           "the drive was armed; find out why")
+            raise HilError(f"the axis stands at {actual_m:.6f} m, the set-points begin at {start_m:.6f} m: it moved "
+                           "while the drive was armed; find out why")
 
     def _loop(self, sample: DriveSample, seen: EncoderSample) -> int:
         """Tick 0 is that of the given samples. Returns the rows recorded."""
@@ -198,7 +198,7 @@ class Session:
         drive.command(self._now_s, setpoint)
         return tick + 1
 
-    # -- when something is wrong ----------------------------------------------------------------------------------------
+    # -- when something is wrong ----------------------------------------------------------------------------------
 
     def _supervise(self, tick: int, index: int, sample: DriveSample, seen: EncoderSample,
                    passed: int) -> Trajectory | None:
@@ -232,7 +232,7 @@ class Session:
         if self._drive.tripped:
             yield Ending.DRIVE_FAULT, _text(self._drive.check), True
         if seen.condition & _ENCODER_LOST and self._encoder is not None:
-            yield Ending.ENCODER_FAULT, _text(lambda: self._encoder.check(self._now_s)), self._from_table
+            yield Ending.ENCODER_FAULT, _text(self._encoder.check), self._from_table
         if passed & Limit.FOLLOWING_ERROR:
             yield (Ending.FOLLOWING_ERROR, f"the axis is more than {section.following_error_m} m from its set-point "
                    "(drive.following_error_m): blocked, overloaded, or badly tuned", again)

@@ -18,7 +18,7 @@ from drivers.sim import axis as truth
 from drivers.sim.axis import AxisTruth
 from drivers.sim.effects import Effect
 from drivers.sim.encoder_node import SimulatedEncoder
-from drivers.sim.node import SimulatedDrive
+from drivers.sim.drive_node import SimulatedDrive
 from drivers.sim.plant import Plant
 from drivers.sim.sensors import Sensors
 from drivers.sim.serial_line import SimulatedSerialEncoder
@@ -115,8 +115,8 @@ def _true_axis(believed: Axis, simulation: SimulationSection) -> AxisTruth:
     if isinstance(axis, OneMass):
         lead_m = axis.screw_lead_m or 2.0 * math.pi
         return truth.one_mass(axis.mass_kg, axis.coulomb_force_n, axis.viscous_force_n_s_m, lead_m)
-    friction = {"lead_m": axis.lead_m, "coulomb_torque_n_m": axis.coulomb_torque_n_m,
-                "viscous_torque_n_m_s_rad": axis.viscous_torque_n_m_s_rad}
+    friction: dict[str, Any] = {"lead_m": axis.lead_m, "coulomb_torque_n_m": axis.coulomb_torque_n_m,
+                                "viscous_torque_n_m_s_rad": axis.viscous_torque_n_m_s_rad}
     if isinstance(axis, Rigid):
         return AxisTruth((axis.mass_kg,), (), None, **friction)
     if isinstance(axis, TwoMass):
@@ -130,7 +130,7 @@ def _true_axis(believed: Axis, simulation: SimulationSection) -> AxisTruth:
     return _seven_dof(axis, friction)
 
 
-def _seven_dof(axis: SevenDofAxis, friction: dict[str, float]) -> AxisTruth:
+def _seven_dof(axis: SevenDofAxis, friction: dict[str, Any]) -> AxisTruth:
     if axis.nut_position_m is not None:
         raise FieldError(("axis", "nut_position_m"), f"given {axis.nut_position_m} m, allowed null on a simulated "
                          "bench: its stiffnesses are those with the nut in the middle; the effect "

@@ -152,7 +152,7 @@ def test_smaller_steps_converge() -> None:
 
 
 def test_refuses_what_cannot_be() -> None:
-    with pytest.raises(ValueError, match=r"step_s: must be <= .*3896 Hz"):
+    with pytest.raises(ValueError, match=r"step_s: must be <= .*3895 Hz"):
         Plant(seven_dof(), step_s=1e-4)
     with pytest.raises(ValueError, match="needs an axis with a table"):
         Plant(one_mass(), effects=[Effect("backlash", {"gap_m": 1e-5})])

@@ -1,1 +1,1 @@
-"""Reports: pictures and pages of results."""
+"""One look for every result: a page that works offline, pictures, and the numbers as JSON."""

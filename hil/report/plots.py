@@ -1,0 +1,62 @@
+"""Interactive plots (Bokeh) of the same panels as the pictures: linked in time, zoomed with the wheel."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from bokeh.layouts import gridplot
+from bokeh.models import BoxAnnotation, ColumnDataSource, CrosshairTool, HoverTool, Range1d, Span
+from bokeh.plotting import figure
+
+from hil.report import look
+from hil.report.figures import Panel
+from hil.report.look import FloatArray, thin
+
+DRAWN_ROWS = 12_000          # of each panel: above it, least and greatest of each stretch
+
+
+def over_time(time_s: FloatArray, panels: Sequence[Panel], heights: Sequence[int] = ()) -> Any:
+    """Panels one above the other with one time axis, a common toolbar and a crosshair through all of them."""
+    shared = Range1d(float(time_s[0]), float(time_s[-1]), bounds=(float(time_s[0]), float(time_s[-1])))
+    cursor = CrosshairTool(overlay=Span(dimension="height", line_color="#888888", line_dash="dotted"), dimensions="height")
+    plots = []
+    for index, panel in enumerate(panels):
+        last = index == len(panels) - 1
+        height = heights[index] if heights else 175
+        plots.append(_panel(time_s, panel, shared, cursor, height + 40 * last + 26 * (index == 0), last))
+    legend = plots[0].legend[0]
+    legend.orientation, legend.padding, legend.border_line_alpha = "horizontal", 2, 0.0
+    plots[0].add_layout(legend, "above")      # inside, it would hide a line sooner or later
+    for plot in plots[1:]:
+        plot.legend.visible = False
+    return gridplot([[plot] for plot in plots], merge_tools=True, sizing_mode="stretch_width", toolbar_location="right",
+                    toolbar_options={"logo": None})
+
+
+def _panel(time_s: FloatArray, panel: Panel, shared: Range1d, cursor: CrosshairTool, height: int, last: bool) -> Any:
+    unit = panel.shown
+    chosen = thin(tuple(line.values for line in panel.lines), DRAWN_ROWS)
+    data = {"time_s": time_s[chosen].astype(np.float32)}
+    data |= {f"y{i}": (line.values[chosen] * unit.factor).astype(np.float32) for i, line in enumerate(panel.lines)}
+    source = ColumnDataSource(data)
+    plot = figure(height=height, x_range=shared, tools="xpan,xwheel_zoom,box_zoom,reset,save", active_scroll="xwheel_zoom",
+                  y_axis_label=f"{panel.label} [{unit.unit}]", x_axis_label="time [s]" if last else None)
+    if panel.band > 0.0:
+        plot.add_layout(BoxAnnotation(bottom=-panel.band * unit.factor, top=panel.band * unit.factor,
+                                      fill_color=look.NOISE, fill_alpha=0.35, level="underlay"))
+    drawn = []
+    for i, line in enumerate(panel.lines):
+        style = {"line_width": 3.2, "line_alpha": 0.5} if line.broad else {"line_width": 1.1}
+        drawn.append(plot.line("time_s", f"y{i}", source=source, color=line.colour,
+                               legend_label=line.label, **style))
+    tips = [("time", "@time_s{0.0000} s")]
+    tips += [(line.label, f"@y{i}{{0.0000}} {unit.unit}") for i, line in enumerate(panel.lines)]
+    plot.add_tools(cursor, HoverTool(renderers=drawn[:1], tooltips=tips, mode="vline"))
+    plot.xaxis.major_label_text_font_size = "12px" if last else "0px"
+    plot.yaxis.axis_label_text_font_style = "normal"
+    plot.yaxis.axis_label_text_font_size = "12px"
+    plot.xaxis.axis_label_text_font_style = "normal"
+    plot.min_border_left = 80
+    return plot

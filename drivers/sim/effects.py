@@ -1,7 +1,7 @@
 """Catalogue of what a simulated axis can conceal: ids, parameters, units, allowed ranges, forms.
 
 On a linear axis read N for n_m, m for rad, N s/m for n_m_s_rad; angles of the screw stay angles.
-The equations stand in contact.py (friction, nut) and kernel.py (drive, sensors, table).
+The equations stand in contact.py (friction, nut), drive_path.py, sensors.py and kernel.py (table).
 """
 
 from __future__ import annotations

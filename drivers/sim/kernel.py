@@ -9,89 +9,18 @@ second order in h for springs and torque, exact rest in stiction. A torque that 
 
 from __future__ import annotations
 
-from math import exp, pi, sin, sqrt
+from math import sqrt
 from typing import Any
 
 import numpy as np
 from numba import njit
 
 from drivers.sim.contact import bristle_torque, coulomb_impulse, friction_law, lead_error, nut_force
-from drivers.sim.layout import CHANNEL_LINE, COMMAND_LINE
-from drivers.sim.sensors import normal, quantise
+from drivers.sim.drive_path import angle_torque, drive_torque
+from drivers.sim.layout import CHANNEL_LINE, delayed, push
+from drivers.sim.sensors import motor_truth, normal, sample, table_truth
 
 MOTOR_SIDE, TABLE_SIDE = 0, 1
-
-
-@njit(cache=True)
-def push(line: Any, tick: int, value: float) -> None:
-    """Store the value of this tick in a ring."""
-    line[tick % line.size] = value
-
-
-@njit(cache=True)
-def delayed(line: Any, tick: int, delay_steps: float) -> float:
-    """Value `delay_steps` before the tick, linear between ticks."""
-    whole = int(delay_steps)
-    part = delay_steps - whole
-    value: float = (1.0 - part) * line[(tick - whole) % line.size] + part * line[(tick - whole - 1) % line.size]
-    return value
-
-
-@njit(cache=True)
-def clip(value: float, limit: float) -> float:
-    return min(max(value, -limit), limit)
-
-
-@njit(cache=True)
-def lag(value: float, output: float, ratio: float) -> tuple[float, float]:
-    """Mean over one step and end of y' = (value - y) / tau from y = output; ratio = step / tau."""
-    gain = 1.0 - exp(-ratio)
-    return value + (output - value) * gain / ratio, output + gain * (value - output)
-
-
-@njit(cache=True)
-def drive_torque(p: Any, s: Any, lines: Any, command: float) -> tuple[float, float]:
-    """Measured current (x nominal torque constant) and torque of the drive for a command, both in the motor's unit.
-
-    delay -> limit -> dead zone -> first-order lag. Form 1 (hidden): the current does not show that stage.
-    """
-    current = torque = command
-    e = p.transport_delay
-    if e.on:
-        push(lines[COMMAND_LINE], s.tick, command)
-        torque = delayed(lines[COMMAND_LINE], s.tick, e.delay_s / p.step_s)
-        if e.form == 0:
-            current = torque
-    if p.torque_saturation.on:
-        limit = p.torque_saturation.limit_n_m
-        torque = clip(torque, limit)
-        if p.torque_saturation.form == 0:
-            current = clip(current, limit)
-    if p.torque_dead_zone.on:
-        width = p.torque_dead_zone.half_width_n_m
-        torque -= clip(torque, width)
-        if p.torque_dead_zone.form == 0:
-            current -= clip(current, width)
-    if p.current_loop_lag.on:
-        ratio = p.step_s / p.current_loop_lag.time_constant_s
-        torque, s.lag_torque = lag(torque, s.lag_torque, ratio)
-        if p.current_loop_lag.form == 0:
-            current, s.lag_current = lag(current, s.lag_current, ratio)
-    return current, torque
-
-
-@njit(cache=True)
-def angle_torque(p: Any, torque: float, angle: float) -> float:
-    """Torque of the motor from its current: saturated torque constant, ripple, cogging."""
-    saturation = p.torque_constant_saturation.coefficient_1_n2_m2
-    if saturation > 0.0:
-        u = clip(torque, 1.0 / sqrt(3.0 * saturation))  # u (1 - c u^2) is greatest here
-        torque = u * (1.0 - saturation * u * u)
-    e = p.torque_ripple
-    torque *= 1.0 + e.fraction * sin(e.cycles_per_rev * angle + e.phase_rad)
-    g = p.cogging_torque
-    torque += g.amplitude_n_m * sin(g.cycles_per_rev * angle + g.phase_rad)
-    return torque
 
 
 @njit(cache=True)
@@ -162,50 +91,6 @@ def kick(p: Any, s: Any, index: int, side: int, share: float, time_s: float) -> 
     else:
         free = mass * s.velocity[index] + h * force
         s.velocity[index] = (free - coulomb_impulse(free, h, bound / ratio, offset / ratio)) / mass
-
-
-@njit(cache=True)
-def sample(p: Any, s: Any, lines: Any) -> None:
-    """Digitise both encoders at this tick into s."""
-    instant = p.sampling_jitter_s * normal(s) if p.sampling_jitter_s > 0.0 else 0.0
-    motor = motor_truth(p, s) + instant * s.velocity[0] / p.drive_ratio
-    table = table_truth(p, s) + instant * s.velocity[p.table]
-    motor_late, table_late = motor, table
-    skew = p.channel_time_skew
-    if skew.on and skew.form < 2:
-        late = delayed(lines[CHANNEL_LINE], s.tick, skew.delay_s / p.step_s)
-        if skew.form == 0:
-            table_late = late
-        else:
-            motor_late = late
-    noise_motor = p.motor_noise * normal(s) if p.motor_noise > 0.0 else 0.0
-    noise_table = p.table_noise * normal(s) if p.table_noise > 0.0 else 0.0
-    s.motor_seen = quantise(motor + noise_motor, p.motor_resolution)
-    s.table_seen = quantise(table + noise_table, p.table_resolution)
-    s.motor_recorded = quantise(motor_late + noise_motor, p.motor_resolution)
-    s.table_recorded = quantise(table_late + noise_table, p.table_resolution)
-
-
-@njit(cache=True)
-def motor_truth(p: Any, s: Any) -> float:
-    """What the motor encoder would read without resolution and noise."""
-    e = p.encoder_eccentricity
-    reading: float = s.position[0] / p.drive_ratio + p.motor_offset
-    if e.on:
-        reading += e.amplitude_rad * sin(s.position[0] / p.screw_ratio + e.phase_rad)
-    return reading
-
-
-@njit(cache=True)
-def table_truth(p: Any, s: Any) -> float:
-    """What the linear encoder, fixed to the machine base, would read without resolution and noise."""
-    e = p.scale_interpolation_error
-    reading: float = s.position[p.table] + p.table_offset
-    if p.base >= 0:
-        reading -= s.position[p.base]
-    if e.on:
-        reading += e.amplitude_m * sin(2.0 * pi * reading / e.period_m + e.phase_rad)
-    return reading
 
 
 @njit(cache=True)

@@ -1,4 +1,4 @@
-"""Records the compiled kernels work on: parameters of one simulated axis and its state.
+"""What the compiled kernels work on: parameters of one simulated axis, its state, and delay lines.
 
 Every effect of the catalogue is a nested record named by its id, holding `on`, `form` and its parameters; switched
 off it is all zeros. Adding an effect: one entry in effects.CATALOGUE and its term in a kernel.
@@ -7,9 +7,11 @@ off it is all zeros. Adding an effect: one entry in effects.CATALOGUE and its te
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 from zlib import crc32
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from drivers.sim.axis import MAX_MASSES
@@ -22,7 +24,8 @@ COMMAND_LINE, CHANNEL_LINE = 0, 1
 
 # A compiled kernel's cache knows its own file only, not the files it calls. With the sources' checksum in the
 # name of a field the records change their type with every edit, and stale kernels are never called.
-_SOURCES = [Path(__file__).with_name(f"{name}.py") for name in ("contact", "kernel", "sensors", "servo", "reality")]
+_KERNELS = ("contact", "drive_path", "kernel", "layout", "reality", "sensors", "servo")
+_SOURCES = [Path(__file__).with_name(f"{name}.py") for name in _KERNELS]
 _STAMP = f"sources_{crc32(b''.join(path.read_bytes() for path in _SOURCES)):08x}"
 
 _SCALARS = (
@@ -81,3 +84,18 @@ STATE = np.dtype(
 def one(dtype: np.dtype[np.void]) -> NDArray[np.void]:
     """Array of one zeroed record; kernels take it and work on its first item."""
     return np.zeros(1, dtype)
+
+
+@njit(cache=True)
+def push(line: Any, tick: int, value: float) -> None:
+    """Store the value of this tick in a ring."""
+    line[tick % line.size] = value
+
+
+@njit(cache=True)
+def delayed(line: Any, tick: int, delay_steps: float) -> float:
+    """Value `delay_steps` before the tick, linear between ticks."""
+    whole = int(delay_steps)
+    part = delay_steps - whole
+    value: float = (1.0 - part) * line[(tick - whole) % line.size] + part * line[(tick - whole - 1) % line.size]
+    return value

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from math import cos, isfinite, log, pi, sqrt
+from math import cos, isfinite, log, pi, sin, sqrt
 from typing import Any
 
 import numpy as np
 from numba import njit
+
+from drivers.sim.layout import CHANNEL_LINE, delayed
 
 
 @dataclass(frozen=True)
@@ -69,3 +71,47 @@ def normal(s: Any) -> float:
 def quantise(value: float, resolution: float) -> float:
     """Nearest multiple of the resolution; 0 leaves the value as it is."""
     return resolution * np.floor(value / resolution + 0.5) if resolution > 0.0 else value
+
+
+@njit(cache=True)
+def sample(p: Any, s: Any, lines: Any) -> None:
+    """Digitise both encoders at this tick into s."""
+    instant = p.sampling_jitter_s * normal(s) if p.sampling_jitter_s > 0.0 else 0.0
+    motor = motor_truth(p, s) + instant * s.velocity[0] / p.drive_ratio
+    table = table_truth(p, s) + instant * s.velocity[p.table]
+    motor_late, table_late = motor, table
+    skew = p.channel_time_skew
+    if skew.on and skew.form < 2:
+        late = delayed(lines[CHANNEL_LINE], s.tick, skew.delay_s / p.step_s)
+        if skew.form == 0:
+            table_late = late
+        else:
+            motor_late = late
+    noise_motor = p.motor_noise * normal(s) if p.motor_noise > 0.0 else 0.0
+    noise_table = p.table_noise * normal(s) if p.table_noise > 0.0 else 0.0
+    s.motor_seen = quantise(motor + noise_motor, p.motor_resolution)
+    s.table_seen = quantise(table + noise_table, p.table_resolution)
+    s.motor_recorded = quantise(motor_late + noise_motor, p.motor_resolution)
+    s.table_recorded = quantise(table_late + noise_table, p.table_resolution)
+
+
+@njit(cache=True)
+def motor_truth(p: Any, s: Any) -> float:
+    """What the motor encoder would read without resolution and noise."""
+    e = p.encoder_eccentricity
+    reading: float = s.position[0] / p.drive_ratio + p.motor_offset
+    if e.on:
+        reading += e.amplitude_rad * sin(s.position[0] / p.screw_ratio + e.phase_rad)
+    return reading
+
+
+@njit(cache=True)
+def table_truth(p: Any, s: Any) -> float:
+    """What the linear encoder, fixed to the machine base, would read without resolution and noise."""
+    e = p.scale_interpolation_error
+    reading: float = s.position[p.table] + p.table_offset
+    if p.base >= 0:
+        reading -= s.position[p.base]
+    if e.on:
+        reading += e.amplitude_m * sin(2.0 * pi * reading / e.period_m + e.phase_rad)
+    return reading

@@ -19,6 +19,8 @@ from drivers.pdo import EVERY_SYNC
 _POSITION: Final = Struct("<i")
 _PLAIN_DIRECTION, _REVERSED = 0x0000, 0x0008  # 0x6000 bit 3: measuring direction
 _OPERATIONAL: Final = 5
+_OK = Condition.OK
+_new = tuple.__new__  # makes a named tuple without its Python-level constructor
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,18 +103,20 @@ class CanopenEncoder:
         self._latched = self._latched | Condition.ALARM if emergency.active else self._latched & ~Condition.ALARM
 
     def _on_heartbeat(self, can_id: int, data: bytes, now_s: float) -> None:
+        if self._answered == self._set_up_at:
+            return  # the loop does not run yet
         self._heartbeat_deadline_s = now_s + 3 * self.settings.heartbeat_s
-        if len(data) == 1 and data[0] & 0x7F != _OPERATIONAL and self._answered != self._set_up_at:
+        if len(data) == 1 and data[0] & 0x7F != _OPERATIONAL:
             self._latched |= Condition.NOT_OPERATIONAL
 
     def read(self, now_s: float) -> EncoderSample:
         """The sample of the latest answered SYNC, and what is wrong. Never raises, never waits."""
         age = self._master.syncs - self._answered
-        self._condition = Condition.OK
+        self._condition = _OK
         if age or self._latched or self._health.state or now_s > self._heartbeat_deadline_s:
             self._condition = self._diagnose(age, now_s)
         counts = self._unwrapper.total
-        return EncoderSample(self._sample_time_s, age, counts * self.step_m, counts, self._condition)
+        return _new(EncoderSample, (self._sample_time_s, age, counts * self.step_m, counts, self._condition))
 
     def _diagnose(self, age: int, now_s: float) -> Condition:
         condition = Condition(self._latched)

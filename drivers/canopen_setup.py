@@ -119,7 +119,13 @@ class DeviceSetup:
 
     def write_only(self, index: int, subindex: int, value: int) -> None:
         """Write without reading back."""
-        data = self._variable(index, subindex).encode_raw(value)
+        try:
+            data = self._variable(index, subindex).encode_raw(value)
+        except (ValueError, OverflowError, struct.error) as error:
+            raise ConfigurationError(
+                f"the value does not fit the object ({error})", where=self._where(index, subindex), given=str(value),
+                advice="Correct the bench description.",
+            ) from error  # fmt: skip
         self._transfer(index, subindex, lambda: self._node.sdo.download(index, subindex, data), value)
 
     def check_identity(self, profile: int, serial_number: int | None = None) -> None:

@@ -171,8 +171,8 @@ class SimulatedDevice:
             self.tick(now_s)
         self._last_s = now_s
         self.process_sync(now_s)
-        if self.nmt_state is NmtState.OPERATIONAL and not self.mute:
-            self.pdo.on_sync(now_s)
+        if not self.mute:
+            self.pdo.on_sync(now_s)  # holds no PDOs outside NMT operational
 
     def emergency(self, code: int, register: int, now_s: float, detail: bytes = b"") -> None:
         """Send an EMCY, keep it in 0x1003 (newest first) and in the error register; code 0: errors reset."""

@@ -29,6 +29,7 @@ _ERROR_CODE, _QUICK_STOP_DECELERATION = key_of(0x603F), key_of(0x6085)
 _FOLLOWING_ERROR, _FOLLOWING_ERROR_WINDOW = key_of(0x60F4), key_of(0x6065)
 
 _SERVO_MODES = (Mode.HOMING, Mode.CYCLIC_SYNC_POSITION, Mode.CYCLIC_SYNC_VELOCITY)
+_SWITCHED_ON = DriveState.SWITCHED_ON  # bound once: looking a member up costs the loop
 _STOPPING = (DriveState.QUICK_STOP_ACTIVE, DriveState.FAULT_REACTION_ACTIVE)
 _FOLLOWING_ERROR_CODE = 0x8611  # CiA 402-2
 
@@ -37,7 +38,7 @@ class SimulatedDrive(SimulatedDevice):
     """The drive node. `servo`: loops inside the drive; without them only CST is accepted and a stop is coasting.
 
     Positions in increments of 0x608F, torques in 1/1000 of `rated_torque_n_m` (0x6076, mN m): it sets the resolution of
-    set-point and measurement. Linear axes: metres for radians, newtons for newton metres, metres per "revolution" 2 pi.
+    set-point and measurement. Linear axes: metres for radians, newtons for newton metres, travel_per_rev in m.
     """
 
     def __init__(
@@ -50,11 +51,14 @@ class SimulatedDrive(SimulatedDevice):
         period_s: float = 0.001,
         rated_torque_n_m: float = 4.0,
         counts_per_rev: int = 1 << 20,
+        travel_per_rev: float = 2 * math.pi,
         eds: Path = EDS_FOLDER / "servo_drive.eds",
     ) -> None:
-        self.plant, self.period_s = plant, period_s
+        self.plant = plant
+        self._set_period(period_s)
         self._loops = DriveLoops(plant, servo)
         self._rated_torque_mn_m, self._counts_per_rev = round(rated_torque_n_m * 1000), counts_per_rev
+        self._travel_per_rev = travel_per_rev
         self.state = DriveState.NOT_READY_TO_SWITCH_ON
         self._controlword = 0
         super().__init__(port, eds, node_id)
@@ -70,7 +74,7 @@ class SimulatedDrive(SimulatedDevice):
         values[key_of(0x608F, 1)] = self._counts_per_rev
         self._n_m_per_mille = self._rated_torque_mn_m / 1e6
         self._mille_per_n_m = 1e6 / self._rated_torque_mn_m
-        self._counts_per_rad = self._counts_per_rev / (2 * math.pi)
+        self._counts_per_rad = self._counts_per_rev / self._travel_per_rev
         self._torque_n_m = 0.0        # command in force in CST, set when an RPDO arrives
         self._offset_counts = 0       # position = encoder counts - offset, set by homing
         self._counts = round(self.plant.motor_position_rad * self._counts_per_rad)
@@ -109,7 +113,7 @@ class SimulatedDrive(SimulatedDevice):
         self.values[_STATUSWORD] = STATUS[self.state] | REMOTE | int(extra)
 
     def process_rpdo(self, now_s: float) -> None:
-        if self.values[_CONTROLWORD] != self._controlword or self.state is DriveState.SWITCHED_ON:
+        if self.values[_CONTROLWORD] != self._controlword or self.state is _SWITCHED_ON:
             self._take_controlword(now_s)
         if self._direct:
             values = self.values
@@ -195,7 +199,10 @@ class SimulatedDrive(SimulatedDevice):
         units, exponent = (value, number(0x60C2, 2)) if subindex == 1 else (number(0x60C2, 1), value)
         if units == 0:
             raise SdoAbort(AbortCode.INVALID_VALUE)
-        self.period_s = units * 10**exponent if exponent >= 0 else units / 10**-exponent
+        self._set_period(units * 10**exponent if exponent >= 0 else units / 10**-exponent)
+
+    def _set_period(self, period_s: float) -> None:
+        self.period_s, self._syncs_per_s = period_s, 1 / period_s
 
     # -- in the loop ------------------------------------------------------------------------------------------------
 
@@ -211,9 +218,11 @@ class SimulatedDrive(SimulatedDevice):
 
     def _measure(self, counts: int) -> None:
         """Position with the wrap-around of an INTEGER32, velocity as its difference."""
+        moved = counts - self._counts
         self._last_counts, self._counts = self._counts, counts
-        self.values[_VELOCITY] = int((counts - self._last_counts) / self.period_s)
-        self.values[_POSITION] = _wrap(counts - self._offset_counts)
+        values = self.values
+        values[_VELOCITY] = int(moved * self._syncs_per_s)
+        values[_POSITION] = ((counts - self._offset_counts + 0x80000000) & 0xFFFFFFFF) - 0x80000000
 
     def _advance_by_loops(self, now_s: float) -> float:
         """One period under the loops inside the drive: CSV, CSP, homing, stop ramps; mean measured torque [N m]."""

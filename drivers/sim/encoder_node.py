@@ -44,7 +44,8 @@ class SimulatedEncoder(SimulatedDevice):
     def _power_up(self) -> None:
         values = self.values
         values[_STEP] = values[key_of(0x6501)] = round(self._step_m * 1e9)
-        values[_RANGE] = self._range_counts = self._delivered_range
+        values[_RANGE] = self._delivered_range
+        self._set_range(self._delivered_range)
         self._refresh(values[_PARAMETERS], 0)
 
     def reset(self, now_s: float) -> None:
@@ -55,26 +56,27 @@ class SimulatedEncoder(SimulatedDevice):
         sign = -1 if parameters & _REVERSED else 1
         self._counts_per_m = sign / self._step_m
         self.values[_OFFSET] = self._offset = offset
-        self._measure()
+        self.process_sync(self._last_s)
 
     def _on_parameters(self, index: int, subindex: int, value: int) -> None:
         self._refresh(value, 0)
 
     def _on_range(self, index: int, subindex: int, value: int) -> None:
-        self._range_counts = value
-        self._measure()
+        self._set_range(value)
+        self.process_sync(self._last_s)
+
+    def _set_range(self, counts: int) -> None:
+        """Modulus of the value, and how far it reaches below zero: INTEGER32 without a range, else 0..range - 1."""
+        self._modulus, self._half = (counts, 0) if counts else (1 << 32, 1 << 31)
 
     def _on_preset(self, index: int, subindex: int, value: int) -> None:
         self._refresh(self.values[_PARAMETERS], value - round(self.plant.table_position_m * self._counts_per_m))
 
-    def _measure(self) -> None:
-        counts = round(self.plant.table_position_m * self._counts_per_m) + self._offset
-        wrap = self._range_counts
-        self.values[_POSITION] = counts % wrap if wrap else ((counts + 0x80000000) & 0xFFFFFFFF) - 0x80000000
-
     def process_sync(self, now_s: float) -> None:
-        if not self.values[_ALARMS]:  # a blind head repeats its last position
-            self._measure()
+        values = self.values
+        if not values[_ALARMS]:  # a blind head repeats its last position
+            counts = round(self.plant.table_position_m * self._counts_per_m) + self._offset
+            values[_POSITION] = (counts + self._half) % self._modulus - self._half
 
     def raise_alarm(self, now_s: float) -> None:
         """The reading head loses the scale."""

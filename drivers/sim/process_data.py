@@ -8,7 +8,7 @@ from operator import itemgetter
 from struct import Struct
 from typing import Any, Final
 
-from drivers.bus import CanPort
+from drivers.bus import CanPort, Listener
 from drivers.pdo import PDO_INVALID, layout
 from drivers.sim.dictionary import Dictionary, Item, key_of
 from drivers.sim.sdo_server import AbortCode, SdoAbort
@@ -45,9 +45,10 @@ class ProcessData:
     ) -> None:
         self._dictionary, self._values, self._port = dictionary, dictionary.values, port
         self._received, self._emergency = received, emergency
-        self._rpdos: dict[int, _Pdo] = {}
+        self._takers: list[tuple[int, Listener]] = []
         self._synchronous: list[_Pdo] = []  # RPDOs that wait for the SYNC
-        self._tpdos: list[_Pdo] = []
+        self._every_sync: list[tuple[int, Callable[..., bytes], Callable[[dict[int, Any]], Any]]] = []
+        self._tpdos: list[_Pdo] = []        # of all other transmission types
         self._operational = False
         for index in {key >> 8 for key in dictionary.items}:
             if RPDO_COMMUNICATION <= index < RPDO_MAPPING or TPDO_COMMUNICATION <= index < TPDO_MAPPING:
@@ -57,17 +58,20 @@ class ProcessData:
 
     def configure(self, *, operational: bool) -> None:
         """Compile the PDOs that are valid now; none outside NMT operational."""
-        for cob_id in self._rpdos:
-            self._port.ignore(cob_id, self._on_rpdo)
+        for cob_id, take in self._takers:
+            self._port.ignore(cob_id, take)
         self._operational = operational
-        self._rpdos, self._synchronous, self._tpdos = {}, [], []
+        self._takers, self._synchronous, self._every_sync, self._tpdos = [], [], [], []
         if not operational:
             return
-        self._rpdos = {pdo.cob_id: pdo for pdo in self._compile(RPDO_COMMUNICATION, RPDO_MAPPING)}
-        self._synchronous = [pdo for pdo in self._rpdos.values() if pdo.transmission_type <= 240]
-        self._tpdos = self._compile(TPDO_COMMUNICATION, TPDO_MAPPING)
-        for cob_id in self._rpdos:
-            self._port.listen(cob_id, self._on_rpdo)
+        rpdos = self._compile(RPDO_COMMUNICATION, RPDO_MAPPING)
+        self._synchronous = [pdo for pdo in rpdos if pdo.transmission_type <= 240]
+        self._takers = [(pdo.cob_id, self._taker(pdo)) for pdo in rpdos]
+        tpdos = self._compile(TPDO_COMMUNICATION, TPDO_MAPPING)
+        self._every_sync = [(pdo.cob_id, pdo.packer.pack, pdo.get) for pdo in tpdos if pdo.transmission_type == 1]
+        self._tpdos = [pdo for pdo in tpdos if pdo.transmission_type != 1]
+        for cob_id, take in self._takers:
+            self._port.listen(cob_id, take)
 
     def _compile(self, communication: int, mapping: int) -> list[_Pdo]:
         pdos = []
@@ -118,20 +122,24 @@ class ProcessData:
 
     # -- in the loop ------------------------------------------------------------------------------------------------
 
-    def _on_rpdo(self, can_id: int, data: bytes, now_s: float) -> None:
-        pdo = self._rpdos[can_id]
-        size = pdo.packer.size
-        if len(data) != size:
-            short = len(data) < size
-            self._emergency(_LENGTH_TOO_SHORT if short else _LENGTH_EXCEEDED, 0x11, now_s)
-            if short:
+    def _taker(self, pdo: _Pdo) -> Listener:
+        """Listener of one RPDO; everything it needs is bound once."""
+        update, keys, unpack, size = self._values.update, pdo.keys, pdo.packer.unpack, pdo.packer.size
+        received, waits = self._received, pdo.transmission_type <= 240
+
+        def take(can_id: int, data: bytes, now_s: float) -> None:
+            if len(data) != size:
+                self._emergency(_LENGTH_TOO_SHORT if len(data) < size else _LENGTH_EXCEEDED, 0x11, now_s)
+                if len(data) < size:
+                    return
+                data = data[:size]
+            if waits:
+                pdo.pending = data
                 return
-            data = data[:size]
-        if pdo.transmission_type <= 240:
-            pdo.pending = data
-            return
-        self._values.update(zip(pdo.keys, pdo.packer.unpack(data), strict=True))
-        self._received(now_s)
+            update(zip(keys, unpack(data)))  # noqa: B905  as many values as keys, by the packer's making
+            received(now_s)
+
+        return take
 
     def on_sync(self, now_s: float) -> None:
         """Synchronous RPDOs act now; the TPDOs that are due go out."""
@@ -140,17 +148,17 @@ class ProcessData:
                 self._values.update(zip(pdo.keys, pdo.packer.unpack(pdo.pending), strict=True))
                 pdo.pending = b""
                 self._received(now_s)
+        values, send = self._values, self._port.send
+        for cob_id, pack, get in self._every_sync:
+            send(cob_id, pack(*get(values)), now_s)
         for pdo in self._tpdos:
-            data = pdo.packer.pack(*pdo.get(self._values))
-            if pdo.transmission_type != 1:  # every n-th SYNC, or (0, 254, 255) on change
-                pdo.syncs += 1
-                if 1 < pdo.transmission_type <= 240:
-                    if pdo.syncs % pdo.transmission_type:
-                        continue
-                elif data == pdo.pending:
-                    continue
+            data = pdo.packer.pack(*pdo.get(values))
+            pdo.syncs += 1
+            cyclic = 1 < pdo.transmission_type <= 240
+            due = pdo.syncs % pdo.transmission_type == 0 if cyclic else data != pdo.pending  # 0, 254, 255: on change
+            if due:
                 pdo.pending = data
-            self._port.send(pdo.cob_id, data, now_s)
+                send(pdo.cob_id, data, now_s)
 
 
 def _tuple_getter(key: int) -> Callable[[dict[int, Any]], tuple[Any]]:

@@ -16,12 +16,14 @@ from hypothesis import strategies as st
 
 from drivers.base import Condition, ConfigurationError, DriveGoal, IdentityError, ResponseTimeout
 from drivers.bus import BusConfig, PumpedPort, PythonCanPort, open_bus
-from drivers.canopen_drive import DriveSettings, HomingSettings
+from drivers.canopen_drive import CanopenDrive, DriveSettings, HomingSettings
 from drivers.canopen_homing import HomingRun
+from drivers.canopen_master import CanopenMaster
 from drivers.canopen_setup import EDS_FOLDER, DeviceSetup, SetupNetwork
 from drivers.cia402 import DriveState, HomingPhase, Mode
 from drivers.inprocess import InProcessBus
 from drivers.modelled import ModelledBus
+from drivers.sim.drive_node import SimulatedDrive
 from drivers.sim.servo import DriveServo, Servo
 
 R = 0.01 / (2 * math.pi)
@@ -259,8 +261,39 @@ def test_the_drive_says_what_it_is() -> None:
     rig = in_process()
     rig.set_up()
     info = rig.drive.info
-    assert (info.counts_per_rev, info.rated_torque_n_m) == (1 << 20, 4.0)
+    assert (info.rad_per_count, info.rated_torque_n_m) == (2 * math.pi / (1 << 20), 4.0)
     assert info.torque_constant_n_m_a == pytest.approx(0.8)
+
+
+def test_a_linear_drive_counts_metres() -> None:
+    bus = InProcessBus()
+    port, plant = bus.port(), Mass(motor_position_rad=0.25)  # m, N and kg
+    node = SimulatedDrive(bus.port(), plant, counts_per_rev=1_000_000, travel_per_rev=1.0, rated_torque_n_m=100.0)
+    master = CanopenMaster(port)
+    drive = CanopenDrive(master, DriveSettings(travel_per_rev=1.0))
+    drive.set_up()
+    assert drive.info.rad_per_count == 1e-6
+    master.start(0.0)
+    master.sync(0.0)
+    assert drive.read(0.0).motor_position_rad == pytest.approx(0.25)
+    assert node.values[0x6064_00] == 250_000
+
+
+def test_a_value_too_large_for_its_object_is_refused() -> None:
+    with pytest.raises(ConfigurationError, match=r"0x6072:00 \(Max torque\): the value does not fit.*given: 250000"):
+        in_process(settings=DriveSettings(max_torque_n_m=1000.0)).set_up()
+
+
+def test_the_loop_may_run_in_any_time_base() -> None:
+    rig = in_process()
+    rig.tick = 5_000_000  # the set-up ran near 0 s, the loop begins at 5000 s
+    rig.set_up()
+    conditions = {rig.cycle().condition for _ in range(100)}
+    assert conditions == {Condition.OK}
+    rig.set_up()
+    rig.tick = 7          # and again, backwards
+    rig.master.start(rig.now_s)
+    assert {rig.cycle().condition for _ in range(200)} == {Condition.OK}
 
 
 # -- what set-up refuses ----------------------------------------------------------------------------------------------

@@ -5,6 +5,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
@@ -55,7 +56,7 @@ class Dictionary:
     """
 
     def __init__(self, eds: Path, node_id: int) -> None:
-        self.items = {key_of(v.index, v.subindex): _item(v) for v in _variables(eds, node_id)}
+        self.items = _read_eds(eds, node_id)
         self.values: dict[int, Value] = {}
         self._indices = {key >> 8 for key in self.items}
         self._hooks: dict[int, Callable[[int, int, int], None]] = {}
@@ -112,9 +113,11 @@ class Dictionary:
         self.values[key_of(index, subindex)] = value
 
 
-def _variables(eds: Path, node_id: int) -> list[ODVariable]:
+@cache  # reading an EDS takes milliseconds, and nobody changes the items
+def _read_eds(eds: Path, node_id: int) -> dict[int, Item]:
     objects = canopen.import_od(str(eds), node_id=node_id).values()
-    return [variable for o in objects for variable in ([o] if isinstance(o, ODVariable) else o.values())]
+    variables = [variable for o in objects for variable in ([o] if isinstance(o, ODVariable) else o.values())]
+    return {key_of(variable.index, variable.subindex): _item(variable) for variable in variables}
 
 
 def _item(variable: ODVariable) -> Item:

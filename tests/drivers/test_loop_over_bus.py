@@ -1,4 +1,4 @@
-"""The bus adds nothing to the loop but the resolution of its numbers: a servo over CANopen and one wired to the plant."""
+"""The bus adds nothing to the loop but the resolution of its numbers: servo over CANopen against servo on the plant."""
 
 from __future__ import annotations
 

@@ -47,7 +47,7 @@ class BlockDeviation:
     @property
     def deviation(self) -> FloatArray:
         """Measured less simulated (n,)."""
-        return self.measured - self.simulated
+        return np.asarray(self.measured - self.simulated)
 
 
 def compare_blocks(measured: Measured, bench: Bench,
@@ -55,9 +55,15 @@ def compare_blocks(measured: Measured, bench: Bench,
     """All blocks that the recording can tell apart; `progress` is told the share of the rows done."""
     torque_unit = "N" if bench.axis.linear else "N m"
     name = "force" if bench.axis.linear else "torque"
+    command = replayed_command(measured, bench.gains)
+    if np.array_equal(command, measured.torque_command):
+        remark = "the replay is bit-identical to the recording"
+    elif bench.gains.integral_gain_n_m_rad:
+        remark = f"integrator set from the recording every {WINDOW_S:g} s: rounded set-points add up in it"
+    else:
+        remark = ""
     blocks = [BlockDeviation("controller", "set-points, measured positions", f"{name} command", torque_unit,
-                             measured.torque_command, replayed_command(measured, bench.gains), 0.0,
-                             f"integrator set from the recording every {WINDOW_S:g} s: rounded set-points add up in it")]
+                             measured.torque_command, command, 0.0, remark)]
     if not measured.torque_is_command:
         response = bench.twin().drive(measured.torque_command, measured.start)
         blocks.append(BlockDeviation("drive", f"measured {name} command", name, torque_unit,
@@ -78,16 +84,16 @@ def compare_blocks(measured: Measured, bench: Bench,
 def replayed_command(measured: Measured, gains: control.Gains) -> FloatArray:
     """Torque command (n,) of the control law fed with measured positions.
 
-    In windows: each begins at a tick of the position loop with the integrator that gives the window's first
-    command. A P velocity loop has no integrator and runs through.
+    In windows, unless it is bit-identical in one piece: each begins at a tick of the position loop with the
+    integrator that gives the window's first command. A P velocity loop has no integrator and runs through.
     """
     channels = (measured.position_command_m, measured.velocity_command_m_s, measured.motor,
                 measured.table_m if measured.table_m.size else gains.ratio_m_rad * measured.motor)
     start, ratio = measured.start, gains.ratio_m_rad
     state = control.init(measured.motor[0], start.velocity_m_s / ratio, start.torque, gains.period_s, start.tick)
     command, _ = control.replay(gains, state, *channels)
-    if gains.integral_gain_n_m_rad == 0.0:
-        return command
+    if gains.integral_gain_n_m_rad == 0.0 or np.array_equal(command, measured.torque_command):
+        return np.asarray(command)
     motor = measured.motor
     rows = max(round(WINDOW_S / gains.period_s / gains.position_ticks), 1) * gains.position_ticks
     first = -start.tick % gains.position_ticks + gains.position_ticks
@@ -98,7 +104,7 @@ def replayed_command(measured: Measured, gains: control.Gains) -> FloatArray:
         proportional, _ = control.replay(gains, state, *(values[begin:begin + 1] for values in channels))
         state = state._replace(integral_n_m=float(measured.torque_command[begin] - proportional[0]))
         command[begin:end], _ = control.replay(gains, state, *(values[begin:end] for values in channels))
-    return command
+    return np.asarray(command)
 
 
 def follow(measured: Measured, bench: Bench,

@@ -179,14 +179,14 @@ def _inverse_dynamics(recording: Recording) -> tuple[InverseDynamics | None, lis
 
 def _notes(measured: Measured, fit: FitResult | None) -> list[str]:
     notes = [
-        f"Velocity, acceleration and jerk: derivatives after a Butterworth low-pass of 4th order at {LOW_PASS_HZ:g} Hz, "
-        "forwards and backwards, on measured and simulated alike.",
+        "Velocity, acceleration and jerk: derivatives after a Butterworth low-pass of 4th order at "
+        f"{LOW_PASS_HZ:g} Hz, forwards and backwards, on measured and simulated alike.",
         f"The first {SETTLE_S:g} s are simulated but not judged: the state at the start is known from the first rows "
         "only.",
     ]
     if measured.torque_is_command:
-        notes.append("Only one of torque and torque command is recorded: the drive cannot be compared, and the noise of "
-                     "the torque is what the encoder puts into its command.")
+        notes.append("Only one of torque and torque command is recorded: the drive cannot be compared, and the noise "
+                     "of the torque is what the encoder puts into its command.")
     if fit is not None:
         notes.append("The parameters were fitted to this recording; judge them on another one with the fitted bench.")
     return notes

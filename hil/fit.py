@@ -64,7 +64,7 @@ def fit_nominal(bench: Bench, recordings: Sequence[Measured],
         candidate = bench_of(x)
         found = np.concatenate([weighted_residuals(candidate, measured) for measured in recordings])
         progress(float(np.sqrt(np.mean(found**2))))
-        return np.nan_to_num(found, nan=1e6, posinf=1e6, neginf=-1e6)
+        return np.asarray(np.nan_to_num(found, nan=1e6, posinf=1e6, neginf=-1e6))
 
     def jacobian(x: FloatArray) -> FloatArray:
         base = residuals(x)

@@ -58,7 +58,7 @@ class Measured:
     @property
     def time_s(self) -> FloatArray:
         """Time from the first row, tick x period."""
-        return np.arange(self.motor.size) * self.period_s
+        return np.asarray(np.arange(self.motor.size) * self.period_s, dtype=np.float64)
 
     @property
     def judged(self) -> slice:
@@ -77,8 +77,8 @@ def take(recording: Recording, bench: Bench) -> Measured:
                          f"{'linear' if bench.axis.linear else 'rotary'} one, as in the bench {bench.name}; "
                          "give the bench of this axis")
     if abs(recording.period_s - gains.period_s) > 0.01 * gains.period_s:
-        raise InputError(f"{recording.name}: given a period of {recording.period_s:g} s, allowed the velocity_period_s "
-                         f"of the bench {bench.name}, {gains.period_s:g} s; record one row per tick of the velocity loop")
+        raise InputError(f"{recording.name}: given a period of {recording.period_s:g} s, allowed velocity_period_s of "
+                         f"the bench {bench.name}, {gains.period_s:g} s; record one row per tick of the velocity loop")
     if len(recording) * recording.period_s < 4.0 * SETTLE_S:
         raise InputError(f"{recording.name}: given {len(recording)} rows, allowed {4.0 * SETTLE_S:g} s or more; "
                          "give a longer recording")
@@ -97,6 +97,14 @@ def take(recording: Recording, bench: Bench) -> Measured:
                     _noise(bench, motor, table, command, torque))
 
 
+def bench_of(recording: Recording) -> Bench:
+    """The bench that a run of the project's own recorded in its metadata. Raises InputError where there is none."""
+    described = recording.metadata.get("bench")
+    if not isinstance(described, dict):
+        raise InputError(f"{recording.name}: no bench is recorded in it; give one: --bench FILE or a shipped name")
+    return Bench.model_validate(described)
+
+
 def _column(recording: Recording, name: str) -> FloatArray:
     return np.ascontiguousarray(recording[name], dtype=np.float64)
 
@@ -105,12 +113,14 @@ def _start(gains: control.Gains, position: FloatArray, velocity: FloatArray, mot
            command: FloatArray) -> Start:
     """Position and velocity of the first row; the phase and integrator that reproduce the torque commands."""
     first_rows = motor[:_FITTED_ROWS]
-    speed = float(np.polyfit(np.arange(first_rows.size), first_rows, 2)[1]) / gains.period_s
+    speed = 0.0
+    if np.ptp(first_rows) > 0.0:    # at rest the polynomial leaves rounding behind
+        speed = float(np.polyfit(np.arange(first_rows.size), first_rows, 2)[1]) / gains.period_s
     channels = tuple(np.ascontiguousarray(values[:_REPLAYED_ROWS]) for values in (position, velocity, motor, feedback))
 
     def replay(tick: int, integral: float) -> FloatArray:
         state = control.init(motor[0], speed, integral, gains.period_s, tick)
-        return control.replay(gains, state, *channels)[0]
+        return np.asarray(control.replay(gains, state, *channels)[0])
 
     def misfit(tick: int) -> tuple[float, float]:
         # the first command less the proportional part is the integrator; a P velocity loop has none

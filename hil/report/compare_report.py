@@ -6,13 +6,14 @@ from pathlib import Path
 
 import numpy as np
 
+from hil.axis_models import OneMass
 from hil.bench import Bench
 from hil.blocks import BlockDeviation
 from hil.compare import Comparison, Deviation
 from hil.fit import FitResult
 from hil.report import figures, look, plots
 from hil.report.figures import Line, Panel
-from hil.report.look import digits, quantity
+from hil.report.look import digits, percent, quantity
 from hil.report.output import write_json, write_text
 from hil.report.page import Number, Page
 
@@ -25,8 +26,8 @@ def write_comparison(result: Comparison, folder: Path) -> None:
     motion, blocks = motion_panels(result), block_panels(result)
     page = Page(f"{result.recording.name} against its twin", _lead(result), verdict(result), result.explained)
     page.heading("Measured over simulated")
-    page.text("The twin runs in closed loop from the set-points of the recording alone. Deviation: measured less simulated; "
-              "relative: rms of the deviation over rms of the measured channel.")
+    page.text("The twin runs in closed loop from the set-points of the recording alone. Deviation: measured less "
+              "simulated; relative: rms of the deviation over rms of the measured channel.")
     page.table(("channel", "rms deviation", "largest deviation", "relative"),
                [_row(channel.label, channel) for channel in result.channels])
     page.plot(plots.over_time(time_s, motion))
@@ -40,11 +41,12 @@ def write_comparison(result: Comparison, folder: Path) -> None:
     if result.inverse_dynamics is not None:
         _inverse_dynamics(page, result)
     page.heading("One move")
-    figures.save(figures.over_time(f"{result.recording.name}: whole recording", time_s, motion), folder / "overview.png")
-    page.picture(figures.save(figures.over_time(f"{result.recording.name}: fastest move", time_s, motion,
-                                                fastest_move(result)), folder / "move.png"),
+    name = result.recording.name
+    figures.save(figures.over_time(f"{name}: whole recording", time_s, motion), folder / "overview.png")
+    move = figures.over_time(f"{name}: fastest move", time_s, motion, fastest_move(result))
+    page.picture(figures.save(move, folder / "move.png"),
                  "The fastest move of the recording (move.png); the whole recording is overview.png.")
-    figures.save(figures.over_time(f"{result.recording.name}: block by block", time_s, blocks), folder / "blocks.png")
+    figures.save(figures.over_time(f"{name}: block by block", time_s, blocks), folder / "blocks.png")
     page.heading("How it was computed")
     page.items([*result.notes, *(f"{block.block}: {block.remark}." for block, _ in result.blocks if block.remark)])
     write_json(folder / "compare.json", result.as_json())
@@ -80,7 +82,8 @@ def block_panels(result: Comparison) -> list[Panel]:
     """Output of each block, measured and simulated, and the deviation."""
     panels = []
     for block, deviation in result.blocks:
-        panels += [_pair(f"{block.block}:\n{block.output}", deviation), _difference("deviation", deviation, block.noise)]
+        panels += [_pair(f"{block.block}:\n{block.output}", deviation),
+                   _difference("deviation", deviation, block.noise)]
     return panels
 
 
@@ -124,9 +127,8 @@ def _difference(label: str, channel: Deviation, noise: float) -> Panel:
 
 
 def _row(label: str, deviation: Deviation) -> tuple[str, ...]:
-    relative = deviation.relative
     return (label, Number(quantity(deviation.rms, deviation.unit)), Number(quantity(deviation.peak, deviation.unit)),
-            Number(f"{digits(100.0 * relative)} %" if relative >= 1e-5 else "< 0.001 %"))
+            Number(percent(deviation.relative)))
 
 
 def _block_row(block: BlockDeviation, deviation: Deviation) -> tuple[str, ...]:
@@ -140,9 +142,10 @@ def _fit(page: Page, fit: FitResult) -> None:
     page.table(("parameter", "bench file", "fitted", "standard error", "change"),
                [(parameter.name, Number(digits(parameter.nominal, 4)), Number(digits(parameter.value, 5)),
                  Number(digits(parameter.standard_error, 2)),
-                 Number(f"{100.0 * (parameter.value / parameter.nominal - 1.0):+.1f} %")) for parameter in fit.parameters])
-    page.text("Closed-loop output error over torque, motor position and table against motor; standard errors hold if what "
-              "is left is white noise. bench.fitted.yaml holds the bench with these values.")
+                 Number(f"{100.0 * (parameter.value / parameter.nominal - 1.0):+.1f} %"))
+                for parameter in fit.parameters])
+    page.text("Closed-loop output error over torque, motor position and table against motor; standard errors hold if "
+              "what is left is white noise. bench.fitted.yaml holds the bench with these values.")
 
 
 def _inverse_dynamics(page: Page, result: Comparison) -> None:
@@ -150,12 +153,13 @@ def _inverse_dynamics(page: Page, result: Comparison) -> None:
     assert fit is not None
     page.heading("Inverse-dynamics fit")
     page.text("Force over measured motion, M a + Fv v + Fc sign(v) + F0, by least squares; relative error "
-              f"{digits(100.0 * fit.relative_error)} %.")
+              f"{percent(fit.relative_error)}.")
     offset = next((entry.parameters["offset_torque_n_m"] for entry in result.bench.mechanisms
                    if entry.effect == "asymmetric_friction"), 0.0)
-    rows = (("mass M", "kg", fit.inertia, fit.inertia_std_error, getattr(axis, "mass_kg", 0.0)),
-            ("viscous friction Fv", "N s/m", fit.viscous, fit.viscous_std_error, getattr(axis, "viscous_force_n_s_m", 0.0)),
-            ("Coulomb friction Fc", "N", fit.coulomb, fit.coulomb_std_error, getattr(axis, "coulomb_force_n", 0.0)),
+    assert isinstance(axis, OneMass)
+    rows = (("mass M", "kg", fit.inertia, fit.inertia_std_error, axis.mass_kg),
+            ("viscous friction Fv", "N s/m", fit.viscous, fit.viscous_std_error, axis.viscous_force_n_s_m),
+            ("Coulomb friction Fc", "N", fit.coulomb, fit.coulomb_std_error, axis.coulomb_force_n),
             ("offset F0", "N", fit.offset, fit.offset_std_error, offset))
     page.table(("parameter", "unit", "value", "standard error", "bench"),
                [(name, unit, Number(digits(value, 5)), Number(digits(error, 2)), Number(digits(believed, 5)))

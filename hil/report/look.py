@@ -49,6 +49,11 @@ def quantity(value: float, unit: str) -> str:
     return shown(unit, value).text(value)
 
 
+def percent(value: float) -> str:
+    """A ratio in percent; what is below 0.001 % is no more than that."""
+    return f"{digits(100.0 * value)} %" if value >= 1e-5 else "< 0.001 %"
+
+
 def digits(value: float, significant: int = 3) -> str:
     """A number with three significant digits, without exponent where that is readable."""
     if value == 0.0 or 1e-3 <= abs(value) < 1e6:

@@ -53,7 +53,8 @@ def write_text(path: Path, text: str) -> None:
         part.write_text(text, encoding="utf-8")
         part.replace(path)
     except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror}); choose a folder with rights and space") from None
+        raise InputError(f"{path}: cannot be written ({error.strerror}); "
+                         "choose a folder with rights and space") from None
     finally:
         part.unlink(missing_ok=True)
 

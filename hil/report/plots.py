@@ -20,7 +20,8 @@ DRAWN_ROWS = 12_000          # of each panel: above it, least and greatest of ea
 def over_time(time_s: FloatArray, panels: Sequence[Panel], heights: Sequence[int] = ()) -> Any:
     """Panels one above the other with one time axis, a common toolbar and a crosshair through all of them."""
     shared = Range1d(float(time_s[0]), float(time_s[-1]), bounds=(float(time_s[0]), float(time_s[-1])))
-    cursor = CrosshairTool(overlay=Span(dimension="height", line_color="#888888", line_dash="dotted"), dimensions="height")
+    line = Span(dimension="height", line_color=look.NOISE, line_dash="dotted")
+    cursor = CrosshairTool(overlay=line, dimensions="height")
     plots = []
     for index, panel in enumerate(panels):
         last = index == len(panels) - 1
@@ -41,8 +42,9 @@ def _panel(time_s: FloatArray, panel: Panel, shared: Range1d, cursor: CrosshairT
     data = {"time_s": time_s[chosen].astype(np.float32)}
     data |= {f"y{i}": (line.values[chosen] * unit.factor).astype(np.float32) for i, line in enumerate(panel.lines)}
     source = ColumnDataSource(data)
-    plot = figure(height=height, x_range=shared, tools="xpan,xwheel_zoom,box_zoom,reset,save", active_scroll="xwheel_zoom",
-                  y_axis_label=f"{panel.label} [{unit.unit}]", x_axis_label="time [s]" if last else None)
+    plot = figure(height=height, x_range=shared, tools="xpan,xwheel_zoom,box_zoom,reset,save",
+                  active_scroll="xwheel_zoom", y_axis_label=f"{panel.label} [{unit.unit}]",
+                  x_axis_label="time [s]" if last else None)
     if panel.band > 0.0:
         plot.add_layout(BoxAnnotation(bottom=-panel.band * unit.factor, top=panel.band * unit.factor,
                                       fill_color=look.NOISE, fill_alpha=0.35, level="underlay"))

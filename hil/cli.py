@@ -1,0 +1,63 @@
+"""The program `hil`.
+
+Exit codes: 0 done, 1 something went wrong that the user can act on, 2 a file or an argument is wrong, 130 stopped by
+ctrl-C. An error is one message on stderr, never a trace; a trace is a defect of the program.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import typer
+
+from hil.commands.compare import compare
+from hil.commands.friction import friction
+from hil.commands.import_ import import_
+from hil.commands.paper import paper
+from hil.commands.validate import validate
+from hil.errors import HilError
+
+app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False, add_completion=False,
+                  help="A servo bench that explains itself: control, twin, comparison.")
+
+# In the order of --help. A command's file imports nothing heavy at its top.
+COMMANDS: tuple[tuple[str, Callable[..., Any]], ...] = (
+    ("import", import_),
+    ("compare", compare),
+    ("friction", friction),
+    ("paper", paper),
+    ("validate", validate),
+)
+for _name, _command in COMMANDS:
+    app.command(_name)(_command)
+
+
+def main() -> None:
+    """Entry point: runs the command line, turns errors into a message and an exit code."""
+    try:
+        app()
+    except SystemExit as end:
+        if end.code == 130:
+            print("hil: stopped by ctrl-C", file=sys.stderr)
+        raise
+    except Exception as error:
+        code = _exit_code(error)
+        if code is None:
+            raise
+        print(f"hil: {error}", file=sys.stderr)
+        sys.exit(code)
+
+
+def _exit_code(error: Exception) -> int | None:
+    """Exit code of an error raised on purpose; None for a defect."""
+    if isinstance(error, HilError):
+        return error.exit_code
+    from drivers.base import DriverError  # only here: the drivers are not light
+
+    return 1 if isinstance(error, DriverError) else None
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,65 @@
+"""hil friction."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from hil.commands.console import out, progress, table
+
+if TYPE_CHECKING:
+    from hil.bench import Bench
+
+
+def friction(
+    run: Annotated[Path | None, typer.Argument(
+        help="Recording of a feed sweep; left out: --profile is run on --bench first", show_default=False)] = None,
+    bench: Annotated[str | None, typer.Option(help="Bench file or shipped name")] = None,
+    profile: Annotated[Path | None, typer.Option(help="Feed sweep to run, as profiles/friction_sweep.yaml")] = None,
+    virtual: Annotated[bool, typer.Option("--virtual", help="Run it in virtual time (simulated bench)")] = False,
+    folder: Annotated[Path | None, typer.Option(
+        "--out", help="New folder for the report; left out: runs/friction-NAME-TIME")] = None,
+) -> None:
+    """Identify Coulomb and viscous friction from constant feeds in both directions."""
+    from hil.bench import load_bench
+    from hil.errors import InputError
+    from hil.friction import identify_friction
+    from hil.measured import bench_of
+    from hil.recording import read_recording
+    from hil.report.friction_report import rows_of, verdict, write_friction
+    from hil.report.output import default_folder, new_folder
+
+    if (run is None) == (profile is None):
+        raise InputError("friction: given neither or both of a recording and --profile, allowed one; "
+                         "give a recording, or --profile with --bench to run it")
+    believed = load_bench(bench) if bench else None
+    if run is None and believed is None:
+        raise InputError("friction: --bench is missing; give the bench that --profile runs on")
+    folder = folder or default_folder(f"friction-{(run or Path(str(bench))).stem}")
+    with new_folder(folder) as part, progress() as tell:
+        if run is None:
+            assert believed is not None
+            assert profile is not None
+            tell("running the feed sweep", None)
+            run = _run(believed, profile, part, virtual)
+        recording = read_recording(run)
+        if believed is None and "bench" in recording.metadata:
+            believed = bench_of(recording)
+        tell("identifying", None)
+        result = identify_friction(recording)
+        write_friction(result, recording.name, believed, part)
+    table(("", "value", "standard error", "bench file"), rows_of(result, believed))
+    out.print(f"\n{verdict(result, believed)}\n\nReport: {folder / 'friction.html'}")
+
+
+def _run(bench: Bench, profile: Path, folder: Path, virtual: bool) -> Path:
+    from hil.errors import HilError
+    from hil.profile import load_profile
+    from hil.run import run_profile
+
+    ran = run_profile(bench, load_profile(profile), folder, "run", virtual=virtual)
+    if not ran.complete or ran.recording is None:
+        raise HilError(f"the feed sweep was not completed: {ran.outcome.ending}: {ran.outcome.reason}")
+    return ran.recording

@@ -1,0 +1,49 @@
+"""hil validate."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from hil.commands.console import out
+
+
+def validate(
+    files: Annotated[list[Path], typer.Argument(help="Bench, profile or map files (YAML)", show_default=False)],
+) -> None:
+    """Check bench, profile and map files: types, units, keys, limits. Every error names file, line and field."""
+    from hil.errors import InputError
+
+    problems = []
+    for path in files:
+        try:
+            out.print(f"{path}: {_checked(path)}", markup=False)
+        except InputError as error:
+            problems.append(str(error))
+    if problems:
+        raise InputError("\n".join(problems))
+
+
+def _checked(path: Path) -> str:
+    """What a file is; by its keys a profile, a map, or else a bench. Raises InputError."""
+    from pydantic import BaseModel, ConfigDict
+
+    from hil.bench import load_bench
+    from hil.profile import load_profile
+    from hil.recording_map import RecordingMap
+    from hil.yamlfile import load_model
+
+    class AnyFile(BaseModel):
+        model_config = ConfigDict(extra="allow")
+
+    keys = load_model(path, AnyFile).model_extra or {}
+    if "segments" in keys:
+        profile = load_profile(path)
+        duration_s = sum(profile.slots(run.move) for run in profile.runs) * profile.grid_s
+        return f"a profile of {len(profile.runs)} moves, {duration_s:.1f} s"
+    if "channels" in keys:
+        return f"a map of {len(load_model(path, RecordingMap).channels)} channels"
+    bench = load_bench(path)
+    return f"a bench with a {bench.axis.model} axis and {len(bench.mechanisms)} mechanisms"

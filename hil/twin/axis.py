@@ -74,6 +74,9 @@ class Start(NamedTuple):
     tick: int = 0
 
 
+_AT_REST = Start()
+
+
 @dataclass(frozen=True)
 class Twin:
     """An axis with its control law and its active mechanisms.
@@ -161,7 +164,7 @@ class Twin:
                 gains = gains._replace(filter_coefficient=1.0 - math.exp(-gains.period_s / max(active.values[0], 1e-9)))
         return gains
 
-    def state(self, start: Start = Start()) -> tuple[FloatArray, FloatArray]:
+    def state(self, start: Start = _AT_REST) -> tuple[FloatArray, FloatArray]:
         """Modal state (2, modes) and memory of an axis that moves as one body at `start`."""
         modes, ratio = self.modal, self.gains.ratio_m_rad
         delta = np.zeros((2, modes.frequency_rad_s.size))
@@ -175,31 +178,48 @@ class Twin:
         return self._constants, self._modes, *self._mechanisms
 
     def simulate(self, position_command_m: FloatArray, velocity_command_m_s: FloatArray,
-                 start: Start = Start(), measured_table_m: FloatArray = _NOTHING) -> Response:
+                 start: Start = _AT_REST, measured_table_m: FloatArray = _NOTHING) -> Response:
         """The axis in closed loop over set-points (n,), one per control tick, from `start`.
 
         `measured_table_m` (n,) holds a table that floats in a gap, see `kernel.closed_loop`.
         """
         delta, memory = self.state(start)
-        ratio = self.gains.ratio_m_rad
-        state = control.init(start.position_m / ratio, start.velocity_m_s / ratio, start.torque,
-                             self.gains.period_s, start.tick)
-        channels = kernel.closed_loop(self.loop_gains, state, position_command_m, velocity_command_m_s,
+        channels = kernel.closed_loop(self.loop_gains, self._controller(start), position_command_m, velocity_command_m_s,
                                       measured_table_m, *self.arrays(), delta, memory)
         return self._channels(Response(*channels))
 
-    def drive(self, torque_command: FloatArray, start: Start = Start()) -> Response:
+    def drive(self, torque_command: FloatArray, start: Start = _AT_REST) -> Response:
         """The axis without its controller under a given torque command (n,), from `start`."""
         delta, memory = self.state(start)
         motor, table, torque = kernel.open_loop(torque_command, *self.arrays(), delta, memory)
         return self._channels(Response(motor, table, torque_command, torque))
 
-    def observe(self, torque_command: FloatArray, motor: FloatArray, table_m: FloatArray,
-                start: Start = Start()) -> Response:
-        """The axis under a measured torque command (n,), corrected by measured positions; its predictions."""
+    def observe(self, position_command_m: FloatArray, velocity_command_m_s: FloatArray, measured: Response,
+                start: Start = _AT_REST) -> Response:
+        """The axis block by block, each fed with measured inputs; see `kernel.observe`.
+
+        `measured.table_position_m` is empty without a linear encoder. Recorded lateness of a channel must
+        have been undone, see `undelayed`.
+        """
         delta, memory = self.state(start)
-        channels = kernel.observe(torque_command, motor, table_m, *self.arrays(), delta, memory)
-        return Response(channels[0], channels[1], torque_command, channels[2])
+        channels = kernel.observe(self.loop_gains, self._controller(start), position_command_m, velocity_command_m_s,
+                                  measured.torque_command, measured.motor_position, measured.table_position_m,
+                                  *self.arrays(), delta, memory)
+        return Response(*channels)
+
+    def undelayed(self, measured: Response) -> Response:
+        """Measured channels with the lateness that active mechanisms give them taken back."""
+        for active in self.active:
+            mechanism = BY_ID[active.effect]
+            if mechanism.stage is Stage.CHANNEL and measured.table_position_m.size:
+                back = tuple(-value for value in active.values)
+                measured = Response(*mechanism.contribution(tuple(measured), back, active.variant, self.gains.period_s))
+        return measured
+
+    def _controller(self, start: Start) -> control.State:
+        ratio = self.gains.ratio_m_rad
+        return control.init(start.position_m / ratio, start.velocity_m_s / ratio, start.torque, self.gains.period_s,
+                            start.tick)
 
     def _channels(self, response: Response) -> Response:
         for active in self.active:

@@ -12,7 +12,7 @@ from hil import control
 from hil.bench import Bench
 from hil.errors import InputError
 from hil.recording import Recording
-from hil.twin.axis import Start
+from hil.twin.axis import Response, Start
 
 FloatArray = NDArray[np.float64]
 
@@ -43,6 +43,11 @@ class Run:
     torque: FloatArray
     start: Start
     floor: Floor
+
+    @property
+    def measured(self) -> Response:
+        """The measured channels in the twin's order."""
+        return Response(self.motor, self.table_m, self.torque_command, self.torque)
 
     @property
     def samples(self) -> int:

@@ -1,4 +1,4 @@
-"""Closed-loop output-error fit of a hypothesis (Ljung 1999, ch. 7), with scipy's trust region.
+"""Prediction-error fit of a hypothesis (Ljung 1999, ch. 7), with scipy's trust region.
 
     min over x of  sum rho(r(x)^2),   r: weighted residuals of all channels and runs
 
@@ -12,6 +12,7 @@ import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,7 @@ from hil.diagnosis.data import Run
 from hil.diagnosis.model import Model
 
 FloatArray = NDArray[np.float64]
+Result = TypeVar("Result")
 
 POOL = ThreadPoolExecutor(os.cpu_count() or 1)
 
@@ -46,10 +48,9 @@ class Fit:
 
 
 def jacobian(model: Model, x: FloatArray, base: FloatArray, runs: Sequence[Run], *,
-             observed: bool = False) -> FloatArray:
+             closed: bool = False) -> FloatArray:
     """Derivative of the weighted residuals (m, parameters) by forward differences, columns in parallel."""
-    low, high = model.bounds()
-    residuals = model.innovations if observed else model.residuals
+    _, high = model.bounds()
 
     def column(index: int) -> FloatArray:
         step = model.coordinates[index].step
@@ -57,39 +58,37 @@ def jacobian(model: Model, x: FloatArray, base: FloatArray, runs: Sequence[Run],
             step = -step
         moved = x.copy()
         moved[index] += step
-        return (residuals(moved, runs) - base) / step
+        return (model.residuals(moved, runs, closed) - base) / step
 
     return np.stack(list(POOL.map(column, range(x.size))), axis=1)
 
 
 def fit(model: Model, runs: Sequence[Run], x: FloatArray | None = None, *, soft: float = 0.0,
-        evaluations: int = 30, observed: bool = False) -> Fit:
+        evaluations: int = 30, closed: bool = False) -> Fit:
     """Fit all coordinates of a model, from `x` or the model's own start.
 
-    `soft` > 0 is the size of residual from which the loss grows only linearly. `observed` fits the
-    innovations of the corrected twin in place of the closed loop's residuals: less exact, but with
-    hardly a wrong valley to fall into, so it serves to find a start.
+    `soft` > 0 is the size of residual from which the loss grows only linearly. `closed` takes the residuals of
+    the closed loop instead of those of the blocks.
     """
     low, high = model.bounds()
     start = np.clip(model.initial() if x is None else x, low + 1e-9, high - 1e-9)
     last: dict[str, FloatArray] = {}
-    evaluate = model.innovations if observed else model.residuals
 
     def residuals(at: FloatArray) -> FloatArray:
-        last["x"], last["r"] = at.copy(), evaluate(at, runs)
+        last["x"], last["r"] = at.copy(), model.residuals(at, runs, closed)
         return last["r"]
 
     def derivative(at: FloatArray) -> FloatArray:
         base = last["r"] if np.array_equal(last["x"], at) else residuals(at)
-        return jacobian(model, at, base, runs, observed=observed)
+        return jacobian(model, at, base, runs, closed=closed)
 
     found = least_squares(residuals, start, derivative, bounds=(low, high), x_scale="jac", max_nfev=evaluations,
                           loss="soft_l1" if soft else "linear", f_scale=soft or 1.0, xtol=1e-7, ftol=1e-6, gtol=1e-8)
-    base = evaluate(found.x, runs)
-    return Fit(model, found.x, base, found.jac if not soft else jacobian(model, found.x, base, runs, observed=observed))
+    base = model.residuals(found.x, runs, closed)
+    return Fit(model, found.x, base, found.jac if not soft else jacobian(model, found.x, base, runs, closed=closed))
 
 
-def in_parallel(jobs: Sequence[Callable[[], Fit]]) -> list[Fit]:
+def in_parallel(jobs: Sequence[Callable[[], Result]]) -> list[Result]:
     """Run fits side by side."""
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
         return [future.result() for future in [pool.submit(job) for job in jobs]]

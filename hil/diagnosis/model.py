@@ -1,7 +1,9 @@
 """A hypothesis: nominal parameters and mechanisms of the twin as one vector, and its residuals.
 
-Residuals are taken in closed loop: the twin gets the set-points and nothing else (but for a table that
-floats in a gap, see `hil.twin.kernel`), so that what it leaves is noise where it is right.
+Residuals come in two kinds. Block by block (`kernel.observe`), each block is fed measured inputs: the kind that
+searches are made with, because a mismatch shows only where it acts and nothing piles up. In closed loop the twin
+gets the set-points and nothing else: the kind that a result is confirmed with. Stick-slip and play make the
+closed loop chaotic, so that there even the truth does not repeat a recording.
 """
 
 from __future__ import annotations
@@ -15,15 +17,15 @@ from numpy.typing import NDArray
 
 from hil.bench import Bench
 from hil.diagnosis.data import Run, judged
+from hil.twin import kernel
 from hil.twin.axis import Active, Response, Twin
 from hil.twin.library import BY_ID
 from hil.twin.mechanism import Parameter
 
 FloatArray = NDArray[np.float64]
 
-# Below this the motor encoder is not believed to matter [m at the table]: the twin's own step errors.
-MOTOR_ACCURACY_M = 0.1e-6
-CHANNELS = ("motor", "table", "torque")
+# Torque that the motor channel is trusted to tell, over the noise of the torque channel: what the twin's own steps err.
+TORQUE_ACCURACY = 0.2
 
 
 @dataclass(frozen=True)
@@ -145,41 +147,54 @@ class Model:
         return self.bench.model_copy(update={"axis": self.bench.axis.model_copy(update=nominal)}), tuple(terms)
 
     def respond(self, x: FloatArray, run: Run) -> Response:
-        """The twin's answer to the set-points of a run."""
+        """The twin's answer to the set-points of a run, in closed loop."""
         return self.twin(x).simulate(run.position_command_m, run.velocity_command_m_s, run.start, run.table_m)
 
-    def observed(self, x: FloatArray, run: Run) -> Response:
-        """The twin's predictions along a run, corrected by its positions."""
-        return self.twin(x).observe(run.torque_command, run.motor, run.table_m, run.start)
+    def closed_loop(self, x: FloatArray, run: Run) -> dict[str, FloatArray]:
+        """Measured minus twin in closed loop, per channel (n,)."""
+        return _differences(self.respond(x, run), run.measured, self.bench)
 
-    def innovations(self, x: FloatArray, runs: Sequence[Run]) -> FloatArray:
-        """As `residuals`, of the corrected twin: what each row adds to the rows before it."""
-        return np.concatenate([part for run in runs for part in weighted(self.observed(x, run), run, self.bench)])
+    def blocks(self, x: FloatArray, run: Run) -> dict[str, FloatArray]:
+        """Measured minus twin with each block fed measured inputs, per channel (n,)."""
+        twin = self.twin(x)
+        measured = twin.undelayed(run.measured)
+        predicted = twin.observe(run.position_command_m, run.velocity_command_m_s, measured, run.start)
+        found = _differences(predicted, measured, self.bench)
+        found["command"] = measured.torque_command - predicted.torque_command
+        return found
 
-    def residuals(self, x: FloatArray, runs: Sequence[Run]) -> FloatArray:
-        """All weighted residuals, channel after channel, run after run: white of size one at best."""
-        return np.concatenate([part for run in runs for part in weighted(self.respond(x, run), run, self.bench)])
+    def weighted(self, differences: dict[str, FloatArray], run: Run) -> dict[str, FloatArray]:
+        """Differences over their scales, of the rows that count: of size one or less at the noise floor."""
+        scale = scales(run, self.bench)
+        rows = judged(run)
+        return {name: np.nan_to_num(value[rows] / scale[name], nan=1e6, posinf=1e6, neginf=-1e6)
+                for name, value in differences.items()}
+
+    def residuals(self, x: FloatArray, runs: Sequence[Run], closed: bool = False) -> FloatArray:
+        """All weighted residuals, run after run, channel after channel."""
+        difference = self.closed_loop if closed else self.blocks
+        return np.concatenate([part for run in runs
+                               for part in self.weighted(difference(x, run), run).values()])
 
 
-def differences(response: Response, run: Run, bench: Bench) -> dict[str, FloatArray]:
-    """Measured minus twin for each channel: motor [rad or m], table against motor [m], torque [N m or N]."""
-    ratio = bench.axis.ratio_m_rad
-    found = {"motor": run.motor - response.motor_position}
-    if run.table_m.size:
-        found["table"] = run.table_m - response.table_position_m - ratio * found["motor"]
-    found["torque"] = run.torque - response.torque
+def _differences(response: Response, measured: Response, bench: Bench) -> dict[str, FloatArray]:
+    """Motor [rad or m], table against motor [m], torque [N m or N]."""
+    found = {"motor": measured.motor_position - response.motor_position}
+    if measured.table_position_m.size:
+        found["table"] = (measured.table_position_m - response.table_position_m
+                          - bench.axis.ratio_m_rad * found["motor"])
+    found["torque"] = measured.torque - response.torque
     return found
 
 
 def scales(run: Run, bench: Bench) -> dict[str, float]:
-    """Size of one unit of weighted residual, per channel."""
-    return {"motor": max(run.floor.motor, MOTOR_ACCURACY_M / bench.axis.ratio_m_rad), "table": run.floor.table_m,
-            "torque": run.floor.torque}
+    """Size of one unit of weighted residual, per channel.
 
-
-def weighted(response: Response, run: Run, bench: Bench) -> list[FloatArray]:
-    """Residual of each channel over its scale, of the rows that count."""
-    scale = scales(run, bench)
-    rows = judged(run)
-    return [np.nan_to_num(value[rows] / scale[name], nan=1e6, posinf=1e6, neginf=-1e6)
-            for name, value in differences(response, run, bench).items()]
+    A torque d that the twin misses moves its motor by d tau^2 / J before the correction takes hold, with tau the
+    observer's time constant: the motor counts from the torque that the torque channel can still see.
+    """
+    modes = bench.twin().modal
+    inertia = float(modes.shape[modes.motor, 0] ** -2)
+    seen = TORQUE_ACCURACY * run.floor.torque * kernel.OBSERVER_S**2 / inertia
+    return {"motor": max(run.floor.motor, seen), "table": run.floor.table_m, "torque": run.floor.torque,
+            "command": run.floor.torque}

@@ -41,7 +41,7 @@ COARSE, FINE, SHAPE_MOTOR, SHAPE_TABLE, SHAPE_SPRING, TABLE_IMPULSE, MOTOR_IMPUL
 
 # Rows of `memory` (MECHANISMS + 1, WIDTH): each mechanism's own, then the kernel's.
 OWN = MECHANISMS
-CLOCK, BRISTLE_DEFLECTION, SPRING_EXTRA, FLOATING = 0, 1, 2, 3
+CLOCK, BRISTLE_DEFLECTION, SPRING_EXTRA, FLOATING, LAST_SPEED = range(5)
 
 _current, _torque, _motor_torque = stages.current, stages.torque, stages.motor_torque
 _coulomb, _friction_scale, _drag, _bias = stages.coulomb, stages.friction_scale, stages.drag, stages.bias
@@ -50,6 +50,8 @@ _table_force, _motor_reading, _table_reading = stages.table_force, stages.motor_
 # Time constant of the observer that holds a floating table: long against a 2 ms table-encoder count at creep,
 # short against a flight through the gap (tens of ms).
 OBSERVER_S = 0.008
+# Time constant with which the replayed integrator follows the recorded command: slow against every filter or delay.
+INTEGRATOR_S = 0.1
 
 _control_step = control.step
 _REASSOCIATE = {"reassoc", "nsz", "contract", "arcp"}
@@ -100,7 +102,9 @@ def _build_advance(digest: str) -> Any:
             table_speed += modes[SHAPE_TABLE, i] * delta[1, i]
             stretch += modes[SHAPE_SPRING, i] * delta[0, i]
             stretch_rate += modes[SHAPE_SPRING, i] * delta[1, i]
-        fine = constants[ALWAYS_FINE] > 0.0 or abs(speed) < constants[SLOW_VELOCITY]
+        reversing = abs(speed) < constants[SLOW_VELOCITY] + 2.0 * abs(speed - own[LAST_SPEED])
+        fine = constants[ALWAYS_FINE] > 0.0 or (reversing and speed != 0.0)
+        own[LAST_SPEED] = speed
         first = FINE if fine else COARSE
         steps = int(constants[FINE_STEPS]) if fine else int(constants[COARSE_STEPS])
         h = period / steps
@@ -148,22 +152,31 @@ def _build_advance(digest: str) -> Any:
                 free += modes[SHAPE_MOTOR, i] * moved
                 table_free += modes[SHAPE_TABLE, i] * moved
 
-            bound, viscous = constants[COULOMB], constants[VISCOUS]
-            shift = opposing = share = stiffness = 0.0
-            if codes[ON_COULOMB]:
-                bound = max(_coulomb(bound, at, values, codes, memory), 0.0)
-            if codes[ON_FRICTION_SCALE]:
-                scale = max(_friction_scale(1.0, at, values, codes, memory), 0.0)
-                bound *= scale
-                viscous *= scale
-            if codes[ON_DRAG]:
-                opposing = _drag(0.0, at, values, codes, memory)
+            viscous, bound, opposing = constants[VISCOUS], constants[COULOMB], 0.0
+            shift = share = stiffness = 0.0
             if codes[ON_BIAS]:
                 shift = _bias(0.0, at, values, codes, memory)
             if codes[ON_TABLE_SHARE]:
                 share = _table_share(0.0, at, values, codes, memory)
             if codes[ON_BRISTLE]:
                 stiffness = _bristle(0.0, at, values, codes, memory)
+            scale = 1.0
+            if codes[ON_FRICTION_SCALE]:
+                scale = max(_friction_scale(1.0, at, values, codes, memory), 0.0)
+                viscous *= scale
+            # Friction that depends on speed is taken at the middle of the step, where it is second order.
+            passes = 2 if codes[ON_COULOMB] or codes[ON_DRAG] else 1
+            for _ in range(passes):
+                bound = constants[COULOMB]
+                if codes[ON_COULOMB]:
+                    bound = max(_coulomb(bound, at, values, codes, memory), 0.0)
+                bound *= scale
+                if codes[ON_DRAG]:
+                    opposing = _drag(0.0, at, values, codes, memory)
+                if passes == 2:
+                    met = _contact(free, gain, (1.0 - share) * bound, (1.0 - share) * viscous, shift, opposing)
+                    at = Moment(at.time_s, at.within_s, at.period_s, at.step_s, at.angle_rad,
+                                0.5 * (speed + free - gain * met), at.table_position_m, at.ratio_m)
             rest = 1.0 - share
             if stiffness > 0.0:
                 friction, own[BRISTLE_DEFLECTION] = _bristle_contact(
@@ -255,24 +268,35 @@ def _build_closed_loop(digest: str) -> Any:
 
 def _build_observe(digest: str) -> Any:
     @njit(cache=True, nogil=True, fastmath=_REASSOCIATE)
-    def observe(command, measured_motor, measured_table, constants, modes, values, codes, delta, memory):  # type: ignore[no-untyped-def]
-        """The axis under the measured torque command, its state corrected by the measured positions.
+    def observe(gains, state, position_command, velocity_command, command, measured_motor, measured_table,  # type: ignore[no-untyped-def]
+                constants, modes, values, codes, delta, memory):
+        """Each block fed with measured inputs: motor, table, torque command, torque, each (n,).
 
-        Returns what it predicts before each correction: motor, table, torque, each (n,). A mismatch shows
-        where and when it acts and is then forgotten. `measured_table` is empty without a linear encoder.
+        The controller gets the measured positions, the drive the measured command, the axis that torque,
+        and the transmission the measured motor: the twin's motor is corrected by it after each
+        prediction, its table only while it floats in a gap. So a mismatch shows in its own block, where and
+        when it acts, and is then forgotten. `measured_table` is empty without a linear encoder.
         """
         assert digest
         n = command.size
-        motor, table, torque = np.empty(n), np.empty(n), np.empty(n)
+        motor, table, wanted, torque = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
+        period = constants[PERIOD]
+        seen = measured_motor * constants[RATIO] if measured_table.size == 0 else measured_table
         for k in range(n):
             motor[k], table[k] = read(constants, modes, values, codes, delta, memory)
-            period = constants[PERIOD]
+            inputs = control.Inputs(position_command[k], velocity_command[k], measured_motor[k], seen[k])
+            state, outputs = _control_step(gains, state, inputs)
+            wanted[k] = outputs.torque_n_m
+            # rounding of recorded set-points piles up in the integrator: let it go
+            resumed = state.integral_n_m + period / INTEGRATOR_S * (command[k] - wanted[k])
+            state = control.State(state.tick, state.velocity_reference_m_s, resumed, state.previous_motor_rad,
+                                  state.previous2_motor_rad, state.filtered_velocity_rad_s)
             _correct(MOTOR_IMPULSE, measured_motor[k] - motor[k], period, modes, delta)
-            if measured_table.size:
+            if measured_table.size and memory[OWN, FLOATING] > 0.0:
                 error = (measured_table[k] - table[k]) / constants[RATIO]
                 _correct(TABLE_IMPULSE, error, period, modes, delta)
             torque[k] = advance(command[k], constants, modes, values, codes, delta, memory)
-        return motor, table, torque
+        return motor, table, wanted, torque
 
     return observe
 

@@ -1,0 +1,141 @@
+"""What acts on the axis beside the nominal physics, read off the measurement, to start searches from.
+
+    d = torque - (J q'' + Fc sign(q') + c q')     on the motor, by central differences over +-5 ms
+
+These are starting values only: every verdict comes from the closed-loop fit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hil.bench import Bench
+from hil.diagnosis.data import Run
+
+FloatArray = NDArray[np.float64]
+
+_HALF_WINDOW_S = 0.005       # of the differences: passes 60 Hz, well above the position loop
+_PASS_HZ = 60.0
+_ORDERS = np.arange(1, 49)   # of the motor angle; up to 48 slots or pole passings per revolution
+
+
+@dataclass(frozen=True, eq=False)
+class Disturbance:
+    """Disturbance torque (n,), velocity (n,) [motor units], and the rows where the axis slides."""
+
+    torque: FloatArray
+    velocity: FloatArray
+    sliding: NDArray[np.bool_]
+
+
+def disturbance(run: Run, bench: Bench, inertia: float, coulomb: float, viscous: float) -> Disturbance:
+    """The disturbance torque of a run for nominal values in motor units."""
+    half = max(int(_HALF_WINDOW_S / run.period_s), 1)
+    kernel = np.ones(half) / half
+
+    def smooth(signal: FloatArray) -> FloatArray:
+        return np.convolve(np.convolve(signal, kernel, "same"), kernel, "same")
+
+    velocity = smooth(np.gradient(run.motor, run.period_s))
+    acceleration = np.gradient(velocity, run.period_s)
+    moving = np.abs(velocity) > 0.02 * np.max(np.abs(velocity), initial=1e-9)
+    edge = np.convolve((~moving).astype(float), np.ones(4 * half + 1), "same") > 0
+    torque = smooth(run.torque) - inertia * acceleration - coulomb * np.sign(velocity) - viscous * velocity
+    sliding = moving & ~edge
+    sliding[: 4 * half] = sliding[-4 * half:] = False
+    return Disturbance(torque, velocity, sliding)
+
+
+def _harmonic_share(phase: FloatArray, signal: FloatArray) -> float:
+    """Share of a signal's energy that one harmonic of `phase` explains."""
+    basis = np.stack([np.sin(phase), np.cos(phase), np.ones_like(phase)], axis=1)
+    coefficients, *_ = np.linalg.lstsq(basis, signal, rcond=None)
+    centred = signal - signal.mean()
+    left = signal - basis @ coefficients
+    return 1.0 - float(left @ left) / max(float(centred @ centred), 1e-300)
+
+
+def orders(runs: Sequence[Run], found: Sequence[Disturbance], angle_per_unit: float, most: int = 3,
+           weight: Sequence[FloatArray] | None = None) -> list[float]:
+    """Orders per motor revolution in which the disturbance is strongest, best first.
+
+    Only rows slow enough for the differences to pass the order are used.
+    """
+    shares = []
+    for order in _ORDERS:
+        phases, signals = [], []
+        for index, (run, d) in enumerate(zip(runs, found, strict=True)):
+            rate = np.abs(d.velocity) * angle_per_unit * order / (2.0 * np.pi)
+            rows = d.sliding & (rate < _PASS_HZ) & (rate > 0.5)
+            phases.append(order * angle_per_unit * run.motor[rows])
+            signals.append((d.torque if weight is None else weight[index])[rows])
+        phase, signal = np.concatenate(phases), np.concatenate(signals)
+        shares.append(_harmonic_share(phase, signal) * min(1.0, phase.size / 2000.0) if phase.size > 100 else 0.0)
+    return [float(_ORDERS[index]) for index in np.argsort(shares)[::-1][:most]]
+
+
+def friction_periods(runs: Sequence[Run], found: Sequence[Disturbance], ratio: float, most: int = 3) -> list[float]:
+    """Periods along the travel [m] with which friction varies most, best first."""
+    travel = max(float(np.ptp(run.position_command_m)) for run in runs)
+    periods = np.geomspace(max(travel / 60.0, 1e-3), 2.0 * travel, 160)
+    x = np.concatenate([ratio * run.motor[d.sliding] for run, d in zip(runs, found, strict=True)])
+    friction = np.concatenate([d.torque[d.sliding] * np.sign(d.velocity[d.sliding]) for d in found])
+    step = max(x.size // 20000, 1)
+    x, friction = x[::step], friction[::step]
+    if x.size < 100:
+        return [float(travel / 3.0)]
+    shares = np.array([_harmonic_share(2.0 * np.pi * x / period, friction) for period in periods])
+    peaks = [i for i in range(periods.size)
+             if shares[i] == shares[max(i - 3, 0):i + 4].max()]
+    peaks.sort(key=lambda i: -shares[i])
+    return [float(periods[i]) for i in peaks[:most]]
+
+
+def scale_periods(runs: Sequence[Run], errors: Sequence[FloatArray], most: int = 2) -> list[float]:
+    """Periods [m] below 1 mm in which an error of the linear encoder repeats, best first.
+
+    The error is averaged over bins of position and transformed; `errors` (n,) in m, one per run.
+    """
+    x = np.concatenate([run.table_m for run in runs])
+    e = np.concatenate(list(errors))
+    size = 2 ** int(np.ceil(np.log2(max(np.ptp(x) / 0.5e-6, 16.0))))
+    width = max(float(np.ptp(x)), 1e-6) / size
+    index = np.minimum(((x - x.min()) / width).astype(int), size - 1)
+    total = np.bincount(index, weights=e - e.mean(), minlength=size)
+    spectrum = np.abs(np.fft.rfft(total))
+    frequency = np.fft.rfftfreq(size, width)
+    spectrum[(frequency < 1e3) | (frequency > 5e5)] = 0.0
+    found: list[float] = []
+    for peak in np.argsort(spectrum)[::-1][:50]:
+        period = 1.0 / frequency[peak] if frequency[peak] > 0.0 else np.inf
+        if np.isfinite(period) and all(abs(period / other - 1.0) > 0.01 for other in found):
+            found.append(float(period))
+        if len(found) == most:
+            break
+    return found
+
+
+def force_window(run: Run, d: Disturbance) -> tuple[float, float, float]:
+    """Start, end [s] and level [motor units] of the constant disturbance that stands out most."""
+    block = max(int(0.02 / run.period_s), 1)
+    n = run.samples // block
+    mask = d.sliding[: n * block].reshape(n, block)
+    values = np.where(mask, d.torque[: n * block].reshape(n, block), 0.0).sum(axis=1)
+    counts = mask.sum(axis=1)
+    mean = values.sum() / max(counts.sum(), 1)
+    total = np.concatenate([[0.0], np.cumsum(values - mean * counts)])
+    count = np.concatenate([[0.0], np.cumsum(counts)])
+    stride = max(n // 600, 1)
+    total, count = total[::stride], count[::stride]
+    sums = np.subtract.outer(total, total).T
+    sizes = np.subtract.outer(count, count).T
+    rest = np.maximum(count[-1] - sizes, 1.0)
+    score = np.where(sizes > 5, sums**2 * (1.0 / np.maximum(sizes, 1.0) + 1.0 / rest), 0.0)
+    first, last = np.unravel_index(int(np.argmax(np.triu(score))), score.shape)
+    scale = block * stride * run.period_s
+    level = float(sums[first, last] / max(sizes[first, last], 1.0))
+    return float(first * scale), float(max(last, first + 1) * scale), level

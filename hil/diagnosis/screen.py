@@ -1,0 +1,89 @@
+"""Score tests: how much of what a hypothesis leaves over would each mechanism of the library explain?
+
+    minimise over a, c:  | W (r + J a + D c) |^2
+
+r: residuals of the hypothesis, J: their derivatives by its parameters, D: change of the residuals when a
+mechanism is switched on at a start, W: weights against wild instants. Because a is free, only what
+no parameter can explain counts (Rao's score test with nuisance parameters).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hil.diagnosis.data import Run
+from hil.diagnosis.fit import POOL, Fit
+from hil.diagnosis.model import Term
+from hil.diagnosis.starts import Start
+from hil.twin.library import BY_ID
+
+FloatArray = NDArray[np.float64]
+
+_SOFT = 3.0     # residuals beyond so many typical ones lose weight
+
+
+@dataclass(frozen=True)
+class Lead:
+    """A mechanism worth fitting: its start, scaled, and the share of the residual it would explain."""
+
+    term: Term
+    share: float
+
+
+def screen(base: Fit, runs: Sequence[Run], starts: Sequence[Start]) -> list[Lead]:
+    """A lead for each start, best first."""
+    typical = max(1.0, float(np.median(np.abs(base.residuals))) / 0.6745)
+    weights = 1.0 / np.sqrt(np.sqrt(1.0 + (base.residuals / (_SOFT * typical)) ** 2))
+    nuisance, _ = np.linalg.qr(weights[:, None] * base.jacobian)
+    residual = weights * base.residuals
+    residual -= nuisance @ (nuisance.T @ residual)
+    energy = float(residual @ residual)
+
+    def direction(start: Start, values: tuple[float, ...]) -> FloatArray:
+        term = Term(start.effect, start.variant, values)
+        model = replace(base.model, terms=(*base.model.terms, term))
+        x = np.concatenate([base.x, model.initial()[base.x.size:]])
+        change = weights * (model.residuals(x, runs) - base.residuals)
+        return change - nuisance @ (nuisance.T @ change)
+
+    def lead(start: Start) -> Lead:
+        directions = [direction(start, start.values)]
+        if start.phase >= 0:
+            turned = list(start.values)
+            turned[start.phase] = np.pi / 2.0
+            directions.append(direction(start, tuple(turned)))
+        span = np.stack(directions, axis=1)
+        coefficients, *_ = np.linalg.lstsq(span, -residual, rcond=None)
+        left = residual + span @ coefficients
+        share = 1.0 - float(left @ left) / energy
+        if start.strength < 0:
+            # a start that cannot be scaled also counts as it stands
+            whole = residual + span[:, 0]
+            return Lead(Term(start.effect, start.variant, start.values),
+                        max(share if coefficients[0] > 0.0 else 0.0, 1.0 - float(whole @ whole) / energy))
+        return Lead(Term(start.effect, start.variant, _scaled(start, coefficients)), share)
+
+    leads = list(POOL.map(lead, starts))
+    return sorted(leads, key=lambda found: -found.share)
+
+
+def _scaled(start: Start, coefficients: FloatArray) -> tuple[float, ...]:
+    """The start at the strength (and phase) that the score test asks for, within bounds."""
+    values = list(start.values)
+    parameter = BY_ID[start.effect].parameters[start.strength]
+    factor = float(coefficients[0])
+    if start.phase >= 0:
+        factor = float(np.hypot(*coefficients))
+        values[start.phase] = float(np.arctan2(coefficients[1], coefficients[0]))
+    wanted = values[start.strength] * factor
+    smallest = abs(values[start.strength]) * 1e-3
+    if parameter.low >= 0.0:
+        wanted = max(wanted, smallest)
+    elif abs(wanted) < smallest:
+        wanted = smallest
+    values[start.strength] = min(max(wanted, parameter.low), parameter.high)
+    return tuple(values)

@@ -1,0 +1,139 @@
+"""Starting values of each mechanism for the recordings at hand: where a search for it begins.
+
+A start is a point of a mechanism's parameters at small but visible strength. The screen asks how much of
+the residual the twin's answer to it explains, scales the strength, and turns the phase. A
+mechanism without an entry here starts from the middle of its bounds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hil.bench import Bench
+from hil.diagnosis import disturbance as estimate
+from hil.diagnosis.data import Run
+from hil.twin.library import BY_ID, LIBRARY
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Start:
+    """Parameter values of one variant, and which of them are strength and phase (-1: no phase)."""
+
+    effect: str
+    variant: int
+    values: tuple[float, ...]
+    strength: int = 0
+    phase: int = -1
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """What the starting values are scaled by."""
+
+    coulomb: float                      # [N m]
+    peak_torque: float                  # [N m]
+    peak_speed: float                   # [rad/s]
+    travel_m: float
+    duration_s: float
+    ratio: float
+    orders: list[float]
+    ripple_orders: list[float]
+    friction_periods: list[float]
+    scale_periods: list[float]
+    window: tuple[float, float, float]  # start, end, level [N m]
+    stretch: float                      # typical table against motor [m]
+
+
+def scene(runs: Sequence[Run], bench: Bench, table_errors: Sequence[FloatArray]) -> Scene:
+    """Measure what the starting values need; `bench` with the nominal parameters as fitted."""
+    physics = bench.axis.physics()
+    ratio = bench.axis.ratio_m_rad
+    modes = bench.twin().modal
+    inertia = float(modes.shape[modes.motor, 0] ** -2)     # of the rigid body
+    found = [estimate.disturbance(run, bench, inertia, physics.coulomb_n_m, physics.viscous_n_m_s_rad)
+             for run in runs]
+    stretch = 0.0
+    if runs[0].table_m.size:
+        stretch = max(float(np.percentile(np.abs(run.table_m - ratio * run.motor
+                                                 - np.median(run.table_m - ratio * run.motor)), 60)) for run in runs)
+    longest = max(range(len(runs)), key=lambda i: runs[i].samples)
+    ripple = [d.torque / np.where(np.abs(run.torque) > 0.2 * physics.coulomb_n_m, run.torque, np.inf)
+              for run, d in zip(runs, found, strict=True)]
+    return Scene(
+        coulomb=max(physics.coulomb_n_m, 1e-6),
+        peak_torque=max(float(np.max(np.abs(run.torque))) for run in runs),
+        peak_speed=max(float(np.max(np.abs(d.velocity))) for d in found),
+        travel_m=max(float(np.ptp(run.position_command_m)) for run in runs),
+        duration_s=max(run.samples * run.period_s for run in runs),
+        ratio=ratio,
+        orders=estimate.orders(runs, found, physics.angle_per_unit),
+        ripple_orders=estimate.orders(runs, found, physics.angle_per_unit, 2, ripple),
+        friction_periods=estimate.friction_periods(runs, found, ratio),
+        scale_periods=estimate.scale_periods(runs, table_errors) if runs[0].table_m.size else [],
+        window=estimate.force_window(runs[longest], found[longest]),
+        stretch=max(stretch, 0.5e-6),
+    )
+
+
+_Values = Sequence[tuple[float, ...]]
+_STARTS: dict[str, tuple[Callable[[Scene], _Values], int, int]] = {
+    "asymmetric_friction": (lambda s: [(0.05 * s.coulomb,)], 0, -1),
+    "constant_load": (lambda s: [(0.05 * s.coulomb,)], 0, -1),
+    "stribeck_friction": (lambda s: [(1.3 * s.coulomb, f * s.peak_speed) for f in (0.003, 0.01, 0.04)], -1, -1),
+    "presliding_hysteresis": (lambda s: [(s.coulomb * s.ratio / d,) for d in (0.3e-6, 1e-6, 4e-6, 16e-6)], -1, -1),
+    "position_dependent_friction": (lambda s: [(0.05, p, 0.0) for p in s.friction_periods], 0, 2),
+    "nonlinear_viscous_friction": (lambda s: [(0.05 * s.coulomb / s.peak_speed**2,)], 0, -1),
+    "friction_drift": (lambda s: [(0.05, f * s.duration_s) for f in (0.2, 1.0, 5.0)], 0, -1),
+    "table_side_friction": (lambda s: [(0.2,), (0.6,)], -1, -1),
+    "backlash": (lambda s: [(f * s.stretch,) for f in (0.5, 1.0, 2.0, 4.0)], -1, -1),
+    "preload_loss": (lambda s: [(f * s.stretch, 0.4) for f in (0.5, 1.0, 2.0, 4.0)], -1, -1),
+    "position_dependent_stiffness": (lambda s: [(0.1 / s.travel_m,)], 0, -1),
+    "periodic_lead_error": (lambda s: [(0.5e-6, 0.0)], 0, 1),
+    "cumulative_lead_error": (lambda s: [(1e-6 / s.travel_m,)], 0, -1),
+    "thermal_growth": (lambda s: [(1e-6 / s.travel_m, f * s.duration_s) for f in (0.2, 1.0, 5.0)], 0, -1),
+    "structural_mode": (lambda s: [(f, 0.03, 0.15) for f in np.geomspace(12.0, 240.0, 13)], -1, -1),
+    "cogging_torque": (lambda s: [(0.01 * s.coulomb, o, 0.0) for o in s.orders], 0, 2),
+    "torque_ripple": (lambda s: [(0.01, o, 0.0) for o in dict.fromkeys((*s.ripple_orders, *s.orders))], 0, 2),
+    "torque_constant_saturation": (lambda s: [(0.02 / s.peak_torque**2,)], 0, -1),
+    "torque_saturation": (lambda s: [(f * s.peak_torque,) for f in (0.999, 0.95, 0.85, 0.7)], -1, -1),
+    "torque_dead_zone": (lambda s: [(f * s.coulomb,) for f in (0.03, 0.15)], -1, -1),
+    "current_loop_lag": (lambda s: [(2e-4,), (1e-3,)], -1, -1),
+    "transport_delay": (lambda s: [(1.5e-4,), (7e-4,)], -1, -1),
+    "velocity_filter_lag": (lambda s: [(2e-4,), (1e-3,)], -1, -1),
+    "channel_time_skew": (lambda s: [(2e-4,)], 0, -1),
+    "encoder_eccentricity": (lambda s: [(1e-4, 0.0)], 0, 1),
+    "scale_interpolation_error": (lambda s: [(1e-7, p, 0.0) for p in s.scale_periods], 0, 2),
+    "external_force": (lambda s: [(-s.window[2] / s.ratio or 1.0, s.window[0], s.window[1])], 0, -1),
+    "spring_load": (lambda s: [(0.02 * s.coulomb / s.ratio / s.travel_m, 0.0)], 0, -1),
+}
+
+_NEEDS_TABLE = ("backlash", "preload_loss", "position_dependent_stiffness", "periodic_lead_error",
+                "cumulative_lead_error", "thermal_growth", "scale_interpolation_error", "structural_mode",
+                "table_side_friction")
+
+
+def starts(scene: Scene, bench: Bench) -> list[Start]:
+    """All starting points of the library for this scene, every variant."""
+    found = []
+    for mechanism in LIBRARY:
+        if mechanism.id in _NEEDS_TABLE and not bench.has_table_encoder:
+            continue
+        if mechanism.id in _STARTS:
+            values, strength, phase = _STARTS[mechanism.id]
+            points = values(scene)
+        else:
+            points, strength, phase = [tuple(0.5 * (p.low + p.high) for p in mechanism.parameters)], 0, -1
+        for variant, name in enumerate(mechanism.variants):
+            if name == "table_position" and not bench.has_table_encoder:
+                continue
+            for point in points:
+                inside = tuple(min(max(value, p.low), p.high)
+                               for value, p in zip(point, BY_ID[mechanism.id].parameters, strict=True))
+                found.append(Start(mechanism.id, variant, inside, strength, phase))
+    return found

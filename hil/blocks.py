@@ -90,14 +90,13 @@ def replayed_command(measured: Measured, gains: control.Gains) -> FloatArray:
     channels = (measured.position_command_m, measured.velocity_command_m_s, measured.motor,
                 measured.table_m if measured.table_m.size else gains.ratio_m_rad * measured.motor)
     start, ratio = measured.start, gains.ratio_m_rad
-    state = control.init(measured.motor[0], start.velocity_m_s / ratio, start.torque, gains.period_s, start.tick)
+    state = control.init(measured.motor[0], start.velocity_m_s / ratio, start.torque, gains.period_s)
     command, _ = control.replay(gains, state, *channels)
     if gains.integral_gain_n_m_rad == 0.0 or np.array_equal(command, measured.torque_command):
         return np.asarray(command)
     motor = measured.motor
     rows = max(round(WINDOW_S / gains.period_s / gains.position_ticks), 1) * gains.position_ticks
-    first = -start.tick % gains.position_ticks + gains.position_ticks
-    for begin in range(first, motor.size, rows):
+    for begin in range(gains.position_ticks, motor.size, rows):
         end = min(begin + rows, motor.size)
         state = control.State(0, 0.0, 0.0, motor[begin - 1], motor[begin - 2],
                               (motor[begin - 1] - motor[begin - 2]) / gains.period_s)

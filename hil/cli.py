@@ -40,13 +40,13 @@ def main() -> None:
         app()
     except SystemExit as end:
         if end.code == 130:
-            print("hil: stopped by ctrl-C", file=sys.stderr)
+            print("stopped by ctrl-C", file=sys.stderr)
         raise
     except Exception as error:
         code = _exit_code(error)
         if code is None:
             raise
-        print(f"hil: {error}", file=sys.stderr)
+        print(error, file=sys.stderr)
         sys.exit(code)
 
 

@@ -16,15 +16,15 @@ from scipy.signal import butter, filtfilt
 
 from hil.bench import Bench
 from hil.blocks import BlockDeviation, compare_blocks
-from hil.errors import InputError
-from hil.fit import FitResult, fit_nominal
+from hil.errors import HilError, InputError
+from hil.fit import TABLE_ACCURACY_M, FitResult, fit_nominal
 from hil.inverse_dynamics import InverseDynamics, fit_inverse_dynamics
 from hil.measured import SETTLE_S, FloatArray, Measured, take
 from hil.recording import Recording
 
 SCHEMA_VERSION = 1
 LOW_PASS_HZ, LOW_PASS_ORDER = 100.0, 4
-EXPLAINED = 1.3              # times the noise of the torque: up to here the twin leaves nothing worth a search
+EXPLAINED = 1.3              # times its noise: up to here the twin leaves nothing of a channel worth a search
 
 Progress = Callable[[str, float], None]
 
@@ -89,20 +89,29 @@ class Comparison:
         return self.torque.rms / self.measured.noise.torque if self.measured.noise.torque > 0.0 else np.inf
 
     @property
+    def table_over_noise(self) -> float:
+        """rms deviation of table less motor position over its noise; 0 without a linear encoder."""
+        if not self.measured.table_m.size:
+            return 0.0
+        values = self.channels[0].values - self.channel("motor_position").values
+        return _rms(values[self.measured.judged]) / max(self.measured.noise.table_m, TABLE_ACCURACY_M)
+
+    @property
     def explained(self) -> bool:
-        """Whether the twin explains the recording: torque within 1.3 x its noise."""
-        return self.torque_over_noise <= EXPLAINED
+        """Whether the twin explains the recording: torque, and table against motor, within 1.3 x their noise."""
+        return max(self.torque_over_noise, self.table_over_noise) <= EXPLAINED
 
     def as_json(self) -> dict[str, Any]:
         """The numbers, SI units in the names or beside them."""
-        position = self.measured.noise
+        noise = self.measured.noise
         return {
             "schema_version": SCHEMA_VERSION,
             "recording": self.recording.name, "bench": self.bench.name, "rows": len(self.recording),
             "period_s": self.recording.period_s, "explained": self.explained,
-            "torque_over_noise": self.torque_over_noise, "low_pass_hz": LOW_PASS_HZ,
-            "noise": {"motor_position": position.motor, "table_position_m": position.table_m,
-                      "torque": position.torque},
+            "torque_over_noise": self.torque_over_noise, "table_over_noise": self.table_over_noise,
+            "low_pass_hz": LOW_PASS_HZ,
+            "noise": {"motor_position": noise.motor, "table_less_motor_position_m": noise.table_m,
+                      "torque": noise.torque},
             "channels": {channel.name: _figures(channel) for channel in self.channels},
             "blocks": {block.block: {"inputs": block.inputs, "output": block.output, **_figures(deviation)}
                        for block, deviation in self.blocks},
@@ -126,6 +135,8 @@ def compare(recording: Recording, bench: Bench, *, fit: bool = False,
     progress("simulating", 0.0)
     response = bench.twin().simulate(measured.position_command_m, measured.velocity_command_m_s, measured.start,
                                      measured.table_m)
+    if not all(np.isfinite(values).all() for values in response):
+        raise HilError(f"{bench.name}: the twin is unstable in closed loop; check the masses and gains of the bench")
     blocks = compare_blocks(measured, bench, lambda share: progress("block by block", share))
     table = measured.table_m.size > 0
     ratio = bench.axis.ratio_m_rad

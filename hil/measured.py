@@ -1,8 +1,9 @@
 """A recording as the twin meets it: channels of its axis, where the axis starts, how noisy the sensors are.
 
-The set-points, the first samples and the control law fix the start of a closed-loop simulation. The phase of
-the position loop (which rows are its ticks) and the torque of the integrator come from replaying the
-controller over the first second: of all phases, the one that reproduces the torque commands best.
+The set-points, the first samples and the control law fix the start of a closed-loop simulation. Which rows are
+ticks of the position loop comes from replaying the controller over the first motion: of all phases, the one that
+reproduces the torque commands best. The rows before the first such tick are left out, since the velocity reference
+they were controlled with is not known.
 """
 
 from __future__ import annotations
@@ -20,9 +21,10 @@ from hil.recording import Recording
 from hil.twin.axis import Start
 
 FloatArray = NDArray[np.float64]
+Channels = tuple[FloatArray, FloatArray, FloatArray, FloatArray]    # as control.replay takes them
 
 SETTLE_S = 0.05             # the start is only roughly known: this much of it is not judged
-_REPLAYED_ROWS = 1000       # to find the phase of the position loop
+_REPLAYED_ROWS = 200        # to find the phase of the position loop
 _FITTED_ROWS = 11           # of the motor position, for its velocity at the first row
 
 
@@ -54,11 +56,12 @@ class Measured:
     torque_is_command: bool            # only one of the two was recorded
     start: Start
     noise: Noise
+    left_out: int = 0                  # rows of the recording before the first tick of the position loop
 
     @property
     def time_s(self) -> FloatArray:
-        """Time from the first row, tick x period."""
-        return np.asarray(np.arange(self.motor.size) * self.period_s, dtype=np.float64)
+        """Time from the first row of the recording, tick x period."""
+        return np.asarray((self.left_out + np.arange(self.motor.size)) * self.period_s, dtype=np.float64)
 
     @property
     def judged(self) -> slice:
@@ -91,10 +94,13 @@ def take(recording: Recording, bench: Bench) -> Measured:
     command = _column(recording, names.torque_command) if has_command else torque
     table = _column(recording, names.table_position) if bench.has_table_encoder else np.empty(0)
     feedback = table if table.size else gains.ratio_m_rad * motor
+    first = _first_tick(gains, (position, velocity, motor, feedback), command)
+    position, velocity, motor, feedback, table, command, torque = (
+        values[first:] for values in (position, velocity, motor, feedback, table, command, torque))
     return Measured(recording.name, recording.kind, recording.period_s, position, velocity, motor, table, command,
                     torque, bool(np.array_equal(command, torque)),
-                    _start(gains, position, velocity, motor, feedback, command),
-                    _noise(bench, motor, table, command, torque))
+                    _start(gains, (position, velocity, motor, feedback), command),
+                    _noise(bench, motor, table, command, torque), first)
 
 
 def bench_of(recording: Recording) -> Bench:
@@ -109,28 +115,47 @@ def _column(recording: Recording, name: str) -> FloatArray:
     return np.ascontiguousarray(recording[name], dtype=np.float64)
 
 
-def _start(gains: control.Gains, position: FloatArray, velocity: FloatArray, motor: FloatArray, feedback: FloatArray,
-           command: FloatArray) -> Start:
-    """Position and velocity of the first row; the phase and integrator that reproduce the torque commands."""
-    first_rows = motor[:_FITTED_ROWS]
+def _first_tick(gains: control.Gains, channels: Channels, command: FloatArray) -> int:
+    """The first row at which the position loop ran: of all, the one whose replay gives the commands best.
+
+    Replayed is the beginning of the first motion: at rest, every phase gives the same.
+    """
+    _, velocity, motor, _ = channels
+    moving = np.flatnonzero(velocity != 0.0)
+    begin = max(int(moving[0]) if moving.size else 0, 2)
+
+    def misfit(row: int) -> float:
+        rows = slice(row, row + _REPLAYED_ROWS)
+        state = _state_at(gains, channels, command, row, (motor[row - 1] - motor[row - 2]) / gains.period_s)
+        replayed, _ = control.replay(gains, state, *(values[rows] for values in channels))
+        return float(np.mean((replayed - command[rows]) ** 2))
+
+    rows = range(begin, begin + gains.position_ticks)
+    return min(rows, key=misfit) % gains.position_ticks
+
+
+def _state_at(gains: control.Gains, channels: Channels, command: FloatArray, row: int, speed: float) -> control.State:
+    """State of the controller at a tick of the position loop: its integrator is the command there less the
+    proportional part. A P velocity loop has none."""
+    _, _, motor, _ = channels
+    state = control.init(motor[row], speed, 0.0, gains.period_s)
+    if row > 0:
+        state = state._replace(previous_motor_rad=motor[row - 1], previous2_motor_rad=motor[max(row - 2, 0)])
+    if gains.integral_gain_n_m_rad == 0.0:
+        return state
+    proportional, _ = control.replay(gains, state, *(values[row:row + 1] for values in channels))
+    return state._replace(integral_n_m=float(command[row] - proportional[0]))
+
+
+def _start(gains: control.Gains, channels: Channels, command: FloatArray) -> Start:
+    """Position and velocity of the first row, by the first few; the torque of the integrator."""
+    motor = channels[2]
+    rows = motor[:_FITTED_ROWS]
     speed = 0.0
-    if np.ptp(first_rows) > 0.0:    # at rest the polynomial leaves rounding behind
-        speed = float(np.polyfit(np.arange(first_rows.size), first_rows, 2)[1]) / gains.period_s
-    channels = tuple(np.ascontiguousarray(values[:_REPLAYED_ROWS]) for values in (position, velocity, motor, feedback))
-
-    def replay(tick: int, integral: float) -> FloatArray:
-        state = control.init(motor[0], speed, integral, gains.period_s, tick)
-        return np.asarray(control.replay(gains, state, *channels)[0])
-
-    def misfit(tick: int) -> tuple[float, float]:
-        # the first command less the proportional part is the integrator; a P velocity loop has none
-        integral = float(command[0] - replay(tick, 0.0)[0]) if gains.integral_gain_n_m_rad else 0.0
-        return float(np.mean((replay(tick, integral) - command[:_REPLAYED_ROWS]) ** 2)), integral
-
-    misfits = [misfit(tick) for tick in range(gains.position_ticks)]
-    tick = int(np.argmin([value for value, _ in misfits]))
-    ratio = gains.ratio_m_rad
-    return Start(float(ratio * motor[0]), ratio * speed, misfits[tick][1], tick)
+    if np.ptp(rows) > 0.0:    # at rest the polynomial leaves rounding behind
+        speed = float(np.polyfit(np.arange(rows.size), rows, 2)[1]) / gains.period_s
+    state = _state_at(gains, channels, command, 0, speed)
+    return Start(float(gains.ratio_m_rad * motor[0]), gains.ratio_m_rad * speed, state.integral_n_m)
 
 
 def _noise(bench: Bench, motor: FloatArray, table: FloatArray, command: FloatArray, torque: FloatArray) -> Noise:

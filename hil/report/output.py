@@ -7,7 +7,7 @@ import math
 import os
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from datetime import datetime
 from enum import Enum
 from pathlib import Path
@@ -33,6 +33,7 @@ def new_folder(folder: Path) -> Iterator[Path]:
         raise InputError(f"{folder}: exists and is not empty; old and new results would mix: give another --out, "
                          "or remove it")
     part = folder.with_name(f".{folder.name}.{os.getpid()}.part")
+    made = [parent for parent in folder.parents if not parent.exists()]
     try:
         part.mkdir(parents=True)
     except OSError as error:
@@ -42,8 +43,12 @@ def new_folder(folder: Path) -> Iterator[Path]:
         if folder.is_dir():
             folder.rmdir()
         part.rename(folder)
-    finally:
+    except BaseException:
         shutil.rmtree(part, ignore_errors=True)
+        for parent in made:
+            with suppress(OSError):    # somebody else's results may stand there by now
+                parent.rmdir()
+        raise
 
 
 def write_text(path: Path, text: str) -> None:

@@ -1,0 +1,187 @@
+"""The comparison finds nothing where twin and axis are the same, and puts a mismatch into the block it is in."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from compare_runs import bench_with, record
+
+from hil.bench import Bench, load_bench
+from hil.compare import Comparison, compare, low_pass
+from hil.errors import HilError, InputError
+from hil.fit import fit_nominal
+from hil.importing import import_recording
+from hil.measured import bench_of, take
+from hil.recording import Recording, read_recording
+
+SHARED = Path(__file__).parents[2].parent / "shared" / "recordings"
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Recording]:
+    """A run of the reference axis, which is as its twin believes."""
+    return record(tmp_path_factory.mktemp("run"), bench_with())
+
+
+@pytest.fixture(scope="module")
+def clean(run: Recording) -> Comparison:
+    """Its comparison."""
+    return compare(run, bench_of(run))
+
+
+def shared(name: str) -> Path:
+    """A recording beside the repository."""
+    if not (SHARED / name).exists():
+        pytest.skip(f"the recording {name} is not beside the repository")
+    return SHARED / name
+
+
+def block_rms(result: Comparison) -> dict[str, float]:
+    return {block.block: deviation.rms for block, deviation in result.blocks}
+
+
+def test_an_axis_as_believed_leaves_noise(clean: Comparison) -> None:
+    assert clean.explained
+    assert 0.9 < clean.torque_over_noise < 1.1
+    assert clean.channel("table_position_m").rms < 0.3e-6
+    assert clean.channel("motor_position").rms < 0.1e-6
+    assert clean.channel("acceleration_m_s2").relative < 0.05
+    assert clean.channel("following_error_m").rms == pytest.approx(clean.channel("table_position_m").rms)
+    assert block_rms(clean)["controller"] < 1e-9
+
+
+@pytest.mark.parametrize(("effect", "parameters", "block"), [
+    ("current_loop_lag", {"time_constant_s": 0.001}, "drive"),
+    ("constant_load", {"load_torque_n_m": 0.5}, "motor and load"),
+    ("periodic_lead_error", {"amplitude_m": 5e-6, "phase_rad": 0.5}, "transmission and table"),
+])
+def test_a_concealed_effect_shows_in_its_block(
+    tmp_path: Path, clean: Comparison, effect: str, parameters: dict[str, float], block: str
+) -> None:
+    recording = record(tmp_path, bench_with({"effects": [{"effect": effect, "parameters": parameters}]}))
+    result = compare(recording, bench_of(recording))
+    assert not result.explained
+    grown = {name: rms / block_rms(clean)[name] for name, rms in block_rms(result).items() if name != "controller"}
+    assert max(grown, key=lambda name: grown[name]) == block
+    assert grown[block] > 3.0
+    assert block_rms(result)["controller"] < 1e-9
+
+
+def test_another_gain_shows_in_the_controller_only(run: Recording, clean: Comparison) -> None:
+    bench = bench_of(run)
+    law = bench.control.model_copy(update={"velocity_gain_ma_rpm": 22.0})
+    result = compare(run, bench.model_copy(update={"control": law}))
+    assert block_rms(result)["controller"] > 0.05
+    for name in ("drive", "motor and load", "transmission and table"):
+        assert block_rms(result)[name] == pytest.approx(block_rms(clean)[name], rel=1e-6)
+
+
+def test_the_fit_finds_the_true_parameters(tmp_path: Path) -> None:
+    true = {"motor_mass_kg": 300.0, "table_mass_kg": 420.0, "stiffness_n_m": 5e7, "coulomb_torque_n_m": 0.9,
+            "viscous_torque_n_m_s_rad": 0.008}
+    recording = record(tmp_path, bench_with({"axis": true}))
+    bench = bench_of(recording)
+    assert compare(recording, bench).torque_over_noise > 5.0
+    result = compare(recording, bench, fit=True)
+    assert result.explained
+    assert result.fit is not None
+    found = {parameter.name: parameter for parameter in result.fit.parameters}
+    for name, value in true.items():
+        assert found[name].value == pytest.approx(value, rel=0.02)
+        assert abs(found[name].value - value) < 6.0 * found[name].standard_error + 2e-3 * value
+
+
+@pytest.mark.parametrize("cut", [1, 2, 3, 450])
+def test_a_recording_may_begin_anywhere(run: Recording, cut: int) -> None:
+    """The ticks of the position loop are found, and a start in motion is the right one after it has settled."""
+    columns = {name: values[cut:] for name, values in run.columns.items()}
+    later = replace(run, columns=columns)
+    bench = bench_of(run)
+    assert take(later, bench).left_out == -cut % 4
+    result = compare(later, bench)
+    assert result.channel("table_position_m").rms < 1e-6
+    assert result.torque_over_noise < 1.3
+
+
+def test_velocity_is_low_passed_without_delay() -> None:
+    time_s = np.arange(4000) * 1e-3
+    slow, fast = np.sin(2 * np.pi * 5 * time_s), np.sin(2 * np.pi * 400 * time_s)
+    assert np.allclose(low_pass(slow + fast, 1e-3)[200:-200], slow[200:-200], atol=1e-3)
+
+
+def _without(run: Recording, channel: str) -> Recording:
+    return replace(run, columns={name: values for name, values in run.columns.items() if name != channel})
+
+
+def test_what_does_not_belong_together_is_refused(run: Recording) -> None:
+    bench = bench_of(run)
+    with pytest.raises(InputError, match=r"table_position_m is not recorded.*'table: null'"):
+        compare(_without(run, "table_position_m"), bench)
+    with pytest.raises(InputError, match="rotary axis, allowed a linear one, as in the bench emps"):
+        compare(run, load_bench("emps"))
+    with pytest.raises(InputError, match=r"given a period of 0\.002 s, allowed velocity_period_s"):
+        compare(replace(run, period_s=0.002), bench)
+    with pytest.raises(InputError, match="given 100 rows, allowed"):
+        compare(replace(run, columns={name: values[:100] for name, values in run.columns.items()}), bench)
+    with pytest.raises(InputError, match="no bench is recorded"):
+        bench_of(replace(run, metadata={}))
+
+
+def test_without_a_table_encoder_the_motor_is_compared(run: Recording) -> None:
+    bench = bench_of(run)
+    blind = bench.model_copy(update={"encoders": bench.encoders.model_copy(update={"table": None})})
+    result = compare(_without(run, "table_position_m"), blind)
+    assert result.explained
+    assert "transmission and table" not in block_rms(result)
+    assert result.channels[0].name == "motor_position_m"
+
+
+def test_an_unstable_twin_is_said_so(run: Recording) -> None:
+    bench = bench_of(run)
+    feather = bench.axis.model_copy(update={"motor_mass_kg": 0.5, "table_mass_kg": 0.5})
+    law = bench.control.model_copy(update={"torque_limit_n_m": None})
+    with pytest.raises(HilError, match="unstable in closed loop"):
+        compare(run, bench.model_copy(update={"axis": feather, "control": law}))
+
+
+def test_emps_with_its_published_parameters() -> None:
+    recording = import_recording(shared("emps/DATA_EMPS.mat"), "emps")
+    result = compare(recording, load_bench("emps"))
+    assert result.channel("motor_position_m").rms <= 1.7e-6
+    assert result.channel("force_n").rms <= 2.5
+    assert result.channel("acceleration_m_s2").relative <= 0.045
+    assert result.inverse_dynamics is not None
+    assert result.inverse_dynamics.relative_error == pytest.approx(0.0408, abs=5e-4)
+    assert "drive" not in block_rms(result)     # the force was not recorded apart from its command
+    assert result.channel("force_n").relative > block_rms(result)["controller"] / 54.0
+
+
+def _rig(name: str) -> tuple[Bench, Recording]:
+    folder = shared("rig")
+    return load_bench(folder / "axis.yaml"), read_recording(folder / name)
+
+
+def test_the_null_rig_is_explained_on_another_motion() -> None:
+    bench, holdout = _rig("null/holdout.csv")
+    trained = [take(_rig(f"null/{name}.csv")[1], bench) for name in ("train_1", "train_2")]
+    result = compare(holdout, fit_nominal(bench, trained).bench)
+    assert result.torque_over_noise <= 1.3
+    assert result.channel("table_position_m").rms <= 1e-6
+    assert result.explained
+
+
+@pytest.mark.parametrize(("folder", "block"), [
+    ("stribeck", "motor and load"), ("lead", "transmission and table"), ("backlash", "transmission and table")])
+def test_the_other_rigs_are_not_explained_by_parameters(folder: str, block: str) -> None:
+    bench, recording = _rig(f"{folder}/holdout.csv")
+    result = compare(recording, bench, fit=True)
+    assert not result.explained
+    over: dict[str, Any] = {part.block: deviation.rms / part.noise for part, deviation in result.blocks
+                            if part.noise > 0.0}
+    assert over[block] > 3.0
+    assert over["drive"] < 1.1

@@ -26,7 +26,7 @@ SCHEMA_VERSION = 1
 LOW_PASS_HZ, LOW_PASS_ORDER = 100.0, 4
 EXPLAINED = 1.3              # times its noise: up to here the twin leaves nothing of a channel worth a search
 
-Progress = Callable[[str, float], None]
+Progress = Callable[[str, float | None], None]    # what is going on; the share that is done, None if not known
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,11 +125,11 @@ def compare(recording: Recording, bench: Bench, *, fit: bool = False,
             progress: Progress = lambda _task, _share: None) -> Comparison:
     """Compare a recording with the twin of a bench; with `fit` its nominal parameters are fitted to it first.
 
-    `progress` is told what is going on and the share that is done. Raises InputError where recording and bench
+    `progress` is told what is going on. Raises InputError where recording and bench
     do not belong together, HilError where the fit fails.
     """
     measured = take(recording, bench)
-    fitted = fit_nominal(bench, [measured], lambda share: progress("fitting", share)) if fit else None
+    fitted = fit_nominal(bench, [measured], lambda _rms: progress("fitting", None)) if fit else None
     if fitted is not None:
         bench = fitted.bench
     progress("simulating", 0.0)

@@ -23,6 +23,9 @@ class Clock(Protocol):
     def since(self, tick: int) -> float:
         """Time since the tick was due [s]."""
 
+    def may_wait(self, tick: int, span_s: float) -> bool:
+        """Whether something may still happen within `span_s` after the tick was due."""
+
 
 class WallClock:
     """Real time. Sleeps up to `spin_s` before a deadline, then spins; spinning all the time would have the kernel
@@ -49,6 +52,9 @@ class WallClock:
     def since(self, tick: int) -> float:
         return (time.perf_counter_ns() - self._start_ns - tick * self._period_ns) * 1e-9
 
+    def may_wait(self, tick: int, span_s: float) -> bool:
+        return self.since(tick) < span_s
+
 
 class VirtualClock:
     """Time that passes as fast as the machine allows: every tick is on time and takes none."""
@@ -61,3 +67,6 @@ class VirtualClock:
 
     def since(self, tick: int) -> float:
         return 0.0
+
+    def may_wait(self, tick: int, span_s: float) -> bool:
+        return False

@@ -103,8 +103,10 @@ class Session:
         self._lateness_s: list[float] = []
 
     def ask_stop(self) -> None:
-        """Stop the axis: under control the first time, by the drive's own ramp the second."""
+        """Stop the axis: under control the first time, by the drive's own ramp the second; the third leaves the loop."""
         self._stops_asked += 1
+        if self._stops_asked > 2:
+            raise KeyboardInterrupt
 
     def run(self) -> Outcome:
         """Arm, run, stop, disarm. Raises HilError when the drive cannot be armed or a device fails in the loop;
@@ -135,7 +137,7 @@ class Session:
         self._master.poll(now_s)
         sample = drive.read(now_s)
         seen = _NO_ENCODER if encoder is None else encoder.read(now_s)
-        while (sample.age_cycles or seen.age_cycles) and self._clock.since(tick) < self._response_s:
+        while (sample.age_cycles or seen.age_cycles) and self._clock.may_wait(tick, self._response_s):
             self._master.poll(now_s, 1e-4)
             sample = drive.read(now_s)
             seen = _NO_ENCODER if encoder is None else encoder.read(now_s)
@@ -259,8 +261,7 @@ class Session:
 
     def _disarm(self) -> None:
         """Power stage off; the recording is over."""
-        if self._phase is not Phase.QUICK_STOP:
-            self._drive.goal = DriveGoal.DISABLED
+        self._drive.goal = DriveGoal.DISABLED
         for _ in range(self._ticks(DISARM_TIMEOUT_S)):
             sample, _ = self._exchange()
             self._drive.command(self._now_s, 0.0)

@@ -19,6 +19,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from hil.rounding import rounded
+
 INFINITE = math.inf
 
 
@@ -117,7 +119,7 @@ def init(motor_position_rad: float, motor_velocity_rad_s: float = 0.0, torque_n_
                  float(motor_position_rad - 2.0 * step_rad), float(motor_velocity_rad_s))
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def step(gains: Gains, state: State, inputs: Inputs) -> tuple[State, Outputs]:
     """One tick of the control law at the top of this module; pure."""
     reference = state.velocity_reference_m_s
@@ -125,9 +127,9 @@ def step(gains: Gains, state: State, inputs: Inputs) -> tuple[State, Outputs]:
         if gains.position_from_table:
             position = inputs.table_position_m
         else:
-            position = gains.ratio_m_rad * inputs.motor_position_rad
-        reference = (gains.position_gain_1_s * (inputs.position_command_m - position)
-                     + gains.velocity_feedforward * inputs.velocity_command_m_s)
+            position = rounded(gains.ratio_m_rad * inputs.motor_position_rad)
+        reference = (rounded(gains.position_gain_1_s * (inputs.position_command_m - position))
+                     + rounded(gains.velocity_feedforward * inputs.velocity_command_m_s))
     motor = inputs.motor_position_rad
     if gains.two_sample_mean:
         velocity = (motor - state.previous2_motor_rad) / (2.0 * gains.period_s)
@@ -135,19 +137,19 @@ def step(gains: Gains, state: State, inputs: Inputs) -> tuple[State, Outputs]:
         velocity = (motor - state.previous_motor_rad) / gains.period_s
     if gains.filter_coefficient < 1.0:
         velocity = (state.filtered_velocity_rad_s
-                    + gains.filter_coefficient * (velocity - state.filtered_velocity_rad_s))
+                    + rounded(gains.filter_coefficient * (velocity - state.filtered_velocity_rad_s)))
     error = reference / gains.ratio_m_rad - velocity
-    wanted = gains.velocity_gain_n_m_s_rad * error + state.integral_n_m
+    wanted = rounded(gains.velocity_gain_n_m_s_rad * error) + state.integral_n_m
     limit = gains.torque_limit_n_m
     integral = state.integral_n_m
     if abs(wanted) < limit:
-        integral += gains.integral_gain_n_m_rad * error * gains.period_s
+        integral += rounded(gains.integral_gain_n_m_rad * error * gains.period_s)
     torque = min(max(wanted, -limit), limit)
     after = State(state.tick + 1, reference, integral, motor, state.previous_motor_rad, velocity)
     return after, Outputs(torque, reference)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def replay(gains: Gains, state: State, position_command_m: NDArray[np.float64],
            velocity_command_m_s: NDArray[np.float64], motor_position_rad: NDArray[np.float64],
            table_position_m: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -1,0 +1,44 @@
+"""Ticks come at start + tick x period."""
+
+from __future__ import annotations
+
+import time
+
+from hil.clock import VirtualClock, WallClock
+
+
+def test_no_tick_comes_early_and_lateness_does_not_add_up() -> None:
+    clock = WallClock(0.002)
+    clock.start()
+    start_s = time.perf_counter()
+    for tick in range(1, 50):
+        late_s = clock.wait(tick)
+        assert late_s >= 0.0
+        # the start was taken a little after the clock's: a tick may seem early by that, never by a period
+        assert time.perf_counter() - start_s >= tick * 0.002 - 0.001
+
+
+def test_a_late_tick_keeps_the_deadlines_of_those_after_it() -> None:
+    clock = WallClock(0.005)
+    clock.start()
+    time.sleep(0.012)
+    assert clock.wait(1) >= 0.007
+    assert clock.wait(2) >= 0.002
+    assert clock.since(2) >= 0.002
+    assert clock.wait(100) < 100 * 0.005   # from the start, not from the late tick
+
+
+def test_waiting_within_a_tick_ends() -> None:
+    clock = WallClock(0.001)
+    clock.start()
+    assert clock.may_wait(1000, 0.001)
+    clock.wait(3)
+    assert not clock.may_wait(1, 0.001)
+
+
+def test_virtual_clock_is_always_on_time() -> None:
+    clock = VirtualClock()
+    clock.start()
+    assert [clock.wait(tick) for tick in (1, 2, 1_000_000)] == [0.0, 0.0, 0.0]
+    assert clock.since(5) == 0.0
+    assert not clock.may_wait(5, 10.0)

@@ -13,9 +13,11 @@ from typing import Any
 import typer
 
 from hil.commands.compare import compare
+from hil.commands.demo import demo
 from hil.commands.friction import friction
 from hil.commands.import_ import import_
 from hil.commands.paper import paper
+from hil.commands.run import run
 from hil.commands.validate import validate
 from hil.errors import HilError
 
@@ -24,6 +26,8 @@ app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False, add_comp
 
 # In the order of --help. A command's file imports nothing heavy at its top.
 COMMANDS: tuple[tuple[str, Callable[..., Any]], ...] = (
+    ("demo", demo),
+    ("run", run),
     ("import", import_),
     ("compare", compare),
     ("friction", friction),

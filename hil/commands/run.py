@@ -1,0 +1,50 @@
+"""hil run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from hil.commands.console import err, out
+
+if TYPE_CHECKING:
+    from hil.run import RunResult
+
+
+def run(
+    profile: Annotated[Path, typer.Argument(help="Profile file, as profiles/reference.yaml", show_default=False)],
+    bench: Annotated[str, typer.Option(help="Bench file, or the name of a shipped one")] = "reference",
+    virtual: Annotated[bool, typer.Option(
+        "--virtual/--wall", help="Simulated bench as fast as the machine allows, or wall-clock time")] = False,
+    force: Annotated[bool, typer.Option(
+        "--force", help="Arm although jitter or bus load exceed the budget of the bench")] = False,
+    seed: Annotated[int | None, typer.Option(help="Of the simulated sensors; left out: the bench's")] = None,
+    folder: Annotated[Path | None, typer.Option(
+        "--out", help="Folder for the recording; left out: runs/NAME-TIME")] = None,
+) -> None:
+    """Run a profile on a bench and record it. ctrl-C stops the axis under control, a second one by the drive's ramp."""
+    from hil.errors import HilError
+    from hil.profile import load_profile
+    from hil.report.output import default_folder
+    from hil.run import run_profile
+    from hil.simulated import load_simulated
+
+    folder = folder or default_folder(profile.stem)
+    loaded = load_simulated(bench)
+    result = run_profile(loaded, load_profile(profile), folder, profile.stem, virtual=virtual, force=force, seed=seed,
+                         planned=lambda trajectory: err.print(
+                             f"{profile.stem} on {loaded.name}: {trajectory.duration_s:.1f} s of motion ..."))
+    say(result, virtual)
+    if not result.complete:
+        raise HilError(f"stopped: {result.outcome.ending}: {result.outcome.reason}")
+
+
+def say(result: RunResult, virtual: bool) -> None:
+    """What came of a run."""
+    for note in (*result.notes, *result.doubts):
+        err.print(f"note: {note}", markup=False)
+    if not virtual:
+        out.print(f"lateness of the ticks: {result.jitter.text}")
+    out.print(f"{result.outcome.rows} rows: {result.recording}", markup=False)

@@ -6,14 +6,14 @@ import contextlib
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
 from typing import Any
 
 from hil.bench import Bench
-from hil.bench_hardware import DriveSection
+from hil.bench_hardware import DriveSection, EncoderConnection, SimulationSection
 from hil.clock import Clock, VirtualClock, WallClock
 from hil.errors import FieldError
 from hil.profile import Profile
@@ -23,7 +23,7 @@ from hil.rig import Rig
 from hil.session import Ending, Outcome, Session, make_cycle
 from hil.trajectory import Trajectory, plan
 
-WARM_UP_TICKS = 50
+REHEARSED_TICKS = 50
 VIRTUAL_START = "virtual time"   # where a recording names the start of a run
 
 
@@ -73,8 +73,8 @@ def run_profile(
         _check_travel(trajectory, section)
         if planned is not None:
             planned(trajectory)
+        rehearse(bench, trajectory, profile)
         cycle = make_cycle(rig, sample.motor_position_rad)
-        _warm_up(rig, sample.motor_position_rad)
         doubts = [_refused(force, lambda: _check_bus_load(rig, section))]
         conditions: dict[str, Any] = {}
         clock: Clock = VirtualClock()
@@ -135,11 +135,35 @@ def _refused(force: bool, check: Callable[[], None]) -> str:
     return ""
 
 
-def _warm_up(rig: Rig, motor_position: float) -> None:
-    """Compile and touch what the loop will run, on a controller of its own."""
-    cycle = make_cycle(rig, motor_position)
-    for tick in range(WARM_UP_TICKS):
-        cycle.step(tick, 0, motor_position, 0.0, 0.0, 0, 0, 0.0, 0.0)
+class _Rehearsal(VirtualClock):
+    """Asks for a stop after some ticks."""
+
+    def __init__(self) -> None:
+        self.session: Session | None = None
+
+    def wait(self, tick: int) -> float:
+        if tick == REHEARSED_TICKS and self.session is not None:
+            self.session.ask_stop()
+        return 0.0
+
+    def record(self, row: Sequence[float]) -> None:
+        """Nothing is recorded."""
+
+
+def rehearse(bench: Bench, trajectory: Trajectory, profile: Profile) -> None:
+    """Arm, begin and stop the run in virtual time on a simulated copy of the bench, so that all is compiled and at hand
+    before the real one."""
+    section = (bench.drive or DriveSection()).model_copy(update={
+        "interface": "inprocess", "encoder": EncoderConnection(), "eds": None, "serial_number": None})
+    copy = bench.model_copy(update={"drive": section, "simulation": bench.simulation or SimulationSection()})
+    with Rig(copy) as rig:
+        assert rig.nodes is not None
+        rig.nodes.plant.reset(float(trajectory.position_m[0]))
+        rig.set_up()
+        clock = _Rehearsal()
+        cycle = make_cycle(rig, rig.drive.read(0.0).motor_position_rad)
+        clock.session = Session(rig, cycle, trajectory, profile.motion_limits, clock, clock)
+        clock.session.run()
 
 
 @contextlib.contextmanager

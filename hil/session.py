@@ -19,9 +19,10 @@ The same code runs on the wall clock and in virtual time.
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import IntEnum, StrEnum
+from typing import Protocol
 
 from drivers.base import Condition, DriveGoal, DriverError, DriveSample, EncoderSample
 from drivers.cia402 import DriveState
@@ -31,7 +32,6 @@ from hil.clock import Clock
 from hil.cycle import Cycle, Limit, Setpoint, Watch
 from hil.errors import HilError
 from hil.moves import MotionLimits
-from hil.recorder import Recorder
 from hil.rig import Rig
 from hil.trajectory import Trajectory, stop_from
 
@@ -79,6 +79,12 @@ class Outcome:
     lateness_s: tuple[float, ...]
 
 
+class Rows(Protocol):
+    """What a session records to; a `Recorder`, or whatever else takes rows."""
+
+    def record(self, row: Sequence[float]) -> None: ...
+
+
 class Session:
     """One run on an opened rig. The rig is set up and stands; `trajectory` begins where it stands.
 
@@ -86,7 +92,7 @@ class Session:
     """
 
     def __init__(self, rig: Rig, cycle: Cycle, trajectory: Trajectory, limits: MotionLimits, clock: Clock,
-                 recorder: Recorder) -> None:
+                 recorder: Rows) -> None:
         self._rig, self._cycle, self._clock, self._recorder = rig, cycle, clock, recorder
         self._trajectory, self._limits = trajectory, limits
         self._master, self._drive, self._encoder = rig.master, rig.drive, rig.encoder
@@ -103,7 +109,7 @@ class Session:
         self._lateness_s: list[float] = []
 
     def ask_stop(self) -> None:
-        """Stop the axis: under control the first time, by the drive's own ramp the second; the third leaves the loop."""
+        """Stop the axis: under control the first time, by the drive's own ramp the second, at once the third."""
         self._stops_asked += 1
         if self._stops_asked > 2:
             raise KeyboardInterrupt

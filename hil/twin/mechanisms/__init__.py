@@ -1,0 +1,1 @@
+"""The mechanisms of the library, one file each."""

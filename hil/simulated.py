@@ -16,9 +16,9 @@ from drivers.bus import CanPort
 from drivers.serial_encoder import SerialFormat
 from drivers.sim import axis as truth
 from drivers.sim.axis import AxisTruth
+from drivers.sim.drive_node import SimulatedDrive
 from drivers.sim.effects import Effect
 from drivers.sim.encoder_node import SimulatedEncoder
-from drivers.sim.drive_node import SimulatedDrive
 from drivers.sim.plant import Plant
 from drivers.sim.sensors import Sensors
 from drivers.sim.serial_line import SimulatedSerialEncoder

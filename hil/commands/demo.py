@@ -27,8 +27,8 @@ def demo(
     bench = load_simulated("reference")
     # on a simulated bench nothing can be harmed by a late tick: a busy machine is reported, not refused
     result = run_profile(bench, Profile.model_validate(MOVES), folder, "demo", virtual=virtual, force=True,
-                         planned=lambda trajectory: err.print(
-                             f"100 mm at 7 and 22 m/min on the simulated CANopen bus: {trajectory.duration_s:.1f} s ..."))
+                         planned=lambda trajectory: err.print(f"100 mm at 7 and 22 m/min on the simulated CANopen bus: "
+                                                              f"{trajectory.duration_s:.1f} s ..."))
     say(result, virtual)
     if not result.complete or result.recording is None:
         raise HilError(f"stopped: {result.outcome.ending}: {result.outcome.reason}")

@@ -10,7 +10,8 @@ from hil.bench import load_bench
 
 
 @pytest.mark.parametrize("changes", [
-    {}, {"position_from_table": True}, {"two_sample_mean": True}, {"filter_coefficient": 0.4}, {"torque_limit_n_m": 5.0},
+    {}, {"position_from_table": True}, {"two_sample_mean": True}, {"filter_coefficient": 0.4},
+    {"torque_limit_n_m": 5.0},
 ])
 def test_replay_step_and_python_agree_bit_by_bit(changes: dict[str, object]) -> None:
     gains = load_bench("reference").gains._replace(**changes)

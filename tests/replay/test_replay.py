@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from bench_runs import MOVING, bench_with, run
 
 from hil import control
-
-sys.path.insert(0, str(Path(__file__).parent.parent / "hil"))
-
-from bench_runs import MOVING, bench_with, run  # noqa: E402
 
 
 def differing(recorded: np.ndarray, replayed: np.ndarray) -> str:

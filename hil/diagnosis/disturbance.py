@@ -1,6 +1,9 @@
 """What acts on the axis beside the nominal physics, read off the measurement, to start searches from.
 
-    d = torque - (J q'' + Fc sign(q') + c q')     on the motor, by central differences over +-5 ms
+    d = e J / tau^2
+
+with the motor's innovation e (block by block, see `hil.diagnosis.model`), the inertia J of the whole axis and the
+time constant tau of the observer: the torque whose effect the correction of the motor just holds.
 
 These are starting values only: every verdict comes from the closed-loop fit.
 """
@@ -13,12 +16,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hil.bench import Bench
-from hil.diagnosis.data import Run
+from hil.measured import Measured
 
 FloatArray = NDArray[np.float64]
 
-_HALF_WINDOW_S = 0.005       # of the differences: passes 60 Hz, well above the position loop
+_SMOOTH_S = 0.006            # of the innovations: passes 60 Hz
 _PASS_HZ = 60.0
 _ORDERS = np.arange(1, 49)   # of the motor angle; up to 48 slots or pole passings per revolution
 
@@ -32,21 +34,15 @@ class Disturbance:
     sliding: NDArray[np.bool_]
 
 
-def disturbance(run: Run, bench: Bench, inertia: float, coulomb: float, viscous: float) -> Disturbance:
-    """The disturbance torque of a run for nominal values in motor units."""
-    half = max(int(_HALF_WINDOW_S / run.period_s), 1)
-    kernel = np.ones(half) / half
-
-    def smooth(signal: FloatArray) -> FloatArray:
-        return np.convolve(np.convolve(signal, kernel, "same"), kernel, "same")
-
-    velocity = smooth(np.gradient(run.motor, run.period_s))
-    acceleration = np.gradient(velocity, run.period_s)
-    moving = np.abs(velocity) > 0.02 * np.max(np.abs(velocity), initial=1e-9)
-    edge = np.convolve((~moving).astype(float), np.ones(4 * half + 1), "same") > 0
-    torque = smooth(run.torque) - inertia * acceleration - coulomb * np.sign(velocity) - viscous * velocity
-    sliding = moving & ~edge
-    sliding[: 4 * half] = sliding[-4 * half:] = False
+def disturbance(run: Measured, innovation: FloatArray, inertia: float, observer_s: float) -> Disturbance:
+    """The disturbance torque of a run from the motor's innovation (n,) [motor units], measured minus twin."""
+    width = max(round(_SMOOTH_S / run.period_s), 1)
+    kernel = np.ones(width) / width
+    velocity = np.convolve(np.gradient(run.motor, run.period_s), kernel, "same")
+    torque = np.convolve(innovation, kernel, "same") * inertia / observer_s**2
+    slow = 2e-3 * np.max(np.abs(velocity), initial=1e-9)
+    sliding = np.convolve((np.abs(velocity) < slow).astype(float), np.ones(3 * width), "same") == 0
+    sliding[: 10 * width] = sliding[-3 * width:] = False
     return Disturbance(torque, velocity, sliding)
 
 
@@ -59,7 +55,7 @@ def _harmonic_share(phase: FloatArray, signal: FloatArray) -> float:
     return 1.0 - float(left @ left) / max(float(centred @ centred), 1e-300)
 
 
-def orders(runs: Sequence[Run], found: Sequence[Disturbance], angle_per_unit: float, most: int = 3,
+def orders(runs: Sequence[Measured], found: Sequence[Disturbance], angle_per_unit: float, most: int = 3,
            weight: Sequence[FloatArray] | None = None) -> list[float]:
     """Orders per motor revolution in which the disturbance is strongest, best first.
 
@@ -78,7 +74,8 @@ def orders(runs: Sequence[Run], found: Sequence[Disturbance], angle_per_unit: fl
     return [float(_ORDERS[index]) for index in np.argsort(shares)[::-1][:most]]
 
 
-def friction_periods(runs: Sequence[Run], found: Sequence[Disturbance], ratio: float, most: int = 3) -> list[float]:
+def friction_periods(runs: Sequence[Measured], found: Sequence[Disturbance], ratio: float,
+                     most: int = 3) -> list[float]:
     """Periods along the travel [m] with which friction varies most, best first."""
     travel = max(float(np.ptp(run.position_command_m)) for run in runs)
     periods = np.geomspace(max(travel / 60.0, 1e-3), 2.0 * travel, 160)
@@ -95,7 +92,7 @@ def friction_periods(runs: Sequence[Run], found: Sequence[Disturbance], ratio: f
     return [float(periods[i]) for i in peaks[:most]]
 
 
-def scale_periods(runs: Sequence[Run], errors: Sequence[FloatArray], most: int = 2) -> list[float]:
+def scale_periods(runs: Sequence[Measured], errors: Sequence[FloatArray], most: int = 2) -> list[float]:
     """Periods [m] below 1 mm in which an error of the linear encoder repeats, best first.
 
     The error is averaged over bins of position and transformed; `errors` (n,) in m, one per run.
@@ -119,10 +116,10 @@ def scale_periods(runs: Sequence[Run], errors: Sequence[FloatArray], most: int =
     return found
 
 
-def force_window(run: Run, d: Disturbance) -> tuple[float, float, float]:
+def force_window(run: Measured, d: Disturbance) -> tuple[float, float, float]:
     """Start, end [s] and level [motor units] of the constant disturbance that stands out most."""
     block = max(int(0.02 / run.period_s), 1)
-    n = run.samples // block
+    n = run.motor.size // block
     mask = d.sliding[: n * block].reshape(n, block)
     values = np.where(mask, d.torque[: n * block].reshape(n, block), 0.0).sum(axis=1)
     counts = mask.sum(axis=1)

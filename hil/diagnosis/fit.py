@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from hil.diagnosis.data import Run
 from hil.diagnosis.model import Model
+from hil.measured import Measured
 
 FloatArray = NDArray[np.float64]
 Result = TypeVar("Result")
@@ -29,12 +29,16 @@ POOL = ThreadPoolExecutor(os.cpu_count() or 1)
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """A fitted hypothesis: its vector, weighted residuals, Jacobian, and cost = sum r^2."""
+    """A fitted hypothesis: its vector, weighted residuals, Jacobian, and cost = sum r^2.
+
+    `splits` are the rows at which the residuals of the next channel or run begin.
+    """
 
     model: Model
     x: FloatArray
     residuals: FloatArray
     jacobian: FloatArray
+    splits: tuple[int, ...]
 
     @property
     def cost(self) -> float:
@@ -47,7 +51,7 @@ class Fit:
         return self.cost / self.residuals.size
 
 
-def jacobian(model: Model, x: FloatArray, base: FloatArray, runs: Sequence[Run], *,
+def jacobian(model: Model, x: FloatArray, base: FloatArray, runs: Sequence[Measured], *,
              closed: bool = False) -> FloatArray:
     """Derivative of the weighted residuals (m, parameters) by forward differences, columns in parallel."""
     _, high = model.bounds()
@@ -63,7 +67,7 @@ def jacobian(model: Model, x: FloatArray, base: FloatArray, runs: Sequence[Run],
     return np.stack(list(POOL.map(column, range(x.size))), axis=1)
 
 
-def fit(model: Model, runs: Sequence[Run], x: FloatArray | None = None, *, soft: float = 0.0,
+def fit(model: Model, runs: Sequence[Measured], x: FloatArray | None = None, *, soft: float = 0.0,
         evaluations: int = 30, closed: bool = False) -> Fit:
     """Fit all coordinates of a model, from `x` or the model's own start.
 
@@ -85,10 +89,18 @@ def fit(model: Model, runs: Sequence[Run], x: FloatArray | None = None, *, soft:
     found = least_squares(residuals, start, derivative, bounds=(low, high), x_scale="jac", max_nfev=evaluations,
                           loss="soft_l1" if soft else "linear", f_scale=soft or 1.0, xtol=1e-7, ftol=1e-6, gtol=1e-8)
     base = model.residuals(found.x, runs, closed)
-    return Fit(model, found.x, base, found.jac if not soft else jacobian(model, found.x, base, runs, closed=closed))
+    slope = found.jac if not soft else jacobian(model, found.x, base, runs, closed=closed)
+    return Fit(model, found.x, base, slope, splits(model, runs, closed))
+
+
+def splits(model: Model, runs: Sequence[Measured], closed: bool = False) -> tuple[int, ...]:
+    """Where the residuals of one channel of one run end and the next begin."""
+    lengths = [run.motor[run.judged].size for run in runs
+               for _ in range(2 + bool(run.table_m.size) + (not closed))]
+    return tuple(int(row) for row in np.cumsum(lengths)[:-1])
 
 
 def in_parallel(jobs: Sequence[Callable[[], Result]]) -> list[Result]:
-    """Run fits side by side."""
+    """Measured fits side by side."""
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
         return [future.result() for future in [pool.submit(job) for job in jobs]]

@@ -16,8 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hil.bench import Bench
-from hil.diagnosis.data import Run, judged
-from hil.twin import kernel
+from hil.measured import Measured
 from hil.twin.axis import Active, Response, Twin
 from hil.twin.library import BY_ID
 from hil.twin.mechanism import Parameter
@@ -26,6 +25,14 @@ FloatArray = NDArray[np.float64]
 
 # Torque that the motor channel is trusted to tell, over the noise of the torque channel: what the twin's own steps err.
 TORQUE_ACCURACY = 0.2
+# Time constants of the motor's observer. Fast: stick-slip is forgotten within a few ticks, so that even a poor start
+# leads to the right valley. Slow: a coarse encoder still tells the torque.
+FASTEST_OBSERVER_S, SLOWEST_OBSERVER_S = 0.002, 0.008
+# Differences by which the edges of a window are moved: first wide, then by a tick.
+EDGE_STEP_S, LAST_EDGE_STEP_S = 0.03, 0.001
+# An owner who believes a mass or a stiffness is not wrong by more than this factor: beyond it lie the valleys in which
+# a wrong structure is mended with absurd parameters.
+TRUST = 3.0
 
 
 @dataclass(frozen=True)
@@ -76,6 +83,8 @@ class Model:
     bench: Bench
     terms: tuple[Term, ...] = ()
     travel_m: float = 0.1
+    observer_s: float = FASTEST_OBSERVER_S
+    edge_step_s: float = EDGE_STEP_S
 
     @cached_property
     def coordinates(self) -> tuple[Coordinate, ...]:
@@ -88,8 +97,7 @@ class Model:
                 found.append(Coordinate(name, max(value, 0.01), True, 1e-4, 0.9, 1e-3))
                 continue
             scale = value if value > 0.0 else 1e-3
-            # 0.02 .. 50 times what the owner believes: far beyond the 30 % he may be wrong by
-            found.append(Coordinate(name, scale, True, scale / 50.0, scale * 50.0, 1e-4))
+            found.append(Coordinate(name, scale, True, scale / TRUST, scale * TRUST, 1e-4))
         for index, term in enumerate(self.terms):
             for parameter, start in zip(BY_ID[term.effect].parameters, term.values, strict=True):
                 found.append(self._coordinate(f"{index}.{parameter.name}", parameter, start))
@@ -99,12 +107,16 @@ class Model:
         step = 1e-4
         if parameter.name == "period_m":
             step = 0.01 * start / (2.0 * np.pi * max(self.travel_m, start))
+        elif parameter.name in ("start_s", "end_s"):
+            # an edge is seen only where it lies: a wide difference sees it coming
+            step = self.edge_step_s / max(abs(start), EDGE_STEP_S)
         elif parameter.name == "cycles_per_rev":
             turns = self.travel_m / self.bench.axis.ratio_m_rad
             step = 0.01 / (start * max(turns, 1.0))
         if parameter.low > 0.0:
             return Coordinate(name, start, True, parameter.low, parameter.high, step)
-        return Coordinate(name, abs(start) or 1.0, False, parameter.low, parameter.high, 1e-3)
+        linear_step = step if parameter.name in ("start_s", "end_s") else 1e-3
+        return Coordinate(name, abs(start) or 1.0, False, parameter.low, parameter.high, linear_step)
 
     @property
     def nominal_count(self) -> int:
@@ -132,7 +144,7 @@ class Model:
         bench, terms = self.resolved(x)
         active = tuple(entry.active() for entry in bench.mechanisms)
         added = tuple(Active(term.effect, term.values, term.variant) for term in terms)
-        return Twin(bench.axis.physics(), bench.gains, active + added)
+        return Twin(bench.axis.physics(), bench.gains, active + added, observer_s=self.observer_s)
 
     def resolved(self, x: FloatArray) -> tuple[Bench, tuple[Term, ...]]:
         """Bench with the nominal parameters of a vector, and the terms with theirs."""
@@ -146,35 +158,40 @@ class Model:
             rest = rest[count:]
         return self.bench.model_copy(update={"axis": self.bench.axis.model_copy(update=nominal)}), tuple(terms)
 
-    def respond(self, x: FloatArray, run: Run) -> Response:
+    def respond(self, x: FloatArray, run: Measured) -> Response:
         """The twin's answer to the set-points of a run, in closed loop."""
         return self.twin(x).simulate(run.position_command_m, run.velocity_command_m_s, run.start, run.table_m)
 
-    def closed_loop(self, x: FloatArray, run: Run) -> dict[str, FloatArray]:
+    def closed_loop(self, x: FloatArray, run: Measured) -> dict[str, FloatArray]:
         """Measured minus twin in closed loop, per channel (n,)."""
-        return _differences(self.respond(x, run), run.measured, self.bench)
+        return _differences(self.respond(x, run), measured_response(run), self.bench)
 
-    def blocks(self, x: FloatArray, run: Run) -> dict[str, FloatArray]:
+    def blocks(self, x: FloatArray, run: Measured) -> dict[str, FloatArray]:
         """Measured minus twin with each block fed measured inputs, per channel (n,)."""
         twin = self.twin(x)
-        measured = twin.undelayed(run.measured)
+        measured = twin.undelayed(measured_response(run))
         predicted = twin.observe(run.position_command_m, run.velocity_command_m_s, measured, run.start)
         found = _differences(predicted, measured, self.bench)
         found["command"] = measured.torque_command - predicted.torque_command
         return found
 
-    def weighted(self, differences: dict[str, FloatArray], run: Run) -> dict[str, FloatArray]:
+    def weighted(self, differences: dict[str, FloatArray], run: Measured) -> dict[str, FloatArray]:
         """Differences over their scales, of the rows that count: of size one or less at the noise floor."""
-        scale = scales(run, self.bench)
-        rows = judged(run)
+        scale = scales(run, self.bench, self.observer_s)
+        rows = run.judged
         return {name: np.nan_to_num(value[rows] / scale[name], nan=1e6, posinf=1e6, neginf=-1e6)
                 for name, value in differences.items()}
 
-    def residuals(self, x: FloatArray, runs: Sequence[Run], closed: bool = False) -> FloatArray:
+    def residuals(self, x: FloatArray, runs: Sequence[Measured], closed: bool = False) -> FloatArray:
         """All weighted residuals, run after run, channel after channel."""
         difference = self.closed_loop if closed else self.blocks
         return np.concatenate([part for run in runs
                                for part in self.weighted(difference(x, run), run).values()])
+
+
+def measured_response(run: Measured) -> Response:
+    """The measured channels in the twin's order."""
+    return Response(run.motor, run.table_m, run.torque_command, run.torque)
 
 
 def _differences(response: Response, measured: Response, bench: Bench) -> dict[str, FloatArray]:
@@ -187,14 +204,24 @@ def _differences(response: Response, measured: Response, bench: Bench) -> dict[s
     return found
 
 
-def scales(run: Run, bench: Bench) -> dict[str, float]:
+def observer_time_s(runs: Sequence[Measured], bench: Bench) -> float:
+    """Time constant at which the motor encoder's counts tell as much torque as the torque channel."""
+    wanted = max(np.sqrt(run.noise.motor * _inertia(bench) / (TORQUE_ACCURACY * run.noise.torque)) for run in runs)
+    return float(np.clip(wanted, FASTEST_OBSERVER_S, SLOWEST_OBSERVER_S))
+
+
+def _inertia(bench: Bench) -> float:
+    """Inertia of the whole axis in motor units."""
+    modes = bench.twin().modal
+    return float(modes.shape[modes.motor, 0] ** -2)
+
+
+def scales(run: Measured, bench: Bench, observer_s: float) -> dict[str, float]:
     """Size of one unit of weighted residual, per channel.
 
     A torque d that the twin misses moves its motor by d tau^2 / J before the correction takes hold, with tau the
     observer's time constant: the motor counts from the torque that the torque channel can still see.
     """
-    modes = bench.twin().modal
-    inertia = float(modes.shape[modes.motor, 0] ** -2)
-    seen = TORQUE_ACCURACY * run.floor.torque * kernel.OBSERVER_S**2 / inertia
-    return {"motor": max(run.floor.motor, seen), "table": run.floor.table_m, "torque": run.floor.torque,
-            "command": run.floor.torque}
+    seen = TORQUE_ACCURACY * run.noise.torque * observer_s**2 / _inertia(bench)
+    return {"motor": max(run.noise.motor, seen), "table": run.noise.table_m, "torque": run.noise.torque,
+            "command": run.noise.torque}

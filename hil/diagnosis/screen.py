@@ -15,10 +15,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from hil.diagnosis.data import Run
 from hil.diagnosis.fit import POOL, Fit
 from hil.diagnosis.model import Term
 from hil.diagnosis.starts import Start
+from hil.measured import Measured
 from hil.twin.library import BY_ID
 
 FloatArray = NDArray[np.float64]
@@ -34,7 +34,7 @@ class Lead:
     share: float
 
 
-def screen(base: Fit, runs: Sequence[Run], starts: Sequence[Start]) -> list[Lead]:
+def screen(base: Fit, runs: Sequence[Measured], starts: Sequence[Start]) -> list[Lead]:
     """A lead for each start, best first."""
     typical = max(1.0, float(np.median(np.abs(base.residuals))) / 0.6745)
     weights = 1.0 / np.sqrt(np.sqrt(1.0 + (base.residuals / (_SOFT * typical)) ** 2))
@@ -57,7 +57,7 @@ def screen(base: Fit, runs: Sequence[Run], starts: Sequence[Start]) -> list[Lead
             turned[start.phase] = np.pi / 2.0
             directions.append(direction(start, tuple(turned)))
         span = np.stack(directions, axis=1)
-        coefficients, *_ = np.linalg.lstsq(span, -residual, rcond=None)
+        coefficients = np.asarray(np.linalg.lstsq(span, -residual, rcond=None)[0], dtype=np.float64)
         left = residual + span @ coefficients
         share = 1.0 - float(left @ left) / energy
         if start.strength < 0:

@@ -13,30 +13,33 @@ import numpy as np
 
 from hil.bench import Bench
 from hil.diagnosis import starts as catalogue
-from hil.diagnosis.data import Run
 from hil.diagnosis.fit import Fit, fit, in_parallel
-from hil.diagnosis.model import Model
+from hil.diagnosis.model import LAST_EDGE_STEP_S, Model, observer_time_s
 from hil.diagnosis.screen import Lead, screen
+from hil.measured import Measured
 
 _RACERS = 8           # leads that are fitted
 _FINALISTS = 3        # of which are fitted to the end
 _SPRINT = 6           # evaluations of a first fit
 _LONG = 25            # evaluations of a last fit
+_HOPELESS = 0.02      # a lead that explains this little of what the first explains is not fitted
+_BEATEN = 100.0       # times the best cost: not worth fitting to the end
 _SOFT = 30.0          # residual from which a first fit hears less: far above noise, so that valleys stay convex
 
 
-def nominal(bench: Bench, runs: Sequence[Run]) -> Fit:
+def nominal(bench: Bench, runs: Sequence[Measured]) -> Fit:
     """Fit of the nominal parameters alone."""
     travel = max(float(np.ptp(run.position_command_m)) for run in runs)
-    model = Model(bench, (), travel)
+    model = Model(bench, (), travel, observer_time_s(runs, bench))
     return fit(model, runs, fit(model, runs, soft=_SOFT, evaluations=8).x, evaluations=10)
 
 
-def leads(base: Fit, runs: Sequence[Run]) -> list[Lead]:
+def leads(base: Fit, runs: Sequence[Measured]) -> list[Lead]:
     """One lead for each mechanism and variant that the hypothesis does not have, best first."""
     fitted, terms = base.model.resolved(base.x)
-    errors = [base.model.blocks(base.x, run).get("table", run.table_m) for run in runs]
-    points = [start for start in catalogue.starts(catalogue.scene(runs, fitted, errors), base.model.bench)
+    blocks = [base.model.blocks(base.x, run) for run in runs]
+    scene = catalogue.scene(runs, fitted, blocks, base.model.observer_s)
+    points = [start for start in catalogue.starts(scene, base.model.bench)
               if start.effect not in {term.effect for term in terms}]
     best: dict[tuple[str, int], Lead] = {}
     for lead in screen(base, runs, points):
@@ -44,7 +47,7 @@ def leads(base: Fit, runs: Sequence[Run]) -> list[Lead]:
     return list(best.values())
 
 
-def race(base: Fit, found: Sequence[Lead], runs: Sequence[Run]) -> list[Fit]:
+def race(base: Fit, found: Sequence[Lead], runs: Sequence[Measured]) -> list[Fit]:
     """Fits of the base with each of the first leads, best first; only the finalists are converged."""
 
     def sprint(lead: Lead) -> Fit:
@@ -53,9 +56,21 @@ def race(base: Fit, found: Sequence[Lead], runs: Sequence[Run]) -> list[Fit]:
         return fit(model, runs, x, soft=_SOFT, evaluations=_SPRINT)
 
     def finish(found: Fit) -> Fit:
-        return fit(found.model, runs, found.x, evaluations=_LONG)
+        if any("end_s" in coordinate.name for coordinate in found.model.coordinates):
+            found = fit(found.model, runs, found.x, evaluations=_LONG)
+        return fit(replace(found.model, edge_step_s=LAST_EDGE_STEP_S), runs, found.x, evaluations=_LONG)
 
-    sprints = in_parallel([partial(sprint, lead) for lead in found[:_RACERS]])
-    ranked = sorted(sprints, key=lambda result: result.cost)
-    ranked[:_FINALISTS] = in_parallel([partial(finish, result) for result in ranked[:_FINALISTS]])
-    return sorted(ranked, key=lambda result: result.cost)
+    def afresh(found: Fit) -> Fit:
+        """From the owner's nominal values: the base may have bent its own to make up for what it lacks."""
+        x = found.x.copy()
+        count = found.model.nominal_count
+        x[:count] = found.model.initial()[:count]
+        return finish(fit(found.model, runs, x, soft=_SOFT, evaluations=_SPRINT))
+
+    good = [lead for lead in found[:_RACERS] if lead.share > _HOPELESS * found[0].share]
+    ranked = sorted(in_parallel([partial(sprint, lead) for lead in good]), key=lambda result: result.cost)
+    first = min(in_parallel([partial(finish, ranked[0]), partial(afresh, ranked[0])]), key=lambda result: result.cost)
+    close = [result for result in ranked[1:_FINALISTS] if result.cost < _BEATEN * first.cost]
+    rest = in_parallel([partial(job, result) for result in close for job in (finish, afresh)])
+    best = {result.model.terms[-1].key: result for result in sorted([*rest, *ranked[1:]], key=lambda r: -r.cost)}
+    return sorted([first, *best.values()], key=lambda result: result.cost)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from hil.bench import Bench
 from hil.diagnosis import disturbance as estimate
-from hil.diagnosis.data import Run
+from hil.measured import Measured
 from hil.twin.library import BY_ID, LIBRARY
 
 FloatArray = NDArray[np.float64]
@@ -50,19 +50,22 @@ class Scene:
     stretch: float                      # typical table against motor [m]
 
 
-def scene(runs: Sequence[Run], bench: Bench, table_errors: Sequence[FloatArray]) -> Scene:
-    """Measure what the starting values need; `bench` with the nominal parameters as fitted."""
+def scene(runs: Sequence[Measured], bench: Bench, blocks: Sequence[dict[str, FloatArray]], observer_s: float) -> Scene:
+    """Measure what the starting values need.
+
+    `bench` has the nominal parameters as fitted, `blocks` their residuals block by block, one per run.
+    """
     physics = bench.axis.physics()
     ratio = bench.axis.ratio_m_rad
     modes = bench.twin().modal
     inertia = float(modes.shape[modes.motor, 0] ** -2)     # of the rigid body
-    found = [estimate.disturbance(run, bench, inertia, physics.coulomb_n_m, physics.viscous_n_m_s_rad)
-             for run in runs]
+    found = [estimate.disturbance(run, block["motor"], inertia, observer_s)
+             for run, block in zip(runs, blocks, strict=True)]
     stretch = 0.0
     if runs[0].table_m.size:
         stretch = max(float(np.percentile(np.abs(run.table_m - ratio * run.motor
                                                  - np.median(run.table_m - ratio * run.motor)), 60)) for run in runs)
-    longest = max(range(len(runs)), key=lambda i: runs[i].samples)
+    longest = max(range(len(runs)), key=lambda i: runs[i].motor.size)
     ripple = [d.torque / np.where(np.abs(run.torque) > 0.2 * physics.coulomb_n_m, run.torque, np.inf)
               for run, d in zip(runs, found, strict=True)]
     return Scene(
@@ -70,12 +73,13 @@ def scene(runs: Sequence[Run], bench: Bench, table_errors: Sequence[FloatArray])
         peak_torque=max(float(np.max(np.abs(run.torque))) for run in runs),
         peak_speed=max(float(np.max(np.abs(d.velocity))) for d in found),
         travel_m=max(float(np.ptp(run.position_command_m)) for run in runs),
-        duration_s=max(run.samples * run.period_s for run in runs),
+        duration_s=max(run.motor.size * run.period_s for run in runs),
         ratio=ratio,
         orders=estimate.orders(runs, found, physics.angle_per_unit),
         ripple_orders=estimate.orders(runs, found, physics.angle_per_unit, 2, ripple),
         friction_periods=estimate.friction_periods(runs, found, ratio),
-        scale_periods=estimate.scale_periods(runs, table_errors) if runs[0].table_m.size else [],
+        scale_periods=(estimate.scale_periods(runs, [block["table"] for block in blocks])
+                       if runs[0].table_m.size else []),
         window=estimate.force_window(runs[longest], found[longest]),
         stretch=max(stretch, 0.5e-6),
     )
@@ -109,7 +113,7 @@ _STARTS: dict[str, tuple[Callable[[Scene], _Values], int, int]] = {
     "channel_time_skew": (lambda s: [(2e-4,)], 0, -1),
     "encoder_eccentricity": (lambda s: [(1e-4, 0.0)], 0, 1),
     "scale_interpolation_error": (lambda s: [(1e-7, p, 0.0) for p in s.scale_periods], 0, 2),
-    "external_force": (lambda s: [(-s.window[2] / s.ratio or 1.0, s.window[0], s.window[1])], 0, -1),
+    "external_force": (lambda s: [(s.window[2] / s.ratio or 1.0, s.window[0], s.window[1])], 0, -1),
     "spring_load": (lambda s: [(0.02 * s.coulomb / s.ratio / s.travel_m, 0.0)], 0, -1),
 }
 

@@ -92,6 +92,7 @@ class Twin:
     coarse_steps: int = COARSE_STEPS
     fine_steps: int = FINE_STEPS
     slow_velocity: float = 0.02
+    observer_s: float = kernel.OBSERVER_S
 
     @cached_property
     def modal(self) -> Modal:
@@ -134,8 +135,10 @@ class Twin:
             damping = self.modal.damping_ratio[self.modal.frequency_rad_s > 0.0][0]
             constants[kernel.DAMPER] = 2.0 * damping * chain.transmission_stiffness_n_m_rad / elastic[0]
         constants[kernel.COARSE_STEPS] = self.coarse_steps
+        constants[kernel.OBSERVER] = self.observer_s
         constants[kernel.FINE_STEPS] = self.fine_steps
         constants[kernel.SLOW_VELOCITY] = self.slow_velocity
+        constants[kernel.PLAY] = float(any(BY_ID[active.effect].play for active in self.active))
         bends = any(BY_ID[active.effect].stage is Stage.TRANSMISSION for active in self.active)
         constants[kernel.ALWAYS_FINE] = float(bends and elastic.size > 1)
         return constants

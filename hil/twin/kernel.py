@@ -32,7 +32,7 @@ COARSE, FINE, SHAPE_MOTOR, SHAPE_TABLE, SHAPE_SPRING, TABLE_IMPULSE, MOTOR_IMPUL
 
 # Entries of `constants`.
 (PERIOD, RATIO, ANGLE_PER_UNIT, COULOMB, VISCOUS, SPRING, DAMPER, COARSE_STEPS, FINE_STEPS, SLOW_VELOCITY,
- ALWAYS_FINE, CONSTANTS) = range(12)
+ ALWAYS_FINE, OBSERVER, PLAY, CONSTANTS) = range(14)
 
 # Entries of `codes`: variant + 1 of each mechanism (0: off), then whether each stage is entered.
 (ON_CURRENT, ON_TORQUE, ON_MOTOR_TORQUE, ON_COULOMB, ON_FRICTION_SCALE, ON_DRAG, ON_BIAS, ON_BRISTLE,
@@ -140,6 +140,10 @@ def _build_advance(digest: str) -> Any:
                 own[FLOATING] = 1.0 if floating else 0.0
                 own[SPRING_EXTRA] = extra
                 spring = -(constants[SPRING] * extra + constants[DAMPER] * rate)
+                if constants[PLAY] > 0.0 and not floating:
+                    pressing = constants[SPRING] * effective + constants[DAMPER] * (stretch_rate + rate)
+                    if pressing * effective < 0.0:      # flanks with play push, they do not pull
+                        spring += pressing
 
             free = table_free = 0.0
             for i in range(n):
@@ -231,10 +235,10 @@ def _build_read(digest: str) -> Any:
 
 
 @njit
-def _correct(impulse, error, period, modes, delta):  # type: ignore[no-untyped-def]
+def _correct(impulse, error, period, time_constant, modes, delta):  # type: ignore[no-untyped-def]
     """Correct the state of one inertia by the error of its position [motor units] (Luenberger observer)."""
-    shift = 2.0 * period / OBSERVER_S * error
-    kick = period / OBSERVER_S**2 * error
+    shift = 2.0 * period / time_constant * error
+    kick = period / time_constant**2 * error
     for i in range(delta.shape[1]):
         delta[0, i] += modes[impulse, i] * shift
         delta[1, i] += modes[impulse, i] * kick
@@ -259,7 +263,7 @@ def _build_closed_loop(digest: str) -> Any:
             command[k] = outputs.torque_n_m
             if measured_table.size and memory[OWN, FLOATING] > 0.0:
                 error = (measured_table[k] - table[k]) / constants[RATIO]
-                _correct(TABLE_IMPULSE, error, constants[PERIOD], modes, delta)
+                _correct(TABLE_IMPULSE, error, constants[PERIOD], OBSERVER_S, modes, delta)
             torque[k] = advance(command[k], constants, modes, values, codes, delta, memory)
         return motor, table, command, torque
 
@@ -291,10 +295,10 @@ def _build_observe(digest: str) -> Any:
             resumed = state.integral_n_m + period / INTEGRATOR_S * (command[k] - wanted[k])
             state = control.State(state.tick, state.velocity_reference_m_s, resumed, state.previous_motor_rad,
                                   state.previous2_motor_rad, state.filtered_velocity_rad_s)
-            _correct(MOTOR_IMPULSE, measured_motor[k] - motor[k], period, modes, delta)
+            _correct(MOTOR_IMPULSE, measured_motor[k] - motor[k], period, constants[OBSERVER], modes, delta)
             if measured_table.size and memory[OWN, FLOATING] > 0.0:
                 error = (measured_table[k] - table[k]) / constants[RATIO]
-                _correct(TABLE_IMPULSE, error, period, modes, delta)
+                _correct(TABLE_IMPULSE, error, period, OBSERVER_S, modes, delta)
             torque[k] = advance(command[k], constants, modes, values, codes, delta, memory)
         return motor, table, wanted, torque
 

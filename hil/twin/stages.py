@@ -47,7 +47,7 @@ def _compose(entries: list[tuple[Any, int, int]]) -> Any:
         return nothing
     (contribution, index, parity), rest = entries[0], _compose(entries[1:])
 
-    @njit
+    @njit(inline="always")
     def chained(value: float, at: Any, values: Any, codes: Any, memory: Any) -> Any:
         code = codes[index]
         if code != 0 and (parity < 0 or (code - 1) % 2 == parity):

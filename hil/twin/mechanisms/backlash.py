@@ -31,4 +31,5 @@ MECHANISM = Mechanism(
     parameters=(Parameter("gap_m", Dimension.LENGTH, 0.0, 1e-3),),
     stage=Stage.TRANSMISSION,
     contribution=_free_play,
+    play=True,
 )

@@ -1,0 +1,147 @@
+"""From recordings to an explanation: how many mechanisms, which, their rivals, and what stays unexplained.
+
+Terms are added one at a time while the evidence asks for them, each against the whole library. After every
+addition the terms that are no longer needed are dropped, so that a first guess that only imitated two
+causes goes once both are there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hil.bench import Bench
+from hil.diagnosis import search
+from hil.diagnosis.evidence import against, effective_samples
+from hil.diagnosis.fit import Fit, fit, in_parallel, splits
+from hil.diagnosis.model import Model, Term, scales
+from hil.diagnosis.screen import Lead
+from hil.measured import Measured
+
+FloatArray = NDArray[np.float64]
+Progress = Callable[[str], None]
+
+MOST_TERMS = 4          # at once; more than an engineer could act on, and the search stays affordable
+# BIC differences. "Very strong" evidence is 10 (Kass and Raftery 1995); the search looks at some 45 variants at some
+# 90 starts, which costs 2 log 90 = 9 more.
+NEEDED = 20.0
+TIED = 10.0             # a rival closer than this is not refuted
+# A term must also matter: take this share of the residual's energy away, at the noise floor 7 % of the noise in rms. The
+# twin's own step errors lie a factor of ten below.
+MATERIAL = 0.005
+FLOOR = 1.10            # mean square of a channel over its noise, up to which it counts as explained: 5 % in rms
+
+
+@dataclass(frozen=True, eq=False)
+class Rival:
+    """Another explanation of the same residual, and the evidence against it (BIC difference)."""
+
+    fit: Fit
+    evidence: float
+
+
+@dataclass(frozen=True, eq=False)
+class Explanation:
+    """What was found: the owner's values, the nominal refit, the final fit and the rivals of each term."""
+
+    owner: Fit
+    nominal: Fit
+    final: Fit
+    rivals: dict[tuple[str, int], list[Rival]] = field(default_factory=dict)
+    needed: dict[tuple[str, int], float] = field(default_factory=dict)   # evidence that each term is needed
+    leads: tuple[Lead, ...] = ()                                  # of the first screen
+
+    @property
+    def terms(self) -> tuple[Term, ...]:
+        """The mechanisms found, with their fitted values."""
+        return self.final.model.resolved(self.final.x)[1]
+
+
+def explain(bench: Bench, runs: Sequence[Measured], progress: Progress = lambda text: None) -> Explanation:
+    """Search for the physics that the twin of `bench` lacks on these recordings."""
+    progress("refitting the nominal parameters")
+    base = search.nominal(bench, runs)
+    owner = at_owner(base.model, runs)
+    nominal, rivals, first_leads = base, dict[tuple[str, int], list[Rival]](), list[Lead]()
+    while len(base.model.terms) < MOST_TERMS:
+        progress(f"screening the library beside {len(base.model.terms)} terms")
+        leads = [lead for lead in search.leads(base, runs) if claimable(lead.term, bench)]
+        first_leads = first_leads or leads
+        samples = effective_samples(base)
+        promising = [lead for lead in leads
+                     if lead.share > MATERIAL and -samples * np.log(max(1.0 - lead.share, 1e-12)) > NEEDED]
+        if not promising:
+            break
+        progress("fitting " + ", ".join(lead.term.effect for lead in promising[:3]))
+        ranked = [found for found in search.race(base, promising, runs) if claimable(_last(found), bench)]
+        if not ranked or against(ranked[0], base) < NEEDED or ranked[0].cost > (1.0 - MATERIAL) * base.cost:
+            break
+        base = ranked[0]
+        samples = effective_samples(base)
+        rivals[base.model.terms[-1].key] = [Rival(other, against(base, other, samples)) for other in ranked[1:]]
+        base = _pruned(base, runs)
+    final = fit(base.model, runs, base.x, evaluations=40)
+    kept = {term.key for term in final.model.terms}
+    needed = {key: evidence for key, (evidence, _) in _ablated(final, runs).items()}
+    return Explanation(owner, nominal, final, {key: value for key, value in rivals.items() if key in kept}, needed,
+                       tuple(first_leads))
+
+
+def at_owner(model: Model, runs: Sequence[Measured]) -> Fit:
+    """The owner's values, not fitted."""
+    x = model.initial()
+    residuals = model.residuals(x, runs)
+    return Fit(model, x, residuals, np.zeros((residuals.size, 0)), splits(model, runs))
+
+
+def at_floor(found: Fit, runs: Sequence[Measured]) -> bool:
+    """Whether every channel of every run is down to its noise."""
+    return all(value <= FLOOR for run in runs for value in noise_ratios(found, run).values())
+
+
+def noise_ratios(found: Fit, run: Measured) -> dict[str, float]:
+    """Mean square over noise of each channel, block by block."""
+    noise = scales(run, found.model.bench, found.model.observer_s)
+    blocks = found.model.blocks(found.x, run)
+    return {name: float(np.mean((blocks[name][run.judged] / noise[name]) ** 2)) for name in blocks}
+
+
+def claimable(term: Term, bench: Bench) -> bool:
+    """Whether the sensors can tell such an effect: an error of the linear encoder below a quarter of its count
+    is how counting looks, and no more."""
+    if term.effect == "scale_interpolation_error" and bench.encoders.table is not None:
+        return abs(term.values[0]) > 0.25 * bench.encoders.table.resolution_m
+    return True
+
+
+def _last(found: Fit) -> Term:
+    return found.model.resolved(found.x)[1][-1]
+
+
+def _ablated(found: Fit, runs: Sequence[Measured]) -> dict[tuple[str, int], tuple[float, Fit]]:
+    """For each term: the evidence for it, and the fit without it."""
+
+    def without(index: int) -> Fit:
+        terms = found.model.resolved(found.x)[1]
+        rest = replace(found.model, terms=terms[:index] + terms[index + 1:])
+        x = np.concatenate([found.x[:rest.nominal_count], rest.initial()[rest.nominal_count:]])
+        return fit(rest, runs, x, evaluations=12)
+
+    count = len(found.model.terms)
+    fits = in_parallel([lambda index=index: without(index) for index in range(count)])  # type: ignore[misc]
+    samples = effective_samples(found)
+    return {term.key: (against(found, other, samples), other)
+            for term, other in zip(found.model.terms, fits, strict=True)}
+
+
+def _pruned(found: Fit, runs: Sequence[Measured]) -> Fit:
+    """The fit without the terms that the evidence no longer asks for, the weakest first."""
+    while len(found.model.terms) > 1:
+        evidence, rest = min(_ablated(found, runs).values(), key=lambda pair: pair[0])
+        if evidence >= NEEDED and rest.cost * (1.0 - MATERIAL) > found.cost:
+            break
+        found = rest
+    return found

@@ -139,6 +139,11 @@ class Twin:
         constants[kernel.FINE_STEPS] = self.fine_steps
         constants[kernel.SLOW_VELOCITY] = self.slow_velocity
         constants[kernel.PLAY] = float(any(BY_ID[active.effect].play for active in self.active))
+        modes = self._modes
+        motor, table = modes[kernel.SHAPE_MOTOR], modes[kernel.SHAPE_TABLE]
+        for at, first in ((kernel.COARSE_GAINS, kernel.COARSE), (kernel.FINE_GAINS, kernel.FINE)):
+            per_torque = modes[first + 5]
+            constants[at:at + 3] = motor * per_torque @ motor, motor * per_torque @ table, table * per_torque @ table
         bends = any(BY_ID[active.effect].stage is Stage.TRANSMISSION for active in self.active)
         constants[kernel.ALWAYS_FINE] = float(bends and elastic.size > 1)
         return constants
@@ -156,6 +161,7 @@ class Twin:
             values[index, PARAMETERS - 1] = active.variant
             codes[index] = active.variant + 1
             codes[len(LIBRARY) + stages.KERNEL_STAGES.index(stage)] = 1
+            codes[kernel.ON_ANY] = 1
         return values, codes
 
     @cached_property

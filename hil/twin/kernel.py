@@ -32,12 +32,12 @@ COARSE, FINE, SHAPE_MOTOR, SHAPE_TABLE, SHAPE_SPRING, TABLE_IMPULSE, MOTOR_IMPUL
 
 # Entries of `constants`.
 (PERIOD, RATIO, ANGLE_PER_UNIT, COULOMB, VISCOUS, SPRING, DAMPER, COARSE_STEPS, FINE_STEPS, SLOW_VELOCITY,
- ALWAYS_FINE, OBSERVER, PLAY, CONSTANTS) = range(14)
+ ALWAYS_FINE, OBSERVER, PLAY, COARSE_GAINS, FINE_GAINS, CONSTANTS) = (*range(14), 16, 19)
 
 # Entries of `codes`: variant + 1 of each mechanism (0: off), then whether each stage is entered.
 (ON_CURRENT, ON_TORQUE, ON_MOTOR_TORQUE, ON_COULOMB, ON_FRICTION_SCALE, ON_DRAG, ON_BIAS, ON_BRISTLE,
- ON_TABLE_SHARE, ON_TRANSMISSION, ON_TABLE_FORCE, ON_MOTOR_READING, ON_TABLE_READING, CODES) = range(
-    MECHANISMS, MECHANISMS + 14)
+ ON_TABLE_SHARE, ON_TRANSMISSION, ON_TABLE_FORCE, ON_MOTOR_READING, ON_TABLE_READING, ON_ANY, CODES) = range(
+    MECHANISMS, MECHANISMS + 15)
 
 # Rows of `memory` (MECHANISMS + 1, WIDTH): each mechanism's own, then the kernel's.
 OWN = MECHANISMS
@@ -54,10 +54,12 @@ OBSERVER_S = 0.008
 INTEGRATOR_S = 0.1
 
 _control_step = control.step
-_REASSOCIATE = {"reassoc", "nsz", "contract", "arcp"}
+# Sums may be reordered; a division does not check its divisor. `_nrt=False` below leaves out the counting of
+# references to arrays, which costs four times the mathematics of a step of a few modes.
+_COMPILE: Any = {"fastmath": {"reassoc", "nsz", "contract", "arcp"}, "error_model": "numpy"}
 
 
-@njit(fastmath=_REASSOCIATE)
+@njit(**_COMPILE)
 def _contact(free, gain, bound, viscous, shift, opposing):  # type: ignore[no-untyped-def]
     """Friction torque of a rigid contact that meets velocity `free`; see the module's equations."""
     stop = free / gain
@@ -68,7 +70,7 @@ def _contact(free, gain, bound, viscous, shift, opposing):  # type: ignore[no-un
     return steady + viscous * (free - gain * steady) / (1.0 + gain * viscous)
 
 
-@njit(fastmath=_REASSOCIATE)
+@njit(**_COMPILE)
 def _bristle_contact(free, gain, bound, viscous, shift, opposing, stiffness, deflection, step):  # type: ignore[no-untyped-def]
     """Friction torque and new deflection of an elastic contact (Dahl 1968), implicit in velocity.
 
@@ -86,33 +88,57 @@ def _bristle_contact(free, gain, bound, viscous, shift, opposing, stiffness, def
     return stiffness * after + shift + opposing + viscous * velocity, after
 
 
+@njit(**_COMPILE)
+def _along(shape, values):  # type: ignore[no-untyped-def]
+    """Modal values (n,) seen at one place of the chain."""
+    total = 0.0
+    for i in range(shape.size):
+        total += shape[i] * values[i]
+    return total
+
+
+@njit(**_COMPILE)
+def _look(at_motor, at_table, at_spring, positions, velocities):  # type: ignore[no-untyped-def]
+    """Position and velocity of motor, table and transmission spring."""
+    position = speed = table = table_speed = stretch = stretch_rate = 0.0
+    for i in range(positions.size):
+        d, v = positions[i], velocities[i]
+        position += at_motor[i] * d
+        speed += at_motor[i] * v
+        table += at_table[i] * d
+        table_speed += at_table[i] * v
+        stretch += at_spring[i] * d
+        stretch_rate += at_spring[i] * v
+    return position, speed, table, table_speed, stretch, stretch_rate
+
+
 def _build_advance(digest: str) -> Any:
-    @njit(cache=True, nogil=True, fastmath=_REASSOCIATE)
+    @njit(cache=True, nogil=True, _nrt=False, **_COMPILE)
     def advance(command, constants, modes, values, codes, delta, memory):  # type: ignore[no-untyped-def]
         """Move the axis by one control period under a held torque command; mean measured torque."""
         assert digest
         n = delta.shape[1]
         own = memory[OWN]
         ratio, period = constants[RATIO], constants[PERIOD]
-        position = speed = table = table_speed = stretch = stretch_rate = 0.0
-        for i in range(n):
-            position += modes[SHAPE_MOTOR, i] * delta[0, i]
-            speed += modes[SHAPE_MOTOR, i] * delta[1, i]
-            table += modes[SHAPE_TABLE, i] * delta[0, i]
-            table_speed += modes[SHAPE_TABLE, i] * delta[1, i]
-            stretch += modes[SHAPE_SPRING, i] * delta[0, i]
-            stretch_rate += modes[SHAPE_SPRING, i] * delta[1, i]
+        at_motor, at_table, at_spring = modes[SHAPE_MOTOR], modes[SHAPE_TABLE], modes[SHAPE_SPRING]
+        positions, velocities = delta[0], delta[1]
+        any_on = codes[ON_ANY] > 0
+        position = table = table_speed = stretch = stretch_rate = 0.0
+        if any_on:
+            position, speed, table, table_speed, stretch, stretch_rate = _look(
+                at_motor, at_table, at_spring, positions, velocities)
+        else:
+            speed = _along(at_motor, velocities)
         reversing = abs(speed) < constants[SLOW_VELOCITY] + 2.0 * abs(speed - own[LAST_SPEED])
         fine = constants[ALWAYS_FINE] > 0.0 or (reversing and speed != 0.0)
         own[LAST_SPEED] = speed
         first = FINE if fine else COARSE
         steps = int(constants[FINE_STEPS]) if fine else int(constants[COARSE_STEPS])
         h = period / steps
-        gain = cross = table_gain = 0.0
-        for i in range(n):
-            gain += modes[SHAPE_MOTOR, i] * modes[first + 5, i] * modes[SHAPE_MOTOR, i]
-            cross += modes[SHAPE_MOTOR, i] * modes[first + 5, i] * modes[SHAPE_TABLE, i]
-            table_gain += modes[SHAPE_TABLE, i] * modes[first + 5, i] * modes[SHAPE_TABLE, i]
+        gains = FINE_GAINS if fine else COARSE_GAINS
+        gain, cross, table_gain = constants[gains], constants[gains + 1], constants[gains + 2]
+        from_position, from_velocity, from_torque = modes[first], modes[first + 1], modes[first + 4]
+        rate_position, rate_velocity, rate_torque = modes[first + 2], modes[first + 3], modes[first + 5]
         measured = 0.0
         for j in range(steps):
             at = Moment(own[CLOCK] + j * h, j * h, period, h,
@@ -146,15 +172,23 @@ def _build_advance(digest: str) -> Any:
                         spring += pressing
 
             free = table_free = 0.0
-            for i in range(n):
-                g = (modes[SHAPE_MOTOR, i] * drive + modes[SHAPE_TABLE, i] * push
-                     + modes[SHAPE_SPRING, i] * spring)
-                d, v = delta[0, i], delta[1, i]
-                delta[0, i] = modes[first, i] * d + modes[first + 1, i] * v + modes[first + 4, i] * g
-                moved = modes[first + 2, i] * d + modes[first + 3, i] * v + modes[first + 5, i] * g
-                delta[1, i] = moved
-                free += modes[SHAPE_MOTOR, i] * moved
-                table_free += modes[SHAPE_TABLE, i] * moved
+            if any_on:
+                for i in range(n):
+                    g = at_motor[i] * drive + at_table[i] * push + at_spring[i] * spring
+                    d, v = positions[i], velocities[i]
+                    positions[i] = from_position[i] * d + from_velocity[i] * v + from_torque[i] * g
+                    moved = rate_position[i] * d + rate_velocity[i] * v + rate_torque[i] * g
+                    velocities[i] = moved
+                    free += at_motor[i] * moved
+                    table_free += at_table[i] * moved
+            else:
+                for i in range(n):
+                    g = at_motor[i] * drive
+                    d, v = positions[i], velocities[i]
+                    positions[i] = from_position[i] * d + from_velocity[i] * v + from_torque[i] * g
+                    moved = rate_position[i] * d + rate_velocity[i] * v + rate_torque[i] * g
+                    velocities[i] = moved
+                    free += at_motor[i] * moved
 
             viscous, bound, opposing = constants[VISCOUS], constants[COULOMB], 0.0
             shift = share = stiffness = 0.0
@@ -193,19 +227,13 @@ def _build_advance(digest: str) -> Any:
                 guide = _contact(table_free - cross * friction, table_gain, share * bound, share * viscous,
                                  0.0, 0.0)
 
-            position = speed = table = table_speed = stretch = stretch_rate = 0.0
             for i in range(n):
-                g = modes[SHAPE_MOTOR, i] * friction + modes[SHAPE_TABLE, i] * guide
-                d = delta[0, i] - modes[first + 4, i] * g
-                v = delta[1, i] - modes[first + 5, i] * g
-                delta[0, i] = d
-                delta[1, i] = v
-                position += modes[SHAPE_MOTOR, i] * d
-                speed += modes[SHAPE_MOTOR, i] * v
-                table += modes[SHAPE_TABLE, i] * d
-                table_speed += modes[SHAPE_TABLE, i] * v
-                stretch += modes[SHAPE_SPRING, i] * d
-                stretch_rate += modes[SHAPE_SPRING, i] * v
+                g = at_motor[i] * friction + at_table[i] * guide
+                positions[i] -= from_torque[i] * g
+                velocities[i] -= rate_torque[i] * g
+            if any_on and j + 1 < steps:
+                position, speed, table, table_speed, stretch, stretch_rate = _look(
+                    at_motor, at_table, at_spring, positions, velocities)
         own[CLOCK] += period
         return measured / steps
 
@@ -213,7 +241,7 @@ def _build_advance(digest: str) -> Any:
 
 
 def _build_read(digest: str) -> Any:
-    @njit(cache=True, nogil=True, fastmath=_REASSOCIATE)
+    @njit(cache=True, nogil=True, _nrt=False, **_COMPILE)
     def read(constants, modes, values, codes, delta, memory):  # type: ignore[no-untyped-def]
         """What the two encoders read: motor position (rad, or m) and table position (m)."""
         assert digest
@@ -245,7 +273,7 @@ def _correct(impulse, error, period, time_constant, modes, delta):  # type: igno
 
 
 def _build_closed_loop(digest: str) -> Any:
-    @njit(cache=True, nogil=True, fastmath=_REASSOCIATE)
+    @njit(cache=True, nogil=True, **_COMPILE)
     def closed_loop(gains, state, position_command, velocity_command, measured_table, constants, modes,  # type: ignore[no-untyped-def]
                     values, codes, delta, memory):
         """Controller and axis from tick to tick: motor, table, torque command, torque, each (n,).
@@ -271,7 +299,7 @@ def _build_closed_loop(digest: str) -> Any:
 
 
 def _build_observe(digest: str) -> Any:
-    @njit(cache=True, nogil=True, fastmath=_REASSOCIATE)
+    @njit(cache=True, nogil=True, **_COMPILE)
     def observe(gains, state, position_command, velocity_command, command, measured_motor, measured_table,  # type: ignore[no-untyped-def]
                 constants, modes, values, codes, delta, memory):
         """Each block fed with measured inputs: motor, table, torque command, torque, each (n,).
@@ -306,7 +334,7 @@ def _build_observe(digest: str) -> Any:
 
 
 def _build_open_loop(digest: str) -> Any:
-    @njit(cache=True, nogil=True, fastmath=_REASSOCIATE)
+    @njit(cache=True, nogil=True, **_COMPILE)
     def open_loop(torque_in, constants, modes, values, codes, delta, memory):  # type: ignore[no-untyped-def]
         """The axis driven by a given torque command (n,): motor, table, torque, each (n,)."""
         assert digest

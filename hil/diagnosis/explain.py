@@ -29,9 +29,9 @@ MOST_TERMS = 4          # at once; more than an engineer could act on, and the s
 # 90 starts, which costs 2 log 90 = 9 more.
 NEEDED = 20.0
 TIED = 10.0             # a rival closer than this is not refuted
-# A term must also matter: take this share of the residual's energy away, at the noise floor 7 % of the noise in rms. The
-# twin's own step errors lie a factor of ten below.
-MATERIAL = 0.005
+# A term must also matter: take this share of the residual's energy away, at the noise floor 14 % of the noise in rms.
+# Below lie the details in which two honest simulations of one axis differ.
+MATERIAL = 0.02
 FLOOR = 1.10            # mean square of a channel over its noise, up to which it counts as explained: 5 % in rms
 
 

@@ -23,8 +23,9 @@ from hil.twin.mechanism import Parameter
 
 FloatArray = NDArray[np.float64]
 
-# Torque that the motor channel is trusted to tell, over the noise of the torque channel: what the twin's own steps err.
-TORQUE_ACCURACY = 0.2
+# Torque that the motor channel is trusted to tell, over the noise of the torque channel. A fine encoder tells much
+# less, but details that no owner asks for lie there too: how friction meets zero speed, the side force of a lead error.
+TORQUE_ACCURACY = 1.0
 # Time constants of the motor's observer. Fast: stick-slip is forgotten within a few ticks, so that even a poor start
 # leads to the right valley. Slow: a coarse encoder still tells the torque.
 FASTEST_OBSERVER_S, SLOWEST_OBSERVER_S = 0.002, 0.008

@@ -23,7 +23,7 @@ _FINALISTS = 3        # of which are fitted to the end
 _SPRINT = 6           # evaluations of a first fit
 _LONG = 25            # evaluations of a last fit
 _HOPELESS = 0.02      # a lead that explains this little of what the first explains is not fitted
-_BEATEN = 100.0       # times the best cost: not worth fitting to the end
+_BEATEN = 10.0        # times the best cost: not worth fitting to the end
 _SOFT = 30.0          # residual from which a first fit hears less: far above noise, so that valleys stay convex
 
 
@@ -71,6 +71,6 @@ def race(base: Fit, found: Sequence[Lead], runs: Sequence[Measured]) -> list[Fit
     ranked = sorted(in_parallel([partial(sprint, lead) for lead in good]), key=lambda result: result.cost)
     first = min(in_parallel([partial(finish, ranked[0]), partial(afresh, ranked[0])]), key=lambda result: result.cost)
     close = [result for result in ranked[1:_FINALISTS] if result.cost < _BEATEN * first.cost]
-    rest = in_parallel([partial(job, result) for result in close for job in (finish, afresh)])
+    rest = in_parallel([partial(finish, result) for result in close])
     best = {result.model.terms[-1].key: result for result in sorted([*rest, *ranked[1:]], key=lambda r: -r.cost)}
     return sorted([first, *best.values()], key=lambda result: result.cost)

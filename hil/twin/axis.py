@@ -138,7 +138,8 @@ class Twin:
         constants[kernel.OBSERVER] = self.observer_s
         constants[kernel.FINE_STEPS] = self.fine_steps
         constants[kernel.SLOW_VELOCITY] = self.slow_velocity
-        constants[kernel.PLAY] = float(any(BY_ID[active.effect].play for active in self.active))
+        constants[kernel.PLAY] = float(
+            any(BY_ID[active.effect].play and active.variant == 1 for active in self.active))
         modes = self._modes
         motor, table = modes[kernel.SHAPE_MOTOR], modes[kernel.SHAPE_TABLE]
         for at, first in ((kernel.COARSE_GAINS, kernel.COARSE), (kernel.FINE_GAINS, kernel.FINE)):
@@ -193,8 +194,8 @@ class Twin:
         `measured_table_m` (n,) holds a table that floats in a gap, see `kernel.closed_loop`.
         """
         delta, memory = self.state(start)
-        channels = kernel.closed_loop(self.loop_gains, self._controller(start), position_command_m, velocity_command_m_s,
-                                      measured_table_m, *self.arrays(), delta, memory)
+        channels = kernel.closed_loop(self.loop_gains, self._controller(start), position_command_m,
+                                      velocity_command_m_s, measured_table_m, *self.arrays(), delta, memory)
         return self._channels(Response(*channels))
 
     def drive(self, torque_command: FloatArray, start: Start = _AT_REST) -> Response:

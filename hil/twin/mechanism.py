@@ -125,7 +125,7 @@ class Mechanism:
     stage: Stage
     contribution: Callable[..., Any]
     variants: tuple[str, ...] = ("",)   # ways it may show: each is weighed in its own right
-    play: bool = False                  # the transmission comes apart: its flanks push and do not pull
+    play: bool = False                  # in the second variant the flanks of the transmission push only
     second_stage: Stage | None = None   # where the second variant enters, if elsewhere
 
     @property

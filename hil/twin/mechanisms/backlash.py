@@ -1,4 +1,7 @@
-"""Backlash: lost motion between screw and table."""
+"""Backlash: lost motion between screw and table.
+
+Oiled flanks are held by their damping when they part, dry flanks only push.
+"""
 
 from __future__ import annotations
 
@@ -31,5 +34,6 @@ MECHANISM = Mechanism(
     parameters=(Parameter("gap_m", Dimension.LENGTH, 0.0, 1e-3),),
     stage=Stage.TRANSMISSION,
     contribution=_free_play,
+    variants=("oiled flanks", "dry flanks"),
     play=True,
 )

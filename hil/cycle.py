@@ -56,7 +56,7 @@ _TO_TORQUE, _TO_VELOCITY = int(Setpoint.TORQUE), int(Setpoint.VELOCITY)
 _FOLLOWING_ERROR, _TRAVEL = int(Limit.FOLLOWING_ERROR), int(Limit.TRAVEL)
 
 
-@njit
+@njit(_nrt=False, error_model="numpy")   # no references counted: see hil.twin.kernel
 def _controller(law, state, position, velocity, motor, table):  # type: ignore[no-untyped-def]
     """One step of `hil.control` on arrays: gains (11,), state (6,)."""
     gains = control.Gains(law[0], law[1], law[2], law[3], law[4], law[5], law[6], int(law[7]), law[8] != 0.0,
@@ -70,7 +70,7 @@ def _controller(law, state, position, velocity, motor, table):  # type: ignore[n
 
 
 def _build_cycle(digest: str) -> Any:
-    @njit(cache=True)
+    @njit(cache=True, _nrt=False, error_model="numpy")
     def cycle(tick, index, motor, table, torque, drive_state, error_code, lateness, cycle_s, setpoints, watch,  # type: ignore[no-untyped-def]
               laws, states, constants, modes, values, codes, delta, memory, rows, place):
         """Tick `tick` with the set-points of row `index`: completes the row before (torque, cycle time) and fills this

@@ -123,7 +123,8 @@ def _digest() -> str:
     return digest.hexdigest()
 
 
-_cycle = _build_cycle(_digest())
+DIGEST = _digest()
+compiled_cycle = _build_cycle(DIGEST)
 
 
 @dataclass(frozen=True)
@@ -165,7 +166,8 @@ class Cycle:
         laws = np.array([gains, twin.loop_gains], dtype=np.float64)
         states = np.array([start, start], dtype=np.float64)
         limits = np.array([watch.setpoint, watch.following_error_m, *watch.travel_m], dtype=np.float64)
-        self._arrays = (limits, laws, states, *twin.arrays(), delta, memory, self._rows, self._place)
+        self.state_arrays = (states, delta, memory, self._rows)   # what a step changes
+        self.arrays = (limits, laws, states, *twin.arrays(), delta, memory, self._rows, self._place)
         self.setpoints = np.array([[ratio * motor_position, 0.0, 0.0, 0.0]])
 
     def follow(self, trajectory: Trajectory, segment: int | None = None) -> None:
@@ -177,7 +179,7 @@ class Cycle:
     @property
     def velocity_m_s(self) -> float:
         """Of the motor at the last step, as the controller sees it, at the table."""
-        laws, states = self._arrays[1:3]
+        laws, states = self.arrays[1:3]
         return float(states[0, 5] * laws[0, 5])
 
     def step(
@@ -188,8 +190,9 @@ class Cycle:
 
         Set-point for the drive in its unit, and the limits passed (`Limit`).
         """
-        result: tuple[float, int] = _cycle(tick, index, motor, table, torque, drive_state, error_code, lateness_s,
-                                           cycle_s, self.setpoints, *self._arrays)
+        result: tuple[float, int] = compiled_cycle(
+            tick, index, motor, table, torque, drive_state, error_code, lateness_s, cycle_s, self.setpoints,
+            *self.arrays)
         return result
 
     def row(self, tick: int) -> memoryview:

@@ -117,6 +117,21 @@ class Recorder:
         # the counter after the row: the writer must not see a row that is not there yet
         self._head = self._counters[RECORDED] = head + 1
 
+    def record_block(self, rows: Any) -> None:
+        """Take many rows at once: a contiguous float64 array (n, channels). Raises as `record`."""
+        data, done = memoryview(rows).cast("B"), 0
+        while done < len(data):
+            head = self._head
+            if head >= self._limit and not self._make_room():
+                self.rows_lost += (len(data) - done) // self._row_bytes - 1   # _make_room counted one
+                return
+            place = head % self._ring_rows
+            count = min(self._limit - head, self._ring_rows - place, (len(data) - done) // self._row_bytes)
+            start, size = HEADER_BYTES + place * self._row_bytes, count * self._row_bytes
+            self._memory[start:start + size] = data[done:done + size]
+            done += size
+            self._head = self._counters[RECORDED] = head + count
+
     def close(self, ended: str = "complete") -> Path | None:
         """End the recording; returns the Parquet file, or None (and no file) without a row.
 

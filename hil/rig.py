@@ -7,11 +7,12 @@ by themselves.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from drivers.base import ConfigurationError, DriverError
+from drivers.base import ConfigurationError, DriverError, PlantLike
 from drivers.bus import BusConfig, CanPort, PumpedPort, PythonCanPort, open_bus
 from drivers.canopen_drive import CanopenDrive, DriveSettings
 from drivers.canopen_encoder import CanopenEncoder, EncoderSettings
@@ -32,20 +33,23 @@ _TARGET_BYTES = {DriveMode.CST: 2, DriveMode.CSV: 4, DriveMode.CSP: 4}
 
 
 class Rig:
-    """Bus, drive and encoder of a bench; a context manager. `nodes` are the simulated devices, None on real ones.
+    """Bus, drive and encoder of a bench; a context manager. `nodes` are the simulated devices, None on real ones;
+    `ports` the connections to a python-can bus, the master's first.
 
-    bus: an in-process bus to use instead of opening one (for injecting faults). Raises FieldError for a bench that
-    cannot be run, HilError when a device cannot be opened.
+    bus: an in-process bus to use instead of opening one (for injecting faults). plant: what the simulated devices move
+    instead of the bench's axis. Raises FieldError for a bench that cannot be run, HilError when a device cannot be
+    opened.
     """
 
-    def __init__(self, bench: Bench, seed: int | None = None, bus: InProcessBus | None = None) -> None:
+    def __init__(self, bench: Bench, seed: int | None = None, bus: InProcessBus | None = None,
+                 plant: PlantLike | None = None) -> None:
         self.bench, self.section = bench, bench.drive or DriveSection()
         _check(bench, self.section)
         self.nodes: SimulatedNodes | None = None
         self.encoder: CanopenEncoder | SerialEncoder | None = None
-        self._ports: list[CanPort] = []
+        self.ports: list[CanPort] = []
         try:
-            self.port = self._connect(seed, bus)
+            self.port = self._connect(bus, lambda port: SimulatedNodes(bench, port, seed, plant))
             self.master = CanopenMaster(self.port, node_id=self.section.master_node_id,
                                         heartbeat_s=self.section.heartbeat_s)
             self.drive = CanopenDrive(self.master, self._drive_settings())
@@ -86,11 +90,11 @@ class Rig:
         """Close encoder line and bus."""
         if isinstance(self.encoder, SerialEncoder):
             self.encoder.close()
-        for port in self._ports:
+        for port in self.ports:
             port.close()
         if self.nodes is not None:
             self.nodes.close()
-        self._ports = []
+        self.ports = []
 
     def __enter__(self) -> Self:
         return self
@@ -100,19 +104,19 @@ class Rig:
     ) -> None:
         self.close()
 
-    def _connect(self, seed: int | None, bus: InProcessBus | None) -> CanPort:
+    def _connect(self, bus: InProcessBus | None, simulate: Callable[[CanPort], SimulatedNodes]) -> CanPort:
         if self.section.interface == "inprocess":
             bus = bus or InProcessBus()
-            self.nodes = SimulatedNodes(self.bench, bus.port(), seed)   # before the master: they boot unheard
+            self.nodes = simulate(bus.port())   # before the master: they boot unheard
             return bus.port()
         config = BusConfig(self.section.interface, self.section.channel, self.section.bitrate)
         port = PythonCanPort(open_bus(config))
-        self._ports.append(port)
+        self.ports.append(port)
         if self.bench.simulation is None:
             return port
         far_end = PythonCanPort(open_bus(config))
-        self._ports.append(far_end)
-        self.nodes = SimulatedNodes(self.bench, far_end, seed)
+        self.ports.append(far_end)
+        self.nodes = simulate(far_end)
         return PumpedPort(port, far_end)
 
     def _drive_settings(self) -> DriveSettings:

@@ -21,7 +21,9 @@ from hil.realtime import Jitter, NotPunctual, check_punctual, measure_jitter, no
 from hil.recorder import Recorder, run_metadata
 from hil.rig import Rig
 from hil.session import Ending, Outcome, Session, make_cycle
+from hil.simulated import make_plant
 from hil.trajectory import Trajectory, plan
+from hil.virtual import VirtualSession
 
 REHEARSED_TICKS = 50
 VIRTUAL_START = "virtual time"   # where a recording names the start of a run
@@ -92,7 +94,8 @@ def run_profile(
         recorder = Recorder(folder, name, cycle.channels, gains.period_s, metadata, lossless=virtual)
         ended = "failed"
         try:
-            session = Session(rig, cycle, trajectory, profile.motion_limits, clock, recorder)
+            kind = VirtualSession if virtual else Session
+            session = kind(rig, cycle, trajectory, profile.motion_limits, clock, recorder)
             with _interruptible(session):
                 outcome = session.run()
             ended = f"{outcome.ending}: {outcome.reason}"
@@ -156,9 +159,9 @@ def rehearse(bench: Bench, trajectory: Trajectory, profile: Profile) -> None:
     section = (bench.drive or DriveSection()).model_copy(update={
         "interface": "inprocess", "encoder": EncoderConnection(), "eds": None, "serial_number": None})
     copy = bench.model_copy(update={"drive": section, "simulation": bench.simulation or SimulationSection()})
-    with Rig(copy) as rig:
-        assert rig.nodes is not None
-        rig.nodes.plant.reset(float(trajectory.position_m[0]))
+    plant = make_plant(copy)
+    plant.reset(float(trajectory.position_m[0]))
+    with Rig(copy, plant=plant) as rig:
         rig.set_up()
         clock = _Rehearsal()
         cycle = make_cycle(rig, rig.drive.read(0.0).motor_position_rad)

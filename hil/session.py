@@ -171,16 +171,16 @@ class Session:
             raise HilError(f"the axis stands at {actual_m:.6f} m, the set-points begin at {start_m:.6f} m: it moved "
                            "while the drive was armed; find out why")
 
-    def _loop(self, sample: DriveSample, seen: EncoderSample) -> int:
-        """Tick 0 is that of the given samples. Returns the rows recorded."""
+    def _loop(self, sample: DriveSample, seen: EncoderSample, tick: int = 0) -> int:
+        """From `tick` on, whose samples are given, to the end. Returns the rows recorded in all."""
         cycle, drive, clock, record = self._cycle, self._drive, self._clock, self._recorder.record
         step, row, exchange = cycle.step, cycle.row, self._exchange
         cycle.follow(self._trajectory)
         lateness = self._lateness_s
         del lateness[:-1]
         overrun_s = self._rig.section.overrun_s
-        tick = index = 0
         last_index = len(self._trajectory) - 1
+        index = min(tick, last_index)
         error_code, cycle_s = 0, 0.0
         while True:
             setpoint, passed = step(tick, index, sample.motor_position_rad, seen.position_m, sample.torque_n_m,

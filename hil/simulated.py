@@ -12,6 +12,7 @@ from typing import Any
 
 from pydantic import ValidationError, model_validator
 
+from drivers.base import PlantLike
 from drivers.bus import CanPort
 from drivers.serial_encoder import SerialFormat
 from drivers.sim import axis as truth
@@ -75,11 +76,11 @@ def make_plant(bench: Bench, seed: int | None = None) -> Plant:
 
 
 class SimulatedNodes:
-    """Drive and encoder of a bench on one port with the plant behind them; the encoder hears a SYNC after the drive."""
+    """Drive and encoder of a bench on one port with a plant behind them; the encoder hears a SYNC after the drive."""
 
-    def __init__(self, bench: Bench, port: CanPort, seed: int | None = None) -> None:
+    def __init__(self, bench: Bench, port: CanPort, seed: int | None = None, plant: PlantLike | None = None) -> None:
         section = bench.drive or DriveSection()
-        self.plant = make_plant(bench, seed)
+        self.plant: PlantLike = plant or make_plant(bench, seed)
         self.drive = SimulatedDrive(
             port, self.plant, node_id=section.node_id, servo=_servo(bench), period_s=bench.gains.period_s,
             rated_torque_n_m=section.rated_torque_n_m or RATED_TORQUE_N_M,

@@ -57,7 +57,7 @@ def bench_with(**changes: dict[str, Any]) -> Bench:
 
 
 def run(folder: Path, bench: Bench | None = None, script: Callable[[Rig, Session], Mapping[int, Callable[[], Any]]]
-        | None = None, profile: Profile = MOVE, bus: InProcessBus | None = None) -> Ran:
+        | None = None, profile: Profile = MOVE, bus: InProcessBus | None = None, kind: type[Session] = Session) -> Ran:
     """Run a profile; `script` says what happens at which tick of the clock (some five before the first row)."""
     bench = bench or bench_with()
     rig = Rig(bench, bus=bus)
@@ -67,7 +67,7 @@ def run(folder: Path, bench: Bench | None = None, script: Callable[[Rig, Session
         trajectory = plan(profile, bench.gains.period_s, 0.0)
         clock = ScriptedClock({})
         with Recorder(folder, "run", cycle.channels, bench.gains.period_s, {}, lossless=True) as recorder:
-            session = Session(rig, cycle, trajectory, profile.motion_limits, clock, recorder)
+            session = kind(rig, cycle, trajectory, profile.motion_limits, clock, recorder)
             clock.script = script(rig, session) if script else {}
             with _interruptible(session):
                 outcome = session.run()

@@ -1,0 +1,99 @@
+"""How long one whole cycle of the loop takes: SYNC, answers, P, PI, live twin of 20 modes, PDO packing, record.
+
+Measured from the deadline to the end of the cycle inside `hil.session`, back to back, under real-time conditions as far
+as they are granted. The simulated devices answer; the axis behind them stands still, for physics is no part of the
+loop. On the in-process bus their work is part of the figure; on a python-can bus it is taken out, since real devices
+serve their end of the bus themselves.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from time import perf_counter_ns
+
+from hil.benchmarks.axis import moves, trajectory, twenty_modes
+from hil.benchmarks.figure import Figure, percentile
+from hil.clock import VirtualClock
+from hil.realtime import real_time
+from hil.recorder import Recorder
+from hil.rig import Rig
+from hil.session import Session, make_cycle
+
+LOOPS = 4
+
+
+class StandingAxis:
+    """A plant that does not move."""
+
+    motor_position_rad = 0.0
+    table_position_m = 0.0
+    torque_n_m = 0.0
+
+    def advance(self, torque_command_n_m: float, period_s: float) -> None:
+        """Nothing happens."""
+
+
+class Stopwatch(VirtualClock):
+    """A clock that is always on time and notes how long each cycle took [ns]."""
+
+    def __init__(self) -> None:
+        self.durations_ns: list[int] = []
+        self.devices_ns: list[int] = []
+        self._start_ns = self._device_ns = 0
+
+    def wait(self, tick: int) -> float:
+        self._device_ns = 0
+        self._start_ns = perf_counter_ns()
+        return 0.0
+
+    def since(self, tick: int) -> float:
+        self.durations_ns.append(perf_counter_ns() - self._start_ns - self._device_ns)
+        self.devices_ns.append(self._device_ns)
+        return 0.0
+
+    def serve_apart(self, rig: Rig) -> None:
+        """Take the time in which the devices serve their end of a python-can bus out of the cycle."""
+        near, far = rig.ports
+
+        def poll(now_s: float, timeout_s: float = 0.0) -> None:
+            start_ns = perf_counter_ns()
+            far.poll(now_s)
+            self._device_ns += perf_counter_ns() - start_ns
+            near.poll(now_s)
+
+        rig.master.poll = poll
+
+
+def whole_cycle(interface: str) -> tuple[list[float], list[float]]:
+    """Durations [s] of the cycles of several runs on a bus of this interface, and of the devices' work left out."""
+    bench, profile = twenty_modes(interface), moves()
+    motion = trajectory(bench.gains.period_s)
+    durations: list[float] = []
+    devices: list[float] = []
+    for run in range(LOOPS + 1):
+        watch = Stopwatch()
+        with Rig(bench, plant=StandingAxis()) as rig, tempfile.TemporaryDirectory() as folder:
+            rig.set_up()
+            if rig.ports:
+                watch.serve_apart(rig)
+            cycle = make_cycle(rig, 0.0)
+            with Recorder(folder, "bench", cycle.channels, bench.gains.period_s, {}) as recorder, real_time():
+                Session(rig, cycle, motion, profile.motion_limits, watch, recorder).run()
+        if run:   # the first one compiles
+            durations += [1e-9 * duration for duration in watch.durations_ns]
+            devices += [1e-9 * duration for duration in watch.devices_ns]
+    return durations, devices
+
+
+def figures() -> list[Figure]:
+    """Cycle times on the in-process bus and through python-can."""
+    inside, _ = whole_cycle("inprocess")
+    outside, devices = whole_cycle("virtual")
+    detail = f"{len(inside)} cycles, twin of 20 modes, simulated devices included"
+    apart = f"twin of 20 modes; without the {1e6 * percentile(devices, 0.5):.0f} us of the simulated devices"
+    return [
+        Figure("whole cycle, in-process bus, p50", 1e6 * percentile(inside, 0.5), "us", 10.0, True, detail),
+        Figure("whole cycle, in-process bus, p99", 1e6 * percentile(inside, 0.99), "us", 50.0, True, detail),
+        Figure("whole cycle, python-can virtual bus, p50", 1e6 * percentile(outside, 0.5), "us", 40.0, True, apart),
+        Figure("whole cycle, python-can virtual bus, p99", 1e6 * percentile(outside, 0.99), "us", None, True, apart),
+    ]

@@ -1,0 +1,59 @@
+"""How much faster than real time the bench and the twin are simulated, at 1 kHz."""
+
+from __future__ import annotations
+
+import tempfile
+from time import perf_counter
+
+from hil.benchmarks.axis import moves, trajectory, twenty_modes, two_mass
+from hil.benchmarks.figure import Figure, best_of
+from hil.clock import VirtualClock
+from hil.recorder import Recorder
+from hil.rig import Rig
+from hil.session import Session, make_cycle
+from hil.twin.axis import Twin
+from hil.virtual import VirtualSession
+
+REPEATS = 5
+TWIN_REPEATS = 25
+
+
+def whole_bench(kind: type[Session]) -> float:
+    """Times real time: the reference bench in virtual time, twin and recorder included."""
+    bench, profile = two_mass(), moves()
+    motion = trajectory(bench.gains.period_s)
+    best_s = float("inf")
+    for _ in range(REPEATS):
+        with Rig(bench) as rig, tempfile.TemporaryDirectory() as folder:
+            rig.set_up()
+            cycle = make_cycle(rig, rig.drive.read(0.0).motor_position_rad)
+            with Recorder(folder, "bench", cycle.channels, bench.gains.period_s, {}, lossless=True) as recorder:
+                start = perf_counter()
+                kind(rig, cycle, motion, profile.motion_limits, VirtualClock(), recorder).run()
+                best_s = min(best_s, perf_counter() - start)
+    return motion.duration_s / best_s
+
+
+def offline_twin(twin: Twin) -> float:
+    """Times real time: a twin in closed loop over the moves."""
+    motion = trajectory(twin.gains.period_s)
+    seconds = best_of(lambda: twin.simulate(motion.position_m, motion.velocity_m_s), TWIN_REPEATS)
+    return motion.duration_s / seconds
+
+
+def figures() -> list[Figure]:
+    """Speeds of the whole bench in virtual time and of the twin."""
+    bench = twenty_modes()
+    whole = Twin(bench.axis.physics(), bench.gains)
+    plain = Twin(bench.axis.physics(), bench.gains, coarse_steps=1, fine_steps=1)
+    real = "x real time"
+    return [
+        Figure("whole bench in virtual time", whole_bench(VirtualSession), real, 200.0, False,
+               "2-dof reality at 10 us steps, live twin, recorder; same rows bit for bit as over the bus"),
+        Figure("whole bench in virtual time, every frame", whole_bench(Session), real, None, False,
+               "the same, each tick over CANopen frames"),
+        Figure("twin offline, closed loop, 20 modes", offline_twin(plain), real, 10_000.0, False,
+               "one exact step per tick"),
+        Figure("twin offline, closed loop, 20 modes, fine at reversals", offline_twin(whole), real, None, False,
+               "default steps: 50 per tick while the motor may reverse"),
+    ]

@@ -1,0 +1,54 @@
+"""Virtual time in one compiled call gives bit for bit what the bus gives."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from bench_runs import bench_with, run
+
+from hil import virtual
+from hil.errors import HilError
+from hil.session import Ending
+from hil.simulated import load_simulated
+from hil.virtual import VirtualSession
+
+PUSH = {"effect": "external_force", "parameters": {"force_n": -9000.0, "start_s": 0.4, "end_s": 0.6}}
+CASES: dict[str, tuple[dict[str, Any], Ending]] = {
+    "reference": ({}, Ending.COMPLETE),
+    "table feedback": ({"control": {"position_feedback": "table"}}, Ending.COMPLETE),
+    "torque beyond the drive's greatest": ({"control": {"torque_limit_n_m": 1000.0}, "drive": {"rated_torque_n_m": 0.7,
+                                            "following_error_m": 0.1}}, Ending.COMPLETE),
+    "noisy sensors": ({"simulation": {"sensors": {"table_noise_m": 1e-6, "motor_noise_rad": 1e-5}}}, Ending.COMPLETE),
+    "travel limit": ({"drive": {"travel_m": (-0.01, 0.03)}}, Ending.TRAVEL_LIMIT),
+    "blocked": ({"simulation": {"effects": [PUSH]}, "drive": {"following_error_m": 0.001}}, Ending.FOLLOWING_ERROR),
+    "drive's own loops": ({"drive": {"mode": "csv"}}, Ending.COMPLETE),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_same_bits_as_over_the_bus(tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(virtual, "SNAPSHOT_TICKS", 150)   # several in a run of 800 ticks
+    changes, ending = CASES[name]
+    bench = bench_with(**changes)
+    framed = run(tmp_path / "framed", bench)
+    compiled = run(tmp_path / "compiled", bench, kind=VirtualSession)
+    assert framed.outcome.ending is compiled.outcome.ending is ending
+    assert framed.outcome.rows == compiled.outcome.rows
+    for channel in framed.recording.columns:
+        assert np.array_equal(framed.recording[channel], compiled.recording[channel]), channel
+
+
+def test_seven_dof_bench(tmp_path: Path) -> None:
+    bench = load_simulated("reference_7dof")
+    framed, compiled = run(tmp_path / "framed", bench), run(tmp_path / "compiled", bench, kind=VirtualSession)
+    assert framed.outcome.ending is Ending.COMPLETE
+    for channel in framed.recording.columns:
+        assert np.array_equal(framed.recording[channel], compiled.recording[channel]), channel
+
+
+def test_stop_asked_while_arming_moves_nothing(tmp_path: Path) -> None:
+    with pytest.raises(HilError, match="nothing moved"):
+        run(tmp_path, kind=VirtualSession, script=lambda _, session: {2: session.ask_stop})

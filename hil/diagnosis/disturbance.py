@@ -70,49 +70,48 @@ def orders(runs: Sequence[Measured], found: Sequence[Disturbance], angle_per_uni
             phases.append(order * angle_per_unit * run.motor[rows])
             signals.append((d.torque if weight is None else weight[index])[rows])
         phase, signal = np.concatenate(phases), np.concatenate(signals)
-        shares.append(_harmonic_share(phase, signal) * min(1.0, phase.size / 2000.0) if phase.size > 100 else 0.0)
+        step = max(phase.size // 10000, 1)
+        phase, signal = phase[::step], signal[::step]
+        shares.append(_harmonic_share(phase, signal) * min(1.0, phase.size / 1000.0) if phase.size > 100 else 0.0)
     return [float(_ORDERS[index]) for index in np.argsort(shares)[::-1][:most]]
 
 
 def friction_periods(runs: Sequence[Measured], found: Sequence[Disturbance], ratio: float,
-                     most: int = 3) -> list[float]:
-    """Periods along the travel [m] with which friction varies most, best first."""
-    travel = max(float(np.ptp(run.position_command_m)) for run in runs)
-    periods = np.geomspace(max(travel / 60.0, 1e-3), 2.0 * travel, 160)
-    x = np.concatenate([ratio * run.motor[d.sliding] for run, d in zip(runs, found, strict=True)])
-    friction = np.concatenate([d.torque[d.sliding] * np.sign(d.velocity[d.sliding]) for d in found])
-    step = max(x.size // 20000, 1)
-    x, friction = x[::step], friction[::step]
-    if x.size < 100:
-        return [float(travel / 3.0)]
-    shares = np.array([_harmonic_share(2.0 * np.pi * x / period, friction) for period in periods])
-    peaks = [i for i in range(periods.size)
-             if shares[i] == shares[max(i - 3, 0):i + 4].max()]
-    peaks.sort(key=lambda i: -shares[i])
-    return [float(periods[i]) for i in peaks[:most]]
+                     most: int = 4) -> list[float]:
+    """Periods along the travel [m], from 1 mm up, with which friction varies most, best first."""
+    x = [ratio * run.motor[d.sliding] for run, d in zip(runs, found, strict=True)]
+    friction = [d.torque[d.sliding] * np.sign(d.velocity[d.sliding]) for d in found]
+    return _periods(x, friction, 1e-4, 1e-3, most)
 
 
 def scale_periods(runs: Sequence[Measured], errors: Sequence[FloatArray], most: int = 2) -> list[float]:
-    """Periods [m] below 1 mm in which an error of the linear encoder repeats, best first.
+    """Periods [m] below 1 mm in which an error (n,) of the linear encoder repeats, best first."""
+    return [period for period in _periods([run.table_m for run in runs], errors, 0.5e-6, 2e-6, most + 2)
+            if period < 1e-3][:most]
 
-    The error is averaged over bins of position and transformed; `errors` (n,) in m, one per run.
-    """
-    x = np.concatenate([run.table_m for run in runs])
-    e = np.concatenate(list(errors))
-    size = 2 ** int(np.ceil(np.log2(max(np.ptp(x) / 0.5e-6, 16.0))))
-    width = max(float(np.ptp(x)), 1e-6) / size
-    index = np.minimum(((x - x.min()) / width).astype(int), size - 1)
-    total = np.bincount(index, weights=e - e.mean(), minlength=size)
-    spectrum = np.abs(np.fft.rfft(total))
-    frequency = np.fft.rfftfreq(size, width)
-    spectrum[(frequency < 1e3) | (frequency > 5e5)] = 0.0
-    found: list[float] = []
-    for peak in np.argsort(spectrum)[::-1][:50]:
-        period = 1.0 / frequency[peak] if frequency[peak] > 0.0 else np.inf
-        if np.isfinite(period) and all(abs(period / other - 1.0) > 0.01 for other in found):
-            found.append(float(period))
-        if len(found) == most:
+
+def _periods(positions: Sequence[FloatArray], values: Sequence[FloatArray], bin_m: float, shortest_m: float,
+             most: int) -> list[float]:
+    """Peaks of the spectrum of values over position [m]: averaged over bins, transformed, best first."""
+    x, y = np.concatenate(list(positions)), np.concatenate(list(values))
+    if x.size < 100 or np.ptp(x) < 4.0 * shortest_m:
+        return []
+    count = int(np.ceil(np.ptp(x) / bin_m))
+    index = np.minimum(((x - x.min()) / np.ptp(x) * count).astype(int), count - 1)
+    rows = np.bincount(index, minlength=count)
+    mean = np.bincount(index, weights=y, minlength=count) / np.maximum(rows, 1)
+    size = 4 * (1 << (count - 1).bit_length())       # padded: a peak is read to a quarter of its width
+    spectrum = np.abs(np.fft.rfft(np.where(rows > 0, mean - mean[rows > 0].mean(), 0.0), size))
+    frequency = np.fft.rfftfreq(size, float(np.ptp(x)) / count)
+    width = size // count + 1
+    spectrum[(frequency > 1.0 / shortest_m) | (frequency < 0.4 / np.ptp(x))] = 0.0
+    found = []
+    for _ in range(most):
+        peak = int(np.argmax(spectrum))
+        if spectrum[peak] == 0.0:
             break
+        found.append(float(1.0 / frequency[peak]))
+        spectrum[max(peak - 2 * width, 0):peak + 2 * width] = 0.0
     return found
 
 

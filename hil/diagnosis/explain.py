@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from hil.bench import Bench
 from hil.diagnosis import search
-from hil.diagnosis.evidence import against, effective_samples
+from hil.diagnosis.evidence import against, whitening
 from hil.diagnosis.fit import Fit, fit, in_parallel, splits
 from hil.diagnosis.model import Model, Term, scales
 from hil.diagnosis.screen import Lead
@@ -24,12 +24,12 @@ from hil.measured import Measured
 FloatArray = NDArray[np.float64]
 Progress = Callable[[str], None]
 
-MOST_TERMS = 4          # at once; more than an engineer could act on, and the search stays affordable
+MOST_TERMS = 6          # at once; more than an engineer could act on, and the search stays affordable
 # BIC differences. "Very strong" evidence is 10 (Kass and Raftery 1995); the search looks at some 45 variants at some
 # 90 starts, which costs 2 log 90 = 9 more.
 NEEDED = 20.0
 TIED = 10.0             # a rival closer than this is not refuted
-# A term must also matter: take this share of the residual's energy away, at the noise floor 14 % of the noise in rms.
+# A term must also matter: take so much energy away, in units of the noise's: 14 % of the noise in rms.
 # Below lie the details in which two honest simulations of one axis differ.
 MATERIAL = 0.02
 FLOOR = 1.10            # mean square of a channel over its noise, up to which it counts as explained: 5 % in rms
@@ -68,26 +68,35 @@ def explain(bench: Bench, runs: Sequence[Measured], progress: Progress = lambda 
     nominal, rivals, first_leads = base, dict[tuple[str, int], list[Rival]](), list[Lead]()
     while len(base.model.terms) < MOST_TERMS:
         progress(f"screening the library beside {len(base.model.terms)} terms")
-        leads = [lead for lead in search.leads(base, runs) if claimable(lead.term, bench)]
+        leads = [lead for lead in search.leads(base, runs) if claimable(lead.term, base.model.resolved(base.x)[0])]
         first_leads = first_leads or leads
-        samples = effective_samples(base)
-        promising = [lead for lead in leads
-                     if lead.share > MATERIAL and -samples * np.log(max(1.0 - lead.share, 1e-12)) > NEEDED]
+        rows = base.residuals.size
+        promising = [lead for lead in leads if lead.share > _bits(rows) and lead.share * base.cost > MATERIAL * rows]
         if not promising:
             break
         progress("fitting " + ", ".join(lead.term.effect for lead in promising[:3]))
-        ranked = [found for found in search.race(base, promising, runs) if claimable(_last(found), bench)]
-        if not ranked or against(ranked[0], base) < NEEDED or ranked[0].cost > (1.0 - MATERIAL) * base.cost:
+        found = [other for other in search.race(base, promising, runs)
+                 if claimable(_last(other), other.model.resolved(other.x)[0])]
+        best = next((other for other in found if against(other, base) >= NEEDED
+                     and base.cost - other.cost >= MATERIAL * rows), None)
+        if best is None:
             break
-        base = ranked[0]
-        samples = effective_samples(base)
-        rivals[base.model.terms[-1].key] = [Rival(other, against(base, other, samples)) for other in ranked[1:]]
+        filters = whitening(best)
+        rivals[best.model.terms[-1].key] = sorted(
+            (Rival(other, against(best, other, filters)) for other in found if other is not best),
+            key=lambda rival: rival.evidence)
+        base = best
         base = _pruned(base, runs)
     final = fit(base.model, runs, base.x, evaluations=40)
     kept = {term.key for term in final.model.terms}
     needed = {key: evidence for key, (evidence, _) in _ablated(final, runs).items()}
     return Explanation(owner, nominal, final, {key: value for key, value in rivals.items() if key in kept}, needed,
                        tuple(first_leads))
+
+
+def _bits(rows: int) -> float:
+    """Share of white residuals that evidence of NEEDED takes away."""
+    return 1.0 - float(np.exp(-NEEDED / rows))
 
 
 def at_owner(model: Model, runs: Sequence[Measured]) -> Fit:
@@ -110,8 +119,13 @@ def noise_ratios(found: Fit, run: Measured) -> dict[str, float]:
 
 
 def claimable(term: Term, bench: Bench) -> bool:
-    """Whether the sensors can tell such an effect: an error of the linear encoder below a quarter of its count
-    is how counting looks, and no more."""
+    """Whether the values still are what the mechanism's name says, and whether the sensors can tell.
+
+    An error of the linear encoder below a quarter of its count is how counting looks, and no more. Static
+    friction below Coulomb friction is no Stribeck effect, whatever it fits.
+    """
+    if term.effect == "stribeck_friction":
+        return term.values[0] > bench.axis.physics().coulomb_n_m
     if term.effect == "scale_interpolation_error" and bench.encoders.table is not None:
         return abs(term.values[0]) > 0.25 * bench.encoders.table.resolution_m
     return True
@@ -132,8 +146,8 @@ def _ablated(found: Fit, runs: Sequence[Measured]) -> dict[tuple[str, int], tupl
 
     count = len(found.model.terms)
     fits = in_parallel([lambda index=index: without(index) for index in range(count)])  # type: ignore[misc]
-    samples = effective_samples(found)
-    return {term.key: (against(found, other, samples), other)
+    filters = whitening(found)
+    return {term.key: (against(found, other, filters), other)
             for term, other in zip(found.model.terms, fits, strict=True)}
 
 
@@ -141,7 +155,7 @@ def _pruned(found: Fit, runs: Sequence[Measured]) -> Fit:
     """The fit without the terms that the evidence no longer asks for, the weakest first."""
     while len(found.model.terms) > 1:
         evidence, rest = min(_ablated(found, runs).values(), key=lambda pair: pair[0])
-        if evidence >= NEEDED and rest.cost * (1.0 - MATERIAL) > found.cost:
+        if evidence >= NEEDED and rest.cost - found.cost >= MATERIAL * found.residuals.size:
             break
         found = rest
     return found

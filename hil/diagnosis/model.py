@@ -25,7 +25,8 @@ FloatArray = NDArray[np.float64]
 
 # Torque that the motor channel is trusted to tell, over the noise of the torque channel. A fine encoder tells much
 # less, but details that no owner asks for lie there too: how friction meets zero speed, the side force of a lead error.
-TORQUE_ACCURACY = 1.0
+# The way there is another matter: with all that the encoder tells, the valleys of stick-slip are convex.
+TORQUE_ACCURACY, SEARCH_ACCURACY = 1.0, 0.2
 # Time constants of the motor's observer. Fast: stick-slip is forgotten within a few ticks, so that even a poor start
 # leads to the right valley. Slow: a coarse encoder still tells the torque.
 FASTEST_OBSERVER_S, SLOWEST_OBSERVER_S = 0.002, 0.008
@@ -86,6 +87,7 @@ class Model:
     travel_m: float = 0.1
     observer_s: float = FASTEST_OBSERVER_S
     edge_step_s: float = EDGE_STEP_S
+    torque_accuracy: float = TORQUE_ACCURACY
 
     @cached_property
     def coordinates(self) -> tuple[Coordinate, ...]:
@@ -178,7 +180,7 @@ class Model:
 
     def weighted(self, differences: dict[str, FloatArray], run: Measured) -> dict[str, FloatArray]:
         """Differences over their scales, of the rows that count: of size one or less at the noise floor."""
-        scale = scales(run, self.bench, self.observer_s)
+        scale = scales(run, self.bench, self.observer_s, self.torque_accuracy)
         rows = run.judged
         return {name: np.nan_to_num(value[rows] / scale[name], nan=1e6, posinf=1e6, neginf=-1e6)
                 for name, value in differences.items()}
@@ -217,12 +219,13 @@ def _inertia(bench: Bench) -> float:
     return float(modes.shape[modes.motor, 0] ** -2)
 
 
-def scales(run: Measured, bench: Bench, observer_s: float) -> dict[str, float]:
+def scales(run: Measured, bench: Bench, observer_s: float,
+           torque_accuracy: float = TORQUE_ACCURACY) -> dict[str, float]:
     """Size of one unit of weighted residual, per channel.
 
     A torque d that the twin misses moves its motor by d tau^2 / J before the correction takes hold, with tau the
     observer's time constant: the motor counts from the torque that the torque channel can still see.
     """
-    seen = TORQUE_ACCURACY * run.noise.torque * observer_s**2 / _inertia(bench)
+    seen = torque_accuracy * run.noise.torque * observer_s**2 / _inertia(bench)
     return {"motor": max(run.noise.motor, seen), "table": run.noise.table_m, "torque": run.noise.torque,
             "command": run.noise.torque}

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from hil.diagnosis.evidence import whitened, whitening
 from hil.diagnosis.fit import POOL, Fit
 from hil.diagnosis.model import Term
 from hil.diagnosis.starts import Start
@@ -34,21 +35,47 @@ class Lead:
     share: float
 
 
+@dataclass(frozen=True, eq=False)
+class _View:
+    """Residuals behind weights and filters, with what the parameters can explain taken out."""
+
+    weights: FloatArray
+    nuisance: FloatArray
+    residual: FloatArray
+    splits: tuple[int, ...]
+    filters: list[FloatArray] | None
+
+    def of(self, change: FloatArray) -> FloatArray:
+        """A change of the residuals, seen the same way."""
+        seen = change if self.filters is None else whitened(change, self.splits, self.filters)
+        seen = self.weights * seen
+        return np.asarray(seen - self.nuisance @ (self.nuisance.T @ seen), dtype=np.float64)
+
+
+def _view(base: Fit, white: bool) -> _View:
+    filters = whitening(base) if white else None
+    seen = base.residuals if filters is None else whitened(base.residuals, base.splits, filters)
+    slopes = base.jacobian if filters is None else whitened(base.jacobian, base.splits, filters)
+    typical = max(float(np.median(np.abs(seen))) / 0.6745, 0.1)
+    weights = 1.0 / np.sqrt(np.sqrt(1.0 + (seen / (_SOFT * typical)) ** 2))
+    nuisance, _ = np.linalg.qr(weights[:, None] * slopes)
+    residual = weights * seen
+    return _View(weights, nuisance, residual - nuisance @ (nuisance.T @ residual), base.splits, filters)
+
+
 def screen(base: Fit, runs: Sequence[Measured], starts: Sequence[Start]) -> list[Lead]:
-    """A lead for each start, best first."""
-    typical = max(1.0, float(np.median(np.abs(base.residuals))) / 0.6745)
-    weights = 1.0 / np.sqrt(np.sqrt(1.0 + (base.residuals / (_SOFT * typical)) ** 2))
-    nuisance, _ = np.linalg.qr(weights[:, None] * base.jacobian)
-    residual = weights * base.residuals
-    residual -= nuisance @ (nuisance.T @ residual)
-    energy = float(residual @ residual)
+    """A lead for each start, best first.
+
+    Each is scored twice: on the residuals as they are, where the largest cause shows, and whitened, where a
+    faint one shows beside a large one. The better share counts.
+    """
+    views = [_view(base, False), _view(base, True)]
 
     def direction(start: Start, values: tuple[float, ...]) -> FloatArray:
         term = Term(start.effect, start.variant, values)
         model = replace(base.model, terms=(*base.model.terms, term))
         x = np.concatenate([base.x, model.initial()[base.x.size:]])
-        change = weights * (model.residuals(x, runs) - base.residuals)
-        return change - nuisance @ (nuisance.T @ change)
+        return model.residuals(x, runs) - base.residuals
 
     def lead(start: Start) -> Lead:
         directions = [direction(start, start.values)]
@@ -56,13 +83,17 @@ def screen(base: Fit, runs: Sequence[Measured], starts: Sequence[Start]) -> list
             turned = list(start.values)
             turned[start.phase] = np.pi / 2.0
             directions.append(direction(start, tuple(turned)))
-        span = np.stack(directions, axis=1)
-        coefficients = np.asarray(np.linalg.lstsq(span, -residual, rcond=None)[0], dtype=np.float64)
-        left = residual + span @ coefficients
+        return max((scored(start, directions, view) for view in views), key=lambda found: found.share)
+
+    def scored(start: Start, directions: list[FloatArray], view: _View) -> Lead:
+        energy = float(view.residual @ view.residual)
+        span = np.stack([view.of(change) for change in directions], axis=1)
+        coefficients = np.asarray(np.linalg.lstsq(span, -view.residual, rcond=None)[0], dtype=np.float64)
+        left = view.residual + span @ coefficients
         share = 1.0 - float(left @ left) / energy
         if start.strength < 0:
             # a start that cannot be scaled also counts as it stands
-            whole = residual + span[:, 0]
+            whole = view.residual + span[:, 0]
             return Lead(Term(start.effect, start.variant, start.values),
                         max(share if coefficients[0] > 0.0 else 0.0, 1.0 - float(whole @ whole) / energy))
         return Lead(Term(start.effect, start.variant, _scaled(start, coefficients)), share)

@@ -54,8 +54,10 @@ OBSERVER_S = 0.008
 INTEGRATOR_S = 0.1
 
 _control_step = control.step
+# A motor slower than this sticks: what is left of its speed is rounding, which no step size may hang on.
+RESTING = 1e-9
 # Sums may be reordered; a division does not check its divisor. `_nrt=False` below leaves out the counting of
-# references to arrays, which costs four times the mathematics of a step of a few modes.
+# references to arrays, `forceinline` the handing over of arrays: both cost more than the mathematics of a step.
 _COMPILE: Any = {"fastmath": {"reassoc", "nsz", "contract", "arcp"}, "error_model": "numpy"}
 
 
@@ -113,7 +115,7 @@ def _look(at_motor, at_table, at_spring, positions, velocities):  # type: ignore
 
 
 def _build_advance(digest: str) -> Any:
-    @njit(cache=True, nogil=True, _nrt=False, **_COMPILE)
+    @njit(cache=True, nogil=True, _nrt=False, forceinline=True, **_COMPILE)
     def advance(command, constants, modes, values, codes, delta, memory):  # type: ignore[no-untyped-def]
         """Move the axis by one control period under a held torque command; mean measured torque."""
         assert digest
@@ -130,7 +132,7 @@ def _build_advance(digest: str) -> Any:
         else:
             speed = _along(at_motor, velocities)
         reversing = abs(speed) < constants[SLOW_VELOCITY] + 2.0 * abs(speed - own[LAST_SPEED])
-        fine = constants[ALWAYS_FINE] > 0.0 or (reversing and speed != 0.0)
+        fine = constants[ALWAYS_FINE] > 0.0 or (reversing and abs(speed) > RESTING)
         own[LAST_SPEED] = speed
         first = FINE if fine else COARSE
         steps = int(constants[FINE_STEPS]) if fine else int(constants[COARSE_STEPS])
@@ -241,7 +243,7 @@ def _build_advance(digest: str) -> Any:
 
 
 def _build_read(digest: str) -> Any:
-    @njit(cache=True, nogil=True, _nrt=False, **_COMPILE)
+    @njit(cache=True, nogil=True, _nrt=False, forceinline=True, **_COMPILE)
     def read(constants, modes, values, codes, delta, memory):  # type: ignore[no-untyped-def]
         """What the two encoders read: motor position (rad, or m) and table position (m)."""
         assert digest

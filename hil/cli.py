@@ -14,6 +14,7 @@ import typer
 
 from hil.commands.compare import compare
 from hil.commands.demo import demo
+from hil.commands.diagnose import diagnose
 from hil.commands.friction import friction
 from hil.commands.import_ import import_
 from hil.commands.paper import paper
@@ -30,6 +31,7 @@ COMMANDS: tuple[tuple[str, Callable[..., Any]], ...] = (
     ("run", run),
     ("import", import_),
     ("compare", compare),
+    ("diagnose", diagnose),
     ("friction", friction),
     ("paper", paper),
     ("validate", validate),

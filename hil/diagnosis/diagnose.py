@@ -1,0 +1,189 @@
+"""The diagnosis of recordings: is there a mismatch, where, of what kind, by which physics, and does that help?"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hil.bench import Bench
+from hil.diagnosis.explain import Explanation, explain, noise_ratios
+from hil.diagnosis.findings import corrections, diagnosed_bench, findings, renamed
+from hil.diagnosis.fit import Fit
+from hil.diagnosis.fit_table import channel_names, fit_table
+from hil.diagnosis.judge import judge
+from hil.diagnosis.locate import locate
+from hil.diagnosis.preflight import prepare
+from hil.diagnosis.proof import Proof, explained_share, prove
+from hil.diagnosis.result import ChannelFit, Location, Mode, Result, Unexplained, Verdict
+from hil.diagnosis.testable import not_testable
+from hil.diagnosis.wording import number, title
+from hil.measured import Measured
+from hil.recording import Recording
+
+Progress = Callable[[str], None]
+
+TRAINED = 2.0 / 3.0       # of a recording, where none is held out
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """The result, and what a report draws it from.
+
+    `final` is the hypothesis that the verdict stands for: `proof.final`, or the refitted nominal twin
+    where no name is given.
+    """
+
+    result: Result
+    bench: Bench                  # with corrected parameters and the new terms
+    owner: Bench
+    train: tuple[Measured, ...]
+    held_out: tuple[Measured, ...]
+    explanation: Explanation
+    proof: Proof
+    final: Fit
+
+
+def diagnose(train: Sequence[Recording], validate: Sequence[Recording], bench: Bench,
+             progress: Progress = lambda text: None) -> Diagnosis:
+    """Diagnose recordings of one axis against its bench, and prove the result on recordings of another motion.
+
+    Without any of those, the last third of each recording is held out. Raises InputError for recordings that
+    cannot be diagnosed, with all reasons.
+    """
+    begin = time.monotonic()
+    progress("checking the recordings")
+    notes = []
+    if not validate:
+        train, validate = _split(train)
+        notes.append("No recording was held out: the last third of each is kept for validation.")
+    prepared = prepare([*train, *validate], bench)
+    runs, held_out = tuple(prepared[:len(train)]), tuple(prepared[len(train):])
+
+    explanation = explain(bench, runs, progress)
+    progress("proving on held-out recordings")
+    proof = prove(explanation.nominal, renamed(explanation.final), runs, held_out)
+    verdict = judge(explanation.owner, explanation.nominal, proof.final, runs, held_out)
+    named = verdict is Verdict.MISSING_PHYSICS
+    final = {Verdict.MISSING_PHYSICS: proof.final, Verdict.NO_MISMATCH: explanation.owner}.get(
+        verdict, explanation.nominal)
+
+    progress("locating")
+    location = None
+    if verdict is not Verdict.NO_MISMATCH:
+        found = explanation.owner if verdict is Verdict.PARAMETER_ERROR else explanation.nominal
+        location = locate(found, runs, final)
+    progress("judging the fit")
+    table = fit_table(explanation.owner, explanation.nominal, final, runs, held_out)
+    missing = findings(explanation, proof.final, proof.ablations, runs, held_out) if named else ()
+    progress("testing what this motion can show")
+    hidden = not_testable(final if named else explanation.nominal, runs)
+    notes += _notes(table, proof, verdict, explanation)
+    result = Result(
+        verdict=verdict, statement="", location=location, missing=missing,
+        parameter_corrections={} if verdict is Verdict.NO_MISMATCH else corrections(bench, final),
+        fit=table, not_testable=hidden, unexplained=_unexplained(explanation, final, runs, held_out, location, verdict),
+        notes=tuple(notes), runtime_s=time.monotonic() - begin)
+    result = result.model_copy(update={"statement": statement(result)})
+    after = bench if verdict is Verdict.NO_MISMATCH else diagnosed_bench(bench, final)
+    return Diagnosis(result, after, bench, runs, held_out, explanation, proof, final)
+
+
+def statement(result: Result) -> str:
+    """The verdict as one sentence."""
+    if result.verdict is Verdict.MISSING_PHYSICS:
+        sure = " ".join(finding.sentence for finding in result.missing)
+        return f"Missing physics: {sure}"
+    if result.verdict is Verdict.PARAMETER_ERROR:
+        worst = sorted(result.parameter_corrections.items(),
+                       key=lambda item: -abs(np.log(max(item[1].value, 1e-300) / max(item[1].nominal, 1e-300))))
+        changes = ", ".join(f"{name} {100.0 * (entry.value / entry.nominal - 1.0):+.1f} %"
+                            for name, entry in worst[:3] if entry.nominal > 0.0)
+        return f"No physics is missing; parameters of the bench are wrong: {changes}."
+    if result.verdict is Verdict.NO_MISMATCH:
+        return "The twin explains these recordings down to their noise."
+    return f"The twin misses something that no mechanism of the library explains: {result.unexplained.description}"
+
+
+def _split(recordings: Sequence[Recording]) -> tuple[list[Recording], list[Recording]]:
+    """The first two thirds of each recording, and the rest."""
+    train, rest = [], []
+    for recording in recordings:
+        cut = _standstill(recording, round(TRAINED * len(recording)))
+        train.append(_part(recording, slice(0, cut), "first part"))
+        rest.append(_part(recording, slice(cut, None), "last part"))
+    return train, rest
+
+
+def _standstill(recording: Recording, row: int) -> int:
+    """The row at rest nearest to `row`, the row itself where none is within a tenth of the recording."""
+    names = recording.axis
+    if names.velocity_command not in recording.columns:
+        return row
+    still = np.flatnonzero(recording[names.velocity_command] == 0.0)
+    near = still[np.abs(still - row) < 0.1 * len(recording)]
+    return int(near[np.argmin(np.abs(near - row))]) if near.size else row
+
+
+def _part(recording: Recording, rows: slice, what: str) -> Recording:
+    columns = {name: values[rows] for name, values in recording.columns.items()}
+    return replace(recording, name=f"{recording.name} ({what})", columns=columns)
+
+
+def _unexplained(explanation: Explanation, final: Fit, train: Sequence[Measured], held_out: Sequence[Measured],
+                 location: Location | None, verdict: Verdict) -> Unexplained:
+    """Share of the excess that is left, and its shape."""
+    before = explanation.owner if verdict is Verdict.PARAMETER_ERROR else explanation.nominal
+    share = 0.0 if verdict is Verdict.NO_MISMATCH else 1.0 - explained_share(before, final, held_out or train)
+    worst: dict[str, float] = {}
+    names = channel_names(final.model.bench, train[0])
+    for run in (*train, *held_out):
+        for name, ratio in noise_ratios(final, run).items():
+            worst[names[name]] = max(worst.get(names[name], 0.0), ratio)
+    above = {name: float(np.sqrt(ratio)) for name, ratio in worst.items() if ratio > 1.1}
+    if not above:
+        return Unexplained(share=share, description="Every channel is down to its noise.")
+    text = ", ".join(f"{name} at {number(above[name])} × its noise" for name in sorted(above, key=lambda n: -above[n]))
+    if verdict is Verdict.UNEXPLAINED and location is not None:
+        text += f"; {shape(location)}"
+    return Unexplained(share=share, description=f"Left above the noise, block by block: {text}.")
+
+
+def shape(location: Location) -> str:
+    """Where a residual without a name shows, in words."""
+    parts = [f"block {title(location.block)}"]
+    parts += [f"{100.0 * phase.share:.0f} % in {title(phase.kind)}" for phase in location.phases[:2]]
+    if location.position_m:
+        parts.append(f"at {location.position_m[0]:.3f} to {location.position_m[1]:.3f} m")
+    if location.speed_m_s:
+        parts.append(f"at speeds of {location.speed_m_s[0]:.3g} to {location.speed_m_s[1]:.3g} m/s")
+    if location.frequency_hz:
+        parts.append(f"repeating at {location.frequency_hz:.3g} Hz")
+    elif location.order_per_rev:
+        parts.append(f"repeating {location.order_per_rev:.3g} times per revolution")
+    elif location.period_m:
+        parts.append(f"repeating every {1e3 * location.period_m:.3g} mm")
+    return ", ".join(parts)
+
+
+def _notes(table: dict[str, ChannelFit], proof: Proof, verdict: Verdict, explanation: Explanation) -> list[str]:
+    notes = []
+    if any(entry.floor_from == "repeated_laps" for entry in table.values()):
+        notes.append("The noise floor is what does not repeat from lap to lap.")
+    else:
+        notes.append("No motion repeats: the noise floor is the white noise of the sensors, so that "
+                     "disturbances of the axis count as mismatch.")
+    blocks = [name for name, entry in table.items() if entry.mode is Mode.BLOCKS]
+    if blocks:
+        notes.append(f"Figures of {', '.join(blocks)} are block by block, fed with measured inputs: in closed loop the "
+                     "twin strays from the recording by more than its noise although every block is at its floor.")
+    notes += [f"{title(ablation.term.effect)} was dropped: it fits the training recordings, but held-out ones speak "
+              "against it." for ablation in proof.dropped]
+    notes += [f"{title(ablation.term.effect)} does not show in the held-out recordings: it is not proven there."
+              for ablation in proof.ablations if ablation.gain is not None and not ablation.shown]
+    if verdict is Verdict.UNEXPLAINED and explanation.terms:
+        tried = ", ".join(title(term.effect) for term in explanation.terms)
+        notes.append(f"The nearest mechanisms ({tried}) explain less than half of it, so that none is named.")
+    return notes

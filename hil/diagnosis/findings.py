@@ -1,0 +1,152 @@
+"""From fitted terms to findings: values with standard errors, equivalents, rivals, confidence, sentence."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hil.bench import Bench, MechanismEntry
+from hil.diagnosis.confidence import confidence
+from hil.diagnosis.explain import TIED, Explanation, Rival
+from hil.diagnosis.fit import Fit
+from hil.diagnosis.model import Term
+from hil.diagnosis.proof import Ablation, explained_share
+from hil.diagnosis.result import Correction, Finding, Value
+from hil.diagnosis.result import Rival as RivalText
+from hil.diagnosis.wording import NOMINAL_UNITS, number, sentence, title
+from hil.measured import Measured
+from hil.twin.library import BY_ID
+from hil.twin.mechanism import Dimension
+
+FloatArray = NDArray[np.float64]
+
+# One set: friction that differs by direction is the Coulomb band shifted by a constant torque
+SAME = ("asymmetric_friction", "constant_load")
+
+_BLOCK_ROWS = 200    # longer than residuals remember: 0.2 s at 1 kHz
+
+
+def renamed(found: Fit) -> Fit:
+    """The fit with a constant load called asymmetric friction, which is the same torque and the commoner cause."""
+    load, friction = SAME[1], SAME[0]
+    if any(term.effect == friction for term in found.model.terms):
+        return found
+    terms = tuple(replace(term, effect=friction) if term.effect == load else term for term in found.model.terms)
+    return replace(found, model=replace(found.model, terms=terms))
+
+
+def findings(explanation: Explanation, final: Fit, ablations: Sequence[Ablation], train: Sequence[Measured],
+             held_out: Sequence[Measured]) -> tuple[Finding, ...]:
+    """A finding for each term, the one that matters most first."""
+    deviations = standard_errors(final)
+    explained = explained_share(explanation.nominal, final, train)
+    on_held_out = explained_share(explanation.nominal, final, held_out) if held_out else None
+    bench, terms = final.model.resolved(final.x)
+    row = final.model.nominal_count
+    result = []
+    for term, ablation in zip(terms, ablations, strict=True):
+        errors = deviations[row:row + len(term.values)]
+        row += len(term.values)
+        rivals = _rivals(explanation, term)
+        tied = [rival.fit.model.terms[-1].effect for rival in rivals if rival.evidence < TIED]
+        if term.effect in SAME:
+            tied.append(next(name for name in SAME if name != term.effect))
+        margin = min((rival.evidence for rival in rivals if rival.fit.model.terms[-1].effect not in tied),
+                     default=explanation.needed.get(_key(explanation, term), math.inf))
+        result.append((ablation.train, Finding(
+            effect=term.effect, variant=BY_ID[term.effect].variants[term.variant],
+            confidence=confidence(margin, explained, on_held_out), equivalents=tuple(dict.fromkeys(tied)),
+            rivals=tuple(RivalText(effect=rival.fit.model.terms[-1].effect, evidence=_text(rival, term, train))
+                         for rival in rivals),
+            parameters=_values(term, errors, bench), sentence=sentence(_normal(term), bench),
+            needed=_needed(ablation))))
+    return tuple(finding for _, finding in sorted(result, key=lambda pair: -pair[0]))
+
+
+def corrections(owner: Bench, found: Fit) -> dict[str, Correction]:
+    """The nominal parameters of the owner and as fitted."""
+    deviations = standard_errors(found)
+    return {name: Correction(nominal=float(getattr(owner.axis, name)), value=value, std=std, unit=NOMINAL_UNITS[name])
+            for name, value, std in zip(owner.axis.NOMINAL, found.model.values(found.x), deviations, strict=False)}
+
+
+def standard_errors(found: Fit) -> list[float]:
+    """Standard error of each physical parameter, robust against residuals that are no white noise:
+
+        A^-1 (sum over blocks of g g^T) A^-1,   A = J^T J,   g = J^T r of a block      (Liang and Zeger 1986)
+    """
+    scale = np.linalg.norm(found.jacobian, axis=0)
+    scale[scale == 0.0] = 1.0
+    slope = found.jacobian / scale
+    inverse = np.linalg.pinv(slope.T @ slope, hermitian=True)
+    starts = np.concatenate([np.arange(begin, end, _BLOCK_ROWS) for begin, end in zip(
+        (0, *found.splits), (*found.splits, found.residuals.size), strict=True)])
+    score = np.add.reduceat(slope * found.residuals[:, None], starts, axis=0)
+    covariance = inverse @ (score.T @ score) @ inverse
+    errors = np.sqrt(np.maximum(np.diag(covariance), 0.0)) / scale
+    return [float(error * (abs(value) if coordinate.logarithmic else abs(coordinate.scale)))
+            for error, value, coordinate in zip(errors, found.model.values(found.x), found.model.coordinates,
+                                                strict=True)]
+
+
+def diagnosed_bench(owner: Bench, found: Fit) -> Bench:
+    """The owner's bench with the parameters and the terms of a fit: what every other command accepts."""
+    bench, terms = found.model.resolved(found.x)
+    entries = tuple(MechanismEntry(effect=term.effect, variant=BY_ID[term.effect].variants[term.variant],
+                                   parameters=dict(zip(BY_ID[term.effect].names, _normal(term).values, strict=True)))
+                    for term in terms)
+    return bench.model_copy(update={"name": f"{owner.name}_diagnosed", "mechanisms": owner.mechanisms + entries})
+
+
+def _normal(term: Term) -> Term:
+    """Phases within one turn."""
+    values = tuple(math.remainder(value, 2.0 * math.pi) if parameter.name == "phase_rad" else value
+                   for value, parameter in zip(term.values, BY_ID[term.effect].parameters, strict=True))
+    return replace(term, values=values)
+
+
+def _values(term: Term, errors: Sequence[float], bench: Bench) -> dict[str, Value]:
+    return {parameter.name: Value(value=value, std=error, unit=parameter.dimension.unit(bench.axis.linear))
+            for parameter, value, error in zip(BY_ID[term.effect].parameters, _normal(term).values, errors,
+                                               strict=True)}
+
+
+def _key(explanation: Explanation, term: Term) -> tuple[str, int]:
+    """The key under which the search knows a term that was renamed."""
+    known = set(explanation.rivals) | set(explanation.needed)
+    return term.key if term.key in known or term.effect not in SAME else (SAME[1], term.variant)
+
+
+def _rivals(explanation: Explanation, term: Term) -> list[Rival]:
+    """Other mechanisms than the term's own, each in its best variant, the strongest first."""
+    best: dict[str, Rival] = {}
+    for rival in sorted(explanation.rivals.get(_key(explanation, term), []), key=lambda found: found.evidence):
+        effect = rival.fit.model.terms[-1].effect
+        if effect != term.effect and {effect, term.effect} != set(SAME):
+            best.setdefault(effect, rival)
+    return list(best.values())
+
+
+def _text(rival: Rival, term: Term, train: Sequence[Measured]) -> str:
+    if rival.evidence < TIED:
+        return f"cannot be told apart from {title(term.effect)} by this motion (evidence {number(rival.evidence)} of " \
+               f"the {TIED:g} that it takes)"
+    size = math.sqrt(rival.fit.reduced)
+    parameters = BY_ID[rival.fit.model.terms[-1].effect].parameters
+    at = rival.fit.model.resolved(rival.fit.x)[1][-1].values
+    stuck = [parameter.name for parameter, value in zip(parameters, at, strict=True)
+             if parameter.dimension is not Dimension.ANGLE and value in (parameter.low, parameter.high)]
+    bound = f", with {', '.join(stuck)} at the end of what is possible" if stuck else ""
+    return (f"leaves {number(size)} × the noise in rms{bound}; evidence against it "
+            f"{number(rival.evidence)}, where {TIED:g} is very strong")
+
+
+def _needed(ablation: Ablation) -> str:
+    text = f"without it the residual energy is {number(ablation.train)} × as large on the training recordings"
+    if ablation.held_out is None:
+        return text + "; there are no held-out recordings"
+    return f"{text}, {number(ablation.held_out)} × on the held-out ones"

@@ -1,0 +1,89 @@
+"""The noise floor of a residual: from repeated laps where there are any, else white sensor noise.
+
+Where the same set-points come again after a lag p, what the axis does again is repeatable, and no noise:
+
+    sigma^2 = mean (r_k - r_{k+p})^2 / 2        over all rows k whose set-points repeat
+
+sigma is the non-repeatable part of the residual r, the rest of its energy repeats lap by lap and is physics that a
+better twin would explain.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hil.measured import Measured
+
+FloatArray = NDArray[np.float64]
+Rows = NDArray[np.intp]
+
+_LAGS = 6                # strongest lags of the set-points that are tried
+_SAME_M = 2e-6           # set-points closer than this are the same: printed ones are rounded
+_SETTLED_S = 0.3         # set-points must have been the same for so long: the axis remembers what came before
+_ENOUGH_S = 1.0          # of repeated motion, to call a floor measured
+
+
+@dataclass(frozen=True, eq=False)
+class Laps:
+    """Rows whose set-points come again, and the rows where they do, each (m,)."""
+
+    first: Rows
+    again: Rows
+    lag_s: float         # the lag that repeats most
+
+    def noise(self, residual: FloatArray) -> float:
+        """Standard deviation of what does not repeat of a residual (n,)."""
+        return float(np.sqrt(np.mean((residual[self.first] - residual[self.again]) ** 2) / 2.0))
+
+
+@dataclass(frozen=True)
+class Floor:
+    """Noise floor of one channel in its unit, and how it is known."""
+
+    rms: float
+    source: Literal["repeated_laps", "white_noise"]
+
+
+def floor(residual: FloatArray, white: float, laps: Laps | None) -> Floor:
+    """Floor of a residual (n,): what does not repeat, never below the sensor's `white` noise."""
+    if laps is None:
+        return Floor(white, "white_noise")
+    return Floor(max(laps.noise(residual), white), "repeated_laps")
+
+
+def laps(run: Measured) -> Laps | None:
+    """The repeated motion in a run; None where nothing moves in the same way twice."""
+    position, velocity = run.position_command_m, run.velocity_command_m_s
+    lags = _lags(velocity)
+    settled = max(round(_SETTLED_S / run.period_s), 1)
+    first, again, best, longest = list[Rows](), list[Rows](), 0.0, 0
+    for lag in lags:
+        same = np.abs(position[:-lag] - position[lag:]) < _SAME_M
+        # the same for a while before: a running count since the last difference
+        different = np.flatnonzero(~same)
+        since = np.full(same.size, -1)
+        since[different] = different
+        since = np.arange(same.size) - np.maximum.accumulate(since)
+        moving = np.abs(velocity[:-lag]) > 1e-3 * np.max(np.abs(velocity))
+        rows = np.flatnonzero((since > settled) & moving)
+        first.append(rows)
+        again.append(rows + lag)
+        if rows.size > longest:
+            best, longest = lag * run.period_s, rows.size
+    if longest * run.period_s < _ENOUGH_S:
+        return None
+    return Laps(np.concatenate(first), np.concatenate(again), best)
+
+
+def _lags(velocity: FloatArray) -> list[int]:
+    """Lags [rows] at which the velocity set-points resemble themselves most, best first."""
+    n = velocity.size
+    size = 1 << (2 * n - 1).bit_length()
+    correlation = np.fft.irfft(np.abs(np.fft.rfft(velocity, size)) ** 2, size)[:n]
+    peaks = np.flatnonzero((correlation[1:-1] > correlation[:-2]) & (correlation[1:-1] >= correlation[2:])
+                           & (correlation[1:-1] > 0.05 * correlation[0])) + 1
+    return [int(peak) for peak in peaks[np.argsort(correlation[peaks])[::-1][:_LAGS]]]

@@ -1,0 +1,208 @@
+"""Before any search: recordings that cannot be diagnosed, and channels with a wrong sign or unit, are said to be so.
+
+    torque = J a + D v + Fc sign(v) + T0      by least squares over the measured motion
+
+A negative J is no result, and a J or Fc that is wrong by a factor of thousand is a unit, no physics.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import savgol_filter
+
+from hil.bench import Bench
+from hil.channels import AXIS_CHANNELS
+from hil.errors import InputError
+from hil.measured import Measured, take
+from hil.recording import Recording
+
+FloatArray = NDArray[np.float64]
+
+SHORTEST_S = 2.0            # there, back, and time to settle
+LEAST_TRAVEL_COUNTS = 50    # of the motor encoder: below this there is no motion to speak of
+LEAST_MOVING_S = 0.5
+# Nominal parameters may be wrong by a factor of three (see `hil.diagnosis.model`), units are wrong by more.
+WRONG_BY = 4.0
+SLOPE_TOLERANCE = 0.2       # of positions against set-points; following errors are below 5 %
+SATURATED = 0.5             # share of the moving rows at the limit
+_SMOOTH_S = 0.021           # window of the derivatives of the motor position
+
+_POSITION_UNITS = {1e3: "mm", 1e6: "µm", 1e9: "nm", 180.0 / math.pi: "degrees", 0.5 / math.pi: "revolutions",
+                   1e-3: "km", 39.37: "inches"}
+_TORQUE_UNITS = {1e3: "mN m", 1e6: "µN m", 1e2: "N cm", 1e-3: "kN m", 1.0 / 9.81: "kgf m", 9.81: "N m times 9.81",
+                 10.2: "kgf cm", 141.6: "ozf in", 0.7376: "lbf ft", 2.0 * math.pi: "N m times 2 pi",
+                 1.0 / (2.0 * math.pi): "N m per 2 pi"}
+
+
+def prepare(recordings: Sequence[Recording], bench: Bench) -> list[Measured]:
+    """The recordings as the twin needs them.
+
+    Raises InputError with everything found, a line each: channels missing, too short, no motion, a frozen or
+    copied channel, a wrong sign or unit of a position or of the torque, saturation throughout.
+    """
+    if not recordings:
+        raise InputError("given no recording, allowed one or more; give the recordings to diagnose")
+    found = [problem for recording in recordings for problem in _raw_problems(recording, bench)]
+    if found:
+        raise InputError("\n".join(found))
+    runs = [take(recording, bench) for recording in recordings]
+    found = [f"{run.name}: {problem}" for run in runs for problem in _problems(run, bench)]
+    if found:
+        raise InputError("\n".join(found))
+    return runs
+
+
+def _raw_problems(recording: Recording, bench: Bench) -> Iterator[str]:
+    duration = len(recording) * recording.period_s
+    if duration < SHORTEST_S:
+        yield (f"{recording.name}: too short: given {duration:.3g} s, allowed {SHORTEST_S:g} s or more; "
+               "record a motion there and back")
+    names = AXIS_CHANNELS[recording.kind]
+    for name in (names.position_command, names.velocity_command, names.motor_position, names.torque):
+        if name not in recording.columns:
+            yield (f"{recording.name}: {name} is not recorded, allowed are recordings with it; "
+                   f"record it (there are {', '.join(recording.columns)})")
+
+
+def _problems(run: Measured, bench: Bench) -> Iterator[str]:
+    names, ratio = AXIS_CHANNELS[run.kind], bench.axis.ratio_m_rad
+    command = run.position_command_m
+    top = float(np.max(np.abs(run.velocity_command_m_s)))
+    moving = np.abs(run.velocity_command_m_s) > 1e-3 * top
+    moved = float(np.ptp(run.motor)) * ratio
+    if np.ptp(command) == 0.0 or top == 0.0:
+        yield ("without excitation: the set-points do not move; a twin at standstill says nothing: "
+               "record a motion with reversals and several feeds")
+        return
+    if moving.sum() * run.period_s < LEAST_MOVING_S:
+        yield (f"without excitation: the set-points move for {moving.sum() * run.period_s:.2g} s, allowed "
+               f"{LEAST_MOVING_S:g} s or more; record more motion")
+        return
+    if np.ptp(run.motor) == 0.0:
+        yield f"{names.motor_position} is frozen at {run.motor[0]:.6g} while the set-points move; check the encoder"
+        return
+    if np.ptp(run.torque) == 0.0:
+        yield f"{names.torque} is frozen at {run.torque[0]:.6g} while the axis moves; check the channel"
+        return
+    if moved < LEAST_TRAVEL_COUNTS * math.sqrt(12.0) * run.noise.motor * ratio:
+        yield (f"without excitation: the motor moves by {moved * 1e6:.3g} µm, {LEAST_TRAVEL_COUNTS} counts of its "
+               "encoder or less; record a longer motion")
+        return
+    found = [*_position_problems(run, ratio, names.motor_position, names.table_position),
+             *_set_point_problems(run, names.velocity_command)]
+    yield from found
+    yield from _saturation(run, bench, moving)
+    if not found:    # the torque is judged by the measured motion
+        yield from _torque_problems(run, bench)
+
+
+def _position_problems(run: Measured, ratio: float, motor: str, table: str) -> Iterator[str]:
+    slope = _slope(run.position_command_m, ratio * run.motor)
+    if abs(slope - 1.0) > SLOPE_TOLERANCE:
+        yield f"{motor}: {_factor(slope, _POSITION_UNITS, 'the set-points')}"
+    if not run.table_m.size:
+        return
+    if np.ptp(run.table_m) == 0.0:
+        yield f"{table} is frozen at {run.table_m[0]:.6g} while the axis moves; check the linear encoder"
+        return
+    if np.ptp(run.table_m - ratio * run.motor) < 1e-12:
+        yield (f"{table} is a copy of the motor position, allowed the linear encoder's own reading; "
+               "record it, or write 'table: null' under encoders in the bench file")
+    slope = _slope(run.position_command_m, run.table_m)
+    if abs(slope - 1.0) > SLOPE_TOLERANCE:
+        yield f"{table}: {_factor(slope, _POSITION_UNITS, 'the set-points')}"
+
+
+def _set_point_problems(run: Measured, name: str) -> Iterator[str]:
+    slope = _slope(np.gradient(run.position_command_m, run.period_s), run.velocity_command_m_s)
+    units = {60.0: "m/min", 1e3: "mm/s", 6e4: "mm/min", 1e6: "µm/s"}
+    if abs(slope - 1.0) > SLOPE_TOLERANCE:
+        yield f"{name}: {_factor(slope, units, 'the derivative of the position set-points')}"
+
+
+def _torque_problems(run: Measured, bench: Bench) -> Iterator[str]:
+    names, unit = AXIS_CHANNELS[run.kind], "N" if bench.axis.linear else "N m"
+    physics = bench.axis.physics()
+    inertia = float(physics.chain.inertia_kg_m2.sum())
+    if not run.torque_is_command:
+        slope = _slope(run.torque_command, run.torque)
+        if slope < 0.0 and _correlation(run.torque_command, run.torque) < -0.5:
+            yield (f"{names.torque} runs against {names.torque_command} (slope {slope:.3g}): one of them has the wrong "
+                   "sign; correct it in the import map")
+            return
+    measured = regress(run)
+    if measured is None:
+        return
+    (j, _, coulomb, _), errors = measured
+    if j < -3.0 * errors[0]:
+        yield (f"{names.torque} has the wrong sign: the inertia that it gives is {j:.3g} ± {errors[0]:.1g}, and no "
+               "mass is negative; correct the sign of the channel, or of the encoder")
+        return
+    factors = [j / inertia] if j > 5.0 * errors[0] else []
+    if physics.coulomb_n_m > 0.0 and coulomb > 5.0 * errors[2]:
+        factors.append(coulomb / physics.coulomb_n_m)
+    # one of them may be badly believed; a wrong unit shows in both
+    if factors and (min(factors) > WRONG_BY or max(factors) < 1.0 / WRONG_BY):
+        factor = float(np.exp(np.mean(np.log(factors))))
+        units = {} if bench.axis.linear else {1.0 / bench.axis.ratio_m_rad: "N at the table"}
+        against = f"the inertia and friction of the bench ({unit})"
+        yield f"{names.torque}: {_factor(factor, units | _TORQUE_UNITS, against)}"
+
+
+def regress(run: Measured) -> tuple[list[float], list[float]] | None:
+    """J, D, Fc, T0 of the regression above and their standard errors [motor units]; None without sliding motion."""
+    window = max(round(_SMOOTH_S / run.period_s) | 1, 5)
+    if run.motor.size < 4 * window:
+        return None
+    velocity = savgol_filter(run.motor, window, 2, deriv=1, delta=run.period_s)
+    acceleration = savgol_filter(run.motor, window, 2, deriv=2, delta=run.period_s)
+    torque = savgol_filter(run.torque, window, 2)
+    rows = np.abs(velocity) > 0.02 * np.max(np.abs(velocity))
+    rows[:window] = rows[-window:] = False
+    if rows.sum() < 4 * window:
+        return None
+    basis = np.stack([acceleration, velocity, np.sign(velocity), np.ones_like(velocity)], axis=1)[rows]
+    if np.ptp(basis[:, 2]) == 0.0:
+        basis[:, 3] = 0.0       # one direction only: offset and Coulomb friction are one
+    solution, *_ = np.linalg.lstsq(basis, torque[rows], rcond=None)
+    left = torque[rows] - basis @ solution
+    # smoothing leaves one independent sample per window
+    variance = float(left @ left) / max(rows.sum() / window - 4.0, 1.0)
+    covariance = np.linalg.pinv(basis.T @ basis) * variance
+    return [float(value) for value in solution], [float(np.sqrt(value)) for value in np.diag(covariance)]
+
+
+def _saturation(run: Measured, bench: Bench, moving: NDArray[np.bool_]) -> Iterator[str]:
+    limit = bench.gains.torque_limit_n_m
+    peak = float(np.max(np.abs(run.torque_command)))
+    level = limit if math.isfinite(limit) and peak <= 1.01 * limit else peak
+    share = float(np.mean(np.abs(run.torque_command[moving]) >= 0.999 * level))
+    if share > SATURATED:
+        yield (f"saturated throughout: the command is at its limit of {level:.4g} in {100.0 * share:.0f} % of the "
+               f"motion, allowed {100.0 * SATURATED:.0f} %; the loop is open there and tells nothing: move slower")
+
+
+def _slope(over: FloatArray, values: FloatArray) -> float:
+    """Slope of a regression of `values` on `over`."""
+    centred = over - over.mean()
+    return float(centred @ (values - values.mean()) / max(float(centred @ centred), 1e-300))
+
+
+def _correlation(a: FloatArray, b: FloatArray) -> float:
+    return float(np.corrcoef(a, b)[0, 1])
+
+
+def _factor(factor: float, units: dict[float, str], against: str) -> str:
+    """What a factor between a channel and what it should be looks like."""
+    if factor < 0.0 and abs(factor + 1.0) < SLOPE_TOLERANCE:
+        return f"has the wrong sign: it runs against {against} (slope {factor:.3g}); correct it in the import map"
+    sign = "has the wrong sign and " if factor < 0.0 else ""
+    size = abs(factor)
+    near = min(units, key=lambda unit: abs(math.log(max(size, 1e-300) / unit)))
+    looks = f": it looks like {units[near]}" if abs(math.log(max(size, 1e-300) / near)) < math.log(1.6) else ""
+    return (f"{sign}is {size:.3g} × what {against} ask for{looks}; correct its unit in the import map, "
+            "or the bench file")

@@ -1,0 +1,117 @@
+"""Proof on held-out recordings: what each term is worth there, and which are dropped.
+
+    gain = sum over channels and runs of  n log(E_without / E_with),      E: whitened energy, see `evidence`
+
+Both hypotheses were fitted to the training recordings, so that on the held-out ones no parameter has to be paid for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hil.diagnosis.evidence import against
+from hil.diagnosis.explain import TIED, noise_ratios
+from hil.diagnosis.fit import Fit, fit, in_parallel, splits
+from hil.diagnosis.model import Term
+from hil.measured import Measured
+
+
+@dataclass(frozen=True, eq=False)
+class Ablation:
+    """A term, the fit without it, and by which factor the energy above the floor grows without it.
+
+    `gain` is the evidence for the term on the held-out recordings, None without any.
+    """
+
+    term: Term
+    without: Fit
+    train: float
+    held_out: float | None
+    gain: float | None
+
+    @property
+    def harms(self) -> bool:
+        """Whether held-out recordings speak against the term. A motion that does not show it says nothing."""
+        return self.gain is not None and self.gain < -TIED
+
+    @property
+    def shown(self) -> bool:
+        """Whether held-out recordings speak for the term."""
+        return self.gain is not None and self.gain > TIED
+
+
+@dataclass(frozen=True, eq=False)
+class Proof:
+    """What is left after useless terms were dropped."""
+
+    final: Fit
+    ablations: tuple[Ablation, ...]
+    dropped: tuple[Ablation, ...]
+
+
+def prove(nominal: Fit, final: Fit, train: Sequence[Measured], held_out: Sequence[Measured]) -> Proof:
+    """Ablate every term; drop, the most harmful first, those that held-out recordings speak against."""
+    dropped: list[Ablation] = []
+    while True:
+        ablations = _ablate(nominal, final, train, held_out)
+        harmful = [ablation for ablation in ablations if ablation.harms]
+        if not harmful:
+            return Proof(final, tuple(ablations), tuple(dropped))
+        worst = min(harmful, key=lambda ablation: ablation.gain or 0.0)
+        dropped.append(worst)
+        final = worst.without
+        if final.model.terms:
+            final = fit(final.model, train, final.x)
+
+
+def energy(found: Fit, runs: Sequence[Measured]) -> float:
+    """Energy of the residuals block by block, n m summed; what is below the noise floor counts as at the floor."""
+    return _sum(found, runs, lambda ratio: max(ratio, 1.0))
+
+
+def excess(found: Fit, runs: Sequence[Measured]) -> float:
+    """Energy above the noise floor."""
+    return _sum(found, runs, lambda ratio: max(ratio - 1.0, 0.0))
+
+
+def explained_share(before: Fit, after: Fit, runs: Sequence[Measured]) -> float:
+    """Share of the energy above the floor that `after` takes away from `before`, in [0, 1]."""
+    left, was = excess(after, runs), excess(before, runs)
+    return min(max(1.0 - left / was, 0.0), 1.0) if was > 0.0 else 1.0
+
+
+def _sum(found: Fit, runs: Sequence[Measured], of: Callable[[float], float]) -> float:
+    return float(sum(run.motor[run.judged].size * of(ratio)
+                     for run in runs for ratio in noise_ratios(found, run).values()))
+
+
+def _ablate(nominal: Fit, final: Fit, train: Sequence[Measured], held_out: Sequence[Measured]) -> list[Ablation]:
+    terms = final.model.resolved(final.x)[1]
+
+    def without(index: int) -> Fit:
+        rest = replace(final.model, terms=terms[:index] + terms[index + 1:])
+        if not rest.terms:
+            return nominal
+        x = np.concatenate([final.x[:rest.nominal_count], rest.initial()[rest.nominal_count:]])
+        return fit(rest, train, x, evaluations=12)
+
+    fits = in_parallel([lambda index=index: without(index) for index in range(len(terms))])  # type: ignore[misc]
+    own_train, own_held_out = energy(final, train), energy(final, held_out)
+    here = _over(final, held_out) if held_out else None
+    return [Ablation(term, other, energy(other, train) / own_train,
+                     energy(other, held_out) / own_held_out if held_out else None,
+                     _gain(here, _over(other, held_out)) if here is not None else None)
+            for term, other in zip(terms, fits, strict=True)]
+
+
+def _over(found: Fit, runs: Sequence[Measured]) -> Fit:
+    """A fit as it stands on other recordings."""
+    residuals = found.model.residuals(found.x, runs)
+    return Fit(found.model, found.x, residuals, np.zeros((residuals.size, 0)), splits(found.model, runs))
+
+
+def _gain(found: Fit, without: Fit) -> float:
+    return against(found, without) + (found.x.size - without.x.size) * float(np.log(found.residuals.size))

@@ -1,0 +1,171 @@
+"""What a diagnosis says: the stable interface `diagnosis.json`, as models and as a JSON Schema.
+
+SI units throughout. `hil/diagnosis/diagnosis.schema.json` is what `write_schema` makes of these models.
+"""
+
+from __future__ import annotations
+
+import json
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+SCHEMA_FILE = Path(__file__).with_name("diagnosis.schema.json")
+
+Share = Annotated[float, Field(ge=0.0, le=1.0)]
+NotNegative = Annotated[float, Field(ge=0.0)]
+
+
+class Verdict(StrEnum):
+    """Answer to: does the twin explain these recordings, and if not, what is wrong with it?"""
+
+    NO_MISMATCH = "no_mismatch"
+    PARAMETER_ERROR = "parameter_error"
+    MISSING_PHYSICS = "missing_physics"
+    UNEXPLAINED = "unexplained"
+
+
+class PhaseKind(StrEnum):
+    """Phase of a motion, by its set-points."""
+
+    REVERSAL = "reversal"
+    CREEP = "creep"
+    ACCELERATION = "acceleration"
+    CONSTANT_FEED = "constant_feed"
+    STANDSTILL = "standstill"
+
+
+class Mode(StrEnum):
+    """How the residuals of a channel were taken."""
+
+    CLOSED_LOOP = "closed_loop"
+    BLOCKS = "blocks"
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class Value(_Part):
+    """An estimated parameter."""
+
+    value: float
+    std: NotNegative = Field(description="standard error")
+    unit: str
+
+
+class Correction(Value):
+    """A nominal parameter of the bench as the recordings have it."""
+
+    nominal: float = Field(description="as the bench file has it")
+
+
+class Rival(_Part):
+    """Another mechanism that was weighed, and why it lost."""
+
+    effect: str
+    evidence: str
+
+
+class Finding(_Part):
+    """A mechanism that the twin lacks."""
+
+    effect: str = Field(description="id in the library of mechanisms")
+    variant: str = Field("", description="the way it shows, where the mechanism has several")
+    confidence: Share
+    equivalents: tuple[str, ...] = Field((), description="mechanisms that this motion cannot tell from it")
+    rivals: tuple[Rival, ...] = ()
+    parameters: dict[str, Value]
+    sentence: str
+    needed: str = Field("", description="what leaving it out costs, on training and on held-out recordings")
+
+
+class Phase(_Part):
+    """Share of the mismatch's energy in a phase of motion."""
+
+    kind: PhaseKind
+    share: Share
+
+
+class Location(_Part):
+    """Where the mismatch is. Ranges and periods are null where it does not keep to one."""
+
+    block: Literal["controller", "drive", "motor_side", "transmission", "table", "sensor"]
+    element: str
+    channels: tuple[str, ...] = Field(description="recorded channels that show it, the strongest first")
+    phases: tuple[Phase, ...] = ()
+    windows_s: tuple[tuple[float, float], ...] = Field((), description="of the first recording, where it concentrates")
+    position_m: tuple[float, float] | None = Field(None, description="range of table position")
+    speed_m_s: tuple[float, float] | None = Field(None, description="range of absolute table speed")
+    frequency_hz: NotNegative | None = Field(None, description="time-locked")
+    period_m: NotNegative | None = Field(None, description="position-locked, or angle-locked as travel")
+    order_per_rev: NotNegative | None = Field(None, description="angle-locked: periods per revolution of the screw")
+
+
+class FitFigures(_Part):
+    """Root mean square residuals in the channel's unit."""
+
+    before_rms: NotNegative = Field(description="nominal parameters refitted, no new physics")
+    after_rms: NotNegative = Field(description="with corrected parameters and the physics found")
+    noise_floor_rms: NotNegative
+    owner_rms: NotNegative = Field(description="parameters of the bench file")
+
+
+class ChannelFit(_Part):
+    """Fit of one channel before and after, on training and on held-out recordings."""
+
+    unit: str
+    mode: Mode
+    floor_from: Literal["repeated_laps", "white_noise"]
+    train: FitFigures
+    validate_: FitFigures | None = Field(None, alias="validate", description="null without held-out recordings")
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, populate_by_name=True)
+
+
+class Unexplained(_Part):
+    """What is left above the noise floor."""
+
+    share: Share = Field(description="of the energy above the floor that the refitted nominal twin leaves")
+    description: str
+
+
+class NextExperiment(_Part):
+    """The motion that separates what this one cannot."""
+
+    profile: str = Field(description="profile file")
+    separates: tuple[str, ...]
+
+
+class Result(_Part):
+    """diagnosis.json."""
+
+    schema_version: Literal[1] = 1
+    verdict: Verdict
+    statement: str = Field(description="the verdict as one sentence")
+    location: Location | None = Field(description="null without a mismatch")
+    missing: tuple[Finding, ...]
+    parameter_corrections: dict[str, Correction]
+    fit: dict[str, ChannelFit]
+    not_testable: tuple[str, ...] = Field(description="mechanisms this motion cannot show")
+    unexplained: Unexplained
+    next_experiment: NextExperiment | None = None
+    notes: tuple[str, ...] = ()
+    runtime_s: NotNegative
+
+    def as_json(self) -> dict[str, Any]:
+        """The numbers and texts as `diagnosis.json` holds them."""
+        return self.model_dump(mode="json", by_alias=True)
+
+
+def schema() -> dict[str, Any]:
+    """JSON Schema of diagnosis.json."""
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "diagnosis.json",
+            **Result.model_json_schema(by_alias=True, mode="serialization")}
+
+
+def write_schema(path: Path = SCHEMA_FILE) -> None:
+    """Write the JSON Schema."""
+    path.write_text(json.dumps(schema(), indent=1) + "\n", encoding="utf-8")

@@ -12,6 +12,7 @@ from typing import Any
 
 import typer
 
+from hil.commands.bench import bench
 from hil.commands.compare import compare
 from hil.commands.demo import demo
 from hil.commands.diagnose import diagnose
@@ -35,6 +36,7 @@ COMMANDS: tuple[tuple[str, Callable[..., Any]], ...] = (
     ("friction", friction),
     ("paper", paper),
     ("validate", validate),
+    ("bench", bench),
 )
 for _name, _command in COMMANDS:
     app.command(_name)(_command)

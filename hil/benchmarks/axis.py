@@ -23,9 +23,10 @@ def moves() -> Profile:
     })
 
 
-def trajectory(period_s: float) -> Trajectory:
-    """Set-points of `moves`."""
-    return plan(moves(), period_s, 0.0)
+def trajectory(period_s: float, laps: int = 1) -> Trajectory:
+    """Set-points of `moves`, several times over."""
+    profile = moves()
+    return plan(profile.model_copy(update={"segments": profile.segments * laps}), period_s, 0.0)
 
 
 def two_mass() -> Bench:

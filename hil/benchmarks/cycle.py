@@ -1,9 +1,8 @@
 """How long one whole cycle of the loop takes: SYNC, answers, P, PI, live twin of 20 modes, PDO packing, record.
 
-Measured from the deadline to the end of the cycle inside `hil.session`, back to back, under real-time conditions as far
-as they are granted. The simulated devices answer; the axis behind them stands still, for physics is no part of the
-loop. On the in-process bus their work is part of the figure; on a python-can bus it is taken out, since real devices
-serve their end of the bus themselves.
+Measured from the deadline to the end of the cycle inside `hil.session`, back to back. The simulated devices answer;
+the axis behind them stands still, for physics is no part of the loop. On the in-process bus their work is part of the
+figure; on a python-can bus it is taken out, since real devices serve their end of the bus themselves.
 """
 
 from __future__ import annotations
@@ -14,7 +13,6 @@ from time import perf_counter_ns
 from hil.benchmarks.axis import moves, trajectory, twenty_modes
 from hil.benchmarks.figure import Figure, percentile
 from hil.clock import VirtualClock
-from hil.realtime import real_time
 from hil.recorder import Recorder
 from hil.rig import Rig
 from hil.session import Session, make_cycle
@@ -77,7 +75,7 @@ def whole_cycle(interface: str) -> tuple[list[float], list[float]]:
             if rig.ports:
                 watch.serve_apart(rig)
             cycle = make_cycle(rig, 0.0)
-            with Recorder(folder, "bench", cycle.channels, bench.gains.period_s, {}) as recorder, real_time():
+            with Recorder(folder, "bench", cycle.channels, bench.gains.period_s, {}) as recorder:
                 Session(rig, cycle, motion, profile.motion_limits, watch, recorder).run()
         if run:   # the first one compiles
             durations += [1e-9 * duration for duration in watch.durations_ns]

@@ -15,7 +15,7 @@ from hil.twin.axis import Twin
 from hil.virtual import VirtualSession
 
 REPEATS = 5
-TWIN_REPEATS = 25
+TWIN_LAPS, TWIN_REPEATS = 10, 15
 
 
 def whole_bench(kind: type[Session]) -> float:
@@ -36,7 +36,7 @@ def whole_bench(kind: type[Session]) -> float:
 
 def offline_twin(twin: Twin) -> float:
     """Times real time: a twin in closed loop over the moves."""
-    motion = trajectory(twin.gains.period_s)
+    motion = trajectory(twin.gains.period_s, TWIN_LAPS)
     seconds = best_of(lambda: twin.simulate(motion.position_m, motion.velocity_m_s), TWIN_REPEATS)
     return motion.duration_s / seconds
 

@@ -110,7 +110,7 @@ def test_a_drive_that_does_not_answer(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("lines", "field"), [
-    ("simulation:\n  effects:\n  - {effect: backlsh, parameters: {gap_m: 1.0e-5}}", r"simulation.effects\[0\].*backlsh"),
+    ("simulation:\n  effects:\n  - {effect: backlsh, parameters: {}}", r"simulation.effects\[0\].*backlsh"),
     ("simulation:\n  effects:\n  - {effect: backlash, parameters: {gap: 1.0e-5}}", r"simulation.effects\[0\].*gap_m"),
     ("simulation:\n  axis: {motor_mass_kg: -3.0}", r"simulation.axis.motor_mass_kg.*greater than 0"),
     ("simulation:\n  sensors: {table_noise: 1.0}", r"simulation.sensors.*table_noise"),

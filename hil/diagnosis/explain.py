@@ -81,6 +81,7 @@ def explain(bench: Bench, runs: Sequence[Measured], progress: Progress = lambda 
                      and base.cost - other.cost >= MATERIAL * rows), None)
         if best is None:
             break
+        best = _simplest([best, *(other for other in found if other is not best and against(best, other) < TIED)])
         filters = whitening(best)
         rivals[best.model.terms[-1].key] = sorted(
             (Rival(other, against(best, other, filters)) for other in found if other is not best),
@@ -129,6 +130,12 @@ def claimable(term: Term, bench: Bench) -> bool:
     if term.effect == "scale_interpolation_error" and bench.encoders.table is not None:
         return abs(term.values[0]) > 0.25 * bench.encoders.table.resolution_m
     return True
+
+
+def _simplest(tied: list[Fit]) -> Fit:
+    """Of explanations that the evidence does not tell apart, the one with the fewest parameters. A constant torque
+    and friction that differs by direction are the same on every motion: the second is named, most axes lie flat."""
+    return min(tied, key=lambda found: (found.x.size, _last(found).effect != "asymmetric_friction"))
 
 
 def _last(found: Fit) -> Term:

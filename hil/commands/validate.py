@@ -30,20 +30,20 @@ def _checked(path: Path) -> str:
     """What a file is; by its keys a profile, a map, or else a bench. Raises InputError."""
     from pydantic import BaseModel, ConfigDict
 
-    from hil.bench import load_bench
     from hil.profile import load_profile
     from hil.recording_map import RecordingMap
+    from hil.simulated import load_simulated
     from hil.yamlfile import load_model
 
     class AnyFile(BaseModel):
         model_config = ConfigDict(extra="allow")
 
     keys = load_model(path, AnyFile).model_extra or {}
-    if "segments" in keys:
+    if keys.keys() & {"segments", "limits"}:
         profile = load_profile(path)
         duration_s = sum(profile.slots(run.move) for run in profile.runs) * profile.grid_s
         return f"a profile of {len(profile.runs)} moves, {duration_s:.1f} s"
     if "channels" in keys:
         return f"a map of {len(load_model(path, RecordingMap).channels)} channels"
-    bench = load_bench(path)
+    bench = load_simulated(path)
     return f"a bench with a {bench.axis.model} axis and {len(bench.mechanisms)} mechanisms"

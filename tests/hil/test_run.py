@@ -131,8 +131,10 @@ def test_command_line(tmp_path: Path) -> None:
                            str(tmp_path / "out")], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert str(tmp_path / "out/reference_100mm_7.parquet") in done.stdout
-    stopped = subprocess.run([*hil, "run", str(ROOT / "profiles/reference.yaml"), "--bench", "emps", "--virtual"],
-                             capture_output=True, text=True, cwd=tmp_path, check=False)
+    believed = tmp_path / "believed.yaml"
+    believed.write_text(shipped_benches()["reference"].read_text().split("drive:")[0])
+    stopped = subprocess.run([*hil, "run", str(ROOT / "profiles/reference.yaml"), "--bench", str(believed),
+                              "--virtual"], capture_output=True, text=True, cwd=tmp_path, check=False)
     assert stopped.returncode == 2
     assert "drive: given nothing" in stopped.stderr
     assert "Traceback" not in stopped.stderr

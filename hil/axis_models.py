@@ -10,8 +10,9 @@ from dataclasses import replace
 from math import pi
 from typing import Annotated, ClassVar, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from hil.errors import FieldError
 from hil.twin.axis import Physics
 from hil.twin.chain import (
     LINEAR_LEAD_M,
@@ -25,6 +26,8 @@ from hil.twin.chain import (
 
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+# up to a metre: a lead in millimetres is refused
+Lead = Annotated[float, Field(gt=0.0, le=1.0, allow_inf_nan=False)]
 Damping = Annotated[float, Field(ge=0.0, lt=1.0, description="modal damping ratio of the elastic modes")]
 
 
@@ -35,7 +38,7 @@ class _Model(BaseModel):
 class _Rotary(_Model):
     """An axis driven by a motor and a screw; friction is given at the motor."""
 
-    lead_m: Positive = Field(description="travel of the table per motor revolution [m]")
+    lead_m: Lead = Field(description="travel of the table per motor revolution [m]")
     coulomb_torque_n_m: NotNegative = Field(description="Coulomb friction at the motor [N m]")
     viscous_torque_n_m_s_rad: NotNegative = Field(description="viscous friction at the motor [N m s/rad]")
 
@@ -93,7 +96,7 @@ class SevenDofAxis(_Rotary):
                                           "coupling_stiffness_n_m_rad", "damping_ratio",
                                           "coulomb_torque_n_m", "viscous_torque_n_m_s_rad")
     model: Literal["seven_dof"] = "seven_dof"
-    lead_m: Positive = RECONSTRUCTED_TABLE_1.lead_m
+    lead_m: Lead = RECONSTRUCTED_TABLE_1.lead_m
     motor_inertia_kg_m2: Positive = RECONSTRUCTED_TABLE_1.motor_inertia_kg_m2
     table_mass_kg: Positive = RECONSTRUCTED_TABLE_1.table_mass_kg
     coupling_stiffness_n_m_rad: Positive = RECONSTRUCTED_TABLE_1.coupling_stiffness_n_m_rad
@@ -123,6 +126,14 @@ class SerialChain(_Rotary):
     stiffness_scale: Positive = Field(1.0, description="factor on all stiffnesses")
     damping_ratio: Damping = 0.03
 
+    @model_validator(mode="after")
+    def _one_spring_fewer(self) -> SerialChain:
+        springs, allowed = len(self.stiffnesses_n_m_rad), len(self.inertias_kg_m2) - 1
+        if springs != allowed:
+            raise FieldError(("stiffnesses_n_m_rad",), f"given {springs} values, allowed {allowed}: one fewer than "
+                             "inertias_kg_m2")
+        return self
+
     def chain(self) -> Chain:
         """The chain of n inertias."""
         return serial_chain([j * self.inertia_scale for j in self.inertias_kg_m2],
@@ -138,7 +149,7 @@ class OneMass(_Model):
     mass_kg: Positive = Field(description="moving mass [kg]")
     coulomb_force_n: NotNegative = Field(description="Coulomb friction [N]")
     viscous_force_n_s_m: NotNegative = Field(description="viscous friction [N s/m]")
-    screw_lead_m: Positive | None = Field(None, description="lead of its screw, for orders per revolution [m]")
+    screw_lead_m: Lead | None = Field(None, description="lead of its screw, for orders per revolution [m]")
 
     @property
     def ratio_m_rad(self) -> float:

@@ -24,19 +24,24 @@ from hil.yamlfile import load_model
 _MA_PER_RPM = 1e-3 * 60.0 / (2.0 * math.pi)    # mA/rpm in A s/rad
 
 
+# a period in milliseconds and a resolution in micrometres are refused
+Period = Annotated[float, Field(gt=0.0, le=0.1, allow_inf_nan=False, description="[s]")]
+Resolution = Annotated[float, Field(gt=0.0, le=1e-3, allow_inf_nan=False, description="table travel per count [m]")]
+
+
 class Control(_Model):
     """The control law of `hil.control`, gains in SI or in the units of the source."""
 
     position_gain_1_s: Positive = Field(description="Kv [1/s]")
     velocity_feedforward: NotNegative = Field(1.0, description="1 is 100 %")
-    position_period_s: Positive = 0.004
+    position_period_s: Period = 0.004
     velocity_gain_n_m_s_rad: Positive | None = Field(None, description="Kp [N m s/rad]; or the next two")
     velocity_gain_n_s_m: Positive | None = Field(None, description="Kp of a linear axis [N s/m]")
     velocity_gain_ma_rpm: Positive | None = Field(None, description="Kp [mA/rpm], with torque_constant_n_m_a")
     torque_constant_n_m_a: Positive | None = Field(None, description="Kt [N m/A]")
     velocity_integral_time_s: Positive | None = Field(None, description="Ti [s]; absent: a P velocity loop")
     velocity_integral_time_ms: Positive | None = Field(None, description="Ti [ms]")
-    velocity_period_s: Positive = 0.001
+    velocity_period_s: Period = 0.001
     torque_limit_n_m: Positive | None = None
     force_limit_n: Positive | None = None
     position_feedback: Literal["motor", "table"] = "motor"
@@ -126,7 +131,7 @@ class MotorEncoder(_Model):
 class TableEncoder(_Model):
     """Linear encoder at the table."""
 
-    resolution_m: Positive = 0.5e-6
+    resolution_m: Resolution = 0.5e-6
     direction: Literal[1, -1] = 1
 
 
@@ -167,6 +172,13 @@ class Bench(_Model):
             data["axis"] = {"model": model_of(set(data["axis"])), **data["axis"]}
         # from here on pydantic takes it for Python's own data, where strictly only a tuple is one
         return _tuples(data)
+
+    @model_validator(mode="after")
+    def _feedback_is_measured(self) -> Bench:
+        if self.control.position_feedback == "table" and not self.has_table_encoder:
+            raise FieldError(("control", "position_feedback"), "given table, allowed motor: this bench has no linear "
+                             "encoder; describe it under encoders.table")
+        return self
 
     @property
     def gains(self) -> law.Gains:

@@ -1,0 +1,52 @@
+"""A bench file is refused where it contradicts itself or where a value is in the wrong unit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from hil.bench import load_bench, shipped_benches
+from hil.errors import InputError
+
+CHAIN = """\
+lead_m: 0.01
+inertias_kg_m2: [4.0e-4, 1.0e-4, 8.0e-4]
+stiffnesses_n_m_rad: [4.0e+3]
+coulomb_torque_n_m: 1.1
+viscous_torque_n_m_s_rad: 0.0064
+control: {position_gain_1_s: 36.84, velocity_gain_n_m_s_rad: 0.27}
+"""
+
+
+@pytest.mark.parametrize(("old", "new", "message"), [
+    ("lead_m: 0.010", "lead_m: 10", r"axis.lead_m: given 10, allowed less than or equal to 1 "),
+    ("position_period_s: 0.004", "position_period_s: 4", r"control.position_period_s: given 4, allowed .* 0.1 "),
+    ("{resolution_m: 0.5e-6}", "{resolution_m: 0.5}", r"encoders.table.resolution_m: given 0.5, allowed .* 0.001 "),
+])
+def test_a_value_in_the_wrong_unit_is_refused(tmp_path: Path, old: str, new: str, message: str) -> None:
+    text = shipped_benches()["reference"].read_text()
+    assert old in text
+    path = tmp_path / "bench.yaml"
+    path.write_text(text.replace(old, new))
+    with pytest.raises(InputError, match=rf"bench\.yaml:\d+: {message}"):
+        load_bench(path)
+
+
+def test_feedback_needs_its_encoder(tmp_path: Path) -> None:
+    text = shipped_benches()["reference"].read_text()
+    path = tmp_path / "bench.yaml"
+    path.write_text(text.replace("encoders:", "  position_feedback: table\nencoders:"))
+    assert load_bench(path).gains.position_from_table
+    path.write_text(path.read_text().replace("{resolution_m: 0.5e-6}", "null"))
+    with pytest.raises(InputError, match=r"control.position_feedback: given table, allowed motor"):
+        load_bench(path)
+
+
+def test_a_chain_has_one_spring_less_than_inertias(tmp_path: Path) -> None:
+    path = tmp_path / "chain.yaml"
+    path.write_text(CHAIN)
+    with pytest.raises(InputError, match=r"chain\.yaml:3: stiffnesses_n_m_rad: given 1 values, allowed 2"):
+        load_bench(path)
+    path.write_text(CHAIN.replace("[4.0e+3]", "[4.0e+3, 140.0]"))
+    assert load_bench(path).axis.model == "serial_chain"

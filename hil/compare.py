@@ -17,7 +17,7 @@ from scipy.signal import butter, filtfilt
 from hil.bench import Bench
 from hil.blocks import BlockDeviation, compare_blocks
 from hil.errors import HilError, InputError
-from hil.fit import TABLE_ACCURACY_M, FitResult, fit_nominal
+from hil.fit import MOST_STEPS, TABLE_ACCURACY_M, FitResult, fit_nominal
 from hil.inverse_dynamics import InverseDynamics, fit_inverse_dynamics
 from hil.measured import SETTLE_S, FloatArray, Measured, take
 from hil.recording import Recording
@@ -200,6 +200,9 @@ def _notes(measured: Measured, fit: FitResult | None) -> list[str]:
                      "of the torque is what the encoder puts into its command.")
     if fit is not None:
         notes.append("The parameters were fitted to this recording; judge them on another one with the fitted bench.")
+    if fit is not None and not fit.converged:
+        notes.append(f"The fit was ended after {MOST_STEPS} steps while its parameters still crept along a valley: the "
+                     "recording does not determine them all, or the twin leaves something out.")
     return notes
 
 

@@ -24,6 +24,8 @@ from hil.measured import FloatArray, Measured
 MOTOR_ACCURACY_M = 0.1e-6
 TABLE_ACCURACY_M = 0.15e-6
 FACTOR_LIMIT = 20.0         # parameters are sought within this factor of the nominal value
+MOST_STEPS = 50
+_NOT_FINITE = 1e6           # stands for a response that is none
 _DIFFERENCE = 1e-4          # of the logarithms: above the twin's own rounding, below any curvature
 
 
@@ -39,11 +41,15 @@ class FittedParameter:
 
 @dataclass(frozen=True)
 class FitResult:
-    """The bench with fitted parameters, and how many times the twin was run for it."""
+    """The bench with fitted parameters, and how many times the twin was run for it.
+
+    converged: False where the search was ended while the parameters still crept: these are the best so far.
+    """
 
     bench: Bench
     parameters: tuple[FittedParameter, ...]
     simulations: int
+    converged: bool = True
 
 
 def fit_nominal(bench: Bench, recordings: Sequence[Measured],
@@ -51,7 +57,8 @@ def fit_nominal(bench: Bench, recordings: Sequence[Measured],
     """Fit `bench.axis.NOMINAL` to recordings; a parameter that is nominally 0 stays 0.
 
     `progress` is told the rms of the weighted residuals after each simulation.
-    Raises HilError where the fit does not converge to a finite result.
+    A twin that leaves something out may creep along a valley for long; then the result says `converged` False.
+    Raises HilError where no parameters give a finite response.
     """
     names = tuple(name for name in bench.axis.NOMINAL if getattr(bench.axis, name) > 0.0)
     nominal = np.array([getattr(bench.axis, name) for name in names])
@@ -64,7 +71,7 @@ def fit_nominal(bench: Bench, recordings: Sequence[Measured],
         candidate = bench_of(x)
         found = np.concatenate([weighted_residuals(candidate, measured) for measured in recordings])
         progress(float(np.sqrt(np.mean(found**2))))
-        return np.asarray(np.nan_to_num(found, nan=1e6, posinf=1e6, neginf=-1e6))
+        return np.asarray(np.nan_to_num(found, nan=_NOT_FINITE, posinf=_NOT_FINITE, neginf=-_NOT_FINITE))
 
     def jacobian(x: FloatArray) -> FloatArray:
         base = residuals(x)
@@ -77,15 +84,16 @@ def fit_nominal(bench: Bench, recordings: Sequence[Measured],
     upper = np.where([name == "damping_ratio" for name in names], np.minimum(limit, np.log(0.99 / nominal)), limit)
     upper -= 2.0 * _DIFFERENCE      # room for the difference
     found = least_squares(residuals, np.zeros(nominal.size), jacobian, bounds=(-limit, upper), x_scale="jac",
-                          ftol=1e-6, xtol=1e-6, max_nfev=50)
-    if not found.success or not np.isfinite(found.fun).all():
-        raise HilError(f"the fit of {', '.join(names)} did not converge ({found.message}); check units and signs of "
-                       "the recording, or give one with more motion")
+                          ftol=1e-6, xtol=1e-6, max_nfev=MOST_STEPS)
+    if np.abs(found.fun).max() >= _NOT_FINITE:
+        raise HilError(f"the fit of {', '.join(names)} has no finite result; check units and signs of the "
+                       "recording, or give one with more motion")
     variance = float(found.fun @ found.fun) / max(found.fun.size - nominal.size, 1)
     errors = np.sqrt(np.diag(np.linalg.pinv(found.jac.T @ found.jac)) * variance) * nominal * np.exp(found.x)
     parameters = tuple(FittedParameter(name, float(start), float(value), float(error)) for name, start, value, error
                        in zip(names, nominal, nominal * np.exp(found.x), errors, strict=True))
-    return FitResult(bench_of(found.x), parameters, int(found.nfev + found.njev * (nominal.size + 1)))
+    return FitResult(bench_of(found.x), parameters, int(found.nfev + found.njev * (nominal.size + 1)),
+                     bool(found.success))
 
 
 def weighted_residuals(bench: Bench, measured: Measured) -> FloatArray:

@@ -9,7 +9,7 @@ import numpy as np
 from hil.axis_models import OneMass
 from hil.bench import Bench
 from hil.blocks import BlockDeviation
-from hil.compare import Comparison, Deviation
+from hil.compare import EXPLAINED, Comparison, Deviation
 from hil.fit import FitResult
 from hil.report import figures, look, plots
 from hil.report.figures import Line, Panel
@@ -56,7 +56,7 @@ def write_comparison(result: Comparison, folder: Path) -> None:
 
 
 def verdict(result: Comparison) -> str:
-    """One sentence: does the twin explain the recording, and if not, where it fails."""
+    """In words: does the twin explain the recording, and if not, where it fails."""
     torque, position = result.torque, result.channels[0]
     figures_ = (f"{torque.label} deviates by {quantity(torque.rms, torque.unit)} rms, "
                 f"{digits(result.torque_over_noise)} × its noise; {position.label} by "
@@ -64,6 +64,9 @@ def verdict(result: Comparison) -> str:
     if result.explained:
         return f"The twin explains this recording: {figures_}."
     worst = [(deviation.rms / block.noise, block.block) for block, deviation in result.blocks if block.noise > 0.0]
+    if worst and max(worst)[0] <= EXPLAINED:
+        return (f"The control loop is not as the twin has it: {figures_}. Drive and axis by themselves are within "
+                f"{EXPLAINED:g} × their noise: look at gains, periods, and where the loops run (drive.mode).")
     where = f" Furthest from its noise: {max(worst)[1]} ({digits(max(worst)[0])} ×)." if worst else ""
     todo = "" if result.fit else " The parameters may be wrong: --fit corrects them."
     return f"The twin leaves something out: {figures_}.{where}{todo}"

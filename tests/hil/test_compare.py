@@ -18,6 +18,7 @@ from hil.fit import fit_nominal
 from hil.importing import import_recording
 from hil.measured import bench_of, take
 from hil.recording import Recording, read_recording
+from hil.report.compare_report import verdict
 
 SHARED = Path(__file__).parents[2].parent / "shared" / "recordings"
 
@@ -185,3 +186,22 @@ def test_the_other_rigs_are_not_explained_by_parameters(folder: str, block: str)
                             if part.noise > 0.0}
     assert over[block] > 3.0
     assert over["drive"] < 1.1
+
+
+def test_a_fit_that_creeps_gives_its_best_and_says_so(run: Recording, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("hil.fit.MOST_STEPS", 2)
+    axis = bench_of(run).axis.model_copy(update={"coulomb_torque_n_m": 1.6, "stiffness_n_m": 3.0e7})
+    wrong = bench_of(run).model_copy(update={"axis": axis})
+    result = compare(run, wrong, fit=True)
+    assert result.fit is not None
+    assert not result.fit.converged
+    assert any("still crept" in note for note in result.notes)
+    assert result.torque.rms < compare(run, wrong).torque.rms
+
+
+def test_a_loop_elsewhere_is_not_blamed_on_the_axis(run: Recording) -> None:
+    bench = bench_of(run)
+    gains = bench.control.model_copy(update={"position_gain_1_s": 1.5 * bench.control.position_gain_1_s})
+    result = compare(run, bench.model_copy(update={"control": gains}))
+    assert not result.explained
+    assert verdict(result).startswith("The control loop is not as the twin has it")

@@ -47,6 +47,12 @@ def load_model(path: str | Path, model: type[Model]) -> Model:
         raise InputError("\n".join(lines)) from None
 
 
+def located(path: str | Path, error: FieldError) -> InputError:
+    """An error found later in a file that could be read, with file and line in front."""
+    line, _ = _locate(_read(Path(path))[0], error.field)
+    return InputError(f"{path}:{line}: {error}")
+
+
 class _Loader(yaml.SafeLoader):
     """SafeLoader with the core schema of YAML 1.2, without anchors and repeated keys."""
 
@@ -141,10 +147,12 @@ def _finding(detail: ErrorDetails, root: yaml.Node, schema: dict[str, Any]) -> _
         keys = list(_schema_at(schema, loc[:-1]).get("properties", {}))
         given, allowed = "an unknown key", "one of " + ", ".join(keys)
         todo = _closest(str(loc[-1]), keys, "remove it")
+    elif kind == "missing" and isinstance(loc[-1], int):
+        given, allowed, todo = f"a list of {loc[-1]}", "one more value", "add it"
     elif kind == "missing":
         given, allowed, todo = "nothing", "a value", "add this key"
     else:
-        allowed = re.sub(r"^\w+ should (be )?", "", detail["msg"])
+        allowed = re.sub(r"^\w+ should (be )?", "", detail["msg"]).replace("an object", "a mapping of keys")
     line, field = _locate(root, loc)
     if message is None:
         meaning = _schema_at(schema, loc).get("description")

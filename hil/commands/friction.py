@@ -24,26 +24,31 @@ def friction(
 ) -> None:
     """Identify Coulomb and viscous friction from constant feeds in both directions."""
     from hil.bench import load_bench
+    from hil.commands.run import named
     from hil.errors import InputError
     from hil.friction import identify_friction
     from hil.measured import bench_of
     from hil.recording import read_recording
     from hil.report.friction_report import rows_of, verdict, write_friction
     from hil.report.output import default_folder, new_folder
+    from hil.simulated import load_simulated
 
     if (run is None) == (profile is None):
         raise InputError("friction: given neither or both of a recording and --profile, allowed one; "
                          "give a recording, or --profile with --bench to run it")
-    believed = load_bench(bench) if bench else None
+    load = load_bench if profile is None else load_simulated
+    believed = load(bench) if bench else None
     if run is None and believed is None:
         raise InputError("friction: --bench is missing; give the bench that --profile runs on")
     folder = folder or default_folder(f"friction-{(run or Path(str(bench))).stem}")
     with new_folder(folder) as part, progress() as tell:
         if run is None:
             assert believed is not None
+            assert bench is not None
             assert profile is not None
             tell("running the feed sweep", None)
-            run = _run(believed, profile, part, virtual)
+            with named(bench, profile):
+                run = _run(believed, profile, part, virtual)
         recording = read_recording(run)
         if believed is None and "bench" in recording.metadata:
             believed = bench_of(recording)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -20,7 +22,7 @@ def run(
         "--virtual/--wall", help="Simulated bench as fast as the machine allows, or wall-clock time")] = False,
     force: Annotated[bool, typer.Option(
         "--force", help="Arm although jitter or bus load exceed the budget of the bench")] = False,
-    seed: Annotated[int | None, typer.Option(help="Of the simulated sensors; left out: the bench's")] = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="Of the simulated sensors; left out: the bench's")] = None,
     folder: Annotated[Path | None, typer.Option(
         "--out", help="Folder for the recording; left out: runs/NAME-TIME")] = None,
 ) -> None:
@@ -29,16 +31,35 @@ def run(
     from hil.profile import load_profile
     from hil.report.output import default_folder
     from hil.run import run_profile
+    from hil.session import Ending
     from hil.simulated import load_simulated
 
     folder = folder or default_folder(profile.stem)
     loaded = load_simulated(bench)
-    result = run_profile(loaded, load_profile(profile), folder, profile.stem, virtual=virtual, force=force, seed=seed,
-                         planned=lambda trajectory: err.print(
-                             f"{profile.stem} on {loaded.name}: {trajectory.duration_s:.1f} s of motion ..."))
+    with named(bench, profile):
+        result = run_profile(
+            loaded, load_profile(profile), folder, profile.stem, virtual=virtual, force=force, seed=seed,
+            planned=lambda trajectory: err.print(
+                f"{profile.stem} on {loaded.name}: {trajectory.duration_s:.1f} s of motion ..."))  # fmt: skip
     say(result, virtual)
+    if result.outcome.ending is Ending.INTERRUPTED:
+        raise typer.Exit(130)
     if not result.complete:
         raise HilError(f"stopped: {result.outcome.ending}: {result.outcome.reason}")
+
+
+@contextmanager
+def named(bench: str, profile: Path) -> Iterator[None]:
+    """An error at a field of the bench or the profile names its file and line."""
+    from hil.bench import bench_path
+    from hil.errors import FieldError
+    from hil.profile import Profile
+    from hil.yamlfile import located
+
+    try:
+        yield
+    except FieldError as error:
+        raise located(profile if error.field[0] in Profile.model_fields else bench_path(bench), error) from None
 
 
 def say(result: RunResult, virtual: bool) -> None:

@@ -7,6 +7,7 @@ import json
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import chdir, redirect_stderr, redirect_stdout
 from pathlib import Path
@@ -179,6 +180,21 @@ def test_validate_tells_what_a_file_is(folder: Path) -> None:
     profile = folder / "profile.yaml"
     profile.write_text(SWEEP.read_text().replace("limits:", "limit:", 1))
     assert "profile.yaml:" in refused(folder, "validate", "profile.yaml")
+    text = (folder / "bench.yaml").read_text()
+    assert "simulation:" in text
+    (folder / "ghost.yaml").write_text(text.split("simulation:")[0] + "simulation: {effects: [{effect: ghost}]}\n")
+    assert "simulation.effects[0]: given ghost" in refused(folder, "validate", "ghost.yaml")
+
+
+def test_what_a_run_refuses_names_file_and_line(folder: Path) -> None:
+    jog = str(SWEEP.with_name("jog.yaml"))
+    text = (folder / "bench.yaml").read_text()
+    (folder / "bare.yaml").write_text(text.split("drive:")[0])
+    assert "bare.yaml:1: drive: given nothing" in refused(folder, "run", jog, "--bench", "bare.yaml", "--virtual")
+    (folder / "short.yaml").write_text(text.split("drive:")[0] + "drive: {travel_m: [-0.01, 0.02]}\nsimulation: {}\n")
+    assert "jog.yaml:10: segments: given set-points" in refused(folder, "run", jog, "--bench", "short.yaml",
+                                                               "--virtual")
+    assert "--seed" in refused(folder, "run", jog, "--virtual", "--seed", "-1")
 
 
 def test_wrong_usage_is_2(folder: Path) -> None:
@@ -197,3 +213,18 @@ def test_ctrl_c_ends_with_130_and_leaves_nothing(folder: Path) -> None:
     assert ran.returncode == 130
     assert errors == "stopped by ctrl-C\n"
     assert not [path for path in folder.iterdir() if "interrupted" in path.name]
+
+
+def test_ctrl_c_during_a_run_stops_the_axis_and_keeps_the_recording(folder: Path) -> None:
+    ran = subprocess.Popen(
+        [sys.executable, "-m", "hil.cli", "run", str(SWEEP), "--force", "--out", "stopped"], cwd=folder,
+        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    stream = folder / "stopped" / "friction_sweep.arrows"
+    while ran.poll() is None and not (stream.exists() and stream.stat().st_size > 20_000):   # in the middle of it
+        time.sleep(0.05)
+    ran.send_signal(signal.SIGINT)
+    _, errors = ran.communicate(timeout=60)
+    assert ran.returncode == 130, errors
+    assert "stopped by ctrl-C" in errors
+    assert "Traceback" not in errors
+    assert [path.name for path in (folder / "stopped").iterdir()] == ["friction_sweep.parquet"]

@@ -10,7 +10,7 @@ import pytest
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from hil.errors import FieldError, InputError, field_name
-from hil.yamlfile import load_model
+from hil.yamlfile import load_model, located
 
 
 class Colour(StrEnum):
@@ -36,6 +36,7 @@ class Arm(Part):
 class Machine(Part):
     name: str
     node_id: int | None = None
+    range_m: tuple[float, float] | None = None
     parts: tuple[Annotated[Wheel | Arm, Field(discriminator="kind")], ...] = ()
     spare: Arm | None = None
 
@@ -96,7 +97,8 @@ def test_a_correct_file_gives_the_model(tmp_path: Path) -> None:
     ("name: !!python/object:os.system a\n", ":1: broken YAML"),
     ("name: a\n---\nname: b\n", ":2: broken YAML"),
     ("", ":1: given an empty file"),
-    ("- 1\n", ":1: given a list, allowed"),
+    ("- 1\n", ":1: given a list, allowed a mapping of keys"),
+    ("name: a\nrange_m: [1.0]\n", ":2: range_m: given a list of 1, allowed one more value; add it"),
     ("just text\n", ":1: given 'just text', allowed"),
     ("? [a, b]\n: 1\n", ":1: broken YAML"),
     ("name: \x07\n", ": not YAML text"),
@@ -127,6 +129,13 @@ def test_unreadable_files(tmp_path: Path) -> None:
     (tmp_path / "binary.yaml").write_bytes(b"name: \xff\xfe")
     with pytest.raises(InputError, match="byte 6 is not UTF-8"):
         load_model(tmp_path / "binary.yaml", Machine)
+
+
+def test_an_error_found_later_is_located(tmp_path: Path) -> None:
+    path = tmp_path / "machine.yaml"
+    path.write_text("name: a\n\nparts:\n- kind: wheel\n  radius_m: 1\n")
+    assert str(located(path, FieldError(("parts", 0, "radius_m"), "too small"))) == (
+        f"{path}:5: parts[0].radius_m: too small")
 
 
 def test_field_errors_know_their_path() -> None:

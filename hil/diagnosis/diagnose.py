@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hil.bench import Bench
-from hil.diagnosis.explain import Explanation, explain, noise_ratios
+from hil.diagnosis.explain import FLOOR, Explanation, explain, noise_ratios
 from hil.diagnosis.findings import corrections, diagnosed_bench, findings, renamed
 from hil.diagnosis.fit import Fit
 from hil.diagnosis.fit_table import channel_names, fit_table
@@ -19,13 +19,15 @@ from hil.diagnosis.preflight import prepare
 from hil.diagnosis.proof import Proof, explained_share, prove
 from hil.diagnosis.result import ChannelFit, Location, Mode, Result, Unexplained, Verdict
 from hil.diagnosis.testable import not_testable
-from hil.diagnosis.wording import number, title
+from hil.diagnosis.wording import number, said, title
 from hil.measured import Measured
 from hil.recording import Recording
+from hil.twin.mechanism import Dimension
 
 Progress = Callable[[str], None]
 
 TRAINED = 2.0 / 3.0       # of a recording, where none is held out
+EXPLAINED = 1.15          # times its noise: up to here nothing is left of a channel to speak of
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,8 +96,14 @@ def diagnose(train: Sequence[Recording], validate: Sequence[Recording], bench: B
 def statement(result: Result) -> str:
     """The verdict as one sentence."""
     if result.verdict is Verdict.MISSING_PHYSICS:
-        sure = " ".join(finding.sentence for finding in result.missing)
-        return f"Missing physics: {sure}"
+        named = " ".join(finding.sentence for finding in result.missing)
+        name, entry = max(result.fit.items(), key=lambda item: (
+            item[1].mode is Mode.CLOSED_LOOP, item[1].train.before_rms / item[1].train.after_rms))
+        found = entry.validate_ or entry.train
+        before, after, noise = (said(value, Dimension(entry.unit)) for value in (
+            found.before_rms, found.after_rms, found.noise_floor_rms))
+        return (f"Missing physics: {named} With it the twin leaves {after} rms of {name} on "
+                f"{'held-out' if entry.validate_ else 'these'} recordings instead of {before}; the noise is {noise}.")
     if result.verdict is Verdict.PARAMETER_ERROR:
         worst = sorted(result.parameter_corrections.items(),
                        key=lambda item: -abs(np.log(max(item[1].value, 1e-300) / max(item[1].nominal, 1e-300))))
@@ -142,8 +150,8 @@ def _unexplained(explanation: Explanation, final: Fit, train: Sequence[Measured]
     for run in (*train, *held_out):
         for name, ratio in noise_ratios(final, run).items():
             worst[names[name]] = max(worst.get(names[name], 0.0), ratio)
-    above = {name: float(np.sqrt(ratio)) for name, ratio in worst.items() if ratio > 1.1}
-    if not above:
+    above = {name: float(np.sqrt(ratio)) for name, ratio in worst.items() if ratio > FLOOR}
+    if not above or max(above.values()) < EXPLAINED:
         return Unexplained(share=share, description="Every channel is down to its noise.")
     text = ", ".join(f"{name} at {number(above[name])} × its noise" for name in sorted(above, key=lambda n: -above[n]))
     if verdict is Verdict.UNEXPLAINED and location is not None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,8 @@ from hil.diagnosis.model import scales
 from hil.measured import Measured
 
 FloatArray = NDArray[np.float64]
+
+_MEMORY_S = 0.03     # an error of the table counts as new for so long
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,9 +35,29 @@ def energies(found: Fit, runs: Sequence[Measured], reference: Fit | None = None)
         if reference is not None:
             other = reference.model.blocks(reference.x, run)
             parts = {name: values - other[name] / scale[name] for name, values in parts.items()}
-        rows = np.sum([values**2 for values in parts.values()], axis=0)
+        rows = np.sum([_arising(name, values, run)**2 for name, values in parts.items()], axis=0)
         if reference is None:
             rows = rows - len(parts)
         rows[: run.judged.start] = 0.0
         result.append(Energy(run, rows, parts))
     return result
+
+
+def without_terms(found: Fit, effect: str | None = None) -> Fit:
+    """The hypothesis with its terms, or those of one effect, switched off and all else as it is."""
+    kept = tuple(term for term in found.model.resolved(found.x)[1] if effect is not None and term.effect != effect)
+    model = replace(found.model, terms=kept)
+    x = np.concatenate([found.x[:model.nominal_count], model.initial()[model.nominal_count:]])
+    return replace(found, model=model, x=x)
+
+
+def _arising(channel: str, values: FloatArray, run: Measured) -> FloatArray:
+    """The part of a residual (n,) that arises at each row.
+
+    The table keeps an error once it has it, at standstill too: what counts is by how much it changes.
+    """
+    if channel != "table":
+        return values
+    lag = max(round(_MEMORY_S / run.period_s), 1)
+    before = np.concatenate([np.full(lag, values[0]), values[:-lag]])
+    return np.asarray((values - before) / np.sqrt(2.0))

@@ -8,12 +8,11 @@ into blocks that are dealt out at random (a block-permutation null), hardly ever
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hil.diagnosis.energy import Energy, energies
+from hil.diagnosis.energy import Energy, energies, without_terms
 from hil.diagnosis.explain import noise_ratios
 from hil.diagnosis.fit import Fit
 from hil.diagnosis.fit_table import channel_names
@@ -61,7 +60,7 @@ def locate(found: Fit, runs: Sequence[Measured], final: Fit) -> Location:
         mechanism = BY_ID[terms[0].effect]
         block, element = mechanism.block.value, mechanism.element
     # with names, what the named physics does to the axis is known without noise
-    seen = energies(_without_terms(final), runs, final) if terms else energies(found, runs)
+    seen = energies(without_terms(final), runs, final) if terms else energies(found, runs)
     locked = lock(seen, max(strongest, key=lambda name: shares[name]), bench, terms)
     return Location(
         block=block, element=element, channels=tuple(names[name] for name in strongest),
@@ -137,11 +136,6 @@ def _dealt(rows: FloatArray, size: int, random: np.random.Generator) -> FloatArr
     """Rows (n,) cut into blocks, dealt out anew."""
     starts = np.arange(0, rows.size, size)
     return np.concatenate([rows[start:start + size] for start in random.permutation(starts)])
-
-
-def _without_terms(final: Fit) -> Fit:
-    model = replace(final.model, terms=())
-    return replace(final, model=model, x=final.x[:model.nominal_count])
 
 
 def _periods(locked: Lock) -> dict[str, float | None]:

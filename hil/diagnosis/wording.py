@@ -36,7 +36,7 @@ def number(value: float) -> str:
     return f"{value:.2e}"
 
 
-def said(value: float, dimension: Dimension, linear: bool) -> str:
+def said(value: float, dimension: Dimension, linear: bool = False) -> str:
     """A parameter's value with its unit, such as "24.7 µm"."""
     unit = dimension.unit(linear)
     for start, factor, text in _SAID.get(dimension, ((0.0, 1.0, unit),)):
@@ -51,7 +51,8 @@ def sentence(term: Term, bench: Bench) -> str:
     values = {parameter.name: said(value, parameter.dimension, linear)
               for parameter, value in zip(mechanism.parameters, term.values, strict=True)}
     variant = mechanism.variants[term.variant]
-    return mechanism.sentence.format(**values) + (f" ({variant})" if variant else "")
+    text = mechanism.sentence.format(**values)
+    return f"{text.removesuffix('.')} ({variant})." if variant else text
 
 
 def title(effect: str) -> str:

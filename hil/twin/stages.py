@@ -87,6 +87,7 @@ def library_digest() -> str:
     """Digest of the sources that the kernel compiles in: numba's cache cannot see when they change."""
     folder = Path(__file__).parent
     digest = hashlib.sha256()
-    for path in (*sorted((folder / "mechanisms").glob("*.py")), folder / "library.py", Path(__file__)):
+    law = [folder.parent / "control.py", folder.parent / "rounding.py"]
+    for path in (*sorted((folder / "mechanisms").glob("*.py")), folder / "library.py", Path(__file__), *law):
         digest.update(path.read_bytes())
     return digest.hexdigest()

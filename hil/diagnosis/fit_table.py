@@ -69,9 +69,11 @@ def fit_table(owner: Fit, nominal: Fit, final: Fit, train: Sequence[Measured],
             continue
 
         def floors(which: str, mode: Mode, channel: str = channel) -> list[Floor]:
-            return [floor(_of(found, mode)[channel], _white(run, final, channel, mode), repeated)
-                    for found, run, repeated in zip(all_residuals[which, "final"], sets[which], all_laps[which],
-                                                    strict=True)]
+            # what one hypothesis does differently from lap to lap is its own, and no noise: the lowest is the floor
+            return [min((floor(_of(found, mode)[channel], _white(run, final, channel, mode), repeated)
+                         for found in pair), key=lambda value: value.rms)
+                    for *pair, run, repeated in zip(all_residuals[which, "nominal"], all_residuals[which, "final"],
+                                                    sets[which], all_laps[which], strict=True)]
 
         def figures(which: str, mode: Mode, channel: str = channel) -> FitFigures:
             runs = sets[which]

@@ -122,7 +122,7 @@ def _range(labels: Sequence[FloatArray], seen: Sequence[Energy]) -> tuple[float,
         return best
 
     share, first, last = spread([energy.rows for energy in seen])
-    if (last - first) > NARROW * _BINS or share > NARROW:
+    if last - first > NARROW * _BINS:
         return None
     random = np.random.default_rng(0)
     null = [spread([_dealt(energy.rows, size, random) for energy in seen])[0] for _ in range(_SHUFFLES)]

@@ -58,11 +58,13 @@ def lock(seen: Sequence[Energy], channel: str, bench: Bench, terms: Sequence[Ter
     signal = np.concatenate([energy.parts[channel][rows] for energy, rows in zip(seen, moving, strict=True)])
     time = np.concatenate([energy.run.time_s[rows] for energy, rows in zip(seen, moving, strict=True)])
     period_s = seen[0].run.period_s
+    # a period that goes into the lead is an order of the screw
+    spans = [float(p) for p in np.geomspace(np.ptp(x) / 60.0, np.ptp(x) / 1.5, 200)
+             if not lead_m or lead_m / p < 0.5 or abs(lead_m / p - round(lead_m / p)) > lead_m / np.ptp(x)]
     found: dict[str, tuple[float, float]] = {
         "order": max(((_share(2.0 * np.pi * n * x / lead_m, signal), float(n)) for n in range(1, HIGHEST_ORDER + 1)),
                      default=(0.0, 0.0)) if lead_m else (0.0, 0.0),
-        "period": max((_share(2.0 * np.pi * x / p, signal), float(p))
-                      for p in np.geomspace(np.ptp(x) / 60.0, np.ptp(x) / 1.5, 200)),
+        "period": max(((_share(2.0 * np.pi * x / p, signal), p) for p in spans), default=(0.0, 0.0)),
         "frequency": _strongest_frequency(time, signal, period_s),
     }
     best = max(found, key=lambda name: found[name][0])

@@ -16,6 +16,7 @@ from scipy.signal import savgol_filter
 
 from hil.bench import Bench
 from hil.channels import AXIS_CHANNELS
+from hil.diagnosis.wording import number
 from hil.errors import InputError
 from hil.measured import Measured, take
 from hil.recording import Recording
@@ -204,5 +205,5 @@ def _factor(factor: float, units: dict[float, str], against: str) -> str:
     size = abs(factor)
     near = min(units, key=lambda unit: abs(math.log(max(size, 1e-300) / unit)))
     looks = f": it looks like {units[near]}" if abs(math.log(max(size, 1e-300) / near)) < math.log(1.6) else ""
-    return (f"{sign}is {size:.3g} × what {against} ask for{looks}; correct its unit in the import map, "
+    return (f"{sign}is {number(size)} × what {against} ask for{looks}; correct its unit in the import map, "
             "or the bench file")

@@ -19,6 +19,7 @@ from hil.report.figures import style
 from hil.report.look import FloatArray, shown
 
 _BINS = 120
+_ENOUGH = 15      # samples of a bin, for a median that is worth a point
 _AFTER = look.SIMULATED
 
 
@@ -43,11 +44,11 @@ class _View:
 
 def convincing(diagnosis: Diagnosis, effect: str) -> Shown:
     """The picture that shows an engineer the mechanism `effect` in the recordings."""
-    runs = diagnosis.held_out or diagnosis.train
-    where = "held-out recordings" if diagnosis.held_out else "training recordings"
-    views = [_view(diagnosis.final, run, effect) for run in runs]
-    shown = _PICTURES.get(effect, _over_time)(diagnosis, views)
-    return Shown(shown.figure, f"{shown.caption} Data: {where}.")
+    picture = _PICTURES.get(effect, _over_time)
+    # a friction curve needs every feed there is; all else is shown where it was not fitted
+    runs = (*diagnosis.train, *diagnosis.held_out) if picture is _friction else diagnosis.held_out or diagnosis.train
+    shown = picture(diagnosis, [_view(diagnosis.final, run, effect) for run in runs])
+    return Shown(shown.figure, f"{shown.caption} Recordings: {', '.join(run.name for run in runs)}.")
 
 
 def _view(final: Fit, run: Measured, effect: str) -> _View:
@@ -280,11 +281,11 @@ def _noise(run: Measured, channel: str) -> float:
 
 
 def _binned(x: FloatArray, y: FloatArray, edges: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Centres, medians, and distances to the quartiles (2, m) of the bins that hold five samples or more."""
+    """Centres, medians, and distances to the quartiles (2, m) of the bins that hold enough samples."""
     index = np.digitize(x, edges) - 1
     order = np.argsort(index, kind="stable")
     groups = np.split(y[order], np.searchsorted(index[order], np.arange(edges.size)))
-    kept = [i for i in range(edges.size - 1) if groups[i + 1].size >= 5]
+    kept = [i for i in range(edges.size - 1) if groups[i + 1].size >= _ENOUGH]
     low, middle, high = np.array([np.percentile(groups[i + 1], [25.0, 50.0, 75.0]) for i in kept]).reshape(-1, 3).T
     centre = np.array([0.5 * (edges[i] + edges[i + 1]) for i in kept])
     return centre, middle, np.stack([middle - low, high - middle])

@@ -1,0 +1,45 @@
+"""hil diagnose as a user meets it when something is wrong: code 2, the reason, nothing written."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from diagnosis_runs import bench, changed, recorded
+
+from hil.commands.diagnose import diagnose
+from hil.errors import InputError
+from hil.recording import Recording, write_parquet
+from hil.report.compare_report import write_bench
+
+
+@pytest.fixture
+def bench_file(tmp_path: Path) -> str:
+    write_bench(bench(), tmp_path / "bench.yaml")
+    return str(tmp_path / "bench.yaml")
+
+
+def refused(folder: Path, bench_file: str, recording: Recording) -> str:
+    """What the command says to a recording that it must refuse."""
+    run = folder / "run.parquet"
+    write_parquet(recording, run)
+    with pytest.raises(InputError) as error:
+        diagnose([run], None, bench_file, folder / "out")
+    assert error.value.exit_code == 2
+    assert sorted(path.name for path in folder.iterdir()) == ["bench.yaml", "run.parquet"]
+    return str(error.value)
+
+
+def test_a_torque_of_wrong_sign_is_refused(tmp_path: Path, bench_file: str) -> None:
+    run = changed(recorded(bench(), times=3), torque_n_m=-1.0, torque_command_n_m=-1.0)
+    assert "torque_n_m has the wrong sign" in refused(tmp_path, bench_file, run)
+
+
+def test_a_table_in_millimetres_is_refused(tmp_path: Path, bench_file: str) -> None:
+    run = changed(recorded(bench(), times=3), table_position_m=1e3)
+    assert "table_position_m: is 1000 × what the set-points ask for: it looks like mm" in refused(
+        tmp_path, bench_file, run)
+
+
+def test_a_recording_that_holds_out_too_little_is_refused(tmp_path: Path, bench_file: str) -> None:
+    assert "run (last part): too short" in refused(tmp_path, bench_file, recorded(bench()))

@@ -1,0 +1,99 @@
+"""The rig recordings, whose cause is known, from the files to the report; one diagnosis for each folder."""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import pytest
+from diagnosis_runs import rig
+
+from hil.bench import load_bench
+from hil.diagnosis.diagnose import Diagnosis, diagnose
+from hil.diagnosis.result import schema
+from hil.measured import take
+from hil.recording import read_recording
+from hil.report.diagnose_report import write_diagnosis
+from hil.twin.library import BY_ID
+
+# As the README of the recordings has it
+TRUTH: dict[str, tuple[str, dict[str, float]]] = {
+    "stribeck": ("stribeck_friction", {"static_torque_n_m": 1.708, "stribeck_velocity_rad_s": 3.085}),
+    "backlash": ("backlash", {"gap_m": 24.74e-6}),
+    "lead": ("periodic_lead_error", {"amplitude_m": 5.858e-6, "phase_rad": 1.532}),
+}
+EFFECTS = [pytest.param(folder, marks=pytest.mark.long) for folder in TRUTH]
+
+
+@cache
+def diagnosed(folder: str) -> Diagnosis:
+    """The diagnosis of a folder, made once."""
+    path = rig(folder)
+    train = [read_recording(path / f"train_{number}.csv") for number in (1, 2)]
+    return diagnose(train, [read_recording(path / "holdout.csv")], load_bench(path.parent / "axis.yaml"))
+
+
+@pytest.mark.parametrize("folder", EFFECTS)
+def test_the_effect_is_named_first_with_its_parameters(folder: str) -> None:
+    effect, parameters = TRUTH[folder]
+    result = diagnosed(folder).result
+    assert result.verdict == "missing_physics"
+    assert [finding.effect for finding in result.missing] == [effect]
+    found = result.missing[0]
+    assert {name: found.parameters[name].value for name in parameters} == pytest.approx(parameters, rel=0.05)
+    assert found.confidence > 0.9
+    assert result.location is not None
+    assert result.location.block == BY_ID[effect].block
+
+
+@pytest.mark.parametrize("folder", EFFECTS)
+def test_it_explains_the_held_out_recording(folder: str) -> None:
+    result = diagnosed(folder).result
+    for channel, entry in result.fit.items():
+        assert entry.validate_ is not None
+        assert entry.validate_.after_rms < 1.15 * entry.validate_.noise_floor_rms, channel
+        assert entry.validate_.after_rms < 0.3 * entry.validate_.before_rms, channel
+    assert result.unexplained.share < 0.01
+
+
+def test_where_no_physics_is_missing_none_is_named() -> None:
+    result = diagnosed("null").result
+    assert result.verdict == "parameter_error"
+    assert result.missing == ()
+    correction = result.parameter_corrections["coulomb_torque_n_m"]
+    assert correction.nominal == 1.1
+    assert abs(correction.value - 1.1) > 10.0 * correction.std
+    for channel, entry in result.fit.items():
+        assert entry.validate_ is not None
+        assert entry.validate_.after_rms < 1.15 * entry.validate_.noise_floor_rms, channel
+
+
+@pytest.mark.parametrize("folder", ["null", *EFFECTS])
+def test_the_report_is_whole(folder: str, tmp_path: Path) -> None:
+    diagnosis = diagnosed(folder)
+    write_diagnosis(diagnosis, tmp_path)
+    data: dict[str, Any] = json.loads((tmp_path / "diagnosis.json").read_text())
+    jsonschema.validate(data, schema())
+    page = (tmp_path / "report.html").read_text()
+    assert diagnosis.result.statement[:40] in page
+    for picture in ["location", "residuals", *(finding.effect for finding in diagnosis.result.missing)]:
+        assert (tmp_path / f"{picture}.png").stat().st_size > 10_000, picture
+
+
+@pytest.mark.parametrize("folder", ["null", *EFFECTS])
+def test_the_diagnosed_bench_is_a_bench_and_explains(folder: str, tmp_path: Path) -> None:
+    """It is read back, and its twin leaves what `fit` says in closed loop."""
+    diagnosis = diagnosed(folder)
+    write_diagnosis(diagnosis, tmp_path)
+    bench = load_bench(tmp_path / "bench.diagnosed.yaml")
+    assert {entry.effect for entry in bench.mechanisms} == {finding.effect for finding in diagnosis.result.missing}
+    run = take(read_recording(rig(folder) / "holdout.csv"), bench)
+    answer = bench.twin().simulate(run.position_command_m, run.velocity_command_m_s, run.start, run.table_m)
+    left = (run.torque - answer.torque)[run.judged]
+    entry = diagnosis.result.fit["torque_n_m"]
+    assert entry.validate_ is not None
+    if entry.mode == "closed_loop":
+        assert float((left**2).mean() ** 0.5) == pytest.approx(entry.validate_.after_rms, rel=0.02)

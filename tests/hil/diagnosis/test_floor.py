@@ -1,0 +1,63 @@
+"""The noise floor of repeated laps is what does not repeat, however large the rest is."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from diagnosis_runs import RIG, bench, recorded
+
+from hil.bench import load_bench
+from hil.diagnosis.floor import floor, laps
+from hil.diagnosis.model import Model
+from hil.importing import import_recording
+from hil.measured import Measured, take
+
+EMPS = RIG.parent / "emps" / "DATA_EMPS.mat"
+
+
+@pytest.fixture(scope="module")
+def three_laps() -> Measured:
+    return take(recorded(bench(), times=3), bench())
+
+
+def test_repeated_laps_are_found(three_laps: Measured) -> None:
+    found = laps(three_laps)
+    assert found is not None
+    period = (three_laps.motor.size - 1) / 3 * three_laps.period_s
+    assert min(abs(found.lag_s - period * k) for k in (1, 2)) < 0.002
+
+
+@pytest.mark.parametrize("sigma", [0.01, 0.3])
+def test_only_what_does_not_repeat_is_noise(three_laps: Measured, sigma: float) -> None:
+    found = laps(three_laps)
+    assert found is not None
+    repeatable = 5.0 * np.sin(three_laps.position_command_m / 0.01) + 3.0 * np.sign(three_laps.velocity_command_m_s)
+    noise = np.random.default_rng(3).normal(0.0, sigma, repeatable.size)
+    measured = floor(repeatable + noise, 1e-6, found)
+    assert measured.source == "repeated_laps"
+    assert measured.rms == pytest.approx(sigma, rel=0.05)
+
+
+def test_a_floor_is_never_below_the_sensor_noise(three_laps: Measured) -> None:
+    found = laps(three_laps)
+    assert floor(np.zeros(three_laps.motor.size), 0.02, found).rms == 0.02
+
+
+def test_without_laps_the_floor_is_the_sensor_noise() -> None:
+    once = take(recorded(bench()), bench())
+    assert laps(once) is None
+    assert floor(np.ones(once.motor.size), 0.02, None).source == "white_noise"
+
+
+def test_the_emps_record_has_its_published_floor() -> None:
+    """Position about 0.22 um, force 0.3 to 0.37 N, by three laps."""
+    if not EMPS.exists():
+        pytest.skip("the EMPS record is not beside the repository")
+    owner = load_bench("emps_symmetric")
+    run = take(import_recording(EMPS, "emps"), owner)
+    found = laps(run)
+    assert found is not None
+    model = Model(owner)
+    left = model.closed_loop(model.initial(), run)
+    assert found.noise(left["motor"]) == pytest.approx(0.2e-6, rel=0.15)
+    assert 0.3 <= found.noise(left["torque"]) <= 0.37

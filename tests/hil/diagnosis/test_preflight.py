@@ -1,0 +1,127 @@
+"""Recordings that cannot be diagnosed are refused with the reason; sound ones pass, whatever physics they have."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from diagnosis_runs import bench, changed, recorded
+
+from hil.bench import load_bench
+from hil.diagnosis.model import Term
+from hil.diagnosis.preflight import prepare, regress
+from hil.errors import InputError
+from hil.recording import Recording
+
+OWNER = bench()
+
+
+@pytest.fixture(scope="module")
+def run() -> Recording:
+    return recorded(OWNER)
+
+
+def refused(recording: Recording) -> str:
+    with pytest.raises(InputError) as error:
+        prepare([recording], OWNER)
+    return str(error.value)
+
+
+def part(recording: Recording, rows: slice) -> Recording:
+    return changed(recording, **{name: values[rows] for name, values in recording.columns.items()})
+
+
+@pytest.mark.parametrize("terms", [
+    (), (Term("backlash", 0, (50e-6,)),), (Term("stribeck_friction", 0, (2.0, 3.0)),),
+    (Term("constant_load", 0, (2.0,)),), (Term("current_loop_lag", 1, (2e-3,)),),
+    (Term("torque_saturation", 0, (3.0,)),)])
+def test_physics_is_no_reason_to_refuse(terms: tuple[Term, ...]) -> None:
+    """With parameters wrong by 30 % beside it."""
+    truth = bench(motor_mass_kg=240.0, table_mass_kg=270.0, coulomb_torque_n_m=1.5)
+    assert len(prepare([recorded(truth, *terms)], OWNER)) == 1
+
+
+def test_the_regression_finds_inertia_and_friction(run: Recording) -> None:
+    found = regress(prepare([run], OWNER)[0])
+    assert found is not None
+    (inertia, viscous, coulomb, offset), _ = found
+    axis = OWNER.axis
+    assert inertia == pytest.approx(719.0 * axis.ratio_m_rad**2, rel=0.05)
+    assert coulomb == pytest.approx(1.1, rel=0.05)
+    assert viscous == pytest.approx(0.0064, rel=0.1)
+    assert abs(offset) < 0.02
+
+
+def test_too_short(run: Recording) -> None:
+    assert "too short: given 1 s, allowed 2 s" in refused(part(run, slice(0, 1000)))
+
+
+def test_no_recording() -> None:
+    with pytest.raises(InputError, match="given no recording"):
+        prepare([], OWNER)
+
+
+def test_without_excitation(run: Recording) -> None:
+    still = {name: np.zeros(3000) for name in run.columns} | {"time_s": np.arange(3000) * 1e-3}
+    assert "without excitation: the set-points do not move" in refused(changed(run, **still))
+
+
+@pytest.mark.parametrize(("channel", "message"), [
+    ("motor_position_rad", "motor_position_rad is not recorded"), ("torque_n_m", "torque_n_m is not recorded"),
+    ("table_position_m", "table_position_m is not recorded, but the bench reference has a linear encoder")])
+def test_missing_channel(run: Recording, channel: str, message: str) -> None:
+    assert message in refused(changed(run, **{channel: None}))
+
+
+@pytest.mark.parametrize("channel", ["motor_position_rad", "table_position_m", "torque_n_m"])
+def test_frozen_channel(run: Recording, channel: str) -> None:
+    assert f"{channel} is frozen" in refused(changed(run, **{channel: np.full(len(run), 0.5)}))
+
+
+def test_copied_channel(run: Recording) -> None:
+    copy = OWNER.axis.ratio_m_rad * run["motor_position_rad"]
+    assert "table_position_m is a copy of the motor position" in refused(changed(run, table_position_m=copy))
+
+
+@pytest.mark.parametrize(("channel", "factor", "message"), [
+    ("motor_position_rad", -1.0, "motor_position_rad: has the wrong sign"),
+    ("motor_position_rad", 180.0 / math.pi, "looks like degrees"),
+    ("motor_position_rad", 0.5 / math.pi, "looks like revolutions"),
+    ("table_position_m", -1.0, "table_position_m: has the wrong sign"),
+    ("table_position_m", 1e3, "looks like mm"),
+    ("velocity_command_m_s", 60.0, "looks like m/min"),
+    ("torque_n_m", -1.0, "torque_n_m runs against torque_command_n_m")])
+def test_wrong_sign_or_unit_of_one_channel(run: Recording, channel: str, factor: float, message: str) -> None:
+    assert message in refused(changed(run, **{channel: factor}))
+
+
+@pytest.mark.parametrize(("factor", "unit"), [
+    (1e3, "mN m"), (100.0, "N cm"), (1e-3, "kN m"), (2.0 * math.pi * 100.0, "N at the table"), (1.0 / 9.81, "")])
+def test_wrong_unit_of_the_torque(run: Recording, factor: float, unit: str) -> None:
+    message = refused(changed(run, torque_n_m=factor, torque_command_n_m=factor))
+    assert "what the inertia and friction of the bench (N m) ask for" in message
+    assert not unit or f"looks like {unit}" in message
+
+
+def test_a_negative_mass_is_a_wrong_sign_and_no_result(run: Recording) -> None:
+    message = refused(changed(run, torque_n_m=-1.0, torque_command_n_m=-1.0))
+    assert "torque_n_m has the wrong sign" in message
+    assert "no mass is negative" in message
+
+
+def test_saturation_throughout(run: Recording) -> None:
+    limit = np.sign(run["torque_command_n_m"]) * OWNER.gains.torque_limit_n_m
+    assert "saturated throughout" in refused(changed(run, torque_command_n_m=limit, torque_n_m=limit))
+
+
+def test_all_reasons_are_given_at_once(run: Recording) -> None:
+    message = refused(changed(run, table_position_m=1e3, motor_position_rad=-1.0))
+    assert len(message.splitlines()) == 2
+    assert "run: motor_position_rad" in message
+    assert "run: table_position_m" in message
+
+
+def test_a_linear_axis_is_not_for_a_rotary_bench(run: Recording) -> None:
+    with pytest.raises(InputError, match="give the bench of this axis"):
+        prepare([run], load_bench("emps"))

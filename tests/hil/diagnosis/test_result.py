@@ -1,0 +1,76 @@
+"""diagnosis.json is as documented, its schema is current; confidence grows with what speaks for a name."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import jsonschema
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hil.diagnosis.confidence import confidence
+from hil.diagnosis.result import SCHEMA_FILE, Result, schema
+
+FIGURES = {"before_rms": 0.08, "after_rms": 0.0101, "noise_floor_rms": 0.0099, "owner_rms": 0.2}
+EXAMPLE: dict[str, Any] = {
+    "verdict": "missing_physics", "statement": "There are 24.7 µm of lost motion between screw and table.",
+    "location": {"block": "transmission", "element": "ball nut", "channels": ("table_position_m",),
+                 "phases": ({"kind": "reversal", "share": 0.9},), "windows_s": ((0.1, 0.2),)},
+    "missing": ({"effect": "backlash", "confidence": 0.9, "equivalents": ("preload_loss",),
+                 "rivals": ({"effect": "preload_loss", "evidence": "close"},),
+                 "parameters": {"gap_m": {"value": 2.4e-5, "std": 1e-8, "unit": "m"}}, "sentence": "lost motion"},),
+    "parameter_corrections": {"motor_mass_kg": {"nominal": 335.0, "value": 330.0, "std": 0.1, "unit": "kg"}},
+    "fit": {"torque_n_m": {"unit": "N m", "mode": "closed_loop", "floor_from": "white_noise", "train": FIGURES,
+                           "validate": FIGURES}},
+    "not_testable": ("thermal_growth",), "unexplained": {"share": 0.01, "description": "noise"}, "runtime_s": 12.0,
+}
+KEYS = {"schema_version", "verdict", "location", "missing", "parameter_corrections", "fit", "not_testable",
+        "unexplained", "next_experiment", "runtime_s"}
+LOCATION = {"block", "element", "channels", "phases", "windows_s", "position_m", "speed_m_s", "frequency_hz",
+            "period_m", "order_per_rev"}
+
+
+def test_the_shipped_schema_is_current() -> None:
+    assert json.loads(SCHEMA_FILE.read_text(encoding="utf-8")) == json.loads(json.dumps(schema())), \
+        "run hil.diagnosis.result.write_schema()"
+
+
+def test_a_result_is_valid_by_its_schema_and_has_the_documented_keys() -> None:
+    data = json.loads(json.dumps(Result.model_validate(EXAMPLE).as_json()))
+    jsonschema.validate(data, schema())
+    assert set(data) >= KEYS
+    assert set(data["location"]) == LOCATION
+    assert set(data["fit"]["torque_n_m"]["validate"]) >= {"before_rms", "after_rms", "noise_floor_rms"}
+    assert data["next_experiment"] is None
+
+
+@pytest.mark.parametrize(("path", "value"), [
+    (("verdict",), "maybe"), (("unexplained", "share"), 1.5), (("schema_version",), 2),
+    (("missing", 0, "confidence"), float("nan")), (("fit", "torque_n_m", "mode"), "open_loop")])
+def test_what_the_interface_does_not_allow_is_refused(path: tuple[str | int, ...], value: Any) -> None:
+    data = json.loads(json.dumps(Result.model_validate(EXAMPLE).as_json()))
+    part = data
+    for key in path[:-1]:
+        part = part[key]
+    part[path[-1]] = value
+    with pytest.raises(ValueError, match="validation error"):
+        Result.model_validate(data)
+
+
+SHARES = st.floats(0.0, 1.0)
+
+
+@given(st.floats(0.0, 1e7), SHARES, SHARES, st.floats(0.0, 1e7), SHARES, SHARES)
+def test_confidence_grows_with_each_thing_that_speaks_for_a_name(
+        margin: float, explained: float, held_out: float, more: float, better: float, proven: float) -> None:
+    low = confidence(margin, explained, held_out)
+    assert 0.0 <= low <= 1.0
+    assert confidence(max(margin, more), max(explained, better), max(held_out, proven)) >= low
+
+
+def test_confidence_tells_a_sure_name_from_a_guess() -> None:
+    assert confidence(1e4, 1.0, 1.0) > 0.95
+    assert confidence(10.0, 0.5, 0.3) < 0.4
+    assert confidence(100.0, 1.0, 0.0) < confidence(100.0, 1.0, None) < confidence(100.0, 1.0, 1.0)

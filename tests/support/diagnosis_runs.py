@@ -1,0 +1,71 @@
+"""Recordings for the diagnosis: the twin itself, with sensor noise, so that every truth is known exactly."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hil.bench import Bench, load_bench
+from hil.diagnosis.model import Model, Term
+from hil.profile import Profile
+from hil.recording import Recording
+from hil.trajectory import plan
+from hil.twin.axis import Start
+
+RIG = Path(__file__).parents[2].parent / "shared" / "recordings" / "rig"
+
+SEGMENTS = [
+    {"kind": "dwell", "duration_s": 0.2},
+    {"kind": "sine_squared", "to_m": 0.06, "feed_m_s": 0.1}, {"kind": "dwell", "duration_s": 0.1},
+    {"kind": "sine_squared", "to_m": 0.0, "feed_m_s": 0.25}, {"kind": "dwell", "duration_s": 0.1},
+    {"kind": "sine_squared", "to_m": 0.0015, "feed_m_s": 0.004},
+    {"kind": "sine_squared", "to_m": 0.0, "feed_m_s": 0.004},
+    {"kind": "dwell", "duration_s": 0.1},
+]
+
+
+def bench(**axis: float) -> Bench:
+    """The reference bench, with parameters of its axis replaced."""
+    reference = load_bench("reference")
+    return reference.model_copy(update={"axis": reference.axis.model_copy(update=axis)})
+
+
+def recorded(truth: Bench, *terms: Term, seed: int = 1, times: int = 1, name: str = "run") -> Recording:
+    """What an axis that is `truth` with `terms` records over the segments, `times` times over."""
+    profile = Profile.model_validate({
+        "schema_version": 1, "limits": {"velocity_m_s": 0.4, "acceleration_m_s2": 2.2, "jerk_m_s3": 100.0},
+        "segments": [{"kind": "repeat", "times": times, "segments": SEGMENTS}]})
+    trajectory = plan(profile, truth.gains.period_s)
+    model = Model(truth, terms)
+    answer = model.twin(model.initial()).simulate(trajectory.position_m, trajectory.velocity_m_s, Start())
+    noise = np.random.default_rng(seed)
+    count = 2.0 * np.pi / truth.encoders.motor.counts_per_rev
+    n = answer.torque.size
+    return Recording(name, {
+        "time_s": np.arange(n) * truth.gains.period_s,
+        "position_command_m": trajectory.position_m, "velocity_command_m_s": trajectory.velocity_m_s,
+        "motor_position_rad": np.round(answer.motor_position / count) * count,
+        "table_position_m": np.round(answer.table_position_m / 0.5e-6) * 0.5e-6,
+        "torque_command_n_m": answer.torque_command,
+        "torque_n_m": answer.torque + noise.normal(0.0, 0.01, n)}, truth.gains.period_s)
+
+
+def changed(recording: Recording, **columns: object) -> Recording:
+    """A recording with columns multiplied by a factor, replaced by an array, or left out (None)."""
+    new = dict(recording.columns)
+    for name, change in columns.items():
+        if change is None:
+            del new[name]
+        else:
+            new[name] = change if isinstance(change, np.ndarray) else change * new[name]   # type: ignore[operator]
+    return replace(recording, columns=new)
+
+
+def rig(folder: str) -> Path:
+    """A folder of rig recordings beside the repository."""
+    if not (RIG / folder).is_dir():
+        pytest.skip(f"the rig recordings {folder} are not beside the repository")
+    return RIG / folder

@@ -122,11 +122,12 @@ def _one_way(found: Sequence[tuple[FloatArray, FloatArray]], sign: float) -> tup
     return speed[speed > 0.0], friction[speed > 0.0]
 
 
-def _over(label: str, x_of: Callable[[Diagnosis, _View], FloatArray], x_unit: str, channel: str = "motor",
+def _over(label: str, x_of: Callable[[Diagnosis, _View], FloatArray], x_unit: str, wanted: str = "motor",
           bins: int = _BINS, against_motion: bool = False) -> Callable[[Diagnosis, Sequence[_View]], Shown]:
     """A picture of the residual over a quantity: measured as points, what the terms explain as a line."""
 
     def picture(diagnosis: Diagnosis, views: Sequence[_View]) -> Shown:
+        channel = wanted if wanted in views[0].measured else "motor"
         x = np.concatenate([x_of(diagnosis, view)[view.torque.sliding] for view in views])
         sign = np.concatenate([-np.sign(view.torque.velocity[view.torque.sliding]) for view in views])
         measured, modelled = (np.concatenate([_residual(view, channel, of_term)[view.torque.sliding] for view in views])

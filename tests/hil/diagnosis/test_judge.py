@@ -1,0 +1,140 @@
+"""Verdicts, proof on held-out recordings and findings, of hypotheses that are right, wrong, or short of the truth."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from diagnosis_runs import bench, recorded
+
+from hil.diagnosis.explain import Explanation, Rival, at_owner
+from hil.diagnosis.findings import diagnosed_bench, findings, renamed, standard_errors
+from hil.diagnosis.fit import Fit, fit
+from hil.diagnosis.judge import judge
+from hil.diagnosis.model import Model, Term
+from hil.diagnosis.proof import explained_share, prove
+from hil.diagnosis.result import Verdict
+from hil.diagnosis.testable import not_testable
+from hil.measured import Measured, take
+
+OWNER = bench()
+LOAD = Term("constant_load", 0, (0.4,))
+PLAY = Term("backlash", 0, (20e-6,))
+
+
+def runs(*terms: Term, seed: int = 1, **axis: float) -> list[Measured]:
+    return [take(recorded(bench(**axis), *terms, seed=seed), OWNER)]
+
+
+def believed(found: list[Measured], *terms: Term, **axis: float) -> Fit:
+    """A hypothesis as it stands, nothing fitted."""
+    return at_owner(Model(bench(**axis), terms), found)
+
+
+def test_a_twin_at_the_noise_has_no_mismatch() -> None:
+    found = runs()
+    right = believed(found)
+    assert judge(right, right, right, found, runs(seed=2)) is Verdict.NO_MISMATCH
+
+
+def test_a_trifle_is_no_parameter_error() -> None:
+    found = runs()
+    almost = believed(found, coulomb_torque_n_m=1.1002)
+    assert judge(almost, believed(found), believed(found), found, []) is Verdict.NO_MISMATCH
+
+
+def test_wrong_parameters_are_a_parameter_error() -> None:
+    found = runs(coulomb_torque_n_m=1.4)
+    wrong, right = believed(found), believed(found, coulomb_torque_n_m=1.4)
+    assert judge(wrong, right, right, found, runs(seed=2, coulomb_torque_n_m=1.4)) is Verdict.PARAMETER_ERROR
+
+
+def test_a_term_that_explains_is_missing_physics() -> None:
+    found = runs(LOAD)
+    plain = believed(found)
+    assert judge(plain, plain, believed(found, LOAD), found, runs(LOAD, seed=2)) is Verdict.MISSING_PHYSICS
+
+
+def test_a_mismatch_without_a_term_or_with_a_poor_one_is_unexplained() -> None:
+    found, held_out = runs(PLAY, LOAD), runs(PLAY, LOAD, seed=2)
+    plain = believed(found)
+    assert judge(plain, plain, plain, found, held_out) is Verdict.UNEXPLAINED
+    poor = believed(found, Term("constant_load", 0, (0.02,)))
+    assert explained_share(plain, poor, held_out) < 0.5
+    assert judge(plain, plain, poor, found, held_out) is Verdict.UNEXPLAINED
+
+
+def test_a_term_that_held_out_recordings_speak_against_is_dropped() -> None:
+    train, held_out = runs(LOAD), runs(seed=2)          # the load has gone
+    plain, loaded = believed(train), believed(train, LOAD)
+    proof = prove(plain, loaded, train, held_out)
+    assert proof.final is plain
+    assert [ablation.term for ablation in proof.dropped] == [LOAD]
+    kept = prove(plain, loaded, train, runs(LOAD, seed=2))
+    assert kept.final is loaded
+    assert kept.ablations[0].shown
+    assert kept.ablations[0].train > 2.0
+
+
+def test_a_term_that_held_out_recordings_do_not_show_may_stay() -> None:
+    late = Term("external_force", 0, (200.0, 1.0, 1.3))
+    train = runs(late)
+    held_out = [take(recorded(OWNER), OWNER)]
+    short = [Measured(**{**vars(run), **{name: getattr(run, name)[:900] for name in (
+        "position_command_m", "velocity_command_m_s", "motor", "table_m", "torque_command", "torque")}})
+        for run in held_out]
+    proof = prove(believed(train), believed(train, late), train, short)
+    assert not proof.dropped
+    assert not proof.ablations[0].shown
+
+
+def test_a_constant_load_is_called_by_its_commoner_name_and_both_are_listed() -> None:
+    train = runs(LOAD)
+    plain, loaded = believed(train), fit(Model(OWNER, (LOAD,)), train, evaluations=8)
+    explanation = Explanation(plain, plain, loaded, {LOAD.key: [Rival(plain_with(train), 500.0)]}, {LOAD.key: 900.0})
+    final = renamed(loaded)
+    proof = prove(plain, final, train, runs(LOAD, seed=2))
+    found, = findings(explanation, proof.final, proof.ablations, train, runs(LOAD, seed=2))
+    assert found.effect == "asymmetric_friction"
+    assert found.equivalents == ("constant_load",)
+    assert [rival.effect for rival in found.rivals] == ["spring_load"]
+    assert "evidence against it 500" in found.rivals[0].evidence
+    value = found.parameters["offset_torque_n_m"]
+    assert value.unit == "N m"
+    assert value.value == pytest.approx(0.4, abs=max(4.0 * value.std, 0.002))
+    assert value.std < 0.02
+    after = diagnosed_bench(OWNER, proof.final)
+    assert after.mechanisms[0].effect == "asymmetric_friction"
+    assert after.drive == OWNER.drive
+
+
+def plain_with(train: list[Measured]) -> Fit:
+    """A poor rival."""
+    return believed(train, Term("spring_load", 0, (10.0, 0.0)))
+
+
+def test_standard_errors_cover_the_truth() -> None:
+    """Of axes with other masses and friction: errors of all parameters over the standard errors that are stated."""
+    errors = []
+    for seed in range(6):
+        scale = np.random.default_rng(seed).uniform(0.8, 1.25, len(OWNER.axis.NOMINAL))
+        truth = {name: float(getattr(OWNER.axis, name) * factor)
+                 for name, factor in zip(OWNER.axis.NOMINAL, scale, strict=True)}
+        found = fit(Model(OWNER), runs(seed=seed, **truth))
+        errors.append((np.array(found.model.values(found.x)) - list(truth.values())) / standard_errors(found))
+    assert 0.3 < float(np.sqrt(np.mean(np.square(errors)))) < 2.5
+
+
+def test_what_this_motion_cannot_show() -> None:
+    train = runs()
+    hidden = not_testable(fit(Model(OWNER), train, evaluations=4), train)
+    assert "torque_saturation" in hidden            # the torque stays far from its limit
+    assert "thermal_growth" in hidden               # three seconds
+    assert not {"constant_load", "backlash", "stribeck_friction", "periodic_lead_error"} & set(hidden)
+
+
+def test_without_a_linear_encoder_nothing_behind_the_motor_can_be_shown() -> None:
+    blind = OWNER.model_copy(update={"encoders": OWNER.encoders.model_copy(update={"table": None})})
+    train = [take(recorded(OWNER), blind)]
+    hidden = not_testable(fit(Model(blind), train, evaluations=4), train)
+    assert {"backlash", "periodic_lead_error", "thermal_growth", "structural_mode"} <= set(hidden)
+    assert "constant_load" not in hidden

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from hil.bench import Bench
 from hil.channels import AXIS_CHANNELS, CHANNELS
 from hil.diagnosis.fit import Fit
-from hil.diagnosis.floor import Floor, floor, laps
+from hil.diagnosis.floor import Floor, Laps, floor, laps
 from hil.diagnosis.model import scales
 from hil.diagnosis.result import ChannelFit, FitFigures, Mode
 from hil.measured import Measured
@@ -55,44 +55,63 @@ def residuals(found: Fit, run: Measured) -> Residuals:
     return Residuals(closed, model.blocks(found.x, run))
 
 
+@dataclass(frozen=True, eq=False)
+class _Set:
+    """Recordings of one kind, training or held out, with the residuals of each hypothesis and their laps."""
+
+    runs: Sequence[Measured]
+    owner: list[Residuals]
+    nominal: list[Residuals]
+    final: list[Residuals]
+    laps: list[Laps | None]
+
+    def rms(self, found: list[Residuals], channel: str, mode: Mode) -> float:
+        """Root mean square of a channel over all recordings."""
+        values = [_of(entry, mode)[channel][run.judged] for entry, run in zip(found, self.runs, strict=True)]
+        return float(np.sqrt(np.mean(np.concatenate(values) ** 2)))
+
+    def floors(self, channel: str, mode: Mode, final: Fit) -> list[Floor]:
+        """Floor of a channel in each recording.
+
+        What one hypothesis does differently from lap to lap is its own, and no noise: the lowest is the floor.
+        """
+        return [min((floor(_of(entry, mode)[channel], _white(run, final, channel, mode), repeated)
+                     for entry in pair), key=lambda found: found.rms)
+                for *pair, run, repeated in zip(self.nominal, self.final, self.runs, self.laps, strict=True)]
+
+
 def fit_table(owner: Fit, nominal: Fit, final: Fit, train: Sequence[Measured],
               held_out: Sequence[Measured]) -> dict[str, ChannelFit]:
     """The table, by recorded channel."""
-    bench = final.model.bench
-    sets = {"train": train, "validate": held_out}
-    all_residuals = {(which, name): [residuals(fit, run) for run in runs] for which, runs in sets.items()
-                     for name, fit in (("owner", owner), ("nominal", nominal), ("final", final))}
-    all_laps = {which: [laps(run) for run in runs] for which, runs in sets.items()}
+
+    def gathered(runs: Sequence[Measured]) -> _Set:
+        return _Set(runs, *([residuals(found, run) for run in runs] for found in (owner, nominal, final)),
+                    [laps(run) for run in runs])
+
+    trained, validated = gathered(train), gathered(held_out)
+
+    def figures(of: _Set, channel: str, mode: Mode) -> FitFigures:
+        # the axis and its sensors are the same: laps of the one set tell the floor of the other
+        other = trained if of is validated else validated
+        own, others = of.floors(channel, mode, final), other.floors(channel, mode, final)
+        repeated = next((known for known in ([value.rms for value in values if value.source == "repeated_laps"]
+                                             for values in (own, others)) if known), [value.rms for value in own])
+        return FitFigures(before_rms=of.rms(of.nominal, channel, mode), after_rms=of.rms(of.final, channel, mode),
+                          noise_floor_rms=float(np.sqrt(np.mean(np.square(repeated)))),
+                          owner_rms=of.rms(of.owner, channel, mode))
+
     result = {}
-    for channel, recorded in channel_names(bench, train[0]).items():
+    any_laps = any(found is not None for found in (*trained.laps, *validated.laps))
+    for channel, recorded in channel_names(final.model.bench, train[0]).items():
         if channel == "command":
             continue
-
-        def floors(which: str, mode: Mode, channel: str = channel) -> list[Floor]:
-            # what one hypothesis does differently from lap to lap is its own, and no noise: the lowest is the floor
-            return [min((floor(_of(found, mode)[channel], _white(run, final, channel, mode), repeated)
-                         for found in pair), key=lambda value: value.rms)
-                    for *pair, run, repeated in zip(all_residuals[which, "nominal"], all_residuals[which, "final"],
-                                                    sets[which], all_laps[which], strict=True)]
-
-        def figures(which: str, mode: Mode, channel: str = channel) -> FitFigures:
-            runs = sets[which]
-            rms = {name: _pooled([_of(found, mode)[channel] for found in all_residuals[which, name]], runs)
-                   for name in ("owner", "nominal", "final")}
-            rows = [run.motor.size for run in runs]
-            noise = float(np.sqrt(np.average([value.rms**2 for value in floors(which, mode)], weights=rows)))
-            return FitFigures(before_rms=rms["nominal"], after_rms=rms["final"], noise_floor_rms=noise,
-                              owner_rms=rms["owner"])
-
-        mode = Mode.CLOSED_LOOP
-        closed, block = figures("train", Mode.CLOSED_LOOP), figures("train", Mode.BLOCKS)
-        strays = closed.after_rms > STRAYS * closed.noise_floor_rms
-        if strays and block.after_rms <= STRAYS * block.noise_floor_rms and not train[0].torque_is_command:
-            mode = Mode.BLOCKS
-        repeated = any(entry is not None for entry in all_laps["train"])
+        closed, block = (figures(trained, channel, mode) for mode in (Mode.CLOSED_LOOP, Mode.BLOCKS))
+        chaotic = (closed.after_rms > STRAYS * closed.noise_floor_rms
+                   and block.after_rms <= STRAYS * block.noise_floor_rms and not train[0].torque_is_command)
+        mode = Mode.BLOCKS if chaotic else Mode.CLOSED_LOOP
         result[recorded] = ChannelFit(
-            unit=CHANNELS[recorded].unit, mode=mode, floor_from="repeated_laps" if repeated else "white_noise",
-            train=figures("train", mode), validate_=figures("validate", mode) if held_out else None)
+            unit=CHANNELS[recorded].unit, mode=mode, floor_from="repeated_laps" if any_laps else "white_noise",
+            train=figures(trained, channel, mode), validate_=figures(validated, channel, mode) if held_out else None)
     return result
 
 
@@ -105,8 +124,3 @@ def _white(run: Measured, found: Fit, channel: str, mode: Mode) -> float:
     if mode is Mode.BLOCKS:
         return scales(run, found.model.bench, found.model.observer_s)[channel]
     return {"motor": run.noise.motor, "table": run.noise.table_m, "torque": run.noise.torque}[channel]
-
-
-def _pooled(values: Sequence[FloatArray], runs: Sequence[Measured]) -> float:
-    squares = [float(np.sum(value[run.judged] ** 2)) for value, run in zip(values, runs, strict=True)]
-    return float(np.sqrt(sum(squares) / sum(value[run.judged].size for value, run in zip(values, runs, strict=True))))

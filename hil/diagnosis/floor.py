@@ -22,6 +22,7 @@ FloatArray = NDArray[np.float64]
 Rows = NDArray[np.intp]
 
 _LAGS = 6                # strongest lags of the set-points that are tried
+_NEAR = 30               # rows about a peak of the correlation in which the lag is sought
 _SAME_M = 2e-6           # set-points closer than this are the same: printed ones are rounded
 _SETTLED_S = 0.3         # set-points must have been the same for so long: the axis remembers what came before
 _ENOUGH_S = 1.0          # of repeated motion, to call a floor measured
@@ -58,10 +59,11 @@ def floor(residual: FloatArray, white: float, laps: Laps | None) -> Floor:
 def laps(run: Measured) -> Laps | None:
     """The repeated motion in a run; None where nothing moves in the same way twice."""
     position, velocity = run.position_command_m, run.velocity_command_m_s
-    lags = _lags(velocity)
+    matched = np.zeros(position.size, dtype=bool)
     settled = max(round(_SETTLED_S / run.period_s), 1)
     first, again, best, longest = list[Rows](), list[Rows](), 0.0, 0
-    for lag in lags:
+    # neighbouring laps first, and each row once: laps far apart also differ by what drifts, which is no noise
+    for lag in sorted(_lags(position, velocity)):
         same = np.abs(position[:-lag] - position[lag:]) < _SAME_M
         # the same for a while before: a running count since the last difference
         different = np.flatnonzero(~same)
@@ -69,7 +71,8 @@ def laps(run: Measured) -> Laps | None:
         since[different] = different
         since = np.arange(same.size) - np.maximum.accumulate(since)
         moving = np.abs(velocity[:-lag]) > 1e-3 * np.max(np.abs(velocity))
-        rows = np.flatnonzero((since > settled) & moving)
+        rows = np.flatnonzero((since > settled) & moving & ~matched[:-lag])
+        matched[rows] = True
         first.append(rows)
         again.append(rows + lag)
         if rows.size > longest:
@@ -79,11 +82,15 @@ def laps(run: Measured) -> Laps | None:
     return Laps(np.concatenate(first), np.concatenate(again), best)
 
 
-def _lags(velocity: FloatArray) -> list[int]:
-    """Lags [rows] at which the velocity set-points resemble themselves most, best first."""
+def _lags(position: FloatArray, velocity: FloatArray) -> list[int]:
+    """Lags [rows] at which the set-points resemble themselves most, best first."""
     n = velocity.size
     size = 1 << (2 * n - 1).bit_length()
     correlation = np.fft.irfft(np.abs(np.fft.rfft(velocity, size)) ** 2, size)[:n]
     peaks = np.flatnonzero((correlation[1:-1] > correlation[:-2]) & (correlation[1:-1] >= correlation[2:])
                            & (correlation[1:-1] > 0.05 * correlation[0])) + 1
-    return [int(peak) for peak in peaks[np.argsort(correlation[peaks])[::-1][:_LAGS]]]
+    # the shorter the overlap, the smaller the sum: its peaks stand a few rows too early
+    found = (min(range(max(peak - _NEAR, 1), min(peak + _NEAR, n - 1)),
+                 key=lambda lag: float(np.mean(np.abs(position[:n - lag:7] - position[lag::7]))))
+             for peak in peaks[np.argsort(correlation[peaks])[::-1][:_LAGS]].tolist())
+    return list(dict.fromkeys(found))

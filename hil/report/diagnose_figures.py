@@ -19,7 +19,8 @@ from hil.report.figures import style
 from hil.report.look import FloatArray, shown
 
 _BINS = 120
-_ENOUGH = 15      # samples of a bin, for a median that is worth a point
+_ENOUGH = 8       # samples of a bin, for a median that is worth a point
+_PER_BIN = 60     # samples on average, where a recording is short
 _AFTER = look.SIMULATED
 
 
@@ -40,6 +41,9 @@ class _View:
     modelled: dict[str, FloatArray]      # of that, what the term explains
     torque: Disturbance                  # the motor's share of it, as a torque
     torque_modelled: Disturbance
+
+
+_Picture = Callable[[Diagnosis, Sequence[_View]], Shown]
 
 
 def convincing(diagnosis: Diagnosis, effect: str) -> Shown:
@@ -123,26 +127,35 @@ def _one_way(found: Sequence[tuple[FloatArray, FloatArray]], sign: float) -> tup
 
 
 def _over(label: str, x_of: Callable[[Diagnosis, _View], FloatArray], x_unit: str, wanted: str = "motor",
-          bins: int = _BINS, against_motion: bool = False) -> Callable[[Diagnosis, Sequence[_View]], Shown]:
+          bins: int = _BINS, against_motion: bool = False, per_torque: bool = False) -> _Picture:
     """A picture of the residual over a quantity: measured as points, what the terms explain as a line."""
 
     def picture(diagnosis: Diagnosis, views: Sequence[_View]) -> Shown:
         channel = wanted if wanted in views[0].measured else "motor"
         x = np.concatenate([x_of(diagnosis, view)[view.torque.sliding] for view in views])
-        sign = np.concatenate([-np.sign(view.torque.velocity[view.torque.sliding]) for view in views])
+        scale = np.ones(x.size)
+        if against_motion:
+            scale = np.concatenate([-np.sign(view.torque.velocity[view.torque.sliding]) for view in views])
+        if per_torque:
+            torque = np.concatenate([view.run.torque[view.torque.sliding] for view in views])
+            scale = 100.0 / np.where(np.abs(torque) > 0.2 * np.abs(torque).max(), torque, np.inf)
         measured, modelled = (np.concatenate([_residual(view, channel, of_term)[view.torque.sliding] for view in views])
-                              * (sign if against_motion else 1.0) for of_term in (False, True))
-        edges = np.linspace(float(x.min()), float(x.max()), bins + 1)
-        centre, points, spread = _binned(x, measured, edges)
-        _, curve, _ = _binned(x, modelled, edges)
-        si = _unit(diagnosis, channel)
+                              * scale for of_term in (False, True))
+        used = scale != 0.0
+        edges = np.linspace(float(x.min()), float(x.max()), int(np.clip(used.sum() / _PER_BIN, 10, bins)) + 1)
+        centre, points, spread = _binned(x[used], measured[used], edges)
+        _, curve, _ = _binned(x[used], modelled[used], edges)
+        gap = np.flatnonzero(np.diff(centre) > 1.5 * (edges[1] - edges[0])) + 1      # no line where nothing is
+        line = np.insert(centre, gap, np.nan), np.insert(curve, gap, np.nan)
+        si = "%" if per_torque else _unit(diagnosis, channel)
         unit = shown(si, float(np.abs(points).max()))
         figure = Figure(figsize=(10.0, 4.8), layout="constrained")
         axis = figure.subplots()
         axis.errorbar(centre, points * unit.factor, spread * unit.factor, fmt="o", color=look.MEASURED, markersize=3.5,
                       linewidth=0.8, label="measured, less the twin without this term")
-        axis.plot(centre, curve * unit.factor, color=_AFTER, linewidth=1.8, label="what the term says")
-        style(axis, f"{'friction' if against_motion else _NAMES[channel]} [{unit.unit}]")
+        axis.plot(line[0], line[1] * unit.factor, color=_AFTER, linewidth=1.8, label="what the term says")
+        name = "friction" if against_motion else "torque per ampere" if per_torque else _NAMES[channel]
+        style(axis, f"{name} [{unit.unit}]")
         axis.set_xlabel(f"{label} [{x_unit}]")
         axis.axhline(0.0, color="black", linewidth=0.8)
         axis.legend(frameon=False, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
@@ -200,16 +213,19 @@ def _drive(diagnosis: Diagnosis, views: Sequence[_View]) -> Shown:
     unit = "N" if diagnosis.owner.axis.linear else "N m"
     window = _steepest(run.torque_command, run)
     for label, values, colour in (
-            ("measured", run.torque, look.MEASURED),
             ("nominal twin, refitted", run.torque - nominal.model.blocks(nominal.x, run)["torque"], look.COMMAND),
+            ("measured", run.torque, look.MEASURED),
             ("twin with the terms found", run.torque - final.model.blocks(final.x, run)["torque"], _AFTER)):
-        left.plot(run.torque_command[rows], values[rows], ".", color=colour, markersize=2.0, alpha=0.6, label=label)
-        right.plot(run.time_s[window], values[window], color=colour, linewidth=1.2)
+        broad = label == "measured"
+        left.plot(run.torque_command[rows], values[rows], ".", color=colour, markersize=6.0 if broad else 2.0,
+                  alpha=0.5, markeredgewidth=0.0, label=label)
+        right.plot(run.time_s[window], values[window], color=colour, linewidth=3.0 if broad else 1.2,
+                   alpha=0.5 if broad else 1.0)
     right.plot(run.time_s[window], run.torque_command[window], color="black", linewidth=0.8, linestyle=":",
                label="command")
     style(left, f"torque [{unit}]")
     left.set_xlabel(f"torque command [{unit}]")
-    left.legend(frameon=False, markerscale=4.0)
+    left.legend(frameon=False, markerscale=2.0)
     left.set_title("Over the command", loc="left")
     style(right, f"torque [{unit}]")
     right.set_xlabel("time [s]")
@@ -259,8 +275,9 @@ def _over_time(diagnosis: Diagnosis, views: Sequence[_View]) -> Shown:
         style(axis, f"{_NAMES[channel]} [{unit.unit}]")
     axes[-1].set_xlabel("time [s]")
     axes[0].legend(frameon=False, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
-    axes[0].set_title("Left by the twin over time; below where it is largest", loc="left")
-    return Shown(figure, "What the twin without this term leaves, and what the mechanism says of it.")
+    axes[0].set_title("Left by the twin over time", loc="left")
+    return Shown(figure, "What the twin without this term leaves, and what the mechanism says of it; below, where that "
+                         "is most.")
 
 
 _NAMES = {"motor": "torque on the motor", "table": "table against motor", "torque": "torque", "command": "command"}
@@ -327,12 +344,13 @@ def _within_period(diagnosis: Diagnosis, view: _View) -> FloatArray:
     return np.asarray(1e6 * np.mod(view.run.table_m, term.values[1]))
 
 
-_PICTURES: dict[str, Callable[[Diagnosis, Sequence[_View]], Shown]] = {
+_PICTURES: dict[str, _Picture] = {
     **dict.fromkeys(("asymmetric_friction", "constant_load", "stribeck_friction", "nonlinear_viscous_friction"),
                     _friction),
     "position_dependent_friction": _over("position", _position, "mm", against_motion=True),
     "spring_load": _over("position", _position, "mm"),
-    **dict.fromkeys(("cogging_torque", "torque_ripple"), _over("motor angle", _angle, "deg", bins=240)),
+    "cogging_torque": _over("motor angle", _angle, "deg", bins=240),
+    "torque_ripple": _over("motor angle", _angle, "deg", bins=240, per_torque=True),
     "encoder_eccentricity": _over("motor angle", _angle, "deg", "table"),
     "periodic_lead_error": _over("screw angle", _angle, "deg", "table"),
     "cumulative_lead_error": _over("position", _position, "mm", "table"),

@@ -57,6 +57,7 @@ def test_the_emps_record_has_its_published_floor() -> None:
     run = take(import_recording(EMPS, "emps"), owner)
     found = laps(run)
     assert found is not None
+    assert found.lag_s == pytest.approx(6.24)
     model = Model(owner)
     left = model.closed_loop(model.initial(), run)
     assert found.noise(left["motor"]) == pytest.approx(0.2e-6, rel=0.15)

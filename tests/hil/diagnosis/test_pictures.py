@@ -1,0 +1,56 @@
+"""Every mechanism of the library has its picture, in which measurement and mechanism agree."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from diagnosis_runs import bench, recorded
+
+from hil.diagnosis.diagnose import Diagnosis
+from hil.diagnosis.explain import Explanation, at_owner
+from hil.diagnosis.model import Model, Term
+from hil.diagnosis.proof import Proof
+from hil.diagnosis.result import Result, Unexplained, Verdict
+from hil.diagnosis.testable import _typical
+from hil.measured import take
+from hil.report.diagnose_figures import convincing
+from hil.report.diagnose_location import location_figure
+from hil.report.figures import save
+from hil.twin.library import BY_ID
+
+OWNER = bench()
+
+
+def diagnosis_of(effect: str, times: float = 3.0) -> Diagnosis:
+    """A right diagnosis of an effect of some times the strength that an engineer would call a defect."""
+    run = take(recorded(OWNER), OWNER)
+    values = list(_typical(OWNER, [run])[effect])
+    as_it_is = ("presliding_hysteresis", "structural_mode", "preload_loss", "stribeck_friction")
+    values[0] *= 1.0 if effect in as_it_is else times
+    if effect == "torque_saturation":
+        values[0] = 3.0
+    if effect == "external_force":
+        values[1:] = [0.8, 1.2]
+    term = Term(effect, 0, tuple(values))
+    runs = [take(recorded(OWNER, term), OWNER)]
+    plain, right = at_owner(Model(OWNER), runs), at_owner(Model(OWNER, (term,)), runs)
+    explanation, proof = Explanation(plain, plain, right), Proof(right, (), ())
+    result = Result(verdict=Verdict.MISSING_PHYSICS, statement="", location=None, missing=(), parameter_corrections={},
+                    fit={}, not_testable=(), unexplained=Unexplained(share=0.0, description=""), runtime_s=0.0)
+    return Diagnosis(result, OWNER, OWNER, tuple(runs), (), explanation, proof, right)
+
+
+@pytest.mark.parametrize("effect", BY_ID)
+def test_every_mechanism_has_its_picture(effect: str, tmp_path: Path) -> None:
+    shown = convincing(diagnosis_of(effect), effect)
+    assert save(shown.figure, tmp_path / f"{effect}.png").stat().st_size > 10_000
+    assert shown.caption.endswith("Recordings: run.")
+    axes = shown.figure.axes
+    assert all(axis.get_xlabel() or axis is not axes[-1] for axis in axes)
+    assert all("[" in axis.get_ylabel() for axis in axes)      # a unit
+
+
+def test_the_location_has_its_picture(tmp_path: Path) -> None:
+    figure = location_figure(diagnosis_of("stribeck_friction"))
+    assert save(figure, tmp_path / "location.png").stat().st_size > 10_000

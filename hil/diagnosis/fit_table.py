@@ -85,8 +85,8 @@ def fit_table(owner: Fit, nominal: Fit, final: Fit, train: Sequence[Measured],
     """The table, by recorded channel."""
 
     def gathered(runs: Sequence[Measured]) -> _Set:
-        return _Set(runs, *([residuals(found, run) for run in runs] for found in (owner, nominal, final)),
-                    [laps(run) for run in runs])
+        of = [[residuals(found, run) for run in runs] for found in (owner, nominal, final)]
+        return _Set(runs, of[0], of[1], of[2], [laps(run) for run in runs])
 
     trained, validated = gathered(train), gathered(held_out)
 

@@ -22,6 +22,7 @@ from hil.commands.paper import paper
 from hil.commands.run import run
 from hil.commands.validate import validate
 from hil.errors import HilError
+from hil.kernel_cache import provide_kernel_cache
 
 app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False, add_completion=False,
                   help="A servo bench that explains itself: control, twin, comparison.")
@@ -45,6 +46,7 @@ for _name, _command in COMMANDS:
 def main() -> None:
     """Entry point: runs the command line, turns errors into a message and an exit code."""
     try:
+        provide_kernel_cache()
         app()
     except SystemExit as end:
         if end.code == 130:

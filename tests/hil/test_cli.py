@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import io
 import json
+import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -93,6 +95,28 @@ def test_help_lists_the_commands_and_imports_nothing_heavy(tmp_path: Path) -> No
     code = f"import sys, hil.cli; sys.exit(', '.join({heavy} & set(sys.modules)) or 0)"
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert loaded.returncode == 0, loaded.stderr
+
+
+@pytest.mark.parametrize("temporary", [True, False])
+def test_an_installation_that_cannot_be_written(tmp_path: Path, temporary: bool) -> None:
+    for package in ("hil", "drivers"):
+        shutil.copytree(Path(__file__).parents[2] / package, tmp_path / package,
+                        ignore=shutil.ignore_patterns("__pycache__"))
+    for folder in {source.parent for source in tmp_path.rglob("*.py")}:
+        (folder / "__pycache__").touch()     # a file in its place stops even root
+    (tmp_path / "tmp").mkdir()
+    environment = {"PATH": os.environ["PATH"], "XDG_CACHE_HOME": os.devnull, "TMPDIR": str(tmp_path / "tmp")}
+    code = "from hil.cli import main; main()"
+    if not temporary:     # tempfile takes any folder it finds, so that none must be left
+        code = "import tempfile; tempfile.tempdir = '/dev/null'; " + code
+    ran = subprocess.run([sys.executable, "-c", code, "validate", "hil/benches/reference.yaml"], cwd=tmp_path,
+                         env=environment, capture_output=True, text=True, check=False)
+    assert ran.returncode == (0 if temporary else 1), ran.stderr
+    assert "Traceback" not in ran.stderr
+    if temporary:
+        assert list((tmp_path / "tmp").glob("hil-kernels-*/*/*.nbi"))
+    else:
+        assert "no folder for compiled kernels is writable" in ran.stderr
 
 
 def test_compare_writes_a_report_and_says_where(folder: Path) -> None:

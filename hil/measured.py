@@ -4,6 +4,8 @@ The set-points, the first samples and the control law fix the start of a closed-
 ticks of the position loop comes from replaying the controller over the first motion: of all phases, the one that
 reproduces the torque commands best. The rows before the first such tick are left out, since the velocity reference
 they were controlled with is not known.
+
+A drive in CSP gets positions only: the velocity that its loops feed forward is their difference from SYNC to SYNC.
 """
 
 from __future__ import annotations
@@ -15,6 +17,7 @@ from numpy.typing import NDArray
 
 from hil import control
 from hil.bench import Bench
+from hil.bench_hardware import DriveMode
 from hil.channels import AxisKind
 from hil.errors import InputError
 from hil.recording import Recording
@@ -90,6 +93,8 @@ def take(recording: Recording, bench: Bench) -> Measured:
                          "linear encoder; record it, or write 'table: null' under encoders in the bench file")
     motor, torque = _column(recording, names.motor_position), _column(recording, names.torque)
     position, velocity = _column(recording, names.position_command), _column(recording, names.velocity_command)
+    if bench.drive is not None and bench.drive.mode is DriveMode.CSP:
+        velocity = np.diff(position, prepend=2.0 * position[0] - position[1]) / gains.period_s
     has_command = names.torque_command in recording.columns
     command = _column(recording, names.torque_command) if has_command else torque
     table = _column(recording, names.table_position) if bench.has_table_encoder else np.empty(0)

@@ -56,6 +56,16 @@ def test_an_axis_as_believed_leaves_noise(clean: Comparison) -> None:
     assert block_rms(clean)["controller"] < 1e-9
 
 
+@pytest.mark.parametrize("mode", ["csv", "csp"])
+def test_loops_in_the_drive_are_those_of_the_twin(tmp_path: Path, mode: str) -> None:
+    data = bench_with().model_dump()
+    data["drive"]["mode"] = mode
+    result = compare(record(tmp_path, Bench.model_validate(data)), Bench.model_validate(data))
+    assert result.explained
+    assert result.torque_over_noise < 1.0
+    assert result.channel("following_error_m").rms < 1.0e-6
+
+
 @pytest.mark.parametrize(("effect", "parameters", "block"), [
     ("current_loop_lag", {"time_constant_s": 0.001}, "drive"),
     ("constant_load", {"load_torque_n_m": 0.5}, "motor and load"),

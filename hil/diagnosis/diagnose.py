@@ -187,8 +187,8 @@ def _notes(table: dict[str, ChannelFit], proof: Proof, verdict: Verdict, explana
     if blocks:
         notes.append(f"Figures of {', '.join(blocks)} are block by block, fed with measured inputs: in closed loop the "
                      "twin strays from the recording by more than its noise although every block is at its floor.")
-    notes += [f"{title(ablation.term.effect)} was dropped: it fits the training recordings, but held-out ones speak "
-              "against it." for ablation in proof.dropped]
+    notes += [f"{title(ablation.term.effect)} was dropped: it fits the training recordings, but held-out ones or "
+              "repeated laps speak against it." for ablation in proof.dropped]
     notes += [f"{title(ablation.term.effect)} does not show in the held-out recordings: it is not proven there."
               for ablation in proof.ablations if ablation.gain is not None and not ablation.shown]
     if verdict is Verdict.UNEXPLAINED and explanation.terms:

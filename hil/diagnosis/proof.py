@@ -3,6 +3,7 @@
     gain = sum over channels and runs of  n log(E_without / E_with),      E: whitened energy, see `evidence`
 
 Both hypotheses were fitted to the training recordings, so that on the held-out ones no parameter has to be paid for.
+Where the motion repeats, it proves too: what a term says of one lap and not of the next must be seen to come and go.
 """
 
 from __future__ import annotations
@@ -15,15 +16,21 @@ import numpy as np
 from hil.diagnosis.evidence import against
 from hil.diagnosis.explain import TIED, noise_ratios
 from hil.diagnosis.fit import Fit, fit, in_parallel, splits
-from hil.diagnosis.model import Term
+from hil.diagnosis.floor import Laps, laps
+from hil.diagnosis.model import Term, scales
 from hil.measured import Measured
+
+# A term that makes neighbouring laps differ by more than they do, in energy. Most terms repeat with the motion and
+# leave this at 1; refitting the others moves it by less.
+REPEATS = 0.95
 
 
 @dataclass(frozen=True, eq=False)
 class Ablation:
     """A term, the fit without it, and by which factor the energy above the floor grows without it.
 
-    `gain` is the evidence for the term on the held-out recordings, None without any.
+    `gain` is the evidence for the term on the held-out recordings, None without any. `laps` is the factor by which
+    the part that does not repeat from lap to lap grows without it, None without laps.
     """
 
     term: Term
@@ -31,11 +38,12 @@ class Ablation:
     train: float
     held_out: float | None
     gain: float | None
+    laps: float | None
 
     @property
     def harms(self) -> bool:
-        """Whether held-out recordings speak against the term. A motion that does not show it says nothing."""
-        return self.gain is not None and self.gain < -TIED
+        """Whether held-out recordings or laps speak against the term. A motion that does not show it says nothing."""
+        return (self.gain is not None and self.gain < -TIED) or (self.laps is not None and self.laps < REPEATS)
 
     @property
     def shown(self) -> bool:
@@ -101,9 +109,12 @@ def _ablate(nominal: Fit, final: Fit, train: Sequence[Measured], held_out: Seque
     fits = in_parallel([lambda index=index: without(index) for index in range(len(terms))])  # type: ignore[misc]
     own_train, own_held_out = energy(final, train), energy(final, held_out)
     here = _over(final, held_out) if held_out else None
+    repeated = [(run, found) for run in train if (found := laps(run)) is not None]
+    unrepeated = _unrepeated(final, repeated)
     return [Ablation(term, other, energy(other, train) / own_train,
                      energy(other, held_out) / own_held_out if held_out else None,
-                     _gain(here, _over(other, held_out)) if here is not None else None)
+                     _gain(here, _over(other, held_out)) if here is not None else None,
+                     _unrepeated(other, repeated) / unrepeated if unrepeated > 0.0 else None)
             for term, other in zip(terms, fits, strict=True)]
 
 
@@ -111,6 +122,16 @@ def _over(found: Fit, runs: Sequence[Measured]) -> Fit:
     """A fit as it stands on other recordings."""
     residuals = found.model.residuals(found.x, runs)
     return Fit(found.model, found.x, residuals, np.zeros((residuals.size, 0)), splits(found.model, runs))
+
+
+def _unrepeated(found: Fit, repeated: Sequence[tuple[Measured, Laps]]) -> float:
+    """Energy of what differs from lap to lap, in units of noise; 0 without laps."""
+    total = 0.0
+    for run, known in repeated:
+        scale = scales(run, found.model.bench, found.model.observer_s)
+        total += sum((known.noise(values) / scale[name]) ** 2 * known.first.size
+                     for name, values in found.model.blocks(found.x, run).items())
+    return total
 
 
 def _gain(found: Fit, without: Fit) -> float:

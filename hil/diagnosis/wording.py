@@ -15,6 +15,7 @@ _SAID: dict[Dimension, tuple[tuple[float, float, str], ...]] = {
     Dimension.TIME: ((1.0, 1.0, "s"), (1e-3, 1e3, "ms"), (0.0, 1e6, "µs")),
     Dimension.ANGLE: ((1e-2, 1.0, "rad"), (0.0, 1e6, "µrad")),
     Dimension.RATIO: ((0.0, 100.0, "%"),),
+    Dimension.COUNT: ((0.0, 1.0, ""),),      # sentences say what is counted
 }
 
 # Units of the nominal parameters, which their names hold in short
@@ -41,7 +42,7 @@ def said(value: float, dimension: Dimension, linear: bool = False) -> str:
     unit = dimension.unit(linear)
     for start, factor, text in _SAID.get(dimension, ((0.0, 1.0, unit),)):
         if abs(value) >= start:
-            return f"{number(value * factor)} {text}"
+            return f"{number(value * factor)} {text}".rstrip()
     raise AssertionError(dimension)
 
 

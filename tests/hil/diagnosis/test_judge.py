@@ -75,6 +75,14 @@ def test_a_term_that_held_out_recordings_speak_against_is_dropped() -> None:
     assert kept.ablations[0].train > 2.0
 
 
+def test_a_term_that_speaks_of_one_lap_only_is_dropped_unless_it_is_seen_there() -> None:
+    once = Term("external_force", 0, (200.0, 0.8, 1.2))
+    for truth, dropped in (((), [once]), ((once,), [])):
+        train = [take(recorded(OWNER, *truth, times=2), OWNER)]
+        proof = prove(believed(train), believed(train, once), train, [])
+        assert [ablation.term for ablation in proof.dropped] == dropped
+
+
 def test_a_term_that_held_out_recordings_do_not_show_may_stay() -> None:
     late = Term("external_force", 0, (200.0, 1.0, 1.3))
     train = runs(late)

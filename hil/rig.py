@@ -44,7 +44,7 @@ class Rig:
     def __init__(self, bench: Bench, seed: int | None = None, bus: InProcessBus | None = None,
                  plant: PlantLike | None = None) -> None:
         self.bench, self.section = bench, bench.drive or DriveSection()
-        _check(bench, self.section)
+        check_runnable(bench)
         self.nodes: SimulatedNodes | None = None
         self.encoder: CanopenEncoder | SerialEncoder | None = None
         self.ports: list[CanPort] = []
@@ -143,8 +143,9 @@ class Rig:
             reversed=table.direction < 0, latency_s=connection.latency_s))  # fmt: skip
 
 
-def _check(bench: Bench, section: DriveSection) -> None:
-    """Raise FieldError for what cannot be run."""
+def check_runnable(bench: Bench) -> None:
+    """Raise FieldError at the field for which a bench cannot be run."""
+    section = bench.drive or DriveSection()
     if bench.drive is None and bench.simulation is None:
         raise FieldError(("drive",), "given nothing, allowed the section `drive` of the bench (and `simulation` to run "
                          "it without hardware); add it")

@@ -30,10 +30,12 @@ def _checked(path: Path) -> str:
     """What a file is; by its keys a profile, a map, or else a bench. Raises InputError."""
     from pydantic import BaseModel, ConfigDict
 
+    from hil.errors import FieldError
     from hil.profile import load_profile
     from hil.recording_map import RecordingMap
+    from hil.rig import check_runnable
     from hil.simulated import load_simulated
-    from hil.yamlfile import load_model
+    from hil.yamlfile import load_model, located
 
     class AnyFile(BaseModel):
         model_config = ConfigDict(extra="allow")
@@ -46,4 +48,9 @@ def _checked(path: Path) -> str:
     if "channels" in keys:
         return f"a map of {len(load_model(path, RecordingMap).channels)} channels"
     bench = load_simulated(path)
+    if bench.drive is not None or bench.simulation is not None:   # with neither it describes recordings only
+        try:
+            check_runnable(bench)
+        except FieldError as error:
+            raise located(path, error) from None
     return f"a bench with a {bench.axis.model} axis and {len(bench.mechanisms)} mechanisms"

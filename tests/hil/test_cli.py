@@ -13,10 +13,11 @@ import time
 from collections.abc import Iterator
 from contextlib import chdir, redirect_stderr, redirect_stdout
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+import yaml
 from compare_runs import bench_with, record
 
 from hil.cli import main
@@ -194,6 +195,22 @@ def test_friction_on_the_bench_gives_the_values_of_the_axis(folder: Path) -> Non
     assert (folder / "sweep" / "friction.html").is_file()
     assert "stretches of constant feed" in refused(folder, "friction", "run.csv")
     assert "given neither or both" in refused(folder, "friction")
+
+
+@pytest.mark.parametrize(("section", "values", "said"), [
+    ("drive", {"mode": "csp"}, "drive.mode: given csp with position_feedback: table"),
+    ("drive", {"encoder": {"interface": "none"}}, "drive.encoder.interface: given none with a table encoder"),
+    ("encoders", {"motor": {"counts_per_rev": 4096, "direction": -1}}, "encoders.motor.direction: given -1"),
+])
+def test_validate_refuses_what_run_refuses(tmp_path: Path, section: str, values: dict[str, Any], said: str) -> None:
+    data = bench_with().model_dump(mode="json")
+    data["control"]["position_feedback"] = "table"
+    data[section] |= values
+    (tmp_path / "bad.yaml").write_text(yaml.safe_dump(data))
+    message = refused(tmp_path, "validate", "bad.yaml")
+    assert "bad.yaml:" in message
+    assert said in message
+    assert message == refused(tmp_path, "run", str(SWEEP), "--bench", "bad.yaml", "--virtual", "--out", "out")
 
 
 def test_validate_tells_what_a_file_is(folder: Path) -> None:

@@ -59,11 +59,6 @@ class Rig:
             self.close()
             raise HilError(str(error)) from error
 
-    @property
-    def simulated(self) -> bool:
-        """Whether nothing real moves."""
-        return self.nodes is not None
-
     def set_up(self) -> None:
         """Configure the devices, power stage off; blocking. Raises HilError with what a device refused."""
         try:

@@ -58,13 +58,13 @@ def run_profile(
     Raises InputError for what cannot be run, NotPunctual for a budget exceeded, HilError for devices that fail.
     """
     section = bench.drive or DriveSection()
+    if virtual and bench.drive is not None and bench.simulation is None:   # before any device is opened
+        raise FieldError(("drive",), "given a real bench in virtual time, allowed the wall clock; leave --virtual")
     if seed is None and bench.simulation is not None:
         seed = bench.simulation.seed
     with contextlib.ExitStack() as stack:
         if rig is None:
             rig = stack.enter_context(Rig(bench, seed))
-        if virtual and not rig.simulated:
-            raise FieldError(("drive",), "given a real bench in virtual time, allowed the wall clock; leave --virtual")
         rig.set_up()
         sample = rig.drive.read(0.0)
         encoder = rig.encoder.read(0.0) if rig.encoder is not None else None

@@ -104,7 +104,11 @@ def run_profile(
             raise
         finally:
             recording = recorder.close(ended)
-    return RunResult(outcome, recording, Jitter.of(list(outcome.lateness_s), gains.period_s), trajectory.notes,
+    notes = trajectory.notes
+    if recorder.path.stem != name:
+        notes += (f"{name}.parquet or {name}.arrows of an earlier run is in {folder} and stays; this run is "
+                  f"{recorder.path.name}",)
+    return RunResult(outcome, recording, Jitter.of(list(outcome.lateness_s), gains.period_s), notes,
                      tuple(doubt for doubt in doubts if doubt))
 
 

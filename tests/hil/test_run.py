@@ -37,6 +37,14 @@ def test_a_recording_says_how_it_was_made(tmp_path: Path) -> None:
     assert {"python", "numpy", "canopen", "hil-servo"} <= set(metadata["versions"])
 
 
+def test_a_second_run_into_a_folder_says_its_name(tmp_path: Path) -> None:
+    first = run_profile(bench_with(), MOVE, tmp_path, "run", virtual=True)
+    second = run_profile(bench_with(), MOVE, tmp_path, "run", virtual=True)
+    assert not first.notes
+    assert second.recording == tmp_path / "run_2.parquet"
+    assert any("stays; this run is run_2.parquet" in note for note in second.notes)
+
+
 def test_wall_clock_gives_the_same_motion_and_a_jitter_certificate(tmp_path: Path) -> None:
     wall = run_profile(bench_with(), MOVE, tmp_path, "wall", force=True)
     virtual = run_profile(bench_with(), MOVE, tmp_path, "virtual", virtual=True)

@@ -20,8 +20,9 @@ from hil.profile import Profile
 from hil.realtime import Jitter, NotPunctual, check_punctual, measure_jitter, now_text, real_time, report
 from hil.recorder import Recorder, run_metadata
 from hil.rig import Rig
-from hil.session import Ending, Outcome, Session, make_cycle
+from hil.session import Outcome, Session, make_cycle
 from hil.simulated import make_plant
+from hil.supervision import Ending
 from hil.trajectory import Trajectory, plan
 from hil.virtual import VirtualSession
 

@@ -19,9 +19,9 @@ The same code runs on the wall clock and in virtual time.
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import IntEnum, StrEnum
+from enum import IntEnum
 from typing import Protocol
 
 from drivers.base import Condition, DriveGoal, DriverError, DriveSample, EncoderSample
@@ -29,10 +29,11 @@ from drivers.cia402 import DriveState
 from hil.bench_hardware import DriveMode
 from hil.channels import AxisKind
 from hil.clock import Clock
-from hil.cycle import Cycle, Limit, Setpoint, Watch
+from hil.cycle import Cycle, Setpoint, Watch
 from hil.errors import HilError
 from hil.moves import MotionLimits
 from hil.rig import Rig
+from hil.supervision import Ending, find
 from hil.trajectory import Trajectory, stop_from
 
 ARM_TIMEOUT_S = 2.0
@@ -42,9 +43,6 @@ AFTERMATH_S = 0.1         # recorded after the power stage is off
 DISARM_TIMEOUT_S = 0.2
 STOP_SEGMENT = -1         # in the recording: set-points of a stop
 _POWERED = (DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE, DriveState.FAULT_REACTION_ACTIVE)
-# What makes a linear encoder useless; a late sample or a broken frame does not.
-_ENCODER_LOST = (Condition.STALE | Condition.HEARTBEAT_LOST | Condition.BUS_OFF | Condition.NOT_OPERATIONAL
-                 | Condition.ALARM | Condition.LINE_LOST)  # fmt: skip
 _NO_ENCODER = EncoderSample(0.0, 0, 0.0, 0, Condition.OK)
 _SETPOINTS = {DriveMode.CST: Setpoint.TORQUE, DriveMode.CSV: Setpoint.VELOCITY, DriveMode.CSP: Setpoint.POSITION}
 
@@ -55,18 +53,6 @@ class Phase(IntEnum):
     RUN = 0
     STOP = 1
     QUICK_STOP = 2
-
-
-class Ending(StrEnum):
-    """Why a run ended."""
-
-    COMPLETE = "complete"
-    INTERRUPTED = "interrupted"
-    DRIVE_FAULT = "drive fault"
-    ENCODER_FAULT = "encoder fault"
-    FOLLOWING_ERROR = "following error"
-    TRAVEL_LIMIT = "travel limit"
-    OVERRUN = "loop too late"
 
 
 @dataclass(frozen=True)
@@ -215,17 +201,16 @@ class Session:
             if sample.state not in _POWERED:
                 self._last_tick = min(self._last_tick, tick + self._ticks(AFTERMATH_S))
             return None
-        findings = self._findings(sample, seen, passed)
-        if self._phase is Phase.STOP:   # the axis is being stopped already: only what prevents that matters
-            findings = (finding for finding in findings if finding[2])
-        found = next(findings, None)
+        stopping = self._phase is Phase.STOP
+        findings = find(self._rig, seen, passed, self._lateness_s[-1], self._stops_asked, stopping=stopping)
+        # an axis that is being stopped already: only what prevents that matters
+        found = next((finding for finding in findings if finding.quick or not stopping), None)
         if found is None:
             return None
-        ending, reason, quick = found
         if self._phase is Phase.RUN:
-            self._ending, self._reason = ending, reason
+            self._ending, self._reason = found.ending, found.reason
         stop = self._stop(index, sample, seen, measured=passed != 0)
-        if quick:
+        if found.quick:
             self._phase = Phase.QUICK_STOP
             self._drive.goal = DriveGoal.QUICK_STOP
             self._last_tick = tick + self._ticks(QUICK_STOP_LIMIT_S)
@@ -233,25 +218,6 @@ class Session:
             self._phase = Phase.STOP
             self._last_tick = tick + len(stop) + self._ticks(SETTLE_S)
         return stop
-
-    def _findings(self, sample: DriveSample, seen: EncoderSample, passed: int) -> Iterator[tuple[Ending, str, bool]]:
-        """Ending, reason, and whether the loop can no longer stop the axis itself; the gravest first."""
-        section, again = self._rig.section, self._phase is Phase.STOP
-        if self._drive.tripped:
-            yield Ending.DRIVE_FAULT, _text(self._drive.check), True
-        if seen.condition & _ENCODER_LOST and self._encoder is not None:
-            yield Ending.ENCODER_FAULT, _text(self._encoder.check), self._from_table
-        if passed & Limit.FOLLOWING_ERROR:
-            yield (Ending.FOLLOWING_ERROR, f"the axis is more than {section.following_error_m} m from its set-point "
-                   "(drive.following_error_m): blocked, overloaded, or badly tuned", again)
-        if passed & Limit.TRAVEL:
-            yield (Ending.TRAVEL_LIMIT, f"the axis left {section.travel_m} m (drive.travel_m): correct the profile or "
-                   "home the axis", False)
-        if self._stops_asked:
-            yield Ending.INTERRUPTED, "stopped by the user", self._stops_asked > 1
-        if self._lateness_s[-1] > section.overrun_s:
-            yield (Ending.OVERRUN, f"the loop was {self._lateness_s[-1]:.3f} s late, allowed {section.overrun_s} s "
-                   "(drive.overrun_s): take load off the machine", False)
 
     def _stop(self, index: int, sample: DriveSample, seen: EncoderSample, *, measured: bool) -> Trajectory:
         """Shortest stop from the set-point, or from where the axis is when it does not follow."""
@@ -285,14 +251,6 @@ class Session:
 
     def _ticks(self, duration_s: float) -> int:
         return round(duration_s / self._period_s)
-
-
-def _text(check: Callable[[], None]) -> str:
-    try:
-        check()
-    except DriverError as error:
-        return str(error)
-    return "it recovered by itself"
 
 
 def make_cycle(rig: Rig, motor_position: float) -> Cycle:

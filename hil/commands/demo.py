@@ -21,8 +21,8 @@ def demo(
     from hil.profile import Profile
     from hil.report.output import default_folder
     from hil.run import run_profile
-    from hil.session import Ending
     from hil.simulated import load_simulated
+    from hil.supervision import Ending
 
     folder = folder or default_folder("demo")
     bench = load_simulated("reference")

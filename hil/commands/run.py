@@ -31,8 +31,8 @@ def run(
     from hil.profile import load_profile
     from hil.report.output import default_folder
     from hil.run import run_profile
-    from hil.session import Ending
     from hil.simulated import load_simulated
+    from hil.supervision import Ending
 
     folder = folder or default_folder(profile.stem)
     loaded = load_simulated(bench)

@@ -17,8 +17,8 @@ from hil.friction import identify_friction
 from hil.profile import load_profile
 from hil.recording import read_recording
 from hil.run import run_profile
-from hil.session import Ending
 from hil.simulated import load_simulated
+from hil.supervision import Ending
 
 ROOT = Path(__file__).parent.parent.parent
 

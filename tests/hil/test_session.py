@@ -14,7 +14,8 @@ from drivers.cia402 import DriveState
 from drivers.modelled import Fault, FaultKind, ModelledBus
 from hil.recording import read_recording
 from hil.rig import Rig
-from hil.session import STOP_SEGMENT, Ending, Session
+from hil.session import STOP_SEGMENT, Session
+from hil.supervision import Ending
 from hil.trajectory import plan
 
 SYNC, DRIVE_TPDO, ENCODER_TPDO, DRIVE_HEARTBEAT = 0x080, 0x185, 0x186, 0x705

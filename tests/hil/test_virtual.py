@@ -11,8 +11,8 @@ from bench_runs import bench_with, run
 
 from hil import virtual
 from hil.errors import HilError
-from hil.session import Ending
 from hil.simulated import load_simulated
+from hil.supervision import Ending
 from hil.virtual import VirtualSession
 
 PUSH = {"effect": "external_force", "parameters": {"force_n": -9000.0, "start_s": 0.4, "end_s": 0.6}}

@@ -15,6 +15,7 @@ import numpy as np
 from scipy.signal import butter, filtfilt
 
 from hil.bench import Bench
+from hil.bench_hardware import DriveMode
 from hil.blocks import BlockDeviation, compare_blocks
 from hil.errors import HilError, InputError
 from hil.fit import MOST_STEPS, TABLE_ACCURACY_M, FitResult, fit_nominal
@@ -154,7 +155,7 @@ def compare(recording: Recording, bench: Bench, *, fit: bool = False,
                   for block in blocks)
     inverse, remark = _inverse_dynamics(recording) if linear else (None, [])
     return Comparison(recording, measured, bench, tuple(channels), pairs, fitted, inverse,
-                      tuple(_notes(measured, fitted) + remark))
+                      tuple(_notes(measured, bench, fitted) + remark))
 
 
 def low_pass(values: FloatArray, period_s: float) -> FloatArray:
@@ -188,13 +189,17 @@ def _inverse_dynamics(recording: Recording) -> tuple[InverseDynamics | None, lis
         return None, [f"No inverse-dynamics fit: {error}"]
 
 
-def _notes(measured: Measured, fit: FitResult | None) -> list[str]:
+def _notes(measured: Measured, bench: Bench, fit: FitResult | None) -> list[str]:
     notes = [
         "Velocity, acceleration and jerk: derivatives after a Butterworth low-pass of 4th order at "
         f"{LOW_PASS_HZ:g} Hz, forwards and backwards, on measured and simulated alike.",
         f"The first {SETTLE_S:g} s are simulated but not judged: the state at the start is known from the first rows "
         "only.",
     ]
+    if bench.drive is not None and bench.drive.mode is not DriveMode.CST:
+        notes.append(f"In {bench.drive.mode} the drive closes loops of its own; the twin closes them with the law and "
+                     f"the periods of the bench file (velocity loop {1e3 * measured.period_s:g} ms). A drive whose "
+                     "loops run otherwise, faster for instance, deviates from it whatever the axis.")
     if measured.torque_is_command:
         notes.append("Only one of torque and torque command is recorded: the drive cannot be compared, and the noise "
                      "of the torque is what the encoder puts into its command.")

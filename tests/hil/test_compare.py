@@ -64,6 +64,7 @@ def test_loops_in_the_drive_are_those_of_the_twin(tmp_path: Path, mode: str) -> 
     assert result.explained
     assert result.torque_over_noise < 1.0
     assert result.channel("following_error_m").rms < 1.0e-6
+    assert any(f"In {mode} the drive closes loops of its own" in note for note in result.notes)
 
 
 @pytest.mark.parametrize(("effect", "parameters", "block"), [

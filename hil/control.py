@@ -119,7 +119,7 @@ def init(motor_position_rad: float, motor_velocity_rad_s: float = 0.0, torque_n_
                  float(motor_position_rad - 2.0 * step_rad), float(motor_velocity_rad_s))
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, fastmath=False)
 def step(gains: Gains, state: State, inputs: Inputs) -> tuple[State, Outputs]:
     """One tick of the control law at the top of this module; pure."""
     reference = state.velocity_reference_m_s
@@ -149,7 +149,7 @@ def step(gains: Gains, state: State, inputs: Inputs) -> tuple[State, Outputs]:
     return after, Outputs(torque, reference)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, fastmath=False)
 def replay(gains: Gains, state: State, position_command_m: NDArray[np.float64],
            velocity_command_m_s: NDArray[np.float64], motor_position_rad: NDArray[np.float64],
            table_position_m: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -1,0 +1,122 @@
+"""How visible an effect is: what it changes in the recordings that no nominal parameter could, in units of noise.
+
+    size = max over channels of rms( (1 - P) (r_with - r_without) ),   P = Q Q^T of the parameters' sensitivities
+
+Runs of the closed loop without sensor noise. Channels: torque over the torque's noise; drive (torque less command) and
+controller (command less the law fed with the recorded positions) over the same; table less r x motor over the noise of
+counting. This is the generator's own yardstick; nothing of the twin or of the diagnosis is in it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import inf
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.sim.axis import AxisTruth
+from drivers.sim.effects import Effect
+from drivers.sim.reality import record
+from drivers.sim.sensors import Sensors
+from hil import control
+from hil.proof.axes import STEP_S, DrawnAxis
+from hil.trajectory import Trajectory
+
+FloatArray = NDArray[np.float64]
+
+_PERFECT = Sensors(motor_counts_per_rev=0, table_resolution_m=0, torque_noise_n_m=0)
+_DIFFERENCE = 0.01           # relative, of a parameter in its finite difference
+
+
+class Visibility:
+    """Sizes of effects on one axis over some motions. Runs are kept, since many draws share them."""
+
+    def __init__(self, axis: DrawnAxis, motions: Sequence[Trajectory]) -> None:
+        self.axis, self.motions = axis, tuple(motions)
+        self._runs: dict[object, FloatArray] = {}
+        self._bases: dict[object, FloatArray] = {}
+
+    def size(self, effects: Sequence[Effect], beside: Sequence[Effect] = (), rival: Sequence[Effect] = ()) -> float:
+        """Size of effects beside others whose parameters could also be fitted, and those of a rival."""
+        sizes = self.sizes(effects, beside, rival)
+        return max(sizes.values())
+
+    def sizes(self, effects: Sequence[Effect], beside: Sequence[Effect] = (),
+              rival: Sequence[Effect] = ()) -> dict[str, float]:
+        """The same for each channel."""
+        change = self._channels([*beside, *effects]) - self._channels(beside)
+        basis = self._basis(tuple(beside), tuple(rival))
+        flat = change.ravel()
+        if not np.all(np.isfinite(flat)):
+            return dict.fromkeys(self._names, inf)
+        left = (flat - basis @ (basis.T @ flat)).reshape(change.shape)
+        return dict(zip(self._names, np.sqrt(np.mean(left**2, axis=1)).tolist(), strict=True))
+
+    def peak_torque(self) -> float:
+        """Largest torque that the motions take without effects."""
+        return max(float(np.max(np.abs(rows["force_n" if self.axis.truth.linear else "torque_n_m"])))
+                   for rows in (self._record(self.axis.truth, (), motion) for motion in self.motions))
+
+    @property
+    def _names(self) -> tuple[str, ...]:
+        names = ("torque", "drive", "controller", "transmission")
+        return names if self.axis.has_table else names[:3]
+
+    def _basis(self, beside: tuple[Effect, ...], rival: tuple[Effect, ...]) -> FloatArray:
+        """Orthonormal directions (n, p) that nominal parameters and those of the other effects span."""
+        key = (_key(beside), _key(rival))
+        if key not in self._bases:
+            at = self._channels(beside).ravel()
+            slopes = []
+            for name in self.axis.nominal:
+                changed = self.axis.with_parameters({name: self.axis.true[name] * (1.0 + _DIFFERENCE)})
+                slopes.append(self._channels(beside, changed).ravel() - at)
+            for index, effect in enumerate(beside):
+                for other in _neighbours(effect):
+                    slopes.append(self._channels([*beside[:index], other, *beside[index + 1:]]).ravel() - at)
+            slopes += [self._channels([*beside, other]).ravel() - at for other in rival]
+            columns = np.stack([slope / max(float(np.linalg.norm(slope)), 1e-300) for slope in slopes], axis=1)
+            self._bases[key] = np.linalg.qr(np.nan_to_num(columns))[0]
+        return self._bases[key]
+
+    def _channels(self, effects: Sequence[Effect], truth: AxisTruth | None = None) -> FloatArray:
+        """Channels over their noise (channels, n), the motions one after the other."""
+        key = (_key(effects), truth)
+        if key not in self._runs:
+            parts = [self._seen(self._record(truth or self.axis.truth, effects, motion)) for motion in self.motions]
+            self._runs[key] = np.concatenate(parts, axis=1)
+        return self._runs[key]
+
+    def _seen(self, rows: Mapping[str, FloatArray]) -> FloatArray:
+        axis, linear = self.axis, self.axis.truth.linear
+        gains, noise = axis.bench.gains, axis.sensors.torque_noise_n_m
+        motor = rows["motor_position_m" if linear else "motor_position_rad"]
+        command = rows["force_command_n" if linear else "torque_command_n_m"]
+        torque = rows["force_n" if linear else "torque_n_m"]
+        law, _ = control.replay(gains, control.init(float(motor[0]), period_s=axis.period_s),
+                                rows["position_command_m"], rows["velocity_command_m_s"], motor, np.zeros(motor.size))
+        channels = [torque / noise, (torque - command) / noise, (command - law) / noise]
+        if axis.has_table:
+            stretch = rows["table_position_m"] - gains.ratio_m_rad * motor
+            channels.append(stretch / axis.table_noise_m)
+        return np.stack(channels)
+
+    def _record(self, truth: AxisTruth, effects: Sequence[Effect], motion: Trajectory) -> dict[str, FloatArray]:
+        return record(truth, _PERFECT, effects, self.axis.servo, np.array(motion.position_m),
+                      np.array(motion.velocity_m_s), self.axis.period_s, step_s=STEP_S)
+
+
+def _neighbours(effect: Effect) -> list[Effect]:
+    """The effect with each of its parameters changed a little."""
+    found = []
+    for name, value in effect.parameters.items():
+        change = _DIFFERENCE if "phase" in name else _DIFFERENCE * value
+        if name in ("cycles_per_rev", "period_m", "start_s", "end_s") or change == 0.0:
+            continue      # read off the recording; a difference of a percent is another effect
+        found.append(Effect(effect.id, {**effect.parameters, name: value + change}, effect.form))
+    return found
+
+
+def _key(effects: Sequence[Effect]) -> tuple[object, ...]:
+    return tuple((effect.id, effect.form, tuple(effect.parameters.items())) for effect in effects)

@@ -3,75 +3,128 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from hil.commands.console import err, out, progress, table
 
+if TYPE_CHECKING:
+    from hil.bench import Bench
+    from hil.bench_hardware import SimulatedEffect, SimulationSection
+    from hil.diagnosis.result import Result
+    from hil.recording import Recording
+
 
 def demo(
-    folder: Annotated[Path | None, typer.Option("--out", help="Folder for recording and report; left out: "
-                                                "runs/demo-TIME")] = None,
+    effect: Annotated[str | None, typer.Option(help="What to conceal, such as backlash; left out: drawn")] = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="Of what is drawn and of the simulated sensors; left out: "
+                                             "another one every time")] = None,
     virtual: Annotated[bool, typer.Option("--virtual", help="In virtual time")] = False,
+    folder: Annotated[Path | None, typer.Option("--out", help="New folder for recordings and reports; left out: "
+                                                "runs/demo-TIME")] = None,
 ) -> None:
-    """Move the simulated reference axis 100 mm at 7 and 22 m/min over CANopen, record it, compare it with its twin."""
-    from hil.commands.run import say
-    from hil.errors import HilError
-    from hil.profile import Profile
-    from hil.report.output import default_folder
-    from hil.run import run_profile
+    """Conceal an effect in the simulated axis, move it over CANopen, compare it with its twin, and find the effect."""
+    import secrets
+
+    from hil import demo as concealed
+    from hil.report.output import default_folder, new_folder
     from hil.simulated import load_simulated
-    from hil.supervision import Ending
 
     folder = folder or default_folder("demo")
-    bench = load_simulated("reference")
-    moves = Profile.model_validate(MOVES)
-    # on a simulated bench nothing can be harmed by a late tick: a busy machine is reported, not refused
-    result = run_profile(bench, moves, folder, "demo", virtual=virtual, force=True,
-                         planned=lambda trajectory: err.print(f"100 mm at 7 and 22 m/min on the simulated CANopen bus: "
-                                                              f"{trajectory.duration_s:.1f} s ..."))
-    say(result, virtual)
-    if result.outcome.ending is Ending.OVERRUN:
-        err.print("This machine is too busy for wall-clock time; the same moves again in virtual time.")
-        result = run_profile(bench, moves, folder, "demo", virtual=True)
-        say(result, virtual=True)
-    if not result.complete or result.recording is None:
-        raise HilError(f"stopped: {result.outcome.ending}: {result.outcome.reason}")
-
+    seed = secrets.randbelow(10_000) if seed is None else seed
+    believed = load_simulated("reference")
+    bench, truth = concealed.conceal(believed, seed, effect)
+    err.print("A simulated ball-screw axis conceals something that neither its twin nor the diagnosis knows.")
+    # only now what takes seconds to import
     from hil.compare import compare
-    from hil.recording import read_recording
+    from hil.diagnosis.diagnose import diagnose
     from hil.report.compare_report import verdict, write_comparison
+    from hil.report.diagnose_report import write_diagnosis
     from hil.report.look import percent, quantity
 
-    with progress() as tell:
-        comparison = compare(read_recording(result.recording), bench, progress=tell)
-        tell("writing the report", None)
-        write_comparison(comparison, folder)
-    table(("measured less simulated", "rms", "largest", "relative"),
-          [(channel.label, quantity(channel.rms, channel.unit), quantity(channel.peak, channel.unit),
-            percent(channel.relative)) for channel in comparison.channels])
-    out.print(f"\n{verdict(comparison)}\n\nOpen this file in a browser: {(folder / 'compare.html').resolve()}")
+    with new_folder(folder) as part:
+        learn, prove = _record(bench, part, virtual)
+        with progress() as tell:
+            comparison = compare(learn, believed, progress=tell)
+            tell("writing the comparison", None)
+            write_comparison(comparison, part)
+        table(("measured less twin as the bench file has it", "rms", "largest", "relative"),
+              [(channel.label, quantity(channel.rms, channel.unit), quantity(channel.peak, channel.unit),
+                percent(channel.relative)) for channel in comparison.channels])
+        out.print(f"\n{verdict(comparison)}\n")
+        with progress() as tell:
+            diagnosis = diagnose([learn], [prove], believed, lambda text: tell(text, None))
+            tell("writing the report", None)
+            write_diagnosis(diagnosis, part)
+    out.print(f"[bold]Diagnosis[/bold]: {diagnosis.result.statement}\n")
+    _say(diagnosis.result, truth, believed)
+    out.print(f"\nThe same again: hil demo --seed {seed}" + (f" --effect {effect}" if effect else "")
+              + "\nOpen these files in a browser:"
+              f"\n  the difference: {(folder / 'compare.html').resolve()}"
+              f"\n  its cause:      {(folder / 'report.html').resolve()}")
 
 
-# The moves of figures 7 and 8 of the source, there and back.
-MOVES = {
-    "schema_version": 1,
-    "description": "100 mm at 7 and 22 m/min, there and back",
-    "limits": {"velocity_m_s": 0.6, "acceleration_m_s2": 2.2, "jerk_m_s3": 100.0},
-    "segments": [
-        {"kind": "dwell", "duration_s": 0.5},
-        {"kind": "repeat", "times": 2, "segments": [
-            {"kind": "sine_squared", "to_m": 0.1, "feed_m_s": 0.116667},
-            {"kind": "dwell", "duration_s": 0.5},
-            {"kind": "sine_squared", "to_m": 0.0, "feed_m_s": 0.116667},
-            {"kind": "dwell", "duration_s": 0.5},
-        ]},
-        {"kind": "repeat", "times": 3, "segments": [
-            {"kind": "sine_squared", "to_m": 0.1, "feed_m_s": 0.366667},
-            {"kind": "dwell", "duration_s": 0.5},
-            {"kind": "sine_squared", "to_m": 0.0, "feed_m_s": 0.366667},
-            {"kind": "dwell", "duration_s": 0.5},
-        ]},
-    ],
-}
+def _record(bench: Bench, folder: Path, virtual: bool) -> list[Recording]:
+    """The two runs of the demo, recorded."""
+    from hil.demo import LEARN, PROVE
+    from hil.errors import HilError
+    from hil.recording import read_recording
+    from hil.run import run_profile
+    from hil.supervision import Ending
+
+    recordings = []
+    for name, profile in (("learn", LEARN), ("prove", PROVE)):
+        # on a simulated bench nothing can be harmed by a late tick: a busy machine is reported, not refused
+        result = run_profile(bench, profile, folder, name, virtual=virtual, force=True,
+                             planned=lambda trajectory, what=profile.description: err.print(    # type: ignore[misc]
+                                 f"on the simulated CANopen bus, {trajectory.duration_s:.1f} s once its kernels are "
+                                 f"compiled: {what} ..."))
+        if result.outcome.ending is Ending.OVERRUN:
+            err.print("This machine is too busy for wall-clock time; the same moves again in virtual time.")
+            virtual = True
+            result = run_profile(bench, profile, folder, name, virtual=True)
+        if not virtual:
+            out.print(f"lateness of the ticks: {result.jitter.text}")
+        if not result.complete or result.recording is None:
+            raise HilError(f"stopped: {result.outcome.ending}: {result.outcome.reason}")
+        recordings.append(read_recording(result.recording))
+    return recordings
+
+
+def _say(result: Result, truth: SimulationSection, believed: Bench) -> None:
+    """What was concealed beside what was found."""
+    import math
+
+    from hil.diagnosis.wording import NOMINAL_UNITS, number, said, title
+    from hil.twin.library import BY_ID
+
+    hidden, = truth.effects
+    found = next((finding for finding in result.missing if finding.effect == hidden.effect), None)
+    rows = []
+    for parameter in BY_ID[hidden.effect].parameters:
+        name, dimension = parameter.name, parameter.dimension
+        value = hidden.parameters[name]
+        seen = found.parameters[name] if found else None
+        rows.append((name, "–", said(math.remainder(value, 2.0 * math.pi) if name == "phase_rad" else value, dimension),
+                     said(seen.value, dimension) if seen else "–", said(seen.std, dimension) if seen else "–"))
+    for name, value in truth.axis.items():
+        unit, fitted = NOMINAL_UNITS[name], result.parameter_corrections.get(name)
+        rows.append((name, f"{number(getattr(believed.axis, name))} {unit}", f"{number(value)} {unit}",
+                     f"{number(fitted.value)} {unit}" if fitted else "–",
+                     f"{number(fitted.std)} {unit}" if fitted else "–"))
+    table((title(hidden.effect), "bench file", "concealed", "found", "standard error"), rows)
+    names = " and ".join(title(finding.effect) for finding in result.missing) or title(result.verdict)
+    out.print(f"\nConcealed: [bold]{title(hidden.effect)}[/bold]; found: [bold]{names}[/bold]. "
+              f"{_judged(result, hidden)}")
+
+
+def _judged(result: Result, hidden: SimulatedEffect) -> str:
+    named = [finding.effect for finding in result.missing]
+    if named == [hidden.effect]:
+        return "[green]It found what was concealed.[/green]"
+    if hidden.effect in named:
+        return "[yellow]What was concealed is among what it found.[/yellow]"
+    if any(hidden.effect in finding.equivalents for finding in result.missing):
+        return "[yellow]It says that these moves cannot tell the two apart.[/yellow]"
+    return "[red]It did not find it.[/red]"

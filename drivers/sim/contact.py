@@ -6,12 +6,13 @@ linear axis N over m/s), nut forces are N.
 
 from __future__ import annotations
 
-from math import atan, exp, pi, sin
+from math import atan, exp, pi, sin, sqrt
 from typing import Any
 
 from numba import njit
 
 GMS_ELEMENTS = 4
+WANDER_RATES = (1.0, 1.618034, 0.414214, 2.718282)
 
 
 @njit(cache=True)
@@ -36,12 +37,33 @@ def friction_law(p: Any, velocity: float, position_m: float, time_s: float) -> t
     if p.position_dependent_friction.on:
         e = p.position_dependent_friction
         bound *= 1.0 + e.fraction * sin(2.0 * pi * position_m / e.period_m + e.phase_rad)
+    if p.novel_friction_bump.on:
+        b = p.novel_friction_bump
+        bound *= 1.0 + b.fraction * bell((position_m - b.centre_m) / b.width_m)
     drag += p.nonlinear_viscous_friction.quadratic_n_m_s2_rad2 * velocity * abs(velocity)
     offset = p.asymmetric_friction.offset_torque_n_m
+    scale: float = 1.0
     if p.friction_drift.on:
-        scale = 1.0 + p.friction_drift.fraction * (1.0 - exp(-time_s / p.friction_drift.time_constant_s))
-        return scale * bound, scale * offset, scale * drag
-    return bound, offset, drag
+        scale += p.friction_drift.fraction * (1.0 - exp(-time_s / p.friction_drift.time_constant_s))
+    if p.novel_friction_wander.on:
+        w = p.novel_friction_wander
+        scale *= 1.0 + w.fraction * wander(time_s / w.period_s, w.phase_rad)
+    return scale * bound, scale * offset, scale * drag
+
+
+@njit(cache=True)
+def bell(u: float) -> float:
+    """exp(-u^2 / 2)."""
+    return exp(-0.5 * u * u)
+
+
+@njit(cache=True)
+def wander(u: float, phase_rad: float) -> float:
+    """Four sines of incommensurate periods and unrelated phases, rms 1: between -2.83 and 2.83, never the same."""
+    total: float = 0.0
+    for k in range(4):
+        total += sin(2.0 * pi * WANDER_RATES[k] * u + (k + 1) * (k + 1) * phase_rad)
+    return total / sqrt(2.0)
 
 
 @njit(cache=True)
@@ -131,4 +153,9 @@ def lead_error(p: Any, coordinate_m: float, time_s: float) -> tuple[float, float
             error += e.amplitude_2_m * sin(second) + e.amplitude_3_m * sin(third)
             slope += 2.0 * e.amplitude_2_m / p.screw_ratio * sin(second + 0.5 * pi)
             slope += 3.0 * e.amplitude_3_m / p.screw_ratio * sin(third + 0.5 * pi)
+    if p.novel_pitch_bump.on:
+        b = p.novel_pitch_bump
+        u = (coordinate_m - b.centre_m) / b.width_m
+        error += b.height_m * bell(u)
+        slope -= b.height_m * bell(u) * u / b.width_m
     return error, slope

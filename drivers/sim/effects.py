@@ -1,5 +1,7 @@
 """Catalogue of what a simulated axis can conceal: ids, parameters, units, allowed ranges, forms.
 
+CATALOGUE is what the diagnosis has names for, NOVEL what it has not, EFFECTS both.
+
 On a linear axis read N for n_m, m for rad, N s/m for n_m_s_rad; angles of the screw stay angles.
 The equations stand in contact.py (friction, nut), drive_path.py, sensors.py and kernel.py (table).
 """
@@ -117,6 +119,33 @@ CATALOGUE: Mapping[str, Definition] = MappingProxyType({
         {"amplitude_m": _AT_LEAST_0, "period_m": _POSITIVE, "phase_rad": _PHASE_0}),
 })  # fmt: skip
 
+# Physics that the library of the diagnosis does not have: a diagnosis that names it is wrong.
+NOVEL: Mapping[str, Definition] = MappingProxyType({
+    "novel_friction_bump": Definition(
+        "Coulomb and static friction times 1 + fraction exp(-((x - centre) / width)^2 / 2): a tight spot",
+        {"fraction": Parameter(low=-1.0), "centre_m": _ANY, "width_m": _POSITIVE}),
+    "novel_friction_wander": Definition(
+        "all friction times 1 + fraction w(t / period), w four sines of incommensurate periods, rms 1",
+        {"fraction": Parameter(0.0, 0.3), "period_s": _POSITIVE, "phase_rad": _PHASE}),
+    "novel_pitch_bump": Definition(
+        "table = r theta + height exp(-((r theta - centre) / width)^2 / 2): a dent in the thread",
+        {"height_m": _ANY, "centre_m": _ANY, "width_m": _POSITIVE}),
+    "novel_mass_change": Definition(
+        "from start_s on the table weighs 1 + fraction of its mass: a workpiece is put down or taken away",
+        {"fraction": Parameter(low=-0.9), "start_s": _ANY}),
+    "novel_vibration": Definition(
+        "force on the table force (sin(2 pi f t + phase) + ratio sin(2 pi f2 t)): a machine beside it",
+        {"force_n": _AT_LEAST_0, "frequency_hz": _POSITIVE, "phase_rad": _PHASE, "ratio": Parameter(0.0, 1.0),
+         "frequency_2_hz": _POSITIVE}),
+    "novel_hammering": Definition(
+        "force on the table in pulses of width_s every period_s from start_s on",
+        {"force_n": _ANY, "start_s": _ANY, "period_s": _POSITIVE, "width_s": _POSITIVE}),
+    "novel_torque_fade": Definition(
+        "torque times 1 - fraction (1 - exp(-t / time_constant)), unseen by the current: magnets that warm up",
+        {"fraction": Parameter(-1.0, 1.0), "time_constant_s": _POSITIVE}),
+})  # fmt: skip
+EFFECTS: Mapping[str, Definition] = MappingProxyType({**CATALOGUE, **NOVEL})
+
 
 @dataclass(frozen=True)
 class Effect:
@@ -128,9 +157,9 @@ class Effect:
     form: str = ""
 
     def __post_init__(self) -> None:
-        if self.id not in CATALOGUE:
-            raise ValueError(f"effect {self.id!r}: unknown; allowed: {', '.join(CATALOGUE)}")
-        definition = CATALOGUE[self.id]
+        if self.id not in EFFECTS:
+            raise ValueError(f"effect {self.id!r}: unknown; allowed: {', '.join(EFFECTS)}")
+        definition = EFFECTS[self.id]
         allowed = definition.parameters
         unknown = sorted(set(self.parameters) - set(allowed))
         missing = sorted(name for name, p in allowed.items() if p.default is None and name not in self.parameters)
@@ -150,7 +179,7 @@ class Effect:
     @property
     def form_index(self) -> int:
         """Index of the form within the catalogue's forms; 0 is the default."""
-        return CATALOGUE[self.id].forms.index(self.form) if self.form else 0
+        return EFFECTS[self.id].forms.index(self.form) if self.form else 0
 
 
 def by_id(effects: Sequence[Effect]) -> dict[str, Effect]:

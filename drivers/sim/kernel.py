@@ -9,7 +9,7 @@ second order in h for springs and torque, exact rest in stiction. A torque that 
 
 from __future__ import annotations
 
-from math import sqrt
+from math import pi, sin, sqrt
 from typing import Any
 
 import numpy as np
@@ -75,9 +75,36 @@ def springs(p: Any, s: Any) -> None:
 
 
 @njit(cache=True)
+def table_force(p: Any, position_m: float, time_s: float) -> float:
+    """Force [N] on the table from outside: a push during a window, a spring, vibration, hammering."""
+    force: float = -p.spring_load.stiffness_n_m * (position_m - p.spring_load.rest_position_m)
+    e = p.external_force
+    if e.start_s <= time_s < e.end_s:
+        force += e.force_n
+    if p.novel_vibration.on:
+        u = p.novel_vibration
+        first, second = 2.0 * pi * u.frequency_hz * time_s + u.phase_rad, 2.0 * pi * u.frequency_2_hz * time_s
+        force += u.force_n * (sin(first) + u.ratio * sin(second))
+    if p.novel_hammering.on:
+        b = p.novel_hammering
+        if time_s >= b.start_s and (time_s - b.start_s) % b.period_s < b.width_s:
+            force += b.force_n
+    return force
+
+
+@njit(cache=True)
+def moving_mass(p: Any, index: int, time_s: float) -> float:
+    """Mass [kg] of a body of the chain at this time."""
+    mass: float = p.mass[index]
+    if p.novel_mass_change.on and index == p.table and time_s >= p.novel_mass_change.start_s:
+        mass *= 1.0 + p.novel_mass_change.fraction
+    return mass
+
+
+@njit(cache=True)
 def kick(p: Any, s: Any, index: int, side: int, share: float, time_s: float) -> None:
     """New velocity of a mass under its force and its share of the friction."""
-    h, ratio, mass = p.step_s, p.drive_ratio, p.mass[index]
+    h, ratio, mass = p.step_s, p.drive_ratio, moving_mass(p, index, time_s)
     speed = s.velocity[index] / ratio
     if p.varied_friction:
         bound, offset, drag = friction_law(p, speed, s.position[index], time_s)
@@ -113,7 +140,7 @@ def advance(p: Any, s: Any, lines: Any, command: float, steps: int) -> None:
         acting = 0.5 * (s.torque + torque)
         s.torque = torque
         if p.angle_torque:
-            acting = angle_torque(p, acting, q[0] / p.screw_ratio)
+            acting = angle_torque(p, acting, q[0] / p.screw_ratio, time_s)
         for i in range(p.masses):
             force[i] = 0.0
         force[0] = (acting - p.constant_load.load_torque_n_m) / p.drive_ratio
@@ -122,17 +149,14 @@ def advance(p: Any, s: Any, lines: Any, command: float, steps: int) -> None:
         if p.has_nut:
             nut(p, s, time_s)
         if p.table_force:
-            e = p.external_force
-            if e.start_s <= time_s < e.end_s:
-                force[p.table] += e.force_n
-            force[p.table] -= p.spring_load.stiffness_n_m * (q[p.table] - p.spring_load.rest_position_m)
+            force[p.table] += table_force(p, q[p.table], time_s)
         kick(p, s, 0, MOTOR_SIDE, motor_share, time_s)
         last = p.masses
         for i in range(1, last):
             if i == p.table and motor_share < 1.0:
                 kick(p, s, i, TABLE_SIDE, 1.0 - motor_share, time_s)
             else:
-                v[i] += h / p.mass[i] * force[i]
+                v[i] += h / moving_mass(p, i, time_s) * force[i]
         for i in range(last):
             q[i] += h * v[i]
         s.tick += 1

@@ -1,7 +1,7 @@
 """What the compiled kernels work on: parameters of one simulated axis, its state, and delay lines.
 
 Every effect of the catalogue is a nested record named by its id, holding `on`, `form` and its parameters; switched
-off it is all zeros. Adding an effect: one entry in effects.CATALOGUE and its term in a kernel.
+off it is all zeros. Adding an effect: one entry in effects.CATALOGUE (or NOVEL) and its term in a kernel.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from drivers.sim.axis import MAX_MASSES
 from drivers.sim.contact import GMS_ELEMENTS
-from drivers.sim.effects import CATALOGUE
+from drivers.sim.effects import EFFECTS
 
 SPRING_ROWS = MAX_MASSES
 LINES = 2  # delay lines: torque command, recorded channel
@@ -54,7 +54,7 @@ PARAMETERS = np.dtype(
     ]
     + [
         (effect, np.dtype([("on", np.int64), ("form", np.int64)] + [(p, np.float64) for p in entry.parameters]))
-        for effect, entry in CATALOGUE.items()
+        for effect, entry in EFFECTS.items()
     ],
     align=True,
 )

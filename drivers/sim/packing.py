@@ -17,17 +17,18 @@ from drivers.sim.sensors import Sensors
 NEED_TABLE = (
     "backlash", "preload_loss", "position_dependent_stiffness", "periodic_lead_error", "cumulative_lead_error",
     "thermal_growth", "table_side_friction", "scale_interpolation_error",
+    "novel_pitch_bump",
 )  # fmt: skip
 GROUPS = {
     "varied_friction": (
         "asymmetric_friction", "stribeck_friction", "position_dependent_friction", "nonlinear_viscous_friction",
-        "friction_drift",
+        "friction_drift", "novel_friction_bump", "novel_friction_wander",
     ),
     "varied_nut": ("backlash", "preload_loss", "position_dependent_stiffness"),
-    "lead_errors": ("periodic_lead_error", "cumulative_lead_error", "thermal_growth"),
+    "lead_errors": ("periodic_lead_error", "cumulative_lead_error", "thermal_growth", "novel_pitch_bump"),
     "drive_path": ("torque_saturation", "torque_dead_zone", "current_loop_lag", "transport_delay"),
-    "angle_torque": ("torque_ripple", "torque_constant_saturation", "cogging_torque"),
-    "table_force": ("external_force", "spring_load"),
+    "angle_torque": ("torque_ripple", "torque_constant_saturation", "cogging_torque", "novel_torque_fade"),
+    "table_force": ("external_force", "spring_load", "novel_vibration", "novel_hammering"),
 }  # fmt: skip
 LARGEST_PHASE_STEP = 1.5  # omega h; leapfrog is stable below 2, less with damping
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hil.bench import Bench
+from hil.diagnosis.experiment import Experiment, separating, showing
 from hil.diagnosis.explain import FLOOR, Explanation, explain, noise_ratios
 from hil.diagnosis.findings import corrections, diagnosed_bench, findings, renamed
 from hil.diagnosis.fit import Fit
@@ -17,7 +18,7 @@ from hil.diagnosis.judge import judge
 from hil.diagnosis.locate import locate
 from hil.diagnosis.preflight import prepare
 from hil.diagnosis.proof import Proof, explained_share, prove
-from hil.diagnosis.result import ChannelFit, Location, Mode, Result, Unexplained, Verdict
+from hil.diagnosis.result import ChannelFit, Location, Mode, NextExperiment, Result, Unexplained, Verdict
 from hil.diagnosis.testable import not_testable
 from hil.diagnosis.wording import number, said, title
 from hil.measured import Measured
@@ -27,6 +28,7 @@ from hil.twin.mechanism import Dimension
 Progress = Callable[[str], None]
 
 TRAINED = 2.0 / 3.0       # of a recording, where none is held out
+NEXT_EXPERIMENT = "next_experiment.yaml"
 EXPLAINED = 1.15          # times its noise: up to here nothing is left of a channel to speak of
 
 
@@ -46,6 +48,7 @@ class Diagnosis:
     explanation: Explanation
     proof: Proof
     final: Fit
+    experiment: Experiment | None = None     # what to run next; None where nothing is open
 
 
 def diagnose(train: Sequence[Recording], validate: Sequence[Recording], bench: Bench,
@@ -82,15 +85,22 @@ def diagnose(train: Sequence[Recording], validate: Sequence[Recording], bench: B
     missing = findings(explanation, proof.final, proof.ablations, runs, held_out) if named else ()
     progress("testing what this motion can show")
     hidden = not_testable(final if named else explanation.nominal, runs)
+    progress("looking for a motion that would tell more")
+    # a cause that is named has only its rivals open; without one, what this motion hides may be it
+    experiment = (separating(explanation, proof.final, runs, held_out) if named
+                  else showing(explanation.nominal, hidden, runs, held_out))
     notes += _notes(table, proof, verdict, explanation)
+    notes += [experiment.note] if experiment else []
     result = Result(
         verdict=verdict, statement="", location=location, missing=missing,
         parameter_corrections={} if verdict is Verdict.NO_MISMATCH else corrections(bench, final),
         fit=table, not_testable=hidden, unexplained=_unexplained(explanation, final, runs, held_out, location, verdict),
+        next_experiment=NextExperiment(profile=NEXT_EXPERIMENT, separates=experiment.separates)
+        if experiment and experiment.profile else None,
         notes=tuple(notes), runtime_s=time.monotonic() - begin)
     result = result.model_copy(update={"statement": statement(result)})
     after = bench if verdict is Verdict.NO_MISMATCH else diagnosed_bench(bench, final)
-    return Diagnosis(result, after, bench, runs, held_out, explanation, proof, final)
+    return Diagnosis(result, after, bench, runs, held_out, explanation, proof, final, experiment)
 
 
 def statement(result: Result) -> str:

@@ -51,7 +51,7 @@ def findings(explanation: Explanation, final: Fit, ablations: Sequence[Ablation]
     for term, ablation in zip(terms, ablations, strict=True):
         errors = deviations[row:row + len(term.values)]
         row += len(term.values)
-        rivals = _rivals(explanation, term)
+        rivals = rivals_of(explanation, term)
         tied = [rival.fit.model.terms[-1].effect for rival in rivals if rival.evidence < TIED]
         if term.effect in SAME:
             tied.append(next(name for name in SAME if name != term.effect))
@@ -121,7 +121,7 @@ def _key(explanation: Explanation, term: Term) -> tuple[str, int]:
     return term.key if term.key in known or term.effect not in SAME else (SAME[1], term.variant)
 
 
-def _rivals(explanation: Explanation, term: Term) -> list[Rival]:
+def rivals_of(explanation: Explanation, term: Term) -> list[Rival]:
     """Other mechanisms than the term's own, each in its best variant, the strongest first."""
     best: dict[str, Rival] = {}
     for rival in sorted(explanation.rivals.get(_key(explanation, term), []), key=lambda found: found.evidence):

@@ -7,7 +7,7 @@ A mechanism is not testable where even the most of its variants stays below the 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -17,15 +17,16 @@ from hil.diagnosis.explain import MATERIAL, NEEDED
 from hil.diagnosis.fit import POOL, Fit
 from hil.diagnosis.model import Term
 from hil.measured import Measured
-from hil.twin.library import LIBRARY
+from hil.twin.library import BY_ID, LIBRARY
 
 NEEDS_TABLE = frozenset({
     "backlash", "preload_loss", "position_dependent_stiffness", "periodic_lead_error", "cumulative_lead_error",
     "thermal_growth", "scale_interpolation_error", "structural_mode", "table_side_friction"})
 
 
-def not_testable(found: Fit, runs: Sequence[Measured]) -> tuple[str, ...]:
-    """Ids of the library's mechanisms that these recordings cannot show, in its order."""
+def not_testable(found: Fit, runs: Sequence[Measured],
+                 asked: Collection[str] = tuple(BY_ID)) -> tuple[str, ...]:
+    """Ids of the mechanisms asked for that these recordings cannot show, in the library's order."""
     bench, terms = found.model.resolved(found.x)
     present = {term.effect for term in terms} | {entry.effect for entry in bench.mechanisms}
     typical = _typical(bench, runs)
@@ -39,10 +40,11 @@ def not_testable(found: Fit, runs: Sequence[Measured]) -> tuple[str, ...]:
         change -= nuisance @ (nuisance.T @ change)
         return float(change @ change) > enough
 
-    jobs = [(mechanism.id, variant) for mechanism in LIBRARY for variant in range(len(mechanism.variants))
-            if mechanism.id not in present and (bench.has_table_encoder or mechanism.id not in NEEDS_TABLE)]
+    wanted = [mechanism for mechanism in LIBRARY if mechanism.id in asked and mechanism.id not in present]
+    jobs = [(mechanism.id, variant) for mechanism in wanted for variant in range(len(mechanism.variants))
+            if bench.has_table_encoder or mechanism.id not in NEEDS_TABLE]
     shown = {effect for (effect, _), seen in zip(jobs, POOL.map(lambda job: visible(*job), jobs), strict=True) if seen}
-    return tuple(mechanism.id for mechanism in LIBRARY if mechanism.id not in shown | present)
+    return tuple(mechanism.id for mechanism in wanted if mechanism.id not in shown)
 
 
 def _typical(bench: Bench, runs: Sequence[Measured]) -> dict[str, tuple[float, ...]]:

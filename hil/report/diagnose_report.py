@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from hil.diagnosis.diagnose import Diagnosis
+from hil.diagnosis.diagnose import NEXT_EXPERIMENT, Diagnosis
 from hil.diagnosis.result import FitFigures, Location, Verdict
 from hil.diagnosis.wording import number, title
 from hil.report import figures, plots
@@ -12,13 +12,13 @@ from hil.report.compare_report import write_bench
 from hil.report.diagnose_figures import convincing
 from hil.report.diagnose_location import location_figure, residual_panels
 from hil.report.look import digits, percent, quantity
-from hil.report.output import write_json
+from hil.report.output import write_json, write_profile
 from hil.report.page import Number, Page
 from hil.twin.library import BY_ID
 
 
 def write_diagnosis(diagnosis: Diagnosis, folder: Path) -> None:
-    """Write diagnosis.json, report.html with its PNGs, and bench.diagnosed.yaml."""
+    """Write diagnosis.json, report.html with its PNGs, bench.diagnosed.yaml and, if one helps, next_experiment.yaml."""
     result = diagnosis.result
     good = result.verdict is not Verdict.UNEXPLAINED
     names = ", ".join(run.name for run in diagnosis.train)
@@ -46,8 +46,11 @@ def write_diagnosis(diagnosis: Diagnosis, folder: Path) -> None:
     page.text(", ".join(title(effect) for effect in result.not_testable) if result.not_testable
               else "Every mechanism of the library would show at a strength that matters.")
     page.heading("Next experiment")
-    page.text(f"{result.next_experiment.profile}: separates {', '.join(map(title, result.next_experiment.separates))}."
-              if result.next_experiment else "None is needed to separate causes, or none is known that does.")
+    page.text(diagnosis.experiment.note if diagnosis.experiment else "Nothing is open that another motion could tell.")
+    if diagnosis.experiment and diagnosis.experiment.profile:
+        page.text(f"{NEXT_EXPERIMENT} is its profile: run it, and diagnose all recordings together; hil investigate "
+                  "does both.")
+        write_profile(folder / NEXT_EXPERIMENT, diagnosis.experiment.profile)
     page.heading("How it was judged")
     page.items([*result.notes, f"Searched and proven in {digits(result.runtime_s)} s.",
                 "bench.diagnosed.yaml is the bench with these parameters and terms, for every other command."])

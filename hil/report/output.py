@@ -16,11 +16,19 @@ from typing import Any
 import numpy as np
 
 from hil.errors import InputError
+from hil.profile import Profile
 
 
 def default_folder(what: str) -> Path:
     """runs/WHAT-DATE-TIME, for results without a given folder."""
     return Path("runs") / f"{what}-{datetime.now():%Y%m%d-%H%M%S}"
+
+
+def refuse_used(folder: Path) -> None:
+    """Raise InputError where `folder` holds something already."""
+    if folder.is_file() or (folder.is_dir() and any(folder.iterdir())):
+        raise InputError(f"{folder}: exists and is not empty; old and new results would mix: give another --out, "
+                         "or remove it")
 
 
 @contextmanager
@@ -29,9 +37,7 @@ def new_folder(folder: Path) -> Iterator[Path]:
 
     Raises InputError where `folder` holds something already or cannot be made.
     """
-    if folder.is_file() or (folder.is_dir() and any(folder.iterdir())):
-        raise InputError(f"{folder}: exists and is not empty; old and new results would mix: give another --out, "
-                         "or remove it")
+    refuse_used(folder)
     part = folder.with_name(f".{folder.name}.{os.getpid()}.part")
     made = [parent for parent in folder.parents if not parent.exists()]
     try:
@@ -70,6 +76,14 @@ def write_json(path: Path, data: Any) -> None:
     Raises ValueError at NaN or infinity, naming the place: a result that is none must not look like one.
     """
     write_text(path, json.dumps(_plain(data, "$"), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+
+
+def write_profile(path: Path, profile: Profile) -> None:
+    """Write a profile as the YAML file that `load_profile` reads."""
+    import yaml
+
+    data = profile.model_dump(mode="json", exclude_defaults=True)
+    write_text(path, yaml.safe_dump(data, sort_keys=False, allow_unicode=True, default_flow_style=None, width=120))
 
 
 def _plain(value: Any, place: str) -> Any:

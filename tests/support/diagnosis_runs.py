@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -33,12 +34,17 @@ def bench(**axis: float) -> Bench:
     return reference.model_copy(update={"axis": reference.axis.model_copy(update=axis)})
 
 
-def recorded(truth: Bench, *terms: Term, seed: int = 1, times: int = 1, name: str = "run") -> Recording:
-    """What an axis that is `truth` with `terms` records over the segments, `times` times over."""
-    profile = Profile.model_validate({
+def moves(segments: list[dict[str, Any]], times: int = 1) -> Profile:
+    """A profile of segments, `times` times over."""
+    return Profile.model_validate({
         "schema_version": 1, "limits": {"velocity_m_s": 0.4, "acceleration_m_s2": 2.2, "jerk_m_s3": 100.0},
-        "segments": [{"kind": "repeat", "times": times, "segments": SEGMENTS}]})
-    trajectory = plan(profile, truth.gains.period_s)
+        "segments": [{"kind": "repeat", "times": times, "segments": segments}]})
+
+
+def recorded(truth: Bench, *terms: Term, seed: int = 1, times: int = 1, name: str = "run",
+             profile: Profile | None = None) -> Recording:
+    """What an axis that is `truth` with `terms` records over a profile, else over the segments, `times` times over."""
+    trajectory = plan(profile or moves(SEGMENTS, times), truth.gains.period_s)
     model = Model(truth, terms)
     answer = model.twin(model.initial()).simulate(trajectory.position_m, trajectory.velocity_m_s, Start())
     noise = np.random.default_rng(seed)

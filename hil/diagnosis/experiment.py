@@ -1,0 +1,208 @@
+"""The motion that separates what the recorded one cannot: T-optimal design (Atkinson and Fedorov 1975).
+
+    evidence = min over a of  |J_o a|^2 + |r + J a|^2,  less the same of the truth
+
+One hypothesis is taken as the truth: its closed loop over a candidate's set-points is a recording without noise. r are
+the residuals of the other on it, block by block in units of noise, J their derivatives, J_o those on the recordings
+that there are: what these have fixed is free no more. The evidence must be had whichever of the two is true.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import permutations
+
+import numpy as np
+
+from hil.diagnosis.candidates import candidates, reach
+from hil.diagnosis.explain import TIED, Explanation
+from hil.diagnosis.findings import SAME, rivals_of
+from hil.diagnosis.fit import Fit, fit, in_parallel, jacobian, splits
+from hil.diagnosis.model import FloatArray, Model
+from hil.diagnosis.testable import not_testable
+from hil.diagnosis.wording import number, title
+from hil.measured import Measured
+from hil.profile import Profile
+from hil.trajectory import Trajectory, plan
+from hil.twin.axis import Start
+
+ONCE = "external_force"      # belongs to its moment: nobody expects it again on another motion
+
+Question = tuple[str, ...]   # two effects to be told apart, or one to be shown
+Answers = Mapping[Question, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Experiment:
+    """The motion to run next, the mechanisms that it tells apart or shows, and what is expected of it in words.
+
+    `profile` is None where no motion within the reach of the recordings answers anything.
+    """
+
+    profile: Profile | None
+    separates: tuple[str, ...]
+    note: str
+
+
+@dataclass(frozen=True, eq=False)
+class _Hypothesis:
+    """An explanation of the recordings; `known` is what these say of its parameters: R of J_o = Q R."""
+
+    effect: str
+    model: Model
+    x: FloatArray
+    known: FloatArray
+
+
+def separating(explanation: Explanation, final: Fit, train: Sequence[Measured],
+               held_out: Sequence[Measured]) -> Experiment | None:
+    """The motion that tells the terms of `final` from the rivals that the recordings tie with them; None without any.
+
+    Of the motions that separate most of them it is the one with the most evidence per second.
+    """
+    groups = [_group(explanation, final, index, train) for index in range(len(final.model.terms))]
+    pairs = [pair for group in groups for pair in permutations(group, 2)]
+    if not pairs:
+        if not any(term.effect in SAME for term in final.model.terms):
+            return None
+        return Experiment(None, (), f"No motion tells {_pairs([SAME])}: they are the same torque on every one.")
+
+    asked: set[Question] = {tuple(sorted((truth.effect, other.effect))) for truth, other in pairs}
+
+    def answers(trajectory: Trajectory) -> Answers:
+        found = dict.fromkeys(asked, np.inf)
+        for truth, other in pairs:
+            run, question = _imagined(truth, trajectory, train[0]), tuple(sorted((truth.effect, other.effect)))
+            found[question] = min(found[question], _left(other, run) - _own(truth, run))
+        return found
+
+    best = _best((*train, *held_out), final.model, len(asked), answers, TIED)
+    if best is None:
+        return Experiment(None, (), f"No motion within the reach of these recordings tells {_pairs(asked)}.")
+    return Experiment(best.profile, best.effects, f"{best.what} is expected to tell {_pairs(best.answered)}, with "
+                      f"evidence of {number(best.worth)} or more, where {TIED:g} is very strong.")
+
+
+def showing(found: Fit, hidden: Sequence[str], train: Sequence[Measured],
+            held_out: Sequence[Measured]) -> Experiment | None:
+    """The motion that shows most of the mechanisms that the recordings cannot show, the shortest of several; None
+    where all show."""
+    if not hidden:
+        return None
+    expected = _hypothesis("", found)
+
+    def answers(trajectory: Trajectory) -> Answers:
+        run = _imagined(expected, trajectory, train[0])
+        residuals = expected.model.residuals(expected.x, [run])
+        slope = jacobian(expected.model, expected.x, residuals, [run])
+        still = not_testable(Fit(expected.model, expected.x, residuals, slope, splits(expected.model, [run])), [run],
+                             hidden)
+        return {(effect,): float(effect not in still) for effect in hidden}
+
+    best = _best((*train, *held_out), found.model, len(hidden), answers, 1.0)
+    names = ", ".join(map(title, best.effects if best else hidden))
+    if best is None:
+        return Experiment(None, (), f"No motion within the reach of these recordings shows {names}.")
+    return Experiment(best.profile, best.effects, f"{best.what} would show {names}, at a strength that matters.")
+
+
+@dataclass(frozen=True, eq=False)
+class _Tested:
+    """A candidate, how long it takes, the questions that it answers, and what it brings for the hardest of them."""
+
+    profile: Profile
+    duration_s: float
+    answered: tuple[Question, ...]
+    worth: float
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """The mechanisms in question."""
+        return tuple(dict.fromkeys(effect for question in self.answered for effect in question))
+
+    @property
+    def what(self) -> str:
+        """The motion in words."""
+        return f"A motion of {self.duration_s:.0f} s ({self.profile.description})"
+
+
+def _best(runs: Sequence[Measured], model: Model, questions: int, answers: Callable[[Trajectory], Answers],
+          enough: float) -> _Tested | None:
+    """Of the candidates that answer most questions the one that brings most for the hardest of them, per second.
+
+    Long ones are tried only for what no shorter one answers.
+    """
+
+    def test(profile: Profile) -> _Tested:
+        trajectory = plan(profile, model.bench.gains.period_s)
+        found = {question: worth for question, worth in answers(trajectory).items() if worth >= enough}
+        return _Tested(profile, trajectory.duration_s, tuple(found), min(found.values(), default=0.0))
+
+    tested: list[_Tested] = []
+    for profiles in candidates(reach(runs, model.bench)):
+        tested += in_parallel([partial(test, profile) for profile in profiles])
+        if any(len(one.answered) == questions for one in tested):
+            break
+    best = max(tested, key=lambda one: (len(one.answered), one.worth / one.duration_s), default=None)
+    return best if best and best.answered else None
+
+
+def _group(explanation: Explanation, final: Fit, index: int, runs: Sequence[Measured]) -> list[_Hypothesis]:
+    """The final fit, and as many as there are rivals that tie with one of its terms."""
+    terms = final.model.resolved(final.x)[1]
+    group = [_hypothesis(terms[index].effect, final)]
+    for rival in rivals_of(explanation, terms[index]):
+        if rival.evidence < TIED:
+            other = rival.fit.model.resolved(rival.fit.x)[1][-1]
+            model = replace(final.model, terms=(*terms[:index], other, *terms[index + 1:]))
+            x = np.concatenate([final.x[:model.nominal_count], model.initial()[model.nominal_count:]])
+            group.append(_hypothesis(other.effect, fit(model, runs, x, evaluations=12)))
+    return group
+
+
+def _hypothesis(effect: str, found: Fit) -> _Hypothesis:
+    """What a fit expects of another motion."""
+    terms = found.model.terms
+    stays = np.concatenate([np.ones(found.model.nominal_count, dtype=bool),
+                            *(np.full(len(term.values), term.effect != ONCE) for term in terms)])
+    model = replace(found.model, terms=tuple(term for term in terms if term.effect != ONCE))
+    return _Hypothesis(effect, model, found.x[stays], _triangle(found.jacobian[:, stays]))
+
+
+def _triangle(jacobian: FloatArray) -> FloatArray:
+    """R of a QR decomposition."""
+    return np.asarray(np.linalg.qr(jacobian, mode="r"), dtype=np.float64)
+
+
+def _imagined(truth: _Hypothesis, trajectory: Trajectory, like: Measured) -> Measured:
+    """What would be recorded if the hypothesis were true, with the noise of a recording but none of it drawn."""
+    position, velocity = np.array(trajectory.position_m), np.array(trajectory.velocity_m_s)
+    start = Start(float(position[0]))
+    answer = truth.model.twin(truth.x).simulate(position, velocity, start)
+    return replace(
+        like, name="imagined", position_command_m=position, velocity_command_m_s=velocity, start=start, left_out=0,
+        motor=answer.motor_position, table_m=answer.table_position_m if like.table_m.size else like.table_m,
+        torque_command=answer.torque_command,
+        torque=answer.torque_command if like.torque_is_command else answer.torque)
+
+
+def _own(truth: _Hypothesis, run: Measured) -> float:
+    """Energy that the truth leaves of its own run: rounding, and what an observer needs to settle."""
+    residuals = truth.model.residuals(truth.x, [run])
+    return float(residuals @ residuals)
+
+
+def _left(found: _Hypothesis, run: Measured) -> float:
+    """Energy that a hypothesis leaves of a run, its parameters refitted to first order."""
+    residuals = found.model.residuals(found.x, [run])
+    slope = np.concatenate([found.known, jacobian(found.model, found.x, residuals, [run])])
+    target = np.concatenate([np.zeros(len(found.known)), residuals])
+    change, *_ = np.linalg.lstsq(slope, -target, rcond=None)
+    left = target + slope @ change
+    return float(left @ left)
+
+
+def _pairs(questions: Collection[Question]) -> str:
+    return ", and ".join(" from ".join(map(title, question)) for question in sorted(questions))

@@ -1,0 +1,130 @@
+"""Motions designed to separate what a recording ties, and to show what it hides; nothing is promised that none does."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from diagnosis_runs import bench, moves, recorded
+
+from hil.bench import Bench
+from hil.diagnosis.candidates import candidates, reach
+from hil.diagnosis.evidence import against
+from hil.diagnosis.experiment import Experiment, separating, showing
+from hil.diagnosis.explain import TIED, Explanation, Rival
+from hil.diagnosis.fit import Fit, fit
+from hil.diagnosis.model import Model, Term
+from hil.diagnosis.testable import not_testable
+from hil.measured import Measured, take
+from hil.profile import Profile, load_profile
+from hil.report.output import write_profile
+from hil.trajectory import plan
+
+OWNER = bench()
+REST = {"kind": "dwell", "duration_s": 0.3}
+ONE_WAY = moves([REST, {"kind": "sine_squared", "to_m": 0.2, "feed_m_s": 0.124}, REST])
+SLOW = moves([REST, {"kind": "sine_squared", "to_m": 0.06, "feed_m_s": 0.03, "acceleration_m_s2": 0.1}, REST])
+
+
+def runs(profile: Profile, *terms: Term, seed: int = 1, believed: Bench = OWNER) -> list[Measured]:
+    return [take(recorded(OWNER, *terms, seed=seed, profile=profile), believed)]
+
+
+def designed(train: list[Measured], right: Fit, *others: Fit) -> Experiment:
+    """The experiment for a fit and its rivals, as evidence on these recordings has them."""
+    rivals = [Rival(other, against(right, other)) for other in others]
+    nominal = fit(Model(OWNER), train)
+    found = separating(Explanation(nominal, nominal, right, {right.model.terms[-1].key: rivals}), right, train, [])
+    assert found is not None
+    return found
+
+
+def test_a_motion_is_designed_that_separates_what_one_way_ties() -> None:
+    """Friction that changes with the position or with the time: at one feed in one direction they are the same."""
+    place = Term("position_dependent_friction", 0, (0.006, 1.0, 0.0))
+    train = runs(ONE_WAY, place)
+    first = fit(Model(OWNER, (place,)), train)
+    second = fit(Model(OWNER, (Term("friction_drift", 0, (0.006, 2.0)),)), train)
+    assert abs(against(first, second)) < TIED
+    found = designed(train, first, second)
+    assert found.profile is not None
+    assert found.separates == ("friction_drift", "position_dependent_friction")
+    assert "is expected to tell friction drift from position dependent friction" in found.note
+    for right, wrong in ((first, second), (second, first)):       # whichever of the two is true
+        truth = right.model.resolved(right.x)[1]
+        both = [*runs(ONE_WAY, *truth), *runs(found.profile, *truth, seed=2)]
+        a, b = (fit(found.model, both, found.x, evaluations=6) for found in (right, wrong))
+        assert against(a, b) > 10.0 * TIED
+
+
+def test_no_motion_is_promised_that_gains_nothing() -> None:
+    lag = Term("current_loop_lag", 0, (1e-4,))      # of a tenth of a tick, on a motion without jerk
+    train = runs(SLOW, lag)
+    found = designed(train, fit(Model(OWNER, (lag,)), train),
+                     fit(Model(OWNER, (Term("transport_delay", 0, (1e-4,)),)), train))
+    assert found.profile is None
+    assert "No motion within the reach of these recordings tells current loop lag from transport delay" in found.note
+
+
+def test_the_same_torque_on_every_motion_needs_no_search() -> None:
+    uneven = Term("asymmetric_friction", 0, (0.2,))
+    train = runs(moves([REST, {"kind": "reversal", "stroke_m": 0.05, "feed_m_s": 0.1}, REST]), uneven)
+    found = designed(train, fit(Model(OWNER, (uneven,)), train))
+    assert found.profile is None
+    assert "No motion tells asymmetric friction from constant load" in found.note
+
+
+def test_a_cause_without_rivals_needs_no_experiment() -> None:
+    play = Term("backlash", 0, (20e-6,))
+    train = runs(ONE_WAY, play)
+    right, nominal = fit(Model(OWNER, (play,)), train), fit(Model(OWNER), train)
+    assert separating(Explanation(nominal, nominal, right), right, train, []) is None
+
+
+def test_what_a_motion_hides_is_shown_by_another() -> None:
+    """Drag that is not linear in speed, on a motion of one feed."""
+    drag = "nonlinear_viscous_friction"
+    train = runs(moves([REST, {"kind": "sine_squared", "to_m": 0.35, "feed_m_s": 0.124}, REST]))
+    nominal = fit(Model(OWNER), train)
+    hidden = not_testable(nominal, train)
+    assert {drag, "torque_saturation"} <= set(hidden)
+    found = showing(nominal, hidden, train, [])
+    assert found is not None
+    assert found.profile is not None
+    assert drag in found.separates
+    assert "torque_saturation" not in found.separates     # takes more torque than these limits ever ask for
+    both = [*train, *runs(found.profile, seed=2)]
+    assert drag not in not_testable(fit(Model(OWNER), both), both)
+
+
+@pytest.mark.parametrize("travel_m", [None, (-0.06, 0.36)])
+def test_candidates_keep_to_what_was_recorded(travel_m: tuple[float, float] | None, tmp_path: Path) -> None:
+    assert OWNER.drive is not None
+    owner = OWNER.model_copy(update={"drive": OWNER.drive.model_copy(update={"travel_m": travel_m})})
+    train = runs(moves([REST, {"kind": "sine_squared", "to_m": 0.06, "feed_m_s": 0.25},
+                        {"kind": "sine_squared", "to_m": 0.01, "feed_m_s": 0.1}]), believed=owner)
+    reached = reach(train, owner)
+    short, long = candidates(reached)
+    assert len(short) >= 5
+    assert long
+    velocity = train[0].velocity_command_m_s
+    fastest, hardest = np.abs(velocity).max(), np.abs(np.diff(velocity)).max() / OWNER.gains.period_s
+    low, high = (0.0, 0.06) if travel_m is None else (travel_m[0] + 0.003, travel_m[1] - 0.003)
+    for profile in (*short, *long):
+        trajectory = plan(profile, OWNER.gains.period_s)
+        assert low <= trajectory.position_m.min() + 1e-12
+        assert trajectory.position_m.max() - 1e-12 <= high
+        assert np.abs(trajectory.velocity_m_s).max() <= fastest
+        assert np.abs(trajectory.acceleration_m_s2).max() <= hardest
+        write_profile(tmp_path / "profile.yaml", profile)
+        assert load_profile(tmp_path / "profile.yaml") == profile
+
+
+@pytest.mark.parametrize(("change", "count"), [({"high_m": 0.0005}, 5), ({"velocity_m_s": 0.004}, 3),
+                                               ({"start_m": 0.1}, 7), ({"acceleration_m_s2": 0.01}, 3)])
+def test_an_axis_that_may_do_little_still_gets_candidates(change: dict[str, float], count: int) -> None:
+    reached = replace(reach(runs(ONE_WAY), OWNER), low_m=0.0, high_m=0.1)
+    short, long = candidates(replace(reached, **change))
+    assert len(short) + len(long) >= count

@@ -19,18 +19,17 @@ NEED_TABLE = frozenset({
     "backlash", "preload_loss", "position_dependent_stiffness", "periodic_lead_error", "cumulative_lead_error",
     "thermal_growth", "scale_interpolation_error", "structural_mode", "table_side_friction"})
 
-# The parameter that says how strong an effect is, where there is one to turn: the ladder of sizes is made with it.
+# The parameter that says how strong an effect is, where one does.
 STRENGTH: Mapping[str, str] = {
     "asymmetric_friction": "offset_torque_n_m", "constant_load": "load_torque_n_m",
     "position_dependent_friction": "fraction", "nonlinear_viscous_friction": "quadratic_n_m_s2_rad2",
     "friction_drift": "fraction", "table_side_friction": "share", "backlash": "gap_m", "preload_loss": "zone_m",
-    "position_dependent_stiffness": "relative_slope", "periodic_lead_error": "amplitude_m",
-    "cumulative_lead_error": "slope_m_m", "thermal_growth": "relative_growth", "structural_mode": "mass_ratio",
-    "cogging_torque": "amplitude_n_m", "torque_ripple": "fraction",
+    "position_dependent_stiffness": "relative_slope", "cumulative_lead_error": "slope_m_m",
+    "thermal_growth": "relative_growth", "structural_mode": "mass_ratio", "torque_ripple": "fraction",
     "torque_constant_saturation": "coefficient_1_n2_m2", "torque_dead_zone": "half_width_n_m",
     "current_loop_lag": "time_constant_s", "transport_delay": "delay_s", "velocity_filter_lag": "time_constant_s",
-    "channel_time_skew": "delay_s", "encoder_eccentricity": "amplitude_rad",
-    "scale_interpolation_error": "amplitude_m", "external_force": "force_n", "spring_load": "stiffness_n_m"}
+    "channel_time_skew": "delay_s", "external_force": "force_n", "spring_load": "stiffness_n_m"}
+_SOFTEST = 0.8      # share of the stiffness that may be lost over the travel
 
 
 @dataclass(frozen=True)
@@ -63,13 +62,25 @@ def draw_effect(name: str, scene: Scene, rng: Rng) -> Effect:
     return Effect(name, {key: float(value) for key, value in parameters.items()}, form)
 
 
-def scaled(effect: Effect, factor: float) -> Effect:
-    """The effect with its strength times a factor: friction that falls less, a harmonic family that errs less."""
+def scaled(effect: Effect, factor: float, scene: Scene) -> Effect | None:
+    """The effect with its strength times a factor; None where that is no longer possible."""
     parameters = dict(effect.parameters)
-    names = [name for name in parameters if name.startswith("amplitude")] or [STRENGTH[effect.id]]
-    for name in names:
-        parameters[name] *= factor
-    return Effect(effect.id, parameters, effect.form)
+    if effect.id == "stribeck_friction":
+        rise = parameters["static_torque_n_m"] - scene.coulomb
+        parameters["static_torque_n_m"] = scene.coulomb + factor * rise
+    elif effect.id == "presliding_hysteresis":
+        parameters["stiffness_n_m_rad"] /= factor
+    elif effect.id == "torque_saturation":
+        parameters["limit_n_m"] = scene.peak_torque - factor * (scene.peak_torque - parameters["limit_n_m"])
+    else:
+        for name in [name for name in parameters if name.startswith("amplitude")] or [STRENGTH[effect.id]]:
+            parameters[name] *= factor
+    if parameters.get("relative_slope", 0.0) * scene.axis.travel_m < -_SOFTEST:
+        return None
+    try:
+        return Effect(effect.id, parameters, effect.form)
+    except ValueError:
+        return None
 
 
 def _phase(rng: Rng) -> float:

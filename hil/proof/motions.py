@@ -6,12 +6,17 @@ accelerations. All are made of sine-squared moves (`hil.profile`), from rest to 
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import replace
+from typing import Any, Literal, get_args
+
+import numpy as np
 
 from hil.profile import Profile
 from hil.proof.axes import DrawnAxis, Rng, log_uniform
 from hil.trajectory import Trajectory, plan
 
+Poor = Literal["one_way", "local", "slow"]
+POOR: tuple[Poor, ...] = get_args(Poor)
 TRAINING_S, SHORT_S, HOLDOUT_S = 18.0, 12.0, 12.0
 JERK_M_S3 = 100.0
 _CREEP_M_S = (0.6e-3, 12e-3)
@@ -28,13 +33,19 @@ def holdout(rng: Rng, axis: DrawnAxis) -> Trajectory:
     return _good(rng, axis, HOLDOUT_S)
 
 
-def poor(rng: Rng, axis: DrawnAxis) -> Trajectory:
-    """One feed, far strokes, no creep and hardly a rest."""
-    feed = axis.feed_m_s * rng.uniform(0.4, 0.8)
-    segments: list[dict[str, Any]] = [_rest(0.1)]
-    while _seconds(axis, segments) < SHORT_S - axis.travel_m / feed:
-        segments += [_to(axis.travel_m, feed), _to(0.0, feed)]
-    return _planned(axis, [*segments, _rest(0.1)])
+def poor(rng: Rng, axis: DrawnAxis, kind: Poor) -> Trajectory:
+    """A motion that shows little: one stroke in one direction, recorded until shortly before its end; strokes of a
+    millimetre in one place; or one low feed back and forth with gentle accelerations."""
+    if kind == "one_way":
+        feed = axis.travel_m / rng.uniform(4.0, 8.0)
+        return _cut(_planned(axis, [_rest(0.2), _to(axis.travel_m, feed)]), 0.95)
+    if kind == "local":
+        stroke, feed = rng.uniform(0.5e-3, 2e-3), axis.feed_m_s * rng.uniform(0.02, 0.05)
+        laps = [_stroke(stroke, feed), _rest(0.1), _stroke(-stroke, feed), _rest(0.1)]
+        return _planned(axis, [_rest(0.2), *laps * 8])
+    feed = axis.feed_m_s * rng.uniform(0.02, 0.05)
+    laps = [_stroke(4.0 * feed, feed), _stroke(-4.0 * feed, feed)]
+    return _planned(axis, [_rest(0.2), *laps, _rest(0.2)], gentle=0.1)
 
 
 def _good(rng: Rng, axis: DrawnAxis, seconds: float) -> Trajectory:
@@ -68,14 +79,17 @@ def _creep(rng: Rng, low_m_s: float, high_m_s: float) -> list[dict[str, Any]]:
     stroke = feed * rng.uniform(0.4, 0.8)
     if rng.random() < 0.5:
         return [{"kind": "reversal", "stroke_m": stroke, "feed_m_s": feed, "cycles": int(rng.integers(1, 3))}]
-    return [{"kind": "sine_squared", "stroke_m": sign * stroke, "feed_m_s": feed} for sign in (1, -1)] * 2
+    return [_stroke(stroke, feed), _stroke(-stroke, feed)] * 2
 
 
 def _short_strokes(rng: Rng, axis: DrawnAxis) -> list[dict[str, Any]]:
     """Strokes that are all acceleration, there and back, at two lengths."""
     strokes = [log_uniform(rng, 1e-3, 30e-3) for _ in range(2)]
-    return [{"kind": "sine_squared", "stroke_m": sign * stroke, "feed_m_s": axis.feed_m_s}
-            for stroke in strokes for sign in (1, -1)]
+    return [_stroke(sign * stroke, axis.feed_m_s) for stroke in strokes for sign in (1, -1)]
+
+
+def _stroke(stroke_m: float, feed_m_s: float) -> dict[str, Any]:
+    return {"kind": "sine_squared", "stroke_m": stroke_m, "feed_m_s": feed_m_s}
 
 
 def _to(position_m: float, feed_m_s: float) -> dict[str, Any]:
@@ -86,8 +100,9 @@ def _rest(duration_s: float) -> dict[str, Any]:
     return {"kind": "dwell", "duration_s": duration_s}
 
 
-def _profile(axis: DrawnAxis, segments: list[dict[str, Any]]) -> Profile:
-    limits = {"velocity_m_s": axis.feed_m_s, "acceleration_m_s2": axis.acceleration_m_s2, "jerk_m_s3": JERK_M_S3}
+def _profile(axis: DrawnAxis, segments: list[dict[str, Any]], gentle: float = 1.0) -> Profile:
+    limits = {"velocity_m_s": axis.feed_m_s, "acceleration_m_s2": gentle * axis.acceleration_m_s2,
+              "jerk_m_s3": gentle * JERK_M_S3}
     return Profile.model_validate({"schema_version": 1, "limits": limits, "segments": segments})
 
 
@@ -96,5 +111,13 @@ def _seconds(axis: DrawnAxis, segments: list[dict[str, Any]]) -> float:
     return sum(profile.slots(run.move) for run in profile.runs) * profile.grid_s
 
 
-def _planned(axis: DrawnAxis, segments: list[dict[str, Any]]) -> Trajectory:
-    return plan(_profile(axis, segments), axis.period_s)
+def _planned(axis: DrawnAxis, segments: list[dict[str, Any]], gentle: float = 1.0) -> Trajectory:
+    return plan(_profile(axis, segments, gentle), axis.period_s)
+
+
+def _cut(trajectory: Trajectory, share: float) -> Trajectory:
+    """The first part of a trajectory."""
+    rows = slice(0, round(share * len(trajectory)))
+    arrays: dict[str, Any] = {
+        name: value[rows] for name, value in vars(trajectory).items() if isinstance(value, np.ndarray)}
+    return replace(trajectory, **arrays)

@@ -14,6 +14,7 @@ from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import least_squares
 
 from drivers.sim.axis import AxisTruth
 from drivers.sim.effects import Effect
@@ -27,6 +28,8 @@ FloatArray = NDArray[np.float64]
 
 _PERFECT = Sensors(motor_counts_per_rev=0, table_resolution_m=0, torque_noise_n_m=0)
 _DIFFERENCE = 0.01           # relative, of a parameter in its finite difference
+# Parameters that a recording shows by themselves, and of which a percent more is another effect.
+_READ_OFF = ("cycles_per_rev", "period_m", "start_s", "end_s")
 
 
 class Visibility:
@@ -37,21 +40,44 @@ class Visibility:
         self._runs: dict[object, FloatArray] = {}
         self._bases: dict[object, FloatArray] = {}
 
-    def size(self, effects: Sequence[Effect], beside: Sequence[Effect] = (), rival: Sequence[Effect] = ()) -> float:
-        """Size of effects beside others whose parameters could also be fitted, and those of a rival."""
-        sizes = self.sizes(effects, beside, rival)
-        return max(sizes.values())
+    def size(self, effects: Sequence[Effect], beside: Sequence[Effect] = ()) -> float:
+        """Size of effects beside others, whose parameters could be fitted too."""
+        return max(self.sizes(effects, beside).values())
 
-    def sizes(self, effects: Sequence[Effect], beside: Sequence[Effect] = (),
-              rival: Sequence[Effect] = ()) -> dict[str, float]:
+    def sizes(self, effects: Sequence[Effect], beside: Sequence[Effect] = ()) -> dict[str, float]:
         """The same for each channel."""
         change = self._channels([*beside, *effects]) - self._channels(beside)
-        basis = self._basis(tuple(beside), tuple(rival))
+        basis = self._basis(tuple(beside))
         flat = change.ravel()
         if not np.all(np.isfinite(flat)):
             return dict.fromkeys(self._names, inf)
         left = (flat - basis @ (basis.T @ flat)).reshape(change.shape)
         return dict(zip(self._names, np.sqrt(np.mean(left**2, axis=1)).tolist(), strict=True))
+
+    def evidence(self, effects: Sequence[Effect]) -> float:
+        """Sum of squares of what the sizes are the rms of: what a test on white noise would see."""
+        rows = sum(len(motion) for motion in self.motions)
+        return rows * sum(size**2 for size in self.sizes(effects).values())
+
+    def separation(self, effect: Effect, rival: Effect, enough: float) -> float:
+        """Evidence by which these motions tell an effect from a rival whose parameters, like the nominal ones, are
+        fitted to what the effect does. Where the rival is `enough` alike as it stands, it is not fitted."""
+        seen = self._channels([effect])
+        at = self._channels([rival]) - seen
+        if float(np.sum(at**2)) < enough:
+            return float(np.sum(at**2))
+        nominal = self.axis.nominal
+        own = [name for name, value in rival.parameters.items() if value != 0.0 and name not in _READ_OFF]
+
+        def left(x: FloatArray) -> FloatArray:
+            true = {name: self.axis.true[name] * value for name, value in zip(nominal, x, strict=False)}
+            mine = {name: rival.parameters[name] * value for name, value in zip(own, x[len(nominal):], strict=True)}
+            other = Effect(rival.id, {**rival.parameters, **mine}, rival.form)
+            difference = self._seen_all([other], self.axis.with_parameters(true)) - seen
+            return np.asarray(np.nan_to_num(difference, nan=1e6, posinf=1e6, neginf=-1e6).ravel())
+
+        start = np.ones(len(nominal) + len(own))
+        return 2.0 * float(least_squares(left, start, bounds=(0.2, 5.0), diff_step=1e-3, max_nfev=6).cost)
 
     def peak_torque(self) -> float:
         """Largest torque that the motions take without effects."""
@@ -63,9 +89,9 @@ class Visibility:
         names = ("torque", "drive", "controller", "transmission")
         return names if self.axis.has_table else names[:3]
 
-    def _basis(self, beside: tuple[Effect, ...], rival: tuple[Effect, ...]) -> FloatArray:
+    def _basis(self, beside: tuple[Effect, ...]) -> FloatArray:
         """Orthonormal directions (n, p) that nominal parameters and those of the other effects span."""
-        key = (_key(beside), _key(rival))
+        key = _key(beside)
         if key not in self._bases:
             at = self._channels(beside).ravel()
             slopes = []
@@ -75,7 +101,6 @@ class Visibility:
             for index, effect in enumerate(beside):
                 for other in _neighbours(effect):
                     slopes.append(self._channels([*beside[:index], other, *beside[index + 1:]]).ravel() - at)
-            slopes += [self._channels([*beside, other]).ravel() - at for other in rival]
             columns = np.stack([slope / max(float(np.linalg.norm(slope)), 1e-300) for slope in slopes], axis=1)
             self._bases[key] = np.linalg.qr(np.nan_to_num(columns))[0]
         return self._bases[key]
@@ -84,9 +109,11 @@ class Visibility:
         """Channels over their noise (channels, n), the motions one after the other."""
         key = (_key(effects), truth)
         if key not in self._runs:
-            parts = [self._seen(self._record(truth or self.axis.truth, effects, motion)) for motion in self.motions]
-            self._runs[key] = np.concatenate(parts, axis=1)
+            self._runs[key] = self._seen_all(effects, truth or self.axis.truth)
         return self._runs[key]
+
+    def _seen_all(self, effects: Sequence[Effect], truth: AxisTruth) -> FloatArray:
+        return np.concatenate([self._seen(self._record(truth, effects, motion)) for motion in self.motions], axis=1)
 
     def _seen(self, rows: Mapping[str, FloatArray]) -> FloatArray:
         axis, linear = self.axis, self.axis.truth.linear
@@ -112,9 +139,8 @@ def _neighbours(effect: Effect) -> list[Effect]:
     found = []
     for name, value in effect.parameters.items():
         change = _DIFFERENCE if "phase" in name else _DIFFERENCE * value
-        if name in ("cycles_per_rev", "period_m", "start_s", "end_s") or change == 0.0:
-            continue      # read off the recording; a difference of a percent is another effect
-        found.append(Effect(effect.id, {**effect.parameters, name: value + change}, effect.form))
+        if name not in _READ_OFF and change != 0.0:
+            found.append(Effect(effect.id, {**effect.parameters, name: value + change}, effect.form))
     return found
 
 

@@ -57,9 +57,10 @@ def _harmonic_share(phase: FloatArray, signal: FloatArray) -> float:
 
 def orders(runs: Sequence[Measured], found: Sequence[Disturbance], angle_per_unit: float, most: int = 3,
            weight: Sequence[FloatArray] | None = None) -> list[float]:
-    """Orders per motor revolution in which the disturbance is strongest, best first.
+    """Orders per motor revolution in which the disturbance is strongest, best first, and always the first two.
 
-    Only rows slow enough for the differences to pass the order are used.
+    Only rows slow enough for the differences to pass the order are used. Where those are less than some turns, high
+    orders fit anything; an unbalanced or bent screw shows once or twice a turn.
     """
     shares = []
     for order in _ORDERS:
@@ -73,7 +74,8 @@ def orders(runs: Sequence[Measured], found: Sequence[Disturbance], angle_per_uni
         step = max(phase.size // 10000, 1)
         phase, signal = phase[::step], signal[::step]
         shares.append(_harmonic_share(phase, signal) * min(1.0, phase.size / 1000.0) if phase.size > 100 else 0.0)
-    return [float(_ORDERS[index]) for index in np.argsort(shares)[::-1][:most]]
+    best = [float(_ORDERS[index]) for index in np.argsort(shares)[::-1][:most]]
+    return list(dict.fromkeys((*best, 1.0, 2.0)))
 
 
 def friction_periods(runs: Sequence[Measured], found: Sequence[Disturbance], ratio: float,

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from hil.bench import Bench
 from hil.diagnosis import search
 from hil.diagnosis.evidence import against, whitening
-from hil.diagnosis.fit import Fit, fit, in_parallel, splits
-from hil.diagnosis.model import Model, Term, scales
+from hil.diagnosis.fit import Fit, evaluate, fit, in_parallel
+from hil.diagnosis.model import Term, scales
 from hil.diagnosis.screen import Lead
 from hil.measured import Measured
 
@@ -32,7 +32,9 @@ TIED = 10.0             # a rival closer than this is not refuted
 # A term must also matter: take so much energy away, in units of the noise's: 14 % of the noise in rms.
 # Below lie the details in which two honest simulations of one axis differ.
 MATERIAL = 0.02
-FLOOR = 1.10            # mean square of a channel over its noise, up to which it counts as explained: 5 % in rms
+# The same law may be written in another form. What a term leaves below this share of the energy that it took from a
+# channel, a tenth in rms, may be its own form, and no second mechanism.
+FORM = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +66,7 @@ def explain(bench: Bench, runs: Sequence[Measured], progress: Progress = lambda 
     """Search for the physics that the twin of `bench` lacks on these recordings."""
     progress("refitting the nominal parameters")
     base = search.nominal(bench, runs)
-    owner = at_owner(base.model, runs)
+    owner = evaluate(base.model, runs)
     nominal, rivals, first_leads = base, dict[tuple[str, int], list[Rival]](), list[Lead]()
     while len(base.model.terms) < MOST_TERMS:
         progress(f"screening the library beside {len(base.model.terms)} terms")
@@ -78,7 +80,7 @@ def explain(bench: Bench, runs: Sequence[Measured], progress: Progress = lambda 
         found = [other for other in search.race(base, promising, runs)
                  if claimable(_last(other), other.model.resolved(other.x)[0])]
         best = next((other for other in found if against(other, base) >= NEEDED
-                     and base.cost - other.cost >= MATERIAL * rows), None)
+                     and gain(base, other, nominal) >= MATERIAL * rows), None)
         if best is None:
             break
         best = _simplest([best, *(other for other in found if other is not best and against(best, other) < TIED)])
@@ -87,7 +89,7 @@ def explain(bench: Bench, runs: Sequence[Measured], progress: Progress = lambda 
             (Rival(other, against(best, other, filters)) for other in found if other is not best),
             key=lambda rival: rival.evidence)
         base = best
-        base = _pruned(base, runs)
+        base = _pruned(base, nominal, runs)
     final = fit(base.model, runs, base.x, evaluations=40)
     kept = {term.key for term in final.model.terms}
     needed = {key: evidence for key, (evidence, _) in _ablated(final, runs).items()}
@@ -95,21 +97,15 @@ def explain(bench: Bench, runs: Sequence[Measured], progress: Progress = lambda 
                        tuple(first_leads))
 
 
+def gain(without: Fit, found: Fit, nominal: Fit) -> float:
+    """Energy that a term takes away, channel by channel beyond what may be the form of the terms before it."""
+    return sum(max(float(a @ a - b @ b) - FORM * max(float(n @ n - a @ a), 0.0), 0.0)
+               for a, b, n in zip(without.parts, found.parts, nominal.parts, strict=True))
+
+
 def _bits(rows: int) -> float:
     """Share of white residuals that evidence of NEEDED takes away."""
     return 1.0 - float(np.exp(-NEEDED / rows))
-
-
-def at_owner(model: Model, runs: Sequence[Measured]) -> Fit:
-    """The owner's values, not fitted."""
-    x = model.initial()
-    residuals = model.residuals(x, runs)
-    return Fit(model, x, residuals, np.zeros((residuals.size, 0)), splits(model, runs))
-
-
-def at_floor(found: Fit, runs: Sequence[Measured]) -> bool:
-    """Whether every channel of every run is down to its noise."""
-    return all(value <= FLOOR for run in runs for value in noise_ratios(found, run).values())
 
 
 def noise_ratios(found: Fit, run: Measured) -> dict[str, float]:
@@ -158,11 +154,11 @@ def _ablated(found: Fit, runs: Sequence[Measured]) -> dict[tuple[str, int], tupl
             for term, other in zip(found.model.terms, fits, strict=True)}
 
 
-def _pruned(found: Fit, runs: Sequence[Measured]) -> Fit:
+def _pruned(found: Fit, nominal: Fit, runs: Sequence[Measured]) -> Fit:
     """The fit without the terms that the evidence no longer asks for, the weakest first."""
     while len(found.model.terms) > 1:
         evidence, rest = min(_ablated(found, runs).values(), key=lambda pair: pair[0])
-        if evidence >= NEEDED and rest.cost - found.cost >= MATERIAL * found.residuals.size:
+        if evidence >= NEEDED and gain(rest, found, nominal) >= MATERIAL * found.residuals.size:
             break
         found = rest
     return found

@@ -1,9 +1,12 @@
-"""Prediction-error fit of a hypothesis (Ljung 1999, ch. 7), with scipy's trust region.
+"""Prediction-error fit of a hypothesis (Ljung 1999, ch. 7) by the method of Levenberg and Marquardt.
 
     min over x of  sum rho(r(x)^2),   r: weighted residuals of all channels and runs
 
-The Jacobian is taken by differences, one simulation per parameter, on all cores: the kernel releases
-the interpreter. A first pass with a soft loss keeps a few wild instants from steering the start.
+    step s:  min |J s + r|^2 + mu |diag(J) s|^2   with x + s inside the bounds;  mu after Nielsen (1999)
+
+The Jacobian J is taken by differences, one simulation per parameter, on all cores: the kernel releases the
+interpreter. A recording has 1e5 rows and a hypothesis ten parameters, hence the step is found from J^T J: a
+decomposition of J, as scipy's solvers take it, costs more than the simulations.
 """
 
 from __future__ import annotations
@@ -16,7 +19,7 @@ from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
+from scipy.optimize import lsq_linear
 
 from hil.diagnosis.model import Model
 from hil.measured import Measured
@@ -25,6 +28,10 @@ FloatArray = NDArray[np.float64]
 Result = TypeVar("Result")
 
 POOL = ThreadPoolExecutor(os.cpu_count() or 1)
+
+FLOOR = 1.10             # mean square of a channel over its noise, up to which it counts as explained: 5 % in rms
+_FIRST_DAMPING = 1e-3
+_LEAST_GAIN = 1e-6       # of the cost, relative: a step that promises or brings less is the last
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,47 +57,112 @@ class Fit:
         """Mean squared weighted residual: 1 at the noise floor."""
         return self.cost / self.residuals.size
 
+    @property
+    def parts(self) -> list[FloatArray]:
+        """Weighted residuals of each channel of each run."""
+        return np.split(self.residuals, self.splits)
+
+    @property
+    def at_floor(self) -> bool:
+        """Whether every channel of every run is down to its noise."""
+        return all(float(part @ part) <= FLOOR * part.size for part in self.parts)
+
+
+def evaluate(model: Model, runs: Sequence[Measured], x: FloatArray | None = None) -> Fit:
+    """A hypothesis as it stands at `x` or its own start, not fitted: its Jacobian is empty."""
+    at = model.initial() if x is None else x
+    residuals = model.residuals(at, runs)
+    return Fit(model, at, residuals, np.zeros((residuals.size, 0)), splits(model, runs))
+
 
 def jacobian(model: Model, x: FloatArray, base: FloatArray, runs: Sequence[Measured], *,
-             closed: bool = False) -> FloatArray:
-    """Derivative of the weighted residuals (m, parameters) by forward differences, columns in parallel."""
-    _, high = model.bounds()
+             closed: bool = False, held: FloatArray | None = None) -> FloatArray:
+    """Derivative of the weighted residuals (m, parameters) by forward differences, columns in parallel.
 
-    def column(index: int) -> FloatArray:
+    The first columns are those `held` (m, k), where given.
+    """
+    _, high = model.bounds()
+    known = 0 if held is None else held.shape[1]
+    slopes = np.empty((base.size, x.size), order="F")
+    if held is not None:
+        slopes[:, :known] = held
+
+    def column(index: int) -> None:
         step = model.coordinates[index].step
         if x[index] + step > high[index]:
             step = -step
         moved = x.copy()
         moved[index] += step
-        return (model.residuals(moved, runs, closed) - base) / step
+        slopes[:, index] = (model.residuals(moved, runs, closed) - base) / step
 
-    return np.stack(list(POOL.map(column, range(x.size))), axis=1)
+    list(POOL.map(column, range(known, x.size)))
+    return slopes
 
 
 def fit(model: Model, runs: Sequence[Measured], x: FloatArray | None = None, *, soft: float = 0.0,
-        evaluations: int = 30, closed: bool = False) -> Fit:
+        evaluations: int = 30, closed: bool = False, held: FloatArray | None = None) -> Fit:
     """Fit all coordinates of a model, from `x` or the model's own start.
 
     `soft` > 0 is the size of residual from which the loss grows only linearly. `closed` takes the residuals of
-    the closed loop instead of those of the blocks.
+    the closed loop instead of those of the blocks. `held` (m, k) are derivatives by the first k coordinates that
+    are taken as constant on the way: near a point where they are known, that saves most simulations.
     """
     low, high = model.bounds()
-    start = np.clip(model.initial() if x is None else x, low + 1e-9, high - 1e-9)
-    last: dict[str, FloatArray] = {}
+    at = np.clip(model.initial() if x is None else x, low, high)
+    residuals = model.residuals(at, runs, closed)
+    slopes = jacobian(model, at, residuals, runs, closed=closed, held=held)
+    damping, growth = _FIRST_DAMPING, 2.0
+    size = np.zeros(at.size)
+    used = 1
+    while used < evaluations:
+        loss, weights = _loss(residuals, soft)
+        weighted = slopes if weights is None else slopes * weights[:, None]
+        normal = weighted.T @ weighted
+        descent = weighted.T @ (residuals if weights is None else residuals * weights)
+        size = np.maximum(size, np.sqrt(np.diag(normal)))
+        step = _step(normal, descent, damping, size, low - at, high - at)
+        promised = -float(step @ (2.0 * descent + normal @ step))
+        if promised <= _LEAST_GAIN * loss:
+            break
+        moved = model.residuals(at + step, runs, closed)
+        used += 1
+        gained = loss - _loss(moved, soft)[0]
+        if gained > 0.0:
+            at, residuals = at + step, moved
+            slopes = jacobian(model, at, residuals, runs, closed=closed, held=held)
+            damping *= max(1.0 / 3.0, 1.0 - (2.0 * gained / promised - 1.0) ** 3)
+            growth = 2.0
+            if gained <= _LEAST_GAIN * loss:
+                break
+        else:
+            damping *= growth
+            growth *= 2.0
+    return Fit(model, at, residuals, slopes, splits(model, runs, closed))
 
-    def residuals(at: FloatArray) -> FloatArray:
-        last["x"], last["r"] = at.copy(), model.residuals(at, runs, closed)
-        return last["r"]
 
-    def derivative(at: FloatArray) -> FloatArray:
-        base = last["r"] if np.array_equal(last["x"], at) else residuals(at)
-        return jacobian(model, at, base, runs, closed=closed)
+def _loss(residuals: FloatArray, soft: float) -> tuple[float, FloatArray | None]:
+    """Sum of rho, and the weights sqrt(rho') of the rows; rho(z) = 2 soft^2 (sqrt(1 + z / soft^2) - 1)."""
+    if not soft:
+        return float(residuals @ residuals), None
+    root = np.sqrt(1.0 + (residuals / soft) ** 2)
+    return float(2.0 * soft**2 * np.sum(root - 1.0)), np.asarray(1.0 / np.sqrt(root), dtype=np.float64)
 
-    found = least_squares(residuals, start, derivative, bounds=(low, high), x_scale="jac", max_nfev=evaluations,
-                          loss="soft_l1" if soft else "linear", f_scale=soft or 1.0, xtol=1e-7, ftol=1e-6, gtol=1e-8)
-    base = model.residuals(found.x, runs, closed)
-    slope = found.jac if not soft else jacobian(model, found.x, base, runs, closed=closed)
-    return Fit(model, found.x, base, slope, splits(model, runs, closed))
+
+def _step(normal: FloatArray, descent: FloatArray, damping: float, size: FloatArray, low: FloatArray,
+          high: FloatArray) -> FloatArray:
+    """The damped step of the module's equation, between `low` and `high`."""
+    scale = np.where(size > 0.0, size, 1.0)
+    damped = normal / np.outer(scale, scale) + damping * np.eye(scale.size)
+    values, vectors = np.linalg.eigh(damped)
+    root = vectors * np.sqrt(np.maximum(values, 1e-14 * values[-1]))
+    target = np.linalg.solve(root, -descent / scale)
+    free = np.linalg.solve(root.T, target)
+    if np.all(free > low * scale) and np.all(free < high * scale):
+        return np.asarray(free / scale, dtype=np.float64)
+    wide = np.maximum(high - low, 1e-12)
+    found = lsq_linear(root.T, target, (np.minimum(low, 0.0) * scale - 1e-12 * wide * scale,
+                                        np.maximum(high, 0.0) * scale + 1e-12 * wide * scale), method="bvls")
+    return np.asarray(np.clip(found.x / scale, low, high), dtype=np.float64)
 
 
 def splits(model: Model, runs: Sequence[Measured], closed: bool = False) -> tuple[int, ...]:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from hil.diagnosis.evidence import against
-from hil.diagnosis.explain import MATERIAL, NEEDED, at_floor
+from hil.diagnosis.explain import MATERIAL, NEEDED
 from hil.diagnosis.fit import Fit
 from hil.diagnosis.proof import explained_share
 from hil.diagnosis.result import Verdict
@@ -21,12 +21,12 @@ MOST = 0.5
 def judge(owner: Fit, nominal: Fit, final: Fit, train: Sequence[Measured], held_out: Sequence[Measured]) -> Verdict:
     """The verdict on the bench's own values, their refit, and the refit with the terms found."""
     if final.model.terms:
-        if at_floor(final, train) or explained_share(nominal, final, held_out or train) >= MOST:
+        if final.at_floor or explained_share(nominal, final, held_out or train) >= MOST:
             return Verdict.MISSING_PHYSICS
         return Verdict.UNEXPLAINED
-    if not at_floor(nominal, train):
+    if not nominal.at_floor:
         return Verdict.UNEXPLAINED
-    return Verdict.NO_MISMATCH if at_floor(owner, train) or not refit_matters(owner, nominal) \
+    return Verdict.NO_MISMATCH if owner.at_floor or not refit_matters(owner, nominal) \
         else Verdict.PARAMETER_ERROR
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from hil.diagnosis.evidence import against
 from hil.diagnosis.explain import TIED, noise_ratios
-from hil.diagnosis.fit import Fit, fit, in_parallel, splits
+from hil.diagnosis.fit import Fit, evaluate, fit, in_parallel
 from hil.diagnosis.floor import Laps, laps
 from hil.diagnosis.model import Term, scales
 from hil.measured import Measured
@@ -108,20 +108,14 @@ def _ablate(nominal: Fit, final: Fit, train: Sequence[Measured], held_out: Seque
 
     fits = in_parallel([lambda index=index: without(index) for index in range(len(terms))])  # type: ignore[misc]
     own_train, own_held_out = energy(final, train), energy(final, held_out)
-    here = _over(final, held_out) if held_out else None
+    here = evaluate(final.model, held_out, final.x) if held_out else None
     repeated = [(run, found) for run in train if (found := laps(run)) is not None]
     unrepeated = _unrepeated(final, repeated)
     return [Ablation(term, other, energy(other, train) / own_train,
                      energy(other, held_out) / own_held_out if held_out else None,
-                     _gain(here, _over(other, held_out)) if here is not None else None,
+                     _gain(here, evaluate(other.model, held_out, other.x)) if here is not None else None,
                      _unrepeated(other, repeated) / unrepeated if unrepeated > 0.0 else None)
             for term, other in zip(terms, fits, strict=True)]
-
-
-def _over(found: Fit, runs: Sequence[Measured]) -> Fit:
-    """A fit as it stands on other recordings."""
-    residuals = found.model.residuals(found.x, runs)
-    return Fit(found.model, found.x, residuals, np.zeros((residuals.size, 0)), splits(found.model, runs))
 
 
 def _unrepeated(found: Fit, repeated: Sequence[tuple[Measured, Laps]]) -> float:

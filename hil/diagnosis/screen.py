@@ -56,11 +56,16 @@ def _view(base: Fit, white: bool) -> _View:
     filters = whitening(base) if white else None
     seen = base.residuals if filters is None else whitened(base.residuals, base.splits, filters)
     slopes = base.jacobian if filters is None else whitened(base.jacobian, base.splits, filters)
-    typical = max(float(np.median(np.abs(seen))) / 0.6745, 0.1)
-    weights = 1.0 / np.sqrt(np.sqrt(1.0 + (seen / (_SOFT * typical)) ** 2))
+    weights = np.concatenate([_weights(part) for part in np.split(seen, base.splits)])
     nuisance, _ = np.linalg.qr(weights[:, None] * slopes)
     residual = weights * seen
     return _View(weights, nuisance, residual - nuisance @ (nuisance.T @ residual), base.splits, filters)
+
+
+def _weights(part: FloatArray) -> FloatArray:
+    """Weights of the residuals of one channel of one run: less for those far beyond its typical one."""
+    typical = max(float(np.median(np.abs(part))) / 0.6745, 0.1)
+    return np.asarray(1.0 / np.sqrt(np.sqrt(1.0 + (part / (_SOFT * typical)) ** 2)), dtype=np.float64)
 
 
 def screen(base: Fit, runs: Sequence[Measured], starts: Sequence[Start]) -> list[Lead]:

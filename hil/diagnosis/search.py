@@ -13,7 +13,7 @@ import numpy as np
 
 from hil.bench import Bench
 from hil.diagnosis import starts as catalogue
-from hil.diagnosis.fit import Fit, fit, in_parallel
+from hil.diagnosis.fit import Fit, evaluate, fit, in_parallel, jacobian
 from hil.diagnosis.model import (
     LAST_EDGE_STEP_S,
     SEARCH_ACCURACY,
@@ -23,11 +23,14 @@ from hil.diagnosis.model import (
 )
 from hil.diagnosis.screen import Lead, screen
 from hil.measured import Measured
+from hil.twin.library import BY_ID
 
 _RACERS = 8           # leads that are fitted
 _FINALISTS = 3        # of which are fitted to the end
-_SPRINT = 6           # evaluations of a first fit
+_NEAR = 6             # evaluations of a first fit with the derivatives of the base
+_SPRINT = 4           # and of the one after it
 _LONG = 25            # evaluations of a last fit
+_NEAR_FLOOR = 4.0     # times the floor's energy: a sprint beyond it is not converged once another reached the floor
 _HOPELESS = 0.02      # a lead that explains this little of what the first explains is not fitted
 _SOFT = 30.0          # residual from which a first fit hears less: far above noise, so that valleys stay convex
 
@@ -40,25 +43,32 @@ def nominal(bench: Bench, runs: Sequence[Measured]) -> Fit:
 
 
 def leads(base: Fit, runs: Sequence[Measured]) -> list[Lead]:
-    """One lead for each mechanism and variant that the hypothesis does not have, best first."""
+    """One lead for each mechanism that the hypothesis does not have, in its most promising variant, best first."""
     fitted, terms = base.model.resolved(base.x)
     blocks = [base.model.blocks(base.x, run) for run in runs]
     scene = catalogue.scene(runs, fitted, blocks, base.model.observer_s)
     points = [start for start in catalogue.starts(scene, base.model.bench)
               if start.effect not in {term.effect for term in terms}]
-    best: dict[tuple[str, int], Lead] = {}
+    best: dict[str, Lead] = {}
     for lead in screen(base, runs, points):
-        best.setdefault(lead.term.key, lead)
+        best.setdefault(lead.term.effect, lead)
     return list(best.values())
 
 
 def race(base: Fit, found: Sequence[Lead], runs: Sequence[Measured]) -> list[Fit]:
-    """Fits of the base with each of the first leads, best first; only the finalists are converged."""
+    """Fits of the base with each of the first leads, best first.
+
+    All sprint; the one that gets furthest is converged, in all its variants. The others are, too, unless it reached
+    the noise floor and they are far from it: then how far exactly is nobody's question.
+    """
+    searched = replace(base.model, torque_accuracy=SEARCH_ACCURACY)
+    held = jacobian(searched, base.x, searched.residuals(base.x, runs), runs)
 
     def sprint(lead: Lead) -> Fit:
-        model = replace(base.model, terms=(*base.model.terms, lead.term), torque_accuracy=SEARCH_ACCURACY)
+        model = replace(searched, terms=(*base.model.terms, lead.term))
         x = np.concatenate([base.x, model.initial()[base.x.size:]])
-        return fit(model, runs, x, soft=_SOFT, evaluations=_SPRINT)
+        near = fit(model, runs, x, soft=_SOFT, evaluations=_NEAR, held=held)
+        return fit(model, runs, near.x, soft=_SOFT, evaluations=_SPRINT)
 
     def afresh(found: Fit) -> Fit:
         """From the owner's nominal values: the base may have bent its own to make up for what it lacks."""
@@ -73,15 +83,30 @@ def race(base: Fit, found: Sequence[Lead], runs: Sequence[Measured]) -> list[Fit
         found = fit(replace(found.model, edge_step_s=LAST_EDGE_STEP_S), runs, found.x, evaluations=_LONG)
         return fit(replace(found.model, torque_accuracy=TORQUE_ACCURACY), runs, found.x, evaluations=_SPRINT)
 
+    def variants(found: Fit) -> list[Fit]:
+        """The other variants of the last term, from where this one ended."""
+        *rest, last = found.model.resolved(found.x)[1]
+        others = [replace(found.model, terms=(*rest, replace(last, variant=variant)))
+                  for variant in range(len(BY_ID[last.effect].variants)) if variant != last.variant]
+        return in_parallel([partial(fit, model, runs, np.concatenate([
+            found.x[:model.nominal_count], model.initial()[model.nominal_count:]])) for model in others])
+
     good = [lead for lead in found[:_RACERS] if lead.share > _HOPELESS * found[0].share]
     sprints = in_parallel([partial(sprint, lead) for lead in good])
     ranked = sorted(sprints, key=lambda result: result.cost)
+    results = in_parallel([partial(finish, ranked[0]), partial(afresh, ranked[0])])
+    leader = min(results, key=lambda result: result.cost)
     # those that got furthest, and the first by the screen, which may only have had a slow start
-    finalists = list({id(result): result for result in (*ranked[:_FINALISTS], *sprints[:2])}.values())
-    jobs = [partial(finish, result) for result in finalists] + [partial(afresh, result) for result in ranked[:1]]
-    best: dict[tuple[str, int], Fit] = {}
-    for result in in_parallel(jobs):
-        key = result.model.terms[-1].key
-        if key not in best or result.cost < best[key].cost:
-            best[key] = result
+    others = {id(result): result for result in (*ranked[1:_FINALISTS], *sprints[:2]) if result is not ranked[0]}
+    reached = [evaluate(replace(result.model, torque_accuracy=TORQUE_ACCURACY), runs, result.x) for result in
+               others.values()]
+    results += reached
+    results += in_parallel([partial(finish, other) for other, result in zip(others.values(), reached, strict=True)
+                            if not leader.at_floor or result.cost < _NEAR_FLOOR * leader.cost])
+    results += variants(min(results, key=lambda result: result.cost))
+    best: dict[str, Fit] = {}
+    for result in results:
+        effect = result.model.terms[-1].effect
+        if effect not in best or result.cost < best[effect].cost:
+            best[effect] = result
     return sorted(best.values(), key=lambda result: result.cost)

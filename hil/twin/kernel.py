@@ -326,7 +326,8 @@ def _build_observe(digest: str) -> Any:
             state = control.State(state.tick, state.velocity_reference_m_s, resumed, state.previous_motor_rad,
                                   state.previous2_motor_rad, state.filtered_velocity_rad_s)
             _correct(MOTOR_IMPULSE, measured_motor[k] - motor[k], period, constants[OBSERVER], modes, delta)
-            if measured_table.size and memory[OWN, FLOATING] > 0.0:
+            resting = abs(measured_motor[k] - measured_motor[max(k - 1, 0)]) <= constants[SLOW_VELOCITY] * period
+            if measured_table.size and (resting or memory[OWN, FLOATING] > 0.0):
                 error = (measured_table[k] - table[k]) / constants[RATIO]
                 _correct(TABLE_IMPULSE, error, period, OBSERVER_S, modes, delta)
             torque[k] = advance(command[k], constants, modes, values, codes, delta, memory)

@@ -1,4 +1,7 @@
-"""Stribeck friction: friction falls with speed from its static value."""
+"""Stribeck friction: friction falls with speed from its static value.
+
+How it falls differs from contact to contact: the variants are the laws in use.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,7 @@ from collections.abc import MutableSequence, Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Stage
+from hil.twin.mechanism import PARAMETERS, Block, Dimension, Mechanism, Moment, Parameter, Stage
 
 
 @njit
@@ -17,7 +20,15 @@ def _stribeck_level(
     static, stribeck_velocity = parameters[0], parameters[1]
     if stribeck_velocity <= 0.0:
         return value
-    return value + (static - value) * math.exp(-((at.velocity / stribeck_velocity) ** 2))
+    u = abs(at.velocity) / stribeck_velocity
+    variant = parameters[PARAMETERS - 1]
+    if variant == 1.0:
+        share = math.exp(-u)
+    elif variant == 2.0:
+        share = 1.0 / (1.0 + u * u)
+    else:
+        share = math.exp(-u * u)
+    return value + (static - value) * share
 
 
 MECHANISM = Mechanism(
@@ -25,12 +36,14 @@ MECHANISM = Mechanism(
     block=Block.MOTOR_SIDE,
     element="ball nut and guideways",
     sentence="Friction falls from {static_torque_n_m} at rest as speed passes {stribeck_velocity_rad_s}.",
-    equation="F(v) = Fc + (Fs - Fc) exp(-(v/vs)^2)",
-    source="Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30 (1994) 1083, Stribeck curve",
+    equation="F(v) = Fc + (Fs - Fc) s(v/vs); s(u) = exp(-u^2), exp(-u) or 1/(1 + u^2)",
+    source="Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30 (1994) 1083: Gaussian; Tustin (1947): "
+           "exponential; Hess and Soom (1990): Lorentzian",
     parameters=(
         Parameter("static_torque_n_m", Dimension.TORQUE, 0.0, 1e4),
         Parameter("stribeck_velocity_rad_s", Dimension.MOTOR_SPEED, 1e-5, 1e3),
     ),
     stage=Stage.COULOMB,
     contribution=_stribeck_level,
+    variants=("Gaussian", "exponential", "Lorentzian"),
 )

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from diagnosis_runs import bench, recorded
 
-from hil.diagnosis.explain import Explanation, Rival, at_owner
+from hil.diagnosis.explain import Explanation, Rival
 from hil.diagnosis.findings import diagnosed_bench, findings, renamed, standard_errors
-from hil.diagnosis.fit import Fit, fit
+from hil.diagnosis.fit import Fit, evaluate, fit
 from hil.diagnosis.judge import judge
 from hil.diagnosis.model import Model, Term
 from hil.diagnosis.proof import explained_share, prove
@@ -27,7 +27,7 @@ def runs(*terms: Term, seed: int = 1, **axis: float) -> list[Measured]:
 
 def believed(found: list[Measured], *terms: Term, **axis: float) -> Fit:
     """A hypothesis as it stands, nothing fitted."""
-    return at_owner(Model(bench(**axis), terms), found)
+    return evaluate(Model(bench(**axis), terms), found)
 
 
 def test_a_twin_at_the_noise_has_no_mismatch() -> None:

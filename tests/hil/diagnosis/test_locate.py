@@ -10,8 +10,7 @@ from diagnosis_runs import bench, recorded
 from numpy.typing import NDArray
 
 from hil.diagnosis.energy import Energy, energies
-from hil.diagnosis.explain import at_owner
-from hil.diagnosis.fit import Fit
+from hil.diagnosis.fit import Fit, evaluate
 from hil.diagnosis.locate import _range, locate, phase_shares, windows
 from hil.diagnosis.model import Model, Term
 from hil.diagnosis.periods import Lock, lock
@@ -26,8 +25,8 @@ OWNER = bench()
 def located(*terms: Term, named: bool = False) -> Location:
     """Location of terms that the twin lacks and whose parameters are right otherwise."""
     run = take(recorded(OWNER, *terms), OWNER)
-    without = at_owner(Model(OWNER), [run])
-    return locate(without, [run], at_owner(Model(OWNER, terms), [run]) if named else without)
+    without = evaluate(Model(OWNER), [run])
+    return locate(without, [run], evaluate(Model(OWNER, terms), [run]) if named else without)
 
 
 @pytest.mark.parametrize(("term", "block", "channel"), [
@@ -122,7 +121,7 @@ def test_energy_in_one_place_is_claimed_there() -> None:
 def clean() -> tuple[Fit, Measured]:
     """The twin of an axis that is as believed."""
     run = take(recorded(OWNER), OWNER)
-    return at_owner(Model(OWNER), [run]), run
+    return evaluate(Model(OWNER), [run]), run
 
 
 def test_shares_of_nothing_are_zero(clean: tuple[Fit, Measured]) -> None:

@@ -8,7 +8,8 @@ import pytest
 from diagnosis_runs import bench, recorded
 
 from hil.diagnosis.diagnose import Diagnosis
-from hil.diagnosis.explain import Explanation, at_owner
+from hil.diagnosis.explain import Explanation
+from hil.diagnosis.fit import evaluate
 from hil.diagnosis.model import Model, Term
 from hil.diagnosis.proof import Proof
 from hil.diagnosis.result import Result, Unexplained, Verdict
@@ -34,7 +35,7 @@ def diagnosis_of(effect: str, times: float = 3.0) -> Diagnosis:
         values[1:] = [0.8, 1.2]
     term = Term(effect, 0, tuple(values))
     runs = [take(recorded(OWNER, term), OWNER)]
-    plain, right = at_owner(Model(OWNER), runs), at_owner(Model(OWNER, (term,)), runs)
+    plain, right = evaluate(Model(OWNER), runs), evaluate(Model(OWNER, (term,)), runs)
     explanation, proof = Explanation(plain, plain, right), Proof(right, (), ())
     result = Result(verdict=Verdict.MISSING_PHYSICS, statement="", location=None, missing=(), parameter_corrections={},
                     fit={}, not_testable=(), unexplained=Unexplained(share=0.0, description=""), runtime_s=0.0)

@@ -13,6 +13,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import permutations
+from typing import Any
 
 import numpy as np
 
@@ -60,7 +61,7 @@ def separating(explanation: Explanation, final: Fit, train: Sequence[Measured],
                held_out: Sequence[Measured]) -> Experiment | None:
     """The motion that tells the terms of `final` from the rivals that the recordings tie with them; None without any.
 
-    Of the motions that separate most of them it is the one with the most evidence per second.
+    Of the motions that separate most of them it is the one with the most evidence per second for the hardest.
     """
     groups = [_group(explanation, final, index, train) for index in range(len(final.model.terms))]
     pairs = [pair for group in groups for pair in permutations(group, 2)]
@@ -78,7 +79,8 @@ def separating(explanation: Explanation, final: Fit, train: Sequence[Measured],
             found[question] = min(found[question], _left(other, run) - _own(truth, run))
         return found
 
-    best = _best((*train, *held_out), final.model, len(asked), answers, TIED)
+    best = _best((*train, *held_out), final.model, len(asked), answers, TIED,
+                 lambda one: (len(one.answered), one.worth / one.duration_s))
     if best is None:
         return Experiment(None, (), f"No motion within the reach of these recordings tells {_pairs(asked)}.")
     return Experiment(best.profile, best.effects, f"{best.what} is expected to tell {_pairs(best.answered)}, with "
@@ -87,8 +89,7 @@ def separating(explanation: Explanation, final: Fit, train: Sequence[Measured],
 
 def showing(found: Fit, hidden: Sequence[str], train: Sequence[Measured],
             held_out: Sequence[Measured]) -> Experiment | None:
-    """The motion that shows most of the mechanisms that the recordings cannot show, the shortest of several; None
-    where all show."""
+    """The motion that shows most per second of the mechanisms that the recordings cannot show; None where all show."""
     if not hidden:
         return None
     expected = _hypothesis("", found)
@@ -101,7 +102,8 @@ def showing(found: Fit, hidden: Sequence[str], train: Sequence[Measured],
                              hidden)
         return {(effect,): float(effect not in still) for effect in hidden}
 
-    best = _best((*train, *held_out), found.model, len(hidden), answers, 1.0)
+    best = _best((*train, *held_out), found.model, len(hidden), answers, 1.0,
+                 lambda one: len(one.answered) / one.duration_s)
     names = ", ".join(map(title, best.effects if best else hidden))
     if best is None:
         return Experiment(None, (), f"No motion within the reach of these recordings shows {names}.")
@@ -129,11 +131,8 @@ class _Tested:
 
 
 def _best(runs: Sequence[Measured], model: Model, questions: int, answers: Callable[[Trajectory], Answers],
-          enough: float) -> _Tested | None:
-    """Of the candidates that answer most questions the one that brings most for the hardest of them, per second.
-
-    Long ones are tried only for what no shorter one answers.
-    """
+          enough: float, rank: Callable[[_Tested], Any]) -> _Tested | None:
+    """The candidate of the highest rank. Long ones are tried only for what no shorter one answers."""
 
     def test(profile: Profile) -> _Tested:
         trajectory = plan(profile, model.bench.gains.period_s)
@@ -145,7 +144,7 @@ def _best(runs: Sequence[Measured], model: Model, questions: int, answers: Calla
         tested += in_parallel([partial(test, profile) for profile in profiles])
         if any(len(one.answered) == questions for one in tested):
             break
-    best = max(tested, key=lambda one: (len(one.answered), one.worth / one.duration_s), default=None)
+    best = max(tested, key=rank, default=None)
     return best if best and best.answered else None
 
 

@@ -6,6 +6,7 @@ ctrl-C. An error is one message on stderr, never a trace; a trace is a defect of
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable
 from typing import Any
@@ -18,6 +19,7 @@ from hil.commands.demo import demo
 from hil.commands.diagnose import diagnose
 from hil.commands.friction import friction
 from hil.commands.import_ import import_
+from hil.commands.investigate import investigate
 from hil.commands.paper import paper
 from hil.commands.run import run
 from hil.commands.validate import validate
@@ -34,6 +36,7 @@ COMMANDS: tuple[tuple[str, Callable[..., Any]], ...] = (
     ("import", import_),
     ("compare", compare),
     ("diagnose", diagnose),
+    ("investigate", investigate),
     ("friction", friction),
     ("paper", paper),
     ("validate", validate),
@@ -46,6 +49,8 @@ for _name, _command in COMMANDS:
 def main() -> None:
     """Entry point: runs the command line, turns errors into a message and an exit code."""
     try:
+        # commands spread their work over the cores themselves; threads of the linear algebra get into their way
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
         provide_kernel_cache()
         app()
     except SystemExit as end:

@@ -92,7 +92,7 @@ def changed(folder: Path, name: str, old: str, new: str) -> Path:
 def test_help_lists_the_commands_and_imports_nothing_heavy(tmp_path: Path) -> None:
     ran = process(tmp_path, "--help")
     assert ran.returncode == 0
-    for command in ("import", "compare", "friction", "paper", "validate"):
+    for command in ("import", "compare", "diagnose", "investigate", "friction", "paper", "validate"):
         assert f" {command} " in ran.stdout
     heavy = "{'numpy', 'scipy', 'numba', 'pyarrow', 'matplotlib', 'bokeh', 'pydantic', 'yaml', 'canopen', 'can'}"
     code = f"import sys, hil.cli; sys.exit(', '.join({heavy} & set(sys.modules)) or 0)"

@@ -1,0 +1,99 @@
+"""Run, diagnose, run what the diagnosis asks for, diagnose again: until one cause remains or nothing is gained."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from pathlib import Path
+
+from hil.bench import Bench
+from hil.diagnosis.diagnose import NEXT_EXPERIMENT, Diagnosis, diagnose
+from hil.diagnosis.wording import title
+from hil.errors import HilError
+from hil.profile import Profile
+from hil.recording import Recording, read_recording
+from hil.report.output import write_json, write_profile
+from hil.run import RunResult
+
+Run = Callable[[Profile, Path, str], RunResult]      # profile, folder, name of the recording
+Progress = Callable[[], AbstractContextManager[Callable[[str, float | None], None]]]   # as hil.commands.console
+
+
+@dataclass(frozen=True, eq=False)
+class Round:
+    """What was run, and what all recordings up to here say."""
+
+    motions: tuple[str, ...]
+    diagnosis: Diagnosis
+
+    @property
+    def open(self) -> tuple[str, ...]:
+        """Mechanisms that another motion could tell apart or show."""
+        following = self.diagnosis.result.next_experiment
+        return following.separates if following else ()
+
+
+@dataclass(frozen=True, eq=False)
+class Investigation:
+    """The rounds in order, and why the last was the last."""
+
+    rounds: tuple[Round, ...]
+    ended: str
+
+    @property
+    def diagnosis(self) -> Diagnosis:
+        """What all recordings say."""
+        return self.rounds[-1].diagnosis
+
+
+def investigate(profiles: Mapping[str, Profile], held_out: Mapping[str, Profile], bench: Bench, folder: Path, run: Run,
+                allowed: Callable[[Profile], bool], progress: Progress, rounds: int = 3) -> Investigation:
+    """Investigate a bench, beginning with profiles by name; `held_out` are run in the first round to prove on.
+
+    Recordings, the profiles that were designed and each round's diagnosis.json go into `folder`/round_1 and so on.
+    `run` runs a profile on the bench; `allowed` is asked before a designed one is run. Raises HilError where a run does
+    not come to its end, InputError for recordings that cannot be diagnosed.
+    """
+    train: list[Recording] = []
+    proving: list[Recording] = []
+    found: list[Round] = []
+    while True:
+        place = folder / f"round_{len(found) + 1}"
+        train += [_recorded(run, profile, place, name) for name, profile in profiles.items()]
+        if not found:
+            proving = [_recorded(run, profile, place, name) for name, profile in held_out.items()]
+        with progress() as tell:
+            diagnosis = diagnose(train, proving, bench, lambda text: tell(text, None))
+        write_json(place / "diagnosis.json", diagnosis.result.as_json())
+        found.append(Round(tuple(profiles), diagnosis))
+        following = diagnosis.experiment.profile if diagnosis.experiment else None
+        if following is None:
+            return Investigation(tuple(found), _settled(diagnosis))
+        if len(found) > 1 and set(found[-1].open) >= set(found[-2].open):
+            return Investigation(tuple(found), f"Nothing was gained. Open: {_open(found[-1].open)}.")
+        if len(found) == rounds:
+            return Investigation(tuple(found), f"The last of {rounds} rounds is done. Open: {_open(found[-1].open)}.")
+        if not allowed(following):
+            return Investigation(tuple(found), f"{NEXT_EXPERIMENT} was not run: it was not confirmed.")
+        name = f"{Path(NEXT_EXPERIMENT).stem}_{len(found)}"
+        (folder / f"round_{len(found) + 1}").mkdir()
+        write_profile(folder / f"round_{len(found) + 1}" / f"{name}.yaml", following)
+        profiles = {name: following}
+
+
+def _recorded(run: Run, profile: Profile, folder: Path, name: str) -> Recording:
+    ran = run(profile, folder, name)
+    if not ran.complete or ran.recording is None:
+        raise HilError(f"{name} stopped: {ran.outcome.ending}: {ran.outcome.reason}; what was recorded is in {folder}")
+    return read_recording(ran.recording)
+
+
+def _settled(diagnosis: Diagnosis) -> str:
+    if diagnosis.experiment:
+        return diagnosis.experiment.note
+    return "Nothing is open that another motion could tell."
+
+
+def _open(effects: Sequence[str]) -> str:
+    return ", ".join(map(title, effects))

@@ -36,6 +36,14 @@ class EncoderConnection(_Model):
     latency_s: NotNegative = 0.0
 
 
+class SetPointLimits(_Model):
+    """What no set-point may pass on this bench, whatever a profile asks for."""
+
+    velocity_m_s: Positive
+    acceleration_m_s2: Positive
+    jerk_m_s3: Positive
+
+
 class DriveSection(_Model):
     """Bus, drive and linear encoder, and what the loop allows before it stops the axis."""
 
@@ -52,6 +60,8 @@ class DriveSection(_Model):
     heartbeat_s: Positive = 0.02
     encoder: EncoderConnection = EncoderConnection()
     travel_m: tuple[float, float] | None = Field(None, description="the axis is stopped outside [m]")
+    limits: SetPointLimits | None = Field(None, description="of every set-point; absent: those of the profile alone, "
+                                          "and designed experiments keep to what was recorded")
     following_error_m: Positive = Field(0.005, description="the axis is stopped beyond [m]")
     response: Share = Field(0.4, description="share of the period within which the answers to a SYNC are awaited")
     missed_answers: Annotated[int, Field(ge=0, le=100)] = Field(3, description="in a row, before data count as stale")

@@ -12,6 +12,8 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
+import numpy as np
+
 from hil.bench import Bench
 from hil.bench_hardware import DriveSection, EncoderConnection, SimulationSection
 from hil.clock import Clock, VirtualClock, WallClock
@@ -73,7 +75,7 @@ def run_profile(
         start_m = (encoder.position_m if encoder is not None and gains.position_from_table
                    else gains.ratio_m_rad * sample.motor_position_rad)
         trajectory = plan(profile, gains.period_s, start_m)
-        _check_travel(trajectory, section)
+        _check_set_points(trajectory, section)
         if planned is not None:
             planned(trajectory)
         rehearse(bench, trajectory, profile)
@@ -113,15 +115,19 @@ def run_profile(
                      tuple(doubt for doubt in doubts if doubt))
 
 
-def _check_travel(trajectory: Trajectory, section: DriveSection) -> None:
-    """Raise FieldError for set-points outside the travel of the bench."""
-    if section.travel_m is None:
-        return
-    low, high = float(trajectory.position_m.min()), float(trajectory.position_m.max())
-    if low < section.travel_m[0] or high > section.travel_m[1]:
-        raise FieldError(("segments",), f"given set-points from {low:.6g} to {high:.6g} m, allowed "
-                         f"{section.travel_m[0]:g} to {section.travel_m[1]:g} m (drive.travel_m of the bench); move "
-                         "less far")
+def _check_set_points(trajectory: Trajectory, section: DriveSection) -> None:
+    """Raise FieldError for set-points outside the travel or beyond the limits of the bench."""
+    if section.travel_m is not None:
+        low, high = float(trajectory.position_m.min()), float(trajectory.position_m.max())
+        if low < section.travel_m[0] or high > section.travel_m[1]:
+            raise FieldError(("segments",), f"given set-points from {low:.6g} to {high:.6g} m, allowed "
+                             f"{section.travel_m[0]:g} to {section.travel_m[1]:g} m (drive.travel_m of the bench); "
+                             "move less far")
+    for name, allowed in section.limits.model_dump().items() if section.limits else ():
+        peak = float(np.max(np.abs(getattr(trajectory, name))))
+        if peak > allowed * (1.0 + 1e-9):
+            raise FieldError(("limits", name), f"given set-points up to {peak:.6g}, allowed {allowed:g} "
+                             f"(drive.limits.{name} of the bench); lower it")
 
 
 def _check_bus_load(rig: Rig, section: DriveSection) -> None:

@@ -1,4 +1,5 @@
-"""Motions that an experiment is chosen from: never farther, faster or harder than the recorded set-points went."""
+"""Motions that an experiment is chosen from: never farther, faster or harder than the recorded set-points went, unless
+the bench file says how far, how fast and how hard the axis may go."""
 
 from __future__ import annotations
 
@@ -27,7 +28,7 @@ Segments = list[dict[str, Any]]
 
 @dataclass(frozen=True)
 class Reach:
-    """Travel [m] and limits that recordings have shown, and where their set-points started [m]."""
+    """Travel [m] and limits that are known to be safe, and where the recorded set-points started [m]."""
 
     low_m: float
     high_m: float
@@ -38,17 +39,20 @@ class Reach:
 
 
 def reach(runs: Sequence[Measured], bench: Bench) -> Reach:
-    """What the set-points of the recordings reached. A travel that the bench file gives is taken up to where the
-    following error that it allows leads out of it."""
+    """What the set-points of the recordings reached, or what the bench file allows. A travel is taken up to where the
+    following error that the bench allows leads out of it."""
     low = min(float(run.position_command_m.min()) for run in runs)
     high = max(float(run.position_command_m.max()) for run in runs)
-    if bench.drive is not None and bench.drive.travel_m is not None:
-        margin = bench.drive.following_error_m
-        low, high = min(low, bench.drive.travel_m[0] + margin), max(high, bench.drive.travel_m[1] - margin)
+    drive = bench.drive
+    if drive is not None and drive.travel_m is not None:
+        margin = drive.following_error_m
+        low, high = min(low, drive.travel_m[0] + margin), max(high, drive.travel_m[1] - margin)
     acceleration = [_slope(run.velocity_command_m_s, run.period_s) for run in runs]
     jerk = [_slope(values, run.period_s) for values, run in zip(acceleration, runs, strict=True)]
     peaks = [max(float(np.max(np.abs(values))) for values in channel)
              for channel in ([run.velocity_command_m_s for run in runs], acceleration, jerk)]
+    if drive is not None and drive.limits is not None:
+        peaks = list(drive.limits.model_dump().values())
     low, high = math.ceil(1e6 * low) / 1e6, math.floor(1e6 * high) / 1e6
     return Reach(low, high, min(max(round(float(runs[0].position_command_m[0]), 6), low), high), *map(_down, peaks))
 

@@ -94,6 +94,8 @@ def test_shipped_benches_run(tmp_path: Path, name: str) -> None:
 
 @pytest.mark.parametrize(("changes", "message"), [
     ({"drive": {"travel_m": (-0.01, 0.04)}}, r"set-points from 0 to 0.05 m, allowed -0.01 to 0.04 m"),
+    ({"drive": {"limits": {"velocity_m_s": 0.09, "acceleration_m_s2": 3.0, "jerk_m_s3": 200.0}}},
+     r"limits.velocity_m_s: given set-points up to 0.1, allowed 0.09 \(drive.limits.velocity_m_s of the bench\)"),
     ({"encoders": {"motor": {"counts_per_rev": 4096, "direction": -1}}}, r"0x607E"),
     ({"drive": {"mode": "csp"}, "control": {"position_feedback": "table"}}, r"csp with position_feedback: table"),
 ])

@@ -10,6 +10,7 @@ import pytest
 from diagnosis_runs import bench, moves, recorded
 
 from hil.bench import Bench
+from hil.bench_hardware import SetPointLimits
 from hil.diagnosis.candidates import candidates, reach
 from hil.diagnosis.evidence import against
 from hil.diagnosis.experiment import Experiment, separating, showing
@@ -35,8 +36,7 @@ def runs(profile: Profile, *terms: Term, seed: int = 1, believed: Bench = OWNER)
 def designed(train: list[Measured], right: Fit, *others: Fit) -> Experiment:
     """The experiment for a fit and its rivals, as evidence on these recordings has them."""
     rivals = [Rival(other, against(right, other)) for other in others]
-    nominal = fit(Model(OWNER), train)
-    found = separating(Explanation(nominal, nominal, right, {right.model.terms[-1].key: rivals}), right, train, [])
+    found = separating(Explanation(right, right, right, {right.model.terms[-1].key: rivals}), right, train, [])
     assert found is not None
     return found
 
@@ -120,6 +120,24 @@ def test_candidates_keep_to_what_was_recorded(travel_m: tuple[float, float] | No
         assert np.abs(trajectory.acceleration_m_s2).max() <= hardest
         write_profile(tmp_path / "profile.yaml", profile)
         assert load_profile(tmp_path / "profile.yaml") == profile
+
+
+@pytest.mark.long
+def test_limits_of_the_bench_count_instead_of_what_was_recorded() -> None:
+    """An error of the encoder or of the screw: gently moved, the table goes wherever the motor does."""
+    gentle = moves([REST, {"kind": "sine_squared", "to_m": 0.03, "feed_m_s": 0.01, "acceleration_m_s2": 0.1}, REST])
+    error = Term("encoder_eccentricity", 0, (2e-4, 1.0))
+    limits = SetPointLimits(velocity_m_s=0.4, acceleration_m_s2=2.2, jerk_m_s3=100.0)
+    assert OWNER.drive is not None
+    free = OWNER.model_copy(update={"drive": OWNER.drive.model_copy(update={"limits": limits})})
+    train = runs(gentle, error)
+    right = fit(Model(OWNER, (error,)), train, evaluations=6)
+    wrong = fit(Model(OWNER, (Term("periodic_lead_error", 0, (3e-7, 4.1)),)), train, evaluations=6)
+    assert designed(train, right, wrong).profile is None
+    right, wrong = (replace(found, model=replace(found.model, bench=free)) for found in (right, wrong))
+    profile = designed(train, right, wrong).profile
+    assert profile is not None
+    assert profile.limits.model_dump() == limits.model_dump()
 
 
 @pytest.mark.parametrize(("change", "count"), [({"high_m": 0.0005}, 5), ({"velocity_m_s": 0.004}, 3),

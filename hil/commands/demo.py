@@ -78,7 +78,7 @@ def _record(bench: Bench, folder: Path, virtual: bool) -> list[Recording]:
         # on a simulated bench nothing can be harmed by a late tick: a busy machine is reported, not refused
         result = run_profile(bench, profile, folder, name, virtual=virtual, force=True,
                              planned=lambda trajectory, what=profile.description: err.print(    # type: ignore[misc]
-                                 f"on the simulated CANopen bus, {trajectory.duration_s:.1f} s once its kernels are "
+                                 f"{trajectory.duration_s:.1f} s over the simulated CANopen bus, once kernels are "
                                  f"compiled: {what} ..."))
         if result.outcome.ending is Ending.OVERRUN:
             err.print("This machine is too busy for wall-clock time; the same moves again in virtual time.")

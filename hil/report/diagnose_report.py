@@ -52,7 +52,9 @@ def write_diagnosis(diagnosis: Diagnosis, folder: Path) -> None:
                   "does both.")
         write_profile(folder / NEXT_EXPERIMENT, diagnosis.experiment.profile)
     page.heading("How it was judged")
-    page.items([*result.notes, f"Searched and proven in {digits(result.runtime_s)} s.",
+    said = diagnosis.experiment.note if diagnosis.experiment else ""
+    page.items([*(note for note in result.notes if note != said),
+                f"Searched and proven in {digits(result.runtime_s)} s.",
                 "bench.diagnosed.yaml is the bench with these parameters and terms, for every other command."])
     write_json(folder / "diagnosis.json", result.as_json())
     write_bench(diagnosis.bench, folder / "bench.diagnosed.yaml")

@@ -13,7 +13,8 @@ from math import pi
 
 from drivers.sim.effects import Effect
 from hil.proof import motions
-from hil.proof.axes import Kind, Rng, log_uniform
+from hil.proof.axis_kinds import Kind
+from hil.proof.chance import Rng, any_phase, log_uniform
 from hil.proof.drafts import Draft, stage
 from hil.proof.effects import Scene, scaled
 from hil.proof.motions import Poor
@@ -60,7 +61,7 @@ def _either(rng: Rng, one: Effect, other: Effect) -> Both:
 
 
 def _angle_or_position(s: Scene, rng: Rng) -> Both:
-    cycles, phase, fraction = float(rng.integers(2, 6)), rng.uniform(-pi, pi), log_uniform(rng, 0.05, 0.3)
+    cycles, phase, fraction = float(rng.integers(2, 6)), any_phase(rng), log_uniform(rng, 0.05, 0.3)
     cogging = Effect("cogging_torque", {"amplitude_n_m": fraction * s.coulomb, "cycles_per_rev": cycles,
                                         "phase_rad": phase})
     friction = Effect("position_dependent_friction", {"fraction": fraction, "phase_rad": phase + pi,
@@ -80,7 +81,7 @@ def _spring_or_push(s: Scene, rng: Rng) -> Both:
 def _encoder_or_screw(s: Scene, rng: Rng) -> Both | None:
     if not s.axis.has_table:
         return None
-    error_m, phase = log_uniform(rng, 0.5e-6, 6e-6), rng.uniform(-pi, pi)
+    error_m, phase = log_uniform(rng, 0.5e-6, 6e-6), any_phase(rng)
     return _either(rng, Effect("encoder_eccentricity", {"amplitude_rad": error_m / s.ratio, "phase_rad": phase}),
                    Effect("periodic_lead_error", {"amplitude_m": error_m, "phase_rad": phase + pi}))
 
@@ -89,7 +90,7 @@ def _scale_or_screw(s: Scene, rng: Rng) -> Both | None:
     lead_m = s.axis.truth.lead_m
     if not s.axis.has_table or lead_m > _LONGEST_SCALE_M:
         return None
-    error_m, phase = log_uniform(rng, 0.5e-6, 6e-6), rng.uniform(-pi, pi)
+    error_m, phase = log_uniform(rng, 0.5e-6, 6e-6), any_phase(rng)
     reading = Effect("scale_interpolation_error", {"amplitude_m": error_m, "period_m": lead_m, "phase_rad": phase})
     return _either(rng, reading, Effect("periodic_lead_error", {"amplitude_m": error_m, "phase_rad": phase}))
 

@@ -1,7 +1,7 @@
 """What is right to answer about a concealed effect: its block, where it shows, and the parameters that can be compared.
 
-A form that the library has not (GMS friction, an atan or exponential Stribeck curve, a yielding base) keeps its name;
-compared are those parameters only that mean the same in both laws.
+A form that the library has not (GMS or damped bristles, an atan or exponential Stribeck curve, a yielding base) keeps
+its name; compared are those parameters only that mean the same in both laws.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def compared(effect: Effect | EncoderFault, axis: DrawnAxis) -> dict[str, float]
         (torque,) = values.values()
         return {"offset_torque_n_m": torque, "load_torque_n_m": torque}
     # the screw, not the nut, is soft on a chain that has both
-    other_law = (effect.form in ("exponential", "atan", "gms")
+    other_law = (effect.form in ("exponential", "atan", "gms", "lugre")
                  or (effect.id == "position_dependent_stiffness" and axis.kind == "seven_dof"))
     if other_law or effect.id not in BY_ID:
         return {}

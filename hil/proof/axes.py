@@ -6,26 +6,24 @@ quarter of the velocity loop); an axis whose loop rings without friction is draw
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import inf, isfinite, log, pi, sqrt
+from math import inf, isfinite, pi, sqrt
 from typing import Any, Literal, cast
 
 import numpy as np
 
-from drivers.sim.axis import AxisTruth, one_mass, serial_chain, seven_dof, two_mass
+from drivers.sim.axis import AxisTruth
 from drivers.sim.reality import record
 from drivers.sim.sensors import Sensors
 from drivers.sim.servo import Servo, VelocityEstimate
 from hil.bench import Bench
+from hil.proof.axis_kinds import KINDS, PARAMETERS, TRUTH, Kind, rigid_inertia
+from hil.proof.chance import Rng, log_uniform
 
-Rng = np.random.Generator
-Kind = Literal["two_mass", "seven_dof", "serial_chain", "one_mass"]
 Belief = Literal["exact", "wrong"]
 
-KINDS: dict[Kind, float] = {"two_mass": 0.5, "seven_dof": 0.2, "serial_chain": 0.1, "one_mass": 0.2}   # shares
-LEADS_M = (0.005, 0.010, 0.016, 0.020)
 WRONG_BY = 1.3              # largest factor between a true parameter and the owner's
 STEP_S = 2e-5               # internal step: 1 to 4 % of a loop period, and below half a radian of the fastest mode
 _TABLE_COUNTS_M = (0.1e-6, 0.2e-6, 0.5e-6, 1e-6)
@@ -54,12 +52,17 @@ class DrawnAxis:
 
     def with_parameters(self, changes: Mapping[str, float]) -> AxisTruth:
         """The axis with other true parameters."""
-        return _TRUTH[self.kind](dict(self.true) | dict(changes))
+        return TRUTH[self.kind](dict(self.true) | dict(changes))
 
     @cached_property
     def bench(self) -> Bench:
         """What the owner believes."""
         return self._bench(self.believed)
+
+    @property
+    def true_bench(self) -> Bench:
+        """What the owner should believe."""
+        return self._bench(self.true)
 
     @property
     def nominal(self) -> tuple[str, ...]:
@@ -112,18 +115,13 @@ def draw_axis(rng: Rng, kind: Kind | None = None, belief: Belief = "wrong", hard
             return axis
 
 
-def log_uniform(rng: Rng, low: float, high: float) -> float:
-    """A number whose logarithm is uniform between two limits."""
-    return float(np.exp(rng.uniform(log(low), log(high))))
-
-
 def _drawn(rng: Rng, kind: Kind, belief: Belief, hard: bool) -> DrawnAxis:
-    true = _PARAMETERS[kind](rng)
+    true = PARAMETERS[kind](rng)
     period_s = 0.5e-3 if rng.random() < 0.15 else 1e-3
     position_every = int(rng.choice((1, 2, 4)))
     feed_m_s = min(rng.uniform(0.15, 0.35) * sqrt(true.get("lead_m", 0.01) / 0.01), 0.45)
     acceleration = rng.uniform(1.0, 3.0)
-    truth = _TRUTH[kind](true)
+    truth = TRUTH[kind](true)
     servo = _servo(rng, truth, feed_m_s, acceleration, period_s, position_every)
     sensors = Sensors(
         motor_counts_per_rev=2.0 ** int(rng.integers(15, 18) if hard else rng.integers(17, 24)),
@@ -144,7 +142,7 @@ def _servo(rng: Rng, truth: AxisTruth, feed_m_s: float, acceleration_m_s2: float
            position_every: int) -> Servo:
     """Gains by bandwidth: of the whole inertia below the first resonance, of the motor alone below the delay."""
     ratio = truth.drive_ratio_m_rad
-    inertia = sum(truth.mass_kg) * ratio**2 if len(truth.mass_kg) < 7 else _rigid_inertia(truth)
+    inertia = rigid_inertia(truth)
     elastic = truth.frequencies_hz()[1:]
     bandwidth = rng.uniform(120.0, 220.0)
     if elastic.size:
@@ -180,91 +178,6 @@ def _settles(axis: DrawnAxis) -> bool:
     rows = record(free, perfect, [], axis.servo, position, velocity, axis.period_s, step_s=STEP_S)
     torque = np.abs(rows["force_n" if axis.truth.linear else "torque_n_m"])
     return bool(np.max(torque[-count // 5:]) < _RINGING * np.max(torque))
-
-
-def _two_mass(rng: Rng) -> dict[str, Any]:
-    lead_m = float(rng.choice(LEADS_M))
-    square = (lead_m / (2 * pi)) ** 2
-    motor_kg = log_uniform(rng, 3e-4, 2e-3) / square
-    table_kg = motor_kg * log_uniform(rng, 0.4, 2.0)
-    omega = 2 * pi * log_uniform(rng, 55.0, 160.0)
-    friction = _friction(rng, (motor_kg + table_kg) * square, lead_m)
-    return {"lead_m": lead_m, "motor_mass_kg": motor_kg, "table_mass_kg": table_kg,
-            "stiffness_n_m": omega**2 / (1 / motor_kg + 1 / table_kg), "damping_ratio": rng.uniform(0.015, 0.06),
-            **friction}
-
-
-def _seven_dof(rng: Rng) -> dict[str, Any]:
-    true = {"lead_m": float(rng.choice(LEADS_M)), "motor_inertia_kg_m2": 8.486e-4 * log_uniform(rng, 0.6, 1.8),
-            "table_mass_kg": 58.8 * log_uniform(rng, 0.6, 4.0),
-            "coupling_stiffness_n_m_rad": 1.10e4 * log_uniform(rng, 0.5, 2.0),
-            "nut_support_stiffness_n_m": 6.53e7 * log_uniform(rng, 0.5, 2.0),
-            "damping_ratio": rng.uniform(0.015, 0.06), "coulomb_torque_n_m": 1.0, "viscous_torque_n_m_s_rad": 0.0}
-    return true | _friction(rng, _rigid_inertia(_seven_dof_truth(true)), true["lead_m"])
-
-
-def _serial_chain(rng: Rng) -> dict[str, Any]:
-    lead_m = float(rng.choice(LEADS_M))
-    motor = log_uniform(rng, 3e-4, 2e-3)
-    inertias = (motor, motor * log_uniform(rng, 0.1, 0.4), motor * log_uniform(rng, 0.4, 2.0))
-    nut = (2 * pi * log_uniform(rng, 60.0, 160.0)) ** 2 / (1 / (inertias[0] + inertias[1]) + 1 / inertias[2])
-    return {"lead_m": lead_m, "inertias_kg_m2": inertias, "stiffnesses_n_m_rad": (nut * rng.uniform(2.0, 6.0), nut),
-            "inertia_scale": 1.0, "stiffness_scale": 1.0, "damping_ratio": rng.uniform(0.015, 0.06),
-            **_friction(rng, sum(inertias), lead_m)}
-
-
-def _one_mass(rng: Rng) -> dict[str, Any]:
-    mass_kg = log_uniform(rng, 30.0, 300.0)
-    coulomb_n = mass_kg * log_uniform(rng, 0.2, 1.0)
-    return {"mass_kg": mass_kg, "coulomb_force_n": coulomb_n,
-            "viscous_force_n_s_m": coulomb_n * rng.uniform(0.4, 2.5) / 0.25,
-            "screw_lead_m": float(rng.choice((0.0025, *LEADS_M)))}
-
-
-def _friction(rng: Rng, inertia_kg_m2: float, lead_m: float) -> dict[str, float]:
-    """Coulomb as a share of the accelerating torque; viscous equal to it at some quarter of a metre per second."""
-    coulomb = inertia_kg_m2 / (lead_m / (2 * pi)) * log_uniform(rng, 0.5, 1.8)
-    return {"coulomb_torque_n_m": coulomb,
-            "viscous_torque_n_m_s_rad": coulomb * rng.uniform(0.3, 1.2) * lead_m / (2 * pi) / 0.25}
-
-
-def _rigid_inertia(truth: AxisTruth) -> float:
-    """Inertia of a 7-dof axis that moves as one body: all but the axial motion of the screw."""
-    return (sum(truth.mass_kg) - truth.mass_kg[4]) * truth.screw_ratio_m_rad**2
-
-
-def _two_mass_truth(p: Mapping[str, Any]) -> AxisTruth:
-    return two_mass(**p)
-
-
-def _seven_dof_truth(p: Mapping[str, Any]) -> AxisTruth:
-    # what a bench file does not name is as in the reconstruction of the source's Table 1
-    return seven_dof(
-        lead_m=p["lead_m"], inertia_kg_m2=(p["motor_inertia_kg_m2"], 1.04e-4, 4.89e-5, 6.62e-4),
-        axial_mass_kg=(5.25, 3.49, p["table_mass_kg"]),
-        torsional_stiffness_n_m_rad=(3.94e4, p["coupling_stiffness_n_m_rad"], 4.17e3),
-        axial_stiffness_n_m=(1.96e8, 6.40e8, p["nut_support_stiffness_n_m"]), damping_ratio=p["damping_ratio"],
-        coulomb_torque_n_m=p["coulomb_torque_n_m"], viscous_torque_n_m_s_rad=p["viscous_torque_n_m_s_rad"])  # fmt: skip
-
-
-def _serial_truth(p: Mapping[str, Any]) -> AxisTruth:
-    square = (p["lead_m"] / (2 * pi)) ** 2
-    return serial_chain(
-        [p["inertia_scale"] * value / square for value in p["inertias_kg_m2"]],
-        [p["stiffness_scale"] * value / square for value in p["stiffnesses_n_m_rad"]],
-        lead_m=p["lead_m"], damping_ratio=p["damping_ratio"], coulomb_torque_n_m=p["coulomb_torque_n_m"],
-        viscous_torque_n_m_s_rad=p["viscous_torque_n_m_s_rad"])  # fmt: skip
-
-
-def _one_mass_truth(p: Mapping[str, Any]) -> AxisTruth:
-    return one_mass(p["mass_kg"], p["coulomb_force_n"], p["viscous_force_n_s_m"], p["screw_lead_m"])
-
-
-_PARAMETERS: dict[Kind, Callable[[Rng], dict[str, Any]]] = {
-    "two_mass": _two_mass, "seven_dof": _seven_dof, "serial_chain": _serial_chain, "one_mass": _one_mass}
-_TRUTH: dict[Kind, Callable[[Mapping[str, Any]], AxisTruth]] = {
-    "two_mass": _two_mass_truth, "seven_dof": _seven_dof_truth, "serial_chain": _serial_truth,
-    "one_mass": _one_mass_truth}
 
 
 def _rounded(value: float, digits: int = 4) -> float:

@@ -19,7 +19,8 @@ from drivers.sim.reality import record
 from hil.bench import Bench
 from hil.channels import AXIS_CHANNELS, AxisKind
 from hil.proof import answers
-from hil.proof.axes import DrawnAxis, Kind
+from hil.proof.axes import DrawnAxis
+from hil.proof.axis_kinds import Kind
 from hil.proof.drafts import Draft
 from hil.proof.tiers import RECIPES
 from hil.recording import Recording, write_parquet

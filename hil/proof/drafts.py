@@ -6,7 +6,9 @@ from dataclasses import dataclass
 
 from drivers.sim.effects import Effect
 from hil.proof import motions
-from hil.proof.axes import Belief, DrawnAxis, Kind, Rng, draw_axis
+from hil.proof.axes import Belief, DrawnAxis, draw_axis
+from hil.proof.axis_kinds import Kind
+from hil.proof.chance import Rng, log_uniform
 from hil.proof.effects import LIBRARY, Scene, applicable, draw_effect, scaled
 from hil.proof.novel import EncoderFault
 from hil.proof.visibility import Visibility
@@ -14,7 +16,9 @@ from hil.trajectory import Trajectory
 
 Runs = tuple[Trajectory, Trajectory, Trajectory]
 Sizes = tuple[float, float]
-TRIES = 15                   # draws on one axis
+Sized = tuple[Effect, float]
+TRIES = 8                    # draws on one axis
+_PAIRS = 3                   # draws of two, each of which takes new sensitivities
 _ON_RUNG = 0.05              # relative, of a size wanted
 _STEPS = 8                   # towards it
 
@@ -67,21 +71,17 @@ def name_on(axis: DrawnAxis, effect: str | None, forced: bool, rng: Rng) -> str 
 
 def one(rng: Rng, on: Stage, name: str, sizes: Sizes) -> Draft | None:
     """One effect of a size between two."""
-    for _ in range(TRIES):
-        effect = draw_effect(name, on.scene, rng)
-        size = on.visibility.size([effect])
-        if sizes[0] <= size <= sizes[1]:
-            return Draft(on.axis, on.runs, "missing_physics", ((effect, size),))
-    return None
+    found = sized(rng, on, name, sizes)
+    return Draft(on.axis, on.runs, "missing_physics", (found,)) if found else None
 
 
 def two(rng: Rng, on: Stage, names: tuple[str, str], sizes: Sizes, second: Sizes, ratio: Sizes) -> Draft | None:
     """Two effects, each of a size between two beside the other; `ratio`: of the second to the first."""
-    for _ in range(TRIES):
-        first, other = (draw_effect(name, on.scene, rng) for name in names)
-        # alone they are the larger: what is too small alone need not be seen beside the other
-        if on.visibility.size([first]) < sizes[0] or on.visibility.size([other]) < second[0]:
-            continue
+    for _ in range(_PAIRS):
+        one, another = sized(rng, on, names[0], sizes), sized(rng, on, names[1], second)
+        if one is None or another is None:
+            return None
+        first, other = one[0], another[0]
         size = on.visibility.size([first], [other])
         if not sizes[0] <= size <= sizes[1]:
             continue
@@ -91,7 +91,18 @@ def two(rng: Rng, on: Stage, names: tuple[str, str], sizes: Sizes, second: Sizes
     return None
 
 
-def at_size(effect: Effect, wanted: float, on: Stage) -> tuple[Effect, float] | None:
+def sized(rng: Rng, on: Stage, name: str, sizes: Sizes) -> Sized | None:
+    """An effect of a size between two: as drawn, or turned up or down where no draw comes to lie there."""
+    for _ in range(TRIES):
+        effect = draw_effect(name, on.scene, rng)
+        size = on.visibility.size([effect])
+        if sizes[0] <= size <= sizes[1]:
+            return effect, size
+    found = at_size(effect, log_uniform(rng, *sizes), on)
+    return found if found and sizes[0] <= found[1] <= sizes[1] else None
+
+
+def at_size(effect: Effect, wanted: float, on: Stage) -> Sized | None:
     """The effect turned up or down until its size is the wanted one; None where it cannot be."""
     found: Effect | None = effect
     for _ in range(_STEPS):

@@ -9,10 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from math import pi, sqrt
+from math import sqrt
 
 from drivers.sim.effects import CATALOGUE, Effect
-from hil.proof.axes import DrawnAxis, Rng, log_uniform
+from hil.proof.axes import DrawnAxis
+from hil.proof.chance import Rng, any_phase, any_sign, log_uniform
 
 Drawn = tuple[str, dict[str, float]]     # form and parameters
 NEED_TABLE = frozenset({
@@ -83,24 +84,16 @@ def scaled(effect: Effect, factor: float, scene: Scene) -> Effect | None:
         return None
 
 
-def _phase(rng: Rng) -> float:
-    return float(rng.uniform(-pi, pi))
-
-
-def _sign(rng: Rng) -> float:
-    return float(rng.choice((-1.0, 1.0)))
-
-
 def _drive_form(rng: Rng) -> str:
     return str(rng.choice(("visible", "hidden")))
 
 
 def _asymmetric_friction(s: Scene, rng: Rng) -> Drawn:
-    return "", {"offset_torque_n_m": _sign(rng) * s.coulomb * log_uniform(rng, 0.03, 0.4)}
+    return "", {"offset_torque_n_m": any_sign(rng) * s.coulomb * log_uniform(rng, 0.03, 0.4)}
 
 
 def _constant_load(s: Scene, rng: Rng) -> Drawn:
-    return "", {"load_torque_n_m": _sign(rng) * s.coulomb * log_uniform(rng, 0.03, 1.0)}
+    return "", {"load_torque_n_m": any_sign(rng) * s.coulomb * log_uniform(rng, 0.03, 1.0)}
 
 
 def _stribeck_friction(s: Scene, rng: Rng) -> Drawn:
@@ -115,7 +108,7 @@ def _presliding_hysteresis(s: Scene, rng: Rng) -> Drawn:
 
 
 def _position_dependent_friction(s: Scene, rng: Rng) -> Drawn:
-    return "", {"fraction": log_uniform(rng, 0.05, 0.5), "phase_rad": _phase(rng),
+    return "", {"fraction": log_uniform(rng, 0.05, 0.5), "phase_rad": any_phase(rng),
                 "period_m": log_uniform(rng, 0.02, 0.8 * s.axis.travel_m)}
 
 
@@ -124,11 +117,11 @@ def _nonlinear_viscous_friction(s: Scene, rng: Rng) -> Drawn:
 
 
 def _friction_drift(s: Scene, rng: Rng) -> Drawn:
-    return "", {"fraction": _sign(rng) * log_uniform(rng, 0.08, 0.6), "time_constant_s": log_uniform(rng, 2.0, 20.0)}
+    return "", {"fraction": any_sign(rng) * log_uniform(rng, 0.08, 0.6), "time_constant_s": log_uniform(rng, 2.0, 20.0)}
 
 
 def _cogging_torque(s: Scene, rng: Rng) -> Drawn:
-    return "", {"amplitude_n_m": s.coulomb * log_uniform(rng, 0.02, 0.3), "phase_rad": _phase(rng),
+    return "", {"amplitude_n_m": s.coulomb * log_uniform(rng, 0.02, 0.3), "phase_rad": any_phase(rng),
                 "cycles_per_rev": rng.choice((4, 6, 8, 12, 18, 24, 36))}
 
 
@@ -149,7 +142,7 @@ def _structural_mode(s: Scene, rng: Rng) -> Drawn:
 
 def _external_force(s: Scene, rng: Rng) -> Drawn:
     start_s = s.duration_s * rng.uniform(0.15, 0.6)
-    return "", {"force_n": _sign(rng) * s.coulomb / s.ratio * log_uniform(rng, 0.1, 1.0), "start_s": start_s,
+    return "", {"force_n": any_sign(rng) * s.coulomb / s.ratio * log_uniform(rng, 0.1, 1.0), "start_s": start_s,
                 "end_s": start_s + s.duration_s * rng.uniform(0.05, 0.3)}
 
 
@@ -175,13 +168,13 @@ def _position_dependent_stiffness(s: Scene, rng: Rng) -> Drawn:
 def _periodic_lead_error(s: Scene, rng: Rng) -> Drawn:
     """As measured on screws: once per revolution dominates, harmonics of a few tenths of it."""
     amplitude_m = log_uniform(rng, 1e-6, 15e-6)
-    return "", {"amplitude_m": amplitude_m, "phase_rad": _phase(rng),
-                "amplitude_2_m": amplitude_m * rng.uniform(0.0, 0.3), "phase_2_rad": _phase(rng),
-                "amplitude_3_m": amplitude_m * rng.uniform(0.0, 0.15), "phase_3_rad": _phase(rng)}
+    return "", {"amplitude_m": amplitude_m, "phase_rad": any_phase(rng),
+                "amplitude_2_m": amplitude_m * rng.uniform(0.0, 0.3), "phase_2_rad": any_phase(rng),
+                "amplitude_3_m": amplitude_m * rng.uniform(0.0, 0.15), "phase_3_rad": any_phase(rng)}
 
 
 def _cumulative_lead_error(s: Scene, rng: Rng) -> Drawn:
-    return "", {"slope_m_m": _sign(rng) * log_uniform(rng, 5e-6, 200e-6)}
+    return "", {"slope_m_m": any_sign(rng) * log_uniform(rng, 5e-6, 200e-6)}
 
 
 def _thermal_growth(s: Scene, rng: Rng) -> Drawn:
@@ -190,7 +183,7 @@ def _thermal_growth(s: Scene, rng: Rng) -> Drawn:
 
 def _torque_ripple(s: Scene, rng: Rng) -> Drawn:
     return "", {"fraction": log_uniform(rng, 0.01, 0.12), "cycles_per_rev": rng.choice((2, 4, 6, 8, 12, 24)),
-                "phase_rad": _phase(rng)}
+                "phase_rad": any_phase(rng)}
 
 
 def _torque_constant_saturation(s: Scene, rng: Rng) -> Drawn:
@@ -225,11 +218,11 @@ def _channel_time_skew(s: Scene, rng: Rng) -> Drawn:
 
 
 def _encoder_eccentricity(s: Scene, rng: Rng) -> Drawn:
-    return "", {"amplitude_rad": log_uniform(rng, 0.3e-6, 6e-6) / s.ratio, "phase_rad": _phase(rng)}
+    return "", {"amplitude_rad": log_uniform(rng, 0.3e-6, 6e-6) / s.ratio, "phase_rad": any_phase(rng)}
 
 
 def _scale_interpolation_error(s: Scene, rng: Rng) -> Drawn:
-    return "", {"amplitude_m": log_uniform(rng, 0.1e-6, 2e-6), "phase_rad": _phase(rng),
+    return "", {"amplitude_m": log_uniform(rng, 0.1e-6, 2e-6), "phase_rad": any_phase(rng),
                 "period_m": rng.choice((4e-6, 10e-6, 20e-6, 40e-6, 100e-6, 200e-6))}
 
 

@@ -12,7 +12,8 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from hil.profile import Profile
-from hil.proof.axes import DrawnAxis, Rng, log_uniform
+from hil.proof.axes import DrawnAxis
+from hil.proof.chance import Rng, log_uniform
 from hil.trajectory import Trajectory, plan
 
 Poor = Literal["one_way", "local", "slow"]

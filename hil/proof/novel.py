@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from math import pi
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.sim.effects import Effect
-from hil.proof.axes import DrawnAxis, Rng, log_uniform
+from hil.proof.axes import DrawnAxis
+from hil.proof.chance import Rng, any_phase, any_sign, log_uniform
 from hil.proof.effects import Scene
 
 FloatArray = NDArray[np.float64]
@@ -73,28 +73,28 @@ def _friction_bump(s: Scene, rng: Rng) -> dict[str, float]:
 
 def _friction_wander(s: Scene, rng: Rng) -> dict[str, float]:
     return {"fraction": log_uniform(rng, 0.05, 0.25), "period_s": log_uniform(rng, 0.6, 3.0),
-            "phase_rad": rng.uniform(-pi, pi)}
+            "phase_rad": any_phase(rng)}
 
 
 def _pitch_bump(s: Scene, rng: Rng) -> dict[str, float]:
-    return {"height_m": rng.choice((-1.0, 1.0)) * log_uniform(rng, 3e-6, 30e-6), **_somewhere(s, rng)}
+    return {"height_m": any_sign(rng) * log_uniform(rng, 3e-6, 30e-6), **_somewhere(s, rng)}
 
 
 def _mass_change(s: Scene, rng: Rng) -> dict[str, float]:
-    fraction = rng.choice((-1.0, 1.0)) * rng.uniform(0.2, 0.6)
+    fraction = any_sign(rng) * rng.uniform(0.2, 0.6)
     return {"fraction": fraction, "start_s": s.duration_s * rng.uniform(0.3, 0.7)}
 
 
 def _vibration(s: Scene, rng: Rng) -> dict[str, float]:
     frequency_hz = log_uniform(rng, 2.0, 20.0)
     return {"force_n": s.coulomb / s.ratio * log_uniform(rng, 0.05, 0.4), "frequency_hz": frequency_hz,
-            "phase_rad": rng.uniform(-pi, pi), "ratio": rng.uniform(0.3, 0.9),
+            "phase_rad": any_phase(rng), "ratio": rng.uniform(0.3, 0.9),
             "frequency_2_hz": frequency_hz * rng.uniform(1.2, 1.9)}
 
 
 def _hammering(s: Scene, rng: Rng) -> dict[str, float]:
     period_s = log_uniform(rng, 0.25, 0.8)
-    return {"force_n": rng.choice((-1.0, 1.0)) * s.coulomb / s.ratio * log_uniform(rng, 0.2, 1.0),
+    return {"force_n": any_sign(rng) * s.coulomb / s.ratio * log_uniform(rng, 0.2, 1.0),
             "start_s": rng.uniform(0.0, 1.0), "period_s": period_s, "width_s": period_s * rng.uniform(0.05, 0.2)}
 
 

@@ -11,7 +11,9 @@ from math import inf
 from hil.proof import motions
 from hil.proof.ambiguity import ambiguous
 from hil.proof.answers import block, same_law
-from hil.proof.axes import Belief, Kind, Rng
+from hil.proof.axes import Belief
+from hil.proof.axis_kinds import Kind
+from hil.proof.chance import Rng
 from hil.proof.drafts import TRIES, Draft, at_size, name_on, one, stage, two
 from hil.proof.effects import applicable, draw_effect
 from hil.proof.novel import EncoderFault, draw_novel, novel

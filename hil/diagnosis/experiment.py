@@ -19,7 +19,7 @@ import numpy as np
 
 from hil.diagnosis.candidates import candidates, reach
 from hil.diagnosis.explain import TIED, Explanation
-from hil.diagnosis.findings import SAME, rivals_of
+from hil.diagnosis.findings import SAME, ambiguous, rivals_of
 from hil.diagnosis.fit import Fit, fit, in_parallel, jacobian, splits
 from hil.diagnosis.model import FloatArray, Model
 from hil.diagnosis.testable import not_testable
@@ -66,7 +66,7 @@ def separating(explanation: Explanation, final: Fit, train: Sequence[Measured],
     groups = [_group(explanation, final, index, train) for index in range(len(final.model.terms))]
     pairs = [pair for group in groups for pair in permutations(group, 2)]
     if not pairs:
-        if not any(term.effect in SAME for term in final.model.terms):
+        if not any(map(ambiguous, final.model.terms)):
             return None
         return Experiment(None, (), f"No motion tells {_pairs([SAME])}: they are the same torque on every one.")
 

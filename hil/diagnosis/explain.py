@@ -130,8 +130,9 @@ def claimable(term: Term, bench: Bench) -> bool:
 
 def _simplest(tied: list[Fit]) -> Fit:
     """Of explanations that the evidence does not tell apart, the one with the fewest parameters. A constant torque
-    and friction that differs by direction are the same on every motion: the second is named, most axes lie flat."""
-    return min(tied, key=lambda found: (found.x.size, _last(found).effect != "asymmetric_friction"))
+    and friction that differs by direction, alike at every speed, are the same on every motion: the second is named,
+    most axes lie flat."""
+    return min(tied, key=lambda found: (found.x.size, _last(found).key != ("asymmetric_friction", 0)))
 
 
 def _last(found: Fit) -> Term:

@@ -24,7 +24,7 @@ from hil.twin.mechanism import Dimension
 
 FloatArray = NDArray[np.float64]
 
-# One set: friction that differs by direction is the Coulomb band shifted by a constant torque
+# One set: Coulomb friction that differs by direction, alike at every speed, is its band shifted by a constant torque
 SAME = ("asymmetric_friction", "constant_load")
 
 _BLOCK_ROWS = 200    # longer than residuals remember: 0.2 s at 1 kHz
@@ -37,6 +37,11 @@ def renamed(found: Fit) -> Fit:
         return found
     terms = tuple(replace(term, effect=friction) if term.effect == load else term for term in found.model.terms)
     return replace(found, model=replace(found.model, terms=terms))
+
+
+def ambiguous(term: Term) -> bool:
+    """Whether the term is one of a set that no motion tells apart."""
+    return term.effect in SAME and term.variant == 0
 
 
 def findings(explanation: Explanation, final: Fit, ablations: Sequence[Ablation], train: Sequence[Measured],
@@ -53,7 +58,7 @@ def findings(explanation: Explanation, final: Fit, ablations: Sequence[Ablation]
         row += len(term.values)
         rivals = rivals_of(explanation, term)
         tied = [rival.fit.model.terms[-1].effect for rival in rivals if rival.evidence < TIED]
-        if term.effect in SAME:
+        if ambiguous(term):
             tied.append(next(name for name in SAME if name != term.effect))
         margin = min((rival.evidence for rival in rivals if rival.fit.model.terms[-1].effect not in tied),
                      default=explanation.needed.get(_key(explanation, term), math.inf))
@@ -125,9 +130,9 @@ def rivals_of(explanation: Explanation, term: Term) -> list[Rival]:
     """Other mechanisms than the term's own, each in its best variant, the strongest first."""
     best: dict[str, Rival] = {}
     for rival in sorted(explanation.rivals.get(_key(explanation, term), []), key=lambda found: found.evidence):
-        effect = rival.fit.model.terms[-1].effect
-        if effect != term.effect and {effect, term.effect} != set(SAME):
-            best.setdefault(effect, rival)
+        other = rival.fit.model.terms[-1]
+        if other.effect != term.effect and not (ambiguous(other) and ambiguous(term)):
+            best.setdefault(other.effect, rival)
     return list(best.values())
 
 

@@ -51,8 +51,10 @@ def sentence(term: Term, bench: Bench) -> str:
     mechanism, linear = BY_ID[term.effect], bench.axis.linear
     values = {parameter.name: said(value, parameter.dimension, linear)
               for parameter, value in zip(mechanism.parameters, term.values, strict=True)}
+    values["viscous_speed"] = said(bench.axis.physics().viscous_speed, Dimension.MOTOR_SPEED, linear)
     variant = mechanism.variants[term.variant]
-    text = mechanism.sentence.format(**values)
+    text = (mechanism.second_sentence if term.variant == 1 else "") or mechanism.sentence
+    text = text.format(**values)
     return f"{text.removesuffix('.')} ({variant})." if variant else text
 
 

@@ -55,6 +55,11 @@ class Physics:
     linear: bool = False
     angle_per_unit: float = 1.0     # motor angle per motor unit: 1, or 2 pi / screw lead on a linear axis
 
+    @property
+    def viscous_speed(self) -> float:
+        """Speed at which viscous friction equals Coulomb friction [rad/s, m/s]; 0 without viscous friction."""
+        return self.coulomb_n_m / self.viscous_n_m_s_rad if self.viscous_n_m_s_rad > 0.0 else 0.0
+
 
 class Response(NamedTuple):
     """What the twin answers with, each (n,): SI values in the units of the axis."""
@@ -129,6 +134,7 @@ class Twin:
         constants[kernel.ANGLE_PER_UNIT] = physics.angle_per_unit
         constants[kernel.COULOMB] = physics.coulomb_n_m
         constants[kernel.VISCOUS] = physics.viscous_n_m_s_rad
+        constants[kernel.VISCOUS_SPEED] = physics.viscous_speed
         constants[kernel.SPRING] = chain.transmission_stiffness_n_m_rad
         elastic = self.modal.frequency_rad_s[self.modal.frequency_rad_s > 0.0]
         if elastic.size:

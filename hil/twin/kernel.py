@@ -8,8 +8,9 @@ Each internal step h moves every modal oscillator exactly under the torques held
     sliding  v = (v* - G (bias +- Fc + drag)) / (1 + G c)
 
 so that sticking is exact and needs no smoothed sign function (time stepping after Moreau; Stewart and
-Trinkle 1996). Position-dependent torques are taken at the predicted middle of the step, which makes
-them second order. While the motor is slow the step is fine, for the reversals; else it is coarse.
+Trinkle 1996). Drag may stop a sliding axis, but not turn it round. Position-dependent torques are taken at
+the predicted middle of the step, which makes them second order. While the motor is slow the step is fine,
+for the reversals; else it is coarse.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ COARSE, FINE, SHAPE_MOTOR, SHAPE_TABLE, SHAPE_SPRING, TABLE_IMPULSE, MOTOR_IMPUL
 
 # Entries of `constants`.
 (PERIOD, RATIO, ANGLE_PER_UNIT, COULOMB, VISCOUS, SPRING, DAMPER, COARSE_STEPS, FINE_STEPS, SLOW_VELOCITY,
- ALWAYS_FINE, OBSERVER, PLAY, COARSE_GAINS, FINE_GAINS, CONSTANTS) = (*range(14), 16, 19)
+ ALWAYS_FINE, OBSERVER, PLAY, VISCOUS_SPEED, COARSE_GAINS, FINE_GAINS, CONSTANTS) = (*range(15), 17, 20)
 
 # Entries of `codes`: variant + 1 of each mechanism (0: off), then whether each stage is entered.
 (ON_CURRENT, ON_TORQUE, ON_MOTOR_TORQUE, ON_COULOMB, ON_FRICTION_SCALE, ON_DRAG, ON_BIAS, ON_BRISTLE,
@@ -69,6 +70,8 @@ def _contact(free, gain, bound, viscous, shift, opposing):  # type: ignore[no-un
         return stop
     sign = 1.0 if stop > shift else -1.0
     steady = shift + sign * bound + opposing
+    if sign * (stop - steady) <= 0.0:
+        return stop
     return steady + viscous * (free - gain * steady) / (1.0 + gain * viscous)
 
 
@@ -80,6 +83,8 @@ def _bristle_contact(free, gain, bound, viscous, shift, opposing, stiffness, def
     """
     pull = stiffness * deflection
     sign = 1.0 if free - gain * (pull + shift) > 0.0 else -1.0
+    if sign * (free - gain * (pull + shift + opposing)) <= 0.0:
+        return free / gain, deflection
     yielding = 1.0 - sign * pull / bound if bound > 0.0 else 0.0
     yielding = max(yielding, 0.0)
     steady = pull + shift + opposing
@@ -145,7 +150,7 @@ def _build_advance(digest: str) -> Any:
         for j in range(steps):
             at = Moment(own[CLOCK] + j * h, j * h, period, h,
                         (position + 0.5 * h * speed) * constants[ANGLE_PER_UNIT], speed,
-                        (table + 0.5 * h * table_speed) * ratio, ratio)
+                        (table + 0.5 * h * table_speed) * ratio, ratio, constants[VISCOUS_SPEED])
             made = command
             if codes[ON_CURRENT]:
                 made = _current(made, at, values, codes, memory)
@@ -216,7 +221,8 @@ def _build_advance(digest: str) -> Any:
                 if passes == 2:
                     met = _contact(free, gain, (1.0 - share) * bound, (1.0 - share) * viscous, shift, opposing)
                     at = Moment(at.time_s, at.within_s, at.period_s, at.step_s, at.angle_rad,
-                                0.5 * (speed + free - gain * met), at.table_position_m, at.ratio_m)
+                                0.5 * (speed + free - gain * met), at.table_position_m, at.ratio_m,
+                                at.viscous_speed)
             rest = 1.0 - share
             if stiffness > 0.0:
                 friction, own[BRISTLE_DEFLECTION] = _bristle_contact(
@@ -254,7 +260,7 @@ def _build_read(digest: str) -> Any:
         table *= constants[RATIO]
         if codes[ON_MOTOR_READING] or codes[ON_TABLE_READING]:
             at = Moment(memory[OWN, CLOCK], 0.0, constants[PERIOD], 0.0, position * constants[ANGLE_PER_UNIT],
-                        0.0, table, constants[RATIO])
+                        0.0, table, constants[RATIO], constants[VISCOUS_SPEED])
             if codes[ON_MOTOR_READING]:
                 position = _motor_reading(position, at, values, codes, memory)
             if codes[ON_TABLE_READING]:

@@ -65,6 +65,7 @@ class Moment(NamedTuple):
     velocity: float                # of the motor, rad/s or m/s
     table_position_m: float
     ratio_m: float                 # m of the table per unit of the motor
+    viscous_speed: float           # of the motor, at which viscous friction equals Coulomb friction; 0: there is none
 
 
 class Dimension(StrEnum):
@@ -127,6 +128,7 @@ class Mechanism:
     variants: tuple[str, ...] = ("",)   # ways it may show: each is weighed in its own right
     play: bool = False                  # in the second variant the flanks of the transmission push only
     second_stage: Stage | None = None   # where the second variant enters, if elsewhere
+    second_sentence: str = ""           # of the second variant, if it says something else; may name viscous_speed too
 
     @property
     def names(self) -> tuple[str, ...]:

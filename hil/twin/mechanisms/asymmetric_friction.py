@@ -1,4 +1,4 @@
-"""Asymmetric friction: Coulomb friction differs by direction."""
+"""Asymmetric friction: friction differs by direction, alike at every speed or the more the faster."""
 
 from __future__ import annotations
 
@@ -6,14 +6,19 @@ from collections.abc import MutableSequence, Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Stage
+from hil.twin.mechanism import PARAMETERS, Block, Dimension, Mechanism, Moment, Parameter, Stage
 
 
 @njit
-def _shifted_band(
+def _offset(
     value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]
 ) -> float:
-    return value + parameters[0]
+    offset, variant = parameters[0], parameters[PARAMETERS - 1]
+    if variant == 0.0:
+        return value + offset
+    if at.viscous_speed <= 0.0:
+        return value
+    return value + offset * abs(at.velocity) / at.viscous_speed
 
 
 MECHANISM = Mechanism(
@@ -21,9 +26,14 @@ MECHANISM = Mechanism(
     block=Block.MOTOR_SIDE,
     element="ball nut, seals and guideways",
     sentence="Friction in positive direction is {offset_torque_n_m} above the mean of both directions.",
-    equation="T_f = Fc sign(v) + T_0; at rest T_0 - Fc <= T_f <= T_0 + Fc",
-    source="Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30 (1994) 1083, direction dependence",
+    second_sentence="Friction differs by direction, the more the faster: at {viscous_speed}, where viscous friction "
+                    "equals Coulomb friction, it is {offset_torque_n_m} above the mean of both in positive direction.",
+    equation="T_f = Fc sign(v) + T_0; at rest T_0 - Fc <= T_f <= T_0 + Fc; with speed: T_0 |v| / v_r, v_r = Fc / c",
+    source="Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30 (1994) 1083, direction dependence; its "
+           "slope over speed differs by direction too: Armstrong-Hélouvry, Control of Machines with Friction (1991)",
     parameters=(Parameter("offset_torque_n_m", Dimension.TORQUE, -1e3, 1e3),),
     stage=Stage.BIAS,
-    contribution=_shifted_band,
+    contribution=_offset,
+    variants=("", "with speed"),
+    second_stage=Stage.DRAG,
 )

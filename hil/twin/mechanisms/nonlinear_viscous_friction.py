@@ -1,19 +1,31 @@
-"""Nonlinear viscous friction: drag beyond linear in speed."""
+"""Nonlinear viscous friction: drag beyond linear in speed.
+
+It departs with the square of the speed or, as in grease and oils that thin when they are sheared, with its root.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import MutableSequence, Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Stage
+from hil.twin.mechanism import PARAMETERS, Block, Dimension, Mechanism, Moment, Parameter, Stage
 
 
 @njit
-def _quadratic_drag(
+def _drag(
     value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]
 ) -> float:
-    return value + parameters[0] * at.velocity * abs(at.velocity)
+    quadratic, variant = parameters[0], parameters[PARAMETERS - 1]
+    speed = abs(at.velocity)
+    if variant == 0.0:
+        drag = quadratic * speed * speed
+    elif at.viscous_speed > 0.0:
+        drag = quadratic * at.viscous_speed**2 * math.sqrt(speed / at.viscous_speed)
+    else:
+        drag = 0.0
+    return value + drag if at.velocity > 0.0 else value - drag
 
 
 MECHANISM = Mechanism(
@@ -21,9 +33,14 @@ MECHANISM = Mechanism(
     block=Block.MOTOR_SIDE,
     element="lubricant of nut and bearings",
     sentence="Drag departs from linear in speed by {quadratic_n_m_s2_rad2} times the square of the speed.",
-    equation="F = Fc sign(v) + c v + q v |v|; q < 0 where the lubricant thins with speed",
-    source="Olsson et al., Friction models and friction compensation, European J. Control 4 (1998) 176",
+    second_sentence="Drag rises steeply from rest and then ever less, with the root of the speed: at {viscous_speed} "
+                    "by {quadratic_n_m_s2_rad2} times the square of that speed.",
+    equation="F = Fc sign(v) + c v + q v |v|; thinning: + q v_r^2 sqrt(|v| / v_r) sign(v), v_r = Fc / c, which for "
+             "q v_r^2 = 2 Fc is the law of Casson, |F| = (sqrt(Fc) + sqrt(c |v|))^2",
+    source="Olsson et al., Friction models and friction compensation, European J. Control 4 (1998) 176; thinning: "
+           "Casson, in Mill (ed.), Rheology of Disperse Systems (1959) 84",
     parameters=(Parameter("quadratic_n_m_s2_rad2", Dimension.MOTOR_DRAG, -1e5, 1e5),),
     stage=Stage.DRAG,
-    contribution=_quadratic_drag,
+    contribution=_drag,
+    variants=("", "thinning lubricant"),
 )

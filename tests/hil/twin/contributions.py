@@ -9,7 +9,7 @@ from hil.twin.mechanism import PARAMETERS, WIDTH, Moment
 
 PERIOD_S = 1e-3
 RATIO_M = 0.010 / (2.0 * np.pi)
-AT_REST = Moment(0.0, 0.0, PERIOD_S, PERIOD_S / 10, 0.0, 0.0, 0.0, RATIO_M)
+AT_REST = Moment(0.0, 0.0, PERIOD_S, PERIOD_S / 10, 0.0, 0.0, 0.0, RATIO_M, viscous_speed=160.0)
 PROPERTY = settings(deadline=None, derandomize=True)   # the first call of each contribution compiles it
 
 moments = st.builds(
@@ -22,6 +22,7 @@ moments = st.builds(
     velocity=st.floats(-500.0, 500.0),
     table_position_m=st.floats(-2.0, 2.0),
     ratio_m=st.sampled_from([RATIO_M, 1.0]),
+    viscous_speed=st.sampled_from([0.0, 0.05, 160.0]),
 )
 
 

@@ -89,6 +89,11 @@ def test_one_file_per_mechanism() -> None:
     assert files == set(BY_ID)
 
 
+def fields(sentence):
+    """The names in braces."""
+    return {field for _, field, _, _ in Formatter().parse(sentence) if field is not None}
+
+
 @each
 def test_bounds_units_and_text(mechanism) -> None:
     assert len(mechanism.parameters) < PARAMETERS   # the last of the row is the variant
@@ -96,9 +101,12 @@ def test_bounds_units_and_text(mechanism) -> None:
         assert np.isfinite([parameter.low, parameter.high]).all()
         assert parameter.low < parameter.high
         assert parameter.name.endswith(SUFFIX.get(parameter.dimension, ""))
-    named = {field for _, field, _, _ in Formatter().parse(mechanism.sentence) if field is not None}
-    assert named <= set(mechanism.names)
+    assert fields(mechanism.sentence) <= set(mechanism.names)
     assert mechanism.sentence.endswith(".")
+    if mechanism.second_sentence:
+        assert fields(mechanism.second_sentence) <= {*mechanism.names, "viscous_speed"}
+        assert mechanism.second_sentence.endswith(".")
+        assert len(mechanism.variants) > 1
     assert mechanism.element
     assert mechanism.equation
     assert mechanism.source

@@ -113,6 +113,17 @@ def test_asymmetric_friction_shifts_the_band(offset, level, at) -> None:
     assert forward >= 0.0 >= backward   # still opposes both directions
 
 
+@given(offset=st.floats(-1.0, 1.0), velocity=st.floats(0.0, 300.0))
+@PROPERTY
+def test_asymmetry_with_speed_is_the_same_torque_both_ways(offset, velocity) -> None:
+    def torque(speed):
+        return call("asymmetric_friction", 0.0, AT_REST._replace(velocity=speed), variant=1, offset_torque_n_m=offset)
+
+    assert torque(AT_REST.viscous_speed) == pytest.approx(offset)
+    assert torque(velocity) == pytest.approx(offset * velocity / AT_REST.viscous_speed)
+    assert torque(-velocity) == torque(velocity)
+
+
 @given(coulomb=st.floats(0.1, 5.0), static=st.floats(0.1, 8.0), stribeck=st.floats(0.01, 20.0))
 @PROPERTY
 def test_stribeck_falls_from_static_to_coulomb(coulomb, static, stribeck) -> None:
@@ -154,6 +165,18 @@ def test_quadratic_drag_quadruples_at_double_speed(quadratic, velocity) -> None:
     assert drag(2.0 * velocity) == pytest.approx(4.0 * drag(velocity))
     assert drag(-velocity) == -drag(velocity)
     assert drag(velocity) * velocity * quadratic >= 0.0   # q > 0 takes power, q < 0 gives some back
+
+
+@given(quadratic=st.floats(-1e-3, 1e-3), velocity=st.floats(0.0, 300.0))
+@PROPERTY
+def test_drag_of_a_thinning_lubricant_rises_with_the_root_of_the_speed(quadratic, velocity) -> None:
+    def drag(speed, variant=1):
+        return call("nonlinear_viscous_friction", 0.0, AT_REST._replace(velocity=speed), variant=variant,
+                    quadratic_n_m_s2_rad2=quadratic)
+
+    assert drag(AT_REST.viscous_speed) == pytest.approx(drag(AT_REST.viscous_speed, variant=0))
+    assert drag(4.0 * velocity) == pytest.approx(2.0 * drag(velocity))
+    assert drag(-velocity) == -drag(velocity)
 
 
 @given(fraction=st.floats(-0.95, 5.0), tau=st.floats(1.0, 1e4))

@@ -1,0 +1,72 @@
+"""Drag in the stepping kernel: steady speeds as its equations say, and it stops an axis but never drives one."""
+
+import numpy as np
+import pytest
+
+from hil import control
+from hil.twin.axis import Active, Physics, Start, Twin
+from hil.twin.chain import LINEAR_LEAD_M, one_mass
+
+MASS_KG, COULOMB_N, VISCOUS_N_S_M = 100.0, 20.0, 200.0
+SPEED_M_S = COULOMB_N / VISCOUS_N_S_M      # at which viscous friction equals Coulomb friction
+GAINS = control.make_gains(position_gain_1_s=100.0, velocity_gain_n_m_s_rad=5000.0, ratio_m_rad=1.0,
+                           velocity_feedforward=0.0, velocity_integral_time_s=None, velocity_period_s=1e-3,
+                           position_period_s=1e-3)
+
+
+def twin(*active, coulomb=COULOMB_N, viscous=VISCOUS_N_S_M, **steps):
+    """A linear axis of one mass."""
+    return Twin(Physics(one_mass(MASS_KG, LINEAR_LEAD_M), coulomb, viscous, linear=True), GAINS, active, **steps)
+
+
+def thinning(n_s2_m2):
+    return Active("nonlinear_viscous_friction", (n_s2_m2,), 1)
+
+
+def with_speed(n):
+    return Active("asymmetric_friction", (n,), 1)
+
+
+def speeds(found):
+    """Mean speed of each period [m/s]."""
+    return np.diff(found.motor_position) / GAINS.period_s
+
+
+@pytest.mark.parametrize(("active", "forwards", "backwards"), [
+    (thinning(500.0), 2.0 * COULOMB_N + 5.0, 2.0 * COULOMB_N + 5.0),
+    (with_speed(-4.0), 2.0 * COULOMB_N - 4.0, 2.0 * COULOMB_N + 4.0),
+])
+def test_the_force_that_holds_the_speed_at_which_the_strength_is_told(active, forwards, backwards) -> None:
+    for sign, force in ((1.0, forwards), (-1.0, backwards)):
+        found = twin(active).drive(np.full(10_000, sign * force))
+        assert speeds(found)[-1] == pytest.approx(sign * SPEED_M_S, rel=1e-4)
+
+
+@pytest.mark.parametrize("contact", [(), (Active("presliding_hysteresis", (4e6,)),)], ids=["rigid", "elastic"])
+@pytest.mark.parametrize("active", [thinning(5e5), Active("nonlinear_viscous_friction", (1e8,))],
+                         ids=["thinning", "quadratic"])
+def test_drag_stops_a_coasting_axis_and_never_turns_it_round(active, contact) -> None:
+    """One step per tick and drag that could stop the axis many times over within it."""
+    coasting = twin(active, *contact, coarse_steps=1, fine_steps=1)
+    found = speeds(coasting.drive(np.zeros(400), Start(0.0, SPEED_M_S)))
+    # an elastic contact gives back what it took: Fc^2 / 2 k of energy
+    springs_back = np.sqrt(COULOMB_N**2 / 4e6 / MASS_KG) if contact else 1e-12
+    assert found[0] > 0.0
+    assert found.min() >= -springs_back
+    assert abs(found[-1]) <= springs_back
+
+
+def test_a_step_across_rest_agrees_with_fine_steps() -> None:
+    """Force that swings the axis to and fro through rest, where the drag of a thinning lubricant is steepest."""
+    time_s = np.arange(4000) * GAINS.period_s
+    force = 60.0 * np.sin(2.0 * np.pi * time_s)
+    coarse, fine = (twin(thinning(2000.0), fine_steps=steps).drive(force).motor_position for steps in (50, 500))
+    assert np.ptp(fine) > 0.01
+    np.testing.assert_allclose(coarse, fine, atol=2e-5 * np.ptp(fine))
+
+
+def test_without_viscous_friction_there_is_no_such_speed() -> None:
+    force = np.full(500, 30.0)
+    plain = twin(viscous=0.0).drive(force).motor_position
+    for active in (thinning(500.0), with_speed(-4.0)):
+        np.testing.assert_array_equal(twin(active, viscous=0.0).drive(force).motor_position, plain)

@@ -101,13 +101,15 @@ class MechanismEntry(_Model):
         if self.effect not in BY_ID:
             raise FieldError(("effect",), f"given {self.effect!r}, allowed one of {', '.join(BY_ID)}")
         mechanism = BY_ID[self.effect]
-        if set(self.parameters) != set(mechanism.names):
+        required = {parameter.name for parameter in mechanism.parameters if parameter.default is None}
+        if not required <= set(self.parameters) <= set(mechanism.names):
             raise FieldError(("parameters",), f"given {', '.join(self.parameters) or 'nothing'}, "
                              f"allowed exactly {', '.join(mechanism.names)}")
         if self.variant and self.variant not in mechanism.variants:
             raise FieldError(("variant",), f"given {self.variant!r}, allowed one of {', '.join(mechanism.variants)}")
         for parameter in mechanism.parameters:
-            value = self.parameters[parameter.name]
+            value = self.parameters.get(parameter.name, parameter.default)
+            assert value is not None
             if not parameter.low <= value <= parameter.high:
                 raise FieldError(("parameters", parameter.name), f"given {value:g}, allowed "
                                  f"{parameter.low:g} to {parameter.high:g} {parameter.dimension.value}")
@@ -117,7 +119,8 @@ class MechanismEntry(_Model):
         """The entry as the twin takes it."""
         mechanism = BY_ID[self.effect]
         variant = mechanism.variants.index(self.variant) if self.variant else 0
-        return Active(self.effect, tuple(self.parameters[name] for name in mechanism.names), variant)
+        return Active(self.effect, tuple(self.parameters.get(parameter.name, parameter.default or 0.0)
+                                         for parameter in mechanism.parameters), variant)
 
 
 class MotorEncoder(_Model):

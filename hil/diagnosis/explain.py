@@ -17,6 +17,7 @@ from hil.bench import Bench
 from hil.diagnosis import search
 from hil.diagnosis.evidence import against, whitening
 from hil.diagnosis.fit import Fit, evaluate, fit, in_parallel
+from hil.diagnosis.floor import REPEATS, all_laps, unrepeated
 from hil.diagnosis.model import Term, scales
 from hil.diagnosis.screen import Lead
 from hil.measured import Measured
@@ -24,7 +25,7 @@ from hil.measured import Measured
 FloatArray = NDArray[np.float64]
 Progress = Callable[[str], None]
 
-MOST_TERMS = 6          # at once; more than an engineer could act on, and the search stays affordable
+MOST_TERMS = 8          # at once; more than an engineer could act on, and the search stays affordable
 # BIC differences. "Very strong" evidence is 10 (Kass and Raftery 1995); the search looks at some 45 variants at some
 # 90 starts, which costs 2 log 90 = 9 more.
 NEEDED = 20.0
@@ -68,6 +69,7 @@ def explain(bench: Bench, runs: Sequence[Measured], progress: Progress = lambda 
     base = search.nominal(bench, runs)
     owner = evaluate(base.model, runs)
     nominal, rivals, first_leads = base, dict[tuple[str, int], list[Rival]](), list[Lead]()
+    repeated = all_laps(runs)
     while len(base.model.terms) < MOST_TERMS:
         progress(f"screening the library beside {len(base.model.terms)} terms")
         leads = [lead for lead in search.leads(base, runs) if claimable(lead.term, base.model.resolved(base.x)[0])]
@@ -79,8 +81,10 @@ def explain(bench: Bench, runs: Sequence[Measured], progress: Progress = lambda 
         progress("fitting " + ", ".join(lead.term.effect for lead in promising[:3]))
         found = [other for other in search.race(base, promising, runs)
                  if claimable(_last(other), other.model.resolved(other.x)[0])]
+        differs = unrepeated(base, repeated)
         best = next((other for other in found if against(other, base) >= NEEDED
-                     and gain(base, other, nominal) >= MATERIAL * rows), None)
+                     and gain(base, other, nominal) >= MATERIAL * rows
+                     and REPEATS * unrepeated(other, repeated) <= differs), None)
         if best is None:
             break
         best = _simplest([best, *(other for other in found if other is not best and against(best, other) < TIED)])

@@ -109,7 +109,7 @@ def diagnosed_bench(owner: Bench, found: Fit) -> Bench:
 
 def _normal(term: Term) -> Term:
     """Phases within one turn."""
-    values = tuple(math.remainder(value, 2.0 * math.pi) if parameter.name == "phase_rad" else value
+    values = tuple(math.remainder(value, 2.0 * math.pi) if parameter.name.startswith("phase") else value
                    for value, parameter in zip(term.values, BY_ID[term.effect].parameters, strict=True))
     return replace(term, values=values)
 

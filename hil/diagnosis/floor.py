@@ -10,17 +10,23 @@ better twin would explain.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hil.diagnosis.fit import Fit
+from hil.diagnosis.model import scales
 from hil.measured import Measured
 
 FloatArray = NDArray[np.float64]
 Rows = NDArray[np.intp]
 
+# A term that makes neighbouring laps differ by more than they do, in energy, is refuted. Most terms repeat with the
+# motion and leave this at 1; refitting the others moves it by less.
+REPEATS = 0.95
 _LAGS = 6                # strongest lags of the set-points that are tried
 _NEAR = 30               # rows about a peak of the correlation in which the lag is sought
 _SAME_M = 2e-6           # set-points closer than this are the same: printed ones are rounded
@@ -94,3 +100,18 @@ def _lags(position: FloatArray, velocity: FloatArray) -> list[int]:
                  key=lambda lag: float(np.mean(np.abs(position[:n - lag:7] - position[lag::7]))))
              for peak in peaks[np.argsort(correlation[peaks])[::-1][:_LAGS]].tolist())
     return list(dict.fromkeys(found))
+
+
+def all_laps(runs: Sequence[Measured]) -> list[tuple[Measured, Laps]]:
+    """The runs in which something repeats, with their laps."""
+    return [(run, found) for run in runs if (found := laps(run)) is not None]
+
+
+def unrepeated(found: Fit, repeated: Sequence[tuple[Measured, Laps]]) -> float:
+    """Energy of what differs from lap to lap, in units of noise; 0 without laps."""
+    total = 0.0
+    for run, known in repeated:
+        scale = scales(run, found.model.bench, found.model.observer_s)
+        total += sum((known.noise(values) / scale[name]) ** 2 * known.first.size
+                     for name, values in found.model.blocks(found.x, run).items())
+    return total

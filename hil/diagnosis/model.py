@@ -39,11 +39,14 @@ TRUST = 3.0
 
 @dataclass(frozen=True)
 class Term:
-    """A mechanism in a hypothesis, with the values it starts from."""
+    """A mechanism in a hypothesis, with the values it starts from; those left out at the end are the defaults."""
 
     effect: str
     variant: int
     values: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "values", BY_ID[self.effect].complete(self.values))
 
     @property
     def key(self) -> tuple[str, int]:

@@ -38,9 +38,6 @@ class Lock:
     order_per_rev: float | None = None
 
 
-_ORDERS_OF_VARIANT = {"periodic_lead_error": (1.0, 2.0, 3.0)}
-
-
 def lock(seen: Sequence[Energy], channel: str, bench: Bench, terms: Sequence[Term]) -> Lock:
     """What the first named term says of itself, else what the residual of `channel` shows."""
     lead_m = _lead_m(bench)
@@ -80,8 +77,8 @@ def lock(seen: Sequence[Energy], channel: str, bench: Bench, terms: Sequence[Ter
 def _named(term: Term, lead_m: float) -> Lock:
     values = dict(zip(BY_ID[term.effect].names, term.values, strict=True))
     order = values.get("cycles_per_rev")
-    if term.effect in _ORDERS_OF_VARIANT:
-        order = _ORDERS_OF_VARIANT[term.effect][term.variant]
+    if term.effect == "periodic_lead_error":     # of the strongest harmonic
+        order = 1.0 + float(np.argmax(term.values[::2]))
     elif term.effect == "encoder_eccentricity":
         order = 1.0
     if order is not None:

@@ -16,13 +16,9 @@ import numpy as np
 from hil.diagnosis.evidence import against
 from hil.diagnosis.explain import TIED, noise_ratios
 from hil.diagnosis.fit import Fit, evaluate, fit, in_parallel
-from hil.diagnosis.floor import Laps, laps
-from hil.diagnosis.model import Term, scales
+from hil.diagnosis.floor import REPEATS, all_laps, unrepeated
+from hil.diagnosis.model import Term
 from hil.measured import Measured
-
-# A term that makes neighbouring laps differ by more than they do, in energy. Most terms repeat with the motion and
-# leave this at 1; refitting the others moves it by less.
-REPEATS = 0.95
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,23 +105,13 @@ def _ablate(nominal: Fit, final: Fit, train: Sequence[Measured], held_out: Seque
     fits = in_parallel([lambda index=index: without(index) for index in range(len(terms))])  # type: ignore[misc]
     own_train, own_held_out = energy(final, train), energy(final, held_out)
     here = evaluate(final.model, held_out, final.x) if held_out else None
-    repeated = [(run, found) for run in train if (found := laps(run)) is not None]
-    unrepeated = _unrepeated(final, repeated)
+    repeated = all_laps(train)
+    differs = unrepeated(final, repeated)
     return [Ablation(term, other, energy(other, train) / own_train,
                      energy(other, held_out) / own_held_out if held_out else None,
                      _gain(here, evaluate(other.model, held_out, other.x)) if here is not None else None,
-                     _unrepeated(other, repeated) / unrepeated if unrepeated > 0.0 else None)
+                     unrepeated(other, repeated) / differs if differs > 0.0 else None)
             for term, other in zip(terms, fits, strict=True)]
-
-
-def _unrepeated(found: Fit, repeated: Sequence[tuple[Measured, Laps]]) -> float:
-    """Energy of what differs from lap to lap, in units of noise; 0 without laps."""
-    total = 0.0
-    for run, known in repeated:
-        scale = scales(run, found.model.bench, found.model.observer_s)
-        total += sum((known.noise(values) / scale[name]) ** 2 * known.first.size
-                     for name, values in found.model.blocks(found.x, run).items())
-    return total
 
 
 def _gain(found: Fit, without: Fit) -> float:

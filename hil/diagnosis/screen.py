@@ -83,43 +83,60 @@ def screen(base: Fit, runs: Sequence[Measured], starts: Sequence[Start]) -> list
         return model.residuals(x, runs) - base.residuals
 
     def lead(start: Start) -> Lead:
-        directions = [direction(start, start.values)]
-        if start.phase >= 0:
-            turned = list(start.values)
-            turned[start.phase] = np.pi / 2.0
-            directions.append(direction(start, tuple(turned)))
+        directions = [direction(start, values) for values in _directions(start)]
         return max((scored(start, directions, view) for view in views), key=lambda found: found.share)
 
     def scored(start: Start, directions: list[FloatArray], view: _View) -> Lead:
         energy = float(view.residual @ view.residual)
         span = np.stack([view.of(change) for change in directions], axis=1)
-        coefficients = np.asarray(np.linalg.lstsq(span, -view.residual, rcond=None)[0], dtype=np.float64)
-        left = view.residual + span @ coefficients
-        share = 1.0 - float(left @ left) / energy
+        products, target = span.T @ span, -(span.T @ view.residual)
+        coefficients = np.asarray(np.linalg.pinv(products, hermitian=True) @ target, dtype=np.float64)
+        share = float(target @ coefficients) / energy
         if start.strength < 0:
             # a start that cannot be scaled also counts as it stands
-            whole = view.residual + span[:, 0]
-            return Lead(Term(start.effect, start.variant, start.values),
-                        max(share if coefficients[0] > 0.0 else 0.0, 1.0 - float(whole @ whole) / energy))
+            whole = float(2.0 * target[0] - products[0, 0]) / energy
+            return Lead(Term(start.effect, start.variant, start.values), max(share if coefficients[0] > 0.0 else 0.0,
+                                                                             whole))
         return Lead(Term(start.effect, start.variant, _scaled(start, coefficients)), share)
 
     leads = list(POOL.map(lead, starts))
     return sorted(leads, key=lambda found: -found.share)
 
 
+def _pairs(start: Start) -> list[tuple[int, int]]:
+    """Places of strength and phase of each harmonic."""
+    return [(start.strength + 2 * n, start.phase + 2 * n) for n in range(start.harmonics)]
+
+
+def _directions(start: Start) -> list[tuple[float, ...]]:
+    """Values that span what the start may become: its strength, or sine and cosine of each harmonic."""
+    if start.phase < 0:
+        return [start.values]
+    found = []
+    for strength, phase in _pairs(start):
+        for angle in (0.0, np.pi / 2.0):
+            values = list(start.values)
+            for other, _ in _pairs(start):
+                values[other] = 0.0
+            values[strength], values[phase] = start.values[start.strength], angle
+            found.append(tuple(values))
+    return found
+
+
 def _scaled(start: Start, coefficients: FloatArray) -> tuple[float, ...]:
-    """The start at the strength (and phase) that the score test asks for, within bounds."""
+    """The start at the strengths (and phases) that the score test asks for, within bounds."""
     values = list(start.values)
-    parameter = BY_ID[start.effect].parameters[start.strength]
-    factor = float(coefficients[0])
-    if start.phase >= 0:
-        factor = float(np.hypot(*coefficients))
-        values[start.phase] = float(np.arctan2(coefficients[1], coefficients[0]))
-    wanted = values[start.strength] * factor
-    smallest = abs(values[start.strength]) * 1e-3
-    if parameter.low >= 0.0:
-        wanted = max(wanted, smallest)
-    elif abs(wanted) < smallest:
-        wanted = smallest
-    values[start.strength] = min(max(wanted, parameter.low), parameter.high)
+    unit = start.values[start.strength]
+    for n, (strength, phase) in enumerate(_pairs(start)):
+        parameter = BY_ID[start.effect].parameters[strength]
+        factor = float(coefficients[0])
+        if start.phase >= 0:
+            sine, cosine = coefficients[2 * n:2 * n + 2]
+            factor, values[phase] = float(np.hypot(sine, cosine)), float(np.arctan2(cosine, sine))
+        wanted, smallest = unit * factor, abs(unit) * 1e-3
+        if parameter.low >= 0.0:
+            wanted = max(wanted, smallest)
+        elif abs(wanted) < smallest:
+            wanted = smallest
+        values[strength] = min(max(wanted, parameter.low), parameter.high)
     return tuple(values)

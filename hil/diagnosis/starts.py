@@ -23,13 +23,17 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Start:
-    """Parameter values of one variant, and which of them are strength and phase (-1: no phase)."""
+    """Parameter values of one variant, and which of them are strength and phase (-1: no phase).
+
+    Further pairs of strength and phase follow the first for so many `harmonics`.
+    """
 
     effect: str
     variant: int
     values: tuple[float, ...]
     strength: int = 0
     phase: int = -1
+    harmonics: int = 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +102,7 @@ _STARTS: dict[str, tuple[Callable[[Scene], _Values], int, int]] = {
     "backlash": (lambda s: [(f * s.stretch,) for f in (0.5, 1.0, 2.0, 4.0)], -1, -1),
     "preload_loss": (lambda s: [(f * s.stretch, 0.4) for f in (0.5, 1.0, 2.0, 4.0)], -1, -1),
     "position_dependent_stiffness": (lambda s: [(0.1 / s.travel_m,)], 0, -1),
-    "periodic_lead_error": (lambda s: [(0.5e-6, 0.0)], 0, 1),
+    "periodic_lead_error": (lambda s: [(0.5e-6, 0.0, 0.0, 0.0, 0.0, 0.0)], 0, 1),
     "cumulative_lead_error": (lambda s: [(1e-6 / s.travel_m,)], 0, -1),
     "thermal_growth": (lambda s: [(1e-6 / s.travel_m, f * s.duration_s) for f in (0.2, 1.0, 5.0)], 0, -1),
     "structural_mode": (lambda s: [(f, 0.03, 0.15) for f in np.geomspace(12.0, 240.0, 13)], -1, -1),
@@ -139,5 +143,6 @@ def starts(scene: Scene, bench: Bench) -> list[Start]:
             for point in points:
                 inside = tuple(min(max(value, p.low), p.high)
                                for value, p in zip(point, BY_ID[mechanism.id].parameters, strict=True))
-                found.append(Start(mechanism.id, variant, inside, strength, phase))
+                harmonics = (len(inside) - strength) // 2 if phase == strength + 1 else 1
+                found.append(Start(mechanism.id, variant, inside, strength, phase, harmonics))
     return found

@@ -12,12 +12,12 @@ are those of the motor side: rad and N m, or m and N on a linear axis.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, NamedTuple
 
-PARAMETERS = 4    # the most parameters a mechanism may have
+PARAMETERS = 8    # the most parameters a mechanism may have; the last place tells its variant
 WIDTH = 16        # numbers of state a mechanism may keep
 
 
@@ -102,12 +102,14 @@ _LINEAR_UNITS = {
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter of a mechanism: its name with unit, what it measures, and its physical bounds."""
+    """A parameter of a mechanism: its name with unit, what it measures, its physical bounds, and what it is where
+    nobody gives it (None: it must be given)."""
 
     name: str
     dimension: Dimension
     low: float
     high: float
+    default: float | None = None
 
 
 @dataclass(frozen=True)
@@ -134,5 +136,12 @@ class Mechanism:
     def names(self) -> tuple[str, ...]:
         """Names of its parameters, in order."""
         return tuple(parameter.name for parameter in self.parameters)
+
+    def complete(self, values: Sequence[float]) -> tuple[float, ...]:
+        """Values of the first parameters, and the defaults of the others; raises ValueError if one has none."""
+        rest = [parameter.default for parameter in self.parameters[len(values):]]
+        if any(value is None for value in rest):
+            raise ValueError(f"{self.id}: given {len(values)} values, allowed {', '.join(self.names)}")
+        return (*values, *(value for value in rest if value is not None))
 
 

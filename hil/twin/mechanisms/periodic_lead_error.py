@@ -1,4 +1,7 @@
-"""Periodic lead error: the table runs ahead and behind with the angle of the screw."""
+"""Periodic lead error: the table runs ahead and behind with the angle of the screw.
+
+A ground screw hardly ever errs by a pure sine: three harmonics are one cause.
+"""
 
 from __future__ import annotations
 
@@ -14,22 +17,30 @@ from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, S
 def _wobble(
     value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]
 ) -> float:
-    order = 1.0 + parameters[3]
-    return value + parameters[0] / at.ratio_m * math.sin(order * at.angle_rad + parameters[1])
+    error = 0.0
+    for harmonic in range(3):
+        amplitude_m, phase = parameters[2 * harmonic], parameters[2 * harmonic + 1]
+        if amplitude_m != 0.0:
+            error += amplitude_m * math.sin((harmonic + 1) * at.angle_rad + phase)
+    return value + error / at.ratio_m
 
 
 MECHANISM = Mechanism(
     id="periodic_lead_error",
     block=Block.TRANSMISSION,
     element="ball screw",
-    sentence="The lead errs by {amplitude_m}, periodic in the angle of the screw.",
-    equation="x = r theta + A sin(n theta + phi), n = 1, 2, 3",
+    sentence="The lead errs with the angle of the screw: by {amplitude_m} once, {amplitude_2_m} twice and "
+             "{amplitude_3_m} three times per revolution.",
+    equation="x = r theta + sum over n = 1, 2, 3 of A_n sin(n theta + phi_n)",
     source="ISO 3408-3:2006, travel variation within 2 pi rad; ISO 230-2, bidirectional positioning",
     parameters=(
         Parameter("amplitude_m", Dimension.LENGTH, 0.0, 1e-3),
         Parameter("phase_rad", Dimension.ANGLE, -2.0 * math.pi, 2.0 * math.pi),
+        Parameter("amplitude_2_m", Dimension.LENGTH, 0.0, 1e-3, 0.0),
+        Parameter("phase_2_rad", Dimension.ANGLE, -2.0 * math.pi, 2.0 * math.pi, 0.0),
+        Parameter("amplitude_3_m", Dimension.LENGTH, 0.0, 1e-3, 0.0),
+        Parameter("phase_3_rad", Dimension.ANGLE, -2.0 * math.pi, 2.0 * math.pi, 0.0),
     ),
     stage=Stage.TRANSMISSION,
     contribution=_wobble,
-    variants=("once per revolution", "twice per revolution", "three times per revolution"),
 )

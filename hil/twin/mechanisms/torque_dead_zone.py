@@ -6,7 +6,7 @@ from collections.abc import MutableSequence, Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Stage
+from hil.twin.mechanism import PARAMETERS, Block, Dimension, Mechanism, Moment, Parameter, Stage
 
 _GATE = 2.0        # from this variant on, the torque outside the zone is unchanged
 
@@ -18,7 +18,7 @@ def _dead_zone(
     half_width = parameters[0]
     if abs(value) <= half_width:
         return 0.0
-    if parameters[3] >= _GATE:
+    if parameters[PARAMETERS - 1] >= _GATE:
         return value
     return value - half_width if value > 0.0 else value + half_width
 

@@ -56,7 +56,7 @@ def test_stribeck_friction_is_at_low_speed(named: bool) -> None:
 
 
 def test_an_angle_locked_error_is_told_from_a_time_locked_one() -> None:
-    assert located(Term("periodic_lead_error", 1, (5e-6, 0.3))).order_per_rev == 2.0
+    assert located(Term("periodic_lead_error", 0, (1e-6, 0.3, 5e-6, 0.3))).order_per_rev == 2.0
     assert located(Term("periodic_lead_error", 0, (5e-6, 0.3))).order_per_rev == 1.0
     run = take(recorded(OWNER), OWNER)
 

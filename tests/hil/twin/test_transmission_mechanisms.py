@@ -31,12 +31,13 @@ def unloaded_table(effect, angle_rad, *, time_s=0.0, variant=0, **parameters):
 
 
 @given(angle=st.floats(-600.0, 600.0), amplitude=st.floats(0.0, 1e-4), phase=st.floats(-pi, pi),
-       variant=st.integers(0, 2))
+       third=st.floats(0.0, 1e-5))
 @PROPERTY
-def test_periodic_lead_error_moves_the_table_with_the_angle(angle, amplitude, phase, variant) -> None:
-    x = unloaded_table("periodic_lead_error", angle, variant=variant, amplitude_m=amplitude, phase_rad=phase)
-    order = variant + 1
-    assert x - RATIO_M * angle == pytest.approx(amplitude * np.sin(order * angle + phase), abs=1e-11)
+def test_periodic_lead_error_moves_the_table_with_the_angle(angle, amplitude, phase, third) -> None:
+    x = unloaded_table("periodic_lead_error", angle, amplitude_m=amplitude, phase_rad=phase, amplitude_2_m=0.0,
+                       phase_2_rad=0.0, amplitude_3_m=third, phase_3_rad=1.0)
+    error = amplitude * np.sin(angle + phase) + third * np.sin(3.0 * angle + 1.0)
+    assert x - RATIO_M * angle == pytest.approx(error, abs=1e-11)
 
 
 @given(angle=st.floats(-600.0, 600.0), slope=st.floats(-1e-3, 1e-3))

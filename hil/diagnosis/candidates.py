@@ -58,7 +58,12 @@ def reach(runs: Sequence[Measured], bench: Bench) -> Reach:
 
 
 def candidates(found: Reach) -> tuple[list[Profile], list[Profile]]:
-    """The motions that can be made within a reach: up to a quarter of a minute, and longer ones."""
+    """The motions that can be made within a reach: up to a quarter of a minute, and longer ones.
+
+    None where the recordings show no acceleration: they were cut out of a constant feed.
+    """
+    if not min(found.velocity_m_s, found.acceleration_m_s2, found.jerk_m_s3) > 0.0:
+        return [], []
     top, room = found.velocity_m_s, max(found.high_m - found.start_m, found.start_m - found.low_m)
     way = 1.0 if found.high_m - found.start_m >= found.start_m - found.low_m else -1.0     # to where there is room
     creep = [part for feed in _CREEP_M_S for part in _reversal(found, way * room, feed)]
@@ -143,5 +148,7 @@ def _slope(values: FloatArray, period_s: float) -> FloatArray:
 
 def _down(value: float) -> float:
     """Four digits, not above."""
+    if value <= 0.0:
+        return value
     factor = 10.0 ** (3 - math.floor(math.log10(value)))
     return math.floor(value * factor) / factor

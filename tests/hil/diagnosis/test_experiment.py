@@ -141,7 +141,8 @@ def test_limits_of_the_bench_count_instead_of_what_was_recorded() -> None:
 
 
 @pytest.mark.parametrize(("change", "count"), [({"high_m": 0.0005}, 5), ({"velocity_m_s": 0.004}, 3),
-                                               ({"start_m": 0.1}, 7), ({"acceleration_m_s2": 0.01}, 3)])
+                                               ({"start_m": 0.1}, 7), ({"acceleration_m_s2": 0.01}, 3),
+                                               ({"acceleration_m_s2": 0.0}, 0)])
 def test_an_axis_that_may_do_little_still_gets_candidates(change: dict[str, float], count: int) -> None:
     reached = replace(reach(runs(ONE_WAY), OWNER), low_m=0.0, high_m=0.1)
     short, long = candidates(replace(reached, **change))

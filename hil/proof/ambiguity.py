@@ -31,12 +31,14 @@ _STEPS = 4                   # towards a strength at which they cannot be told
 
 def ambiguous(rng: Rng, effect: str | None, kind: Kind | None) -> Draft | None:
     """An effect, its rival, and motions that show that one of them is there but not which."""
+    if effect is not None and effect not in _EFFECTS:
+        raise ValueError(f"effect: must be one of {', '.join(sorted(_EFFECTS))}, got {effect!r}")
     on = stage(rng, kind)
     couple, how = _COUPLES[int(rng.integers(len(_COUPLES)))]
     found = couple(on.scene, rng)
-    if found is None or (effect is not None and effect not in (found[0].id, found[1].id)):
+    if found is None or effect not in (None, found[0].id):
         return None
-    first, second = found
+    first, second = found   # the effect, and what is taken for it
     runs = (motions.poor(rng, on.axis, how), motions.poor(rng, on.axis, how), motions.poor(rng, on.axis, how))
     visibility = Visibility(on.axis, runs[:2])
     for _ in range(_STEPS):
@@ -98,3 +100,5 @@ def _scale_or_screw(s: Scene, rng: Rng) -> Both | None:
 _COUPLES: tuple[tuple[Couple, Poor], ...] = (
     (_angle_or_position, "one_way"), (_spring_or_push, "local"), (_encoder_or_screw, "slow"),
     (_scale_or_screw, "slow"))
+_EFFECTS = frozenset({"cogging_torque", "position_dependent_friction", "spring_load", "encoder_eccentricity",
+                      "periodic_lead_error", "scale_interpolation_error"})

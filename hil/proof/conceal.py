@@ -22,12 +22,16 @@ from hil.proof import answers
 from hil.proof.axes import DrawnAxis
 from hil.proof.axis_kinds import Kind
 from hil.proof.drafts import Draft
+from hil.proof.effects import LIBRARY
+from hil.proof.novel import NOVEL
 from hil.proof.tiers import RECIPES
 from hil.recording import Recording, write_parquet
 from hil.trajectory import Trajectory
 
 TIERS = tuple(RECIPES)
+BALANCED = {"single": LIBRARY, "ladder": LIBRARY, "pair": LIBRARY, "masked": LIBRARY, "novel": NOVEL}
 RECORDINGS = ("train_1", "train_2", "holdout")
+_AXES = 300                  # drawn before it is clear that the tier cannot have what was asked for
 _STOPPED_M = 3e-3            # following error, beyond that of the law, and share of torque at its limit at which an
 _LIMITED = 0.05              # engineer would have stopped the axis
 
@@ -87,13 +91,16 @@ class Case:
 def draw(tier: str, number: int, seed: int, effect: str | None = None, axis: Kind | None = None) -> Case:
     """The case of a tier, number and seed; always the same one.
 
-    `effect` and `axis` force what is drawn, where the tier has a choice. Raises ValueError for an unknown tier, and
-    for an effect that this kind of axis cannot show.
+    `effect` and `axis` force what is drawn, where the tier has a choice. Without them, consecutive numbers of a tier
+    take all its effects equally often. Raises ValueError for an unknown tier, and
+    for an effect that the tier or this kind of axis cannot show.
     """
     if tier not in RECIPES:
         raise ValueError(f"tier: must be one of {', '.join(TIERS)}, got {tier!r}")
     rng = np.random.default_rng([seed, number, TIERS.index(tier)])
-    while True:
+    if effect is None and axis is None and tier in BALANCED:
+        effect = _turn(BALANCED[tier], number, seed)
+    for _ in range(_AXES):
         draft = RECIPES[tier](rng, effect, axis)
         if draft is None:
             continue
@@ -102,6 +109,8 @@ def draw(tier: str, number: int, seed: int, effect: str | None = None, axis: Kin
         if all(_sound(recording, draft.axis) for recording in recordings):
             name = f"case_{number:04d}"
             return Case(name, tuple(recordings), draft.axis.bench, _truth(name, tier, number, seed, draft), draft)
+    raise ValueError(f"tier {tier}: given {effect} on {axis or 'any axis'}, which came to no case on {_AXES} axes; "
+                     "leave the effect or the axis out")
 
 
 def rerun(draft: Draft, run: Trajectory, seed: int, name: str = "run") -> Recording:
@@ -127,6 +136,12 @@ def write(case: Case, folder: str | Path) -> Path:
     plain = case.bench.model_dump(mode="json", exclude_defaults=True)
     (place / "bench.yaml").write_text(yaml.safe_dump(plain, sort_keys=False), encoding="utf-8")
     return place
+
+
+def _turn(names: tuple[str, ...], number: int, seed: int) -> str:
+    """Every name once in each round of numbers, in another order each time."""
+    turn, at = divmod(number, len(names))
+    return names[int(np.random.default_rng([seed, turn]).permutation(len(names))[at])]
 
 
 def _sound(recording: Recording, axis: DrawnAxis) -> bool:

@@ -59,7 +59,7 @@ def draw_novel(name: str, scene: Scene, rng: Rng) -> Effect | EncoderFault:
 
 def novel(axis: DrawnAxis) -> tuple[str, ...]:
     """Ids of what this kind of axis can have."""
-    return tuple(name for name in _DRAWS if axis.has_table or name not in ("novel_pitch_bump", *FAULTS))
+    return tuple(name for name in NOVEL if axis.has_table or name not in ("novel_pitch_bump", *FAULTS))
 
 
 def _somewhere(s: Scene, rng: Rng) -> dict[str, float]:
@@ -116,3 +116,4 @@ _DRAWS: Mapping[str, Callable[[Scene, Rng], Mapping[str, float]]] = {
         _friction_bump, _friction_wander, _pitch_bump, _mass_change, _vibration, _hammering, _torque_fade,
         _lost_counts, _noise_bursts)}
 FAULTS = ("novel_lost_counts", "novel_noise_bursts")
+NOVEL: tuple[str, ...] = tuple(_DRAWS)

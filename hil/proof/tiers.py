@@ -16,7 +16,7 @@ from hil.proof.axis_kinds import Kind
 from hil.proof.chance import Rng
 from hil.proof.drafts import TRIES, Draft, at_size, name_on, one, stage, two
 from hil.proof.effects import applicable, draw_effect
-from hil.proof.novel import EncoderFault, draw_novel, novel
+from hil.proof.novel import NOVEL, EncoderFault, draw_novel, novel
 from hil.proof.visibility import Visibility
 
 Recipe = Callable[[Rng, str | None, Kind | None], Draft | None]
@@ -82,8 +82,9 @@ def novel_physics(rng: Rng, effect: str | None, kind: Kind | None) -> Draft | No
     """Physics that the library has not."""
     on = stage(rng, kind)
     names = novel(on.axis)
-    if effect is not None and effect not in names and kind is not None:
-        raise ValueError(f"effect: must be one of {', '.join(names)} on {kind}, got {effect!r}")
+    possible = names if kind is not None else NOVEL
+    if effect is not None and effect not in possible:
+        raise ValueError(f"effect: must be one of {', '.join(possible)}, got {effect!r}")
     name = effect or str(rng.choice(names))
     for _ in range(TRIES if name in names else 0):
         found = draw_novel(name, on.scene, rng)

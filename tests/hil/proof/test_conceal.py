@@ -17,7 +17,7 @@ from hil.proof import motions
 from hil.proof.answers import compared
 from hil.proof.axes import WRONG_BY, draw_axis
 from hil.proof.axis_kinds import KINDS, Kind
-from hil.proof.conceal import RECORDINGS, TIERS, Case, draw, rerun, write
+from hil.proof.conceal import RECORDINGS, TIERS, Case, _turn, draw, rerun, write
 from hil.proof.drafts import at_size, one, stage
 from hil.proof.effects import LIBRARY, NEED_TABLE, Scene, applicable, draw_effect
 from hil.proof.novel import draw_novel, novel
@@ -54,6 +54,13 @@ def test_same_numbers_same_case_other_numbers_another(cases: dict[str, Case]) ->
     for first, second in zip(case.recordings, again.recordings, strict=True):
         assert all(np.array_equal(first[channel], second[channel]) for channel in first.columns)
     assert other.truth.true_parameters != case.truth.true_parameters
+
+
+def test_consecutive_numbers_take_all_effects_equally_often() -> None:
+    rounds = [[_turn(LIBRARY, 28 * turn + at, 5) for at in range(28)] for turn in range(2)]
+    assert set(rounds[0]) == set(rounds[1]) == set(LIBRARY)
+    assert rounds[0] != rounds[1]
+    assert draw("single", 3, 5).truth.effects[0].effect == rounds[0][3]
 
 
 @pytest.mark.parametrize("tier", QUICK)
@@ -199,7 +206,9 @@ def test_a_base_is_compared_by_the_mass_that_acts_like_it() -> None:
     ({"tier": "single", "effect": "backslash"}, r"effect: must be one of .*backlash.*, got 'backslash'"),
     ({"tier": "single", "effect": "backlash", "axis": "one_mass"}, r"effect: must be one of .*, got 'backlash'"),
     ({"tier": "null", "effect": "backlash"}, r"effect: must be left out where nothing is concealed"),
-    ({"tier": "novel", "effect": "novel_pitch_bump", "axis": "one_mass"}, r"on one_mass, got 'novel_pitch_bump'"),
+    ({"tier": "novel", "effect": "novel_pitch_bump", "axis": "one_mass"}, r"must be one of .*, got 'novel_pitch_bump'"),
+    ({"tier": "novel", "effect": "backlash"}, r"must be one of .*novel_friction_bump.*, got 'backlash'"),
+    ({"tier": "ambiguous", "effect": "backlash"}, r"effect: must be one of cogging_torque, .*, got 'backlash'"),
 ])  # fmt: skip
 def test_refusals_say_what_is_allowed(arguments: dict[str, Any], says: str) -> None:
     with pytest.raises(ValueError, match=says):

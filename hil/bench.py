@@ -106,7 +106,8 @@ class MechanismEntry(_Model):
             raise FieldError(("parameters",), f"given {', '.join(self.parameters) or 'nothing'}, "
                              f"allowed exactly {', '.join(mechanism.names)}")
         if self.variant and self.variant not in mechanism.variants:
-            raise FieldError(("variant",), f"given {self.variant!r}, allowed one of {', '.join(mechanism.variants)}")
+            allowed = ", ".join(variant or "none" for variant in mechanism.variants)
+            raise FieldError(("variant",), f"given {self.variant!r}, allowed one of {allowed}")
         for parameter in mechanism.parameters:
             value = self.parameters.get(parameter.name, parameter.default)
             assert value is not None
@@ -175,6 +176,16 @@ class Bench(_Model):
             data["axis"] = {"model": model_of(set(data["axis"])), **data["axis"]}
         # from here on pydantic takes it for Python's own data, where strictly only a tuple is one
         return _tuples(data)
+
+    @model_validator(mode="after")
+    def _room_for_mechanisms(self) -> Bench:
+        effects = [entry.effect for entry in self.mechanisms]
+        for effect in effects:
+            given, most = effects.count(effect), BY_ID[effect].most
+            if given > most:
+                raise FieldError(("mechanisms",), f"given {effect} {given} times, allowed {most}: it cannot act "
+                                 "more often at once")
+        return self
 
     @model_validator(mode="after")
     def _feedback_is_measured(self) -> Bench:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hil.diagnosis.fit import Fit
-from hil.diagnosis.model import scales
+from hil.diagnosis.model import Term, scales
 from hil.measured import Measured
 
 FloatArray = NDArray[np.float64]
@@ -43,9 +43,9 @@ def energies(found: Fit, runs: Sequence[Measured], reference: Fit | None = None)
     return result
 
 
-def without_terms(found: Fit, effect: str | None = None) -> Fit:
-    """The hypothesis with its terms, or those of one effect, switched off and all else as it is."""
-    kept = tuple(term for term in found.model.resolved(found.x)[1] if effect is not None and term.effect != effect)
+def without_terms(found: Fit, off: Term | None = None) -> Fit:
+    """The hypothesis with its terms, or one of them, switched off and all else as it is."""
+    kept = tuple(term for term in found.model.resolved(found.x)[1] if off is not None and term.key != off.key)
     model = replace(found.model, terms=kept)
     x = np.concatenate([found.x[:model.nominal_count], model.initial()[model.nominal_count:]])
     return replace(found, model=model, x=x)

@@ -18,7 +18,7 @@ from hil.diagnosis import search
 from hil.diagnosis.evidence import against, whitening
 from hil.diagnosis.fit import Fit, evaluate, fit, in_parallel
 from hil.diagnosis.floor import REPEATS, all_laps, unrepeated
-from hil.diagnosis.model import Term, scales
+from hil.diagnosis.model import Key, Term, scales
 from hil.diagnosis.screen import Lead
 from hil.measured import Measured
 
@@ -53,8 +53,8 @@ class Explanation:
     owner: Fit
     nominal: Fit
     final: Fit
-    rivals: dict[tuple[str, int], list[Rival]] = field(default_factory=dict)
-    needed: dict[tuple[str, int], float] = field(default_factory=dict)   # evidence that each term is needed
+    rivals: dict[Key, list[Rival]] = field(default_factory=dict)
+    needed: dict[Key, float] = field(default_factory=dict)   # evidence that each term is needed
     leads: tuple[Lead, ...] = ()                                  # of the first screen
 
     @property
@@ -68,7 +68,7 @@ def explain(bench: Bench, runs: Sequence[Measured], progress: Progress = lambda 
     progress("refitting the nominal parameters")
     base = search.nominal(bench, runs)
     owner = evaluate(base.model, runs)
-    nominal, rivals, first_leads = base, dict[tuple[str, int], list[Rival]](), list[Lead]()
+    nominal, rivals, first_leads = base, dict[Key, list[Rival]](), list[Lead]()
     repeated = all_laps(runs)
     while len(base.model.terms) < MOST_TERMS:
         progress(f"screening the library beside {len(base.model.terms)} terms")
@@ -136,14 +136,14 @@ def _simplest(tied: list[Fit]) -> Fit:
     """Of explanations that the evidence does not tell apart, the one with the fewest parameters. A constant torque
     and friction that differs by direction, alike at every speed, are the same on every motion: the second is named,
     most axes lie flat."""
-    return min(tied, key=lambda found: (found.x.size, _last(found).key != ("asymmetric_friction", 0)))
+    return min(tied, key=lambda found: (found.x.size, _last(found).key[:2] != ("asymmetric_friction", 0)))
 
 
 def _last(found: Fit) -> Term:
     return found.model.resolved(found.x)[1][-1]
 
 
-def _ablated(found: Fit, runs: Sequence[Measured]) -> dict[tuple[str, int], tuple[float, Fit]]:
+def _ablated(found: Fit, runs: Sequence[Measured]) -> dict[Key, tuple[float, Fit]]:
     """For each term: the evidence for it, and the fit without it."""
 
     def without(index: int) -> Fit:

@@ -13,7 +13,7 @@ from hil.bench import Bench, MechanismEntry
 from hil.diagnosis.confidence import confidence
 from hil.diagnosis.explain import TIED, Explanation, Rival
 from hil.diagnosis.fit import Fit
-from hil.diagnosis.model import Term
+from hil.diagnosis.model import Key, Term
 from hil.diagnosis.proof import Ablation, explained_share
 from hil.diagnosis.result import Correction, Finding, Value
 from hil.diagnosis.result import Rival as RivalText
@@ -104,7 +104,7 @@ def diagnosed_bench(owner: Bench, found: Fit) -> Bench:
     entries = tuple(MechanismEntry(effect=term.effect, variant=BY_ID[term.effect].variants[term.variant],
                                    parameters=dict(zip(BY_ID[term.effect].names, _normal(term).values, strict=True)))
                     for term in terms)
-    return bench.model_copy(update={"name": f"{owner.name}_diagnosed", "mechanisms": owner.mechanisms + entries})
+    return bench.model_copy(update={"name": f"{owner.name}_diagnosed", "mechanisms": found.model.kept + entries})
 
 
 def _normal(term: Term) -> Term:
@@ -120,10 +120,10 @@ def _values(term: Term, errors: Sequence[float], bench: Bench) -> dict[str, Valu
                                                strict=True)}
 
 
-def _key(explanation: Explanation, term: Term) -> tuple[str, int]:
+def _key(explanation: Explanation, term: Term) -> Key:
     """The key under which the search knows a term that was renamed."""
     known = set(explanation.rivals) | set(explanation.needed)
-    return term.key if term.key in known or term.effect not in SAME else (SAME[1], term.variant)
+    return term.key if term.key in known or term.effect not in SAME else replace(term, effect=SAME[1]).key
 
 
 def rivals_of(explanation: Explanation, term: Term) -> list[Rival]:

@@ -11,17 +11,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hil.bench import Bench
+from hil.bench import Bench, MechanismEntry
 from hil.measured import Measured
 from hil.twin.axis import Active, Response, Twin
 from hil.twin.library import BY_ID
 from hil.twin.mechanism import Parameter
 
 FloatArray = NDArray[np.float64]
+Key = tuple[str, int, int]
 
 # Torque that the motor channel is trusted to tell, over the noise of the torque channel. A fine encoder tells much
 # less, but details that no owner asks for lie there too: how friction meets zero speed, the side force of a lead error.
@@ -32,6 +34,8 @@ TORQUE_ACCURACY, SEARCH_ACCURACY = 1.0, 0.2
 FASTEST_OBSERVER_S, SLOWEST_OBSERVER_S = 0.002, 0.008
 # Differences by which the edges of a window are moved: first wide, then by a tick.
 EDGE_STEP_S, LAST_EDGE_STEP_S = 0.03, 0.001
+# Periods, or orders, further apart than this factor are two causes.
+_APART = 1.1
 # An owner who believes a mass or a stiffness is not wrong by more than this factor: beyond it lie the valleys in which
 # a wrong structure is mended with absurd parameters.
 TRUST = 3.0
@@ -44,14 +48,32 @@ class Term:
     effect: str
     variant: int
     values: tuple[float, ...]
+    slot: int = 0       # which of those of its effect
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "values", BY_ID[self.effect].complete(self.values))
 
     @property
-    def key(self) -> tuple[str, int]:
-        """Effect and variant."""
-        return self.effect, self.variant
+    def key(self) -> Key:
+        """Effect, variant and slot: its own among the terms of a hypothesis."""
+        return self.effect, self.variant, self.slot
+
+
+def repeats(one: Term | Active, other: Term | Active) -> bool:
+    """Whether a mechanism is another over again: the same effect and, where it has one, the same period or order."""
+    if one.effect != other.effect:
+        return False
+    for name, value, other_value in zip(BY_ID[one.effect].names, one.values, other.values, strict=True):
+        if name in ("period_m", "cycles_per_rev"):
+            return max(value, other_value) < _APART * min(value, other_value)
+    return True
+
+
+def compatible(found: Sequence[Term | Active]) -> bool:
+    """Whether mechanisms can act at once: each as often as it may, and none over again."""
+    effects = [one.effect for one in found]
+    return (all(effects.count(effect) <= BY_ID[effect].most for effect in effects)
+            and not any(repeats(one, other) for one, other in combinations(found, 2)))
 
 
 @dataclass(frozen=True)
@@ -145,10 +167,22 @@ class Model:
         """Physical values of a vector, kept inside their bounds."""
         return [min(max(c.value(v), c.low), c.high) for c, v in zip(self.coordinates, x, strict=True)]
 
+    @cached_property
+    def kept(self) -> tuple[MechanismEntry, ...]:
+        """The mechanisms of the bench whose place no term has taken."""
+        kept = []
+        taken = [term.effect for term in self.terms]
+        for entry in self.bench.mechanisms:
+            again = any(repeats(entry.active(), term) for term in self.terms)
+            if not again and taken.count(entry.effect) < BY_ID[entry.effect].most:
+                kept.append(entry)
+                taken.append(entry.effect)
+        return tuple(kept)
+
     def twin(self, x: FloatArray) -> Twin:
         """The twin of a vector."""
         bench, terms = self.resolved(x)
-        active = tuple(entry.active() for entry in bench.mechanisms)
+        active = tuple(entry.active() for entry in self.kept)
         added = tuple(Active(term.effect, term.values, term.variant) for term in terms)
         return Twin(bench.axis.physics(), bench.gains, active + added, observer_s=self.observer_s)
 

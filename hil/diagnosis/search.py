@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import count
 
 import numpy as np
 
@@ -19,9 +20,13 @@ from hil.diagnosis.model import (
     SEARCH_ACCURACY,
     TORQUE_ACCURACY,
     Model,
+    Term,
+    compatible,
     observer_time_s,
+    repeats,
 )
 from hil.diagnosis.screen import Lead, screen
+from hil.diagnosis.starts import Start
 from hil.measured import Measured
 from hil.twin.library import BY_ID
 
@@ -43,16 +48,24 @@ def nominal(bench: Bench, runs: Sequence[Measured]) -> Fit:
 
 
 def leads(base: Fit, runs: Sequence[Measured]) -> list[Lead]:
-    """One lead for each mechanism that the hypothesis does not have, in its most promising variant, best first."""
+    """One lead for each mechanism that the hypothesis may have beside its terms, the most promising one, best first."""
     fitted, terms = base.model.resolved(base.x)
     blocks = [base.model.blocks(base.x, run) for run in runs]
     scene = catalogue.scene(runs, fitted, blocks, base.model.observer_s)
-    points = [start for start in catalogue.starts(scene, base.model.bench)
-              if start.effect not in {term.effect for term in terms}]
+    points = [start for start in catalogue.starts(scene, base.model.bench) if _offered(start, base.model, terms)]
     best: dict[str, Lead] = {}
     for lead in screen(base, runs, points):
-        best.setdefault(lead.term.effect, lead)
+        used = [term.slot for term in terms if term.effect == lead.term.effect]
+        slot = next(slot for slot in count() if slot not in used)
+        best.setdefault(lead.term.effect, replace(lead, term=replace(lead.term, slot=slot)))
     return list(best.values())
+
+
+def _offered(start: Start, model: Model, terms: Sequence[Term]) -> bool:
+    """Whether there is room for a start beside the terms; what it says again of the bench's mechanisms gives way."""
+    new = Term(start.effect, start.variant, start.values)
+    known = [entry.active() for entry in model.kept]
+    return compatible((*terms, new, *(other for other in known if not repeats(new, other))))
 
 
 def race(base: Fit, found: Sequence[Lead], runs: Sequence[Measured]) -> list[Fit]:
@@ -107,6 +120,8 @@ def race(base: Fit, found: Sequence[Lead], runs: Sequence[Measured]) -> list[Fit
     best: dict[str, Fit] = {}
     for result in results:
         effect = result.model.terms[-1].effect
+        if not compatible(result.model.resolved(result.x)[1]):
+            continue
         if effect not in best or result.cost < best[effect].cost:
             best[effect] = result
     return sorted(best.values(), key=lambda result: result.cost)

@@ -58,6 +58,16 @@ def sentence(term: Term, bench: Bench) -> str:
     return f"{text.removesuffix('.')} ({variant})." if variant else text
 
 
+def label(term: Term) -> str:
+    """An effect's id as words, with the period or order where it may act more than once."""
+    values = dict(zip(BY_ID[term.effect].names, term.values, strict=True))
+    if BY_ID[term.effect].most == 1:
+        return title(term.effect)
+    where = (f"every {said(values['period_m'], Dimension.LENGTH)}" if "period_m" in values
+             else f"{number(values['cycles_per_rev'])} times per revolution")
+    return f"{title(term.effect)}, {where}"
+
+
 def title(effect: str) -> str:
     """An effect's id as words."""
     return effect.replace("_", " ")

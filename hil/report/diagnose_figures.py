@@ -13,6 +13,7 @@ from hil.diagnosis.diagnose import Diagnosis
 from hil.diagnosis.disturbance import Disturbance, disturbance
 from hil.diagnosis.energy import without_terms
 from hil.diagnosis.fit import Fit
+from hil.diagnosis.model import Term
 from hil.measured import Measured
 from hil.report import look
 from hil.report.figures import style
@@ -21,6 +22,7 @@ from hil.report.look import FloatArray, shown
 _BINS = 120
 _ENOUGH = 8       # samples of a bin, for a median that is worth a point
 _PER_BIN = 60     # samples on average, where a recording is short
+_SHORT = 6        # periods in the travel, from which on they are laid over each other
 _AFTER = look.SIMULATED
 
 
@@ -36,6 +38,7 @@ class Shown:
 class _View:
     """One run as the pictures need it: what the twin without a term leaves, and what the term says of that."""
 
+    term: Term
     run: Measured
     measured: dict[str, FloatArray]      # residual of the corrected twin with one term off
     modelled: dict[str, FloatArray]      # of that, what the term explains
@@ -46,21 +49,21 @@ class _View:
 _Picture = Callable[[Diagnosis, Sequence[_View]], Shown]
 
 
-def convincing(diagnosis: Diagnosis, effect: str) -> Shown:
-    """The picture that shows an engineer the mechanism `effect` in the recordings."""
-    picture = _PICTURES.get(effect, _over_time)
+def convincing(diagnosis: Diagnosis, term: Term) -> Shown:
+    """The picture that shows an engineer a mechanism that was found in the recordings."""
+    picture = _PICTURES.get(term.effect, _over_time)
     # a friction curve needs every feed there is; all else is shown where it was not fitted
     runs = (*diagnosis.train, *diagnosis.held_out) if picture is _friction else diagnosis.held_out or diagnosis.train
-    shown = picture(diagnosis, [_view(diagnosis.final, run, effect) for run in runs])
+    shown = picture(diagnosis, [_view(diagnosis.final, run, term) for run in runs])
     return Shown(shown.figure, f"{shown.caption} Recordings: {', '.join(run.name for run in runs)}.")
 
 
-def _view(final: Fit, run: Measured, effect: str) -> _View:
-    off = without_terms(final, effect)
+def _view(final: Fit, run: Measured, term: Term) -> _View:
+    off = without_terms(final, term)
     measured, left = off.model.blocks(off.x, run), final.model.blocks(final.x, run)
     modelled = {name: measured[name] - left[name] for name in measured}
     inertia, observer_s = _inertia(final), final.model.observer_s
-    return _View(run, measured, modelled, disturbance(run, measured["motor"], inertia, observer_s),
+    return _View(term, run, measured, modelled, disturbance(run, measured["motor"], inertia, observer_s),
                  disturbance(run, modelled["motor"], inertia, observer_s))
 
 
@@ -339,15 +342,26 @@ def _position(diagnosis: Diagnosis, view: _View) -> FloatArray:
 
 def _within_period(diagnosis: Diagnosis, view: _View) -> FloatArray:
     """Position within the signal period of the linear encoder [µm]."""
-    term = next(term for term in diagnosis.final.model.resolved(diagnosis.final.x)[1]
-                if term.effect == "scale_interpolation_error")
-    return np.asarray(1e6 * np.mod(view.run.table_m, term.values[1]))
+    return np.asarray(1e6 * np.mod(view.run.table_m, view.term.values[1]))
+
+
+def _within_friction_period(diagnosis: Diagnosis, view: _View) -> FloatArray:
+    return np.asarray(np.mod(_position(diagnosis, view), 1e3 * view.term.values[1]))
+
+
+def _friction_along_travel(diagnosis: Diagnosis, views: Sequence[_View]) -> Shown:
+    """Friction over position, within the period where that is short."""
+    travel = max(float(np.ptp(_position(diagnosis, view))) for view in views)
+    short = 1e3 * views[0].term.values[1] < travel / _SHORT
+    picture = (_over("position within the period", _within_friction_period, "mm", bins=40, against_motion=True) if short
+               else _over("position", _position, "mm", against_motion=True))
+    return picture(diagnosis, views)
 
 
 _PICTURES: dict[str, _Picture] = {
     **dict.fromkeys(("asymmetric_friction", "constant_load", "stribeck_friction", "nonlinear_viscous_friction"),
                     _friction),
-    "position_dependent_friction": _over("position", _position, "mm", against_motion=True),
+    "position_dependent_friction": _friction_along_travel,
     "spring_load": _over("position", _position, "mm"),
     "cogging_torque": _over("motor angle", _angle, "deg", bins=240),
     "torque_ripple": _over("motor angle", _angle, "deg", bins=240, per_torque=True),

@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from hil.diagnosis.diagnose import NEXT_EXPERIMENT, Diagnosis
+from hil.diagnosis.model import Term
 from hil.diagnosis.result import FitFigures, Location, Verdict
-from hil.diagnosis.wording import number, title
+from hil.diagnosis.wording import label, number, title
 from hil.report import figures, plots
 from hil.report.compare_report import write_bench
 from hil.report.diagnose_figures import convincing
@@ -23,8 +24,8 @@ def write_diagnosis(diagnosis: Diagnosis, folder: Path) -> None:
     good = result.verdict is not Verdict.UNEXPLAINED
     names = ", ".join(run.name for run in diagnosis.train)
     page = Page(f"Diagnosis of {names}", _lead(diagnosis), result.statement, good)
-    for index, finding in enumerate(result.missing):
-        _finding(page, diagnosis, index, folder / f"{finding.effect}.png")
+    for index, term in enumerate(_terms(diagnosis)):
+        _finding(page, diagnosis, index, term, folder / f"{term.effect}{f'_{term.slot + 1}' if term.slot else ''}.png")
     if result.location is not None:
         page.heading("Where it is")
         page.items(_where(result.location))
@@ -68,11 +69,19 @@ def _lead(diagnosis: Diagnosis) -> str:
             f"({diagnosis.owner.axis.model})")
 
 
-def _finding(page: Page, diagnosis: Diagnosis, index: int, picture: Path) -> None:
+def _terms(diagnosis: Diagnosis) -> list[Term]:
+    """The term of each finding."""
+    terms = diagnosis.final.model.resolved(diagnosis.final.x)[1]
+    return [next(term for term in terms if term.effect == finding.effect
+                 and term.values[0] == next(iter(finding.parameters.values())).value)
+            for finding in diagnosis.result.missing]
+
+
+def _finding(page: Page, diagnosis: Diagnosis, index: int, term: Term, picture: Path) -> None:
     finding = diagnosis.result.missing[index]
     mechanism = BY_ID[finding.effect]
     page.heading(f"{index + 1}. {title(finding.effect).capitalize()}: {mechanism.element}")
-    shown = convincing(diagnosis, finding.effect)
+    shown = convincing(diagnosis, term)
     page.picture(figures.save(shown.figure, picture), shown.caption)
     page.text(f"{finding.sentence} Confidence {_sure(finding.confidence)}: {finding.needed}.")
     page.text(f"{mechanism.equation} ({mechanism.source})")
@@ -125,7 +134,7 @@ def _fit(page: Page, diagnosis: Diagnosis, folder: Path) -> None:
     if len(result.missing) > 1 or diagnosis.proof.dropped:
         page.text("Each term left out in turn, everything else refitted: factor by which the residual energy grows.")
         page.table(("without", "training", "held out", "kept"),
-                   [(title(ablation.term.effect), Number(f"{number(ablation.train)} ×"),
+                   [(label(ablation.term), Number(f"{number(ablation.train)} ×"),
                      Number(f"{number(ablation.held_out)} ×" if ablation.held_out is not None else "–"), kept)
                     for kept, found in (("yes", diagnosis.proof.ablations), ("no", diagnosis.proof.dropped))
                     for ablation in found], mark=3)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from hil import control
 from hil.twin import kernel, stages
 from hil.twin.chain import Chain
-from hil.twin.library import BY_ID, LIBRARY
+from hil.twin.library import BY_ID, SLOTS
 from hil.twin.mechanism import PARAMETERS, WIDTH, Stage
 from hil.twin.modal import Modal, discretise, modal, truncate
 
@@ -33,7 +33,6 @@ COARSE_STEPS = 5
 _REVERSAL_ACCELERATION = 1000.0
 
 _NOTHING = np.empty(0)
-_INDEX = {mechanism.id: index for index, mechanism in enumerate(LIBRARY)}
 
 
 @dataclass(frozen=True)
@@ -157,17 +156,22 @@ class Twin:
 
     @cached_property
     def _mechanisms(self) -> tuple[FloatArray, NDArray[np.int64]]:
-        values = np.zeros((len(LIBRARY), PARAMETERS))
+        values = np.zeros((len(SLOTS), PARAMETERS))
         codes = np.zeros(kernel.CODES, dtype=np.int64)
+        free = dict(enumerate(SLOTS))
         for active in self.active:
-            mechanism, index = BY_ID[active.effect], _INDEX[active.effect]
+            mechanism = BY_ID[active.effect]
+            slot = next((slot for slot, other in free.items() if other is mechanism), None)
+            if slot is None:
+                raise ValueError(f"{mechanism.id} must act at most {mechanism.most} times at once, got more")
+            del free[slot]
             stage = stages.stage_of(mechanism, active.variant)
             if stage not in stages.KERNEL_STAGES:
                 continue
-            values[index, :len(active.values)] = active.values
-            values[index, PARAMETERS - 1] = active.variant
-            codes[index] = active.variant + 1
-            codes[len(LIBRARY) + stages.KERNEL_STAGES.index(stage)] = 1
+            values[slot, :len(active.values)] = active.values
+            values[slot, PARAMETERS - 1] = active.variant
+            codes[slot] = active.variant + 1
+            codes[len(SLOTS) + stages.KERNEL_STAGES.index(stage)] = 1
             codes[kernel.ON_ANY] = 1
         return values, codes
 
@@ -187,7 +191,7 @@ class Twin:
         rigid = modes.shape[modes.motor, 0]
         delta[0, 0] = start.position_m / ratio / rigid
         delta[1, 0] = start.velocity_m_s / ratio / rigid
-        return delta, np.zeros((len(LIBRARY) + 1, WIDTH))
+        return delta, np.zeros((len(SLOTS) + 1, WIDTH))
 
     def arrays(self) -> tuple[FloatArray, FloatArray, FloatArray, NDArray[np.int64]]:
         """Constants, modes, mechanism values and codes, as the kernel takes them."""

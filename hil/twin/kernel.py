@@ -22,10 +22,8 @@ from numba import njit
 
 from hil import control
 from hil.twin import stages
-from hil.twin.library import LIBRARY
+from hil.twin.library import SLOTS
 from hil.twin.mechanism import Moment
-
-MECHANISMS = len(LIBRARY)
 
 # Rows of `modes` (MODE_ROWS, n): exact discretisation for the coarse and the fine step, then shapes.
 COARSE, FINE, SHAPE_MOTOR, SHAPE_TABLE, SHAPE_SPRING, TABLE_IMPULSE, MOTOR_IMPULSE, MODE_ROWS = (
@@ -35,13 +33,13 @@ COARSE, FINE, SHAPE_MOTOR, SHAPE_TABLE, SHAPE_SPRING, TABLE_IMPULSE, MOTOR_IMPUL
 (PERIOD, RATIO, ANGLE_PER_UNIT, COULOMB, VISCOUS, SPRING, DAMPER, COARSE_STEPS, FINE_STEPS, SLOW_VELOCITY,
  ALWAYS_FINE, OBSERVER, PLAY, VISCOUS_SPEED, COARSE_GAINS, FINE_GAINS, CONSTANTS) = (*range(15), 17, 20)
 
-# Entries of `codes`: variant + 1 of each mechanism (0: off), then whether each stage is entered.
+# Entries of `codes`: variant + 1 of the mechanism in each slot (0: off), then whether each stage is entered.
 (ON_CURRENT, ON_TORQUE, ON_MOTOR_TORQUE, ON_COULOMB, ON_FRICTION_SCALE, ON_DRAG, ON_BIAS, ON_BRISTLE,
  ON_TABLE_SHARE, ON_TRANSMISSION, ON_TABLE_FORCE, ON_MOTOR_READING, ON_TABLE_READING, ON_ANY, CODES) = range(
-    MECHANISMS, MECHANISMS + 15)
+    len(SLOTS), len(SLOTS) + 15)
 
-# Rows of `memory` (MECHANISMS + 1, WIDTH): each mechanism's own, then the kernel's.
-OWN = MECHANISMS
+# Rows of `memory` (slots + 1, WIDTH): each mechanism's own, then the kernel's.
+OWN = len(SLOTS)
 CLOCK, BRISTLE_DEFLECTION, SPRING_EXTRA, FLOATING, LAST_SPEED = range(5)
 
 _current, _torque, _motor_torque = stages.current, stages.torque, stages.motor_torque

@@ -69,3 +69,6 @@ LIBRARY: tuple[Mechanism, ...] = (
 )
 
 BY_ID: dict[str, Mechanism] = {mechanism.id: mechanism for mechanism in LIBRARY}
+
+# Places in the twin: a mechanism that may act twice at once has two.
+SLOTS: tuple[Mechanism, ...] = tuple(mechanism for mechanism in LIBRARY for _ in range(mechanism.most))

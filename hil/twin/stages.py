@@ -13,7 +13,7 @@ from typing import Any
 
 from numba import njit
 
-from hil.twin.library import LIBRARY
+from hil.twin.library import SLOTS
 from hil.twin.mechanism import Mechanism, Stage
 
 # fmt: off
@@ -35,7 +35,7 @@ def stage_of(mechanism: Mechanism, variant: int) -> Stage:
 def _compose(entries: list[tuple[Any, int, int]]) -> Any:
     """A compiled `(value, at, values, codes, memory) -> value` that runs the entries in order.
 
-    An entry is (contribution, index of the mechanism, parity of the variants that enter here, or -1
+    An entry is (contribution, slot of the mechanism, parity of the variants that enter here, or -1
     for all).
     """
     if not entries:
@@ -59,7 +59,7 @@ def _compose(entries: list[tuple[Any, int, int]]) -> Any:
 
 def _stage(stage: Stage) -> Any:
     entries = []
-    for index, mechanism in enumerate(LIBRARY):
+    for index, mechanism in enumerate(SLOTS):
         if mechanism.second_stage is None:
             if mechanism.stage is stage:
                 entries.append((mechanism.contribution, index, -1))
@@ -88,6 +88,7 @@ def library_digest() -> str:
     folder = Path(__file__).parent
     digest = hashlib.sha256()
     law = [folder.parent / "control.py", folder.parent / "rounding.py"]
-    for path in (*sorted((folder / "mechanisms").glob("*.py")), folder / "library.py", Path(__file__), *law):
+    twin = (*sorted((folder / "mechanisms").glob("*.py")), folder / "mechanism.py", folder / "library.py")
+    for path in (*twin, Path(__file__), *law):
         digest.update(path.read_bytes())
     return digest.hexdigest()

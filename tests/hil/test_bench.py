@@ -50,3 +50,14 @@ def test_a_chain_has_one_spring_less_than_inertias(tmp_path: Path) -> None:
         load_bench(path)
     path.write_text(CHAIN.replace("[4.0e+3]", "[4.0e+3, 140.0]"))
     assert load_bench(path).axis.model == "serial_chain"
+
+
+def test_a_mechanism_acts_no_more_often_than_it_may(tmp_path: Path) -> None:
+    entry = "\n  - {effect: cogging_torque, parameters: {amplitude_n_m: 0.1, cycles_per_rev: %d, phase_rad: 0.0}}"
+    text = shipped_benches()["reference"].read_text()
+    path = tmp_path / "bench.yaml"
+    path.write_text(text + "\nmechanisms:" + "".join(entry % order for order in (6, 12)))
+    assert len(load_bench(path).twin().active) == 2
+    path.write_text(path.read_text() + entry % 18)
+    with pytest.raises(InputError, match=r"mechanisms: given cogging_torque 3 times, allowed 2"):
+        load_bench(path)

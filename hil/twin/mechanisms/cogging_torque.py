@@ -31,4 +31,5 @@ MECHANISM = Mechanism(
     ),
     stage=Stage.MOTOR_TORQUE,
     contribution=_cogging,
+    most=2,
 )

@@ -34,4 +34,5 @@ MECHANISM = Mechanism(
     ),
     stage=Stage.COULOMB,
     contribution=_level_along_travel,
+    most=2,
 )

@@ -31,4 +31,5 @@ MECHANISM = Mechanism(
     ),
     stage=Stage.TORQUE,
     contribution=_rippling_torque,
+    most=2,
 )

@@ -1,15 +1,16 @@
-"""Names and texts of findings: which share a name, which do not."""
+"""Names of findings: which are the same torque, which are not, and one name for two causes."""
 
 from __future__ import annotations
 
 import pytest
 from diagnosis_runs import bench, recorded
 
-from hil.bench import Bench
+from hil.bench import Bench, MechanismEntry
+from hil.diagnosis import search
 from hil.diagnosis.explain import Explanation, Rival
 from hil.diagnosis.findings import diagnosed_bench, findings, renamed
 from hil.diagnosis.fit import Fit, fit
-from hil.diagnosis.model import Model, Term
+from hil.diagnosis.model import Model, Term, compatible, repeats
 from hil.diagnosis.proof import prove
 from hil.measured import Measured, take
 
@@ -41,3 +42,48 @@ def test_friction_that_differs_with_speed_is_no_constant_load() -> None:
     after = diagnosed_bench(OWNER, final)
     assert after.twin().active == Bench.model_validate(after.model_dump()).twin().active
     assert after.twin().active[0].variant == 1
+
+
+SIX, FIFTEEN = Term("cogging_torque", 0, (0.2, 6.0, 0.5)), Term("cogging_torque", 0, (0.15, 15.0, -1.0), slot=1)
+
+
+def test_the_same_period_is_the_same_cause() -> None:
+    assert repeats(SIX, Term("cogging_torque", 0, (0.5, 6.3, 0.0)))
+    assert not repeats(SIX, FIFTEEN)
+    assert not repeats(SIX, Term("torque_ripple", 0, (0.02, 6.0, 0.0)))
+    assert compatible([SIX, FIFTEEN])
+    assert not compatible([SIX, FIFTEEN, Term("cogging_torque", 0, (0.1, 30.0, 0.0))])
+
+
+def test_a_mechanism_is_offered_again_at_another_order() -> None:
+    train = runs(SIX, FIFTEEN)
+    offered = {lead.term.effect: lead.term for lead in search.leads(fitted(train, SIX), train)}
+    assert offered["cogging_torque"].slot == 1
+    assert offered["cogging_torque"].values[1] == 15.0
+    assert "cogging_torque" not in {lead.term.effect for lead in search.leads(fitted(train, SIX, FIFTEEN), train)}
+
+
+def test_two_of_a_name_are_two_findings_with_two_entries() -> None:
+    train, held_out = runs(SIX, FIFTEEN), runs(SIX, FIFTEEN, seed=2)
+    plain, right = fitted(train), fitted(train, SIX, FIFTEEN)
+    explanation = Explanation(plain, plain, right, {}, {SIX.key: 900.0, FIFTEEN.key: 800.0})
+    proof = prove(plain, right, train, held_out)
+    found = findings(explanation, proof.final, proof.ablations, train, held_out)
+    assert [finding.effect for finding in found] == ["cogging_torque", "cogging_torque"]
+    orders = [finding.parameters["cycles_per_rev"].value for finding in found]
+    assert orders == pytest.approx([6.0, 15.0], abs=0.02)
+    after = diagnosed_bench(OWNER, proof.final)
+    again = Bench.model_validate(after.model_dump())
+    assert again.twin().active == proof.final.model.twin(proof.final.x).active
+
+
+def test_a_mechanism_that_the_bench_has_gives_way_to_the_one_found() -> None:
+    def known(*terms: Term) -> Bench:
+        entries = tuple(MechanismEntry(effect=term.effect, parameters=dict(zip(
+            ("amplitude_n_m", "cycles_per_rev", "phase_rad"), term.values, strict=True))) for term in terms)
+        return OWNER.model_copy(update={"mechanisms": entries})
+
+    found = Model(known(SIX, FIFTEEN), (Term("cogging_torque", 0, (0.4, 6.1, 0.5)),))
+    assert [entry.parameters["cycles_per_rev"] for entry in found.kept] == [15.0]
+    assert len(found.twin(found.initial()).active) == 2
+    assert len(Model(known(SIX), (FIFTEEN,)).kept) == 1

@@ -44,7 +44,8 @@ def diagnosis_of(effect: str, times: float = 3.0) -> Diagnosis:
 
 @pytest.mark.parametrize("effect", BY_ID)
 def test_every_mechanism_has_its_picture(effect: str, tmp_path: Path) -> None:
-    shown = convincing(diagnosis_of(effect), effect)
+    diagnosis = diagnosis_of(effect)
+    shown = convincing(diagnosis, diagnosis.final.model.terms[0])
     assert save(shown.figure, tmp_path / f"{effect}.png").stat().st_size > 10_000
     assert shown.caption.endswith("Recordings: run.")
     axes = shown.figure.axes

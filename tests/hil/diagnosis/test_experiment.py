@@ -84,19 +84,19 @@ def test_a_cause_without_rivals_needs_no_experiment() -> None:
 
 
 def test_what_a_motion_hides_is_shown_by_another() -> None:
-    """Drag that is not linear in speed, on a motion of one feed."""
-    drag = "nonlinear_viscous_friction"
-    train = runs(moves([REST, {"kind": "sine_squared", "to_m": 0.35, "feed_m_s": 0.124}, REST]))
+    """Friction that changes while the axis runs, on a motion of a few seconds."""
+    drift = "friction_drift"
+    train = runs(moves([REST, {"kind": "sine_squared", "to_m": 0.7, "feed_m_s": 0.124}, REST]))
     nominal = fit(Model(OWNER), train)
     hidden = not_testable(nominal, train)
-    assert {drag, "torque_saturation"} <= set(hidden)
+    assert {drift, "torque_saturation"} <= set(hidden)
     found = showing(nominal, hidden, train, [])
     assert found is not None
     assert found.profile is not None
-    assert drag in found.separates
+    assert drift in found.separates
     assert "torque_saturation" not in found.separates     # takes more torque than these limits ever ask for
     both = [*train, *runs(found.profile, seed=2)]
-    assert drag not in not_testable(fit(Model(OWNER), both), both)
+    assert drift not in not_testable(fit(Model(OWNER), both), both)
 
 
 @pytest.mark.parametrize("travel_m", [None, (-0.06, 0.36)])

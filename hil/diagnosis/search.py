@@ -31,6 +31,7 @@ from hil.measured import Measured
 from hil.twin.library import BY_ID
 
 _RACERS = 8           # leads that are fitted
+_SPRINTERS = 4        # of which are fitted on
 _FINALISTS = 3        # of which are fitted to the end
 _NEAR = 6             # evaluations of a first fit with the derivatives of the base
 _SPRINT = 4           # and of the one after it
@@ -71,17 +72,20 @@ def _offered(start: Start, model: Model, terms: Sequence[Term]) -> bool:
 def race(base: Fit, found: Sequence[Lead], runs: Sequence[Measured]) -> list[Fit]:
     """Fits of the base with each of the first leads, best first.
 
-    All sprint; the one that gets furthest is converged, in all its variants. The others are, too, unless it reached
+    All start; the one that gets furthest is converged, in all its variants. The others are, too, unless it reached
     the noise floor and they are far from it: then how far exactly is nobody's question.
     """
     searched = replace(base.model, torque_accuracy=SEARCH_ACCURACY)
     held = jacobian(searched, base.x, searched.residuals(base.x, runs), runs)
 
-    def sprint(lead: Lead) -> Fit:
+    def near(lead: Lead) -> Fit:
+        """A first fit, with the derivatives of the base."""
         model = replace(searched, terms=(*base.model.terms, lead.term))
         x = np.concatenate([base.x, model.initial()[base.x.size:]])
-        near = fit(model, runs, x, soft=_SOFT, evaluations=_NEAR, held=held)
-        return fit(model, runs, near.x, soft=_SOFT, evaluations=_SPRINT)
+        return fit(model, runs, x, soft=_SOFT, evaluations=_NEAR, held=held)
+
+    def sprint(found: Fit) -> Fit:
+        return fit(found.model, runs, found.x, soft=_SOFT, evaluations=_SPRINT)
 
     def afresh(found: Fit) -> Fit:
         """From the owner's nominal values: the base may have bent its own to make up for what it lacks."""
@@ -105,16 +109,17 @@ def race(base: Fit, found: Sequence[Lead], runs: Sequence[Measured]) -> list[Fit
             found.x[:model.nominal_count], model.initial()[model.nominal_count:]])) for model in others])
 
     good = [lead for lead in found[:_RACERS] if lead.share > _HOPELESS * found[0].share]
-    sprints = in_parallel([partial(sprint, lead) for lead in good])
+    started = in_parallel([partial(near, lead) for lead in good])
+    # those that got furthest, and the first by the screen, which may only have had a slow start
+    better = sorted(started, key=lambda result: result.cost)[:_SPRINTERS]
+    sprints = in_parallel([partial(sprint, result) for result in unique([*started[:2], *better])])
     ranked = sorted(sprints, key=lambda result: result.cost)
     results = in_parallel([partial(finish, ranked[0]), partial(afresh, ranked[0])])
     leader = min(results, key=lambda result: result.cost)
-    # those that got furthest, and the first by the screen, which may only have had a slow start
-    others = {id(result): result for result in (*ranked[1:_FINALISTS], *sprints[:2]) if result is not ranked[0]}
-    reached = [evaluate(replace(result.model, torque_accuracy=TORQUE_ACCURACY), runs, result.x) for result in
-               others.values()]
+    others = [result for result in unique([*sprints[:2], *ranked[:_FINALISTS]]) if result is not ranked[0]]
+    reached = [evaluate(replace(result.model, torque_accuracy=TORQUE_ACCURACY), runs, result.x) for result in others]
     results += reached
-    results += in_parallel([partial(finish, other) for other, result in zip(others.values(), reached, strict=True)
+    results += in_parallel([partial(finish, other) for other, result in zip(others, reached, strict=True)
                             if not leader.at_floor or result.cost < _NEAR_FLOOR * leader.cost])
     results += variants(min(results, key=lambda result: result.cost))
     best: dict[str, Fit] = {}
@@ -125,3 +130,8 @@ def race(base: Fit, found: Sequence[Lead], runs: Sequence[Measured]) -> list[Fit
         if effect not in best or result.cost < best[effect].cost:
             best[effect] = result
     return sorted(best.values(), key=lambda result: result.cost)
+
+
+def unique(fits: Sequence[Fit]) -> list[Fit]:
+    """Each fit once, in order."""
+    return list({id(found): found for found in fits}.values())

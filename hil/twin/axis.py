@@ -33,6 +33,7 @@ COARSE_STEPS = 5
 _REVERSAL_ACCELERATION = 1000.0
 
 _NOTHING = np.empty(0)
+_ANSWER = "torque"      # the recorded channel that is an answer of the axis only, and no input of any block
 
 
 @dataclass(frozen=True)
@@ -119,9 +120,9 @@ class Twin:
         rows[kernel.SHAPE_MOTOR] = modes.shape[modes.motor]
         rows[kernel.SHAPE_TABLE] = modes.shape[modes.table]
         rows[kernel.SHAPE_SPRING] = modes.transmission
-        inertia = self.physics.chain.inertia_kg_m2
-        rows[kernel.TABLE_IMPULSE] = modes.shape[modes.table] * inertia[modes.table, modes.table]
-        rows[kernel.MOTOR_IMPULSE] = modes.shape[modes.motor] * inertia[modes.motor, modes.motor]
+        chain = self.physics.chain      # the coordinates that mechanisms add come after it, and stay
+        for row, place in ((kernel.TABLE_IMPULSE, chain.table), (kernel.MOTOR_IMPULSE, chain.motor)):
+            rows[row] = chain.inertia_kg_m2 @ chain.side(place) @ modes.shape[:len(chain.names)]
         return rows
 
     @cached_property
@@ -225,13 +226,21 @@ class Twin:
         channels = kernel.observe(self.loop_gains, self._controller(start), position_command_m, velocity_command_m_s,
                                   measured.torque_command, measured.motor_position, measured.table_position_m,
                                   *self.arrays(), delta, memory)
-        return Response(*channels)
+        response = Response(*channels)
+        for active in self.active:      # lateness of an input is taken back, that of the answer is simulated
+            mechanism = BY_ID[active.effect]
+            if mechanism.stage is Stage.CHANNEL and mechanism.variants[active.variant] == _ANSWER:
+                response = Response(*mechanism.contribution(tuple(response), active.values, active.variant,
+                                                            self.gains.period_s))
+        return response
 
     def undelayed(self, measured: Response) -> Response:
-        """Measured channels with the lateness that active mechanisms give them taken back."""
+        """Measured inputs with the lateness that active mechanisms give them taken back."""
         for active in self.active:
             mechanism = BY_ID[active.effect]
-            if mechanism.stage is Stage.CHANNEL and measured.table_position_m.size:
+            variant = mechanism.variants[active.variant]
+            present = variant != "table_position" or measured.table_position_m.size
+            if mechanism.stage is Stage.CHANNEL and variant != _ANSWER and present:
                 back = tuple(-value for value in active.values)
                 measured = Response(*mechanism.contribution(tuple(measured), back, active.variant, self.gains.period_s))
         return measured

@@ -45,6 +45,15 @@ class Chain:
     transmission: FloatArray
     transmission_stiffness_n_m_rad: float
 
+    def side(self, place: int) -> FloatArray:
+        """1 for each coordinate on the same side of the transmission as `place`, else 0; shape (n,)."""
+        nut = self.transmission_stiffness_n_m_rad * np.outer(self.transmission, self.transmission)
+        rest = np.abs(self.stiffness_n_m_rad - nut)
+        reached = (rest > 1e-9 * np.max(np.abs(self.stiffness_n_m_rad))) | np.eye(len(self.names), dtype=bool)
+        for _ in self.names:
+            reached = reached @ reached
+        return np.asarray(reached[place], dtype=np.float64)
+
 
 def one_mass(mass_kg: float, lead_m: float = LINEAR_LEAD_M) -> Chain:
     """A rigid axis: motor and table are one mass [kg], seen at the table."""

@@ -270,7 +270,8 @@ def _build_read(digest: str) -> Any:
 
 @njit
 def _correct(impulse, error, period, time_constant, modes, delta):  # type: ignore[no-untyped-def]
-    """Correct the state of one inertia by the error of its position [motor units] (Luenberger observer)."""
+    """Correct the state of one side of the transmission by the error of its position [motor units]: a Luenberger
+    observer. The side moves as one: a motor alone would wind up its coupling."""
     shift = 2.0 * period / time_constant * error
     kick = period / time_constant**2 * error
     for i in range(delta.shape[1]):

@@ -17,11 +17,19 @@ _VARIANTS = {"table_position": 1, "torque": 3, "motor_position": 0}   # name: in
 
 def _skewed(channels: Channels, parameters: Sequence[float], variant: int, period_s: float) -> Channels:
     """The channels, each (n,), with that of the variant late by the delay; its ends are held."""
-    late = tuple(_VARIANTS.values())[variant]
-    return tuple(
-        _delayed(channel, parameters[0] / period_s) if index == late else channel
-        for index, channel in enumerate(channels)
-    )
+    name, late = list(_VARIANTS.items())[variant]
+    delayed = _delayed_mean if name == "torque" else _delayed
+    return tuple(delayed(channel, parameters[0] / period_s) if index == late else channel
+                 for index, channel in enumerate(channels))
+
+
+def _delayed_mean(means: NDArray[np.float64], periods: float) -> NDArray[np.float64]:
+    """Means over each period (n,) of what is held over it, later by a number of periods."""
+    whole = math.floor(periods)
+    f, last = periods - whole, means.size - 1
+    nearest = np.arange(means.size) - whole
+    return np.asarray((1.0 - f) * means[np.clip(nearest, 0, last)] + f * means[np.clip(nearest - 1, 0, last)],
+                      dtype=np.float64)
 
 
 def _delayed(samples: NDArray[np.float64], periods: float) -> NDArray[np.float64]:

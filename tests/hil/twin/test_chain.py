@@ -129,6 +129,14 @@ def test_the_transmission_spring_carries_the_force_on_the_table() -> None:
     assert carried == pytest.approx(-torque, rel=1e-9)
 
 
+def test_sides_of_the_transmission() -> None:
+    """Of the seven coordinates, four turn with the motor; nut bracket and table are beyond the nut."""
+    chain = seven_dof(RECONSTRUCTED_TABLE_1, 0.03)
+    assert chain.side(chain.motor).tolist() == [1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0]
+    assert chain.side(chain.table).tolist() == [0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0]
+    assert one_mass(95.0).side(0).tolist() == [1.0]
+
+
 def test_one_mass_moves_as_a_whole() -> None:
     chain = one_mass(95.109)
     assert chain.inertia_kg_m2[0, 0] == pytest.approx(95.109)   # r = 1: newtons and metres

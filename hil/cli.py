@@ -21,6 +21,7 @@ from hil.commands.friction import friction
 from hil.commands.import_ import import_
 from hil.commands.investigate import investigate
 from hil.commands.paper import paper
+from hil.commands.prove import prove
 from hil.commands.run import run
 from hil.commands.validate import validate
 from hil.errors import HilError
@@ -39,6 +40,7 @@ COMMANDS: tuple[tuple[str, Callable[..., Any]], ...] = (
     ("investigate", investigate),
     ("friction", friction),
     ("paper", paper),
+    ("prove", prove),
     ("validate", validate),
     ("bench", bench),
 )

@@ -1,0 +1,38 @@
+"""hil prove."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from hil.commands.console import out, progress, table
+
+
+def prove(
+    folder: Annotated[Path, typer.Option("--out", help="Folder for cases, answers and scores; one that was "
+                                         "interrupted goes on", show_default=False)],
+    cases: Annotated[int | None, typer.Option("--cases", help="How many cases; left out: 40")] = None,
+    full: Annotated[bool, typer.Option("--full", help="The whole proof, some 1200 cases: takes many hours")] = False,
+    seed: Annotated[int, typer.Option(min=0, help="Of the draw")] = 1,
+    jobs: Annotated[int | None, typer.Option(min=1, help="Cases diagnosed at once; left out: one per core")] = None,
+) -> None:
+    """Conceal effects in simulated axes, seal what they are, diagnose the recordings blind, unseal and score."""
+    import os
+
+    from hil.errors import InputError
+    from hil.proof.page import HEADERS, goal_row, write_proof
+    from hil.proof.plan import FULL, plan
+    from hil.proof.run import prove as run
+
+    if full and cases is not None:
+        raise InputError("--full: given with --cases, allowed one of them")
+    count = sum(FULL.values()) if full else 40 if cases is None else cases
+    planned = plan(count, seed)
+    with progress() as tell:
+        scores = run(folder, planned, seed, jobs or os.cpu_count() or 1, out.print, tell)
+        tell("writing the report", None)
+        write_proof(scores, folder)
+    table(HEADERS, [goal_row(goal) for goal in scores.goals])
+    out.print(f"\nReport: {folder / 'report.html'}")

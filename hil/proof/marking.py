@@ -1,0 +1,220 @@
+"""An answer held against the truth: what is right in it, and how far its numbers are off."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from math import pi, remainder
+
+from hil.proof.answers import same_law
+from hil.proof.conceal import Concealed, Truth
+from hil.proof.replies import Named, Reply
+
+NORMAL_90 = 1.645            # standard errors to either side of a 90 % interval
+ABOVE_FLOOR = 1.0            # size, in units of noise, from which on an effect is above the noise floor
+# Parameters that say where an effect is: scored as its place, not once more as its parameters.
+_PLACES = ("cycles_per_rev", "period_m", "start_s", "end_s", "frequency_hz")
+_PERIODS = ("period_m", "cycles_per_rev")
+
+
+@dataclass(frozen=True)
+class Marked:
+    """A case with its answer."""
+
+    truth: Truth
+    reply: Reply
+
+    @property
+    def concealed(self) -> Concealed | None:
+        """What the case is about; None where nothing is concealed."""
+        return self.truth.effects[0] if self.truth.effects else None
+
+    @property
+    def first(self) -> Named | None:
+        """What was named first."""
+        return self.reply.named[0] if self.reply.named else None
+
+    @property
+    def size(self) -> float:
+        """Of the largest concealed effect, in units of noise."""
+        return max((effect.size for effect in self.truth.effects), default=0.0)
+
+    @property
+    def detected(self) -> bool:
+        """Whether something is said to be missing, with a name or without."""
+        return self.reply.verdict in ("missing_physics", "unexplained")
+
+    @property
+    def top(self) -> bool:
+        """Whether what the case is about was named first."""
+        return self.first is not None and self.first.effect in self._laws(0)
+
+    @property
+    def in_set(self) -> bool:
+        """Whether it is what was named first or what that is said not to be told from."""
+        return self.first is not None and bool(self.first.reported & self._laws(0))
+
+    @cached_property
+    def matched(self) -> tuple[Named | None, ...]:
+        """For each concealed effect the finding that names it, none of them twice."""
+        left, found = list(self.reply.named), []
+        for index in range(len(self.truth.effects)):
+            match = next((named for named in left if named.effect in self._laws(index)), None)
+            found.append(match)
+            if match is not None:
+                left.remove(match)
+        return tuple(found)
+
+    @property
+    def spurious(self) -> tuple[Named, ...]:
+        """Findings that name nothing that is there, and whose set holds nothing that is there and unnamed."""
+        open_laws = frozenset[str]().union(*(self._laws(index) for index, found in enumerate(self.matched)
+                                             if found is None))
+        taken = [id(found) for found in self.matched]
+        return tuple(named for named in self.reply.named if id(named) not in taken and not named.reported & open_laws)
+
+    @property
+    def block_right(self) -> bool:
+        """Whether the mismatch is placed in the block of a concealed effect."""
+        return self.reply.location.get("block") in {effect.block for effect in self.truth.effects}
+
+    @property
+    def set_reported(self) -> bool:
+        """Whether the effect and all its rivals are reported as one set."""
+        return self.first is not None and bool(self.first.reported & self._law(0)) and all(
+            self.first.reported & {rival, *same_law(rival)} for rival in self.truth.rivals)
+
+    @property
+    def called_untestable(self) -> bool:
+        """Whether what the motion cannot show is called not testable, and not named."""
+        hidden = set(self.truth.not_testable)
+        return bool(hidden & set(self.reply.not_testable)) and not any(
+            named.effect in hidden for named in self.reply.named)
+
+    @property
+    def right(self) -> bool:
+        """Whether the answer as a whole is the right one: everything that is there named, and nothing else."""
+        if self.truth.tier == "ambiguous":
+            return self.set_reported and not self.spurious
+        if self.truth.tier == "insufficient":
+            return self.called_untestable and not self.reply.named
+        if not self.truth.effects or self.truth.tier == "novel":
+            return self.reply.verdict == self.truth.verdict and not self.reply.named
+        if self.size < ABOVE_FLOOR and not self.reply.named:
+            return True
+        return all(self.matched) and not self.spurious
+
+    @property
+    def wrong(self) -> str:
+        """What is wrong with the answer, in words; empty where it is right."""
+        if self.right:
+            return ""
+        if self.reply.verdict in ("error", "no_answer"):
+            return "There is no diagnosis."
+        if self.spurious:
+            return f"It names {_listed(named.effect for named in self.spurious)}, which is not there."
+        if self.truth.tier == "ambiguous" and self.top:
+            return f"It does not say that {_listed(self.truth.rivals)} cannot be told from what it names."
+        if self.truth.tier == "insufficient":
+            return f"It does not say that this motion cannot show {_listed(self.truth.not_testable, 'or')}."
+        unnamed = [effect.effect for effect, found in zip(self.truth.effects, self.matched, strict=True) if not found]
+        if self.truth.tier != "novel" and unnamed:
+            return f"It does not name {_listed(unnamed)}."
+        return f"The verdict is {self.reply.verdict} instead of {self.truth.verdict}."
+
+    def named_right(self, named: Named) -> bool:
+        """Whether what a finding names is there."""
+        return any(named is found for found in self.matched)
+
+    def parameter_errors(self) -> dict[str, float]:
+        """Relative errors of the parameters of what was named first and rightly.
+
+        A harmonic counts by its amplitude: its error is relative to the first amplitude, that of its phase [rad] is
+        weighted with its own.
+        """
+        return {name: _error(name, value, self._known()) for name, (value, _) in self._estimated().items()
+                if name not in _PLACES}
+
+    def covered(self) -> dict[str, bool]:
+        """Whether the 90 % interval of each parameter of what was named first and rightly holds the true value."""
+        known = self._known()
+        return {name: _difference(name, value, known[name]) <= NORMAL_90 * deviation
+                for name, (value, deviation) in self._estimated().items() if name != "cycles_per_rev"}
+
+    def nominal_errors(self) -> dict[str, float]:
+        """Relative errors of the corrected parameters of the bench."""
+        true = self.truth.true_parameters
+        return {name: abs(value / true[name] - 1.0) for name, (value, _) in self.reply.nominal.items() if true[name]}
+
+    def period_error(self) -> float | None:
+        """Relative error of the spatial period, infinite where none is given; None for what has no free period."""
+        if self.concealed is None or not set(_PERIODS) & set(self.concealed.parameters):
+            return None
+        lead_m = self.truth.true_parameters.get("lead_m") or self.truth.true_parameters["screw_lead_m"]
+        true = float(self.concealed.place["period_m"])    # type: ignore[arg-type]
+        period_m, order = self._said("period_m"), self._said("cycles_per_rev", "order_per_rev")
+        found = lead_m / order if order else period_m
+        return abs(found / true - 1.0) if found else float("inf")
+
+    def frequency_error(self) -> float | None:
+        """Relative error of the frequency of a mode, infinite where none is given; None for other effects."""
+        if self.concealed is None or self.concealed.effect != "structural_mode":
+            return None
+        found = self._said("frequency_hz")
+        true = float(self.concealed.place["frequency_hz"])    # type: ignore[arg-type]
+        return abs(found / true - 1.0) if found else float("inf")
+
+    def window_overlap(self) -> float | None:
+        """Intersection over union of the windows said and the true one; None for what has no window."""
+        if self.concealed is None or "window_s" not in self.concealed.place:
+            return None
+        begin, end = self.concealed.place["window_s"]    # type: ignore[misc]
+        named = self.first.parameters if self.first else {}
+        windows = ([(named["start_s"][0], named["end_s"][0])] if "start_s" in named
+                   else self.reply.location.get("windows_s", []))
+        common = sum(max(min(b, end) - max(a, begin), 0.0) for a, b in windows)
+        return common / (end - begin + sum(b - a for a, b in windows) - common)
+
+    def _said(self, name: str, in_location: str | None = None) -> float | None:
+        """A number that the first finding has, or else the location."""
+        if self.first and name in self.first.parameters:
+            return self.first.parameters[name][0]
+        found: float | None = self.reply.location.get(in_location or name)
+        return found
+
+    def _estimated(self) -> dict[str, tuple[float, float]]:
+        if not self.top or self.first is None:
+            return {}
+        return {name: found for name, found in self.first.parameters.items() if name in self._known()}
+
+    def _known(self) -> Mapping[str, float]:
+        return self.concealed.compared if self.concealed else {}
+
+    def _law(self, index: int) -> frozenset[str]:
+        """Ids that say what a concealed effect is."""
+        return frozenset(self.truth.effects[index].same_law) if index < len(self.truth.effects) else frozenset()
+
+    def _laws(self, index: int) -> frozenset[str]:
+        """The same, with those that this motion cannot tell from the first one."""
+        laws = self._law(index)
+        return laws.union(*(({rival, *same_law(rival)}) for rival in self.truth.rivals)) if index == 0 else laws
+
+
+def _difference(name: str, value: float, true: float) -> float:
+    return abs(remainder(value - true, 2.0 * pi)) if name.startswith("phase") else abs(value - true)
+
+
+def _error(name: str, value: float, known: Mapping[str, float]) -> float:
+    difference = _difference(name, value, known[name])
+    first = next((size for other, size in known.items() if other.startswith("amplitude")), 0.0)
+    if name.startswith("phase"):
+        own = known.get(name.replace("phase", "amplitude").replace("_rad", "_m"), first)
+        return difference * (own / first if first else 1.0)
+    scale = first if name.startswith("amplitude") else abs(known[name])
+    return difference / scale if scale else float(difference > 0.0)
+
+
+def _listed(names: object, last: str = "and") -> str:
+    words = [str(name).replace("_", " ") for name in names]    # type: ignore[attr-defined]
+    return f" {last} ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)

@@ -1,0 +1,50 @@
+"""Which cases a proof consists of: how many of each tier, in mixed order."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+
+from hil.errors import InputError
+
+# Cases of the full proof. 300 singles are ten and more of each effect; the ladder has a dozen on each rung.
+FULL: Mapping[str, int] = MappingProxyType({
+    "single": 300, "pair": 200, "null": 150, "parameters_only": 150, "masked": 100, "novel": 60, "ladder": 140,
+    "ambiguous": 60, "insufficient": 60})
+MOST = 10_000        # case folders have four digits
+
+
+@dataclass(frozen=True)
+class Planned:
+    """A case to be drawn: its folder, which says nothing, and its tier and number within that."""
+
+    name: str
+    tier: str
+    number: int
+
+
+def plan(cases: int, seed: int) -> tuple[Planned, ...]:
+    """So many cases, of each tier its share of the full proof, shuffled by the seed.
+
+    Within a tier numbers are consecutive, so that its effects are drawn equally often. Raises InputError for a
+    number of cases that makes no sense.
+    """
+    if not 1 <= cases <= MOST:
+        raise InputError(f"--cases: given {cases}, allowed 1 to {MOST}")
+    order = [(tier, number) for tier, count in counts(cases).items() for number in range(count)]
+    random = np.random.default_rng([seed, cases])
+    return tuple(Planned(f"case_{place:04d}", *order[index])
+                 for place, index in enumerate(random.permutation(len(order))))
+
+
+def counts(cases: int) -> dict[str, int]:
+    """Cases of each tier in a proof of so many, by largest remainders."""
+    whole = sum(FULL.values())
+    found = {tier: cases * count // whole for tier, count in FULL.items()}
+    missing = cases - sum(found.values())
+    for tier in sorted(FULL, key=lambda tier: -(cases * FULL[tier] % whole))[:missing]:
+        found[tier] += 1
+    return found

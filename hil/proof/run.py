@@ -1,0 +1,73 @@
+"""A proof from the draw to the scores: conceal, seal, diagnose blind, unseal, score."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from hil.errors import HilError, InputError
+from hil.proof.blind import answered
+from hil.proof.plan import FULL, Planned
+from hil.proof.replies import read_replies
+from hil.proof.score import Scores, score
+from hil.proof.seal import CASES, SEAL, code_sha256, draw_cases, read_seal, seal, unseal
+
+ANSWERS = "answers"
+
+Say = Callable[[str], None]                      # what is to be kept
+Tell = Callable[[str, float | None], None]       # what is going on, and the share that is done
+
+
+def prove(folder: Path, planned: Sequence[Planned], seed: int, jobs: int, say: Say, tell: Tell) -> Scores:
+    """Do what is still to be done of a proof in `folder`, and score it.
+
+    Raises InputError where `folder` holds another proof, HilError where what was sealed has changed or the blind
+    process failed.
+    """
+    cases = f"--cases {len(planned)}" if len(planned) != sum(FULL.values()) else "--full"
+    command = f"hil prove {cases} --seed {seed} --out DIR"
+    about = read_seal(folder)
+    if about is None:
+        if folder.exists() and {path.name for path in folder.iterdir()} - {CASES, "sealed"}:
+            raise InputError(f"{folder}: holds other things than a proof; give another --out")
+        tell("drawing cases", 0.0)
+        draw_cases(folder, planned, seed, jobs, lambda share: tell("drawing cases", share))
+        about = seal(folder, planned, command, seed)
+    elif about["command"] != command:
+        raise InputError(f"{folder / SEAL}: given {command}, allowed what was sealed, {about['command']}; or another "
+                         "--out")
+    say(f"sealed: SHA-256 {about['truths_sha256']}, {about['cases']} cases, {about['sealed_at']}")
+    names = [case.name for case in planned]
+    diagnose_blind(folder / CASES, folder / ANSWERS, names, about["code_sha256"], jobs,
+                   lambda share: tell("diagnosing blind", share))
+    tell("scoring", None)
+    return score(unseal(folder), read_replies(folder / ANSWERS, names))
+
+
+def diagnose_blind(cases: Path, answers: Path, names: Sequence[str], code: str, jobs: int,
+                   told: Callable[[float], None]) -> None:
+    """Have all cases without an answer diagnosed by another process, by the code that was sealed."""
+    done = sum(answered(answers / name) for name in names)
+    if done == len(names):
+        return
+    if code_sha256() != code:
+        raise InputError(f"{cases.parent}: was sealed for a diagnosis by other code than this (SHA-256 {code}); "
+                         "answers of two would mix: give another --out")
+    told(done / len(names))
+    process = subprocess.Popen([sys.executable, "-m", "hil.proof.blind", str(cases.resolve()), str(answers.resolve()),
+                                "--jobs", str(jobs)], stdout=subprocess.PIPE, text=True, start_new_session=True)
+    try:
+        for _ in process.stdout or ():
+            done += 1
+            told(done / len(names))
+        ended = process.wait()
+    except BaseException:
+        os.killpg(process.pid, signal.SIGTERM)      # with the processes that it started
+        raise
+    if ended:
+        raise HilError(f"{cases}: the blind diagnosis ended with code {ended} before all cases had an answer; run "
+                       "the same again to go on")

@@ -1,0 +1,155 @@
+"""The seal: what is concealed is written and fixed by its SHA-256 before any diagnosis starts.
+
+    DIR/cases/NAME/          recordings and bench: all that a diagnosis gets
+    DIR/sealed/truths.json   what each conceals, and the SHA-256 of each of its files
+    DIR/seal.json            SHA-256 of truths.json, with the command, the seed and the code that were used
+
+Files are sealed, not seeds: another machine's linear algebra may draw a case with other digits.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import platform
+import shutil
+import subprocess
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import replace
+from datetime import UTC, datetime
+from importlib.metadata import version
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+from hil.errors import HilError, InputError
+from hil.proof.conceal import Concealed, Truth, draw, write
+from hil.proof.plan import Planned
+from hil.report.output import write_json
+
+CASES, SEALED, SEAL = "cases", "sealed", "seal.json"
+_TRUTHS = f"{SEALED}/truths.json"
+_PACKAGE = Path(__file__).parents[1]
+_LIBRARIES = ("hil-servo", "numpy", "scipy", "numba")
+
+Told = Callable[[float], None]       # the share that is done
+
+
+def draw_cases(folder: Path, planned: Sequence[Planned], seed: int, jobs: int, told: Told) -> None:
+    """Draw and write cases, several at once; those that stand there already are left alone.
+
+    Raises InputError where `folder` holds cases of another plan.
+    """
+    todo = []
+    for case in planned:
+        part = _part(folder, case.name)
+        if not part.exists():
+            todo.append(case)
+        elif {key: json.loads(part.read_text())["truth"][key] for key in ("tier", "number", "seed")} != {
+                "tier": case.tier, "number": case.number, "seed": seed}:
+            raise InputError(f"{part}: given a case of another plan, allowed one of --seed {seed} and as many --cases; "
+                             "give another --out")
+    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
+        drawn = [pool.submit(_draw, folder, case, seed) for case in todo]
+        for done, case_drawn in enumerate(as_completed(drawn), 1):
+            case_drawn.result()
+            told((len(planned) - len(todo) + done) / len(planned))
+
+
+def seal(folder: Path, planned: Sequence[Planned], command: str, seed: int) -> dict[str, Any]:
+    """Put the truths together and seal them; returns what seal.json says."""
+    parts = [_part(folder, case.name) for case in planned]
+    write_json(folder / _TRUTHS, {path.stem: json.loads(path.read_text()) for path in parts})
+    about = {"truths_sha256": sha256(folder / _TRUTHS), "cases": len(planned), "seed": seed, "command": command,
+             "sealed_at": f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}", **_commit(), "code_sha256": code_sha256(),
+             "versions": {"python": platform.python_version(), **{name: version(name) for name in _LIBRARIES}}}
+    write_json(folder / SEAL, about)
+    for path in parts:
+        path.unlink()
+    return about
+
+
+def read_seal(folder: Path) -> dict[str, Any] | None:
+    """What seal.json says; None where nothing is sealed yet. Raises HilError where it cannot be read."""
+    if not (folder / SEAL).exists():
+        return None
+    try:
+        about: dict[str, Any] = json.loads((folder / SEAL).read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise HilError(f"{folder / SEAL}: cannot be read ({error}); the seal is lost: give another --out") from None
+    return about
+
+
+def unseal(folder: Path) -> dict[str, Truth]:
+    """The truths by case. Raises HilError when they, a recording or a bench are not what was sealed."""
+    about, path = read_seal(folder), folder / _TRUTHS
+    if about is None:
+        raise HilError(f"{folder}: nothing is sealed here; give the --out of hil prove")
+    if not path.exists() or sha256(path) != about["truths_sha256"]:
+        raise HilError(f"{path}: is not what was sealed (SHA-256 {about['truths_sha256']}); nothing can be scored: "
+                       "give another --out")
+    truths = {}
+    for name, entry in json.loads(path.read_text(encoding="utf-8")).items():
+        place = folder / CASES / name
+        if not place.is_dir() or _digests(place) != entry["sha256"]:
+            raise HilError(f"{place}: recordings or bench are not what was sealed; nothing can be scored: "
+                           "give another --out")
+        truths[name] = truth_of(entry["truth"])
+    return truths
+
+
+def truth_of(data: dict[str, Any]) -> Truth:
+    """The truth of a case from plain data."""
+    effects = tuple(Concealed(**{**effect, "same_law": tuple(effect["same_law"])}) for effect in data["effects"])
+    return Truth(**{**data, "effects": effects, "rivals": tuple(data["rivals"]),
+                    "not_testable": tuple(data["not_testable"])})
+
+
+def sha256(path: Path) -> str:
+    """SHA-256 of a file."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def code_sha256() -> str:
+    """SHA-256 of the code that a diagnosis runs: twin, diagnosis and what they stand on."""
+    digest = hashlib.sha256()
+    for path in sorted([*_PACKAGE.glob("*.py"), *_PACKAGE.glob("diagnosis/**/*.py"), *_PACKAGE.glob("twin/**/*.py")]):
+        digest.update(path.relative_to(_PACKAGE).as_posix().encode() + b"\0" + path.read_bytes())
+    return digest.hexdigest()
+
+
+def _draw(folder: Path, case: Planned, seed: int) -> None:
+    drawn = draw(case.tier, case.number, seed)
+    # the number within the tier would tell the tier
+    drawn = replace(drawn, name=case.name, truth=replace(drawn.truth, name=case.name))
+    shutil.rmtree(folder / CASES / case.name, ignore_errors=True)
+    place = write(drawn, folder / CASES)
+    part = _part(folder, case.name)
+    part.parent.mkdir(parents=True, exist_ok=True)
+    write_json(part, {"truth": drawn.truth.as_json(), "sha256": _digests(place)})
+
+
+def _digests(place: Path) -> dict[str, str]:
+    return {path.name: sha256(path) for path in sorted(place.iterdir())}
+
+
+def _part(folder: Path, name: str) -> Path:
+    return folder / SEALED / f"{name}.json"
+
+
+def _commit() -> dict[str, Any]:
+    """The commit of the code and whether it was changed since; nothing where there is none."""
+    def git(*arguments: str) -> str | None:
+        try:
+            ran = subprocess.run(["git", "-C", str(_PACKAGE), *arguments], capture_output=True, text=True, check=True,
+                                 env={**os.environ, "GIT_OPTIONAL_LOCKS": "0"})
+        except (OSError, subprocess.CalledProcessError):
+            return None
+        return ran.stdout.strip()
+
+    commit = git("rev-parse", "HEAD")
+    return {"git_commit": commit, "git_changed": bool(git("status", "--porcelain", "--", str(_PACKAGE)))
+            if commit else None}

@@ -1,8 +1,8 @@
 """Starting values of each mechanism for the recordings at hand: where a search for it begins.
 
 A start is a point of a mechanism's parameters at small but visible strength. The screen asks how much of
-the residual the twin's answer to it explains, scales the strength, and turns the phase. A
-mechanism without an entry here starts from the middle of its bounds.
+the residual the twin's answer to it explains, scales the strength, and turns the phase. A variant without an
+entry of its own starts as its mechanism does, a mechanism without an entry from the middle of its bounds.
 """
 
 from __future__ import annotations
@@ -43,6 +43,7 @@ class Scene:
     coulomb: float                      # [N m]
     peak_torque: float                  # [N m]
     peak_speed: float                   # [rad/s]
+    viscous_speed: float                # [rad/s] at which viscous friction equals Coulomb friction
     travel_m: float
     duration_s: float
     ratio: float
@@ -70,18 +71,22 @@ def scene(runs: Sequence[Measured], bench: Bench, blocks: Sequence[dict[str, Flo
         stretch = max(float(np.percentile(np.abs(run.table_m - ratio * run.motor
                                                  - np.median(run.table_m - ratio * run.motor)), 60)) for run in runs)
     longest = max(range(len(runs)), key=lambda i: runs[i].motor.size)
+    travel = max(float(np.ptp(run.position_command_m)) for run in runs)
+    lead = 2.0 * np.pi * ratio / physics.angle_per_unit
+    turns = [period for period in (lead, 0.5 * lead) if period < travel]     # a nut rubs once or twice a turn
     ripple = [d.torque / np.where(np.abs(run.torque) > 0.2 * physics.coulomb_n_m, run.torque, np.inf)
               for run, d in zip(runs, found, strict=True)]
     return Scene(
         coulomb=max(physics.coulomb_n_m, 1e-6),
         peak_torque=max(float(np.max(np.abs(run.torque))) for run in runs),
         peak_speed=max(float(np.max(np.abs(d.velocity))) for d in found),
-        travel_m=max(float(np.ptp(run.position_command_m)) for run in runs),
+        viscous_speed=max(physics.viscous_speed, 1e-6),
+        travel_m=travel,
         duration_s=max(run.motor.size * run.period_s for run in runs),
         ratio=ratio,
         orders=estimate.orders(runs, found, physics.angle_per_unit),
         ripple_orders=estimate.orders(runs, found, physics.angle_per_unit, 2, ripple),
-        friction_periods=estimate.friction_periods(runs, found, ratio),
+        friction_periods=[*estimate.friction_periods(runs, found, ratio), *turns],
         scale_periods=(estimate.scale_periods(runs, [block["table"] for block in blocks])
                        if runs[0].table_m.size else []),
         window=estimate.force_window(runs[longest], found[longest]),
@@ -97,6 +102,8 @@ _STARTS: dict[str, tuple[Callable[[Scene], _Values], int, int]] = {
     "presliding_hysteresis": (lambda s: [(s.coulomb * s.ratio / d,) for d in (0.3e-6, 1e-6, 4e-6, 16e-6)], -1, -1),
     "position_dependent_friction": (lambda s: [(0.05, p, 0.0) for p in s.friction_periods], 0, 2),
     "nonlinear_viscous_friction": (lambda s: [(0.05 * s.coulomb / s.peak_speed**2,)], 0, -1),
+    "nonlinear_viscous_friction.thinning lubricant": (
+        lambda s: [(f * s.coulomb / s.viscous_speed**2,) for f in (0.1, 1.0)], -1, -1),
     "friction_drift": (lambda s: [(0.05, f * s.duration_s) for f in (0.2, 1.0, 5.0)], 0, -1),
     "table_side_friction": (lambda s: [(0.2,), (0.6,)], -1, -1),
     "backlash": (lambda s: [(f * s.stretch,) for f in (0.5, 1.0, 2.0, 4.0)], -1, -1),
@@ -132,14 +139,15 @@ def starts(scene: Scene, bench: Bench) -> list[Start]:
     for mechanism in LIBRARY:
         if mechanism.id in _NEEDS_TABLE and not bench.has_table_encoder:
             continue
-        if mechanism.id in _STARTS:
-            values, strength, phase = _STARTS[mechanism.id]
-            points = values(scene)
-        else:
-            points, strength, phase = [tuple(0.5 * (p.low + p.high) for p in mechanism.parameters)], 0, -1
         for variant, name in enumerate(mechanism.variants):
             if name == "table_position" and not bench.has_table_encoder:
                 continue
+            known = _STARTS.get(f"{mechanism.id}.{name}") or _STARTS.get(mechanism.id)
+            if known:
+                values, strength, phase = known
+                points = values(scene)
+            else:
+                points, strength, phase = [tuple(0.5 * (p.low + p.high) for p in mechanism.parameters)], 0, -1
             for point in points:
                 inside = tuple(min(max(value, p.low), p.high)
                                for value, p in zip(point, BY_ID[mechanism.id].parameters, strict=True))

@@ -22,7 +22,7 @@ def _drag(
     if variant == 0.0:
         drag = quadratic * speed * speed
     elif at.viscous_speed > 0.0:
-        drag = quadratic * at.viscous_speed**2 * math.sqrt(speed / at.viscous_speed)
+        drag = max(quadratic, 0.0) * at.viscous_speed**2 * math.sqrt(speed / at.viscous_speed)
     else:
         drag = 0.0
     return value + drag if at.velocity > 0.0 else value - drag
@@ -35,8 +35,8 @@ MECHANISM = Mechanism(
     sentence="Drag departs from linear in speed by {quadratic_n_m_s2_rad2} times the square of the speed.",
     second_sentence="Drag rises steeply from rest and then ever less, with the root of the speed: at {viscous_speed} "
                     "by {quadratic_n_m_s2_rad2} times the square of that speed.",
-    equation="F = Fc sign(v) + c v + q v |v|; thinning: + q v_r^2 sqrt(|v| / v_r) sign(v), v_r = Fc / c, which for "
-             "q v_r^2 = 2 Fc is the law of Casson, |F| = (sqrt(Fc) + sqrt(c |v|))^2",
+    equation="F = Fc sign(v) + c v + q v |v|; thinning: + q v_r^2 sqrt(|v| / v_r) sign(v), q >= 0, v_r = Fc / c, "
+             "which for q v_r^2 = 2 Fc is the law of Casson, |F| = (sqrt(Fc) + sqrt(c |v|))^2",
     source="Olsson et al., Friction models and friction compensation, European J. Control 4 (1998) 176; thinning: "
            "Casson, in Mill (ed.), Rheology of Disperse Systems (1959) 84",
     parameters=(Parameter("quadratic_n_m_s2_rad2", Dimension.MOTOR_DRAG, -1e5, 1e5),),

@@ -15,6 +15,7 @@ from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 from hil.bench import Bench, MechanismEntry
 from hil.measured import Measured
@@ -30,8 +31,9 @@ Key = tuple[str, int, int]
 # The way there is another matter: with all that the encoder tells, the valleys of stick-slip are convex.
 TORQUE_ACCURACY, SEARCH_ACCURACY = 1.0, 0.2
 # Time constants of the motor's observer. Fast: stick-slip is forgotten within a few ticks, so that even a poor start
-# leads to the right valley. Slow: a coarse encoder still tells the torque.
-FASTEST_OBSERVER_S, SLOWEST_OBSERVER_S = 0.002, 0.008
+# leads to the right valley; faster than two ticks, the sampled observer is unstable on an elastic axis. Slow: a coarse
+# encoder still tells the torque.
+FASTEST_OBSERVER_TICKS, FASTEST_OBSERVER_S, SLOWEST_OBSERVER_S = 2.0, 0.002, 0.008
 # Differences by which the edges of a window are moved: first wide, then by a tick.
 EDGE_STEP_S, LAST_EDGE_STEP_S = 0.03, 0.001
 # Periods, or orders, further apart than this factor are two causes.
@@ -39,6 +41,7 @@ _APART = 1.1
 # An owner who believes a mass or a stiffness is not wrong by more than this factor: beyond it lie the valleys in which
 # a wrong structure is mended with absurd parameters.
 TRUST = 3.0
+_LOST = 1e6      # residuals beyond say no more than that the hypothesis is lost
 
 
 @dataclass(frozen=True)
@@ -219,8 +222,9 @@ class Model:
         """Differences over their scales, of the rows that count: of size one or less at the noise floor."""
         scale = scales(run, self.bench, self.observer_s, self.torque_accuracy)
         rows = run.judged
-        return {name: np.nan_to_num(value[rows] / scale[name], nan=1e6, posinf=1e6, neginf=-1e6)
-                for name, value in differences.items()}
+        with np.errstate(over="ignore"):     # a hypothesis may be unstable
+            return {name: np.clip(np.nan_to_num(value[rows] / scale[name], nan=_LOST), -_LOST, _LOST)
+                    for name, value in differences.items()}
 
     def residuals(self, x: FloatArray, runs: Sequence[Measured], closed: bool = False) -> FloatArray:
         """All weighted residuals, run after run, channel after channel."""
@@ -247,7 +251,7 @@ def _differences(response: Response, measured: Response, bench: Bench) -> dict[s
 def observer_time_s(runs: Sequence[Measured], bench: Bench) -> float:
     """Time constant at which the motor encoder's counts tell as much torque as the torque channel."""
     wanted = max(np.sqrt(run.noise.motor * _inertia(bench) / (TORQUE_ACCURACY * run.noise.torque)) for run in runs)
-    return float(np.clip(wanted, FASTEST_OBSERVER_S, SLOWEST_OBSERVER_S))
+    return float(np.clip(wanted, FASTEST_OBSERVER_TICKS * runs[0].period_s, SLOWEST_OBSERVER_S))
 
 
 def _inertia(bench: Bench) -> float:
@@ -261,8 +265,13 @@ def scales(run: Measured, bench: Bench, observer_s: float,
     """Size of one unit of weighted residual, per channel.
 
     A torque d that the twin misses moves its motor by d tau^2 / J before the correction takes hold, with tau the
-    observer's time constant: the motor counts from the torque that the torque channel can still see.
+    observer's time constant: the motor counts from the torque that the torque channel can still see. White noise e
+    of its encoder comes back through the observer as (1 - z^-1)^2 / (1 - a z^-1)^2 e, a = 1 - T / tau.
     """
     seen = torque_accuracy * run.noise.torque * observer_s**2 / _inertia(bench)
-    return {"motor": max(run.noise.motor, seen), "table": run.noise.table_m, "torque": run.noise.torque,
-            "command": run.noise.torque}
+    a = 1.0 - run.period_s / observer_s
+    impulse = np.zeros(round(20.0 * observer_s / run.period_s) + 3)
+    impulse[0] = 1.0
+    passed = lfilter([1.0, -2.0, 1.0], [1.0, -2.0 * a, a * a], impulse)
+    return {"motor": max(run.noise.motor * float(np.linalg.norm(passed)), seen), "table": run.noise.table_m,
+            "torque": run.noise.torque, "command": run.noise.torque}

@@ -36,7 +36,7 @@ _FINALISTS = 3        # of which are fitted to the end
 _NEAR = 6             # evaluations of a first fit with the derivatives of the base
 _SPRINT = 4           # and of the one after it
 _LONG = 25            # evaluations of a last fit
-_NEAR_FLOOR = 4.0     # times the floor's energy: a sprint beyond it is not converged once another reached the floor
+_BEATEN = 5.0         # times the energy that the leader leaves: a sprint that leaves more is not converged
 _HOPELESS = 0.02      # a lead that explains this little of what the first explains is not fitted
 _SOFT = 30.0          # residual from which a first fit hears less: far above noise, so that valleys stay convex
 
@@ -72,8 +72,8 @@ def _offered(start: Start, model: Model, terms: Sequence[Term]) -> bool:
 def race(base: Fit, found: Sequence[Lead], runs: Sequence[Measured]) -> list[Fit]:
     """Fits of the base with each of the first leads, best first.
 
-    All start; the one that gets furthest is converged, in all its variants. The others are, too, unless it reached
-    the noise floor and they are far from it: then how far exactly is nobody's question.
+    All start; the one that gets furthest is converged, in all its variants. Others are, too, if they are anywhere near
+    it; how far exactly those are that lost is nobody's question.
     """
     searched = replace(base.model, torque_accuracy=SEARCH_ACCURACY)
     held = jacobian(searched, base.x, searched.residuals(base.x, runs), runs)
@@ -120,7 +120,7 @@ def race(base: Fit, found: Sequence[Lead], runs: Sequence[Measured]) -> list[Fit
     reached = [evaluate(replace(result.model, torque_accuracy=TORQUE_ACCURACY), runs, result.x) for result in others]
     results += reached
     results += in_parallel([partial(finish, other) for other, result in zip(others, reached, strict=True)
-                            if not leader.at_floor or result.cost < _NEAR_FLOOR * leader.cost])
+                            if result.cost < _BEATEN * leader.cost])
     results += variants(min(results, key=lambda result: result.cost))
     best: dict[str, Fit] = {}
     for result in results:

@@ -25,6 +25,7 @@ def prove(
     from hil.proof.page import HEADERS, goal_row, write_proof
     from hil.proof.plan import FULL, plan
     from hil.proof.run import prove as run
+    from hil.proof.run import score_others
 
     if full and cases is not None:
         raise InputError("--full: given with --cases, allowed one of them")
@@ -33,6 +34,6 @@ def prove(
     with progress() as tell:
         scores = run(folder, planned, seed, jobs or os.cpu_count() or 1, out.print, tell)
         tell("writing the report", None)
-        write_proof(scores, folder)
+        write_proof(scores, score_others(folder), folder)
     table(HEADERS, [goal_row(goal) for goal in scores.goals])
     out.print(f"\nReport: {folder / 'report.html'}")

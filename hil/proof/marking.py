@@ -20,10 +20,11 @@ _PERIODS = ("period_m", "cycles_per_rev")
 
 @dataclass(frozen=True)
 class Marked:
-    """A case with its answer."""
+    """A case with its answer, and the answer after the motion that the diagnosis asked for was run too."""
 
     truth: Truth
     reply: Reply
+    later: Reply | None = None
 
     @property
     def concealed(self) -> Concealed | None:
@@ -39,6 +40,11 @@ class Marked:
     def size(self) -> float:
         """Of the largest concealed effect, in units of noise."""
         return max((effect.size for effect in self.truth.effects), default=0.0)
+
+    @property
+    def above_floor(self) -> bool:
+        """Whether an effect is concealed that these motions show above the noise."""
+        return self.size >= ABOVE_FLOOR and self.truth.tier != "insufficient"
 
     @property
     def detected(self) -> bool:
@@ -86,6 +92,14 @@ class Marked:
             self.first.reported & {rival, *same_law(rival)} for rival in self.truth.rivals)
 
     @property
+    def resolved(self) -> bool:
+        """Whether the motion that was asked for left the concealed effect alone, without its rivals."""
+        if self.later is None or not self.later.named:
+            return False
+        first = self.later.named[0]
+        return first.effect in self._law(0) and not first.reported & (self._laws(0) - self._law(0))
+
+    @property
     def called_untestable(self) -> bool:
         """Whether what the motion cannot show is called not testable, and not named."""
         hidden = set(self.truth.not_testable)
@@ -101,7 +115,7 @@ class Marked:
             return self.called_untestable and not self.reply.named
         if not self.truth.effects or self.truth.tier == "novel":
             return self.reply.verdict == self.truth.verdict and not self.reply.named
-        if self.size < ABOVE_FLOOR and not self.reply.named:
+        if not self.above_floor and not self.reply.named:
             return True
         return all(self.matched) and not self.spurious
 

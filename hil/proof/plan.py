@@ -15,6 +15,7 @@ FULL: Mapping[str, int] = MappingProxyType({
     "single": 300, "pair": 200, "null": 150, "parameters_only": 150, "masked": 100, "novel": 60, "ladder": 140,
     "ambiguous": 60, "insufficient": 60})
 MOST = 10_000        # case folders have four digits
+_NUMBERS = 1_000_000 # that the first case of a tier may have
 
 
 @dataclass(frozen=True)
@@ -34,8 +35,10 @@ def plan(cases: int, seed: int) -> tuple[Planned, ...]:
     """
     if not 1 <= cases <= MOST:
         raise InputError(f"--cases: given {cases}, allowed 1 to {MOST}")
-    order = [(tier, number) for tier, count in counts(cases).items() for number in range(count)]
     random = np.random.default_rng([seed, cases])
+    # from another number in each tier: the same number of two tiers is the same effect
+    order = [(tier, first + number) for tier, count in counts(cases).items()
+             for first in (int(random.integers(_NUMBERS)),) for number in range(count)]
     return tuple(Planned(f"case_{place:04d}", *order[index])
                  for place, index in enumerate(random.permutation(len(order))))
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from hil.errors import HilError
-from hil.proof.blind import DIAGNOSIS, ERROR
+from hil.proof.blind import DIAGNOSIS, ERROR, answered
 
 FAILED, ABSENT = "error", "no_answer"      # verdicts beside those of a diagnosis
 
@@ -47,16 +47,15 @@ class Reply:
 
 
 def read_replies(folder: Path, names: Iterable[str]) -> dict[str, Reply]:
-    """Answers of the cases `names` in folder/NAME/diagnosis.json; raises HilError for one that cannot be read."""
-    return {name: _read(folder / name) for name in names}
+    """Answers in folder/NAME/diagnosis.json for those cases that have one; raises HilError for one that cannot be
+    read."""
+    return {name: _read(folder / name) for name in names if answered(folder / name)}
 
 
 def _read(place: Path) -> Reply:
     path = place / DIAGNOSIS
     try:
         if not path.exists():
-            if not (place / ERROR).exists():
-                return Reply(ABSENT, statement="No answer was given.")
             failure = json.loads((place / ERROR).read_text(encoding="utf-8"))
             return Reply(FAILED, statement=f"{failure['kind']}: {failure['error']}")
         return reply_of(json.loads(path.read_text(encoding="utf-8")))

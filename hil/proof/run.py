@@ -1,4 +1,4 @@
-"""A proof from the draw to the scores: conceal, seal, diagnose blind, unseal, score."""
+"""A proof from the draw to the scores: conceal, seal, diagnose blind, unseal, run what was asked for, score."""
 
 from __future__ import annotations
 
@@ -10,13 +10,14 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from hil.errors import HilError, InputError
+from hil.proof.again import AGAIN, record_again
 from hil.proof.blind import answered
 from hil.proof.plan import FULL, Planned
 from hil.proof.replies import read_replies
 from hil.proof.score import Scores, score
-from hil.proof.seal import CASES, SEAL, code_sha256, draw_cases, read_seal, seal, unseal
+from hil.proof.seal import CASES, SEAL, SEALED, code_sha256, draw_cases, read_seal, seal, unseal
 
-ANSWERS = "answers"
+ANSWERS, PEERS = "answers", "peers"
 
 Say = Callable[[str], None]                      # what is to be kept
 Tell = Callable[[str, float | None], None]       # what is going on, and the share that is done
@@ -32,7 +33,7 @@ def prove(folder: Path, planned: Sequence[Planned], seed: int, jobs: int, say: S
     command = f"hil prove {cases} --seed {seed} --out DIR"
     about = read_seal(folder)
     if about is None:
-        if folder.exists() and {path.name for path in folder.iterdir()} - {CASES, "sealed"}:
+        if folder.exists() and {path.name for path in folder.iterdir()} - {CASES, SEALED}:
             raise InputError(f"{folder}: holds other things than a proof; give another --out")
         tell("drawing cases", 0.0)
         draw_cases(folder, planned, seed, jobs, lambda share: tell("drawing cases", share))
@@ -44,8 +45,20 @@ def prove(folder: Path, planned: Sequence[Planned], seed: int, jobs: int, say: S
     names = [case.name for case in planned]
     diagnose_blind(folder / CASES, folder / ANSWERS, names, about["code_sha256"], jobs,
                    lambda share: tell("diagnosing blind", share))
+    truths = unseal(folder)
+    tell("running proposed motions", 0.0)
+    again = record_again(folder, folder / ANSWERS, truths, jobs,
+                         lambda share: tell("running proposed motions", share))
+    diagnose_blind(folder / AGAIN / CASES, folder / AGAIN / ANSWERS, again, about["code_sha256"], jobs,
+                   lambda share: tell("diagnosing again", share))
     tell("scoring", None)
-    return score(unseal(folder), read_replies(folder / ANSWERS, names))
+    return score(truths, read_replies(folder / ANSWERS, names), read_replies(folder / AGAIN / ANSWERS, again))
+
+
+def score_others(folder: Path) -> dict[str, Scores]:
+    """Scores of other methods by name, whose answers lie in DIR/peers/METHOD/NAME/diagnosis.json."""
+    truths = unseal(folder)
+    return {place.name: score(truths, read_replies(place, truths)) for place in sorted((folder / PEERS).glob("*/"))}
 
 
 def diagnose_blind(cases: Path, answers: Path, names: Sequence[str], code: str, jobs: int,

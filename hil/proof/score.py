@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
 
-from hil.proof.conceal import TIERS, Truth
-from hil.proof.marking import ABOVE_FLOOR, Marked
-from hil.proof.replies import Reply
+from hil.proof.conceal import Truth
+from hil.proof.marking import Marked
+from hil.proof.replies import ABSENT, Reply
 from hil.proof.statistics import (
     ConfidenceBin,
     Rate,
@@ -17,9 +17,11 @@ from hil.proof.statistics import (
     quantile,
     rate,
 )
+from hil.proof.tallies import by_effect
 
 FLOORED = 1.15               # times the noise floor, up to which a held-out residual is down to it
 SURE = 0.9                   # confidence that may be relied on
+NO_REPLY = Reply(ABSENT, statement="No answer was given.")
 
 
 @dataclass(frozen=True)
@@ -31,6 +33,7 @@ class Goal:
     low: float = 0.0
     high: float = inf
     of: int = 0              # cases behind a number; a rate has its own
+    percent: bool = True     # how it is read
     detail: str = ""
 
     @property
@@ -59,30 +62,23 @@ class Scores:
         return [case for case in self.cases if case.truth.tier in tiers]
 
 
-def score(truths: Mapping[str, Truth], replies: Mapping[str, Reply]) -> Scores:
-    """Score answers; a case without one counts as wrong."""
-    cases = tuple(Marked(truth, replies[name]) for name, truth in truths.items())
+def score(truths: Mapping[str, Truth], replies: Mapping[str, Reply],
+          later: Mapping[str, Reply] | None = None) -> Scores:
+    """Score answers by case; one that is wanting counts as wrong. `later` are those after the motion asked for."""
+    cases = tuple(Marked(truth, replies.get(name, NO_REPLY), (later or {}).get(name))
+                  for name, truth in truths.items())
     bins = calibration(cases)
     return Scores(cases, (*_named(cases), *_located(cases), *_modelled(cases), *_sure(cases, bins),
                           *_abstained(cases)), tuple(bins))
 
 
-def by_effect(cases: Iterable[Marked], hit: Callable[[Marked], bool]) -> dict[str, Rate]:
-    """A rate for each concealed effect."""
-    found: dict[str, list[bool]] = {}
-    for case in cases:
-        if case.concealed:
-            found.setdefault(case.concealed.effect, []).append(hit(case))
-    return {effect: rate(found[effect]) for effect in sorted(found)}
-
-
-def verdicts(cases: Iterable[Marked]) -> dict[str, dict[str, int]]:
-    """How often each verdict was given, by tier."""
-    found: dict[str, dict[str, int]] = {}
-    for case in sorted(cases, key=lambda case: TIERS.index(case.truth.tier)):
-        counts = found.setdefault(case.truth.tier, {})
-        counts[case.reply.verdict] = counts.get(case.reply.verdict, 0) + 1
-    return found
+def lead(scores: Scores, others: Mapping[str, Scores]) -> Goal:
+    """Points of the rate of singles named first by which a method is ahead of the best of the others."""
+    rates = {name: rate(case.top for case in other.of_tier("single")).value for name, other in others.items()}
+    best = max(rates, key=lambda name: rates[name] or 0.0, default="")
+    own, singles = rate(case.top for case in scores.of_tier("single")).value, scores.of_tier("single")
+    ahead = None if own is None or rates.get(best) is None else own - (rates[best] or 0.0)
+    return Goal("ahead of the best other method", ahead, low=0.20, of=len(singles), detail=best)
 
 
 def calibration(cases: Iterable[Marked]) -> list[ConfidenceBin]:
@@ -93,18 +89,20 @@ def calibration(cases: Iterable[Marked]) -> list[ConfidenceBin]:
 
 def _named(cases: Sequence[Marked]) -> list[Goal]:
     singles, pairs = _tier(cases, "single"), _tier(cases, "pair")
-    above = [case for case in cases if case.size >= ABOVE_FLOOR and case.truth.tier != "insufficient"]
+    above = [case for case in cases if case.above_floor]
     effects = by_effect(singles, lambda case: case.top)
     worst = min(effects, key=lambda effect: effects[effect].value or 0.0, default="")
+    nulls, wrong = _tier(cases, "null"), _tier(cases, "parameters_only")
     return [
-        Goal("false alarms on nulls", rate(bool(case.reply.named) for case in _tier(cases, "null")), high=0.01),
-        Goal("false alarms on wrong parameters only",
-             rate(bool(case.reply.named) for case in _tier(cases, "parameters_only")), high=0.02),
-        Goal("detection where the effect is above the floor", rate(case.detected for case in above), low=0.95),
+        Goal("nulls: something named", rate(bool(case.reply.named) for case in nulls), high=0.01),
+        Goal("nulls: right verdict", rate(case.right for case in nulls)),
+        Goal("wrong parameters: something named", rate(bool(case.reply.named) for case in wrong), high=0.02),
+        Goal("wrong parameters: right verdict", rate(case.right for case in wrong)),
+        Goal("detected where above the floor", rate(case.detected for case in above), low=0.95),
         Goal("singles: named first", rate(case.top for case in singles), low=0.92),
         Goal("singles: in the set named first", rate(case.in_set for case in singles), low=0.99),
-        Goal("singles: worst effect, named first", effects.get(worst), low=0.80, detail=worst),
-        Goal("singles: something else named beside", rate(bool(case.spurious) for case in singles)),
+        Goal("singles: worst effect", effects.get(worst), low=0.80, detail=worst),
+        Goal("singles: a spurious second", rate(bool(case.spurious) for case in singles)),
         Goal("pairs: both named", rate(all(case.matched) for case in pairs), low=0.80),
         Goal("pairs: at least one named", rate(any(case.matched) for case in pairs), low=0.98),
         Goal("pairs: a spurious third", rate(bool(case.spurious) for case in pairs), high=0.05),
@@ -115,7 +113,7 @@ def _located(cases: Sequence[Marked]) -> list[Goal]:
     singles = _tier(cases, "single")
     return [
         Goal("block right", rate(case.block_right for case in singles), low=0.95),
-        _median("window overlap (IoU), median", [case.window_overlap() for case in singles], low=0.8),
+        _median("window overlap, median IoU", [case.window_overlap() for case in singles], low=0.8, percent=False),
         _median("spatial period, median error", [case.period_error() for case in singles], high=0.002),
         _median("mode frequency, median error", [case.frequency_error() for case in singles], high=0.01)]
 
@@ -127,30 +125,30 @@ def _modelled(cases: Sequence[Marked]) -> list[Goal]:
     ratios = [case.reply.over_floor for case in named if case.reply.over_floor is not None]
     nominal = [error for case in _tier(cases, "parameters_only") for error in case.nominal_errors().values()]
     return [
-        _median("parameters: median error", errors, high=0.03),
-        Goal("parameters: 90th percentile of the error", quantile(errors, 0.9), high=0.10, of=len(errors)),
-        Goal("parameters: 90 % intervals cover", covered, low=0.86, high=0.94),
-        Goal(f"held-out residual up to {FLOORED} × floor when rightly named",
-             rate(ratio <= FLOORED for ratio in ratios), low=0.90),
-        _median("parameters of the bench, wrong parameters only: median error", nominal)]
+        _median("parameters, median error", errors, high=0.03),
+        Goal("parameters, 90th percentile", quantile(errors, 0.9), high=0.10, of=len(errors)),
+        Goal("parameters, 90 % intervals cover", covered, low=0.86, high=0.94),
+        Goal(f"held out ≤ {FLOORED} × floor if right", rate(ratio <= FLOORED for ratio in ratios), low=0.90),
+        _median("parameters of the bench, median", nominal)]
 
 
 def _sure(cases: Sequence[Marked], bins: Sequence[ConfidenceBin]) -> list[Goal]:
     found = _confidences(cases)
     return [
-        Goal("confidence: expected calibration error", expected_calibration_error(bins), high=0.05, of=len(found)),
-        Goal(f"accuracy where confidence is at least {SURE}", rate(right for sure, right in found if sure >= SURE),
-             low=0.95)]
+        Goal("confidence: calibration error", expected_calibration_error(bins), high=0.05, of=len(found),
+             percent=False),
+        Goal(f"right where confidence ≥ {SURE}", rate(right for sure, right in found if sure >= SURE), low=0.95)]
 
 
 def _abstained(cases: Sequence[Marked]) -> list[Goal]:
     novel, poor = _tier(cases, "novel"), _tier(cases, "insufficient")
     return [
         Goal("novel: unexplained", rate(case.reply.verdict == "unexplained" for case in novel), low=0.90),
-        Goal("novel: wrongly named", rate(bool(case.reply.named) for case in novel), high=0.05),
+        Goal("novel: something named", rate(bool(case.reply.named) for case in novel), high=0.05),
         Goal("novel: block right", rate(case.block_right for case in novel)),
         Goal("ambiguous: reported as a set", rate(case.set_reported for case in _tier(cases, "ambiguous")), low=0.95),
-        Goal("insufficient: called not testable and not named", rate(case.called_untestable for case in poor)),
+        Goal("ambiguous: resolved by motion", rate(case.resolved for case in _tier(cases, "ambiguous")), low=0.90),
+        Goal("insufficient: called not testable", rate(case.called_untestable for case in poor)),
         Goal("insufficient: something named", rate(bool(case.reply.named) for case in poor))]
 
 
@@ -163,6 +161,7 @@ def _tier(cases: Iterable[Marked], tier: str) -> list[Marked]:
     return [case for case in cases if case.truth.tier == tier]
 
 
-def _median(name: str, values: Iterable[float | None], low: float = 0.0, high: float = inf) -> Goal:
+def _median(name: str, values: Iterable[float | None], low: float = 0.0, high: float = inf,
+            percent: bool = True) -> Goal:
     known = [value for value in values if value is not None]
-    return Goal(name, quantile(known, 0.5), low, high, len(known))
+    return Goal(name, quantile(known, 0.5), low, high, len(known), percent)

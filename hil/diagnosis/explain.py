@@ -37,6 +37,8 @@ MATERIAL = 0.02
 # channel, a tenth in rms, may be its own form, and no second mechanism.
 FORM = 0.01
 
+_COUNTING = 1.25 / np.pi    # a quarter more than counting itself makes
+
 
 @dataclass(frozen=True, eq=False)
 class Rival:
@@ -122,13 +124,14 @@ def noise_ratios(found: Fit, run: Measured) -> dict[str, float]:
 def claimable(term: Term, bench: Bench) -> bool:
     """Whether the values still are what the mechanism's name says, and whether the sensors can tell.
 
-    An error of the linear encoder below a quarter of its count is how counting looks, and no more. Static
-    friction below Coulomb friction is no Stribeck effect, whatever it fits.
+    Counting errs as a sawtooth, whose fundamental is 1/pi of a count: an error of the linear encoder up to there is
+    how counting looks at one feed, and no more. Static friction below Coulomb friction is no Stribeck effect,
+    whatever it fits.
     """
     if term.effect == "stribeck_friction":
         return term.values[0] > bench.axis.physics().coulomb_n_m
     if term.effect == "scale_interpolation_error" and bench.encoders.table is not None:
-        return abs(term.values[0]) > 0.25 * bench.encoders.table.resolution_m
+        return abs(term.values[0]) > _COUNTING * bench.encoders.table.resolution_m
     return True
 
 

@@ -71,16 +71,16 @@ def diagnose_blind(cases: Path, answers: Path, names: Sequence[str], code: str, 
         raise InputError(f"{cases.parent}: was sealed for a diagnosis by other code than this (SHA-256 {code}); "
                          "answers of two would mix: give another --out")
     told(done / len(names))
-    process = subprocess.Popen([sys.executable, "-m", "hil.proof.blind", str(cases.resolve()), str(answers.resolve()),
-                                "--jobs", str(jobs)], stdout=subprocess.PIPE, text=True, start_new_session=True)
-    try:
-        for _ in process.stdout or ():
-            done += 1
-            told(done / len(names))
-        ended = process.wait()
-    except BaseException:
-        os.killpg(process.pid, signal.SIGTERM)      # with the processes that it started
-        raise
+    with subprocess.Popen([sys.executable, "-m", "hil.proof.blind", str(cases.resolve()), str(answers.resolve()),
+                           "--jobs", str(jobs)], stdout=subprocess.PIPE, text=True, start_new_session=True) as process:
+        try:
+            for _ in process.stdout or ():
+                done += 1
+                told(done / len(names))
+            ended = process.wait()
+        except BaseException:
+            os.killpg(process.pid, signal.SIGTERM)      # with the processes that it started
+            raise
     if ended:
         raise HilError(f"{cases}: the blind diagnosis ended with code {ended} before all cases had an answer; run "
                        "the same again to go on")

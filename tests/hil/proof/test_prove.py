@@ -1,0 +1,271 @@
+"""The proof as it is run: plan, seal, the blind process, going on after an interruption, and a small proof itself."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from hil.cli import app
+from hil.errors import HilError, InputError
+from hil.proof.blind import DIAGNOSIS, ERROR
+from hil.proof.conceal import TIERS
+from hil.proof.effects import LIBRARY
+from hil.proof.plan import FULL, Planned, counts, plan
+from hil.proof.run import ANSWERS, diagnose_blind, prove, score_others
+from hil.proof.score import Scores
+from hil.proof.seal import CASES, SEAL, SEALED, code_sha256, draw_cases, read_seal, seal, sha256, unseal
+from hil.report.output import write_json
+from hil.twin.library import BY_ID
+
+SEED, SMALL = 5, 6
+QUICK = (Planned("case_0000", "parameters_only", 3), Planned("case_0001", "null", 8))
+
+
+def quiet(*what: object) -> None:
+    """Nobody listens."""
+
+
+@pytest.fixture(scope="module")
+def sealed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two sealed cases that nobody has diagnosed."""
+    folder = tmp_path_factory.mktemp("sealed")
+    draw_cases(folder, QUICK, 7, 1, quiet)
+    seal(folder, QUICK, "hil prove --cases 2 --seed 7 --out DIR", 7)
+    return folder
+
+
+@pytest.fixture
+def copy(sealed: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(sealed, tmp_path / "copy"))
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A small proof."""
+    folder = tmp_path_factory.mktemp("small")
+    ran = CliRunner().invoke(app, ["prove", "--cases", str(SMALL), "--seed", str(SEED), "--out", str(folder)])
+    assert ran.exit_code == 0, ran.output
+    return folder
+
+
+def data(path: Path) -> Any:
+    return json.loads(path.read_text(encoding="utf-8"))
+
+
+def answer(folder: Path, name: str, **more: Any) -> None:
+    """Put an answer there."""
+    (folder / ANSWERS / name).mkdir(parents=True)
+    write_json(folder / ANSWERS / name / DIAGNOSIS, {"verdict": "no_mismatch", "missing": [], **more})
+
+
+def test_the_full_proof_has_the_cases_that_were_promised() -> None:
+    assert set(FULL) == set(TIERS)
+    assert counts(sum(FULL.values())) == FULL
+    assert (FULL["single"], FULL["pair"], FULL["masked"], FULL["novel"]) == (300, 200, 100, 60)
+    assert FULL["null"] + FULL["parameters_only"] == 300
+
+
+@pytest.mark.parametrize("cases", [1, 6, 9, 40, 333])
+def test_a_plan_mixes_the_tiers_in_their_shares(cases: int) -> None:
+    planned = plan(cases, 3)
+    assert planned == plan(cases, 3)
+    assert planned != plan(cases, 4)
+    assert [case.name for case in planned] == [f"case_{place:04d}" for place in range(cases)]
+    found = Counter(case.tier for case in planned)
+    assert all(abs(found[tier] - cases * FULL[tier] / sum(FULL.values())) < 1.0 for tier in TIERS)
+    for tier in found:
+        numbers = sorted(case.number for case in planned if case.tier == tier)
+        assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
+    if cases >= 40:
+        tiers = [case.tier for case in planned]
+        assert tiers != sorted(tiers, key=TIERS.index)
+
+
+@pytest.mark.parametrize("cases", [0, -3, 10_001])
+def test_a_plan_of_no_cases_is_refused(cases: int) -> None:
+    with pytest.raises(InputError, match=rf"--cases: given {cases}, allowed 1 to 10000"):
+        plan(cases, 1)
+
+
+def test_a_seal_holds_the_truth_and_every_file(sealed: Path) -> None:
+    about = data(sealed / SEAL)
+    assert about["truths_sha256"] == sha256(sealed / SEALED / "truths.json")
+    assert (about["seed"], about["cases"], about["code_sha256"]) == (7, 2, code_sha256())
+    assert {path.name for path in (sealed / SEALED).iterdir()} == {"truths.json"}
+    truths = unseal(sealed)
+    assert [(truths[case.name].tier, truths[case.name].number) for case in QUICK] == [
+        (case.tier, case.number) for case in QUICK]
+    for name, entry in data(sealed / SEALED / "truths.json").items():
+        assert set(entry["sha256"]) == {"train_1.parquet", "train_2.parquet", "holdout.parquet", "bench.yaml"}
+        for file, digest in entry["sha256"].items():
+            assert sha256(sealed / CASES / name / file) == digest
+
+
+def test_what_a_diagnosis_gets_says_nothing_of_the_truth(sealed: Path) -> None:
+    words = (*BY_ID, *TIERS, "truth", "novel")
+    for path in (sealed / CASES).rglob("*"):
+        assert not any(word in path.name for word in words)
+    for path in (sealed / CASES).rglob("bench.yaml"):
+        assert not any(word in path.read_text() for word in (*BY_ID, "novel"))
+
+
+@pytest.mark.parametrize("file", ["train_1.parquet", "holdout.parquet", "bench.yaml"])
+def test_the_seal_notices_a_changed_file(copy: Path, file: str) -> None:
+    path = copy / CASES / "case_0001" / file
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
+    with pytest.raises(HilError, match=r"case_0001: recordings or bench are not what was sealed"):
+        unseal(copy)
+
+
+def test_the_seal_notices_a_file_too_many_and_one_too_few(copy: Path) -> None:
+    (copy / CASES / "case_0000" / "hint.txt").write_text("it is the backlash")
+    with pytest.raises(HilError, match=r"case_0000: recordings or bench are not what was sealed"):
+        unseal(copy)
+    shutil.rmtree(copy / CASES / "case_0000")
+    with pytest.raises(HilError, match=r"case_0000: recordings or bench are not what was sealed"):
+        unseal(copy)
+
+
+def test_the_seal_notices_a_changed_truth(copy: Path) -> None:
+    path = copy / SEALED / "truths.json"
+    truths = data(path)
+    truths["case_0000"]["truth"]["verdict"] = "no_mismatch"
+    write_json(path, truths)
+    with pytest.raises(HilError, match=r"truths.json: is not what was sealed \(SHA-256 [0-9a-f]{64}\)"):
+        unseal(copy)
+    path.unlink()
+    with pytest.raises(HilError, match=r"truths.json: is not what was sealed"):
+        unseal(copy)
+    (copy / SEAL).unlink()
+    with pytest.raises(HilError, match=r"nothing is sealed here"):
+        unseal(copy)
+
+
+def test_drawing_goes_on_where_it_was_interrupted(copy: Path, sealed: Path) -> None:
+    truths = data(copy / SEALED / "truths.json")
+    # as it was when one case stood, and of the other its first recording
+    (copy / SEAL).unlink()
+    (copy / SEALED / "truths.json").unlink()
+    write_json(copy / SEALED / "case_0000.json", truths["case_0000"])
+    for file in ("train_2.parquet", "holdout.parquet", "bench.yaml"):
+        (copy / CASES / "case_0001" / file).unlink()
+    before = (copy / CASES / "case_0000" / "train_1.parquet").stat().st_mtime_ns
+    with pytest.raises(InputError, match=r"case_0000.json: given a case of another plan, allowed one of --seed 8"):
+        draw_cases(copy, QUICK, 8, 1, quiet)
+    shares: list[float] = []
+    draw_cases(copy, QUICK, 7, 1, shares.append)
+    about = seal(copy, QUICK, "hil prove --cases 2 --seed 7 --out DIR", 7)
+    assert shares == [1.0]
+    assert (copy / CASES / "case_0000" / "train_1.parquet").stat().st_mtime_ns == before
+    assert about["truths_sha256"] == data(sealed / SEAL)["truths_sha256"]
+
+
+def test_answers_are_kept_and_scored(copy: Path) -> None:
+    for name in ("case_0000", "case_0001"):
+        answer(copy, name, runtime_s=1.0)
+    told: list[str] = []
+    found = prove(copy, QUICK, 7, 1, told.append, quiet)
+    assert told == [f"sealed: SHA-256 {data(copy / SEAL)['truths_sha256']}, 2 cases, {data(copy / SEAL)['sealed_at']}"]
+    assert [case.right for case in found.cases] == [False, True]
+    (copy / "peers" / "silent").mkdir(parents=True)
+    assert {name: [case.reply.verdict for case in other.cases] for name, other in score_others(copy).items()} == {
+        "silent": ["no_answer", "no_answer"]}
+
+
+def test_another_plan_other_code_and_another_folder_are_refused(copy: Path, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"seal.json: given hil prove --cases 2 --seed 9 .*, allowed what was sealed"):
+        prove(copy, QUICK, 9, 1, quiet, quiet)
+    write_json(copy / SEAL, data(copy / SEAL) | {"code_sha256": "0" * 64})
+    with pytest.raises(InputError, match=r"was sealed for a diagnosis by other code"):
+        prove(copy, QUICK, 7, 1, quiet, quiet)
+    (tmp_path / "notes.txt").write_text("mine")
+    with pytest.raises(InputError, match=r"holds other things than a proof"):
+        prove(tmp_path, QUICK, 7, 1, quiet, quiet)
+    (copy / SEAL).write_text("{")
+    with pytest.raises(HilError, match=r"seal.json: cannot be read"):
+        read_seal(copy)
+
+
+def test_the_blind_process_imports_nothing_that_knows(tmp_path: Path) -> None:
+    """All that a diagnosis of a case loads, by what it would load: a case without recordings."""
+    (tmp_path / "cases" / "empty").mkdir(parents=True)
+    code = ("import sys; from pathlib import Path; from hil.proof.blind import diagnose_case;"
+            f"diagnose_case(Path({str(tmp_path / 'cases' / 'empty')!r}), Path({str(tmp_path / 'answer')!r}));"
+            "print(*sorted(name for name in sys.modules if name.split('.')[0] in ('hil', 'drivers')))")
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    loaded = set(ran.stdout.split())
+    assert "hil.diagnosis.diagnose" in loaded
+    assert {name for name in loaded if name.startswith("hil.proof.")} == {"hil.proof.blind"}
+    assert not {name for name in loaded if name.startswith("drivers.sim") or name in ("hil.simulated", "hil.run")}
+    assert data(tmp_path / "answer" / ERROR)["kind"] == "InputError"
+
+
+def test_a_case_that_fails_is_an_answer_and_not_tried_again(tmp_path: Path) -> None:
+    for name in ("one", "two"):
+        (tmp_path / CASES / name).mkdir(parents=True)
+    answer(tmp_path, "two")
+    shares: list[float] = []
+    for _ in range(2):
+        diagnose_blind(tmp_path / CASES, tmp_path / ANSWERS, ["one", "two"], code_sha256(), 2, shares.append)
+    assert shares == [0.5, 1.0]
+    assert "holdout" in data(tmp_path / ANSWERS / "one" / ERROR)["error"]
+    assert not (tmp_path / ANSWERS / "two" / ERROR).exists()
+
+
+def test_a_small_proof_finds_what_is_concealed(small: Path) -> None:
+    found = data(small / "scores.json")
+    assert len(found["cases"]) == SMALL
+    assert len({case["tier"] for case in found["cases"]}) == SMALL
+    assert all(case["verdict"] not in ("error", "no_answer") for case in found["cases"])
+    concealing = [case for case in found["cases"] if case["concealed"]]
+    assert sum(bool({one["effect"] for one in case["concealed"]} & {one["effect"] for one in case["named"]})
+               for case in concealing) >= len(concealing) / 2  # fmt: skip
+    assert sum(bool(case["named"]) for case in found["cases"] if not case["concealed"]) <= 1
+    assert (small / "report.html").exists()
+
+
+def test_the_seal_is_older_than_every_answer_and_still_holds(small: Path) -> None:
+    sealed_at = (small / SEAL).stat().st_mtime_ns
+    answers = list((small / ANSWERS).rglob(DIAGNOSIS))
+    assert len(answers) == SMALL
+    assert all(path.stat().st_mtime_ns > sealed_at for path in answers)
+    assert len(unseal(small)) == SMALL
+
+
+def test_the_blind_process_needs_the_recordings_and_nothing_else(small: Path, tmp_path: Path) -> None:
+    """The quickest case alone in another folder, without a truth on the way: the same answer but for its time."""
+    quickest = min(data(small / "scores.json")["cases"], key=lambda case: case["runtime_s"])["name"]
+    shutil.copytree(small / CASES / quickest, tmp_path / "given" / "x")
+    diagnose_blind(tmp_path / "given", tmp_path / ANSWERS, ["x"], code_sha256(), 1, quiet)
+    first, again = (data(path / DIAGNOSIS) for path in (small / ANSWERS / quickest, tmp_path / ANSWERS / "x"))
+    assert (again["verdict"], [found["effect"] for found in again["missing"]]) == (
+        first["verdict"], [found["effect"] for found in first["missing"]])
+    for name, correction in first["parameter_corrections"].items():
+        assert again["parameter_corrections"][name]["value"] == pytest.approx(correction["value"], rel=1e-6)
+
+
+@pytest.mark.long
+def test_forty_cases(tmp_path: Path) -> None:
+    """What hil prove does when nothing else is said, with wide margins."""
+    planned = plan(40, 1)
+    found: Scores = prove(tmp_path, planned, 1, 2, quiet, quiet)
+    measured = {goal.name: goal.value for goal in found.goals}
+    least = {"detected where above the floor": 0.8, "singles: named first": 0.6, "singles: in the set named first": 0.7,
+             "pairs: at least one named": 0.6, "block right": 0.6, "right where confidence ≥ 0.9": 0.6}
+    assert {name: measured[name] for name, value in least.items() if (measured[name] or 0.0) < value} == {}
+    most = {"nulls: something named": 0.2, "wrong parameters: something named": 0.2, "parameters, median error": 0.1}
+    assert {name: measured[name] for name, value in most.items() if (measured[name] or 0.0) > value} == {}
+    effects = [case.concealed.effect for case in found.of_tier("single") if case.concealed]
+    assert len(set(effects)) == len(effects) <= len(LIBRARY)
+    assert np.all([case.reply.verdict != "error" for case in found.cases])

@@ -22,13 +22,14 @@ def prove(
     import os
 
     from hil.errors import InputError
-    from hil.proof.page import HEADERS, goal_row, write_proof
+    from hil.proof.page import write_proof
     from hil.proof.plan import FULL, plan
     from hil.proof.run import prove as run
     from hil.proof.run import score_others
+    from hil.proof.tables import HEADERS, goal_row
 
     if full and cases is not None:
-        raise InputError("--full: given with --cases, allowed one of them")
+        raise InputError(f"--full: given with --cases {cases}, allowed one of them")
     count = sum(FULL.values()) if full else 40 if cases is None else cases
     planned = plan(count, seed)
     with progress() as tell:

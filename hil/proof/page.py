@@ -1,29 +1,34 @@
-"""The page of a proof: goals beside what was measured, pictures, the worst cases, and all numbers as scores.json."""
+"""The results of a proof: the page with its pictures, the same tables as Markdown, and all numbers as scores.json."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from math import inf, isfinite
+from collections.abc import Mapping, Sequence
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from hil.diagnosis.wording import title
 from hil.proof import pictures
 from hil.proof.marking import Marked
 from hil.proof.score import Goal, Scores, lead
-from hil.proof.seal import CASES, read_seal
-from hil.proof.statistics import Rate
+from hil.proof.seal import read_seal
+from hil.proof.statistics import Rate, quantile
+from hil.proof.tables import (
+    Table,
+    checking,
+    effects_table,
+    goals_table,
+    others_table,
+    power_table,
+    verdicts_table,
+    worst_tables,
+)
 from hil.proof.tallies import by_effect, confusion, power, verdicts
 from hil.report.figures import save
 from hil.report.look import digits
-from hil.report.output import write_json
+from hil.report.output import write_json, write_text
 from hil.report.page import Number, Page
 
-SCORES, REPORT = "scores.json", "report.html"
-HEADERS = ("", "goal", "measured", "95 %", "of", "reached")
-_WORST = 5
+SCORES, REPORT, MARKDOWN = "scores.json", "report.html", "proof.md"
 _PICTURES = (
     ("power", pictures.power_figure, "Share of the cases of the ladder that are found, over the size of what is "
      "concealed: what it changes in the recordings beyond anything that other nominal parameters could, over the "
@@ -38,128 +43,72 @@ _PICTURES = (
 
 
 def write_proof(scores: Scores, others: Mapping[str, Scores], folder: Path) -> None:
-    """Write report.html with its PNGs, and scores.json; `others` are those of other methods on the same cases."""
+    """Write report.html with its PNGs, proof.md and scores.json; `others` are the scores of other methods."""
     goals = (*scores.goals, *((lead(scores, others),) if others else ()))
     seal = read_seal(folder) or {}
     missed = [goal for goal in goals if goal.met is False]
     told = sum(goal.met is not None for goal in goals)
-    page = Page("Proof: concealed effects, diagnosed blind",
-                f"{len(scores.cases)} cases, seed {seal['seed']}, sealed {seal['sealed_at']}",
-                f"{told - len(missed)} of {told} goals reached."
-                + (f" Not reached: {', '.join(goal.name for goal in missed)}." if missed else ""), not missed)
-    page.heading("Goals")
-    page.table(HEADERS, [goal_row(goal) for goal in goals], mark=5)
-    if others:
-        _beside(page, scores, others)
-    page.heading("Verdicts")
-    page.table(("tier", "verdicts"), [
-        (title(tier), ", ".join(f"{title(verdict)} {number}" for verdict, number in found.items()))
-        for tier, found in verdicts(scores.cases).items()])
+    heading, about = "Proof: concealed effects, diagnosed blind", (
+        f"{len(scores.cases)} cases, seed {seal['seed']}, sealed {seal['sealed_at']}")
+    verdict = f"{told - len(missed)} of {told} goals reached." + (
+        f" Not reached: {', '.join(goal.name for goal in missed)}." if missed else "")
+    before = [goals_table(goals), *([others_table(scores, others)] if others else []), verdicts_table(scores)]
+    after = [effects_table(scores), *worst_tables(scores)]
+
+    page = Page(heading, about, verdict, not missed)
+    for table in before:
+        _add(page, table)
     for name, draw, caption in _PICTURES:
         figure = draw(scores)
         if figure is not None:
-            page.heading(title(name).capitalize())
+            page.heading(name.capitalize())
             page.picture(save(figure, folder / f"{name}.png"), caption)
-    _effects(page, scores)
-    _worst(page, scores)
+    for table in after:
+        _add(page, table)
     page.heading("How to check it")
-    page.items([
-        f"What is concealed was written to sealed/truths.json before any diagnosis; its SHA-256 is "
-        f"{seal['truths_sha256']}. It holds the SHA-256 of every recording and bench.",
-        "The diagnosis ran in a process of its own that is given the folder of recordings: python -m hil.proof.blind "
-        "cases answers gives the same answers without sealed/ on the machine.",
-        f"Drawn and diagnosed by {seal['command']}, commit {seal['git_commit'] or 'unknown'}"
-        f"{' with changes' if seal['git_changed'] else ''}, "
-        + ", ".join(f"{name} {version}" for name, version in seal["versions"].items()) + "."])
+    page.items(checking(seal))
+    page.write(folder / REPORT)
+    parts = [f"# {heading}", f"{about}. {_time(scores)}{verdict}",
+             *(_markdown(table) for table in (*before, power_table(scores), *after)),
+             "## How to check it", "\n".join(f"- {text}" for text in checking(seal))]
+    write_text(folder / MARKDOWN, "\n\n".join(part for part in parts if part) + "\n")
     write_json(folder / SCORES, _scores_json(scores, goals, seal)
                | {"others": {name: [_goal_json(goal) for goal in other.goals] for name, other in others.items()}})
-    page.write(folder / REPORT)
 
 
-def goal_row(goal: Goal) -> tuple[str, ...]:
-    """A row of the table of goals."""
-    name = f"{goal.name} ({title(goal.detail)})" if goal.detail else goal.name
-    interval = ""
-    if isinstance(goal.measured, Rate) and goal.measured.of:
-        interval = "{:.1f}–{:.1f} %".format(*(100.0 * value for value in goal.measured.interval))
-    return (name, _wanted(goal), Number(_text(goal, goal.value)), Number(interval),
-            Number(str(goal.measured.of if isinstance(goal.measured, Rate) else goal.of)),
-            {None: "–", True: "yes", False: "no"}[goal.met])
-
-
-def _wanted(goal: Goal) -> str:
-    low, high = _text(goal, goal.low), _text(goal, goal.high)
-    if (goal.low, goal.high) == (0.0, inf):
-        return "–"
-    if goal.low == 0.0:
-        return f"≤ {high}"
-    return f"≥ {low}" if goal.high == inf else f"{low.removesuffix(' %')}–{high}"
-
-
-def _text(goal: Goal, value: float | None) -> str:
-    if value is None:
-        return "–"
-    if not isfinite(value):
-        return "none given"
-    return f"{digits(100.0 * value)} %" if goal.percent else digits(value)
-
-
-def _beside(page: Page, scores: Scores, others: Mapping[str, Scores]) -> None:
-    """Other methods on the same cases, by the same score."""
-    page.heading("Beside other methods")
-    page.text("The same recordings, the same score. What a method does not say is not scored.")
-    rows = {name: {goal.name: goal for goal in other.goals} for name, other in others.items()}
-    page.table(("", "this diagnosis", *rows),
-               [(goal.name, Number(_text(goal, goal.value)),
-                 *(Number(_text(found[goal.name], found[goal.name].value)) for found in rows.values()))
-                for goal in scores.goals if isinstance(goal.measured, Rate)
-                and any(found[goal.name].value is not None for found in rows.values())])
-
-
-def _effects(page: Page, scores: Scores) -> None:
-    singles = scores.of_tier("single")
-    if not singles:
+def _add(page: Page, table: Table) -> None:
+    if not table.rows:
         return
-    page.heading("Singles, effect by effect")
-    columns = [by_effect(singles, lambda case: case.top), by_effect(singles, lambda case: case.in_set),
-               by_effect(singles, lambda case: not case.spurious), by_effect(singles, lambda case: case.block_right)]
-    page.table(("effect", "cases", "named first", "in the set", "nothing else named", "block right"),
-               [(title(effect), Number(str(columns[0][effect].of)),
-                 *(Number(f"{100.0 * (column[effect].value or 0.0):.0f} %") for column in columns))
-                for effect in columns[0]])
+    if table.heading:
+        page.heading(table.heading)
+    if table.text:
+        page.text(table.text)
+    page.table(table.headers, table.rows, table.mark)
 
 
-def _worst(page: Page, scores: Scores) -> None:
-    """The cases that are wrong in the surest way: by the confidence of what is not there, then by size."""
-    wrong = sorted((case for case in scores.cases if not case.right), reverse=True,
-                   key=lambda case: (max((named.confidence or 0.0 for named in case.spurious), default=0.0), case.size))
-    page.heading(f"The worst cases of {len(wrong)} that are not wholly right" if wrong else "Every answer is right")
-    for case in wrong[:_WORST]:
-        truth, reply = case.truth, case.reply
-        hidden = [f"{title(effect.effect)}{f' ({effect.form})' if effect.form else ''}, {digits(effect.size)} × the "
-                  "noise: " + ", ".join(f"{name} {digits(value, 4)}" for name, value in effect.parameters.items())
-                  for effect in truth.effects]
-        page.table((truth.name, case.wrong), [
-            ("tier and axis", f"{title(truth.tier)}, {title(truth.axis)}"),
-            ("concealed", "; ".join(hidden) or "nothing"), ("verdict", title(reply.verdict)),
-            ("named", "; ".join(_finding(case, index) for index in range(len(reply.named))) or "nothing"),
-            ("in its words", reply.statement),
-            ("to see it", f"hil diagnose {CASES}/{truth.name}/train_*.parquet --validate {CASES}/{truth.name}/"
-                          f"holdout.parquet --bench {CASES}/{truth.name}/bench.yaml")])
+def _markdown(table: Table) -> str:
+    """A table in Markdown with its heading; empty where it has no rows."""
+    if not table.rows:
+        return ""
+    right = [all(isinstance(row[at], Number) for row in table.rows) for at in range(len(table.headers))]
+    lines = [table.headers, ["---:" if number else "---" for number in right], *table.rows]
+    parts = [f"## {table.heading}" if table.heading else "", table.text,
+             "\n".join("| " + " | ".join(cell.replace("|", "/") for cell in line) + " |" for line in lines)]
+    return "\n\n".join(part for part in parts if part)
 
 
-def _finding(case: Marked, index: int) -> str:
-    named = case.reply.named[index]
-    parts = [title(named.effect)]
-    parts += [f"or {', '.join(map(title, named.equivalents))}"] if named.equivalents else []
-    parts += [f"confidence {100.0 * named.confidence:.0f} %"] if named.confidence is not None else []
-    parts += [f"{name} {digits(value, 4)}" for name, (value, _) in named.parameters.items()]
-    return ", ".join(parts)
+def _times(scores: Scores) -> list[float]:
+    return [case.reply.runtime_s for case in scores.cases if case.reply.runtime_s is not None]
 
 
-def _scores_json(scores: Scores, goals: tuple[Goal, ...], seal: dict[str, Any]) -> dict[str, Any]:
-    times = [case.reply.runtime_s for case in scores.cases if case.reply.runtime_s is not None]
-    singles = scores.of_tier("single")
+def _time(scores: Scores) -> str:
+    times = _times(scores)
+    return (f"A diagnosis took {digits(quantile(times, 0.5) or 0.0)} s in the median, {digits(max(times))} s at most. "
+            if times else "")
+
+
+def _scores_json(scores: Scores, goals: Sequence[Goal], seal: dict[str, Any]) -> dict[str, Any]:
+    times, singles = _times(scores), scores.of_tier("single")
     return {
         "schema_version": 1, "seal": seal, "goals": [_goal_json(goal) for goal in goals],
         "verdicts": verdicts(scores.cases), "confusion": confusion(scores.cases),
@@ -168,8 +117,7 @@ def _scores_json(scores: Scores, goals: tuple[Goal, ...], seal: dict[str, Any]) 
                   for rung in power(scores.cases)],
         "calibration": [{"confidence": found.confidence, "right": _rate_json(found.right)}
                         for found in scores.calibration],
-        "runtime_s": {"median": float(np.median(times)), "p90": float(np.quantile(times, 0.9)), "longest": max(times)}
-        if times else None,
+        "runtime_s": {"median": quantile(times, 0.5), "p90": quantile(times, 0.9), "longest": max(times, default=None)},
         "cases": [_case_json(case) for case in scores.cases]}
 
 

@@ -197,6 +197,13 @@ def test_another_plan_other_code_and_another_folder_are_refused(copy: Path, tmp_
         read_seal(copy)
 
 
+def test_all_and_some_at_once_is_refused(tmp_path: Path) -> None:
+    ran = CliRunner().invoke(app, ["prove", "--full", "--cases", "3", "--out", str(tmp_path / "new")])
+    assert isinstance(ran.exception, InputError)
+    assert str(ran.exception) == "--full: given with --cases 3, allowed one of them"
+    assert not (tmp_path / "new").exists()
+
+
 def test_the_blind_process_imports_nothing_that_knows(tmp_path: Path) -> None:
     """All that a diagnosis of a case loads, by what it would load: a case without recordings."""
     (tmp_path / "cases" / "empty").mkdir(parents=True)

@@ -14,11 +14,12 @@ from hil.proof.answers import block, same_law
 from hil.proof.blind import DIAGNOSIS, ERROR
 from hil.proof.conceal import Concealed, Truth
 from hil.proof.marking import Marked
-from hil.proof.page import goal_row, write_proof
+from hil.proof.page import write_proof
 from hil.proof.replies import read_replies, reply_of
 from hil.proof.score import Goal, Scores, lead, score
 from hil.proof.seal import SEAL
 from hil.proof.statistics import Rate, confidence_bins, expected_calibration_error, quantile, rate
+from hil.proof.tables import goal_row
 from hil.proof.tallies import confusion, power, verdicts
 from hil.report.output import write_json
 
@@ -299,13 +300,17 @@ def test_the_page_holds_scores_pictures_and_the_worst_cases(tmp_path: Path) -> N
         "git_commit": None, "git_changed": None, "versions": {"numpy": "2"}})
     write_proof(found, {"other": found}, tmp_path)
     pictures = ("power", "confusion", "calibration", "errors", "times")
-    assert {path.name for path in tmp_path.iterdir()} == {SEAL, "scores.json", "report.html",
+    assert {path.name for path in tmp_path.iterdir()} == {SEAL, "scores.json", "report.html", "proof.md",
                                                           *(f"{name}.png" for name in pictures)}
     page = (tmp_path / "report.html").read_text()
     assert "It names constant load, which is not there." in page
     assert "Missing physics: something." in page
     assert "00ff" in page
     assert page.count("data:image/png") == len(pictures)
+    text = (tmp_path / "proof.md").read_text()
+    assert "| nulls: something named | ≤ 1.00 % | 100 % | 20.7–100.0 % | 1 | no |" in text
+    assert "| 5 | 1 | 100 % | 20.7–100.0 % | 100 % | 20.7–100.0 % |" in text
+    assert "A diagnosis took 12.0 s in the median, 12.0 s at most." in text
     data = json.loads((tmp_path / "scores.json").read_text())
     assert data["goals"][0] == {"name": "nulls: something named", "detail": "", "low": 0.0, "high": 0.01, "value": 1.0,
                                 "hits": 1, "of": 1, "interval_95": pytest.approx([0.20654, 1.0], abs=1e-5),

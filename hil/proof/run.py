@@ -18,6 +18,8 @@ from hil.proof.score import Scores, score
 from hil.proof.seal import CASES, SEAL, SEALED, code_sha256, draw_cases, read_seal, seal, unseal
 
 ANSWERS, PEERS = "answers", "peers"
+# Processes that are stopped by ctrl-C leave semaphores, which are then cleared away: nothing that a user can act on.
+_UNCLEAN = "ignore::UserWarning:multiprocessing.resource_tracker"
 
 Say = Callable[[str], None]                      # what is to be kept
 Tell = Callable[[str, float | None], None]       # what is going on, and the share that is done
@@ -71,8 +73,9 @@ def diagnose_blind(cases: Path, answers: Path, names: Sequence[str], code: str, 
         raise InputError(f"{cases.parent}: was sealed for a diagnosis by other code than this (SHA-256 {code}); "
                          "answers of two would mix: give another --out")
     told(done / len(names))
-    with subprocess.Popen([sys.executable, "-m", "hil.proof.blind", str(cases.resolve()), str(answers.resolve()),
-                           "--jobs", str(jobs)], stdout=subprocess.PIPE, text=True, start_new_session=True) as process:
+    blind = [sys.executable, "-W", _UNCLEAN, "-m", "hil.proof.blind", str(cases.resolve()), str(answers.resolve()),
+             "--jobs", str(jobs)]
+    with subprocess.Popen(blind, stdout=subprocess.PIPE, text=True, start_new_session=True) as process:
         try:
             for _ in process.stdout or ():
                 done += 1

@@ -1,0 +1,55 @@
+"""A real axis: what the recording of the EMPS benchmark holds beside one mass with symmetric friction."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import pytest
+from diagnosis_runs import RIG
+
+from hil.bench import Bench, load_bench
+from hil.compare import compare
+from hil.diagnosis.diagnose import Diagnosis, diagnose
+from hil.importing import import_recording
+from hil.recording import Recording
+
+EMPS = RIG.parent / "emps" / "DATA_EMPS.mat"
+
+
+def recording() -> Recording:
+    if not EMPS.is_file():
+        pytest.skip("the EMPS recording is not beside the repository")
+    return import_recording(EMPS, "emps")
+
+
+@cache
+def diagnosed() -> Diagnosis:
+    """The diagnosis, made once."""
+    return diagnose([recording()], [], load_bench("emps_symmetric"))
+
+
+@pytest.mark.long
+def test_what_the_real_axis_does_is_found() -> None:
+    result = diagnosed().result
+    assert result.verdict == "missing_physics"
+    found = {(finding.effect, finding.variant) for finding in result.missing}
+    assert result.missing[0].effect == "asymmetric_friction"
+    assert {("asymmetric_friction", "with speed"), ("nonlinear_viscous_friction", "thinning lubricant")} <= found
+    cogging = next(finding for finding in result.missing if finding.effect == "cogging_torque")
+    assert cogging.parameters["cycles_per_rev"].value == pytest.approx(1.0, abs=0.005)
+
+
+@pytest.mark.long
+def test_the_held_out_force_falls_below_a_third() -> None:
+    force = diagnosed().result.fit["force_n"]
+    assert force.mode == "closed_loop"
+    assert force.validate_ is not None
+    assert force.validate_.after_rms < force.validate_.before_rms / 3.0
+
+
+@pytest.mark.long
+def test_the_diagnosed_bench_says_the_same_to_a_comparison() -> None:
+    found = diagnosed()
+    before, after = (compare(recording(), Bench.model_validate(bench.model_dump())).channel("force_n").rms
+                     for bench in (found.owner, found.bench))
+    assert after < before / 3.0

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from math import pi, remainder
 
+from hil.diagnosis.wording import title
 from hil.proof.answers import same_law
 from hil.proof.conceal import Concealed, Truth
-from hil.proof.replies import Named, Reply
+from hil.proof.replies import ABSENT, FAILED, Named, Reply
 
 NORMAL_90 = 1.645            # standard errors to either side of a 90 % interval
 ABOVE_FLOOR = 1.0            # size, in units of noise, from which on an effect is above the noise floor
@@ -109,6 +110,8 @@ class Marked:
     @property
     def right(self) -> bool:
         """Whether the answer as a whole is the right one: everything that is there named, and nothing else."""
+        if self.reply.verdict in (FAILED, ABSENT):
+            return False
         if self.truth.tier == "ambiguous":
             return self.set_reported and not self.spurious
         if self.truth.tier == "insufficient":
@@ -124,7 +127,7 @@ class Marked:
         """What is wrong with the answer, in words; empty where it is right."""
         if self.right:
             return ""
-        if self.reply.verdict in ("error", "no_answer"):
+        if self.reply.verdict in (FAILED, ABSENT):
             return "There is no diagnosis."
         if self.spurious:
             return f"It names {_listed(named.effect for named in self.spurious)}, which is not there."
@@ -135,7 +138,7 @@ class Marked:
         unnamed = [effect.effect for effect, found in zip(self.truth.effects, self.matched, strict=True) if not found]
         if self.truth.tier != "novel" and unnamed:
             return f"It does not name {_listed(unnamed)}."
-        return f"The verdict is {self.reply.verdict} instead of {self.truth.verdict}."
+        return f"The verdict is {title(self.reply.verdict)} instead of {title(self.truth.verdict)}."
 
     def named_right(self, named: Named) -> bool:
         """Whether what a finding names is there."""
@@ -229,6 +232,6 @@ def _error(name: str, value: float, known: Mapping[str, float]) -> float:
     return difference / scale if scale else float(difference > 0.0)
 
 
-def _listed(names: object, last: str = "and") -> str:
-    words = [str(name).replace("_", " ") for name in names]    # type: ignore[attr-defined]
+def _listed(names: Iterable[str], last: str = "and") -> str:
+    words = [title(name) for name in names]
     return f" {last} ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)

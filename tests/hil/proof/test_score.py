@@ -147,6 +147,7 @@ def test_below_the_floor_silence_is_right_and_a_wrong_name_is_not() -> None:
     assert marked(of, finding("backlash")).right
     assert not marked(of, finding("torque_ripple")).right
     assert not marked(truth("ladder", concealed("backlash", size=1.5)), verdict="no_mismatch").right
+    assert not marked(of, verdict="error").right
 
 
 def test_parameter_errors_are_relative_and_harmonics_weighted() -> None:

@@ -1,0 +1,86 @@
+"""Everything at once: all mechanisms of the library fitted together in the twin, those that differ from nothing named.
+
+    z = strength / standard error,  named where z > 2
+
+It is given the diagnosis's own twin, blocks and fit, and for each mechanism the start that the diagnosis's screen likes
+best, weakened to the share of the residual that it explains; what it lacks is the search. The mechanism without which
+the residual grows most comes first; one that changes nothing to speak of is not named.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hil.diagnosis import search
+from hil.diagnosis.explain import MATERIAL
+from hil.diagnosis.fit import POOL, Fit, evaluate, fit
+from hil.diagnosis.model import Term
+from hil.diagnosis.screen import Lead
+from hil.diagnosis.starts import Start, starts
+from hil.measured import Measured
+from hil.proof.peers.case import Answer, read_case
+
+EVALUATIONS = 12         # a minute on two cores for half a minute of recordings
+SIGNIFICANT = 2.0        # standard errors
+# The parameter that says how strong a mechanism is, where its start cannot be scaled and it is not the first.
+_STRENGTH = {"structural_mode": 2}
+# No value of these is without effect but infinity or that of another parameter: that they change nothing says the same.
+_NEVER_ZERO = ("stribeck_friction", "presliding_hysteresis", "torque_saturation")
+
+
+def fit_everything(folder: Path, evaluations: int = EVALUATIONS) -> Answer:
+    """The answer of one fit of everything about a case folder."""
+    case = read_case(folder)
+    begun = {start.effect: start for start in starts(case.scene, case.bench)}
+    terms = tuple(_weak(lead, begun[lead.term.effect]) for lead in search.leads(case.nominal, case.train))
+    model = replace(case.nominal.model, terms=terms)
+    found = fit(model, case.train, np.concatenate([case.nominal.x, model.initial()[case.nominal.x.size:]]),
+                evaluations=evaluations)
+    significant = [index for index, term in enumerate(terms)
+                   if term.effect in _NEVER_ZERO or _strength_over_error(found, index, begun) > SIGNIFICANT]
+    grown = dict(zip(significant, POOL.map(lambda index: _without(found, index, case.train), significant), strict=True))
+    named = sorted((index for index in significant if grown[index] > MATERIAL * found.residuals.size),
+                   key=lambda index: -grown[index])
+    return case.answer([terms[index].effect for index in named])
+
+
+def _weak(lead: Lead, start: Start) -> Term:
+    """A lead's term at a strength as small as what it explains."""
+    values = list(lead.term.values)
+    if start.strength >= 0:
+        for n in range(start.harmonics):
+            values[start.strength + 2 * n] *= lead.share
+    return replace(lead.term, values=tuple(values))
+
+
+def _strength_over_error(found: Fit, index: int, begun: dict[str, Start]) -> float:
+    """Strength of a term in standard errors; the logarithm of a value has its relative error."""
+    term = found.model.terms[index]
+    first = found.model.nominal_count + sum(len(other.values) for other in found.model.terms[:index])
+    strength = max(begun[term.effect].strength, 0) if term.effect not in _STRENGTH else _STRENGTH[term.effect]
+    at = first + strength
+    error = _standard_errors(found)[at]
+    value = 1.0 if found.model.coordinates[at].logarithmic else abs(found.x[at])
+    return float(value / max(error, 1e-300))
+
+
+def _standard_errors(found: Fit) -> NDArray[np.float64]:
+    """Of each coordinate, as if all rows were independent: infinite where nothing depends on it."""
+    normal = found.jacobian.T @ found.jacobian
+    size = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    variance = np.diag(np.linalg.pinv(normal / np.outer(size, size), hermitian=True)) * found.reduced
+    return np.asarray(np.where(np.diag(normal) > 0.0, np.sqrt(np.maximum(variance, 0.0)) / size, np.inf))
+
+
+def _without(found: Fit, index: int, runs: Sequence[Measured]) -> float:
+    """By how much the sum of squares grows where a term is taken out of the fit as it stands."""
+    nominal = found.model.nominal_count
+    resolved = found.model.resolved(found.x)[1]
+    rest = replace(found.model, terms=tuple(term for k, term in enumerate(resolved) if k != index))
+    x = np.concatenate([found.x[:nominal], rest.initial()[nominal:]])
+    return evaluate(rest, runs, x).cost - found.cost

@@ -1,0 +1,106 @@
+"""Signals of a recording that regressors are made of: derivatives, directions, and what a late or limited torque is.
+
+All signals of an equation pass the same Gaussian, derivatives pass its derivative: what was equal stays equal. (A local
+polynomial passes less of an acceleration than of a position, which a stiff axis would show as a flexible mode.)
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
+from scipy.signal import bilinear, lfilter
+
+from hil import control
+from hil.bench import Bench
+from hil.measured import Measured
+
+FloatArray = NDArray[np.float64]
+
+SMOOTH_S = 0.002             # standard deviation of the Gaussian: passes some 66 Hz
+_TRUNCATE = 8.0              # standard deviations: derivatives of a constant are zero to rounding
+_REACH = 4.0                 # up to which it sees anything to speak of
+SLIDING_M_S = 1e-4           # at the table: what is slower counts as rest
+
+
+def smooth(values: FloatArray, period_s: float, order: int = 0) -> FloatArray:
+    """A signal (n,) through the Gaussian, or its derivative of an order."""
+    filtered = gaussian_filter1d(values, SMOOTH_S / period_s, order=order, mode="nearest", truncate=_TRUNCATE)
+    return np.asarray(filtered / period_s**order, dtype=np.float64)
+
+
+def curvature(values: FloatArray, period_s: float) -> FloatArray:
+    """Second difference (n,), for a signal that is still to be smoothed."""
+    return np.asarray(np.pad(np.diff(values, 2), 1) / period_s**2, dtype=np.float64)
+
+
+def at_rows(torque: FloatArray) -> FloatArray:
+    """Torque (n,) at the instants of the rows: a row holds its mean over the period that follows."""
+    return np.asarray(0.5 * (torque + np.concatenate([torque[:1], torque[:-1]])), dtype=np.float64)
+
+
+def direction(velocity_m_s: FloatArray) -> FloatArray:
+    """Sign of the last motion (n,): kept while the axis rests."""
+    moving = np.flatnonzero(np.abs(velocity_m_s) > SLIDING_M_S)
+    if not moving.size:
+        return np.zeros(velocity_m_s.size)
+    last = np.searchsorted(moving, np.arange(velocity_m_s.size), side="right") - 1
+    return np.asarray(np.where(last < 0, 0.0, np.sign(velocity_m_s[moving[np.maximum(last, 0)]])), dtype=np.float64)
+
+
+def sliding(velocity_m_s: FloatArray, period_s: float) -> NDArray[np.bool_]:
+    """Rows (n,) at which all that the Gaussian sees slides one way."""
+    window = 2 * round(_REACH * SMOOTH_S / period_s) + 1
+    moving = np.where(np.abs(velocity_m_s) > SLIDING_M_S, np.sign(velocity_m_s), 0.0)
+    return np.asarray(np.abs(np.convolve(moving, np.ones(window), "same")) > window - 0.5, dtype=np.bool_)
+
+
+def since_reversal(position: FloatArray, way: FloatArray) -> FloatArray:
+    """Distance (n,) from where the direction changed last."""
+    turns = np.flatnonzero(np.diff(way, prepend=way[0]) != 0.0)
+    turns = np.concatenate([[0], turns])
+    last = turns[np.searchsorted(turns, np.arange(way.size), side="right") - 1]
+    return np.asarray(np.abs(position - position[last]), dtype=np.float64)
+
+
+def delayed(torque: FloatArray, delay_s: float, period_s: float) -> FloatArray:
+    """A held torque (n,) as its means over each period when it acts late."""
+    whole = math.floor(delay_s / period_s)
+    f = delay_s / period_s - whole
+    rows = np.arange(torque.size) - whole
+    return np.asarray((1.0 - f) * torque[np.maximum(rows, 0)] + f * torque[np.maximum(rows - 1, 0)], dtype=np.float64)
+
+
+def lagged(torque: FloatArray, time_constant_s: float, period_s: float) -> FloatArray:
+    """A held torque (n,) behind a first-order lag, as its means over each period."""
+    pole = math.exp(-period_s / time_constant_s)
+    ends = lfilter([1.0 - pole], [1.0, -pole], torque)
+    begins = np.concatenate([[0.0], ends[:-1]])
+    return np.asarray(torque - (torque - begins) * time_constant_s / period_s * (1.0 - pole), dtype=np.float64)
+
+
+def swayed(acceleration: FloatArray, frequency_hz: float, period_s: float, damping: float = 0.03) -> FloatArray:
+    """Acceleration (n,) of a mass on a spring on what accelerates."""
+    omega = 2.0 * math.pi * frequency_hz
+    b, a = bilinear([omega**2], [1.0, 2.0 * damping * omega, omega**2], 1.0 / period_s)
+    return np.asarray(lfilter(b, a, acceleration), dtype=np.float64)
+
+
+def law(run: Measured, bench: Bench) -> Callable[[FloatArray, float], FloatArray]:
+    """The control law of the bench over a run: motor position (n,) and a velocity filter's time constant [s] ->
+    torque command (n,)."""
+    feedback = run.table_m if run.table_m.size else run.motor
+
+    def command(motor: FloatArray, filter_s: float = 0.0) -> FloatArray:
+        gains = bench.gains
+        if filter_s > 0.0:
+            gains = gains._replace(filter_coefficient=1.0 - math.exp(-gains.period_s / filter_s))
+        state = control.init(float(run.motor[0]), run.start.velocity_m_s / gains.ratio_m_rad, run.start.torque,
+                             gains.period_s, run.start.tick)
+        torque, _ = control.replay(gains, state, run.position_command_m, run.velocity_command_m_s, motor, feedback)
+        return np.asarray(torque, dtype=np.float64)
+
+    return command

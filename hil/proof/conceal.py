@@ -108,7 +108,7 @@ def draw(tier: str, number: int, seed: int, effect: str | None = None, axis: Kin
                       for name, run in zip(RECORDINGS, draft.runs, strict=True)]
         if all(_sound(recording, draft.axis) for recording in recordings):
             name = f"case_{number:04d}"
-            return Case(name, tuple(recordings), draft.axis.bench, _truth(name, tier, number, seed, draft), draft)
+            return Case(name, tuple(recordings), draft.axis.bench, truth_of(name, tier, number, seed, draft), draft)
     raise ValueError(f"tier {tier}: given {effect} on {axis or 'any axis'}, which came to no case on {_AXES} axes; "
                      "leave the effect or the axis out")
 
@@ -138,6 +138,18 @@ def write(case: Case, folder: str | Path) -> Path:
     return place
 
 
+def truth_of(name: str, tier: str, number: int, seed: int, draft: Draft) -> Truth:
+    """What a draft conceals and what is right to answer about it."""
+    axis = draft.axis
+    noise = {"torque": axis.sensors.torque_noise_n_m} | ({"table_m": axis.table_noise_m} if axis.has_table else {})
+    concealed = tuple(
+        Concealed(effect.id, effect.form, dict(effect.parameters), size, answers.same_law(effect.id),
+                  answers.block(effect.id), answers.place(effect, axis), answers.compared(effect, axis))
+        for effect, size in draft.effects)
+    return Truth(name, tier, number, seed, axis.kind, draft.verdict, concealed, draft.rivals, draft.not_testable,
+                 dict(axis.true), dict(axis.believed), noise)
+
+
 def _turn(names: tuple[str, ...], number: int, seed: int) -> str:
     """Every name once in each round of numbers, in another order each time."""
     turn, at = divmod(number, len(names))
@@ -150,14 +162,3 @@ def _sound(recording: Recording, axis: DrawnAxis) -> bool:
     limited = np.abs(recording[names.torque_command]) >= axis.servo.torque_limit_n_m
     lag_m = axis.feed_m_s * (1.0 - axis.servo.velocity_feedforward) / axis.servo.position_gain_1_s
     return bool(np.max(np.abs(error)) < _STOPPED_M + 1.5 * lag_m and np.mean(limited) < _LIMITED)
-
-
-def _truth(name: str, tier: str, number: int, seed: int, draft: Draft) -> Truth:
-    axis = draft.axis
-    noise = {"torque": axis.sensors.torque_noise_n_m} | ({"table_m": axis.table_noise_m} if axis.has_table else {})
-    concealed = tuple(
-        Concealed(effect.id, effect.form, dict(effect.parameters), size, answers.same_law(effect.id),
-                  answers.block(effect.id), answers.place(effect, axis), answers.compared(effect, axis))
-        for effect, size in draft.effects)
-    return Truth(name, tier, number, seed, axis.kind, draft.verdict, concealed, draft.rivals, draft.not_testable,
-                 dict(axis.true), dict(axis.believed), noise)

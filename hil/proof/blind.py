@@ -42,9 +42,13 @@ def diagnose_cases(cases: Annotated[Path, typer.Argument(help="Folder with a fol
     try:
         with ProcessPoolExecutor(jobs, context, _keep_to, (shares,)) as pool:
             running = {pool.submit(diagnose_case, place, answers / place.name): place.name for place in todo}
-            for done in as_completed(running):
-                done.result()
-                print(running[done], flush=True)
+            try:
+                for done in as_completed(running):
+                    done.result()
+                    print(running[done], flush=True)
+            except BaseException:     # stopped, or nobody listens any more: no case is begun
+                pool.shutdown(wait=False, cancel_futures=True)
+                raise
     except BrokenProcessPool:
         typer.echo("a process that diagnosed was ended from outside, perhaps for want of memory; run the same again "
                    "to go on", err=True)

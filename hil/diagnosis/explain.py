@@ -34,8 +34,8 @@ TIED = 10.0             # a rival closer than this is not refuted
 # Below lie the details in which two honest simulations of one axis differ.
 MATERIAL = 0.02
 # The same law may be written in another form. What a term leaves below this share of the energy that it took from a
-# channel, a tenth in rms, may be its own form, and no second mechanism.
-FORM = 0.01
+# channel, a twentieth in rms, may be its own form, and no second mechanism.
+FORM = 0.0025
 
 _COUNTING = 1.25 / np.pi    # a quarter more than counting itself makes
 

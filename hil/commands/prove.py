@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -10,12 +11,21 @@ import typer
 from hil.commands.console import out, progress, table
 
 
+class Plant(StrEnum):
+    """What moves the axes of a proof."""
+
+    SIMULATED = "simulated"
+    MUJOCO = "mujoco"
+
+
 def prove(
     folder: Annotated[Path, typer.Option("--out", help="Folder for cases, answers and scores; one that was "
                                          "interrupted goes on", show_default=False)],
     cases: Annotated[int | None, typer.Option("--cases", help="How many cases; left out: 40")] = None,
     full: Annotated[bool, typer.Option("--full", help="The whole proof, some 1200 cases: takes many hours")] = False,
     seed: Annotated[int, typer.Option(min=0, help="Of the draw")] = 1,
+    plant: Annotated[Plant, typer.Option("--plant", help="What moves the axes: our simulation, or MuJoCo, which must "
+                                         "be installed (make peers)")] = Plant.SIMULATED,
     jobs: Annotated[int | None, typer.Option(min=1, help="Cases diagnosed at once; left out: one per core")] = None,
 ) -> None:
     """Conceal effects in simulated axes, seal what they are, diagnose the recordings blind, unseal and score."""
@@ -23,17 +33,17 @@ def prove(
 
     from hil.errors import InputError
     from hil.proof.page import write_proof
-    from hil.proof.plan import FULL, plan
+    from hil.proof.plan import PLANTS, plan
     from hil.proof.run import prove as run
     from hil.proof.run import score_others
     from hil.proof.tables import HEADERS, goal_row
 
     if full and cases is not None:
         raise InputError(f"--full: given with --cases {cases}, allowed one of them")
-    count = sum(FULL.values()) if full else 40 if cases is None else cases
-    planned = plan(count, seed)
+    count = sum(PLANTS[plant].values()) if full else 40 if cases is None else cases
+    planned = plan(count, seed, plant)
     with progress() as tell:
-        scores = run(folder, planned, seed, jobs or os.cpu_count() or 1, out.print, tell)
+        scores = run(folder, planned, seed, jobs or os.cpu_count() or 1, out.print, tell, plant)
         tell("writing the report", None)
         write_proof(scores, score_others(folder), folder)
     table(HEADERS, [goal_row(goal) for goal in scores.goals])

@@ -14,6 +14,9 @@ from hil.errors import InputError
 FULL: Mapping[str, int] = MappingProxyType({
     "single": 300, "pair": 200, "null": 150, "parameters_only": 150, "masked": 100, "novel": 60, "ladder": 140,
     "ambiguous": 60, "insufficient": 60})
+# MuJoCo moves two-mass axes; three of each effect that can be had there.
+MUJOCO: Mapping[str, int] = MappingProxyType({"single": 45, "parameters_only": 15})
+PLANTS: Mapping[str, Mapping[str, int]] = MappingProxyType({"simulated": FULL, "mujoco": MUJOCO})
 MOST = 10_000        # case folders have four digits
 _NUMBERS = 1_000_000 # that the first case of a tier may have
 
@@ -27,8 +30,8 @@ class Planned:
     number: int
 
 
-def plan(cases: int, seed: int) -> tuple[Planned, ...]:
-    """So many cases, of each tier its share of the full proof, shuffled by the seed.
+def plan(cases: int, seed: int, plant: str = "simulated") -> tuple[Planned, ...]:
+    """So many cases, of each tier its share of the full proof on a plant, shuffled by the seed.
 
     Within a tier numbers are consecutive, so that its effects are drawn equally often. Raises InputError for a
     number of cases that makes no sense.
@@ -37,17 +40,17 @@ def plan(cases: int, seed: int) -> tuple[Planned, ...]:
         raise InputError(f"--cases: given {cases}, allowed 1 to {MOST}")
     random = np.random.default_rng([seed, cases])
     # from another number in each tier: the same number of two tiers is the same effect
-    order = [(tier, first + number) for tier, count in counts(cases).items()
+    order = [(tier, first + number) for tier, count in counts(cases, PLANTS[plant]).items()
              for first in (int(random.integers(_NUMBERS)),) for number in range(count)]
     return tuple(Planned(f"case_{place:04d}", *order[index])
                  for place, index in enumerate(random.permutation(len(order))))
 
 
-def counts(cases: int) -> dict[str, int]:
+def counts(cases: int, full: Mapping[str, int] = FULL) -> dict[str, int]:
     """Cases of each tier in a proof of so many, by largest remainders."""
-    whole = sum(FULL.values())
-    found = {tier: cases * count // whole for tier, count in FULL.items()}
+    whole = sum(full.values())
+    found = {tier: cases * count // whole for tier, count in full.items()}
     missing = cases - sum(found.values())
-    for tier in sorted(FULL, key=lambda tier: -(cases * FULL[tier] % whole))[:missing]:
+    for tier in sorted(full, key=lambda tier: -(cases * full[tier] % whole))[:missing]:
         found[tier] += 1
     return found

@@ -12,7 +12,7 @@ from pathlib import Path
 from hil.errors import HilError, InputError
 from hil.proof.again import AGAIN, record_again
 from hil.proof.blind import answered
-from hil.proof.plan import FULL, Planned
+from hil.proof.plan import PLANTS, Planned
 from hil.proof.replies import read_replies
 from hil.proof.score import Scores, score
 from hil.proof.seal import CASES, SEAL, SEALED, code_sha256, draw_cases, read_seal, seal, unseal
@@ -25,20 +25,22 @@ Say = Callable[[str], None]                      # what is to be kept
 Tell = Callable[[str, float | None], None]       # what is going on, and the share that is done
 
 
-def prove(folder: Path, planned: Sequence[Planned], seed: int, jobs: int, say: Say, tell: Tell) -> Scores:
-    """Do what is still to be done of a proof in `folder`, and score it.
+def prove(folder: Path, planned: Sequence[Planned], seed: int, jobs: int, say: Say, tell: Tell,
+          plant: str = "simulated") -> Scores:
+    """Do what is still to be done of a proof in `folder`, on a plant of `plan.PLANTS`, and score it.
 
     Raises InputError where `folder` holds another proof, HilError where what was sealed has changed or the blind
     process failed.
     """
-    cases = f"--cases {len(planned)}" if len(planned) != sum(FULL.values()) else "--full"
-    command = f"hil prove {cases} --seed {seed} --out DIR"
+    cases = f"--cases {len(planned)}" if len(planned) != sum(PLANTS[plant].values()) else "--full"
+    which = "" if plant == "simulated" else f"--plant {plant} "
+    command = f"hil prove {which}{cases} --seed {seed} --out DIR"
     about = read_seal(folder)
     if about is None:
         if folder.exists() and {path.name for path in folder.iterdir()} - {CASES, SEALED}:
             raise InputError(f"{folder}: holds other things than a proof; give another --out")
         tell("drawing cases", 0.0)
-        draw_cases(folder, planned, seed, jobs, lambda share: tell("drawing cases", share))
+        draw_cases(folder, planned, seed, jobs, lambda share: tell("drawing cases", share), plant)
         about = seal(folder, planned, command, seed)
     elif about["command"] != command:
         raise InputError(f"{folder / SEAL}: given {command}, allowed what was sealed, {about['command']}; or another "

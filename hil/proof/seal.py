@@ -26,6 +26,7 @@ from typing import Any
 
 from hil.errors import HilError, InputError
 from hil.proof.conceal import Concealed, Truth, draw, write
+from hil.proof.mujoco_plant import draw_mujoco
 from hil.proof.plan import Planned
 from hil.report.output import write_json
 
@@ -37,8 +38,9 @@ _LIBRARIES = ("hil-servo", "numpy", "scipy", "numba")
 Told = Callable[[float], None]       # the share that is done
 
 
-def draw_cases(folder: Path, planned: Sequence[Planned], seed: int, jobs: int, told: Told) -> None:
-    """Draw and write cases, several at once; those that stand there already are left alone.
+def draw_cases(folder: Path, planned: Sequence[Planned], seed: int, jobs: int, told: Told,
+               plant: str = "simulated") -> None:
+    """Draw and write cases of a plant, several at once; those that stand there already are left alone.
 
     Raises InputError where `folder` holds cases of another plan.
     """
@@ -52,7 +54,7 @@ def draw_cases(folder: Path, planned: Sequence[Planned], seed: int, jobs: int, t
             raise InputError(f"{part}: given a case of another plan, allowed one of --seed {seed} and as many --cases; "
                              "give another --out")
     with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
-        drawn = [pool.submit(_draw, folder, case, seed) for case in todo]
+        drawn = [pool.submit(_draw, folder, case, seed, plant) for case in todo]
         for done, case_drawn in enumerate(as_completed(drawn), 1):
             case_drawn.result()
             told((len(planned) - len(todo) + done) / len(planned))
@@ -121,8 +123,8 @@ def code_sha256() -> str:
     return digest.hexdigest()
 
 
-def _draw(folder: Path, case: Planned, seed: int) -> None:
-    drawn = draw(case.tier, case.number, seed)
+def _draw(folder: Path, case: Planned, seed: int, plant: str) -> None:
+    drawn = (draw_mujoco if plant == "mujoco" else draw)(case.tier, case.number, seed)
     # the number within the tier would tell the tier
     drawn = replace(drawn, name=case.name, truth=replace(drawn.truth, name=case.name))
     shutil.rmtree(folder / CASES / case.name, ignore_errors=True)

@@ -166,12 +166,12 @@ def _start(gains: control.Gains, channels: Channels, command: FloatArray) -> Sta
 def _noise(bench: Bench, motor: FloatArray, table: FloatArray, command: FloatArray, torque: FloatArray) -> Noise:
     encoder = bench.encoders.motor
     count = encoder.resolution_m if bench.axis.linear else 2.0 * np.pi / encoder.counts_per_rev
-    table_noise = 0.0
+    motor_noise, table_noise = max(_white(motor), (count or 0.0) / np.sqrt(12.0)), 0.0
     if table.size and bench.encoders.table is not None:
-        table_noise = max(_white(table - bench.axis.ratio_m_rad * motor),
-                          bench.encoders.table.resolution_m / np.sqrt(12.0))
+        counting = np.hypot(bench.encoders.table.resolution_m, bench.axis.ratio_m_rad * (count or 0.0)) / np.sqrt(12.0)
+        table_noise = max(_white(table - bench.axis.ratio_m_rad * motor), float(counting))
     of_torque = _white(torque) if np.array_equal(command, torque) else _coloured(torque - command)
-    return Noise(max(_white(motor), (count or 0.0) / np.sqrt(12.0)), table_noise, of_torque)
+    return Noise(motor_noise, table_noise, of_torque)
 
 
 def _white(signal: FloatArray) -> float:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,7 @@ MOST_TERMS = 8          # at once; more than an engineer could act on, and the s
 # 90 starts, which costs 2 log 90 = 9 more.
 NEEDED = 20.0
 TIED = 10.0             # a rival closer than this is not refuted
+_CLEAR = 20.0 * NEEDED  # evidence that a few more steps of a fit do not change the answer of
 # A term must also matter: take so much energy away, in units of the noise's: 14 % of the noise in rms.
 # Below lie the details in which two honest simulations of one axis differ.
 MATERIAL = 0.02
@@ -70,7 +72,7 @@ def explain(bench: Bench, runs: Sequence[Measured], progress: Progress = lambda 
     progress("refitting the nominal parameters")
     base = search.nominal(bench, runs)
     owner = evaluate(base.model, runs)
-    nominal, rivals, first_leads = base, dict[Key, list[Rival]](), list[Lead]()
+    nominal, rivals, needed, first_leads = base, dict[Key, list[Rival]](), dict[Key, float](), list[Lead]()
     repeated = all_laps(runs)
     while len(base.model.terms) < MOST_TERMS:
         progress(f"screening the library beside {len(base.model.terms)} terms")
@@ -90,15 +92,15 @@ def explain(bench: Bench, runs: Sequence[Measured], progress: Progress = lambda 
         if best is None:
             break
         best = _simplest([best, *(other for other in found if other is not best and against(best, other) < TIED)])
+        if not best.jacobian.size:      # a rival that was not fitted to its end, before another was refused
+            best = fit(best.model, runs, best.x)
         filters = whitening(best)
         rivals[best.model.terms[-1].key] = sorted(
             (Rival(other, against(best, other, filters)) for other in found if other is not best),
             key=lambda rival: rival.evidence)
-        base = best
-        base = _pruned(base, nominal, runs)
+        base, needed = _pruned(best, nominal, runs)
     final = fit(base.model, runs, base.x, evaluations=40)
     kept = {term.key for term in final.model.terms}
-    needed = {key: evidence for key, (evidence, _) in _ablated(final, runs).items()}
     return Explanation(owner, nominal, final, {key: value for key, value in rivals.items() if key in kept}, needed,
                        tuple(first_leads))
 
@@ -147,26 +149,31 @@ def _last(found: Fit) -> Term:
 
 
 def _ablated(found: Fit, runs: Sequence[Measured]) -> dict[Key, tuple[float, Fit]]:
-    """For each term: the evidence for it, and the fit without it."""
+    """For each term: the evidence for it, and the fit without it, to the end where that may decide."""
+    filters = whitening(found)
 
-    def without(index: int) -> Fit:
+    def without(index: int) -> tuple[float, Fit]:
         terms = found.model.resolved(found.x)[1]
         rest = replace(found.model, terms=terms[:index] + terms[index + 1:])
         x = np.concatenate([found.x[:rest.nominal_count], rest.initial()[rest.nominal_count:]])
-        return fit(rest, runs, x, evaluations=12)
+        first = found.model.nominal_count + sum(len(term.values) for term in terms[:index])
+        slopes = np.delete(found.jacobian, slice(first, first + len(terms[index].values)), axis=1)
+        other = fit(rest, runs, x, evaluations=4, slopes=slopes)
+        if against(found, other, filters) < _CLEAR:
+            other = fit(rest, runs, other.x, evaluations=12, slopes=other.jacobian)
+        return against(found, other, filters), other
 
-    count = len(found.model.terms)
-    fits = in_parallel([lambda index=index: without(index) for index in range(count)])  # type: ignore[misc]
-    filters = whitening(found)
-    return {term.key: (against(found, other, filters), other)
-            for term, other in zip(found.model.terms, fits, strict=True)}
+    fits = in_parallel([partial(without, index) for index in range(len(found.model.terms))])
+    return {term.key: result for term, result in zip(found.model.terms, fits, strict=True)}
 
 
-def _pruned(found: Fit, nominal: Fit, runs: Sequence[Measured]) -> Fit:
-    """The fit without the terms that the evidence no longer asks for, the weakest first."""
-    while len(found.model.terms) > 1:
-        evidence, rest = min(_ablated(found, runs).values(), key=lambda pair: pair[0])
-        if evidence >= NEEDED and gain(rest, found, nominal) >= MATERIAL * found.residuals.size:
-            break
+def _pruned(found: Fit, nominal: Fit, runs: Sequence[Measured]) -> tuple[Fit, dict[Key, float]]:
+    """The fit without the terms that the evidence no longer asks for, the weakest first; the evidence for the others.
+    """
+    while True:
+        ablated = _ablated(found, runs)
+        evidence, rest = min(ablated.values(), key=lambda pair: pair[0])
+        if len(ablated) == 1 or (evidence >= NEEDED
+                                 and gain(rest, found, nominal) >= MATERIAL * found.residuals.size):
+            return found, {key: value for key, (value, _) in ablated.items()}
         found = rest
-    return found

@@ -25,14 +25,19 @@ from hil.twin.library import BY_ID
 FloatArray = NDArray[np.float64]
 
 _SOFT = 3.0     # residuals beyond so many typical ones lose weight
+_WEAKER = (0.3, 0.1)
 
 
 @dataclass(frozen=True)
 class Lead:
-    """A mechanism worth fitting: its start, scaled, and the share of the residual it would explain."""
+    """A mechanism worth fitting: its start, scaled, and the share of the residual it would explain.
+
+    `weaker` are terms like it of less strength: what a small change promises, a large one need not keep.
+    """
 
     term: Term
     share: float
+    weaker: tuple[Term, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +102,8 @@ def screen(base: Fit, runs: Sequence[Measured], starts: Sequence[Start]) -> list
             whole = float(2.0 * target[0] - products[0, 0]) / energy
             return Lead(Term(start.effect, start.variant, start.values), max(share if coefficients[0] > 0.0 else 0.0,
                                                                              whole))
-        return Lead(Term(start.effect, start.variant, _scaled(start, coefficients)), share)
+        return Lead(Term(start.effect, start.variant, _scaled(start, coefficients)), share, tuple(
+            Term(start.effect, start.variant, _scaled(start, factor * coefficients)) for factor in _WEAKER))
 
     leads = list(POOL.map(lead, starts))
     return sorted(leads, key=lambda found: -found.share)

@@ -14,7 +14,7 @@ import numpy as np
 
 from hil.bench import Bench
 from hil.diagnosis import starts as catalogue
-from hil.diagnosis.fit import Fit, evaluate, fit, in_parallel, jacobian
+from hil.diagnosis.fit import POOL, Fit, evaluate, fit, in_parallel, jacobian, soft_cost
 from hil.diagnosis.model import (
     LAST_EDGE_STEP_S,
     SEARCH_ACCURACY,
@@ -36,8 +36,10 @@ _FINALISTS = 3        # of which are fitted to the end
 _NEAR = 6             # evaluations of a first fit with the derivatives of the base
 _SPRINT = 4           # and of the one after it
 _LONG = 25            # evaluations of a last fit
-_BEATEN = 5.0         # times the energy that the leader leaves: a sprint that leaves more is not converged
+_BEATEN = 5.0         # times the energy that the leader leaves: a sprint that leaves more is not converged,
+_BEHIND = 0.5         # nor one that takes away less than this share of what the leader does
 _HOPELESS = 0.02      # a lead that explains this little of what the first explains is not fitted
+_EDGE_SHIFTS_S = np.arange(-15, 16) * 0.005     # of an edge, where it may have been missed
 _SOFT = 30.0          # residual from which a first fit hears less: far above noise, so that valleys stay convex
 
 
@@ -58,7 +60,8 @@ def leads(base: Fit, runs: Sequence[Measured]) -> list[Lead]:
     for lead in screen(base, runs, points):
         used = [term.slot for term in terms if term.effect == lead.term.effect]
         slot = next(slot for slot in count() if slot not in used)
-        best.setdefault(lead.term.effect, replace(lead, term=replace(lead.term, slot=slot)))
+        best.setdefault(lead.term.effect, replace(lead, term=replace(lead.term, slot=slot), weaker=tuple(
+            replace(term, slot=slot) for term in lead.weaker)))
     return list(best.values())
 
 
@@ -79,25 +82,29 @@ def race(base: Fit, found: Sequence[Lead], runs: Sequence[Measured]) -> list[Fit
     held = jacobian(searched, base.x, searched.residuals(base.x, runs), runs)
 
     def near(lead: Lead) -> Fit:
-        """A first fit, with the derivatives of the base."""
-        model = replace(searched, terms=(*base.model.terms, lead.term))
-        x = np.concatenate([base.x, model.initial()[base.x.size:]])
-        return fit(model, runs, x, soft=_SOFT, evaluations=_NEAR, held=held)
+        """A first fit, with the derivatives of the base, from the strength of the lead that leaves least."""
+        models = [replace(searched, terms=(*base.model.terms, term)) for term in (lead.term, *lead.weaker)]
+        begun = [evaluate(model, runs, np.concatenate([base.x, model.initial()[base.x.size:]])) for model in models]
+        first = min(begun, key=lambda found: soft_cost(found.residuals, _SOFT))
+        return fit(first.model, runs, first.x, soft=_SOFT, evaluations=_NEAR, held=held)
 
     def sprint(found: Fit) -> Fit:
-        return fit(found.model, runs, found.x, soft=_SOFT, evaluations=_SPRINT)
+        return fit(found.model, runs, found.x, soft=_SOFT, evaluations=_SPRINT, slopes=found.jacobian)
 
     def afresh(found: Fit) -> Fit:
         """From the owner's nominal values: the base may have bent its own to make up for what it lacks."""
         x = found.x.copy()
         count = found.model.nominal_count
         x[:count] = found.model.initial()[:count]
-        return finish(fit(found.model, runs, x, soft=_SOFT, evaluations=_SPRINT))
+        again = fit(found.model, runs, x, soft=_SOFT, evaluations=_SPRINT)
+        return finish(again) if gained(again) > 0.0 else again
 
     def finish(found: Fit) -> Fit:
         if any("end_s" in coordinate.name for coordinate in found.model.coordinates):
-            found = fit(found.model, runs, found.x, evaluations=_LONG)
-        found = fit(replace(found.model, edge_step_s=LAST_EDGE_STEP_S), runs, found.x, evaluations=_LONG)
+            found = fit(found.model, runs, found.x, evaluations=_LONG, slopes=found.jacobian)
+            found = _edges_moved(found, runs)
+        found = fit(replace(found.model, edge_step_s=LAST_EDGE_STEP_S), runs, found.x, evaluations=_LONG,
+                    slopes=found.jacobian)
         return fit(replace(found.model, torque_accuracy=TORQUE_ACCURACY), runs, found.x, evaluations=_SPRINT)
 
     def variants(found: Fit) -> list[Fit]:
@@ -108,19 +115,22 @@ def race(base: Fit, found: Sequence[Lead], runs: Sequence[Measured]) -> list[Fit
         return in_parallel([partial(fit, model, runs, np.concatenate([
             found.x[:model.nominal_count], model.initial()[model.nominal_count:]])) for model in others])
 
+    def gained(found: Fit) -> float:
+        return base.cost - found.cost
+
     good = [lead for lead in found[:_RACERS] if lead.share > _HOPELESS * found[0].share]
     started = in_parallel([partial(near, lead) for lead in good])
     # those that got furthest, and the first by the screen, which may only have had a slow start
     better = sorted(started, key=lambda result: result.cost)[:_SPRINTERS]
     sprints = in_parallel([partial(sprint, result) for result in unique([*started[:2], *better])])
     ranked = sorted(sprints, key=lambda result: result.cost)
-    results = in_parallel([partial(finish, ranked[0]), partial(afresh, ranked[0])])
-    leader = min(results, key=lambda result: result.cost)
+    leader = finish(ranked[0])
     others = [result for result in unique([*sprints[:2], *ranked[:_FINALISTS]]) if result is not ranked[0]]
     reached = [evaluate(replace(result.model, torque_accuracy=TORQUE_ACCURACY), runs, result.x) for result in others]
-    results += reached
-    results += in_parallel([partial(finish, other) for other, result in zip(others, reached, strict=True)
-                            if result.cost < _BEATEN * leader.cost])
+    again = [] if leader.at_floor else [partial(afresh, ranked[0])]
+    results = [leader, *reached, *in_parallel(again + [
+        partial(finish, other) for other, result in zip(others, reached, strict=True)
+        if result.cost < _BEATEN * leader.cost and gained(result) > _BEHIND * gained(leader)])]
     results += variants(min(results, key=lambda result: result.cost))
     best: dict[str, Fit] = {}
     for result in results:
@@ -130,6 +140,20 @@ def race(base: Fit, found: Sequence[Lead], runs: Sequence[Measured]) -> list[Fit
         if effect not in best or result.cost < best[effect].cost:
             best[effect] = result
     return sorted(best.values(), key=lambda result: result.cost)
+
+
+def _edges_moved(found: Fit, runs: Sequence[Measured]) -> Fit:
+    """A fit with each edge of a window where it leaves least: their valleys are narrow, a step leads past them."""
+    x, low, high = found.x.copy(), *found.model.bounds()
+    for index, coordinate in enumerate(found.model.coordinates):
+        if not coordinate.name.endswith(("start_s", "end_s")):
+            continue
+
+        edges = np.tile(x, (_EDGE_SHIFTS_S.size, 1))
+        edges[:, index] = [coordinate.x(coordinate.value(x[index]) + shift_s) for shift_s in _EDGE_SHIFTS_S]
+        edges = np.clip(edges, low, high)
+        x = min(POOL.map(partial(evaluate, found.model, runs), edges), key=lambda other: other.cost).x
+    return fit(found.model, runs, x, evaluations=_LONG)
 
 
 def unique(fits: Sequence[Fit]) -> list[Fit]:

@@ -52,7 +52,8 @@ class Scene:
     friction_periods: list[float]
     scale_periods: list[float]
     window: tuple[float, float, float]  # start, end, level [N m]
-    stretch: float                      # typical table against motor [m]
+    stretch: float                      # table against motor [m], typical
+    most_stretch: float                 # and the most
 
 
 def scene(runs: Sequence[Measured], bench: Bench, blocks: Sequence[dict[str, FloatArray]], observer_s: float) -> Scene:
@@ -66,10 +67,11 @@ def scene(runs: Sequence[Measured], bench: Bench, blocks: Sequence[dict[str, Flo
     inertia = float(modes.shape[modes.motor, 0] ** -2)     # of the rigid body
     found = [estimate.disturbance(run, block["motor"], inertia, observer_s)
              for run, block in zip(runs, blocks, strict=True)]
-    stretch = 0.0
+    stretch = most_stretch = 0.0
     if runs[0].table_m.size:
-        stretch = max(float(np.percentile(np.abs(run.table_m - ratio * run.motor
-                                                 - np.median(run.table_m - ratio * run.motor)), 60)) for run in runs)
+        stretches = [run.table_m - ratio * run.motor for run in runs]
+        sizes = [np.percentile(np.abs(found - np.median(found)), (60.0, 99.9)) for found in stretches]
+        stretch, most_stretch = (float(value) for value in np.max(sizes, axis=0))
     longest = max(range(len(runs)), key=lambda i: runs[i].motor.size)
     travel = max(float(np.ptp(run.position_command_m)) for run in runs)
     lead = 2.0 * np.pi * ratio / physics.angle_per_unit
@@ -90,7 +92,7 @@ def scene(runs: Sequence[Measured], bench: Bench, blocks: Sequence[dict[str, Flo
         scale_periods=(estimate.scale_periods(runs, [block["table"] for block in blocks])
                        if runs[0].table_m.size else []),
         window=estimate.force_window(runs[longest], found[longest]),
-        stretch=max(stretch, 0.5e-6),
+        stretch=max(stretch, 0.5e-6), most_stretch=max(most_stretch, 1e-6),
     )
 
 
@@ -107,7 +109,9 @@ _STARTS: dict[str, tuple[Callable[[Scene], _Values], int, int]] = {
     "friction_drift": (lambda s: [(0.05, f * s.duration_s) for f in (0.2, 1.0, 5.0)], 0, -1),
     "table_side_friction": (lambda s: [(0.2,), (0.6,)], -1, -1),
     "backlash": (lambda s: [(f * s.stretch,) for f in (0.5, 1.0, 2.0, 4.0)], -1, -1),
-    "preload_loss": (lambda s: [(f * s.stretch, 0.4) for f in (0.5, 1.0, 2.0, 4.0)], -1, -1),
+    "preload_loss": (lambda s: [(zone, 0.4) for zone in (
+        0.5 * s.stretch, s.stretch, 2.0 * s.stretch, 0.5 * s.most_stretch, s.most_stretch, 1.5 * s.most_stretch)],
+        -1, -1),
     "position_dependent_stiffness": (lambda s: [(0.1 / s.travel_m,)], 0, -1),
     "periodic_lead_error": (lambda s: [(0.5e-6, 0.0, 0.0, 0.0, 0.0, 0.0)], 0, 1),
     "cumulative_lead_error": (lambda s: [(1e-6 / s.travel_m,)], 0, -1),

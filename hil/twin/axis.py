@@ -136,10 +136,11 @@ class Twin:
         constants[kernel.VISCOUS] = physics.viscous_n_m_s_rad
         constants[kernel.VISCOUS_SPEED] = physics.viscous_speed
         constants[kernel.SPRING] = chain.transmission_stiffness_n_m_rad
-        elastic = self.modal.frequency_rad_s[self.modal.frequency_rad_s > 0.0]
-        if elastic.size:
-            damping = self.modal.damping_ratio[self.modal.frequency_rad_s > 0.0][0]
-            constants[kernel.DAMPER] = 2.0 * damping * chain.transmission_stiffness_n_m_rad / elastic[0]
+        elastic = (self.modal.frequency_rad_s > 0.0) & (self.modal.transmission != 0.0)
+        if elastic.any():
+            # what the transmission may have of the modal damping: its loss leaves no mode with less than none
+            damping = 2.0 * self.modal.damping_ratio * self.modal.frequency_rad_s
+            constants[kernel.DAMPER] = np.min(damping[elastic] / self.modal.transmission[elastic] ** 2)
         constants[kernel.COARSE_STEPS] = self.coarse_steps
         constants[kernel.OBSERVER] = self.observer_s
         constants[kernel.FINE_STEPS] = self.fine_steps
@@ -152,7 +153,7 @@ class Twin:
             per_torque = modes[first + 5]
             constants[at:at + 3] = motor * per_torque @ motor, motor * per_torque @ table, table * per_torque @ table
         bends = any(BY_ID[active.effect].stage is Stage.TRANSMISSION for active in self.active)
-        constants[kernel.ALWAYS_FINE] = float(bends and elastic.size > 1)
+        constants[kernel.ALWAYS_FINE] = float(bends and np.count_nonzero(elastic) > 1)
         return constants
 
     @cached_property

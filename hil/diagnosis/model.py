@@ -273,5 +273,5 @@ def scales(run: Measured, bench: Bench, observer_s: float,
     impulse = np.zeros(round(20.0 * observer_s / run.period_s) + 3)
     impulse[0] = 1.0
     passed = lfilter([1.0, -2.0, 1.0], [1.0, -2.0 * a, a * a], impulse)
-    return {"motor": max(run.noise.motor * float(np.linalg.norm(passed)), seen), "table": run.noise.table_m,
+    return {"motor": float(np.hypot(run.noise.motor * np.linalg.norm(passed), seen)), "table": run.noise.table_m,
             "torque": run.noise.torque, "command": run.noise.torque}

@@ -153,7 +153,7 @@ def _group(explanation: Explanation, final: Fit, index: int, runs: Sequence[Meas
     terms = final.model.resolved(final.x)[1]
     group = [_hypothesis(terms[index].effect, final)]
     for rival in rivals_of(explanation, terms[index]):
-        if rival.evidence < TIED:
+        if rival.tied:
             other = rival.fit.model.resolved(rival.fit.x)[1][-1]
             model = replace(final.model, terms=(*terms[:index], other, *terms[index + 1:]))
             if not compatible(model.terms):

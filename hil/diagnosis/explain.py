@@ -35,19 +35,33 @@ _CLEAR = 20.0 * NEEDED  # evidence that a few more steps of a fit do not change 
 # A term must also matter: take so much energy away, in units of the noise's: 14 % of the noise in rms.
 # Below lie the details in which two honest simulations of one axis differ.
 MATERIAL = 0.02
+# And so much of what is left above the noise: one mechanism after the other that each explain next to nothing are a
+# series expansion of something else.
+WORTH = 0.02
 # The same law may be written in another form. What a term leaves below this share of the energy that it took from a
 # channel, a twentieth in rms, may be its own form, and no second mechanism.
 FORM = 0.0025
+
+# A rival that leaves no more than this beside the best is not refuted either, whatever the evidence: a quarter of what
+# is material, 7 % of the noise in rms. A simulation of the axis by someone else differs by as much.
+ALIKE = 0.25 * MATERIAL
 
 _COUNTING = 1.25 / np.pi    # a quarter more than counting itself makes
 
 
 @dataclass(frozen=True, eq=False)
 class Rival:
-    """Another explanation of the same residual, and the evidence against it (BIC difference)."""
+    """Another explanation of the same residual, the evidence against it (BIC difference), and the energy that it
+    leaves beyond, per row in units of the noise's."""
 
     fit: Fit
     evidence: float
+    more: float = np.inf
+
+    @property
+    def tied(self) -> bool:
+        """Whether it is not refuted."""
+        return self.evidence < TIED or self.more < ALIKE
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +101,7 @@ def explain(bench: Bench, runs: Sequence[Measured], progress: Progress = lambda 
                  if claimable(_last(other), other.model.resolved(other.x)[0])]
         differs = unrepeated(base, repeated)
         best = next((other for other in found if against(other, base) >= NEEDED
-                     and gain(base, other, nominal) >= MATERIAL * rows
+                     and gain(base, other, nominal) >= max(MATERIAL * rows, WORTH * excess(base))
                      and REPEATS * unrepeated(other, repeated) <= differs), None)
         if best is None:
             break
@@ -96,7 +110,8 @@ def explain(bench: Bench, runs: Sequence[Measured], progress: Progress = lambda 
             best = fit(best.model, runs, best.x)
         filters = whitening(best)
         rivals[best.model.terms[-1].key] = sorted(
-            (Rival(other, against(best, other, filters)) for other in found if other is not best),
+            (Rival(other, against(best, other, filters), (other.cost - best.cost) / rows)
+             for other in found if other is not best),
             key=lambda rival: rival.evidence)
         base, needed = _pruned(best, nominal, runs)
     final = fit(base.model, runs, base.x, evaluations=40)
@@ -109,6 +124,11 @@ def gain(without: Fit, found: Fit, nominal: Fit) -> float:
     """Energy that a term takes away, channel by channel beyond what may be the form of the terms before it."""
     return sum(max(float(a @ a - b @ b) - FORM * max(float(n @ n - a @ a), 0.0), 0.0)
                for a, b, n in zip(without.parts, found.parts, nominal.parts, strict=True))
+
+
+def excess(found: Fit) -> float:
+    """Energy above that of the noise."""
+    return sum(max(float(part @ part) - part.size, 0.0) for part in found.parts)
 
 
 def _bits(rows: int) -> float:

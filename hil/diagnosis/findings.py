@@ -57,7 +57,7 @@ def findings(explanation: Explanation, final: Fit, ablations: Sequence[Ablation]
         errors = deviations[row:row + len(term.values)]
         row += len(term.values)
         rivals = rivals_of(explanation, term)
-        tied = [rival.fit.model.terms[-1].effect for rival in rivals if rival.evidence < TIED]
+        tied = [rival.fit.model.terms[-1].effect for rival in rivals if rival.tied]
         if ambiguous(term):
             tied.append(next(name for name in SAME if name != term.effect))
         margin = min((rival.evidence for rival in rivals if rival.fit.model.terms[-1].effect not in tied),
@@ -137,9 +137,9 @@ def rivals_of(explanation: Explanation, term: Term) -> list[Rival]:
 
 
 def _text(rival: Rival, term: Term, train: Sequence[Measured]) -> str:
-    if rival.evidence < TIED:
-        return f"cannot be told apart from {title(term.effect)} by this motion (evidence {number(rival.evidence)} of " \
-               f"the {TIED:g} that it takes)"
+    if rival.tied:
+        return (f"cannot be told apart from {title(term.effect)} by this motion: evidence against it "
+                f"{number(rival.evidence)}, and it leaves as much but for a trifle")
     size = math.sqrt(rival.fit.reduced)
     parameters = BY_ID[rival.fit.model.terms[-1].effect].parameters
     at = rival.fit.model.resolved(rival.fit.x)[1][-1].values

@@ -11,6 +11,7 @@ A drive in CSP gets positions only: the velocity that its loops feed forward is 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,12 +36,14 @@ _FITTED_ROWS = 11           # of the motor position, for its velocity at the fir
 class Noise:
     """Standard deviation of the white noise of a sensor: motor in rad (m), table in m, torque in N m (N).
 
-    `table_m` is that of table position less r x motor position, 0 without a linear encoder.
+    `table_m` is that of table position less r x motor position, 0 without a linear encoder. `jitter_s` is that of the
+    instants at which positions are read: an error that grows with the speed, and is the same for both encoders.
     """
 
     motor: float
     table_m: float
     torque: float
+    jitter_s: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +68,12 @@ class Measured:
     def time_s(self) -> FloatArray:
         """Time from the first row of the recording, tick x period."""
         return np.asarray((self.left_out + np.arange(self.motor.size)) * self.period_s, dtype=np.float64)
+
+    @cached_property
+    def motor_noise(self) -> FloatArray:
+        """Noise of the motor position at each row (n,), with that of the instant of its reading."""
+        speed = np.gradient(self.motor) / self.period_s
+        return np.asarray(np.hypot(self.noise.motor, self.noise.jitter_s * speed), dtype=np.float64)
 
     @property
     def judged(self) -> slice:
@@ -105,7 +114,7 @@ def take(recording: Recording, bench: Bench) -> Measured:
     return Measured(recording.name, recording.kind, recording.period_s, position, velocity, motor, table, command,
                     torque, bool(np.array_equal(command, torque)),
                     _start(gains, (position, velocity, motor, feedback), command),
-                    _noise(bench, motor, table, command, torque), first)
+                    _noise(bench, motor, table, command, torque, recording.period_s), first)
 
 
 def bench_of(recording: Recording) -> Bench:
@@ -163,7 +172,8 @@ def _start(gains: control.Gains, channels: Channels, command: FloatArray) -> Sta
     return Start(float(gains.ratio_m_rad * motor[0]), gains.ratio_m_rad * speed, state.integral_n_m)
 
 
-def _noise(bench: Bench, motor: FloatArray, table: FloatArray, command: FloatArray, torque: FloatArray) -> Noise:
+def _noise(bench: Bench, motor: FloatArray, table: FloatArray, command: FloatArray, torque: FloatArray,
+           period_s: float) -> Noise:
     encoder = bench.encoders.motor
     count = encoder.resolution_m if bench.axis.linear else 2.0 * np.pi / encoder.counts_per_rev
     motor_noise, table_noise = max(_white(motor), (count or 0.0) / np.sqrt(12.0)), 0.0
@@ -171,7 +181,7 @@ def _noise(bench: Bench, motor: FloatArray, table: FloatArray, command: FloatArr
         counting = np.hypot(bench.encoders.table.resolution_m, bench.axis.ratio_m_rad * (count or 0.0)) / np.sqrt(12.0)
         table_noise = max(_white(table - bench.axis.ratio_m_rad * motor), float(counting))
     of_torque = _white(torque) if np.array_equal(command, torque) else _coloured(torque - command)
-    return Noise(motor_noise, table_noise, of_torque)
+    return Noise(motor_noise, table_noise, of_torque, _jitter_s(motor, motor_noise, period_s))
 
 
 def _white(signal: FloatArray) -> float:
@@ -179,9 +189,28 @@ def _white(signal: FloatArray) -> float:
 
     The median over blocks keeps events, such as reversals, out of it.
     """
+    return float(np.sqrt(np.median(_white_blocks(signal))))
+
+
+def _white_blocks(signal: FloatArray) -> FloatArray:
+    """Variance of the white noise in each block of 64 rows."""
     differences = np.diff(signal, 4)
     blocks = differences[: differences.size // 64 * 64].reshape(-1, 64)
-    return float(np.sqrt(np.median(np.mean(blocks**2, axis=1)) / 70.0))
+    return np.asarray(np.mean(blocks**2, axis=1) / 70.0, dtype=np.float64)
+
+
+def _jitter_s(motor: FloatArray, noise: float, period_s: float) -> float:
+    """Jitter of the instants of reading: what the noise of the faster half of the motion is more, over the speed.
+
+    Less than twice the noise is not told from counting.
+    """
+    variance = _white_blocks(motor)
+    speed = np.abs(np.diff(motor)[: 64 * variance.size].reshape(-1, 64).mean(axis=1)) / period_s
+    fast = speed > 0.5 * np.max(speed, initial=0.0)
+    if not fast.any():
+        return 0.0
+    more = float(np.median(variance[fast])) - noise**2
+    return float(np.sqrt(np.median((variance[fast] - noise**2) / speed[fast] ** 2))) if more > noise**2 else 0.0
 
 
 def _coloured(signal: FloatArray) -> float:

@@ -140,7 +140,7 @@ def noise_ratios(found: Fit, run: Measured) -> dict[str, float]:
     """Mean square over noise of each channel, block by block."""
     noise = scales(run, found.model.bench, found.model.observer_s)
     blocks = found.model.blocks(found.x, run)
-    return {name: float(np.mean((blocks[name][run.judged] / noise[name]) ** 2)) for name in blocks}
+    return {name: float(np.mean((blocks[name] / noise[name])[run.judged] ** 2)) for name in blocks}
 
 
 def claimable(term: Term, bench: Bench) -> bool:

@@ -122,5 +122,9 @@ def _of(found: Residuals, mode: Mode) -> dict[str, FloatArray]:
 def _white(run: Measured, found: Fit, channel: str, mode: Mode) -> float:
     """White noise of a channel; block by block the motor counts from the torque that the torque channel can see."""
     if mode is Mode.BLOCKS:
-        return scales(run, found.model.bench, found.model.observer_s)[channel]
-    return {"motor": run.noise.motor, "table": run.noise.table_m, "torque": run.noise.torque}[channel]
+        return _rms(scales(run, found.model.bench, found.model.observer_s)[channel][run.judged])
+    return {"motor": _rms(run.motor_noise[run.judged]), "table": run.noise.table_m, "torque": run.noise.torque}[channel]
+
+
+def _rms(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(values**2)))

@@ -112,6 +112,6 @@ def unrepeated(found: Fit, repeated: Sequence[tuple[Measured, Laps]]) -> float:
     total = 0.0
     for run, known in repeated:
         scale = scales(run, found.model.bench, found.model.observer_s)
-        total += sum((known.noise(values) / scale[name]) ** 2 * known.first.size
+        total += sum((known.noise(values / scale[name])) ** 2 * known.first.size
                      for name, values in found.model.blocks(found.x, run).items())
     return total

@@ -223,7 +223,7 @@ class Model:
         scale = scales(run, self.bench, self.observer_s, self.torque_accuracy)
         rows = run.judged
         with np.errstate(over="ignore"):     # a hypothesis may be unstable
-            return {name: np.clip(np.nan_to_num(value[rows] / scale[name], nan=_LOST), -_LOST, _LOST)
+            return {name: np.clip(np.nan_to_num(value[rows] / scale[name][rows], nan=_LOST), -_LOST, _LOST)
                     for name, value in differences.items()}
 
     def residuals(self, x: FloatArray, runs: Sequence[Measured], closed: bool = False) -> FloatArray:
@@ -261,8 +261,8 @@ def _inertia(bench: Bench) -> float:
 
 
 def scales(run: Measured, bench: Bench, observer_s: float,
-           torque_accuracy: float = TORQUE_ACCURACY) -> dict[str, float]:
-    """Size of one unit of weighted residual, per channel.
+           torque_accuracy: float = TORQUE_ACCURACY) -> dict[str, FloatArray]:
+    """Size of one unit of weighted residual at each row (n,), per channel.
 
     A torque d that the twin misses moves its motor by d tau^2 / J before the correction takes hold, with tau the
     observer's time constant: the motor counts from the torque that the torque channel can still see. White noise e
@@ -273,5 +273,7 @@ def scales(run: Measured, bench: Bench, observer_s: float,
     impulse = np.zeros(round(20.0 * observer_s / run.period_s) + 3)
     impulse[0] = 1.0
     passed = lfilter([1.0, -2.0, 1.0], [1.0, -2.0 * a, a * a], impulse)
-    return {"motor": float(np.hypot(run.noise.motor * np.linalg.norm(passed), seen)), "table": run.noise.table_m,
-            "torque": run.noise.torque, "command": run.noise.torque}
+    rows = run.motor.shape
+    table, torque = (np.broadcast_to(noise, rows) for noise in (run.noise.table_m, run.noise.torque))
+    return {"motor": np.hypot(run.motor_noise * np.linalg.norm(passed), seen), "table": table, "torque": torque,
+            "command": torque}

@@ -95,8 +95,8 @@ def test_what_a_motion_hides_is_shown_by_another() -> None:
     assert found.profile is not None
     assert drift in found.separates
     assert "torque_saturation" not in found.separates     # takes more torque than these limits ever ask for
-    both = [*train, *runs(found.profile, seed=2)]
-    assert drift not in not_testable(fit(Model(OWNER), both), both)
+    shown = runs(found.profile, seed=2)
+    assert drift not in not_testable(fit(Model(OWNER), shown), shown)
 
 
 @pytest.mark.parametrize("travel_m", [None, (-0.06, 0.36)])

@@ -31,6 +31,8 @@ from hil.twin.axis import Start
 
 ONCE = "external_force"      # belongs to its moment: nobody expects it again on another motion
 
+_SURE = 2.0      # times as visible as needed must be what a motion shows that nobody has made yet
+
 Question = tuple[str, ...]   # two effects to be told apart, or one to be shown
 Answers = Mapping[Question, float]
 
@@ -99,7 +101,7 @@ def showing(found: Fit, hidden: Sequence[str], train: Sequence[Measured],
         residuals = expected.model.residuals(expected.x, [run])
         slope = jacobian(expected.model, expected.x, residuals, [run])
         still = not_testable(Fit(expected.model, expected.x, residuals, slope, splits(expected.model, [run])), [run],
-                             hidden)
+                             hidden, _SURE)
         return {(effect,): float(effect not in still) for effect in hidden}
 
     best = _best((*train, *held_out), found.model, len(hidden), answers, 1.0,

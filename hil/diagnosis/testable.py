@@ -25,13 +25,16 @@ NEEDS_TABLE = frozenset({
 
 
 def not_testable(found: Fit, runs: Sequence[Measured],
-                 asked: Collection[str] = tuple(BY_ID)) -> tuple[str, ...]:
-    """Ids of the mechanisms asked for that these recordings cannot show, in the library's order."""
+                 asked: Collection[str] = tuple(BY_ID), margin: float = 1.0) -> tuple[str, ...]:
+    """Ids of the mechanisms asked for that these recordings cannot show, in the library's order.
+
+    `margin` is how often a mechanism must be visible: more than once where the recordings are only imagined.
+    """
     bench, terms = found.model.resolved(found.x)
     present = {term.effect for term in terms} | {entry.effect for entry in bench.mechanisms}
     typical = _typical(bench, runs)
     nuisance, _ = np.linalg.qr(found.jacobian[:, : found.model.nominal_count])
-    enough = max(NEEDED, MATERIAL * found.residuals.size)
+    enough = margin * max(NEEDED, MATERIAL * found.residuals.size)
 
     def visible(effect: str, variant: int) -> bool:
         model = replace(found.model, terms=(*terms, Term(effect, variant, typical[effect])))

@@ -105,9 +105,10 @@ def fit_table(owner: Fit, nominal: Fit, final: Fit, train: Sequence[Measured],
     for channel, recorded in channel_names(final.model.bench, train[0]).items():
         if channel == "command":
             continue
-        closed, block = (figures(trained, channel, mode) for mode in (Mode.CLOSED_LOOP, Mode.BLOCKS))
-        chaotic = (closed.after_rms > STRAYS * closed.noise_floor_rms
-                   and block.after_rms <= STRAYS * block.noise_floor_rms and not train[0].torque_is_command)
+        sets = [trained, validated] if held_out else [trained]
+        closed, block = (max(found.after_rms / found.noise_floor_rms for found in (
+            figures(of, channel, mode) for of in sets)) for mode in (Mode.CLOSED_LOOP, Mode.BLOCKS))
+        chaotic = closed > STRAYS >= block and not train[0].torque_is_command
         mode = Mode.BLOCKS if chaotic else Mode.CLOSED_LOOP
         result[recorded] = ChannelFit(
             unit=CHANNELS[recorded].unit, mode=mode, floor_from="repeated_laps" if any_laps else "white_noise",

@@ -1,0 +1,32 @@
+"""What is known of the sensors from a recording alone."""
+
+import numpy as np
+import pytest
+
+from hil.measured import _jitter_s, _white
+
+PERIOD_S = 1e-3
+
+
+def position(noise: float, jitter_s: float, seed: int = 1) -> np.ndarray:
+    """A motor that goes there and back (n,), read with noise at instants that are not quite the nominal ones."""
+    rng = np.random.default_rng(seed)
+    time_s = np.arange(10_000) * PERIOD_S
+    instants = time_s + jitter_s * rng.standard_normal(time_s.size)
+    return 40.0 * np.sin(2.0 * np.pi * 0.3 * instants) + noise * rng.standard_normal(time_s.size)
+
+
+@pytest.mark.parametrize("jitter_s", [5e-7, 2e-6, 1e-5])
+def test_jitter_is_told_from_noise_by_the_speed(jitter_s: float) -> None:
+    assert _jitter_s(position(1e-6, jitter_s), 1e-6, PERIOD_S) == pytest.approx(jitter_s, rel=0.1)
+
+
+def test_noise_without_jitter_has_none() -> None:
+    motor = position(1e-5, 0.0)
+    assert _white(motor) == pytest.approx(1e-5, rel=0.05)
+    assert _jitter_s(motor, _white(motor), PERIOD_S) == 0.0
+
+
+@pytest.mark.parametrize("motor", [np.zeros(5000), np.zeros(3)])
+def test_a_motor_at_rest_tells_no_jitter(motor: np.ndarray) -> None:
+    assert _jitter_s(motor, 1e-6, PERIOD_S) == 0.0

@@ -114,7 +114,7 @@ def take(recording: Recording, bench: Bench) -> Measured:
     return Measured(recording.name, recording.kind, recording.period_s, position, velocity, motor, table, command,
                     torque, bool(np.array_equal(command, torque)),
                     _start(gains, (position, velocity, motor, feedback), command),
-                    _noise(bench, motor, table, command, torque, recording.period_s), first)
+                    _noise(bench, velocity, motor, table, command, torque, recording.period_s), first)
 
 
 def bench_of(recording: Recording) -> Bench:
@@ -172,8 +172,8 @@ def _start(gains: control.Gains, channels: Channels, command: FloatArray) -> Sta
     return Start(float(gains.ratio_m_rad * motor[0]), gains.ratio_m_rad * speed, state.integral_n_m)
 
 
-def _noise(bench: Bench, motor: FloatArray, table: FloatArray, command: FloatArray, torque: FloatArray,
-           period_s: float) -> Noise:
+def _noise(bench: Bench, velocity: FloatArray, motor: FloatArray, table: FloatArray, command: FloatArray,
+           torque: FloatArray, period_s: float) -> Noise:
     encoder = bench.encoders.motor
     count = encoder.resolution_m if bench.axis.linear else 2.0 * np.pi / encoder.counts_per_rev
     motor_noise, table_noise = max(_white(motor), (count or 0.0) / np.sqrt(12.0)), 0.0
@@ -181,7 +181,7 @@ def _noise(bench: Bench, motor: FloatArray, table: FloatArray, command: FloatArr
         counting = np.hypot(bench.encoders.table.resolution_m, bench.axis.ratio_m_rad * (count or 0.0)) / np.sqrt(12.0)
         table_noise = max(_white(table - bench.axis.ratio_m_rad * motor), float(counting))
     of_torque = _white(torque) if np.array_equal(command, torque) else _coloured(torque - command)
-    return Noise(motor_noise, table_noise, of_torque, _jitter_s(motor, motor_noise, period_s))
+    return Noise(motor_noise, table_noise, of_torque, _jitter_s(motor, velocity, motor_noise, period_s))
 
 
 def _white(signal: FloatArray) -> float:
@@ -199,18 +199,21 @@ def _white_blocks(signal: FloatArray) -> FloatArray:
     return np.asarray(np.mean(blocks**2, axis=1) / 70.0, dtype=np.float64)
 
 
-def _jitter_s(motor: FloatArray, noise: float, period_s: float) -> float:
-    """Jitter of the instants of reading: what the noise of the faster half of the motion is more, over the speed.
+def _jitter_s(motor: FloatArray, velocity: FloatArray, noise: float, period_s: float) -> float:
+    """Jitter of the instants of reading: by how much noise at constant feed exceeds `noise`, over the speed.
 
-    Less than twice the noise is not told from counting.
+    Known from ten blocks of 64 rows in which the set velocity is constant, from half of the fastest such feed on; with
+    less of them 0. Less than twice the noise is not told from counting.
     """
     variance = _white_blocks(motor)
-    speed = np.abs(np.diff(motor)[: 64 * variance.size].reshape(-1, 64).mean(axis=1)) / period_s
-    fast = speed > 0.5 * np.max(speed, initial=0.0)
-    if not fast.any():
+    rows = 64 * variance.size
+    speed = np.abs(np.diff(motor)[:rows].reshape(-1, 64).mean(axis=1)) / period_s
+    steady = np.ptp(velocity[:rows].reshape(-1, 64), axis=1) <= 1e-6 * np.max(np.abs(velocity), initial=0.0)
+    fast = steady & (speed > 0.5 * np.max(speed[steady], initial=0.0))
+    if np.count_nonzero(fast) < 10:
         return 0.0
-    more = float(np.median(variance[fast])) - noise**2
-    return float(np.sqrt(np.median((variance[fast] - noise**2) / speed[fast] ** 2))) if more > noise**2 else 0.0
+    more = (variance[fast] - noise**2) / speed[fast] ** 2
+    return float(np.sqrt(np.median(more))) if np.median(variance[fast]) > 2.0 * noise**2 else 0.0
 
 
 def _coloured(signal: FloatArray) -> float:

@@ -29,7 +29,6 @@ Progress = Callable[[str], None]
 
 TRAINED = 2.0 / 3.0       # of a recording, where none is held out
 NEXT_EXPERIMENT = "next_experiment.yaml"
-EXPLAINED = 1.15          # times its noise: up to here nothing is left of a channel to speak of
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,7 +160,7 @@ def _unexplained(explanation: Explanation, final: Fit, train: Sequence[Measured]
         for name, ratio in noise_ratios(final, run).items():
             worst[names[name]] = max(worst.get(names[name], 0.0), ratio)
     above = {name: float(np.sqrt(ratio)) for name, ratio in worst.items() if ratio > FLOOR}
-    if not above or max(above.values()) < EXPLAINED:
+    if not above:
         return Unexplained(share=share, description="Every channel is down to its noise.")
     text = ", ".join(f"{name} at {number(above[name])} × its noise" for name in sorted(above, key=lambda n: -above[n]))
     if verdict is Verdict.UNEXPLAINED and location is not None:

@@ -19,7 +19,7 @@ from hil.diagnosis import search
 from hil.diagnosis.evidence import against, whitening
 from hil.diagnosis.fit import Fit, evaluate, fit, in_parallel
 from hil.diagnosis.floor import REPEATS, all_laps, unrepeated
-from hil.diagnosis.model import Key, Term, scales
+from hil.diagnosis.model import LAST_EDGE_STEP_S, Key, Term, scales
 from hil.diagnosis.screen import Lead
 from hil.measured import Measured
 
@@ -31,7 +31,8 @@ MOST_TERMS = 8          # at once; more than an engineer could act on, and the s
 # 90 starts, which costs 2 log 90 = 9 more.
 NEEDED = 20.0
 TIED = 10.0             # a rival closer than this is not refuted
-_CLEAR = 20.0 * NEEDED  # evidence that a few more steps of a fit do not change the answer of
+# Share of the energy above which a term is needed, however much more steps of the fit without it would gain
+_CLEAR = 0.7
 # A term must also matter: take so much energy away, in units of the noise's: 14 % of the noise in rms.
 # Below lie the details in which two honest simulations of one axis differ.
 MATERIAL = 0.02
@@ -106,12 +107,13 @@ def explain(bench: Bench, runs: Sequence[Measured], progress: Progress = lambda 
         if best is None:
             break
         best = _simplest([best, *(other for other in found if other is not best and against(best, other) < TIED)])
+        found = [other for other in found if other is not best]
         if not best.jacobian.size:      # a rival that was not fitted to its end, before another was refused
-            best = fit(best.model, runs, best.x)
+            best = fit(replace(best.model, edge_step_s=LAST_EDGE_STEP_S), runs, best.x)
         filters = whitening(best)
         rivals[best.model.terms[-1].key] = sorted(
             (Rival(other, against(best, other, filters), (other.cost - best.cost) / rows)
-             for other in found if other is not best),
+             for other in found),
             key=lambda rival: rival.evidence)
         base, needed = _pruned(best, nominal, runs)
     final = fit(base.model, runs, base.x, evaluations=40)
@@ -173,13 +175,13 @@ def _ablated(found: Fit, runs: Sequence[Measured]) -> dict[Key, tuple[float, Fit
     filters = whitening(found)
 
     def without(index: int) -> tuple[float, Fit]:
-        terms = found.model.resolved(found.x)[1]
+        terms = found.model.terms
         rest = replace(found.model, terms=terms[:index] + terms[index + 1:])
-        x = np.concatenate([found.x[:rest.nominal_count], rest.initial()[rest.nominal_count:]])
         first = found.model.nominal_count + sum(len(term.values) for term in terms[:index])
-        slopes = np.delete(found.jacobian, slice(first, first + len(terms[index].values)), axis=1)
-        other = fit(rest, runs, x, evaluations=4, slopes=slopes)
-        if against(found, other, filters) < _CLEAR:
+        columns = slice(first, first + len(terms[index].values))
+        other = fit(rest, runs, np.delete(found.x, columns), evaluations=6,
+                    slopes=np.delete(found.jacobian, columns, axis=1))
+        if found.cost > _CLEAR * other.cost:
             other = fit(rest, runs, other.x, evaluations=12, slopes=other.jacobian)
         return against(found, other, filters), other
 

@@ -32,12 +32,12 @@ _WEAKER = (0.3, 0.1)
 class Lead:
     """A mechanism worth fitting: its start, scaled, and the share of the residual it would explain.
 
-    `weaker` are terms like it of less strength: what a small change promises, a large one need not keep.
+    `others` are the same at less strength or from elsewhere: what a small change promises, a large one need not keep.
     """
 
     term: Term
     share: float
-    weaker: tuple[Term, ...] = ()
+    others: tuple[Term, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

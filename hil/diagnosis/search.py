@@ -11,6 +11,7 @@ from functools import partial
 from itertools import count
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hil.bench import Bench
 from hil.diagnosis import starts as catalogue
@@ -30,9 +31,12 @@ from hil.diagnosis.starts import Start
 from hil.measured import Measured
 from hil.twin.library import BY_ID
 
+FloatArray = NDArray[np.float64]
+
 _RACERS = 8           # leads that are fitted
 _SPRINTERS = 4        # of which are fitted on
 _FINALISTS = 3        # of which are fitted to the end
+_OTHERS = 6           # starts of one mechanism that are weighed
 _NEAR = 6             # evaluations of a first fit with the derivatives of the base
 _SPRINT = 4           # and of the one after it
 _LONG = 25            # evaluations of a last fit
@@ -56,13 +60,18 @@ def leads(base: Fit, runs: Sequence[Measured]) -> list[Lead]:
     blocks = [base.model.blocks(base.x, run) for run in runs]
     scene = catalogue.scene(runs, fitted, blocks, base.model.observer_s)
     points = [start for start in catalogue.starts(scene, base.model.bench) if _offered(start, base.model, terms)]
-    best: dict[str, Lead] = {}
+    best: dict[str, list[Lead]] = {}
     for lead in screen(base, runs, points):
-        used = [term.slot for term in terms if term.effect == lead.term.effect]
+        best.setdefault(lead.term.effect, []).append(lead)
+
+    def gathered(effect: str, same: Sequence[Lead]) -> Lead:
+        used = [term.slot for term in terms if term.effect == effect]
         slot = next(slot for slot in count() if slot not in used)
-        best.setdefault(lead.term.effect, replace(lead, term=replace(lead.term, slot=slot), weaker=tuple(
-            replace(term, slot=slot) for term in lead.weaker)))
-    return list(best.values())
+        first, *rest = (replace(term, slot=slot) for term in (
+            same[0].term, *same[0].others, *(lead.term for lead in same[1:_OTHERS])))
+        return Lead(first, same[0].share, tuple(rest))
+
+    return [gathered(effect, same) for effect, same in best.items()]
 
 
 def _offered(start: Start, model: Model, terms: Sequence[Term]) -> bool:
@@ -82,25 +91,29 @@ def race(base: Fit, found: Sequence[Lead], runs: Sequence[Measured]) -> list[Fit
     held = jacobian(searched, base.x, searched.residuals(base.x, runs), runs)
 
     def near(lead: Lead) -> Fit:
-        """A first fit, with the derivatives of the base, from the strength of the lead that leaves least."""
-        models = [replace(searched, terms=(*base.model.terms, term)) for term in (lead.term, *lead.weaker)]
-        begun = [evaluate(model, runs, np.concatenate([base.x, model.initial()[base.x.size:]])) for model in models]
-        first = min(begun, key=lambda found: soft_cost(found.residuals, _SOFT))
+        """A first fit, with the derivatives of the base."""
+        first = likeliest(lead, base.x)
         return fit(first.model, runs, first.x, soft=_SOFT, evaluations=_NEAR, held=held)
+
+    def likeliest(lead: Lead, x: FloatArray) -> Fit:
+        """The point of a lead that leaves least beside what is known at `x`."""
+        models = [replace(searched, terms=(*base.model.terms, term)) for term in (lead.term, *lead.others)]
+        begun = [evaluate(model, runs, np.concatenate([x, model.initial()[x.size:]])) for model in models]
+        return min(begun, key=lambda found: soft_cost(found.residuals, _SOFT))
 
     def sprint(found: Fit) -> Fit:
         return fit(found.model, runs, found.x, soft=_SOFT, evaluations=_SPRINT, slopes=found.jacobian)
 
     def afresh(found: Fit) -> Fit:
         """From the owner's nominal values: the base may have bent its own to make up for what it lacks."""
-        x = found.x.copy()
-        count = found.model.nominal_count
-        x[:count] = found.model.initial()[:count]
-        again = fit(found.model, runs, x, soft=_SOFT, evaluations=_SPRINT)
+        lead = next(lead for lead in good if lead.term.effect == found.model.terms[-1].effect)
+        nominal = base.model.nominal_count
+        first = likeliest(lead, np.concatenate([base.model.initial()[:nominal], base.x[nominal:]]))
+        again = fit(first.model, runs, first.x, soft=_SOFT, evaluations=_SPRINT)
         return finish(again) if gained(again) > 0.0 else again
 
     def finish(found: Fit) -> Fit:
-        if any("end_s" in coordinate.name for coordinate in found.model.coordinates):
+        if any(coordinate.name.endswith("end_s") for coordinate in found.model.coordinates):
             found = fit(found.model, runs, found.x, evaluations=_LONG, slopes=found.jacobian)
             found = _edges_moved(found, runs)
         found = fit(replace(found.model, edge_step_s=LAST_EDGE_STEP_S), runs, found.x, evaluations=_LONG,
@@ -148,7 +161,6 @@ def _edges_moved(found: Fit, runs: Sequence[Measured]) -> Fit:
     for index, coordinate in enumerate(found.model.coordinates):
         if not coordinate.name.endswith(("start_s", "end_s")):
             continue
-
         edges = np.tile(x, (_EDGE_SHIFTS_S.size, 1))
         edges[:, index] = [coordinate.x(coordinate.value(x[index]) + shift_s) for shift_s in _EDGE_SHIFTS_S]
         edges = np.clip(edges, low, high)

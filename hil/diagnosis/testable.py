@@ -28,7 +28,7 @@ def not_testable(found: Fit, runs: Sequence[Measured],
                  asked: Collection[str] = tuple(BY_ID), margin: float = 1.0) -> tuple[str, ...]:
     """Ids of the mechanisms asked for that these recordings cannot show, in the library's order.
 
-    `margin` is how often a mechanism must be visible: more than once where the recordings are only imagined.
+    `margin` is how many times as visible as needed: more than one where the recordings are only imagined.
     """
     bench, terms = found.model.resolved(found.x)
     present = {term.effect for term in terms} | {entry.effect for entry in bench.mechanisms}

@@ -68,7 +68,7 @@ def record_mujoco(axis: DrawnAxis, effect: Effect | None, run: Trajectory, seed:
     try:
         import mujoco
     except ModuleNotFoundError as error:
-        raise HilError(f"{error.name} is not installed, allowed are cases of other tiers; install it with: "
+        raise HilError(f"{error.name} is not installed, allowed is the simulated plant; install it with: "
                        "make peers") from None
     model = mujoco.MjModel.from_xml_string(xml(axis, effect, step_s))
     data, act = mujoco.MjData(model), acting(axis, effect)

@@ -37,8 +37,14 @@ def prove(folder: Path, planned: Sequence[Planned], seed: int, jobs: int, say: S
     command = f"hil prove {which}{cases} --seed {seed} --out DIR"
     about = read_seal(folder)
     if about is None:
+        if folder.is_file():
+            raise InputError(f"{folder}: is a file, allowed a folder; give another --out")
         if folder.exists() and {path.name for path in folder.iterdir()} - {CASES, SEALED}:
             raise InputError(f"{folder}: holds other things than a proof; give another --out")
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InputError(f"{folder}: cannot be made ({error.strerror}); give another --out") from None
         tell("drawing cases", 0.0)
         draw_cases(folder, planned, seed, jobs, lambda share: tell("drawing cases", share), plant)
         about = seal(folder, planned, command, seed)

@@ -55,9 +55,13 @@ def draw_cases(folder: Path, planned: Sequence[Planned], seed: int, jobs: int, t
                              "give another --out")
     with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
         drawn = [pool.submit(_draw, folder, case, seed, plant) for case in todo]
-        for done, case_drawn in enumerate(as_completed(drawn), 1):
-            case_drawn.result()
-            told((len(planned) - len(todo) + done) / len(planned))
+        try:
+            for done, case_drawn in enumerate(as_completed(drawn), 1):
+                case_drawn.result()
+                told((len(planned) - len(todo) + done) / len(planned))
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
 
 
 def seal(folder: Path, planned: Sequence[Planned], command: str, seed: int) -> dict[str, Any]:

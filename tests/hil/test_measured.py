@@ -8,25 +8,34 @@ from hil.measured import _jitter_s, _white
 PERIOD_S = 1e-3
 
 
+VELOCITY = np.repeat([0.0, 40.0, 0.0, -40.0, 0.0], 2000)
+
+
 def position(noise: float, jitter_s: float, seed: int = 1) -> np.ndarray:
     """A motor that goes there and back (n,), read with noise at instants that are not quite the nominal ones."""
     rng = np.random.default_rng(seed)
-    time_s = np.arange(10_000) * PERIOD_S
-    instants = time_s + jitter_s * rng.standard_normal(time_s.size)
-    return 40.0 * np.sin(2.0 * np.pi * 0.3 * instants) + noise * rng.standard_normal(time_s.size)
+    late_s = jitter_s * rng.standard_normal(VELOCITY.size)
+    return np.cumsum(VELOCITY) * PERIOD_S + VELOCITY * late_s + noise * rng.standard_normal(VELOCITY.size)
 
 
 @pytest.mark.parametrize("jitter_s", [5e-7, 2e-6, 1e-5])
 def test_jitter_is_told_from_noise_by_the_speed(jitter_s: float) -> None:
-    assert _jitter_s(position(1e-6, jitter_s), 1e-6, PERIOD_S) == pytest.approx(jitter_s, rel=0.1)
+    assert _jitter_s(position(1e-6, jitter_s), VELOCITY, 1e-6, PERIOD_S) == pytest.approx(jitter_s, rel=0.1)
 
 
 def test_noise_without_jitter_has_none() -> None:
     motor = position(1e-5, 0.0)
     assert _white(motor) == pytest.approx(1e-5, rel=0.05)
-    assert _jitter_s(motor, _white(motor), PERIOD_S) == 0.0
+    assert _jitter_s(motor, VELOCITY, _white(motor), PERIOD_S) == 0.0
 
 
 @pytest.mark.parametrize("motor", [np.zeros(5000), np.zeros(3)])
 def test_a_motor_at_rest_tells_no_jitter(motor: np.ndarray) -> None:
-    assert _jitter_s(motor, 1e-6, PERIOD_S) == 0.0
+    assert _jitter_s(motor, np.zeros(motor.size), 1e-6, PERIOD_S) == 0.0
+
+
+def test_a_ramp_of_the_motor_is_no_jitter() -> None:
+    """Acceleration in steps of a slow position loop has fourth differences of its own."""
+    velocity = np.repeat(np.linspace(0.0, 40.0, 2000), 4)
+    motor = np.cumsum(velocity) * PERIOD_S
+    assert _jitter_s(motor, velocity, 1e-9, PERIOD_S) == 0.0

@@ -106,7 +106,7 @@ class Twin:
         for active in self.active:
             mechanism = BY_ID[active.effect]
             if mechanism.stage is Stage.CHAIN:
-                chain = mechanism.contribution(chain, active.values)
+                chain = mechanism.contribution(chain, active.values, active.variant)
         modes = modal(chain)
         return modes if self.modes is None else truncate(modes, self.modes)
 

@@ -115,7 +115,7 @@ class Parameter:
 @dataclass(frozen=True)
 class Mechanism:
     """One piece of physics. `contribution` is compiled (`numba.njit`) for stages in the stepping
-    kernel; for Stage.CHAIN it is `(chain, parameters) -> chain`, for Stage.CHANNEL
+    kernel; for Stage.CHAIN it is `(chain, parameters, variant) -> chain`, for Stage.CHANNEL
     `(channels, parameters, variant, period_s) -> channels`, both plain Python."""
 
     id: str

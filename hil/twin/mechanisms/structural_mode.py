@@ -13,32 +13,48 @@ from hil.twin.mechanism import Block, Dimension, Mechanism, Parameter, Stage
 from hil.twin.modal import modal
 
 
-def _with_auxiliary_mass(chain: Chain, parameters: Sequence[float]) -> Chain:
-    """The chain with a mass on a spring at its table; a mass ratio of 0 leaves it as it is."""
+def _with_structure(chain: Chain, parameters: Sequence[float], variant: int = 0) -> Chain:
+    """The chain with one more mass on a spring; a mass ratio of 0 leaves it as it is."""
     frequency_hz, damping_ratio, mass_ratio = parameters[:3]
     if mass_ratio <= 0.0:
         return chain
+    extended = (_on_the_table, _under_the_axis)[variant](chain, (2.0 * math.pi * frequency_hz) ** 2, mass_ratio)
+    # The new damping belongs to the elastic mode in which the added mass has most of its energy
+    modes = modal(extended)
+    energy = np.where(modes.frequency_rad_s > 0.0, modes.shape[len(chain.names)] ** 2, -1.0)
+    return replace(extended, damping_ratio=np.insert(chain.damping_ratio, int(energy.argmax()), damping_ratio))
+
+
+def _on_the_table(chain: Chain, square: float, mass_ratio: float) -> Chain:
+    """A mass that sways on the table."""
     n, table = len(chain.names), chain.table
     inertia = mass_ratio * chain.inertia_kg_m2[table, table]
-    spring = inertia * (2.0 * math.pi * frequency_hz) ** 2
+    extended = _longer(chain)
+    extended.inertia_kg_m2[n, n] = inertia
+    extended.stiffness_n_m_rad[np.ix_((table, n), (table, n))] += inertia * square * np.array([[1.0, -1.0],
+                                                                                              [-1.0, 1.0]])
+    return extended
 
-    inertias = np.pad(chain.inertia_kg_m2, (0, 1))
-    inertias[n, n] = inertia
-    stiffness = np.pad(chain.stiffness_n_m_rad, (0, 1))
-    stiffness[np.ix_((table, n), (table, n))] += spring * np.array([[1.0, -1.0], [-1.0, 1.0]])
-    longer = replace(
-        chain,
-        inertia_kg_m2=inertias,
-        stiffness_n_m_rad=stiffness,
-        damping_ratio=np.append(chain.damping_ratio, damping_ratio),
-        names=(*chain.names, "structure"),
-        transmission=np.append(chain.transmission, 0.0),
-    )
-    # The new damping belongs to the elastic mode in which the auxiliary mass has most of its energy
-    modes = modal(longer)
-    energy = np.where(modes.frequency_rad_s > 0.0, modes.shape[n] ** 2, -1.0)
-    damping = np.insert(chain.damping_ratio, int(energy.argmax()), damping_ratio)
-    return replace(longer, damping_ratio=damping)
+
+def _under_the_axis(chain: Chain, square: float, mass_ratio: float) -> Chain:
+    """A machine base that yields, with the linear encoder on it: all that travels with the nut is seen from it, and
+    has its motion as well."""
+    n = len(chain.names)
+    travelling = chain.inertia_kg_m2 @ (1.0 - chain.side(chain.motor))
+    table = chain.inertia_kg_m2[chain.table, chain.table]
+    extended = _longer(chain)
+    extended.inertia_kg_m2[:n, n] = extended.inertia_kg_m2[n, :n] = travelling
+    extended.inertia_kg_m2[n, n] = table / mass_ratio + travelling.sum()
+    extended.stiffness_n_m_rad[n, n] = (table / mass_ratio + table) * square
+    return extended
+
+
+def _longer(chain: Chain) -> Chain:
+    """The chain with one more coordinate that nothing holds yet."""
+    return replace(chain, inertia_kg_m2=np.pad(chain.inertia_kg_m2, (0, 1)),
+                   stiffness_n_m_rad=np.pad(chain.stiffness_n_m_rad, (0, 1)),
+                   damping_ratio=np.append(chain.damping_ratio, 0.0), names=(*chain.names, "structure"),
+                   transmission=np.append(chain.transmission, 0.0))
 
 
 MECHANISM = Mechanism(
@@ -46,7 +62,10 @@ MECHANISM = Mechanism(
     block=Block.TABLE,
     element="machine base, column or screw torsion",
     sentence="A structure of {mass_ratio} of the table's mass sways at {frequency_hz}, damped by {damping_ratio}.",
-    equation="m_a x_a'' + k_a (x_a - x) = 0, k_a = m_a (2 pi f)^2, m_a = mu m_table; modal damping ratio xi",
+    second_sentence="The machine base yields: it sways with the table at {frequency_hz}, damped by {damping_ratio}; "
+                    "the table has {mass_ratio} of its mass.",
+    equation="m_a x_a'' + k_a (x_a - x) = 0, k_a = m_a (2 pi f)^2, m_a = mu m_table; modal damping ratio xi; or a base "
+             "of m_table / mu under the axis, which sways with the table at f",
     source="Den Hartog, Mechanical Vibrations, 4th ed. (1956), auxiliary mass on a spring",
     parameters=(
         Parameter("frequency_hz", Dimension.FREQUENCY, 1.0, 2000.0),
@@ -54,5 +73,6 @@ MECHANISM = Mechanism(
         Parameter("mass_ratio", Dimension.RATIO, 1e-3, 10.0),
     ),
     stage=Stage.CHAIN,
-    contribution=_with_auxiliary_mass,
+    contribution=_with_structure,
+    variants=("mass on the table", "yielding base"),
 )

@@ -140,6 +140,20 @@ def test_structural_mode_adds_one_mode_and_keeps_the_rest(chain, frequency, rati
     assert modes.transmission.shape == modes.frequency_rad_s.shape
 
 
+@given(frequency=frequencies, ratio=ratios)
+@PROPERTY
+def test_a_yielding_base_has_the_modes_of_the_chain_seen_from_the_ground(frequency: float, ratio: float) -> None:
+    """Motor, table and base in absolute coordinates: the nut pulls table and base together, a spring holds the base."""
+    motor, table, stiffness = 335.0, 384.0, 5.64e7
+    longer = BY_ID["structural_mode"].contribution(two_mass(motor, table, stiffness, 0.03, 2.0 * pi),
+                                                   (frequency, 0.01, ratio), 1)
+    base = table / ratio
+    nut = np.array([1.0, -1.0, 1.0])
+    held = np.diag([0.0, 0.0, (base + table) * (2.0 * pi * frequency) ** 2]) + stiffness * np.outer(nut, nut)
+    expected = np.sort(np.linalg.eigvals(held / np.array([motor, table, base])[:, None]).real)[1:]
+    np.testing.assert_allclose(modal(longer).frequency_rad_s[1:] ** 2, expected, rtol=1e-6)
+
+
 @pytest.mark.parametrize(("frequency_hz", "mode"), [(20.0, 1), (400.0, 2)])
 def test_structural_mode_damps_the_mode_it_brings(frequency_hz: float, mode: int) -> None:
     """The reference axis has its own mode at 89.4 Hz, damped by 0.03."""

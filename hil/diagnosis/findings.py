@@ -143,8 +143,8 @@ def rivals_of(explanation: Explanation, term: Term) -> list[Rival]:
 
 def _text(rival: Rival, term: Term, train: Sequence[Measured]) -> str:
     if rival.tied:
-        return (f"cannot be told apart from {title(term.effect)} by this motion: evidence against it "
-                f"{number(rival.evidence)}, and it leaves as much but for a trifle")
+        return (f"cannot be told apart from {title(term.effect)} by this motion: evidence against it is "
+                f"{number(rival.evidence)}, and next to the noise it leaves as much")
     size = math.sqrt(rival.fit.reduced)
     parameters = BY_ID[rival.fit.model.terms[-1].effect].parameters
     at = rival.fit.model.resolved(rival.fit.x)[1][-1].values

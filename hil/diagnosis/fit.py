@@ -199,6 +199,6 @@ def splits(model: Model, runs: Sequence[Measured], closed: bool = False) -> tupl
 
 
 def in_parallel(jobs: Sequence[Callable[[], Result]]) -> list[Result]:
-    """Measured fits side by side."""
+    """Results of jobs that run side by side, in order."""
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
         return [future.result() for future in [pool.submit(job) for job in jobs]]

@@ -135,6 +135,10 @@ def _torque_problems(run: Measured, bench: Bench) -> Iterator[str]:
             yield (f"{names.torque} runs against {names.torque_command} (slope {slope:.3g}): one of them has the wrong "
                    "sign; correct it in the import map")
             return
+        # a drive that saturates gives less than asked for, but no eighth of it
+        if _correlation(run.torque_command, run.torque) > 0.5 and not 0.5 / WRONG_BY < slope < 2.0 * WRONG_BY:
+            yield f"{names.torque}: {_factor(slope, _TORQUE_UNITS, names.torque_command)}"
+            return
     measured = regress(run)
     if measured is None:
         return

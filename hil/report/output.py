@@ -37,10 +37,10 @@ def new_folder(folder: Path) -> Iterator[Path]:
 
     Raises InputError where `folder` holds something already or cannot be made.
     """
-    refuse_used(folder)
     part = folder.with_name(f".{folder.name}.{os.getpid()}.part")
-    made = [parent for parent in folder.parents if not parent.exists()]
     try:
+        refuse_used(folder)
+        made = [parent for parent in folder.parents if not parent.exists()]
         part.mkdir(parents=True)
     except OSError as error:
         raise InputError(f"{folder}: cannot be made ({error.strerror}); give a folder with rights as --out") from None

@@ -138,7 +138,7 @@ class Twin:
         constants[kernel.SPRING] = chain.transmission_stiffness_n_m_rad
         elastic = (self.modal.frequency_rad_s > 0.0) & (self.modal.transmission != 0.0)
         if elastic.any():
-            # what the transmission may have of the modal damping: its loss leaves no mode with less than none
+            # what of the modal damping acts in the transmission: so much that no mode is driven where it is taken away
             damping = 2.0 * self.modal.damping_ratio * self.modal.frequency_rad_s
             constants[kernel.DAMPER] = np.min(damping[elastic] / self.modal.transmission[elastic] ** 2)
         constants[kernel.COARSE_STEPS] = self.coarse_steps

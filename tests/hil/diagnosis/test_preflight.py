@@ -91,6 +91,7 @@ def test_copied_channel(run: Recording) -> None:
     ("table_position_m", -1.0, "table_position_m: has the wrong sign"),
     ("table_position_m", 1e3, "looks like mm"),
     ("velocity_command_m_s", 60.0, "looks like m/min"),
+    ("torque_command_n_m", 1e-3, "torque_n_m: is 1000 × what torque_command_n_m ask for: it looks like mN m"),
     ("torque_n_m", -1.0, "torque_n_m runs against torque_command_n_m")])
 def test_wrong_sign_or_unit_of_one_channel(run: Recording, channel: str, factor: float, message: str) -> None:
     assert message in refused(changed(run, **{channel: factor}))

@@ -46,7 +46,7 @@ class Goal:
         """Whether the goal is met; None where no case tells it or there is none."""
         if self.value is None or (self.low, self.high) == (0.0, inf):
             return None
-        return self.low <= self.value <= self.high
+        return bool(self.low <= self.value <= self.high)
 
 
 @dataclass(frozen=True)

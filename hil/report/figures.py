@@ -45,22 +45,22 @@ def over_time(title: str, time_s: FloatArray, panels: Sequence[Panel], rows: sli
     figure = Figure(figsize=(10.0, 0.8 + 1.75 * len(panels)), layout="constrained")
     axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
     time_s = time_s[rows]
-    noise = None
     for axis, panel in zip(axes, panels, strict=True):
         lines = [line.values[rows] for line in panel.lines]
         chosen = thin(tuple(lines), DRAWN_ROWS)
         unit = shown(panel.unit, max(float(abs(values).max()) for values in lines))
         if panel.band > 0.0:
-            noise = axis.axhspan(-panel.band * unit.factor, panel.band * unit.factor, color=look.NOISE, alpha=0.35,
-                                 label="noise, ±1 σ")
+            axis.axhspan(-panel.band * unit.factor, panel.band * unit.factor, color=look.NOISE, alpha=0.35,
+                         label="noise, ±1 σ")
         for line, values in zip(panel.lines, lines, strict=True):
             axis.plot(time_s[chosen], values[chosen] * unit.factor, color=line.colour, label=line.label,
                       linewidth=2.6 if line.broad else 0.9, alpha=0.5 if line.broad else 1.0)
         style(axis, f"{panel.label}\n[{unit.unit}]")
     axes[0].set_title(title, loc="left")
     # above the first panel: inside, it would hide a line sooner or later
-    handles = [*axes[0].get_legend_handles_labels()[0], *([noise] if noise is not None else [])]
-    axes[0].legend(handles=handles, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, frameon=False,
+    labelled = [axis.get_legend_handles_labels() for axis in axes]
+    known = {label: handle for handles, labels in labelled for handle, label in zip(handles, labels, strict=True)}
+    axes[0].legend(handles=list(known.values()), loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, frameon=False,
                    borderaxespad=0.2)
     axes[-1].set_xlabel("time [s]")
     axes[-1].set_xlim(time_s[0], time_s[-1])

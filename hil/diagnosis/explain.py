@@ -31,7 +31,8 @@ MOST_TERMS = 8          # at once; more than an engineer could act on, and the s
 # 90 starts, which costs 2 log 90 = 9 more.
 NEEDED = 20.0
 TIED = 10.0             # a rival closer than this is not refuted
-# Share of the energy above which a term is needed, however much more steps of the fit without it would gain
+# A fit without a term that leaves so much more than the one with it, 1 / 0.7, is not carried to its end: more steps
+# would change the number, not the answer. Nearer ones are.
 _CLEAR = 0.7
 # A term must also matter: take so much energy away, in units of the noise's: 14 % of the noise in rms.
 # Below lie the details in which two honest simulations of one axis differ.

@@ -25,7 +25,7 @@ from hil.twin.library import BY_ID
 FloatArray = NDArray[np.float64]
 
 _SOFT = 3.0     # residuals beyond so many typical ones lose weight
-_WEAKER = (0.3, 0.1)
+_WEAKER = (0.3, 0.1)     # of the strength that a straight line promises: half an order of magnitude apart
 
 
 @dataclass(frozen=True)

@@ -75,9 +75,10 @@ def compare_blocks(measured: Measured, bench: Bench,
         f"deviation: what the twin's mechanics need less or more, up to {OBSERVER_RAD_S / (2.0 * np.pi):.0f} Hz"))
     if measured.table_m.size:
         ratio = bench.axis.ratio_m_rad
+        datum_m = measured.datum_m(motor, table, ratio)
         blocks.append(BlockDeviation(
             "transmission and table", "measured motor position (twin held on it)", "table less motor position", "m",
-            measured.table_m - ratio * measured.motor, table - ratio * motor, measured.noise.table_m))
+            measured.table_m - datum_m - ratio * measured.motor, table - ratio * motor, measured.noise.table_m))
     return tuple(blocks)
 
 

@@ -138,10 +138,11 @@ def compare(recording: Recording, bench: Bench, *, fit: bool = False,
                                      measured.table_m)
     if not all(np.isfinite(values).all() for values in response):
         raise HilError(f"{bench.name}: the twin is unstable in closed loop; check the masses and gains of the bench")
+    ratio = bench.axis.ratio_m_rad
+    datum_m = measured.datum_m(response.motor_position, response.table_position_m, ratio)
     blocks = compare_blocks(measured, bench, lambda share: progress("block by block", share))
     table = measured.table_m.size > 0
-    ratio = bench.axis.ratio_m_rad
-    positions = ((measured.table_m, response.table_position_m) if table
+    positions = ((measured.table_m - datum_m, response.table_position_m) if table
                  else (ratio * measured.motor, ratio * response.motor_position))
     channels = [_channel(measured, *entry) for entry in _motion(measured, *positions, table)]
     if table:
@@ -155,7 +156,7 @@ def compare(recording: Recording, bench: Bench, *, fit: bool = False,
                   for block in blocks)
     inverse, remark = _inverse_dynamics(recording) if linear else (None, [])
     return Comparison(recording, measured, bench, tuple(channels), pairs, fitted, inverse,
-                      tuple(_notes(measured, bench, fitted) + remark))
+                      tuple(_notes(measured, bench, fitted, datum_m) + remark))
 
 
 def low_pass(values: FloatArray, period_s: float) -> FloatArray:
@@ -189,13 +190,16 @@ def _inverse_dynamics(recording: Recording) -> tuple[InverseDynamics | None, lis
         return None, [f"No inverse-dynamics fit: {error}"]
 
 
-def _notes(measured: Measured, bench: Bench, fit: FitResult | None) -> list[str]:
+def _notes(measured: Measured, bench: Bench, fit: FitResult | None, datum_m: float) -> list[str]:
     notes = [
         "Velocity, acceleration and jerk: derivatives after a Butterworth low-pass of 4th order at "
         f"{LOW_PASS_HZ:g} Hz, forwards and backwards, on measured and simulated alike.",
         f"The first {SETTLE_S:g} s are simulated but not judged: the state at the start is known from the first rows "
         "only.",
     ]
+    if measured.table_m.size:
+        notes.append(f"The linear encoder has a datum of its own: {1e6 * datum_m:.3g} µm from that of the twin, taken off "
+                     "the table position.")
     if bench.drive is not None and bench.drive.mode is not DriveMode.CST:
         notes.append(f"In {bench.drive.mode} the drive closes loops of its own; the twin closes them with the law and "
                      f"the periods of the bench file (velocity loop {1e3 * measured.period_s:g} ms). A drive whose "

@@ -105,5 +105,6 @@ def weighted_residuals(bench: Bench, measured: Measured) -> FloatArray:
     parts = [(measured.torque - response.torque) / noise.torque, motor / max(noise.motor, MOTOR_ACCURACY_M / ratio)]
     if measured.table_m.size:
         table = measured.table_m - response.table_position_m - ratio * motor
+        table = table - np.mean(table[rows])      # its datum is its own
         parts.append(table / max(noise.table_m, TABLE_ACCURACY_M))
     return np.concatenate([part[rows] for part in parts])

@@ -28,6 +28,7 @@ FloatArray = NDArray[np.float64]
 Channels = tuple[FloatArray, FloatArray, FloatArray, FloatArray]    # as control.replay takes them
 
 SETTLE_S = 0.05             # the start is only roughly known: this much of it is not judged
+_STRETCH_M = 1e-4           # between motor and table; what is more, is the datum of an encoder
 _REPLAYED_ROWS = 200        # to find the phase of the position loop
 _FITTED_ROWS = 11           # of the motor position, for its velocity at the first row
 
@@ -75,6 +76,13 @@ class Measured:
         speed = np.gradient(self.motor) / self.period_s
         return np.asarray(np.hypot(self.noise.motor, self.noise.jitter_s * speed), dtype=np.float64)
 
+    def datum_m(self, motor: FloatArray, table_m: FloatArray, ratio_m: float) -> float:
+        """By how much the datum of the linear encoder differs from that of a simulation's motor and table (n,): the
+        mean difference of the stretch. 0 without a linear encoder."""
+        if not self.table_m.size:
+            return 0.0
+        return float(np.mean((self.table_m - table_m - ratio_m * (self.motor - motor))[self.judged]))
+
     @property
     def judged(self) -> slice:
         """The rows that count: all after the start has settled."""
@@ -107,6 +115,9 @@ def take(recording: Recording, bench: Bench) -> Measured:
     has_command = names.torque_command in recording.columns
     command = _column(recording, names.torque_command) if has_command else torque
     table = _column(recording, names.table_position) if bench.has_table_encoder else np.empty(0)
+    if table.size and gains.position_from_table and abs(table[0] - gains.ratio_m_rad * motor[0]) > _STRETCH_M:
+        # the loop goes by the linear encoder: the motor's datum is the one that is free
+        motor = motor + (table[0] - gains.ratio_m_rad * motor[0]) / gains.ratio_m_rad
     feedback = table if table.size else gains.ratio_m_rad * motor
     first = _first_tick(gains, (position, velocity, motor, feedback), command)
     position, velocity, motor, feedback, table, command, torque = (

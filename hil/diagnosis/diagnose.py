@@ -202,5 +202,5 @@ def _notes(table: dict[str, ChannelFit], proof: Proof, verdict: Verdict, explana
               for ablation in proof.ablations if ablation.gain is not None and not ablation.shown]
     if verdict is Verdict.UNEXPLAINED and explanation.terms:
         tried = ", ".join(title(term.effect) for term in explanation.terms)
-        notes.append(f"The nearest mechanisms ({tried}) explain less than half of it, so that none is named.")
+        notes.append(f"The nearest mechanisms ({tried}) leave too much of it, so that none is named.")
     return notes

@@ -39,7 +39,9 @@ _CLEAR = 0.7
 MATERIAL = 0.02
 # And so much of what is left above the noise: one mechanism after the other that each explain next to nothing are a
 # series expansion of something else.
-WORTH = 0.02
+WORTH = 0.05
+# So are as many as this that together leave more than they explain.
+_IN_VAIN = 3
 # The same law may be written in another form. What a term leaves below this share of the energy that it took from a
 # channel, a twentieth in rms, may be its own form, and no second mechanism.
 FORM = 0.0025
@@ -48,7 +50,8 @@ FORM = 0.0025
 # is material, 7 % of the noise in rms. A simulation of the axis by someone else differs by as much.
 ALIKE = 0.25 * MATERIAL
 
-_COUNTING = 1.25 / np.pi    # a quarter more than counting itself makes
+_COUNTING = 1.25 / np.pi    # a quarter more than counting itself makes,
+_LONG_PERIOD_M = 1e-3       # which has no period as long as this
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,6 +120,8 @@ def explain(bench: Bench, runs: Sequence[Measured], progress: Progress = lambda 
              for other in found),
             key=lambda rival: rival.evidence)
         base, needed = _pruned(best, nominal, runs)
+        if len(base.model.terms) >= _IN_VAIN and excess(base) > 0.5 * excess(nominal):
+            break
     final = fit(base.model, runs, base.x, evaluations=40)
     kept = {term.key for term in final.model.terms}
     return Explanation(owner, nominal, final, {key: value for key, value in rivals.items() if key in kept}, needed,
@@ -156,7 +161,8 @@ def claimable(term: Term, bench: Bench) -> bool:
     if term.effect == "stribeck_friction":
         return term.values[0] > bench.axis.physics().coulomb_n_m
     if term.effect == "scale_interpolation_error" and bench.encoders.table is not None:
-        return abs(term.values[0]) > _COUNTING * bench.encoders.table.resolution_m
+        amplitude_m, period_m, _ = term.values
+        return period_m > _LONG_PERIOD_M or amplitude_m > _COUNTING * bench.encoders.table.resolution_m
     return True
 
 

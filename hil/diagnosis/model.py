@@ -207,14 +207,14 @@ class Model:
 
     def closed_loop(self, x: FloatArray, run: Measured) -> dict[str, FloatArray]:
         """Measured minus twin in closed loop, per channel (n,)."""
-        return _differences(self.respond(x, run), measured_response(run), self.bench)
+        return _differences(self.respond(x, run), measured_response(run), self.bench, run.judged)
 
     def blocks(self, x: FloatArray, run: Measured) -> dict[str, FloatArray]:
         """Measured minus twin with each block fed measured inputs, per channel (n,)."""
         twin = self.twin(x)
         measured = twin.undelayed(measured_response(run))
         predicted = twin.observe(run.position_command_m, run.velocity_command_m_s, measured, run.start)
-        found = _differences(predicted, measured, self.bench)
+        found = _differences(predicted, measured, self.bench, run.judged)
         found["command"] = measured.torque_command - predicted.torque_command
         return found
 
@@ -238,12 +238,15 @@ def measured_response(run: Measured) -> Response:
     return Response(run.motor, run.table_m, run.torque_command, run.torque)
 
 
-def _differences(response: Response, measured: Response, bench: Bench) -> dict[str, FloatArray]:
-    """Motor [rad or m], table against motor [m], torque [N m or N]."""
+def _differences(response: Response, measured: Response, bench: Bench, judged: slice) -> dict[str, FloatArray]:
+    """Motor [rad or m], table against motor [m], torque [N m or N].
+
+    The linear encoder has a datum of its own: a difference that is always there is none.
+    """
     found = {"motor": measured.motor_position - response.motor_position}
     if measured.table_position_m.size:
-        found["table"] = (measured.table_position_m - response.table_position_m
-                          - bench.axis.ratio_m_rad * found["motor"])
+        table = measured.table_position_m - response.table_position_m - bench.axis.ratio_m_rad * found["motor"]
+        found["table"] = table - np.mean(table[judged])
     found["torque"] = measured.torque - response.torque
     return found
 

@@ -29,6 +29,7 @@ LEAST_MOVING_S = 0.5
 # Nominal parameters may be wrong by a factor of three (see `hil.diagnosis.model`), units are wrong by more.
 WRONG_BY = 4.0
 SLOPE_TOLERANCE = 0.2       # of positions against set-points; following errors are below 5 %
+_AWAY, _AWAY_M = 0.01, 1e-3 # of the travel, and at least: a loop that rests so far from its set-points is none
 SATURATED = 0.5             # share of the moving rows at the limit
 _SMOOTH_S = 0.021           # window of the derivatives of the motor position
 
@@ -102,9 +103,14 @@ def _problems(run: Measured, bench: Bench) -> Iterator[str]:
 
 
 def _position_problems(run: Measured, ratio: float, motor: str, table: str) -> Iterator[str]:
-    slope = _slope(run.position_command_m, ratio * run.motor)
+    slope = _factor_between(run.position_command_m, ratio * run.motor)
+    resting = run.velocity_command_m_s == 0.0
+    away_m = float(np.median((run.position_command_m - ratio * run.motor)[resting])) if resting.any() else 0.0
     if abs(slope - 1.0) > SLOPE_TOLERANCE:
         yield f"{motor}: {_factor(slope, _POSITION_UNITS, 'the set-points')}"
+    elif abs(away_m) > max(_AWAY * float(np.ptp(run.position_command_m)), _AWAY_M):
+        yield (f"{motor}: lies {1e3 * away_m:.4g} mm behind the set-points at rest: their zeros differ; "
+               "shift it in the import map")
     if not run.table_m.size:
         return
     if np.ptp(run.table_m) == 0.0:
@@ -113,7 +119,7 @@ def _position_problems(run: Measured, ratio: float, motor: str, table: str) -> I
     if np.ptp(run.table_m - ratio * run.motor) < 1e-12:
         yield (f"{table} is a copy of the motor position, allowed the linear encoder's own reading; "
                "record it, or write 'table: null' under encoders in the bench file")
-    slope = _slope(run.position_command_m, run.table_m)
+    slope = _factor_between(run.position_command_m, run.table_m)
     if abs(slope - 1.0) > SLOPE_TOLERANCE:
         yield f"{table}: {_factor(slope, _POSITION_UNITS, 'the set-points')}"
 
@@ -195,6 +201,18 @@ def _slope(over: FloatArray, values: FloatArray) -> float:
     """Slope of a regression of `values` on `over`."""
     centred = over - over.mean()
     return float(centred @ (values - values.mean()) / max(float(centred @ centred), 1e-300))
+
+
+def _factor_between(over: FloatArray, values: FloatArray) -> float:
+    """Factor of `values` to `over`: of all between the two regressions, of each on the other, the one nearest to 1.
+
+    A unit scales exactly and leaves no choice; an axis that lags or sticks on short strokes does.
+    """
+    forward, backward = _slope(over, values), _slope(values, over)
+    if forward * backward <= 0.0:
+        return forward
+    low, high = sorted((forward, 1.0 / backward))
+    return min(max(1.0, low), high)
 
 
 def _correlation(a: FloatArray, b: FloatArray) -> float:

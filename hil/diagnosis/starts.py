@@ -75,7 +75,12 @@ def scene(runs: Sequence[Measured], bench: Bench, blocks: Sequence[dict[str, Flo
     longest = max(range(len(runs)), key=lambda i: runs[i].motor.size)
     travel = max(float(np.ptp(run.position_command_m)) for run in runs)
     lead = 2.0 * np.pi * ratio / physics.angle_per_unit
-    turns = [period for period in (lead, 0.5 * lead) if period < travel]     # a nut rubs once or twice a turn
+    # What is locked to the screw shows in its angle and along the travel alike: each is a start for the other.
+    periods = estimate.friction_periods(runs, found, ratio)
+    orders = estimate.orders(runs, found, physics.angle_per_unit)
+    turns = [lead / order for order in dict.fromkeys((1.0, 2.0, *orders)) if _SHORTEST_M < lead / order < travel]
+    orders = list(dict.fromkeys((*orders, *(float(round(lead / period)) for period in periods
+                                            if abs(lead / period - round(lead / period)) < _WHOLE and period < lead))))
     ripple = [d.torque / np.where(np.abs(run.torque) > 0.2 * physics.coulomb_n_m, run.torque, np.inf)
               for run, d in zip(runs, found, strict=True)]
     return Scene(
@@ -86,15 +91,18 @@ def scene(runs: Sequence[Measured], bench: Bench, blocks: Sequence[dict[str, Flo
         travel_m=travel,
         duration_s=max(run.motor.size * run.period_s for run in runs),
         ratio=ratio,
-        orders=estimate.orders(runs, found, physics.angle_per_unit),
+        orders=orders,
         ripple_orders=estimate.orders(runs, found, physics.angle_per_unit, 2, ripple),
-        friction_periods=[*estimate.friction_periods(runs, found, ratio), *turns],
-        scale_periods=(estimate.scale_periods(runs, [block["table"] for block in blocks])
+        friction_periods=[*periods, *turns],
+        scale_periods=([*estimate.scale_periods(runs, [block["table"] for block in blocks]), lead]
                        if runs[0].table_m.size else []),
         window=estimate.force_window(runs[longest], found[longest]),
         stretch=max(stretch, 0.5e-6), most_stretch=max(most_stretch, 1e-6),
     )
 
+
+_SHORTEST_M = 1e-3       # along the travel: below, friction is not looked for
+_WHOLE = 0.05            # of a turn, to which a period makes a whole order of the screw
 
 _Values = Sequence[tuple[float, ...]]
 _STARTS: dict[str, tuple[Callable[[Scene], _Values], int, int]] = {
@@ -129,7 +137,9 @@ _STARTS: dict[str, tuple[Callable[[Scene], _Values], int, int]] = {
     "encoder_eccentricity": (lambda s: [(1e-4, 0.0)], 0, 1),
     "scale_interpolation_error": (lambda s: [(1e-7, p, 0.0) for p in s.scale_periods], 0, 2),
     "external_force": (lambda s: [(s.window[2] / s.ratio or 1.0, s.window[0], s.window[1])], 0, -1),
-    "spring_load": (lambda s: [(0.02 * s.coulomb / s.ratio / s.travel_m, 0.0)], 0, -1),
+    # at rest where the axis starts, or so far away that it pushes alike all over a short motion
+    "spring_load": (lambda s: [(0.02 * s.coulomb / s.ratio / s.travel_m, f * s.travel_m) for f in (0.0, -20.0, 20.0)],
+                    0, -1),
 }
 
 _NEEDS_TABLE = ("backlash", "preload_loss", "position_dependent_stiffness", "periodic_lead_error",

@@ -1,7 +1,7 @@
 """Cases that their motion cannot decide: one effect, and a rival that does the same over this motion.
 
 Each couple is known from the mechanics: a torque of the motor angle and friction of the position are one thing while
-the axis moves one way; a spring is a constant push where it does not stretch; a motor encoder that errs, or a linear
+the axis moves one way; a spring is a constant load where it does not stretch; a motor encoder that errs, or a linear
 one, is a screw that errs as long as nothing accelerates. That a case cannot be decided is not believed but worked out:
 all parameters of the rival and of the axis are fitted to what the effect does.
 """
@@ -71,13 +71,11 @@ def _angle_or_position(s: Scene, rng: Rng) -> Both:
     return _either(rng, cogging, friction)
 
 
-def _spring_or_push(s: Scene, rng: Rng) -> Both:
+def _spring_or_load(s: Scene, rng: Rng) -> Both:
     rest_m = s.axis.travel_m * rng.uniform(0.6, 1.5)
     force_n = s.coulomb / s.ratio * log_uniform(rng, 0.1, 0.8)
     spring = Effect("spring_load", {"stiffness_n_m": force_n / rest_m, "rest_position_m": rest_m})
-    if not s.axis.has_table:
-        return spring, Effect("constant_load", {"load_torque_n_m": -force_n})
-    return spring, Effect("external_force", {"force_n": force_n, "start_s": 0.0, "end_s": 100.0})
+    return spring, Effect("constant_load", {"load_torque_n_m": -force_n * s.ratio})
 
 
 def _encoder_or_screw(s: Scene, rng: Rng) -> Both | None:
@@ -98,7 +96,7 @@ def _scale_or_screw(s: Scene, rng: Rng) -> Both | None:
 
 
 _COUPLES: tuple[tuple[Couple, Poor], ...] = (
-    (_angle_or_position, "one_way"), (_spring_or_push, "local"), (_encoder_or_screw, "slow"),
+    (_angle_or_position, "one_way"), (_spring_or_load, "local"), (_encoder_or_screw, "slow"),
     (_scale_or_screw, "slow"))
 _EFFECTS = frozenset({"cogging_torque", "position_dependent_friction", "spring_load", "encoder_eccentricity",
                       "periodic_lead_error", "scale_interpolation_error"})

@@ -43,10 +43,7 @@ def compared(effect: Effect | EncoderFault, axis: DrawnAxis) -> dict[str, float]
     if effect.id in ("asymmetric_friction", "constant_load"):
         (torque,) = values.values()
         return {"offset_torque_n_m": torque, "load_torque_n_m": torque}
-    # the screw, not the nut, is soft on a chain that has both
-    other_law = (effect.form in ("exponential", "atan", "gms", "lugre")
-                 or (effect.id == "position_dependent_stiffness" and axis.kind == "seven_dof"))
-    if other_law or effect.id not in BY_ID:
+    if effect.form in ("exponential", "atan", "gms", "lugre") or effect.id not in BY_ID:
         return {}
     return {name: values[name] for name in BY_ID[effect.id].names if name in values}
 

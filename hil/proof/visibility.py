@@ -2,6 +2,9 @@
 
     size = max over channels of rms( (1 - P) (r_with - r_without) ),   P = Q Q^T of the parameters' sensitivities
 
+What large changes of the parameters explain beyond that, as a nut that is soft all over, is no size either: r_without
+is taken again where P leads, a few times (a chord method).
+
 Runs of the closed loop without sensor noise. Channels: torque over the torque's noise; drive (torque less command) and
 controller (command less the law fed with the recorded positions) over the same; table less r x motor over the noise of
 counting. This is the generator's own yardstick; nothing of the twin or of the diagnosis is in it.
@@ -28,6 +31,8 @@ FloatArray = NDArray[np.float64]
 
 _PERFECT = Sensors(motor_counts_per_rev=0, table_resolution_m=0, torque_noise_n_m=0)
 _DIFFERENCE = 0.01           # relative, of a parameter in its finite difference
+_FACTORS = (0.2, 5.0)        # of the true value, between which parameters are fitted
+_CHORDS = 3                  # steps of that fit with the derivatives of the true values
 # Parameters that a recording shows by themselves, and of which a percent more is another effect.
 _READ_OFF = ("cycles_per_rev", "period_m", "start_s", "end_s")
 
@@ -38,7 +43,7 @@ class Visibility:
     def __init__(self, axis: DrawnAxis, motions: Sequence[Trajectory]) -> None:
         self.axis, self.motions = axis, tuple(motions)
         self._runs: dict[object, FloatArray] = {}
-        self._bases: dict[object, FloatArray] = {}
+        self._bases: dict[object, tuple[FloatArray, FloatArray]] = {}
 
     def size(self, effects: Sequence[Effect], beside: Sequence[Effect] = ()) -> float:
         """Size of effects beside others, whose parameters could be fitted too."""
@@ -46,13 +51,37 @@ class Visibility:
 
     def sizes(self, effects: Sequence[Effect], beside: Sequence[Effect] = ()) -> dict[str, float]:
         """The same for each channel."""
-        change = self._channels([*beside, *effects]) - self._channels(beside)
-        basis = self._basis(tuple(beside))
-        flat = change.ravel()
-        if not np.all(np.isfinite(flat)):
+        seen = self._channels([*beside, *effects])
+        if not np.all(np.isfinite(seen)):
             return dict.fromkeys(self._names, inf)
-        left = (flat - basis @ (basis.T @ flat)).reshape(change.shape)
+        left = self._left(seen, self._channels(beside), tuple(beside))
+        if not beside:
+            left = self._refitted(seen, left)
         return dict(zip(self._names, np.sqrt(np.mean(left**2, axis=1)).tolist(), strict=True))
+
+    def _left(self, seen: FloatArray, without: FloatArray, beside: tuple[Effect, ...] = ()) -> FloatArray:
+        """What of channels (channels, n) the parameters cannot explain from where they are."""
+        basis, _ = self._basis(beside)
+        flat = (seen - without).ravel()
+        return np.asarray((flat - basis @ (basis.T @ flat)).reshape(seen.shape), dtype=np.float64)
+
+    def _refitted(self, seen: FloatArray, best: FloatArray) -> FloatArray:
+        """The least that is left of channels (channels, n) on the way of the nominal parameters to them."""
+        _, slopes = self._basis(())
+        factors, at = np.ones(len(self.axis.nominal)), self._channels(())
+        for _ in range(_CHORDS):
+            step, *_ = np.linalg.lstsq(slopes, (seen - at).ravel(), rcond=None)
+            factors = np.clip(factors + _DIFFERENCE * step, *_FACTORS)
+            there = {name: self.axis.true[name] * value
+                     for name, value in zip(self.axis.nominal, factors, strict=True)}
+            at = self._seen_all((), self.axis.with_parameters(there))
+            if not np.all(np.isfinite(at)):
+                break
+            left = self._left(seen, at)
+            if np.sum(left**2) >= np.sum(best**2):
+                break
+            best = left
+        return best
 
     def evidence(self, effects: Sequence[Effect]) -> float:
         """Sum of squares of what the sizes are the rms of: what a test on white noise would see."""
@@ -77,7 +106,7 @@ class Visibility:
             return np.asarray(np.nan_to_num(difference, nan=1e6, posinf=1e6, neginf=-1e6).ravel())
 
         start = np.ones(len(nominal) + len(own))
-        return 2.0 * float(least_squares(left, start, bounds=(0.2, 5.0), diff_step=1e-3, max_nfev=6).cost)
+        return 2.0 * float(least_squares(left, start, bounds=_FACTORS, diff_step=1e-3, max_nfev=6).cost)
 
     def peak_torque(self) -> float:
         """Largest torque that the motions take without effects."""
@@ -89,8 +118,9 @@ class Visibility:
         names = ("torque", "drive", "controller", "transmission")
         return names if self.axis.has_table else names[:3]
 
-    def _basis(self, beside: tuple[Effect, ...]) -> FloatArray:
-        """Orthonormal directions (n, p) that nominal parameters and those of the other effects span."""
+    def _basis(self, beside: tuple[Effect, ...]) -> tuple[FloatArray, FloatArray]:
+        """Orthonormal directions (n, p) that nominal parameters and those of the other effects span, and the changes
+        (n, p) that span them."""
         key = _key(beside)
         if key not in self._bases:
             at = self._channels(beside).ravel()
@@ -101,8 +131,9 @@ class Visibility:
             for index, effect in enumerate(beside):
                 for other in _neighbours(effect):
                     slopes.append(self._channels([*beside[:index], other, *beside[index + 1:]]).ravel() - at)
-            columns = np.stack([slope / max(float(np.linalg.norm(slope)), 1e-300) for slope in slopes], axis=1)
-            self._bases[key] = np.linalg.qr(np.nan_to_num(columns))[0]
+            columns = np.nan_to_num(np.stack(slopes, axis=1))
+            length = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+            self._bases[key] = np.linalg.qr(columns / length)[0], columns
         return self._bases[key]
 
     def _channels(self, effects: Sequence[Effect], truth: AxisTruth | None = None) -> FloatArray:

@@ -120,6 +120,7 @@ class Twin:
         rows[kernel.SHAPE_MOTOR] = modes.shape[modes.motor]
         rows[kernel.SHAPE_TABLE] = modes.shape[modes.table]
         rows[kernel.SHAPE_SPRING] = modes.transmission
+        rows[kernel.SHAPE_SCREW] = modes.screw
         chain = self.physics.chain      # the coordinates that mechanisms add come after it, and stay
         for row, place in ((kernel.TABLE_IMPULSE, chain.table), (kernel.MOTOR_IMPULSE, chain.motor)):
             rows[row] = chain.inertia_kg_m2 @ chain.side(place) @ modes.shape[:len(chain.names)]
@@ -136,6 +137,8 @@ class Twin:
         constants[kernel.VISCOUS] = physics.viscous_n_m_s_rad
         constants[kernel.VISCOUS_SPEED] = physics.viscous_speed
         constants[kernel.SPRING] = chain.transmission_stiffness_n_m_rad
+        constants[kernel.SCREW] = chain.screw_stiffness_n_m_rad
+        constants[kernel.SCREW_APART] = float(not np.array_equal(chain.screw, chain.transmission))
         elastic = (self.modal.frequency_rad_s > 0.0) & (self.modal.transmission != 0.0)
         if elastic.any():
             # what of the modal damping acts in the transmission: so much that no mode is driven where it is taken away
@@ -152,7 +155,7 @@ class Twin:
         for at, first in ((kernel.COARSE_GAINS, kernel.COARSE), (kernel.FINE_GAINS, kernel.FINE)):
             per_torque = modes[first + 5]
             constants[at:at + 3] = motor * per_torque @ motor, motor * per_torque @ table, table * per_torque @ table
-        bends = any(BY_ID[active.effect].stage is Stage.TRANSMISSION for active in self.active)
+        bends = any(BY_ID[active.effect].stage in (Stage.TRANSMISSION, Stage.SCREW) for active in self.active)
         constants[kernel.ALWAYS_FINE] = float(bends and np.count_nonzero(elastic) > 1)
         return constants
 

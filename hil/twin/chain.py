@@ -16,6 +16,7 @@ from math import pi
 import numpy as np
 
 from hil.twin.ballscrew import RECONSTRUCTED_TABLE_1, FloatArray, SevenDof
+from hil.twin.elasticity import in_series
 
 __all__ = [
     "LINEAR_LEAD_M", "RECONSTRUCTED_TABLE_1", "Chain", "FloatArray", "SevenDof",
@@ -32,7 +33,8 @@ class Chain:
 
     `damping_ratio` holds one modal damping ratio per mode, in ascending frequency, 0 for the rigid
     body. `transmission @ q` is the deflection of the transmission spring, motor side minus table
-    side [rad]; zeros where the chain has none.
+    side [rad]; zeros where the chain has none. `screw @ q` is the deflection of the screw between its bearing and
+    the nut; where that is no spring of its own, it is the transmission's.
     """
 
     inertia_kg_m2: FloatArray
@@ -44,6 +46,8 @@ class Chain:
     table: int
     transmission: FloatArray
     transmission_stiffness_n_m_rad: float
+    screw: FloatArray
+    screw_stiffness_n_m_rad: float
 
     def side(self, place: int) -> FloatArray:
         """1 for each coordinate on the same side of the transmission as `place`, else 0; shape (n,)."""
@@ -59,7 +63,7 @@ def one_mass(mass_kg: float, lead_m: float = LINEAR_LEAD_M) -> Chain:
     """A rigid axis: motor and table are one mass [kg], seen at the table."""
     r = lead_m / (2.0 * pi)
     zero = np.zeros(1)
-    return Chain(np.array([[mass_kg * r**2]]), np.zeros((1, 1)), lead_m, zero, ("axis",), 0, 0, zero, 0.0)
+    return Chain(np.array([[mass_kg * r**2]]), np.zeros((1, 1)), lead_m, zero, ("axis",), 0, 0, zero, 0.0, zero, 0.0)
 
 
 def two_mass(
@@ -78,6 +82,8 @@ def two_mass(
         table=1,
         transmission=np.array([1.0, -1.0]),
         transmission_stiffness_n_m_rad=k,
+        screw=np.array([1.0, -1.0]),
+        screw_stiffness_n_m_rad=k,
     )
 
 
@@ -106,6 +112,7 @@ def serial_chain(
         raise ValueError(f"names must have one entry per inertia ({n}), got {len(names)}")
     spring = np.eye(n - 1, n) - np.eye(n - 1, n, k=1)
     stiffness = np.asarray(stiffnesses_n_m_rad, dtype=float)
+    nut = (spring[transmission], float(stiffness[transmission])) if n > 1 else (np.zeros(1), 0.0)
     return Chain(
         inertia_kg_m2=np.diag(np.asarray(inertias_kg_m2, dtype=float)),
         stiffness_n_m_rad=spring.T @ (stiffness[:, None] * spring),
@@ -114,8 +121,10 @@ def serial_chain(
         names=tuple(names) or tuple(f"inertia {i + 1}" for i in range(n)),
         motor=0,
         table=n - 1,
-        transmission=spring[transmission] if n > 1 else np.zeros(1),
-        transmission_stiffness_n_m_rad=float(stiffness[transmission]) if n > 1 else 0.0,
+        transmission=nut[0],
+        transmission_stiffness_n_m_rad=nut[1],
+        screw=nut[0],
+        screw_stiffness_n_m_rad=nut[1],
     )
 
 
@@ -158,4 +167,7 @@ def seven_dof(parameters: SevenDof, damping_ratio: float, nut_position_m: float 
         table=6,
         transmission=spring[4],
         transmission_stiffness_n_m_rad=float(stiffnesses[4]),
+        # torsion and axial give: both carry the load, and both are longer the farther the nut is away
+        screw=spring[2] - spring[3],
+        screw_stiffness_n_m_rad=in_series(float(stiffnesses[2]), float(stiffnesses[3])),
     )

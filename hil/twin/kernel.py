@@ -26,17 +26,18 @@ from hil.twin.library import SLOTS
 from hil.twin.mechanism import Moment
 
 # Rows of `modes` (MODE_ROWS, n): exact discretisation for the coarse and the fine step, then shapes.
-COARSE, FINE, SHAPE_MOTOR, SHAPE_TABLE, SHAPE_SPRING, TABLE_IMPULSE, MOTOR_IMPULSE, MODE_ROWS = (
-    0, 6, 12, 13, 14, 15, 16, 17)
+COARSE, FINE, SHAPE_MOTOR, SHAPE_TABLE, SHAPE_SPRING, SHAPE_SCREW, TABLE_IMPULSE, MOTOR_IMPULSE, MODE_ROWS = (
+    0, 6, 12, 13, 14, 15, 16, 17, 18)
 
 # Entries of `constants`.
 (PERIOD, RATIO, ANGLE_PER_UNIT, COULOMB, VISCOUS, SPRING, DAMPER, COARSE_STEPS, FINE_STEPS, SLOW_VELOCITY,
- ALWAYS_FINE, OBSERVER, PLAY, VISCOUS_SPEED, COARSE_GAINS, FINE_GAINS, CONSTANTS) = (*range(15), 17, 20)
+ ALWAYS_FINE, OBSERVER, PLAY, VISCOUS_SPEED, SCREW, SCREW_APART, COARSE_GAINS, FINE_GAINS, CONSTANTS) = (
+    *range(17), 19, 22)
 
 # Entries of `codes`: variant + 1 of the mechanism in each slot (0: off), then whether each stage is entered.
 (ON_CURRENT, ON_TORQUE, ON_MOTOR_TORQUE, ON_COULOMB, ON_FRICTION_SCALE, ON_DRAG, ON_BIAS, ON_BRISTLE,
- ON_TABLE_SHARE, ON_TRANSMISSION, ON_TABLE_FORCE, ON_MOTOR_READING, ON_TABLE_READING, ON_ANY, CODES) = range(
-    len(SLOTS), len(SLOTS) + 15)
+ ON_TABLE_SHARE, ON_TRANSMISSION, ON_SCREW, ON_TABLE_FORCE, ON_MOTOR_READING, ON_TABLE_READING, ON_ANY, CODES) = range(
+    len(SLOTS), len(SLOTS) + 16)
 
 # Rows of `memory` (slots + 1, WIDTH): each mechanism's own, then the kernel's.
 OWN = len(SLOTS)
@@ -45,7 +46,8 @@ CLOCK, BRISTLE_DEFLECTION, SPRING_EXTRA, FLOATING, LAST_SPEED = range(5)
 _current, _torque, _motor_torque = stages.current, stages.torque, stages.motor_torque
 _coulomb, _friction_scale, _drag, _bias = stages.coulomb, stages.friction_scale, stages.drag, stages.bias
 _bristle, _table_share, _transmission = stages.bristle, stages.table_share, stages.transmission
-_table_force, _motor_reading, _table_reading = stages.table_force, stages.motor_reading, stages.table_reading
+_screw, _table_force = stages.screw, stages.table_force
+_motor_reading, _table_reading = stages.motor_reading, stages.table_reading
 # Time constant of the observer that holds a floating table: long against a 2 ms table-encoder count at creep,
 # short against a flight through the gap (tens of ms).
 OBSERVER_S = 0.008
@@ -126,6 +128,7 @@ def _build_advance(digest: str) -> Any:
         own = memory[OWN]
         ratio, period = constants[RATIO], constants[PERIOD]
         at_motor, at_table, at_spring = modes[SHAPE_MOTOR], modes[SHAPE_TABLE], modes[SHAPE_SPRING]
+        at_screw = modes[SHAPE_SCREW]
         positions, velocities = delta[0], delta[1]
         any_on = codes[ON_ANY] > 0
         position = table = table_speed = stretch = stretch_rate = 0.0
@@ -161,9 +164,9 @@ def _build_advance(digest: str) -> Any:
             push = 0.0
             if codes[ON_TABLE_FORCE]:
                 push = _table_force(0.0, at, values, codes, memory) * ratio
-            spring = 0.0
+            spring = screw = 0.0
+            bent = effective = stretch + 0.5 * h * stretch_rate
             if codes[ON_TRANSMISSION]:
-                bent = stretch + 0.5 * h * stretch_rate
                 effective = _transmission(bent, at, values, codes, memory)
                 extra = effective - bent
                 floating = effective == 0.0
@@ -175,11 +178,15 @@ def _build_advance(digest: str) -> Any:
                     pressing = constants[SPRING] * effective + constants[DAMPER] * (stretch_rate + rate)
                     if pressing * effective < 0.0:      # flanks with play push, they do not pull
                         spring += pressing
+            if codes[ON_SCREW]:
+                if constants[SCREW_APART] > 0.0:
+                    effective = _along(at_screw, positions) + 0.5 * h * _along(at_screw, velocities)
+                screw = -constants[SCREW] * effective * (_screw(1.0, at, values, codes, memory) - 1.0)
 
             free = table_free = 0.0
             if any_on:
                 for i in range(n):
-                    g = at_motor[i] * drive + at_table[i] * push + at_spring[i] * spring
+                    g = at_motor[i] * drive + at_table[i] * push + at_spring[i] * spring + at_screw[i] * screw
                     d, v = positions[i], velocities[i]
                     positions[i] = from_position[i] * d + from_velocity[i] * v + from_torque[i] * g
                     moved = rate_position[i] * d + rate_velocity[i] * v + rate_torque[i] * g
@@ -291,13 +298,16 @@ def _build_closed_loop(digest: str) -> Any:
         assert digest
         n = position_command.size
         motor, table, command, torque = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
+        datum = 0.0
         for k in range(n):
             motor[k], table[k] = read(constants, modes, values, codes, delta, memory)
+            if measured_table.size and memory[OWN, FLOATING] == 0.0:
+                datum += (measured_table[k] - table[k] - datum) / (k + 1)
             inputs = control.Inputs(position_command[k], velocity_command[k], motor[k], table[k])
             state, outputs = _control_step(gains, state, inputs)
             command[k] = outputs.torque_n_m
             if measured_table.size and memory[OWN, FLOATING] > 0.0:
-                error = (measured_table[k] - table[k]) / constants[RATIO]
+                error = (measured_table[k] - datum - table[k]) / constants[RATIO]
                 _correct(TABLE_IMPULSE, error, constants[PERIOD], OBSERVER_S, modes, delta)
             torque[k] = advance(command[k], constants, modes, values, codes, delta, memory)
         return motor, table, command, torque
@@ -313,14 +323,16 @@ def _build_observe(digest: str) -> Any:
 
         The controller gets the measured positions, the drive the measured command, the axis that torque,
         and the transmission the measured motor: the twin's motor is corrected by it after each
-        prediction, its table only while it floats in a gap. So a mismatch shows in its own block, where and
-        when it acts, and is then forgotten. `measured_table` is empty without a linear encoder.
+        prediction, its table only while it floats in a gap or rests. So a mismatch shows in its own block, where and
+        when it acts, and is then forgotten. `measured_table` is empty without a linear encoder. That has a datum of
+        its own, which is the mean of what it differs by while the axis moves.
         """
         assert digest
         n = command.size
         motor, table, wanted, torque = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
         period = constants[PERIOD]
         seen = measured_motor * constants[RATIO] if measured_table.size == 0 else measured_table
+        datum, moved = 0.0, 0
         for k in range(n):
             motor[k], table[k] = read(constants, modes, values, codes, delta, memory)
             inputs = control.Inputs(position_command[k], velocity_command[k], measured_motor[k], seen[k])
@@ -330,11 +342,17 @@ def _build_observe(digest: str) -> Any:
             resumed = state.integral_n_m + period / INTEGRATOR_S * (command[k] - wanted[k])
             state = control.State(state.tick, state.velocity_reference_m_s, resumed, state.previous_motor_rad,
                                   state.previous2_motor_rad, state.filtered_velocity_rad_s)
-            _correct(MOTOR_IMPULSE, measured_motor[k] - motor[k], period, constants[OBSERVER], modes, delta)
-            resting = abs(measured_motor[k] - measured_motor[max(k - 1, 0)]) <= constants[SLOW_VELOCITY] * period
-            if measured_table.size and (resting or memory[OWN, FLOATING] > 0.0):
-                error = (measured_table[k] - table[k]) / constants[RATIO]
-                _correct(TABLE_IMPULSE, error, period, OBSERVER_S, modes, delta)
+            error = measured_motor[k] - motor[k]
+            _correct(MOTOR_IMPULSE, error, period, constants[OBSERVER], modes, delta)
+            if measured_table.size:
+                resting = abs(measured_motor[k] - measured_motor[max(k - 1, 0)]) <= constants[SLOW_VELOCITY] * period
+                free = resting or memory[OWN, FLOATING] > 0.0
+                if not free or k == 0:
+                    moved += 1
+                    datum += (measured_table[k] - table[k] - constants[RATIO] * error - datum) / moved
+                if free:
+                    error = (measured_table[k] - datum - table[k]) / constants[RATIO]
+                    _correct(TABLE_IMPULSE, error, period, OBSERVER_S, modes, delta)
             torque[k] = advance(command[k], constants, modes, values, codes, delta, memory)
         return motor, table, wanted, torque
 

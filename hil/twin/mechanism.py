@@ -46,6 +46,7 @@ class Stage(StrEnum):
     TABLE_SHARE = "table_share"        # + share of the friction that acts on the table
     TRANSMISSION = "transmission"      # deflection of the transmission [motor units] -> the deflection its
                                        # nominal spring would need for the same torque
+    SCREW = "screw"                    # x factor on the stiffness of the screw between its bearing and the nut
     TABLE_FORCE = "table_force"        # + force on the table [N]
     MOTOR_READING = "motor_reading"    # motor position -> what its encoder reads
     TABLE_READING = "table_reading"    # table position -> what its encoder reads

@@ -25,7 +25,7 @@ class Modal:
 
     Column i of `shape` is mode i, mass-normalised [1/sqrt(kg m^2)], with a motor component >= 0.
     `shape[motor]` and `shape[table]` are the participations of the two encoders, `transmission` (m,)
-    that of the transmission spring's deflection.
+    and `screw` (m,) those of the deflections of these springs.
     """
 
     frequency_rad_s: FloatArray
@@ -35,6 +35,7 @@ class Modal:
     table: int
     lead_m: float
     transmission: FloatArray
+    screw: FloatArray
 
 
 class Discrete(NamedTuple):
@@ -67,6 +68,7 @@ def modal(chain: Chain) -> Modal:
         table=chain.table,
         lead_m=chain.lead_m,
         transmission=chain.transmission @ shape,
+        screw=chain.screw @ shape,
     )
 
 
@@ -81,6 +83,7 @@ def truncate(modal: Modal, modes: int) -> Modal:
         shape=modal.shape[:, :modes],
         damping_ratio=modal.damping_ratio[:modes],
         transmission=modal.transmission[:modes],
+        screw=modal.screw[:modes],
     )
 
 

@@ -19,7 +19,7 @@ from hil.twin.mechanism import Mechanism, Stage
 # fmt: off
 KERNEL_STAGES = (
     Stage.CURRENT, Stage.TORQUE, Stage.MOTOR_TORQUE, Stage.COULOMB, Stage.FRICTION_SCALE, Stage.DRAG,
-    Stage.BIAS, Stage.BRISTLE, Stage.TABLE_SHARE, Stage.TRANSMISSION, Stage.TABLE_FORCE,
+    Stage.BIAS, Stage.BRISTLE, Stage.TABLE_SHARE, Stage.TRANSMISSION, Stage.SCREW, Stage.TABLE_FORCE,
     Stage.MOTOR_READING, Stage.TABLE_READING,
 )
 # fmt: on
@@ -78,6 +78,7 @@ bias = _stage(Stage.BIAS)
 bristle = _stage(Stage.BRISTLE)
 table_share = _stage(Stage.TABLE_SHARE)
 transmission = _stage(Stage.TRANSMISSION)
+screw = _stage(Stage.SCREW)
 table_force = _stage(Stage.TABLE_FORCE)
 motor_reading = _stage(Stage.MOTOR_READING)
 table_reading = _stage(Stage.TABLE_READING)

@@ -21,9 +21,9 @@ MECHANISM = Mechanism(
     block=Block.TRANSMISSION,
     element="screw between bearing and nut",
     sentence="The stiffness of the screw changes by a share of {relative_slope} for each metre of travel.",
-    equation="T = k max(1 + s x, 0) q",
+    equation="T = k max(1 + s x, 0) q,   k: torsion and axial give of the screw, one after the other",
     source="Zaeh, Oertli and Milberg, CIRP Annals 53 (2004) 289, screw stiffness over the position of its nut",
     parameters=(Parameter("relative_slope", Dimension.PER_LENGTH, -10.0, 10.0),),
-    stage=Stage.TRANSMISSION,
+    stage=Stage.SCREW,
     contribution=_stiffness_along_travel,
 )

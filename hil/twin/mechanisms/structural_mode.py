@@ -54,7 +54,7 @@ def _longer(chain: Chain) -> Chain:
     return replace(chain, inertia_kg_m2=np.pad(chain.inertia_kg_m2, (0, 1)),
                    stiffness_n_m_rad=np.pad(chain.stiffness_n_m_rad, (0, 1)),
                    damping_ratio=np.append(chain.damping_ratio, 0.0), names=(*chain.names, "structure"),
-                   transmission=np.append(chain.transmission, 0.0))
+                   transmission=np.append(chain.transmission, 0.0), screw=np.append(chain.screw, 0.0))
 
 
 MECHANISM = Mechanism(

@@ -10,7 +10,7 @@ from diagnosis_runs import bench, changed, recorded
 
 from hil.bench import load_bench
 from hil.diagnosis.model import Term
-from hil.diagnosis.preflight import prepare, regress
+from hil.diagnosis.preflight import _factor_between, prepare, regress
 from hil.errors import InputError
 from hil.recording import Recording
 
@@ -126,3 +126,19 @@ def test_all_reasons_are_given_at_once(run: Recording) -> None:
 def test_a_linear_axis_is_not_for_a_rotary_bench(run: Recording) -> None:
     with pytest.raises(InputError, match="give the bench of this axis"):
         prepare([run], load_bench("emps"))
+
+
+def test_a_motor_encoder_with_another_zero_is_refused(run: Recording) -> None:
+    shifted = changed(run, motor_position_rad=run["motor_position_rad"] + 10.0)
+    assert "lies -15.9" in refused(shifted)
+
+
+def test_an_axis_that_lags_on_short_strokes_is_not_taken_for_another_unit() -> None:
+    """The motor makes three quarters of each stroke, late."""
+    lagging = recorded(OWNER)
+    command = lagging["position_command_m"]
+    late = np.concatenate([np.full(60, command[0]), command[:-60]])
+    factor = _factor_between(command, 0.5 * (command + late) * 0.95)
+    assert 0.9 < factor <= 1.0
+    assert _factor_between(command, 1e3 * command) == pytest.approx(1e3)
+    assert _factor_between(command, -command) == pytest.approx(-1.0)

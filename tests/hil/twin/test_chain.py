@@ -129,6 +129,15 @@ def test_the_transmission_spring_carries_the_force_on_the_table() -> None:
     assert carried == pytest.approx(-torque, rel=1e-9)
 
 
+def test_the_screw_gives_by_torsion_and_along_its_axis_one_after_the_other() -> None:
+    chain = seven_dof(RECONSTRUCTED_TABLE_1, 0.03)
+    torque = 0.7
+    angle = np.append(0.0, np.linalg.solve(chain.stiffness_n_m_rad[1:, 1:], torque * np.eye(6)[-1]))
+    _, stiffnesses = RECONSTRUCTED_TABLE_1.reduced()
+    assert chain.screw @ angle == pytest.approx(-torque / stiffnesses[2] - torque / stiffnesses[3], rel=1e-9)
+    assert chain.screw_stiffness_n_m_rad * (chain.screw @ angle) == pytest.approx(-torque, rel=1e-9)
+
+
 def test_sides_of_the_transmission() -> None:
     """Of the seven coordinates, four turn with the motor; nut bracket and table are beyond the nut."""
     chain = seven_dof(RECONSTRUCTED_TABLE_1, 0.03)

@@ -198,8 +198,8 @@ def _notes(measured: Measured, bench: Bench, fit: FitResult | None, datum_m: flo
         "only.",
     ]
     if measured.table_m.size:
-        notes.append(f"The linear encoder has a datum of its own: {1e6 * datum_m:.3g} µm from that of the twin, taken off "
-                     "the table position.")
+        notes.append(f"The linear encoder has a datum of its own: {1e6 * datum_m:.3g} µm from that of the twin, taken "
+                     "off the table position.")
     if bench.drive is not None and bench.drive.mode is not DriveMode.CST:
         notes.append(f"In {bench.drive.mode} the drive closes loops of its own; the twin closes them with the law and "
                      f"the periods of the bench file (velocity loop {1e3 * measured.period_s:g} ms). A drive whose "

@@ -26,6 +26,8 @@ def prove(
     seed: Annotated[int, typer.Option(min=0, help="Of the draw")] = 1,
     plant: Annotated[Plant, typer.Option("--plant", help="What moves the axes: our simulation, or MuJoCo, which must "
                                          "be installed (make peers)")] = Plant.SIMULATED,
+    only: Annotated[list[str] | None, typer.Option("--only", help="A tier to draw from, as single or pair; may be "
+                                                   "repeated; left out: all")] = None,
     jobs: Annotated[int | None, typer.Option(min=1, help="Cases diagnosed at once; left out: one per core")] = None,
 ) -> None:
     """Conceal effects in simulated axes, seal what they are, diagnose the recordings blind, unseal and score."""
@@ -40,10 +42,11 @@ def prove(
 
     if full and cases is not None:
         raise InputError(f"--full: given with --cases {cases}, allowed one of them")
-    count = sum(PLANTS[plant].values()) if full else 40 if cases is None else cases
-    planned = plan(count, seed, plant)
+    whole = sum(share for tier, share in PLANTS[plant].items() if not only or tier in only)
+    count = whole if full else 40 if cases is None else cases
+    planned = plan(count, seed, plant, only or ())
     with progress() as tell:
-        scores = run(folder, planned, seed, jobs or os.cpu_count() or 1, out.print, tell, plant)
+        scores = run(folder, planned, seed, jobs or os.cpu_count() or 1, out.print, tell, plant, only or ())
         tell("writing the report", None)
         write_proof(scores, score_others(folder), folder)
     table(HEADERS, [goal_row(goal) for goal in scores.goals])

@@ -21,6 +21,7 @@ from hil.diagnosis.proof import Proof, explained_share, prove
 from hil.diagnosis.result import ChannelFit, Location, Mode, NextExperiment, Result, Unexplained, Verdict
 from hil.diagnosis.testable import not_testable
 from hil.diagnosis.wording import number, said, title
+from hil.errors import InputError
 from hil.measured import Measured
 from hil.recording import Recording
 from hil.twin.mechanism import Dimension
@@ -63,6 +64,10 @@ def diagnose(train: Sequence[Recording], validate: Sequence[Recording], bench: B
     if not validate:
         train, validate = _split(train)
         notes.append("No recording was held out: the last third of each is kept for validation.")
+    twice = [held.name for held in validate for run in train if _same(held, run)]
+    if twice:
+        raise InputError(f"--validate: given {', '.join(twice)}, which is a training recording too, allowed recordings of "
+                         "another motion; leave it out of one of them")
     prepared = prepare([*train, *validate], bench)
     runs, held_out = tuple(prepared[:len(train)]), tuple(prepared[len(train):])
 
@@ -132,6 +137,12 @@ def _split(recordings: Sequence[Recording]) -> tuple[list[Recording], list[Recor
         train.append(_part(recording, slice(0, cut), "first part"))
         rest.append(_part(recording, slice(cut, None), "last part"))
     return train, rest
+
+
+def _same(one: Recording, other: Recording) -> bool:
+    """Whether two recordings are one and the same."""
+    return one.columns.keys() == other.columns.keys() and all(
+        np.array_equal(values, other[name]) for name, values in one.columns.items())
 
 
 def _standstill(recording: Recording, row: int) -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -30,17 +30,22 @@ class Planned:
     number: int
 
 
-def plan(cases: int, seed: int, plant: str = "simulated") -> tuple[Planned, ...]:
-    """So many cases, of each tier its share of the full proof on a plant, shuffled by the seed.
+def plan(cases: int, seed: int, plant: str = "simulated", only: Collection[str] = ()) -> tuple[Planned, ...]:
+    """So many cases, of each tier its share of the full proof on a plant, shuffled by the seed; `only` of some tiers.
 
     Within a tier numbers are consecutive, so that its effects are drawn equally often. Raises InputError for a
-    number of cases that makes no sense.
+    number of cases that makes no sense and for a tier that the plant has not.
     """
+    known = PLANTS[plant]
+    for tier in only:
+        if tier not in known:
+            raise InputError(f"--only: given {tier}, allowed {', '.join(known)}")
     if not 1 <= cases <= MOST:
         raise InputError(f"--cases: given {cases}, allowed 1 to {MOST}")
+    shares = {tier: share for tier, share in known.items() if not only or tier in only}
     random = np.random.default_rng([seed, cases])
     # from another number in each tier: the same number of two tiers is the same effect
-    order = [(tier, first + number) for tier, count in counts(cases, PLANTS[plant]).items()
+    order = [(tier, first + number) for tier, count in counts(cases, shares).items()
              for first in (int(random.integers(_NUMBERS)),) for number in range(count)]
     return tuple(Planned(f"case_{place:04d}", *order[index])
                  for place, index in enumerate(random.permutation(len(order))))

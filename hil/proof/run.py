@@ -26,14 +26,15 @@ Tell = Callable[[str, float | None], None]       # what is going on, and the sha
 
 
 def prove(folder: Path, planned: Sequence[Planned], seed: int, jobs: int, say: Say, tell: Tell,
-          plant: str = "simulated") -> Scores:
-    """Do what is still to be done of a proof in `folder`, on a plant of `plan.PLANTS`, and score it.
+          plant: str = "simulated", only: Sequence[str] = ()) -> Scores:
+    """Do what is still to be done of a proof in `folder`, on a plant of `plan.PLANTS`, and score it; `only` are the
+    tiers that it was planned of, where not of all.
 
     Raises InputError where `folder` holds another proof, HilError where what was sealed has changed or the blind
     process failed.
     """
     cases = f"--cases {len(planned)}" if len(planned) != sum(PLANTS[plant].values()) else "--full"
-    which = "" if plant == "simulated" else f"--plant {plant} "
+    which = "".join(f"--only {tier} " for tier in only) + ("" if plant == "simulated" else f"--plant {plant} ")
     command = f"hil prove {which}{cases} --seed {seed} --out DIR"
     about = read_seal(folder)
     if about is None:

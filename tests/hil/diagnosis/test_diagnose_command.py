@@ -44,3 +44,10 @@ def test_a_table_in_millimetres_is_refused(tmp_path: Path, bench_file: str) -> N
 
 def test_a_recording_that_holds_out_too_little_is_refused(tmp_path: Path, bench_file: str) -> None:
     assert "run (last part): too short" in refused(tmp_path, bench_file, recorded(bench()))
+
+
+def test_a_training_recording_proves_nothing(tmp_path: Path, bench_file: str) -> None:
+    run = tmp_path / "run.parquet"
+    write_parquet(recorded(bench(), times=3), run)
+    with pytest.raises(InputError, match="--validate: given run, which is a training recording too"):
+        diagnose([run], [run], bench_file, tmp_path / "out")

@@ -87,6 +87,13 @@ def test_a_plan_of_no_cases_is_refused(cases: int) -> None:
         plan(cases, 1)
 
 
+def test_a_plan_of_some_tiers_has_no_others() -> None:
+    planned = plan(30, 3, only=("single", "null"))
+    assert Counter(case.tier for case in planned) == {"single": 20, "null": 10}
+    with pytest.raises(InputError, match="--only: given novell, allowed single, pair"):
+        plan(30, 3, only=("novell",))
+
+
 def test_a_seal_holds_the_truth_and_every_file(sealed: Path) -> None:
     about = data(sealed / SEAL)
     assert about["truths_sha256"] == sha256(sealed / SEALED / "truths.json")

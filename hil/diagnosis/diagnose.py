@@ -66,8 +66,8 @@ def diagnose(train: Sequence[Recording], validate: Sequence[Recording], bench: B
         notes.append("No recording was held out: the last third of each is kept for validation.")
     twice = [held.name for held in validate for run in train if _same(held, run)]
     if twice:
-        raise InputError(f"--validate: given {', '.join(twice)}, which is a training recording too, allowed recordings of "
-                         "another motion; leave it out of one of them")
+        raise InputError(f"--validate: given {', '.join(twice)}, which is a training recording too, allowed recordings "
+                         "of another motion; leave it out of one of them")
     prepared = prepare([*train, *validate], bench)
     runs, held_out = tuple(prepared[:len(train)]), tuple(prepared[len(train):])
 

@@ -1,16 +1,9 @@
 """The compiled stepping kernel: modal states, friction, active mechanisms, controller.
 
 Each internal step h moves every modal oscillator exactly under the torques held over the step
-(Eq. 8 of the source), then lets contact friction act as an impulse:
-
-    v* = velocity after the step without friction,  G = velocity gained per unit of torque over h
-    stuck    F = v* / G                 where |F - bias| <= Fc
-    sliding  v = (v* - G (bias +- Fc + drag)) / (1 + G c)
-
-so that sticking is exact and needs no smoothed sign function (time stepping after Moreau; Stewart and
-Trinkle 1996). Drag may stop a sliding axis, but not turn it round. Position-dependent torques are taken at
-the predicted middle of the step, which makes them second order. While the motor is slow the step is fine,
-for the reversals; else it is coarse.
+(Eq. 8 of the source), then lets contact friction act as an impulse (`hil.twin.contact`).
+Position-dependent torques are taken at the predicted middle of the step, which makes them second order. While the
+motor is slow the step is fine, for the reversals; else it is coarse.
 """
 
 from __future__ import annotations
@@ -21,7 +14,7 @@ import numpy as np
 from numba import njit
 
 from hil import control
-from hil.twin import stages
+from hil.twin import contact, stages
 from hil.twin.library import SLOTS
 from hil.twin.mechanism import Moment
 
@@ -55,44 +48,12 @@ OBSERVER_S = 0.008
 INTEGRATOR_S = 0.1
 
 _control_step = control.step
+_contact, _bristle_contact = contact.rigid, contact.elastic
 # A motor slower than this sticks: what is left of its speed is rounding, which no step size may hang on.
 RESTING = 1e-9
 # Sums may be reordered; a division does not check its divisor. `_nrt=False` below leaves out the counting of
 # references to arrays, `forceinline` the handing over of arrays: both cost more than the mathematics of a step.
 _COMPILE: Any = {"fastmath": {"reassoc", "nsz", "contract", "arcp"}, "error_model": "numpy"}
-
-
-@njit(**_COMPILE)
-def _contact(free, gain, bound, viscous, shift, opposing):  # type: ignore[no-untyped-def]
-    """Friction torque of a rigid contact that meets velocity `free`; see the module's equations."""
-    stop = free / gain
-    if abs(stop - shift) <= bound:
-        return stop
-    sign = 1.0 if stop > shift else -1.0
-    steady = shift + sign * bound + opposing
-    if sign * (stop - steady) <= 0.0:
-        return stop
-    return steady + viscous * (free - gain * steady) / (1.0 + gain * viscous)
-
-
-@njit(**_COMPILE)
-def _bristle_contact(free, gain, bound, viscous, shift, opposing, stiffness, deflection, step):  # type: ignore[no-untyped-def]
-    """Friction torque and new deflection of an elastic contact (Dahl 1968), implicit in velocity.
-
-    dz/dt = v (1 - sign(v) K z / Fc),  F = K z + c v + shift + drag
-    """
-    pull = stiffness * deflection
-    sign = 1.0 if free - gain * (pull + shift) > 0.0 else -1.0
-    if sign * (free - gain * (pull + shift + opposing)) <= 0.0:
-        return free / gain, deflection
-    yielding = 1.0 - sign * pull / bound if bound > 0.0 else 0.0
-    yielding = max(yielding, 0.0)
-    steady = pull + shift + opposing
-    velocity = (free - gain * steady) / (1.0 + gain * (stiffness * step * yielding + viscous))
-    after = deflection + step * velocity * yielding
-    limit = bound / stiffness
-    after = min(max(after, -limit), limit)
-    return stiffness * after + shift + opposing + viscous * velocity, after
 
 
 @njit(**_COMPILE)

@@ -88,7 +88,7 @@ def library_digest() -> str:
     """Digest of the sources that the kernel compiles in: numba's cache cannot see when they change."""
     folder = Path(__file__).parent
     digest = hashlib.sha256()
-    law = [folder.parent / "control.py", folder.parent / "rounding.py"]
+    law = [folder.parent / "control.py", folder.parent / "rounding.py", folder / "contact.py"]
     twin = (*sorted((folder / "mechanisms").glob("*.py")), folder / "mechanism.py", folder / "library.py")
     for path in (*twin, Path(__file__), *law):
         digest.update(path.read_bytes())

@@ -14,11 +14,11 @@ from typing import Any
 
 from numba import njit
 
-# Sums may be reordered; a division does not check its divisor.
-_COMPILE: Any = {"fastmath": {"reassoc", "nsz", "contract", "arcp"}, "error_model": "numpy"}
+# Of all compiled steps: sums may be reordered; a division does not check its divisor.
+COMPILE: Any = {"fastmath": {"reassoc", "nsz", "contract", "arcp"}, "error_model": "numpy"}
 
 
-@njit(**_COMPILE)
+@njit(**COMPILE)
 def rigid(free, gain, bound, viscous, shift, opposing):  # type: ignore[no-untyped-def]
     """Friction torque of a rigid contact that meets velocity `free`; see the module's equations."""
     stop = free / gain
@@ -31,7 +31,7 @@ def rigid(free, gain, bound, viscous, shift, opposing):  # type: ignore[no-untyp
     return steady + viscous * (free - gain * steady) / (1.0 + gain * viscous)
 
 
-@njit(**_COMPILE)
+@njit(**COMPILE)
 def elastic(free, gain, bound, viscous, shift, opposing, stiffness, deflection, step):  # type: ignore[no-untyped-def]
     """Friction torque and new deflection of an elastic contact (Dahl 1968), implicit in velocity.
 

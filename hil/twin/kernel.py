@@ -51,8 +51,8 @@ _control_step = control.step
 _contact, _bristle_contact = contact.rigid, contact.elastic
 # A motor slower than this sticks: what is left of its speed is rounding, which no step size may hang on.
 RESTING = 1e-9
-# `_nrt=False` below leaves out the counting of references to arrays, `forceinline` the handing over of arrays: both cost
-# more than the mathematics of a step.
+# `_nrt=False` below leaves out the counting of references to arrays, `forceinline` the handing over of arrays:
+# both cost more than the mathematics of a step.
 _COMPILE = contact.COMPILE
 
 

@@ -41,6 +41,7 @@ _NEAR = 6             # evaluations of a first fit with the derivatives of the b
 _SPRINT = 4           # and of the one after it
 _LONG = 25            # evaluations of a last fit
 _BEATEN = 5.0         # times the energy that the leader leaves: a sprint that leaves more is not converged,
+_LEVEL = 1.5          # except where it is level with the leader, as far as that had come by then;
 _BEHIND = 0.5         # nor one that takes away less than this share of what the leader does
 _HOPELESS = 0.02      # a lead that explains this little of what the first explains is not fitted
 _EDGE_SHIFTS_S = np.arange(-15, 16) * 0.005     # of an edge, where it may have been missed
@@ -88,12 +89,17 @@ def race(base: Fit, found: Sequence[Lead], runs: Sequence[Measured]) -> list[Fit
     it; how far exactly those are that lost is nobody's question.
     """
     searched = replace(base.model, torque_accuracy=SEARCH_ACCURACY)
-    held = jacobian(searched, base.x, searched.residuals(base.x, runs), runs)
+    # the base may have bent its nominal values to make up for what it lacks: those of the owner may be nearer
+    believed = np.concatenate([base.model.initial()[:base.model.nominal_count], base.x[base.model.nominal_count:]])
+    known = [(x, jacobian(searched, x, searched.residuals(x, runs), runs)) for x in (base.x, believed)]
 
     def near(lead: Lead) -> Fit:
-        """A first fit, with the derivatives of the base."""
-        first = likeliest(lead, base.x)
-        return fit(first.model, runs, first.x, soft=_SOFT, evaluations=_NEAR, held=held)
+        """A first fit, with the derivatives of the base or at the owner's values."""
+        found = []
+        for x, held in known if lead in good[:_SPRINTERS] else known[:1]:
+            first = likeliest(lead, x)
+            found.append(fit(first.model, runs, first.x, soft=_SOFT, evaluations=_NEAR, held=held))
+        return min(found, key=lambda result: soft_cost(result.residuals, _SOFT))
 
     def likeliest(lead: Lead, x: FloatArray) -> Fit:
         """The point of a lead that leaves least beside what is known at `x`."""
@@ -105,10 +111,9 @@ def race(base: Fit, found: Sequence[Lead], runs: Sequence[Measured]) -> list[Fit
         return fit(found.model, runs, found.x, soft=_SOFT, evaluations=_SPRINT, slopes=found.jacobian)
 
     def afresh(found: Fit) -> Fit:
-        """From the owner's nominal values: the base may have bent its own to make up for what it lacks."""
+        """From the owner's values, with derivatives of its own."""
         lead = next(lead for lead in good if lead.term.effect == found.model.terms[-1].effect)
-        nominal = base.model.nominal_count
-        first = likeliest(lead, np.concatenate([base.model.initial()[:nominal], base.x[nominal:]]))
+        first = likeliest(lead, believed)
         again = fit(first.model, runs, first.x, soft=_SOFT, evaluations=_SPRINT)
         return finish(again) if gained(again) > 0.0 else again
 
@@ -139,11 +144,13 @@ def race(base: Fit, found: Sequence[Lead], runs: Sequence[Measured]) -> list[Fit
     ranked = sorted(sprints, key=lambda result: result.cost)
     leader = finish(ranked[0])
     others = [result for result in unique([*sprints[:2], *ranked[:_FINALISTS]]) if result is not ranked[0]]
-    reached = [evaluate(replace(result.model, torque_accuracy=TORQUE_ACCURACY), runs, result.x) for result in others]
+    level, *reached = [evaluate(replace(result.model, torque_accuracy=TORQUE_ACCURACY), runs, result.x)
+                       for result in (ranked[0], *others)]
+    beaten = max(_BEATEN * leader.cost, _LEVEL * level.cost)
     again = [] if leader.at_floor else [partial(afresh, ranked[0])]
     results = [leader, *reached, *in_parallel(again + [
         partial(finish, other) for other, result in zip(others, reached, strict=True)
-        if result.cost < _BEATEN * leader.cost and gained(result) > _BEHIND * gained(leader)])]
+        if result.cost < beaten and gained(result) > _BEHIND * gained(leader)])]
     results += variants(min(results, key=lambda result: result.cost))
     best: dict[str, Fit] = {}
     for result in results:

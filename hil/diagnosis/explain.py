@@ -39,7 +39,7 @@ _CLEAR = 0.7
 MATERIAL = 0.02
 # And so much of what is left above the noise: one mechanism after the other that each explain next to nothing are a
 # series expansion of something else.
-WORTH = 0.05
+WORTH = 0.02
 # So are as many as this that together leave more than they explain.
 _IN_VAIN = 3
 # The same law may be written in another form. What a term leaves below this share of the energy that it took from a

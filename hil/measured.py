@@ -83,10 +83,12 @@ class Measured:
             return 0.0
         return float(np.mean((self.table_m - table_m - ratio_m * (self.motor - motor))[self.judged]))
 
-    @property
+    @cached_property
     def judged(self) -> slice:
-        """The rows that count: all after the start has settled."""
-        return slice(round(SETTLE_S / self.period_s), None)
+        """The rows that count: all after the start has settled, from the first motion on. How an axis came to rest
+        before is not known."""
+        moving = np.flatnonzero(self.velocity_command_m_s)
+        return slice(max(round(SETTLE_S / self.period_s), int(moving[0]) if moving.size else 0), None)
 
 
 def take(recording: Recording, bench: Bench) -> Measured:

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from hil.diagnosis.candidates import candidates, reach
-from hil.diagnosis.explain import TIED, Explanation
+from hil.diagnosis.explain import ALIKE, TIED, Explanation
 from hil.diagnosis.findings import SAME, ambiguous, rivals_of
 from hil.diagnosis.fit import Fit, fit, in_parallel, jacobian, splits
 from hil.diagnosis.model import FloatArray, Model, compatible
@@ -81,7 +81,14 @@ def separating(explanation: Explanation, final: Fit, train: Sequence[Measured],
             found[question] = min(found[question], _left(other, run) - _own(truth, run))
         return found
 
-    best = _best((*train, *held_out), final.model, len(asked), answers, TIED,
+    known = final.residuals.size
+    channels = known / sum(run.motor[run.judged].size for run in train)
+
+    def enough(trajectory: Trajectory) -> float:
+        # beside what is recorded, the difference must be one that tells (see `Rival.tied`)
+        return max(TIED, ALIKE * (known + channels * len(trajectory)))
+
+    best = _best((*train, *held_out), final.model, len(asked), answers, enough,
                  lambda one: (len(one.answered), one.worth / one.duration_s))
     if best is None:
         return Experiment(None, (), f"No motion within the reach of these recordings tells {_pairs(asked)}.")
@@ -104,7 +111,7 @@ def showing(found: Fit, hidden: Sequence[str], train: Sequence[Measured],
                              hidden, _SURE)
         return {(effect,): float(effect not in still) for effect in hidden}
 
-    best = _best((*train, *held_out), found.model, len(hidden), answers, 1.0,
+    best = _best((*train, *held_out), found.model, len(hidden), answers, lambda _: 1.0,
                  lambda one: len(one.answered) / one.duration_s)
     names = ", ".join(map(title, best.effects if best else hidden))
     if best is None:
@@ -133,12 +140,13 @@ class _Tested:
 
 
 def _best(runs: Sequence[Measured], model: Model, questions: int, answers: Callable[[Trajectory], Answers],
-          enough: float, rank: Callable[[_Tested], Any]) -> _Tested | None:
+          enough: Callable[[Trajectory], float], rank: Callable[[_Tested], Any]) -> _Tested | None:
     """The candidate of the highest rank. Long ones are tried only for what no shorter one answers."""
 
     def test(profile: Profile) -> _Tested:
         trajectory = plan(profile, model.bench.gains.period_s)
-        found = {question: worth for question, worth in answers(trajectory).items() if worth >= enough}
+        least = enough(trajectory)
+        found = {question: worth for question, worth in answers(trajectory).items() if worth >= least}
         return _Tested(profile, trajectory.duration_s, tuple(found), min(found.values(), default=0.0))
 
     tested: list[_Tested] = []

@@ -31,9 +31,10 @@ Result = TypeVar("Result")
 
 POOL = ThreadPoolExecutor(os.cpu_count() or 1)
 
-# Mean square of a channel over its noise, up to which it counts as explained: 15 % in rms. An encoder at rest errs by
-# the same part of a count all the time, which may be three times the mean square of counting.
-FLOOR = 1.15**2
+# Mean square of a channel over its noise, up to which it counts as explained: 25 % in rms, where something as large as
+# the noise makes 41 %. An encoder at rest errs by the same part of a count all the time, which may be three times the
+# mean square of counting.
+FLOOR = 1.25**2
 _FIRST_DAMPING = 1e-3
 _LEAST_GAIN = 1e-6       # of the cost, relative: a step that promises or brings less is the last
 _AGREES = 0.25           # by which a step may miss what it promised, relative, while the Jacobian is still good

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from hil.bench import Bench
 from hil.channels import AXIS_CHANNELS, CHANNELS
-from hil.diagnosis.fit import FLOOR, Fit
+from hil.diagnosis.fit import Fit
 from hil.diagnosis.floor import Floor, Laps, floor, laps
 from hil.diagnosis.model import scales
 from hil.diagnosis.result import ChannelFit, FitFigures, Mode
@@ -24,7 +24,7 @@ from hil.measured import Measured
 
 FloatArray = NDArray[np.float64]
 
-STRAYS = float(np.sqrt(FLOOR))   # times its floor: beyond, though its block is at the floor, a closed loop strays
+STRAYS = 1.15        # times its floor: beyond, though its block is at the floor, a closed loop strays
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,10 +24,12 @@ from hil.proof.chance import Rng, log_uniform
 
 Belief = Literal["exact", "wrong"]
 
+JERK_M_S3 = 100.0
 WRONG_BY = 1.3              # largest factor between a true parameter and the owner's
 STEP_S = 2e-5               # internal step: 1 to 4 % of a loop period, and below half a radian of the fastest mode
 _TABLE_COUNTS_M = (0.1e-6, 0.2e-6, 0.5e-6, 1e-6)
 _COARSE_COUNTS_M = (1e-6, 2e-6, 5e-6)
+_SPARE_M = 0.01             # travel beyond the strokes
 _RINGING = 0.01             # of the largest torque, that an axis without friction may still need at rest
 
 
@@ -102,7 +104,11 @@ class DrawnAxis:
         table = None if linear else {"resolution_m": self.sensors.table_resolution_m}
         return Bench.model_validate({
             "name": "axis", "axis": {"model": self.kind, **axis}, "control": control,
-            "encoders": {"motor": motor, "table": table}})
+            "encoders": {"motor": motor, "table": table},
+            # what the axis may do is no secret of its owner, however little of it a recording shows
+            "drive": {"travel_m": [-_SPARE_M, self.travel_m + _SPARE_M], "limits": {
+                "velocity_m_s": self.feed_m_s, "acceleration_m_s2": self.acceleration_m_s2,
+                "jerk_m_s3": JERK_M_S3}}})
 
 
 def draw_axis(rng: Rng, kind: Kind | None = None, belief: Belief = "wrong", hard: bool = False) -> DrawnAxis:

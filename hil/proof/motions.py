@@ -12,14 +12,13 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from hil.profile import Profile
-from hil.proof.axes import DrawnAxis
+from hil.proof.axes import JERK_M_S3, DrawnAxis
 from hil.proof.chance import Rng, log_uniform
 from hil.trajectory import Trajectory, plan
 
 Poor = Literal["one_way", "local", "slow"]
 POOR: tuple[Poor, ...] = get_args(Poor)
 TRAINING_S, SHORT_S, HOLDOUT_S = 18.0, 12.0, 12.0
-JERK_M_S3 = 100.0
 _CREEP_M_S = (0.6e-3, 12e-3)
 _TRIES = 5                   # draws that do not fit into the time before a motion counts as full
 

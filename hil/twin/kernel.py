@@ -51,6 +51,7 @@ _control_step = control.step
 _contact, _bristle_contact = contact.rigid, contact.elastic
 # A motor slower than this sticks: what is left of its speed is rounding, which no step size may hang on.
 RESTING = 1e-9
+SETTLING = 50           # passes in which the table comes to rest at the start
 # `_nrt=False` below leaves out the counting of references to arrays, `forceinline` the handing over of arrays:
 # both cost more than the mathematics of a step.
 _COMPILE = contact.COMPILE
@@ -78,6 +79,38 @@ def _look(at_motor, at_table, at_spring, positions, velocities):  # type: ignore
         stretch += at_spring[i] * d
         stretch_rate += at_spring[i] * v
     return position, speed, table, table_speed, stretch, stretch_rate
+
+
+@njit(**_COMPILE)
+def _settle(constants, modes, values, codes, delta, memory):  # type: ignore[no-untyped-def]
+    """Put the table to where it rests under what acts on it and on the transmission at the start, the motor held.
+
+    Quasi-static, in the elastic modes: delta_i = g_i / w_i^2, w^2 = (1 - a11) / b1 of the exact discretisation. What
+    is late or hysteretic has not begun.
+    """
+    if not (codes[ON_TRANSMISSION] or codes[ON_TABLE_FORCE]):
+        return
+    at_motor, at_table, at_spring = modes[SHAPE_MOTOR], modes[SHAPE_TABLE], modes[SHAPE_SPRING]
+    at = Moment(0.0, 0.0, constants[PERIOD], 0.0, _along(at_motor, delta[0]) * constants[ANGLE_PER_UNIT], 0.0,
+                _along(at_table, delta[0]) * constants[RATIO], constants[RATIO], constants[VISCOUS_SPEED])
+    push = 0.0
+    if codes[ON_TABLE_FORCE]:
+        push = _table_force(0.0, at, values, codes, memory) * constants[RATIO]
+    bent = effective = 0.0
+    for _ in range(SETTLING):
+        effective = _transmission(bent, at, values, codes, memory) if codes[ON_TRANSMISSION] else bent
+        spring = -constants[SPRING] * (effective - bent)
+        bent = 0.0
+        for i in range(1, at_motor.size):
+            softness = modes[COARSE + 4, i] / (1.0 - modes[COARSE, i])
+            bent += at_spring[i] * softness * (push * (at_table[i] - at_motor[i]) + spring * at_spring[i])
+    moved = 0.0
+    for i in range(1, at_motor.size):
+        softness = modes[COARSE + 4, i] / (1.0 - modes[COARSE, i])
+        delta[0, i] += softness * (push * (at_table[i] - at_motor[i]) + spring * at_spring[i])
+        moved += at_motor[i] * softness * (push * (at_table[i] - at_motor[i]) + spring * at_spring[i])
+    delta[0, 0] -= moved / at_motor[0]
+    memory[OWN, SPRING_EXTRA] = effective - bent
 
 
 def _build_advance(digest: str) -> Any:
@@ -260,6 +293,7 @@ def _build_closed_loop(digest: str) -> Any:
         n = position_command.size
         motor, table, command, torque = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
         datum = 0.0
+        _settle(constants, modes, values, codes, delta, memory)
         for k in range(n):
             motor[k], table[k] = read(constants, modes, values, codes, delta, memory)
             if measured_table.size and memory[OWN, FLOATING] == 0.0:
@@ -293,7 +327,8 @@ def _build_observe(digest: str) -> Any:
         motor, table, wanted, torque = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
         period = constants[PERIOD]
         seen = measured_motor * constants[RATIO] if measured_table.size == 0 else measured_table
-        datum, moved = 0.0, 0
+        datum, settled, moved = 0.0, 0, 0
+        _settle(constants, modes, values, codes, delta, memory)
         for k in range(n):
             motor[k], table[k] = read(constants, modes, values, codes, delta, memory)
             inputs = control.Inputs(position_command[k], velocity_command[k], measured_motor[k], seen[k])
@@ -308,9 +343,13 @@ def _build_observe(digest: str) -> Any:
             if measured_table.size:
                 resting = abs(measured_motor[k] - measured_motor[max(k - 1, 0)]) <= constants[SLOW_VELOCITY] * period
                 free = resting or memory[OWN, FLOATING] > 0.0
-                if not free or k == 0:
+                apart = measured_table[k] - table[k] - constants[RATIO] * error
+                if moved == 0 and resting:      # where it rests at first is a datum, until motion tells a better one
+                    settled += 1
+                    datum += (apart - datum) / settled
+                elif not free:
                     moved += 1
-                    datum += (measured_table[k] - table[k] - constants[RATIO] * error - datum) / moved
+                    datum += (apart - datum) / (moved + 1)
                 if free:
                     error = (measured_table[k] - datum - table[k]) / constants[RATIO]
                     _correct(TABLE_IMPULSE, error, period, OBSERVER_S, modes, delta)
@@ -327,6 +366,7 @@ def _build_open_loop(digest: str) -> Any:
         assert digest
         n = torque_in.size
         motor, table, torque = np.empty(n), np.empty(n), np.empty(n)
+        _settle(constants, modes, values, codes, delta, memory)
         for k in range(n):
             motor[k], table[k] = read(constants, modes, values, codes, delta, memory)
             torque[k] = advance(torque_in[k], constants, modes, values, codes, delta, memory)

@@ -31,3 +31,14 @@ def test_the_comparison_takes_it_off_and_says_so() -> None:
     for one, other in zip(before.channels, after.channels, strict=True):
         assert other.rms == pytest.approx(one.rms, rel=1e-6, abs=1e-12)
     assert any("datum" in note and "50 µm" in note for note in after.notes)
+
+
+@pytest.mark.parametrize("term", [
+    Term("periodic_lead_error", 0, (5e-6, 1.0, 0.0, 0.0, 0.0, 0.0)), Term("spring_load", 0, (5e3, 0.05)),
+    Term("backlash", 0, (20e-6,)), Term("preload_loss", 0, (10e-6, 0.4))])
+def test_an_axis_that_stands_has_stood_before(term: Term) -> None:
+    """The twin begins at rest under whatever bends the transmission, it does not spring there."""
+    model = Model(OWNER, (Term("external_force", 0, (200.0, 0.0, 10.0)), term))
+    still = np.zeros(300)
+    answer = model.twin(model.initial()).simulate(still, still)
+    assert np.ptp(answer.table_position_m) < 2e-9

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from hil.bench import Bench, MechanismEntry
 from hil.diagnosis.confidence import confidence
-from hil.diagnosis.explain import TIED, Explanation, Rival
+from hil.diagnosis.explain import TIED, Explanation, Rival, noise_ratios
 from hil.diagnosis.fit import Fit
 from hil.diagnosis.model import Key, Term
-from hil.diagnosis.proof import Ablation, explained_share
+from hil.diagnosis.proof import Ablation
 from hil.diagnosis.result import Correction, Finding, Value
 from hil.diagnosis.result import Rival as RivalText
 from hil.diagnosis.wording import NOMINAL_UNITS, number, sentence, title
@@ -51,8 +51,7 @@ def findings(explanation: Explanation, final: Fit, ablations: Sequence[Ablation]
              held_out: Sequence[Measured]) -> tuple[Finding, ...]:
     """A finding for each term, the one that matters most first."""
     deviations = standard_errors(final)
-    explained = explained_share(explanation.nominal, final, train)
-    on_held_out = explained_share(explanation.nominal, final, held_out) if held_out else None
+    left = math.sqrt(max(ratio for run in (*train, *held_out) for ratio in noise_ratios(final, run).values()))
     bench, terms = final.model.resolved(final.x)
     row = final.model.nominal_count
     result = []
@@ -67,7 +66,7 @@ def findings(explanation: Explanation, final: Fit, ablations: Sequence[Ablation]
                      default=explanation.needed.get(_key(explanation, term), math.inf))
         result.append((ablation.train, Finding(
             effect=term.effect, variant=BY_ID[term.effect].variants[term.variant],
-            confidence=confidence(margin, explained, on_held_out), equivalents=tuple(dict.fromkeys(tied)),
+            confidence=confidence(left, _factor(ablation), margin), equivalents=tuple(dict.fromkeys(tied)),
             rivals=tuple(RivalText(effect=rival.fit.model.terms[-1].effect, evidence=_text(rival, term, train))
                          for rival in rivals),
             parameters=_values(term, errors, bench), sentence=sentence(_normal(term), bench),
@@ -123,6 +122,13 @@ def _values(term: Term, errors: Sequence[float], bench: Bench) -> dict[str, Valu
     return {parameter.name: Value(value=value, std=error, unit=parameter.dimension.unit(bench.axis.linear))
             for parameter, value, error in zip(BY_ID[term.effect].parameters, _normal(term).values, errors,
                                                strict=True)}
+
+
+def _factor(ablation: Ablation) -> float:
+    """By which factor more energy is left without a term; on held-out recordings too, where these show it at all."""
+    if ablation.held_out is None or not ablation.shown:
+        return ablation.train
+    return min(ablation.train, ablation.held_out)
 
 
 def _key(explanation: Explanation, term: Term) -> Key:

@@ -59,18 +59,19 @@ def test_what_the_interface_does_not_allow_is_refused(path: tuple[str | int, ...
         Result.model_validate(data)
 
 
-SHARES = st.floats(0.0, 1.0)
+LEFT, FACTORS, MARGINS = st.floats(0.0, 1e3), st.floats(0.0, 1e6), st.floats(-1e3, 1e7)
 
 
-@given(st.floats(0.0, 1e7), SHARES, SHARES, st.floats(0.0, 1e7), SHARES, SHARES)
+@given(LEFT, FACTORS, MARGINS, LEFT, FACTORS, MARGINS)
 def test_confidence_grows_with_each_thing_that_speaks_for_a_name(
-        margin: float, explained: float, held_out: float, more: float, better: float, proven: float) -> None:
-    low = confidence(margin, explained, held_out)
+        left: float, factor: float, margin: float, less: float, more: float, clearer: float) -> None:
+    low = confidence(left, factor, margin)
     assert 0.0 <= low <= 1.0
-    assert confidence(max(margin, more), max(explained, better), max(held_out, proven)) >= low
+    assert confidence(min(left, less), max(factor, more), max(margin, clearer)) >= low
 
 
 def test_confidence_tells_a_sure_name_from_a_guess() -> None:
-    assert confidence(1e4, 1.0, 1.0) > 0.95
-    assert confidence(10.0, 0.5, 0.3) < 0.4
-    assert confidence(100.0, 1.0, 0.0) < confidence(100.0, 1.0, None) < confidence(100.0, 1.0, 1.0)
+    assert confidence(1.0, 10.0, 1e4) > 0.95
+    assert confidence(1.0, 1.05, 1e4) < 0.8
+    assert confidence(8.0, 10.0, 1e4) < 0.2
+    assert confidence(1.0, 10.0, 10.0) < confidence(1.0, 10.0, 1e3)

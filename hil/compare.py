@@ -140,14 +140,16 @@ def compare(recording: Recording, bench: Bench, *, fit: bool = False,
         raise HilError(f"{bench.name}: the twin is unstable in closed loop; check the masses and gains of the bench")
     ratio = bench.axis.ratio_m_rad
     datum_m = measured.datum_m(response.motor_position, response.table_position_m, ratio)
+    # the encoder that the position loop goes by has that of the set-points
+    of_motor = -datum_m if bench.gains.position_from_table else 0.0
     blocks = compare_blocks(measured, bench, lambda share: progress("block by block", share))
     table = measured.table_m.size > 0
-    positions = ((measured.table_m - datum_m, response.table_position_m) if table
+    positions = ((measured.table_m - datum_m - of_motor, response.table_position_m) if table
                  else (ratio * measured.motor, ratio * response.motor_position))
     channels = [_channel(measured, *entry) for entry in _motion(measured, *positions, table)]
     if table:
         channels.append(_channel(measured, "motor_position", "motor position at the table", "m",
-                                 ratio * measured.motor, ratio * response.motor_position))
+                                 ratio * measured.motor - of_motor, ratio * response.motor_position))
     linear = bench.axis.linear
     channels.append(_channel(measured, "force_n" if linear else "torque_n_m",
                              "motor force" if linear else "motor torque", "N" if linear else "N m",
@@ -198,8 +200,9 @@ def _notes(measured: Measured, bench: Bench, fit: FitResult | None, datum_m: flo
         "only.",
     ]
     if measured.table_m.size:
-        notes.append(f"The linear encoder has a datum of its own: {1e6 * datum_m:.3g} µm from that of the twin, taken "
-                     "off the table position.")
+        other = "motor" if bench.gains.position_from_table else "linear"
+        notes.append(f"The {other} encoder has a datum of its own: {1e6 * abs(datum_m):.3g} µm from that of the twin, "
+                     "taken off its position.")
     if bench.drive is not None and bench.drive.mode is not DriveMode.CST:
         notes.append(f"In {bench.drive.mode} the drive closes loops of its own; the twin closes them with the law and "
                      f"the periods of the bench file (velocity loop {1e3 * measured.period_s:g} ms). A drive whose "

@@ -102,6 +102,8 @@ def weighted_residuals(bench: Bench, measured: Measured) -> FloatArray:
     response = bench.twin().simulate(measured.position_command_m, measured.velocity_command_m_s, measured.start,
                                      measured.table_m)
     motor = measured.motor - response.motor_position
+    if bench.gains.position_from_table:
+        motor = motor - np.mean(motor[rows])
     parts = [(measured.torque - response.torque) / noise.torque, motor / max(noise.motor, MOTOR_ACCURACY_M / ratio)]
     if measured.table_m.size:
         table = measured.table_m - response.table_position_m - ratio * motor

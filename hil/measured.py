@@ -28,7 +28,6 @@ FloatArray = NDArray[np.float64]
 Channels = tuple[FloatArray, FloatArray, FloatArray, FloatArray]    # as control.replay takes them
 
 SETTLE_S = 0.05             # the start is only roughly known: this much of it is not judged
-_STRETCH_M = 1e-4           # between motor and table; what is more, is the datum of an encoder
 _REPLAYED_ROWS = 200        # to find the phase of the position loop
 _FITTED_ROWS = 11           # of the motor position, for its velocity at the first row
 
@@ -84,11 +83,22 @@ class Measured:
         return float(np.mean((self.table_m - table_m - ratio_m * (self.motor - motor))[self.judged]))
 
     @cached_property
+    def moving(self) -> NDArray[np.bool_]:
+        """Rows (n,) at which the set-points move."""
+        return moving(self.velocity_command_m_s)
+
+    @cached_property
     def judged(self) -> slice:
         """The rows that count: all after the start has settled, from the first motion on. How an axis came to rest
         before is not known."""
-        moving = np.flatnonzero(self.velocity_command_m_s)
-        return slice(max(round(SETTLE_S / self.period_s), int(moving[0]) if moving.size else 0), None)
+        first = min(int(np.argmax(self.moving)), self.motor.size // 2)
+        return slice(max(round(SETTLE_S / self.period_s), first), None)
+
+
+def moving(velocity: FloatArray) -> NDArray[np.bool_]:
+    """Where a set velocity (n,) is one: above a thousandth of the highest, below which lies noise."""
+    speed = np.abs(velocity)
+    return np.asarray(speed > 1e-3 * np.max(speed, initial=0.0))
 
 
 def take(recording: Recording, bench: Bench) -> Measured:
@@ -117,9 +127,9 @@ def take(recording: Recording, bench: Bench) -> Measured:
     has_command = names.torque_command in recording.columns
     command = _column(recording, names.torque_command) if has_command else torque
     table = _column(recording, names.table_position) if bench.has_table_encoder else np.empty(0)
-    if table.size and gains.position_from_table and abs(table[0] - gains.ratio_m_rad * motor[0]) > _STRETCH_M:
+    if table.size and gains.position_from_table:
         # the loop goes by the linear encoder: the motor's datum is the one that is free
-        motor = motor + (table[0] - gains.ratio_m_rad * motor[0]) / gains.ratio_m_rad
+        motor = motor + float(np.mean(table - gains.ratio_m_rad * motor)) / gains.ratio_m_rad
     feedback = table if table.size else gains.ratio_m_rad * motor
     first = _first_tick(gains, (position, velocity, motor, feedback), command)
     position, velocity, motor, feedback, table, command, torque = (
@@ -148,8 +158,7 @@ def _first_tick(gains: control.Gains, channels: Channels, command: FloatArray) -
     Replayed is the beginning of the first motion: at rest, every phase gives the same.
     """
     _, velocity, motor, _ = channels
-    moving = np.flatnonzero(velocity != 0.0)
-    begin = max(int(moving[0]) if moving.size else 0, 2)
+    begin = max(int(np.argmax(moving(velocity))), 2)
 
     def misfit(row: int) -> float:
         rows = slice(row, row + _REPLAYED_ROWS)

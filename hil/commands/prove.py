@@ -45,8 +45,9 @@ def prove(
     whole = sum(share for tier, share in PLANTS[plant].items() if not only or tier in only)
     count = whole if full else 40 if cases is None else cases
     planned = plan(count, seed, plant, only or ())
+    tiers = [tier for tier in PLANTS[plant] if tier in (only or ())]
     with progress() as tell:
-        scores = run(folder, planned, seed, jobs or os.cpu_count() or 1, out.print, tell, plant, only or ())
+        scores = run(folder, planned, seed, jobs or os.cpu_count() or 1, out.print, tell, plant, tiers)
         tell("writing the report", None)
         write_proof(scores, score_others(folder), folder)
     table(HEADERS, [goal_row(goal) for goal in scores.goals])

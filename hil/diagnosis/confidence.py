@@ -26,7 +26,9 @@ def confidence(left: float, factor: float, margin: float) -> float:
     of what is left without the term over that with it. `margin`: evidence against the best rival that is not
     equivalent (BIC difference).
     """
+    if not math.isfinite(left):
+        return 0.0
     little = max(math.log(_DOUBLED / max(factor - 1.0, _LEAST)), 0.0)
-    close = max(math.log(_PLENTY / (1.0 + max(margin, 0.0))), 0.0)
+    close = max(math.log(_PLENTY / (1.0 + min(max(margin, 0.0), _PLENTY))), 0.0)
     score = OFFSET - LEFT * math.log(max(left, 1.0)) - FACTOR * little - MARGIN * close
     return 1.0 / (1.0 + math.exp(-score))

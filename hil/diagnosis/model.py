@@ -241,9 +241,12 @@ def measured_response(run: Measured) -> Response:
 def _differences(response: Response, measured: Response, bench: Bench, judged: slice) -> dict[str, FloatArray]:
     """Motor [rad or m], table against motor [m], torque [N m or N].
 
-    The linear encoder has a datum of its own: a difference that is always there is none.
+    Each encoder has a datum of its own, only that of the position loop is the set-points': a difference that is always
+    there is none.
     """
     found = {"motor": measured.motor_position - response.motor_position}
+    if bench.gains.position_from_table:
+        found["motor"] = found["motor"] - np.mean(found["motor"][judged])
     if measured.table_position_m.size:
         table = measured.table_position_m - response.table_position_m - bench.axis.ratio_m_rad * found["motor"]
         found["table"] = table - np.mean(table[judged])

@@ -29,6 +29,7 @@ LEAST_MOVING_S = 0.5
 # Nominal parameters may be wrong by a factor of three (see `hil.diagnosis.model`), units are wrong by more.
 WRONG_BY = 4.0
 SLOPE_TOLERANCE = 0.2       # of positions against set-points; following errors are below 5 %
+_RELATED = 0.5              # of the variance of a channel, that the other must tell
 _AWAY, _AWAY_M = 0.01, 1e-3 # of the travel, and at least: a loop that rests so far from its set-points is none
 SATURATED = 0.5             # share of the moving rows at the limit
 _SMOOTH_S = 0.021           # window of the derivatives of the motor position
@@ -74,7 +75,7 @@ def _problems(run: Measured, bench: Bench) -> Iterator[str]:
     names, ratio = AXIS_CHANNELS[run.kind], bench.axis.ratio_m_rad
     command = run.position_command_m
     top = float(np.max(np.abs(run.velocity_command_m_s)))
-    moving = np.abs(run.velocity_command_m_s) > 1e-3 * top
+    moving = run.moving
     moved = float(np.ptp(run.motor)) * ratio
     if np.ptp(command) == 0.0 or top == 0.0:
         yield ("without excitation: the set-points do not move; a twin at standstill says nothing: "
@@ -104,7 +105,7 @@ def _problems(run: Measured, bench: Bench) -> Iterator[str]:
 
 def _position_problems(run: Measured, ratio: float, motor: str, table: str) -> Iterator[str]:
     slope = _factor_between(run.position_command_m, ratio * run.motor)
-    resting = run.velocity_command_m_s == 0.0
+    resting = ~run.moving
     away_m = float(np.median((run.position_command_m - ratio * run.motor)[resting])) if resting.any() else 0.0
     if abs(slope - 1.0) > SLOPE_TOLERANCE:
         yield f"{motor}: {_factor(slope, _POSITION_UNITS, 'the set-points')}"
@@ -206,10 +207,11 @@ def _slope(over: FloatArray, values: FloatArray) -> float:
 def _factor_between(over: FloatArray, values: FloatArray) -> float:
     """Factor of `values` to `over`: of all between the two regressions, of each on the other, the one nearest to 1.
 
-    A unit scales exactly and leaves no choice; an axis that lags or sticks on short strokes does.
+    A unit scales exactly and leaves no choice; an axis that lags or sticks on short strokes does. Where the two have
+    little to do with each other, no factor is given the benefit of the doubt.
     """
     forward, backward = _slope(over, values), _slope(values, over)
-    if forward * backward <= 0.0:
+    if forward * backward < _RELATED:
         return forward
     low, high = sorted((forward, 1.0 / backward))
     return min(max(1.0, low), high)

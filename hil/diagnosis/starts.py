@@ -94,7 +94,8 @@ def scene(runs: Sequence[Measured], bench: Bench, blocks: Sequence[dict[str, Flo
         orders=orders,
         ripple_orders=estimate.orders(runs, found, physics.angle_per_unit, 2, ripple),
         friction_periods=[*periods, *turns],
-        scale_periods=([*estimate.scale_periods(runs, [block["table"] for block in blocks]), lead]
+        scale_periods=([*estimate.scale_periods(runs, [block["table"] for block in blocks]),
+                        *(period for period in (lead,) if period < min(travel, _LONGEST_SCALE_M * (1.0 + 1e-9)))]
                        if runs[0].table_m.size else []),
         window=estimate.force_window(runs[longest], found[longest]),
         stretch=max(stretch, 0.5e-6), most_stretch=max(most_stretch, 1e-6),
@@ -102,6 +103,7 @@ def scene(runs: Sequence[Measured], bench: Bench, blocks: Sequence[dict[str, Flo
 
 
 _SHORTEST_M = 1e-3       # along the travel: below, friction is not looked for
+_LONGEST_SCALE_M = BY_ID["scale_interpolation_error"].parameters[1].high
 _WHOLE = 0.05            # of a turn, to which a period makes a whole order of the screw
 
 _Values = Sequence[tuple[float, ...]]

@@ -33,7 +33,8 @@ def prove(folder: Path, planned: Sequence[Planned], seed: int, jobs: int, say: S
     Raises InputError where `folder` holds another proof, HilError where what was sealed has changed or the blind
     process failed.
     """
-    cases = f"--cases {len(planned)}" if len(planned) != sum(PLANTS[plant].values()) else "--full"
+    full = not only and len(planned) == sum(PLANTS[plant].values())
+    cases = "--full" if full else f"--cases {len(planned)}"
     which = "".join(f"--only {tier} " for tier in only) + ("" if plant == "simulated" else f"--plant {plant} ")
     command = f"hil prove {which}{cases} --seed {seed} --out DIR"
     about = read_seal(folder)

@@ -190,13 +190,15 @@ class Twin:
         return gains
 
     def state(self, start: Start = _AT_REST) -> tuple[FloatArray, FloatArray]:
-        """Modal state (2, modes) and memory of an axis that moves as one body at `start`."""
+        """Modal state (2, modes) and memory of an axis that moves as one body at `start`, at rest under its loads."""
         modes, ratio = self.modal, self.gains.ratio_m_rad
         delta = np.zeros((2, modes.frequency_rad_s.size))
         rigid = modes.shape[modes.motor, 0]
         delta[0, 0] = start.position_m / ratio / rigid
         delta[1, 0] = start.velocity_m_s / ratio / rigid
-        return delta, np.zeros((len(SLOTS) + 1, WIDTH))
+        memory = np.zeros((len(SLOTS) + 1, WIDTH))
+        kernel.settle(*self.arrays(), delta, memory)
+        return delta, memory
 
     def arrays(self) -> tuple[FloatArray, FloatArray, FloatArray, NDArray[np.int64]]:
         """Constants, modes, mechanism values and codes, as the kernel takes them."""

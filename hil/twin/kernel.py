@@ -51,7 +51,8 @@ _control_step = control.step
 _contact, _bristle_contact = contact.rigid, contact.elastic
 # A motor slower than this sticks: what is left of its speed is rounding, which no step size may hang on.
 RESTING = 1e-9
-SETTLING = 50           # passes in which the table comes to rest at the start
+SETTLING = 80           # halvings in which the table comes to rest at the start, of
+STROKE = 10.0           # so much deflection [motor units]: more than any play
 # `_nrt=False` below leaves out the counting of references to arrays, `forceinline` the handing over of arrays:
 # both cost more than the mathematics of a step.
 _COMPILE = contact.COMPILE
@@ -81,36 +82,65 @@ def _look(at_motor, at_table, at_spring, positions, velocities):  # type: ignore
     return position, speed, table, table_speed, stretch, stretch_rate
 
 
-@njit(**_COMPILE)
-def _settle(constants, modes, values, codes, delta, memory):  # type: ignore[no-untyped-def]
-    """Put the table to where it rests under what acts on it and on the transmission at the start, the motor held.
+def _build_settle(digest: str) -> Any:
+    @njit(cache=True, nogil=True, **_COMPILE)
+    def settle(constants, modes, values, codes, delta, memory):  # type: ignore[no-untyped-def]
+        """Put the table to where it rests under what acts on it and on the transmission at the start, the motor held.
 
-    Quasi-static, in the elastic modes: delta_i = g_i / w_i^2, w^2 = (1 - a11) / b1 of the exact discretisation. What
-    is late or hysteretic has not begun.
-    """
-    if not (codes[ON_TRANSMISSION] or codes[ON_TABLE_FORCE]):
-        return
-    at_motor, at_table, at_spring = modes[SHAPE_MOTOR], modes[SHAPE_TABLE], modes[SHAPE_SPRING]
-    at = Moment(0.0, 0.0, constants[PERIOD], 0.0, _along(at_motor, delta[0]) * constants[ANGLE_PER_UNIT], 0.0,
-                _along(at_table, delta[0]) * constants[RATIO], constants[RATIO], constants[VISCOUS_SPEED])
-    push = 0.0
-    if codes[ON_TABLE_FORCE]:
-        push = _table_force(0.0, at, values, codes, memory) * constants[RATIO]
-    bent = effective = 0.0
-    for _ in range(SETTLING):
-        effective = _transmission(bent, at, values, codes, memory) if codes[ON_TRANSMISSION] else bent
-        spring = -constants[SPRING] * (effective - bent)
-        bent = 0.0
+        Quasi-static, in the elastic modes: delta_i = g_i / w_i^2, w^2 = (1 - a11) / b1 of the exact discretisation. The
+        deflection of the transmission is found by bisection: the torque that it carries grows with it. What is late or
+        hysteretic has not begun.
+        """
+        assert digest
+        if not (codes[ON_TRANSMISSION] or codes[ON_TABLE_FORCE]):
+            return
+        at_motor, at_table, at_spring = modes[SHAPE_MOTOR], modes[SHAPE_TABLE], modes[SHAPE_SPRING]
+        at_screw = modes[SHAPE_SCREW]
+        at = Moment(0.0, 0.0, constants[PERIOD], 0.0, _along(at_motor, delta[0]) * constants[ANGLE_PER_UNIT], 0.0,
+                    _along(at_table, delta[0]) * constants[RATIO], constants[RATIO], constants[VISCOUS_SPEED])
+        push = 0.0
+        if codes[ON_TABLE_FORCE]:
+            push = _table_force(0.0, at, values, codes, memory) * constants[RATIO]
+        stiffer = 0.0
+        if codes[ON_SCREW]:
+            stiffer = constants[SCREW] * (_screw(1.0, at, values, codes, memory) - 1.0)
+        apart = constants[SCREW_APART] > 0.0
+        soft = np.zeros(at_motor.size)      # 1 / w^2 of each elastic mode
+        spring_push = spring_spring = spring_screw = screw_push = screw_screw = 0.0
         for i in range(1, at_motor.size):
-            softness = modes[COARSE + 4, i] / (1.0 - modes[COARSE, i])
-            bent += at_spring[i] * softness * (push * (at_table[i] - at_motor[i]) + spring * at_spring[i])
-    moved = 0.0
-    for i in range(1, at_motor.size):
-        softness = modes[COARSE + 4, i] / (1.0 - modes[COARSE, i])
-        delta[0, i] += softness * (push * (at_table[i] - at_motor[i]) + spring * at_spring[i])
-        moved += at_motor[i] * softness * (push * (at_table[i] - at_motor[i]) + spring * at_spring[i])
-    delta[0, 0] -= moved / at_motor[0]
-    memory[OWN, SPRING_EXTRA] = effective - bent
+            soft[i] = modes[COARSE + 4, i] / (1.0 - modes[COARSE, i])
+            spring_push += at_spring[i] * soft[i] * (at_table[i] - at_motor[i]) * push
+            spring_spring += at_spring[i] * soft[i] * at_spring[i]
+            spring_screw += at_spring[i] * soft[i] * at_screw[i]
+            screw_push += at_screw[i] * soft[i] * (at_table[i] - at_motor[i]) * push
+            screw_screw += at_screw[i] * soft[i] * at_screw[i]
+        bent = effective = spring = screw = low = high = 0.0
+        for trial in range(SETTLING):
+            effective = _transmission(bent, at, values, codes, memory) if codes[ON_TRANSMISSION] else bent
+            spring = -constants[SPRING] * (effective - bent)
+            if apart:
+                screw = -stiffer * (screw_push + spring_screw * spring) / (1.0 + stiffer * screw_screw)
+            else:
+                screw = -stiffer * effective
+            missing = spring_push + spring_spring * spring + spring_screw * screw - bent
+            if abs(missing) <= 1e-15:
+                break
+            if trial == 0:      # from no deflection on towards the load
+                low, high = min(4.0 * missing - STROKE, 0.0), max(4.0 * missing + STROKE, 0.0)
+            if missing > 0.0:
+                low = bent
+            else:
+                high = bent
+            bent = 0.5 * (low + high)
+        moved = 0.0
+        for i in range(1, at_motor.size):
+            shift = soft[i] * (push * (at_table[i] - at_motor[i]) + spring * at_spring[i] + screw * at_screw[i])
+            delta[0, i] += shift
+            moved += at_motor[i] * shift
+        delta[0, 0] -= moved / at_motor[0]
+        memory[OWN, SPRING_EXTRA] = effective - bent
+
+    return settle
 
 
 def _build_advance(digest: str) -> Any:
@@ -292,16 +322,16 @@ def _build_closed_loop(digest: str) -> Any:
         assert digest
         n = position_command.size
         motor, table, command, torque = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
-        datum = 0.0
-        _settle(constants, modes, values, codes, delta, memory)
+        datum, told = 0.0, 0
         for k in range(n):
             motor[k], table[k] = read(constants, modes, values, codes, delta, memory)
             if measured_table.size and memory[OWN, FLOATING] == 0.0:
-                datum += (measured_table[k] - table[k] - datum) / (k + 1)
+                told += 1
+                datum += (measured_table[k] - table[k] - datum) / told
             inputs = control.Inputs(position_command[k], velocity_command[k], motor[k], table[k])
             state, outputs = _control_step(gains, state, inputs)
             command[k] = outputs.torque_n_m
-            if measured_table.size and memory[OWN, FLOATING] > 0.0:
+            if told > 0 and memory[OWN, FLOATING] > 0.0:
                 error = (measured_table[k] - datum - table[k]) / constants[RATIO]
                 _correct(TABLE_IMPULSE, error, constants[PERIOD], OBSERVER_S, modes, delta)
             torque[k] = advance(command[k], constants, modes, values, codes, delta, memory)
@@ -328,7 +358,6 @@ def _build_observe(digest: str) -> Any:
         period = constants[PERIOD]
         seen = measured_motor * constants[RATIO] if measured_table.size == 0 else measured_table
         datum, settled, moved = 0.0, 0, 0
-        _settle(constants, modes, values, codes, delta, memory)
         for k in range(n):
             motor[k], table[k] = read(constants, modes, values, codes, delta, memory)
             inputs = control.Inputs(position_command[k], velocity_command[k], measured_motor[k], seen[k])
@@ -344,13 +373,14 @@ def _build_observe(digest: str) -> Any:
                 resting = abs(measured_motor[k] - measured_motor[max(k - 1, 0)]) <= constants[SLOW_VELOCITY] * period
                 free = resting or memory[OWN, FLOATING] > 0.0
                 apart = measured_table[k] - table[k] - constants[RATIO] * error
-                if moved == 0 and resting:      # where it rests at first is a datum, until motion tells a better one
+                if not free:
+                    moved += 1
+                    datum += (apart - datum) / (moved + min(settled, 1))
+                elif moved == 0 and memory[OWN, FLOATING] == 0.0:
+                    # where it rests at first is a datum, until motion tells a better one; not so within a gap
                     settled += 1
                     datum += (apart - datum) / settled
-                elif not free:
-                    moved += 1
-                    datum += (apart - datum) / (moved + 1)
-                if free:
+                if free and moved + settled > 0:
                     error = (measured_table[k] - datum - table[k]) / constants[RATIO]
                     _correct(TABLE_IMPULSE, error, period, OBSERVER_S, modes, delta)
             torque[k] = advance(command[k], constants, modes, values, codes, delta, memory)
@@ -366,7 +396,6 @@ def _build_open_loop(digest: str) -> Any:
         assert digest
         n = torque_in.size
         motor, table, torque = np.empty(n), np.empty(n), np.empty(n)
-        _settle(constants, modes, values, codes, delta, memory)
         for k in range(n):
             motor[k], table[k] = read(constants, modes, values, codes, delta, memory)
             torque[k] = advance(torque_in[k], constants, modes, values, codes, delta, memory)
@@ -377,6 +406,7 @@ def _build_open_loop(digest: str) -> Any:
 
 # Bound into each kernel, so that numba's cache knows when a mechanism compiled into it has changed.
 _DIGEST = stages.library_digest()
+settle = _build_settle(_DIGEST)
 advance = _build_advance(_DIGEST)
 read = _build_read(_DIGEST)
 closed_loop = _build_closed_loop(_DIGEST)

@@ -30,15 +30,47 @@ def test_the_comparison_takes_it_off_and_says_so() -> None:
     before, after = compare(recording, OWNER), compare(shifted, OWNER)
     for one, other in zip(before.channels, after.channels, strict=True):
         assert other.rms == pytest.approx(one.rms, rel=1e-6, abs=1e-12)
-    assert any("datum" in note and "50 µm" in note for note in after.notes)
+    assert any("linear encoder has a datum" in note and "50 µm" in note for note in after.notes)
 
 
+@pytest.mark.parametrize("rest_s", [0.2, 3.0])
+@pytest.mark.parametrize("shift_m", [0.0, 1e-3])
+def test_a_recording_may_begin_on_one_flank_of_a_gap(rest_s: float, shift_m: float) -> None:
+    """As every axis with play does: only the twin begins in its middle."""
+    whole = recorded(OWNER, PLAY, times=2)
+    stands = np.flatnonzero(whole["velocity_command_m_s"] == 0.0)
+    begin = int(stands[stands > 1000][0]) + 20        # in a rest after a move
+    rest = np.full(round(rest_s / whole.period_s), begin)
+    rows = np.concatenate([rest, np.arange(begin, whole["time_s"].size)])
+    columns = {name: values[rows] for name, values in whole.columns.items()}
+    columns["time_s"] = np.arange(rows.size) * whole.period_s
+    columns["table_position_m"] = columns["table_position_m"] + shift_m
+    run, = prepare([changed(whole, **columns)], OWNER)
+    model = Model(OWNER, (PLAY,))
+    table = model.blocks(model.initial(), run)["table"][run.judged]
+    assert np.sqrt(np.mean(table**2)) < 2.0 * run.noise.table_m
+
+
+@pytest.mark.parametrize("force_n", [8.0, 200.0])
 @pytest.mark.parametrize("term", [
     Term("periodic_lead_error", 0, (5e-6, 1.0, 0.0, 0.0, 0.0, 0.0)), Term("spring_load", 0, (5e3, 0.05)),
-    Term("backlash", 0, (20e-6,)), Term("preload_loss", 0, (10e-6, 0.4))])
-def test_an_axis_that_stands_has_stood_before(term: Term) -> None:
+    Term("backlash", 0, (20e-6,)), Term("preload_loss", 0, (10e-6, 0.4)),
+    Term("preload_loss", 0, (10e-6, 0.0)), Term("position_dependent_stiffness", 0, (-5.0,))])
+def test_an_axis_that_stands_has_stood_before(term: Term, force_n: float) -> None:
     """The twin begins at rest under whatever bends the transmission, it does not spring there."""
-    model = Model(OWNER, (Term("external_force", 0, (200.0, 0.0, 10.0)), term))
+    model = Model(OWNER, (Term("external_force", 0, (force_n, 0.0, 10.0)), term))
     still = np.zeros(300)
     answer = model.twin(model.initial()).simulate(still, still)
     assert np.ptp(answer.table_position_m) < 2e-9
+
+
+@pytest.mark.parametrize("shift_rad", [0.03, -6e3])
+def test_where_the_loop_goes_by_the_table_the_motor_has_the_datum(shift_rad: float) -> None:
+    owner = OWNER.model_copy(update={"control": OWNER.control.model_copy(update={"position_feedback": "table"})})
+    assert owner.gains.position_from_table
+    recording = recorded(owner, PLAY)
+    shifted = changed(recording, motor_position_rad=recording["motor_position_rad"] + shift_rad)
+    model = Model(owner, (PLAY,))
+    known, moved = (model.closed_loop(model.initial(), run) for run in prepare([recording, shifted], owner))
+    for channel, noise in (("motor", 1e-6 / owner.axis.ratio_m_rad), ("table", 0.3e-6), ("torque", 0.015)):
+        assert np.std(moved[channel] - known[channel]) < noise, channel

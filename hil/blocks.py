@@ -20,8 +20,10 @@ import numpy as np
 
 from hil import control
 from hil.bench import Bench
+from hil.differences import datum_m
 from hil.measured import FloatArray, Measured
 from hil.twin import kernel
+from hil.twin.axis import Response
 from hil.twin.library import BY_ID
 from hil.twin.mechanism import Stage
 from hil.twin.stages import stage_of
@@ -75,10 +77,11 @@ def compare_blocks(measured: Measured, bench: Bench,
         f"deviation: what the twin's mechanics need less or more, up to {OBSERVER_RAD_S / (2.0 * np.pi):.0f} Hz"))
     if measured.table_m.size:
         ratio = bench.axis.ratio_m_rad
-        datum_m = measured.datum_m(motor, table, ratio)
+        simulated = Response(motor, table, measured.torque_command, measured.torque)
+        datum = datum_m(measured.response, simulated, ratio, measured.judged)
         blocks.append(BlockDeviation(
             "transmission and table", "measured motor position (twin held on it)", "table less motor position", "m",
-            measured.table_m - datum_m - ratio * measured.motor, table - ratio * motor, measured.noise.table_m))
+            measured.table_m - datum - ratio * measured.motor, table - ratio * motor, measured.noise.table_m))
     return tuple(blocks)
 
 

@@ -17,6 +17,7 @@ from scipy.signal import butter, filtfilt
 from hil.bench import Bench
 from hil.bench_hardware import DriveMode
 from hil.blocks import BlockDeviation, compare_blocks
+from hil.differences import datum_m
 from hil.errors import HilError, InputError
 from hil.fit import MOST_STEPS, TABLE_ACCURACY_M, FitResult, fit_nominal
 from hil.inverse_dynamics import InverseDynamics, fit_inverse_dynamics
@@ -139,12 +140,12 @@ def compare(recording: Recording, bench: Bench, *, fit: bool = False,
     if not all(np.isfinite(values).all() for values in response):
         raise HilError(f"{bench.name}: the twin is unstable in closed loop; check the masses and gains of the bench")
     ratio = bench.axis.ratio_m_rad
-    datum_m = measured.datum_m(response.motor_position, response.table_position_m, ratio)
+    datum = datum_m(measured.response, response, ratio, measured.judged)
     # the encoder that the position loop goes by has that of the set-points
-    of_motor = -datum_m if bench.gains.position_from_table else 0.0
+    of_table, of_motor = (0.0, -datum) if bench.gains.position_from_table else (datum, 0.0)
     blocks = compare_blocks(measured, bench, lambda share: progress("block by block", share))
     table = measured.table_m.size > 0
-    positions = ((measured.table_m - datum_m - of_motor, response.table_position_m) if table
+    positions = ((measured.table_m - of_table, response.table_position_m) if table
                  else (ratio * measured.motor, ratio * response.motor_position))
     channels = [_channel(measured, *entry) for entry in _motion(measured, *positions, table)]
     if table:
@@ -158,7 +159,7 @@ def compare(recording: Recording, bench: Bench, *, fit: bool = False,
                   for block in blocks)
     inverse, remark = _inverse_dynamics(recording) if linear else (None, [])
     return Comparison(recording, measured, bench, tuple(channels), pairs, fitted, inverse,
-                      tuple(_notes(measured, bench, fitted, datum_m) + remark))
+                      tuple(_notes(measured, bench, fitted, datum) + remark))
 
 
 def low_pass(values: FloatArray, period_s: float) -> FloatArray:
@@ -192,16 +193,16 @@ def _inverse_dynamics(recording: Recording) -> tuple[InverseDynamics | None, lis
         return None, [f"No inverse-dynamics fit: {error}"]
 
 
-def _notes(measured: Measured, bench: Bench, fit: FitResult | None, datum_m: float) -> list[str]:
+def _notes(measured: Measured, bench: Bench, fit: FitResult | None, datum: float) -> list[str]:
     notes = [
         "Velocity, acceleration and jerk: derivatives after a Butterworth low-pass of 4th order at "
         f"{LOW_PASS_HZ:g} Hz, forwards and backwards, on measured and simulated alike.",
-        f"The first {SETTLE_S:g} s are simulated but not judged: the state at the start is known from the first rows "
-        "only.",
+        f"The rows before the first motion, {SETTLE_S:g} s at least, are simulated but not judged: how the axis came "
+        "to rest there is not known.",
     ]
     if measured.table_m.size:
         other = "motor" if bench.gains.position_from_table else "linear"
-        notes.append(f"The {other} encoder has a datum of its own: {1e6 * abs(datum_m):.3g} µm from that of the twin, "
+        notes.append(f"The {other} encoder has a datum of its own: {1e6 * abs(datum):.3g} µm from that of the twin, "
                      "taken off its position.")
     if bench.drive is not None and bench.drive.mode is not DriveMode.CST:
         notes.append(f"In {bench.drive.mode} the drive closes loops of its own; the twin closes them with the law and "

@@ -8,10 +8,8 @@ torque of tick k is measured as the mean until tick k + 1, hence a row is comple
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass
 from enum import IntEnum, IntFlag
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -115,16 +113,7 @@ def _build_cycle(digest: str) -> Any:
     return cycle
 
 
-def _digest() -> str:
-    """Of all sources compiled into `cycle`, which numba's cache cannot see."""
-    digest = hashlib.sha256(stages.library_digest().encode())
-    for module in (control, kernel):
-        digest.update(Path(str(module.__file__)).read_bytes())
-    return digest.hexdigest()
-
-
-DIGEST = _digest()
-compiled_cycle = _build_cycle(DIGEST)
+compiled_cycle = _build_cycle(stages.source_digest())
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from hil.bench import Bench
+from hil.differences import differences
 from hil.errors import HilError
 from hil.measured import FloatArray, Measured
 
@@ -101,12 +102,7 @@ def weighted_residuals(bench: Bench, measured: Measured) -> FloatArray:
     ratio, rows, noise = bench.axis.ratio_m_rad, measured.judged, measured.noise
     response = bench.twin().simulate(measured.position_command_m, measured.velocity_command_m_s, measured.start,
                                      measured.table_m)
-    motor = measured.motor - response.motor_position
-    if bench.gains.position_from_table:
-        motor = motor - np.mean(motor[rows])
-    parts = [(measured.torque - response.torque) / noise.torque, motor / max(noise.motor, MOTOR_ACCURACY_M / ratio)]
-    if measured.table_m.size:
-        table = measured.table_m - response.table_position_m - ratio * motor
-        table = table - np.mean(table[rows])      # its datum is its own
-        parts.append(table / max(noise.table_m, TABLE_ACCURACY_M))
-    return np.concatenate([part[rows] for part in parts])
+    found = differences(measured.response, response, bench, rows)
+    noise_of = {"torque": noise.torque, "motor": max(noise.motor, MOTOR_ACCURACY_M / ratio),
+                "table": max(noise.table_m, TABLE_ACCURACY_M)}
+    return np.concatenate([values[rows] / noise_of[name] for name, values in found.items()])

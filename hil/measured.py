@@ -22,7 +22,7 @@ from hil.bench_hardware import DriveMode
 from hil.channels import AxisKind
 from hil.errors import InputError
 from hil.recording import Recording
-from hil.twin.axis import Start
+from hil.twin.axis import Response, Start
 
 FloatArray = NDArray[np.float64]
 Channels = tuple[FloatArray, FloatArray, FloatArray, FloatArray]    # as control.replay takes them
@@ -75,12 +75,10 @@ class Measured:
         speed = np.gradient(self.motor) / self.period_s
         return np.asarray(np.hypot(self.noise.motor, self.noise.jitter_s * speed), dtype=np.float64)
 
-    def datum_m(self, motor: FloatArray, table_m: FloatArray, ratio_m: float) -> float:
-        """By how much the datum of the linear encoder differs from that of a simulation's motor and table (n,): the
-        mean difference of the stretch. 0 without a linear encoder."""
-        if not self.table_m.size:
-            return 0.0
-        return float(np.mean((self.table_m - table_m - ratio_m * (self.motor - motor))[self.judged]))
+    @property
+    def response(self) -> Response:
+        """The measured channels in the twin's order."""
+        return Response(self.motor, self.table_m, self.torque_command, self.torque)
 
     @cached_property
     def moving(self) -> NDArray[np.bool_]:

@@ -19,11 +19,12 @@ from numpy.typing import NDArray
 
 from drivers.base import DriveSample, EncoderSample
 from drivers.canopen_encoder import CanopenEncoder
-from drivers.sim import contact, kernel, layout, sensors
+from drivers.sim import kernel
 from drivers.sim.plant import Plant
 from hil import cycle as compiled
 from hil.bench_hardware import DriveMode
 from hil.session import Rows, Session
+from hil.twin import stages
 
 SNAPSHOT_TICKS = 2000
 LAST_TICKS = 20          # over the bus again, so that the devices know where the axis is when they disarm
@@ -74,11 +75,9 @@ def _build_ticks(digest: str) -> Any:
 
 
 def _digest() -> str:
-    """Of the sources compiled into `ticks` from elsewhere, which numba's cache cannot see."""
-    digest = hashlib.sha256(compiled.DIGEST.encode())
-    for module in (compiled, kernel, contact, sensors, layout):
-        digest.update(Path(str(module.__file__)).read_bytes())
-    return digest.hexdigest()
+    """Of the sources in `ticks` that numba's cache cannot see; those of the simulated axis stamp its types."""
+    cycle = Path(str(compiled.__file__)).read_bytes()
+    return hashlib.sha256(stages.source_digest().encode() + cycle).hexdigest()
 
 
 _ticks = _build_ticks(_digest())

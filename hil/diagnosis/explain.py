@@ -40,8 +40,9 @@ MATERIAL = 0.02
 # And so much of what is left above the noise: one mechanism after the other that each explain next to nothing are a
 # series expansion of something else.
 WORTH = 0.02
-# So are as many as this that together leave more than they explain.
-_IN_VAIN = 3
+# Terms that together leave more than this of what is above the floor are a fit, not an explanation: more of the
+# mismatch is not understood than is. After so many of them the search ends.
+MOST, _IN_VAIN = 0.5, 3
 # The same law may be written in another form. What a term leaves below this share of the energy that it took from a
 # channel, a twentieth in rms, may be its own form, and no second mechanism.
 FORM = 0.0025
@@ -120,7 +121,7 @@ def explain(bench: Bench, runs: Sequence[Measured], progress: Progress = lambda 
              for other in found),
             key=lambda rival: rival.evidence)
         base, needed = _pruned(best, nominal, runs)
-        if len(base.model.terms) >= _IN_VAIN and excess(base) > 0.5 * excess(nominal):
+        if len(base.model.terms) >= _IN_VAIN and excess(base) > MOST * excess(nominal):
             break
     final = fit(base.model, runs, base.x, evaluations=40)
     kept = {term.key for term in final.model.terms}

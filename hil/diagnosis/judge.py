@@ -7,16 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from hil.diagnosis.evidence import against
-from hil.diagnosis.explain import MATERIAL, NEEDED, noise_ratios
+from hil.diagnosis.explain import MATERIAL, MOST, NEEDED, noise_ratios
 from hil.diagnosis.fit import Fit
 from hil.diagnosis.proof import explained_share
 from hil.diagnosis.result import Verdict
 from hil.measured import Measured
 
-# Terms that explain less than half of what is above the floor on recordings of another motion are a fit, not
-# an explanation: more of the mismatch is not understood than is.
-MOST = 0.5
-# Nor are names believed beside so much that has none: a twentieth of the energy above the floor, where that still
+# Names are not believed beside so much that has none: a twentieth of the energy above the floor, where that still
 # stands so many times above the noise of a channel. The same law in another form leaves less.
 _MUCH, _FAR = 0.05, 5.0
 
@@ -26,7 +23,7 @@ def judge(owner: Fit, nominal: Fit, final: Fit, train: Sequence[Measured], held_
     if final.model.terms:
         left = 1.0 - explained_share(nominal, final, held_out or train)
         far = max(ratio for run in (*train, *held_out) for ratio in noise_ratios(final, run).values()) > _FAR**2
-        guessed = left > 1.0 - MOST or (left > _MUCH and far)
+        guessed = left > MOST or (left > _MUCH and far)
         return Verdict.MISSING_PHYSICS if final.at_floor or not guessed else Verdict.UNEXPLAINED
     if not nominal.at_floor:
         return Verdict.UNEXPLAINED

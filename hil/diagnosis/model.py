@@ -1,6 +1,6 @@
 """A hypothesis: nominal parameters and mechanisms of the twin as one vector, and its residuals.
 
-Residuals come in two kinds. Block by block (`kernel.observe`), each block is fed measured inputs: the kind that
+Residuals come in two kinds. Block by block (`loops.observe`), each block is fed measured inputs: the kind that
 searches are made with, because a mismatch shows only where it acts and nothing piles up. In closed loop the twin
 gets the set-points and nothing else: the kind that a result is confirmed with. Stick-slip and play make the
 closed loop chaotic, so that there even the truth does not repeat a recording.
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from hil.bench import Bench, MechanismEntry
+from hil.differences import differences
 from hil.measured import Measured
 from hil.twin.axis import Active, Response, Twin
 from hil.twin.library import BY_ID
@@ -207,14 +208,14 @@ class Model:
 
     def closed_loop(self, x: FloatArray, run: Measured) -> dict[str, FloatArray]:
         """Measured minus twin in closed loop, per channel (n,)."""
-        return _differences(self.respond(x, run), measured_response(run), self.bench, run.judged)
+        return differences(run.response, self.respond(x, run), self.bench, run.judged)
 
     def blocks(self, x: FloatArray, run: Measured) -> dict[str, FloatArray]:
         """Measured minus twin with each block fed measured inputs, per channel (n,)."""
         twin = self.twin(x)
-        measured = twin.undelayed(measured_response(run))
+        measured = twin.undelayed(run.response)
         predicted = twin.observe(run.position_command_m, run.velocity_command_m_s, measured, run.start)
-        found = _differences(predicted, measured, self.bench, run.judged)
+        found = differences(measured, predicted, self.bench, run.judged)
         found["command"] = measured.torque_command - predicted.torque_command
         return found
 
@@ -231,27 +232,6 @@ class Model:
         difference = self.closed_loop if closed else self.blocks
         return np.concatenate([part for run in runs
                                for part in self.weighted(difference(x, run), run).values()])
-
-
-def measured_response(run: Measured) -> Response:
-    """The measured channels in the twin's order."""
-    return Response(run.motor, run.table_m, run.torque_command, run.torque)
-
-
-def _differences(response: Response, measured: Response, bench: Bench, judged: slice) -> dict[str, FloatArray]:
-    """Motor [rad or m], table against motor [m], torque [N m or N].
-
-    Each encoder has a datum of its own, only that of the position loop is the set-points': a difference that is always
-    there is none.
-    """
-    found = {"motor": measured.motor_position - response.motor_position}
-    if bench.gains.position_from_table:
-        found["motor"] = found["motor"] - np.mean(found["motor"][judged])
-    if measured.table_position_m.size:
-        table = measured.table_position_m - response.table_position_m - bench.axis.ratio_m_rad * found["motor"]
-        found["table"] = table - np.mean(table[judged])
-    found["torque"] = measured.torque - response.torque
-    return found
 
 
 def observer_time_s(runs: Sequence[Measured], bench: Bench) -> float:

@@ -95,7 +95,7 @@ def scene(runs: Sequence[Measured], bench: Bench, blocks: Sequence[dict[str, Flo
         ripple_orders=estimate.orders(runs, found, physics.angle_per_unit, 2, ripple),
         friction_periods=[*periods, *turns],
         scale_periods=([*estimate.scale_periods(runs, [block["table"] for block in blocks]),
-                        *(period for period in (lead,) if period < min(travel, _LONGEST_SCALE_M * (1.0 + 1e-9)))]
+                        *([lead] if lead < travel and round(lead, 9) <= _LONGEST_SCALE_M else [])]
                        if runs[0].table_m.size else []),
         window=estimate.force_window(runs[longest], found[longest]),
         stretch=max(stretch, 0.5e-6), most_stretch=max(most_stretch, 1e-6),
@@ -144,16 +144,17 @@ _STARTS: dict[str, tuple[Callable[[Scene], _Values], int, int]] = {
                     0, -1),
 }
 
-_NEEDS_TABLE = ("backlash", "preload_loss", "position_dependent_stiffness", "periodic_lead_error",
-                "cumulative_lead_error", "thermal_growth", "scale_interpolation_error", "structural_mode",
-                "table_side_friction")
+# Nothing tells them apart from parameters of the motor side where no linear encoder is.
+NEEDS_TABLE = frozenset({
+    "backlash", "preload_loss", "position_dependent_stiffness", "periodic_lead_error", "cumulative_lead_error",
+    "thermal_growth", "scale_interpolation_error", "structural_mode", "table_side_friction"})
 
 
 def starts(scene: Scene, bench: Bench) -> list[Start]:
     """All starting points of the library for this scene, every variant."""
     found = []
     for mechanism in LIBRARY:
-        if mechanism.id in _NEEDS_TABLE and not bench.has_table_encoder:
+        if mechanism.id in NEEDS_TABLE and not bench.has_table_encoder:
             continue
         for variant, name in enumerate(mechanism.variants):
             if name == "table_position" and not bench.has_table_encoder:

@@ -16,12 +16,9 @@ from hil.bench import Bench
 from hil.diagnosis.explain import MATERIAL, NEEDED
 from hil.diagnosis.fit import POOL, Fit
 from hil.diagnosis.model import Term
+from hil.diagnosis.starts import NEEDS_TABLE
 from hil.measured import Measured
 from hil.twin.library import BY_ID, LIBRARY
-
-NEEDS_TABLE = frozenset({
-    "backlash", "preload_loss", "position_dependent_stiffness", "periodic_lead_error", "cumulative_lead_error",
-    "thermal_growth", "scale_interpolation_error", "structural_mode", "table_side_friction"})
 
 
 def not_testable(found: Fit, runs: Sequence[Measured],

@@ -24,7 +24,7 @@ from hil.proof.chance import Rng, log_uniform
 
 Belief = Literal["exact", "wrong"]
 
-JERK_M_S3 = 100.0
+JERK_M_S3 = 100.0           # of the moves: full acceleration of some 2 m/s^2 within 20 ms, as of a machine tool
 WRONG_BY = 1.3              # largest factor between a true parameter and the owner's
 STEP_S = 2e-5               # internal step: 1 to 4 % of a loop period, and below half a radian of the fastest mode
 _TABLE_COUNTS_M = (0.1e-6, 0.2e-6, 0.5e-6, 1e-6)

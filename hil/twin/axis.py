@@ -16,11 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hil import control
-from hil.twin import kernel, stages
+from hil.twin import layout, loops, stages
 from hil.twin.chain import Chain
 from hil.twin.library import BY_ID, SLOTS
 from hil.twin.mechanism import PARAMETERS, WIDTH, Stage
 from hil.twin.modal import Modal, discretise, modal, truncate
+from hil.twin.settle import settle
 
 FloatArray = NDArray[np.float64]
 
@@ -97,7 +98,7 @@ class Twin:
     coarse_steps: int = COARSE_STEPS
     fine_steps: int = FINE_STEPS
     slow_velocity: float = 0.02
-    observer_s: float = kernel.OBSERVER_S
+    observer_s: float = loops.OBSERVER_S
 
     @cached_property
     def modal(self) -> Modal:
@@ -113,56 +114,56 @@ class Twin:
     @cached_property
     def _modes(self) -> FloatArray:
         modes = self.modal
-        rows = np.empty((kernel.MODE_ROWS, modes.frequency_rad_s.size))
+        rows = np.empty((layout.MODE_ROWS, modes.frequency_rad_s.size))
         period = self.gains.period_s
-        rows[kernel.COARSE:kernel.COARSE + 6] = discretise(modes, period / self.coarse_steps)
-        rows[kernel.FINE:kernel.FINE + 6] = discretise(modes, period / self.fine_steps)
-        rows[kernel.SHAPE_MOTOR] = modes.shape[modes.motor]
-        rows[kernel.SHAPE_TABLE] = modes.shape[modes.table]
-        rows[kernel.SHAPE_SPRING] = modes.transmission
-        rows[kernel.SHAPE_SCREW] = modes.screw
+        rows[layout.COARSE:layout.COARSE + 6] = discretise(modes, period / self.coarse_steps)
+        rows[layout.FINE:layout.FINE + 6] = discretise(modes, period / self.fine_steps)
+        rows[layout.SHAPE_MOTOR] = modes.shape[modes.motor]
+        rows[layout.SHAPE_TABLE] = modes.shape[modes.table]
+        rows[layout.SHAPE_SPRING] = modes.transmission
+        rows[layout.SHAPE_SCREW] = modes.screw
         chain = self.physics.chain      # the coordinates that mechanisms add come after it, and stay
-        for row, place in ((kernel.TABLE_IMPULSE, chain.table), (kernel.MOTOR_IMPULSE, chain.motor)):
+        for row, place in ((layout.TABLE_IMPULSE, chain.table), (layout.MOTOR_IMPULSE, chain.motor)):
             rows[row] = chain.inertia_kg_m2 @ chain.side(place) @ modes.shape[:len(chain.names)]
         return rows
 
     @cached_property
     def _constants(self) -> FloatArray:
-        constants = np.zeros(kernel.CONSTANTS)
+        constants = np.zeros(layout.CONSTANTS)
         physics, chain, ratio = self.physics, self.physics.chain, self.gains.ratio_m_rad
-        constants[kernel.PERIOD] = self.gains.period_s
-        constants[kernel.RATIO] = ratio
-        constants[kernel.ANGLE_PER_UNIT] = physics.angle_per_unit
-        constants[kernel.COULOMB] = physics.coulomb_n_m
-        constants[kernel.VISCOUS] = physics.viscous_n_m_s_rad
-        constants[kernel.VISCOUS_SPEED] = physics.viscous_speed
-        constants[kernel.SPRING] = chain.transmission_stiffness_n_m_rad
-        constants[kernel.SCREW] = chain.screw_stiffness_n_m_rad
-        constants[kernel.SCREW_APART] = float(not np.array_equal(chain.screw, chain.transmission))
+        constants[layout.PERIOD] = self.gains.period_s
+        constants[layout.RATIO] = ratio
+        constants[layout.ANGLE_PER_UNIT] = physics.angle_per_unit
+        constants[layout.COULOMB] = physics.coulomb_n_m
+        constants[layout.VISCOUS] = physics.viscous_n_m_s_rad
+        constants[layout.VISCOUS_SPEED] = physics.viscous_speed
+        constants[layout.SPRING] = chain.transmission_stiffness_n_m_rad
+        constants[layout.SCREW] = chain.screw_stiffness_n_m_rad
+        constants[layout.SCREW_APART] = float(not np.array_equal(chain.screw, chain.transmission))
         elastic = (self.modal.frequency_rad_s > 0.0) & (self.modal.transmission != 0.0)
         if elastic.any():
             # what of the modal damping acts in the transmission: so much that no mode is driven where it is taken away
             damping = 2.0 * self.modal.damping_ratio * self.modal.frequency_rad_s
-            constants[kernel.DAMPER] = np.min(damping[elastic] / self.modal.transmission[elastic] ** 2)
-        constants[kernel.COARSE_STEPS] = self.coarse_steps
-        constants[kernel.OBSERVER] = self.observer_s
-        constants[kernel.FINE_STEPS] = self.fine_steps
-        constants[kernel.SLOW_VELOCITY] = self.slow_velocity
-        constants[kernel.PLAY] = float(
+            constants[layout.DAMPER] = np.min(damping[elastic] / self.modal.transmission[elastic] ** 2)
+        constants[layout.COARSE_STEPS] = self.coarse_steps
+        constants[layout.OBSERVER] = self.observer_s
+        constants[layout.FINE_STEPS] = self.fine_steps
+        constants[layout.SLOW_VELOCITY] = self.slow_velocity
+        constants[layout.PLAY] = float(
             any(BY_ID[active.effect].play and active.variant == 1 for active in self.active))
         modes = self._modes
-        motor, table = modes[kernel.SHAPE_MOTOR], modes[kernel.SHAPE_TABLE]
-        for at, first in ((kernel.COARSE_GAINS, kernel.COARSE), (kernel.FINE_GAINS, kernel.FINE)):
+        motor, table = modes[layout.SHAPE_MOTOR], modes[layout.SHAPE_TABLE]
+        for at, first in ((layout.COARSE_GAINS, layout.COARSE), (layout.FINE_GAINS, layout.FINE)):
             per_torque = modes[first + 5]
             constants[at:at + 3] = motor * per_torque @ motor, motor * per_torque @ table, table * per_torque @ table
         bends = any(BY_ID[active.effect].stage in (Stage.TRANSMISSION, Stage.SCREW) for active in self.active)
-        constants[kernel.ALWAYS_FINE] = float(bends and np.count_nonzero(elastic) > 1)
+        constants[layout.ALWAYS_FINE] = float(bends and np.count_nonzero(elastic) > 1)
         return constants
 
     @cached_property
     def _mechanisms(self) -> tuple[FloatArray, NDArray[np.int64]]:
         values = np.zeros((len(SLOTS), PARAMETERS))
-        codes = np.zeros(kernel.CODES, dtype=np.int64)
+        codes = np.zeros(layout.CODES, dtype=np.int64)
         free = dict(enumerate(SLOTS))
         for active in self.active:
             mechanism = BY_ID[active.effect]
@@ -177,7 +178,7 @@ class Twin:
             values[slot, PARAMETERS - 1] = active.variant
             codes[slot] = active.variant + 1
             codes[len(SLOTS) + stages.KERNEL_STAGES.index(stage)] = 1
-            codes[kernel.ON_ANY] = 1
+            codes[layout.ON_ANY] = 1
         return values, codes
 
     @cached_property
@@ -197,7 +198,7 @@ class Twin:
         delta[0, 0] = start.position_m / ratio / rigid
         delta[1, 0] = start.velocity_m_s / ratio / rigid
         memory = np.zeros((len(SLOTS) + 1, WIDTH))
-        kernel.settle(*self.arrays(), delta, memory)
+        settle(*self.arrays(), delta, memory)
         return delta, memory
 
     def arrays(self) -> tuple[FloatArray, FloatArray, FloatArray, NDArray[np.int64]]:
@@ -208,28 +209,28 @@ class Twin:
                  start: Start = _AT_REST, measured_table_m: FloatArray = _NOTHING) -> Response:
         """The axis in closed loop over set-points (n,), one per control tick, from `start`.
 
-        `measured_table_m` (n,) holds a table that floats in a gap, see `kernel.closed_loop`.
+        `measured_table_m` (n,) holds a table that floats in a gap, see `hil.twin.loops`.
         """
         delta, memory = self.state(start)
-        channels = kernel.closed_loop(self.loop_gains, self._controller(start), position_command_m,
+        channels = loops.closed_loop(self.loop_gains, self._controller(start), position_command_m,
                                       velocity_command_m_s, measured_table_m, *self.arrays(), delta, memory)
         return self._channels(Response(*channels))
 
     def drive(self, torque_command: FloatArray, start: Start = _AT_REST) -> Response:
         """The axis without its controller under a given torque command (n,), from `start`."""
         delta, memory = self.state(start)
-        motor, table, torque = kernel.open_loop(torque_command, *self.arrays(), delta, memory)
+        motor, table, torque = loops.open_loop(torque_command, *self.arrays(), delta, memory)
         return self._channels(Response(motor, table, torque_command, torque))
 
     def observe(self, position_command_m: FloatArray, velocity_command_m_s: FloatArray, measured: Response,
                 start: Start = _AT_REST) -> Response:
-        """The axis block by block, each fed with measured inputs; see `kernel.observe`.
+        """The axis block by block, each fed with measured inputs; see `hil.twin.loops`.
 
         `measured.table_position_m` is empty without a linear encoder. Recorded lateness of a channel must
         have been undone, see `undelayed`.
         """
         delta, memory = self.state(start)
-        channels = kernel.observe(self.loop_gains, self._controller(start), position_command_m, velocity_command_m_s,
+        channels = loops.observe(self.loop_gains, self._controller(start), position_command_m, velocity_command_m_s,
                                   measured.torque_command, measured.motor_position, measured.table_position_m,
                                   *self.arrays(), delta, memory)
         response = Response(*channels)

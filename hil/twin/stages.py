@@ -84,12 +84,10 @@ motor_reading = _stage(Stage.MOTOR_READING)
 table_reading = _stage(Stage.TABLE_READING)
 
 
-def library_digest() -> str:
-    """Digest of the sources that the kernel compiles in: numba's cache cannot see when they change."""
+def source_digest() -> str:
+    """Digest of the twin's sources and the control law's: numba's cache sees only the file that a kernel stands in."""
     folder = Path(__file__).parent
     digest = hashlib.sha256()
-    law = [folder.parent / "control.py", folder.parent / "rounding.py", folder / "contact.py"]
-    twin = (*sorted((folder / "mechanisms").glob("*.py")), folder / "mechanism.py", folder / "library.py")
-    for path in (*twin, Path(__file__), *law):
+    for path in (*sorted(folder.rglob("*.py")), folder.parent / "control.py", folder.parent / "rounding.py"):
         digest.update(path.read_bytes())
     return digest.hexdigest()

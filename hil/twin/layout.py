@@ -1,0 +1,27 @@
+"""Where what stands in the arrays that the compiled kernels share.
+
+`modes` (MODE_ROWS, n), `constants` (CONSTANTS,), `codes` (CODES,) and `memory` (slots + 1, WIDTH) are packed by
+`hil.twin.axis`; beside them go `values` (slots, PARAMETERS), those of the mechanisms.
+"""
+
+from __future__ import annotations
+
+from hil.twin.library import SLOTS
+
+# Rows of `modes` (MODE_ROWS, n): exact discretisation for the coarse and the fine step, then shapes.
+COARSE, FINE, SHAPE_MOTOR, SHAPE_TABLE, SHAPE_SPRING, SHAPE_SCREW, TABLE_IMPULSE, MOTOR_IMPULSE, MODE_ROWS = (
+    0, 6, 12, 13, 14, 15, 16, 17, 18)
+
+# Entries of `constants`.
+(PERIOD, RATIO, ANGLE_PER_UNIT, COULOMB, VISCOUS, SPRING, DAMPER, COARSE_STEPS, FINE_STEPS, SLOW_VELOCITY,
+ ALWAYS_FINE, OBSERVER, PLAY, VISCOUS_SPEED, SCREW, SCREW_APART, COARSE_GAINS, FINE_GAINS, CONSTANTS) = (
+    *range(17), 19, 22)
+
+# Entries of `codes`: variant + 1 of the mechanism in each slot (0: off), then whether each stage is entered.
+(ON_CURRENT, ON_TORQUE, ON_MOTOR_TORQUE, ON_COULOMB, ON_FRICTION_SCALE, ON_DRAG, ON_BIAS, ON_BRISTLE,
+ ON_TABLE_SHARE, ON_TRANSMISSION, ON_SCREW, ON_TABLE_FORCE, ON_MOTOR_READING, ON_TABLE_READING, ON_ANY, CODES) = range(
+    len(SLOTS), len(SLOTS) + 16)
+
+# Rows of `memory` (slots + 1, WIDTH): each mechanism's own, then the kernel's.
+OWN = len(SLOTS)
+CLOCK, BRISTLE_DEFLECTION, SPRING_EXTRA, FLOATING, LAST_SPEED = range(5)

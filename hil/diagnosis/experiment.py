@@ -74,19 +74,21 @@ def separating(explanation: Explanation, final: Fit, train: Sequence[Measured],
 
     asked: set[Question] = {tuple(sorted((truth.effect, other.effect))) for truth, other in pairs}
 
-    def answers(trajectory: Trajectory) -> Answers:
-        found = dict.fromkeys(asked, np.inf)
-        for truth, other in pairs:
-            run, question = _imagined(truth, trajectory, train[0]), tuple(sorted((truth.effect, other.effect)))
-            found[question] = min(found[question], _left(other, run) - _own(truth, run))
-        return found
-
     known = final.residuals.size
     channels = known / sum(run.motor[run.judged].size for run in train)
 
     def enough(trajectory: Trajectory) -> float:
         # beside what is recorded, the difference must be one that tells (see `Rival.tied`)
         return max(TIED, ALIKE * (known + channels * len(trajectory)))
+
+    def answers(trajectory: Trajectory) -> Answers:
+        found, least = dict.fromkeys(asked, np.inf), enough(trajectory)
+        for truth, other in pairs:
+            question = tuple(sorted((truth.effect, other.effect)))
+            if found[question] >= least:     # not already open the other way round
+                run = _imagined(truth, trajectory, train[0])
+                found[question] = min(found[question], _left(other, run) - _own(truth, run))
+        return found
 
     best = _best((*train, *held_out), final.model, len(asked), answers, enough,
                  lambda one: (len(one.answered), one.worth / one.duration_s))

@@ -30,8 +30,8 @@ FloatArray = NDArray[np.float64]
 # axis, below its current noise. Coarse: sliding friction is constant over a step, modes are exact.
 FINE_STEPS = 50
 COARSE_STEPS = 5
-# The step is fine while the motor could reverse within two ticks at this acceleration [rad/s^2].
-_REVERSAL_ACCELERATION = 1000.0
+# The step is fine while the motor turns slower than this [rad/s], or could reverse within two ticks.
+SLOW_RAD_S = 0.02
 
 _NOTHING = np.empty(0)
 _ANSWER = "torque"      # the recorded channel that is an answer of the axis only, and no input of any block
@@ -97,7 +97,6 @@ class Twin:
     modes: int | None = None
     coarse_steps: int = COARSE_STEPS
     fine_steps: int = FINE_STEPS
-    slow_velocity: float = 0.02
     observer_s: float = loops.OBSERVER_S
 
     @cached_property
@@ -148,7 +147,7 @@ class Twin:
         constants[layout.COARSE_STEPS] = self.coarse_steps
         constants[layout.OBSERVER] = self.observer_s
         constants[layout.FINE_STEPS] = self.fine_steps
-        constants[layout.SLOW_VELOCITY] = self.slow_velocity
+        constants[layout.SLOW_VELOCITY] = SLOW_RAD_S / physics.angle_per_unit
         constants[layout.PLAY] = float(
             any(BY_ID[active.effect].play and active.variant == 1 for active in self.active))
         modes = self._modes

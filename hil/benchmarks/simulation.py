@@ -45,7 +45,8 @@ def figures() -> list[Figure]:
     """Speeds of the whole bench in virtual time and of the twin."""
     bench = twenty_modes()
     whole = Twin(bench.axis.physics(), bench.gains)
-    plain = Twin(bench.axis.physics(), bench.gains, coarse_steps=1, fine_steps=1)
+    tick_s = bench.gains.period_s
+    plain = Twin(bench.axis.physics(), bench.gains, coarse_step_s=tick_s, fine_step_s=tick_s)
     real = "x real time"
     return [
         Figure("whole bench in virtual time", whole_bench(VirtualSession), real, 200.0, False,

@@ -120,7 +120,10 @@ def explain(bench: Bench, runs: Sequence[Measured], progress: Progress = lambda 
             (Rival(other, against(best, other, filters), (other.cost - best.cost) / rows)
              for other in found),
             key=lambda rival: rival.evidence)
+        before = base
         base, needed = _pruned(best, nominal, runs)
+        if len(base.model.terms) == len(before.model.terms) and before.cost - base.cost < MATERIAL * rows:
+            break       # what was added went again, or took the place of another
         if len(base.model.terms) >= _IN_VAIN and excess(base) > MOST * excess(nominal):
             break
     final = fit(base.model, runs, base.x, evaluations=40)

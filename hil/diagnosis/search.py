@@ -89,17 +89,19 @@ def race(base: Fit, found: Sequence[Lead], runs: Sequence[Measured]) -> list[Fit
     it; how far exactly those are that lost is nobody's question.
     """
     searched = replace(base.model, torque_accuracy=SEARCH_ACCURACY)
-    # the base may have bent its nominal values to make up for what it lacks: those of the owner may be nearer
-    believed = np.concatenate([base.model.initial()[:base.model.nominal_count], base.x[base.model.nominal_count:]])
-    known = [(x, jacobian(searched, x, searched.residuals(x, runs), runs)) for x in (base.x, believed)]
+    known = {tuple(x): jacobian(searched, x, searched.residuals(x, runs), runs) for x in (base.x, *_believed(base))}
 
     def near(lead: Lead) -> Fit:
         """A first fit, with the derivatives of the base or at the owner's values."""
-        found = []
-        for x, held in known if lead in good[:_SPRINTERS] else known[:1]:
-            first = likeliest(lead, x)
-            found.append(fit(first.model, runs, first.x, soft=_SOFT, evaluations=_NEAR, held=held))
+        begun = [likeliest(lead, base.x), *([owners(lead)] if lead in good[:_SPRINTERS] else [])]
+        found = [fit(first.model, runs, first.x, soft=_SOFT, evaluations=_NEAR,
+                     held=known[tuple(first.x[:base.x.size])]) for first in begun]
         return min(found, key=lambda result: soft_cost(result.residuals, _SOFT))
+
+    def owners(lead: Lead) -> Fit:
+        """The likeliest point of a lead at values of the owner."""
+        return min((likeliest(lead, x) for x in _believed(base)),
+                   key=lambda found: soft_cost(found.residuals, _SOFT))
 
     def likeliest(lead: Lead, x: FloatArray) -> Fit:
         """The point of a lead that leaves least beside what is known at `x`."""
@@ -113,7 +115,7 @@ def race(base: Fit, found: Sequence[Lead], runs: Sequence[Measured]) -> list[Fit
     def afresh(found: Fit) -> Fit:
         """From the owner's values, with derivatives of its own."""
         lead = next(lead for lead in good if lead.term.effect == found.model.terms[-1].effect)
-        first = likeliest(lead, believed)
+        first = owners(lead)
         again = fit(first.model, runs, first.x, soft=_SOFT, evaluations=_SPRINT)
         return finish(again) if gained(again) > 0.0 else again
 
@@ -160,6 +162,22 @@ def race(base: Fit, found: Sequence[Lead], runs: Sequence[Measured]) -> list[Fit
         if effect not in best or result.cost < best[effect].cost:
             best[effect] = result
     return sorted(best.values(), key=lambda result: result.cost)
+
+
+def _believed(base: Fit) -> list[FloatArray]:
+    """The vector of a base with the owner's values, of all nominal parameters, and of those of the springs alone.
+
+    The base may have bent its values to make up for what it lacks. What lies between motor and table bends those of the
+    springs, and leaves mass and friction as right as they are.
+    """
+    names = [coordinate.name for coordinate in base.model.coordinates[:base.model.nominal_count]]
+    initial = base.model.initial()
+
+    def with_owners(taken: Sequence[str]) -> FloatArray:
+        mine = np.array([name in taken for name in names] + [False] * (base.x.size - len(names)))
+        return np.where(mine, initial, base.x)
+
+    return [with_owners(taken) for taken in (names, base.model.bench.axis.SPRINGS) if taken]
 
 
 def _edges_moved(found: Fit, runs: Sequence[Measured]) -> Fit:

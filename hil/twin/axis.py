@@ -25,11 +25,11 @@ from hil.twin.settle import settle
 
 FloatArray = NDArray[np.float64]
 
-# Internal steps per control tick. Fine: 20 us at 1 ms, so that the friction impulse of the step in
-# which the motor reverses is right to Fc x 20 us, 0.003 N m of velocity-loop torque on the reference
-# axis, below its current noise. Coarse: sliding friction is constant over a step, modes are exact.
-FINE_STEPS = 50
-COARSE_STEPS = 5
+# Internal steps. Fine: the friction impulse of the step in which the motor reverses is right to Fc x 20 us, 0.003 N m
+# of velocity-loop torque on the reference axis, below its current noise. Coarse: sliding friction is constant over a
+# step, modes are exact.
+FINE_STEP_S = 20e-6
+COARSE_STEP_S = 200e-6
 # The step is fine while the motor turns slower than this [rad/s], or could reverse within two ticks.
 SLOW_RAD_S = 0.02
 
@@ -87,16 +87,16 @@ _AT_REST = Start()
 class Twin:
     """An axis with its control law and its active mechanisms.
 
-    `modes` keeps only the lowest modes of the chain (None: all). `fine_steps` and `coarse_steps` are
-    internal steps per control tick; equal values give a fixed step.
+    `modes` keeps only the lowest modes of the chain (None: all). `fine_step_s` and `coarse_step_s` are the longest
+    internal steps, of which a whole number makes a control tick; equal values give a fixed step.
     """
 
     physics: Physics
     gains: control.Gains
     active: Sequence[Active] = ()
     modes: int | None = None
-    coarse_steps: int = COARSE_STEPS
-    fine_steps: int = FINE_STEPS
+    coarse_step_s: float = COARSE_STEP_S
+    fine_step_s: float = FINE_STEP_S
     observer_s: float = loops.OBSERVER_S
 
     @cached_property
@@ -110,13 +110,17 @@ class Twin:
         modes = modal(chain)
         return modes if self.modes is None else truncate(modes, self.modes)
 
+    def _steps(self, longest_s: float) -> int:
+        """Internal steps per control tick, of which none is longer (but for rounding)."""
+        return max(math.ceil(self.gains.period_s / longest_s - 1e-6), 1)
+
     @cached_property
     def _modes(self) -> FloatArray:
         modes = self.modal
         rows = np.empty((layout.MODE_ROWS, modes.frequency_rad_s.size))
         period = self.gains.period_s
-        rows[layout.COARSE:layout.COARSE + 6] = discretise(modes, period / self.coarse_steps)
-        rows[layout.FINE:layout.FINE + 6] = discretise(modes, period / self.fine_steps)
+        rows[layout.COARSE:layout.COARSE + 6] = discretise(modes, period / self._steps(self.coarse_step_s))
+        rows[layout.FINE:layout.FINE + 6] = discretise(modes, period / self._steps(self.fine_step_s))
         rows[layout.SHAPE_MOTOR] = modes.shape[modes.motor]
         rows[layout.SHAPE_TABLE] = modes.shape[modes.table]
         rows[layout.SHAPE_SPRING] = modes.transmission
@@ -144,9 +148,9 @@ class Twin:
             # what of the modal damping acts in the transmission: so much that no mode is driven where it is taken away
             damping = 2.0 * self.modal.damping_ratio * self.modal.frequency_rad_s
             constants[layout.DAMPER] = np.min(damping[elastic] / self.modal.transmission[elastic] ** 2)
-        constants[layout.COARSE_STEPS] = self.coarse_steps
+        constants[layout.COARSE_STEPS] = self._steps(self.coarse_step_s)
         constants[layout.OBSERVER] = self.observer_s
-        constants[layout.FINE_STEPS] = self.fine_steps
+        constants[layout.FINE_STEPS] = self._steps(self.fine_step_s)
         constants[layout.SLOW_VELOCITY] = SLOW_RAD_S / physics.angle_per_unit
         constants[layout.PLAY] = float(
             any(BY_ID[active.effect].play and active.variant == 1 for active in self.active))

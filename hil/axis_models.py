@@ -1,7 +1,7 @@
 """What the owner of an axis believes about it: one pydantic model per kind of axis.
 
 Each gives the twin's physics (`physics`) and names the parameters that may be wrong (`NOMINAL`), which the
-diagnosis refits before it looks for missing physics; `SPRINGS` are those of them that lie between motor and table.
+diagnosis refits before it looks for missing physics. Of them `MASSES` move, `SPRINGS` lie between motor and table.
 """
 
 from __future__ import annotations
@@ -66,6 +66,7 @@ class TwoMass(_Rotary):
 
     NOMINAL: ClassVar[tuple[str, ...]] = ("motor_mass_kg", "table_mass_kg", "stiffness_n_m", "damping_ratio",
                                           "coulomb_torque_n_m", "viscous_torque_n_m_s_rad")
+    MASSES: ClassVar[tuple[str, ...]] = ("motor_mass_kg", "table_mass_kg")
     SPRINGS: ClassVar[tuple[str, ...]] = ("stiffness_n_m", "damping_ratio")
     model: Literal["two_mass"] = "two_mass"
     motor_mass_kg: Positive = Field(description="motor inertia as translation at the table [kg]")
@@ -82,6 +83,7 @@ class Rigid(_Rotary):
     """A motor and a screw stiff enough to be one mass with the table."""
 
     NOMINAL: ClassVar[tuple[str, ...]] = ("mass_kg", "coulomb_torque_n_m", "viscous_torque_n_m_s_rad")
+    MASSES: ClassVar[tuple[str, ...]] = ("mass_kg",)
     SPRINGS: ClassVar[tuple[str, ...]] = ()
     model: Literal["rigid"] = "rigid"
     mass_kg: Positive = Field(description="all moving mass and inertia at the table [kg]")
@@ -97,6 +99,7 @@ class SevenDofAxis(_Rotary):
     NOMINAL: ClassVar[tuple[str, ...]] = ("motor_inertia_kg_m2", "table_mass_kg", "nut_support_stiffness_n_m",
                                           "coupling_stiffness_n_m_rad", "damping_ratio",
                                           "coulomb_torque_n_m", "viscous_torque_n_m_s_rad")
+    MASSES: ClassVar[tuple[str, ...]] = ("motor_inertia_kg_m2", "table_mass_kg")
     SPRINGS: ClassVar[tuple[str, ...]] = ("nut_support_stiffness_n_m", "coupling_stiffness_n_m_rad", "damping_ratio")
     model: Literal["seven_dof"] = "seven_dof"
     lead_m: Lead = RECONSTRUCTED_TABLE_1.lead_m
@@ -122,6 +125,7 @@ class SerialChain(_Rotary):
 
     NOMINAL: ClassVar[tuple[str, ...]] = ("inertia_scale", "stiffness_scale", "damping_ratio", "coulomb_torque_n_m",
                                           "viscous_torque_n_m_s_rad")
+    MASSES: ClassVar[tuple[str, ...]] = ("inertia_scale",)
     SPRINGS: ClassVar[tuple[str, ...]] = ("stiffness_scale", "damping_ratio")
     model: Literal["serial_chain"] = "serial_chain"
     inertias_kg_m2: tuple[Positive, ...] = Field(min_length=2, description="from motor to table [kg m^2]")
@@ -149,6 +153,7 @@ class OneMass(_Model):
     """A linear axis: one mass, one encoder, newtons and metres."""
 
     NOMINAL: ClassVar[tuple[str, ...]] = ("mass_kg", "coulomb_force_n", "viscous_force_n_s_m")
+    MASSES: ClassVar[tuple[str, ...]] = ("mass_kg",)
     SPRINGS: ClassVar[tuple[str, ...]] = ()
     model: Literal["one_mass"] = "one_mass"
     mass_kg: Positive = Field(description="moving mass [kg]")

@@ -13,7 +13,7 @@ from hil.bench import Bench, MechanismEntry
 from hil.diagnosis.confidence import confidence
 from hil.diagnosis.explain import TIED, Explanation, Rival, noise_ratios
 from hil.diagnosis.fit import Fit
-from hil.diagnosis.model import Key, Term
+from hil.diagnosis.model import SAME, Key, Term, ambiguous
 from hil.diagnosis.proof import Ablation
 from hil.diagnosis.result import Correction, Finding, Value
 from hil.diagnosis.result import Rival as RivalText
@@ -23,9 +23,6 @@ from hil.twin.library import BY_ID
 from hil.twin.mechanism import Dimension
 
 FloatArray = NDArray[np.float64]
-
-# One set: Coulomb friction that differs by direction, alike at every speed, is its band shifted by a constant torque
-SAME = ("asymmetric_friction", "constant_load")
 
 # On development cases (seeds 931 and 941 of the proof's generator, 67 parameters) nine in ten errors are below 3.5
 # standard errors of the noise alone, 2.1 times 1.645: two honest simulations of one axis differ by that.
@@ -40,11 +37,6 @@ def renamed(found: Fit) -> Fit:
         return found
     terms = tuple(replace(term, effect=friction) if term.effect == load else term for term in found.model.terms)
     return replace(found, model=replace(found.model, terms=terms))
-
-
-def ambiguous(term: Term) -> bool:
-    """Whether the term is one of a set that no motion tells apart."""
-    return term.effect in SAME and term.variant == 0
 
 
 def findings(explanation: Explanation, final: Fit, ablations: Sequence[Ablation], train: Sequence[Measured],

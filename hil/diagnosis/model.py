@@ -37,8 +37,13 @@ TORQUE_ACCURACY, SEARCH_ACCURACY = 1.0, 0.2
 FASTEST_OBSERVER_TICKS, FASTEST_OBSERVER_S, SLOWEST_OBSERVER_S = 2.0, 0.002, 0.008
 # Differences by which the edges of a window are moved: first wide, then by a tick.
 EDGE_STEP_S, LAST_EDGE_STEP_S = 0.03, 0.001
+# A light nut chatters in its gap: contacts come and go with the least change, and only a wide difference sees past them
+# (Moré and Wild 2012: the step grows with the noise of a function). Of logarithms.
+CHATTER_STEP = 0.03
 # Periods, or orders, further apart than this factor are two causes.
 _APART = 1.1
+# One set: Coulomb friction that differs by direction, alike at every speed, is its band shifted by a constant torque.
+SAME = ("asymmetric_friction", "constant_load")
 # An owner who believes a mass or a stiffness is not wrong by more than this factor: beyond it lie the valleys in which
 # a wrong structure is mended with absurd parameters.
 TRUST = 3.0
@@ -63,6 +68,11 @@ class Term:
         return self.effect, self.variant, self.slot
 
 
+def ambiguous(one: Term) -> bool:
+    """Whether a mechanism is one of the set that no motion tells apart."""
+    return one.effect in SAME and one.variant == 0
+
+
 def repeats(one: Term | Active, other: Term | Active) -> bool:
     """Whether a mechanism is another over again: the same effect and, where it has one, the same period or order."""
     if one.effect != other.effect:
@@ -78,6 +88,11 @@ def compatible(found: Sequence[Term | Active]) -> bool:
     effects = [one.effect for one in found]
     return (all(effects.count(effect) <= BY_ID[effect].most for effect in effects)
             and not any(repeats(one, other) for one, other in combinations(found, 2)))
+
+
+def distinct(terms: Sequence[Term]) -> bool:
+    """Whether terms can act at once and some motion tells them apart."""
+    return compatible(terms) and sum(map(ambiguous, terms)) < 2
 
 
 @dataclass(frozen=True)
@@ -122,21 +137,22 @@ class Model:
     def coordinates(self) -> tuple[Coordinate, ...]:
         """Nominal parameters first, then those of each term."""
         axis = self.bench.axis
+        step = CHATTER_STEP if self._chatters else 1e-4
         found = []
         for name in axis.NOMINAL:
             value = float(getattr(axis, name))
             if name == "damping_ratio":
-                found.append(Coordinate(name, max(value, 0.01), True, 1e-4, 0.9, 1e-3))
+                found.append(Coordinate(name, max(value, 0.01), True, 1e-4, 0.9, max(step, 1e-3)))
                 continue
             scale = value if value > 0.0 else 1e-3
-            found.append(Coordinate(name, scale, True, scale / TRUST, scale * TRUST, 1e-4))
+            found.append(Coordinate(name, scale, True, scale / TRUST, scale * TRUST, step))
         for index, term in enumerate(self.terms):
             for parameter, start in zip(BY_ID[term.effect].parameters, term.values, strict=True):
                 found.append(self._coordinate(f"{index}.{parameter.name}", parameter, start))
         return tuple(found)
 
     def _coordinate(self, name: str, parameter: Parameter, start: float) -> Coordinate:
-        step = 1e-4
+        step = CHATTER_STEP if self._chatters else 1e-4
         if parameter.name == "period_m":
             step = 0.01 * start / (2.0 * np.pi * max(self.travel_m, start))
         elif parameter.name in ("start_s", "end_s"):
@@ -147,8 +163,14 @@ class Model:
             step = 0.01 / (start * max(turns, 1.0))
         if parameter.low > 0.0:
             return Coordinate(name, start, True, parameter.low, parameter.high, step)
-        linear_step = step if parameter.name in ("start_s", "end_s") else 1e-3
+        linear_step = step if parameter.name in ("start_s", "end_s") else max(step, 1e-3)
         return Coordinate(name, abs(start) or 1.0, False, parameter.low, parameter.high, linear_step)
+
+    @property
+    def _chatters(self) -> bool:
+        """Whether there is play, in which a nut may chatter."""
+        return any(BY_ID[effect].play for effect in (*(term.effect for term in self.terms),
+                                                     *(entry.effect for entry in self.bench.mechanisms)))
 
     @property
     def nominal_count(self) -> int:
@@ -236,11 +258,11 @@ class Model:
 
 def observer_time_s(runs: Sequence[Measured], bench: Bench) -> float:
     """Time constant at which the motor encoder's counts tell as much torque as the torque channel."""
-    wanted = max(np.sqrt(run.noise.motor * _inertia(bench) / (TORQUE_ACCURACY * run.noise.torque)) for run in runs)
+    wanted = max(np.sqrt(run.noise.motor * inertia(bench) / (TORQUE_ACCURACY * run.noise.torque)) for run in runs)
     return float(np.clip(wanted, FASTEST_OBSERVER_TICKS * runs[0].period_s, SLOWEST_OBSERVER_S))
 
 
-def _inertia(bench: Bench) -> float:
+def inertia(bench: Bench) -> float:
     """Inertia of the whole axis in motor units."""
     modes = bench.twin().modal
     return float(modes.shape[modes.motor, 0] ** -2)
@@ -254,7 +276,7 @@ def scales(run: Measured, bench: Bench, observer_s: float,
     observer's time constant: the motor counts from the torque that the torque channel can still see. White noise e
     of its encoder comes back through the observer as (1 - z^-1)^2 / (1 - a z^-1)^2 e, a = 1 - T / tau.
     """
-    seen = torque_accuracy * run.noise.torque * observer_s**2 / _inertia(bench)
+    seen = torque_accuracy * run.noise.torque * observer_s**2 / inertia(bench)
     a = 1.0 - run.period_s / observer_s
     impulse = np.zeros(round(20.0 * observer_s / run.period_s) + 3)
     impulse[0] = 1.0

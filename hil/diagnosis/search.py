@@ -20,9 +20,12 @@ from hil.diagnosis.model import (
     LAST_EDGE_STEP_S,
     SEARCH_ACCURACY,
     TORQUE_ACCURACY,
+    TRUST,
     Model,
     Term,
     compatible,
+    distinct,
+    inertia,
     observer_time_s,
     repeats,
 )
@@ -79,7 +82,7 @@ def _offered(start: Start, model: Model, terms: Sequence[Term]) -> bool:
     """Whether there is room for a start beside the terms; what it says again of the bench's mechanisms gives way."""
     new = Term(start.effect, start.variant, start.values)
     known = [entry.active() for entry in model.kept]
-    return compatible((*terms, new, *(other for other in known if not repeats(new, other))))
+    return distinct((*terms, new)) and compatible((*terms, new, *(other for other in known if not repeats(new, other))))
 
 
 def race(base: Fit, found: Sequence[Lead], runs: Sequence[Measured]) -> list[Fit]:
@@ -157,7 +160,7 @@ def race(base: Fit, found: Sequence[Lead], runs: Sequence[Measured]) -> list[Fit
     best: dict[str, Fit] = {}
     for result in results:
         effect = result.model.terms[-1].effect
-        if not compatible(result.model.resolved(result.x)[1]):
+        if not distinct(result.model.resolved(result.x)[1]):
             continue
         if effect not in best or result.cost < best[effect].cost:
             best[effect] = result
@@ -165,19 +168,30 @@ def race(base: Fit, found: Sequence[Lead], runs: Sequence[Measured]) -> list[Fit
 
 
 def _believed(base: Fit) -> list[FloatArray]:
-    """The vector of a base with the owner's values, of all nominal parameters, and of those of the springs alone.
+    """The vector of a base with the owner's values, of all nominal parameters, and of those that a rigid body hides.
 
-    The base may have bent its values to make up for what it lacks. What lies between motor and table bends those of the
-    springs, and leaves mass and friction as right as they are.
+    The base may have bent its values to make up for what it lacks. What lies between motor and table bends the springs
+    and the shares of the masses, and leaves friction and their sum as right as they are.
     """
-    names = [coordinate.name for coordinate in base.model.coordinates[:base.model.nominal_count]]
-    initial = base.model.initial()
+    bench, count = base.model.bench, base.model.nominal_count
+    owner = np.concatenate([base.model.initial()[:count], base.x[count:]])
+    if not bench.axis.SPRINGS:
+        return [owner]
+    axis, coordinates = bench.axis, base.model.coordinates
 
-    def with_owners(taken: Sequence[str]) -> FloatArray:
-        mine = np.array([name in taken for name in names] + [False] * (base.x.size - len(names)))
-        return np.where(mine, initial, base.x)
+    def heavier(factor: float) -> Bench:
+        return bench.model_copy(update={"axis": axis.model_copy(update={
+            name: factor * getattr(axis, name) for name in axis.MASSES})})
 
-    return [with_owners(taken) for taken in (names, base.model.bench.axis.SPRINGS) if taken]
+    light, heavy, wanted = inertia(bench), inertia(heavier(2.0)), inertia(base.model.resolved(base.x)[0])
+    factor = max(1.0 + (wanted - light) / (heavy - light), 1.0 / TRUST)
+    hidden = base.x.copy()
+    for index, coordinate in enumerate(coordinates[:count]):
+        if coordinate.name in axis.MASSES:
+            hidden[index] = coordinate.x(factor * getattr(axis, coordinate.name))
+        elif coordinate.name in axis.SPRINGS:
+            hidden[index] = owner[index]
+    return [owner, hidden]
 
 
 def _edges_moved(found: Fit, runs: Sequence[Measured]) -> Fit:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from hil.bench import Bench
 from hil.diagnosis import disturbance as estimate
+from hil.diagnosis.model import inertia
 from hil.measured import Measured
 from hil.twin.library import BY_ID, LIBRARY
 
@@ -63,9 +64,7 @@ def scene(runs: Sequence[Measured], bench: Bench, blocks: Sequence[dict[str, Flo
     """
     physics = bench.axis.physics()
     ratio = bench.axis.ratio_m_rad
-    modes = bench.twin().modal
-    inertia = float(modes.shape[modes.motor, 0] ** -2)     # of the rigid body
-    found = [estimate.disturbance(run, block["motor"], inertia, observer_s)
+    found = [estimate.disturbance(run, block["motor"], inertia(bench), observer_s)
              for run, block in zip(runs, blocks, strict=True)]
     stretch = most_stretch = 0.0
     if runs[0].table_m.size:

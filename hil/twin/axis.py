@@ -152,8 +152,9 @@ class Twin:
         constants[layout.OBSERVER] = self.observer_s
         constants[layout.FINE_STEPS] = self._steps(self.fine_step_s)
         constants[layout.SLOW_VELOCITY] = SLOW_RAD_S / physics.angle_per_unit
-        constants[layout.PLAY] = float(
-            any(BY_ID[active.effect].play and active.variant == 1 for active in self.active))
+        second = [BY_ID[active.effect] for active in self.active if active.variant == 1]
+        constants[layout.PLAY] = float(any(mechanism.play for mechanism in second))
+        constants[layout.SLIPS] = float(any(mechanism.slips for mechanism in second))
         modes = self._modes
         motor, table = modes[layout.SHAPE_MOTOR], modes[layout.SHAPE_TABLE]
         for at, first in ((layout.COARSE_GAINS, layout.COARSE), (layout.FINE_GAINS, layout.FINE)):

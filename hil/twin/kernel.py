@@ -20,7 +20,7 @@ _coulomb, _friction_scale, _drag = stages.coulomb, stages.friction_scale, stages
 _bias, _bristle, _table_share = stages.bias, stages.bristle, stages.table_share
 _transmission, _screw, _table_force = stages.transmission, stages.screw, stages.table_force
 _motor_reading, _table_reading = stages.motor_reading, stages.table_reading
-_contact, _bristle_contact = contact.rigid, contact.elastic
+_contact, _bristle_contact, _slipping_contact = contact.rigid, contact.elastic, contact.slipping
 # A motor slower than this sticks: what is left of its speed is rounding, which no step size may hang on.
 RESTING = 1e-9
 # `_nrt=False` below leaves out the counting of references to arrays, `forceinline` the handing over of arrays:
@@ -162,7 +162,11 @@ def _build_advance(digest: str) -> Any:
                                 0.5 * (speed + free - gain * met), at.table_position_m, at.ratio_m,
                                 at.viscous_speed)
             rest = 1.0 - share
-            if stiffness > 0.0:
+            if stiffness > 0.0 and constants[layout.SLIPS] > 0.0:
+                friction = _slipping_contact(
+                    free, gain, rest * bound, rest * viscous, shift, opposing, stiffness,
+                    own[layout.SLIP_ELEMENTS:], h)
+            elif stiffness > 0.0:
                 friction, own[layout.BRISTLE_DEFLECTION] = _bristle_contact(
                     free, gain, rest * bound, rest * viscous, shift, opposing, stiffness,
                     own[layout.BRISTLE_DEFLECTION], h)

@@ -130,6 +130,7 @@ class Mechanism:
     contribution: Callable[..., Any]
     variants: tuple[str, ...] = ("",)   # ways it may show: each is weighed in its own right
     play: bool = False                  # in the second variant the flanks of the transmission push only
+    slips: bool = False                 # in the second variant the contact is of Maxwell slip elements
     second_stage: Stage | None = None   # where the second variant enters, if elsewhere
     most: int = 1                       # times that it may act at once, with periods or orders of their own
     second_sentence: str = ""           # of the second variant, if it says something else; may name viscous_speed too

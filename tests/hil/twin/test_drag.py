@@ -42,7 +42,8 @@ def test_the_force_that_holds_the_speed_at_which_the_strength_is_told(active, fo
         assert speeds(found)[-1] == pytest.approx(sign * SPEED_M_S, rel=1e-4)
 
 
-@pytest.mark.parametrize("contact", [(), (Active("presliding_hysteresis", (4e6,)),)], ids=["rigid", "elastic"])
+@pytest.mark.parametrize("contact", [(), (Active("presliding_hysteresis", (4e6,)),),
+                                     (Active("presliding_hysteresis", (4e6,), 1),)], ids=["rigid", "elastic", "slips"])
 @pytest.mark.parametrize("active", [thinning(5e5), Active("nonlinear_viscous_friction", (1e8,))],
                          ids=["thinning", "quadratic"])
 def test_drag_stops_a_coasting_axis_and_never_turns_it_round(active, contact) -> None:

@@ -42,8 +42,8 @@ LIBRARY: tuple[Mechanism, ...] = (
     torque_dead_zone.MECHANISM,
     torque_saturation.MECHANISM,
     current_loop_lag.MECHANISM,
+    torque_constant_saturation.MECHANISM,    # K(angle, current) is the product: the ripple does not saturate it
     torque_ripple.MECHANISM,
-    torque_constant_saturation.MECHANISM,
     cogging_torque.MECHANISM,
     constant_load.MECHANISM,
     asymmetric_friction.MECHANISM,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import MutableSequence, Sequence
 
 from numba import njit
@@ -13,7 +14,12 @@ from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, S
 def _saturating_torque_constant(
     value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]
 ) -> float:
-    return value * max(1.0 - parameters[0] * value * value, 0.0)
+    falling = parameters[0]
+    if falling <= 0.0:
+        return value
+    most = 1.0 / math.sqrt(3.0 * falling)      # more current gives no more torque from here on
+    held = min(max(value, -most), most)
+    return held * (1.0 - falling * held * held)
 
 
 MECHANISM = Mechanism(
@@ -21,7 +27,7 @@ MECHANISM = Mechanism(
     block=Block.DRIVE,
     element="motor iron",
     sentence="The torque constant falls with current: T = u (1 - c u^2), c = {coefficient_1_n2_m2}.",
-    equation="T = u max(1 - c u^2, 0)",
+    equation="T = u (1 - c u^2) up to where that is greatest, |u| = 1 / sqrt(3 c), and no more beyond",
     source="Krishnan, Permanent Magnet Synchronous and Brushless DC Motor Drives (2010), magnetic saturation",
     parameters=(Parameter("coefficient_1_n2_m2", Dimension.INVERSE_TORQUE_SQUARED, 0.0, 1.0),),
     stage=Stage.TORQUE,

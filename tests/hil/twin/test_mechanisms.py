@@ -87,7 +87,9 @@ def test_torque_constant_falls_with_the_square_of_the_current(value, coefficient
     torque = call("torque_constant_saturation", value, coefficient_1_n2_m2=coefficient)
     assert torque == -call("torque_constant_saturation", -value, coefficient_1_n2_m2=coefficient)
     assert torque * value >= 0.0   # never turns round
-    assume(coefficient * value**2 < 1.0)
+    more = call("torque_constant_saturation", 1.1 * value, coefficient_1_n2_m2=coefficient)
+    assert abs(more) >= abs(torque) * (1.0 - 1e-12)    # more current never gives less
+    assume(3.0 * coefficient * value**2 < 1.0)
     assert value - torque == pytest.approx(coefficient * value**3, abs=1e-12)
 
 

@@ -76,6 +76,9 @@ def slipping(free, gain, bound, viscous, shift, opposing, stiffness, elements, s
     sign = 1.0 if free - gain * (pull + shift) > 0.0 else -1.0
     if sign * (free - gain * (pull + shift + opposing)) <= 0.0:
         return free / gain
+    if sign * pull >= (1.0 - 1e-12) * bound:      # all slip already, and go on
+        steady = pull + shift + opposing
+        return steady + viscous * (free - gain * steady) / (1.0 + gain * viscous)
     steady, held, velocity = pull, stiffness, 0.0
     for _ in range(ELEMENTS + 1):
         before = held

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hil.diagnosis.fit import Fit
-from hil.diagnosis.model import Term, scales
+from hil.diagnosis.model import scales
+from hil.diagnosis.terms import Term
 from hil.measured import Measured
 
 FloatArray = NDArray[np.float64]

@@ -21,7 +21,8 @@ from hil.diagnosis.candidates import candidates, reach
 from hil.diagnosis.explain import ALIKE, TIED, Explanation
 from hil.diagnosis.findings import rivals_of
 from hil.diagnosis.fit import Fit, fit, in_parallel, jacobian, splits
-from hil.diagnosis.model import SAME, FloatArray, Model, ambiguous, distinct
+from hil.diagnosis.model import FloatArray, Model
+from hil.diagnosis.terms import SAME, ambiguous, distinct
 from hil.diagnosis.testable import not_testable
 from hil.diagnosis.wording import number, title
 from hil.measured import Measured

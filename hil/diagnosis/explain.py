@@ -19,8 +19,9 @@ from hil.diagnosis import search
 from hil.diagnosis.evidence import against, whitening
 from hil.diagnosis.fit import Fit, evaluate, fit, in_parallel
 from hil.diagnosis.floor import REPEATS, all_laps, unrepeated
-from hil.diagnosis.model import LAST_EDGE_STEP_S, Key, Term, scales
+from hil.diagnosis.model import LAST_EDGE_STEP_S, scales
 from hil.diagnosis.screen import Lead
+from hil.diagnosis.terms import Key, Term
 from hil.measured import Measured
 
 FloatArray = NDArray[np.float64]

@@ -13,10 +13,10 @@ from hil.bench import Bench, MechanismEntry
 from hil.diagnosis.confidence import confidence
 from hil.diagnosis.explain import TIED, Explanation, Rival, noise_ratios
 from hil.diagnosis.fit import Fit
-from hil.diagnosis.model import SAME, Key, Term, ambiguous
 from hil.diagnosis.proof import Ablation
 from hil.diagnosis.result import Correction, Finding, Value
 from hil.diagnosis.result import Rival as RivalText
+from hil.diagnosis.terms import SAME, Key, Term, ambiguous
 from hil.diagnosis.wording import NOMINAL_UNITS, number, sentence, title
 from hil.measured import Measured
 from hil.twin.library import BY_ID

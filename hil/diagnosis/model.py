@@ -11,13 +11,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from hil.bench import Bench, MechanismEntry
+from hil.diagnosis.terms import Term, repeats
 from hil.differences import differences
 from hil.measured import Measured
 from hil.twin.axis import Active, Response, Twin
@@ -25,7 +25,6 @@ from hil.twin.library import BY_ID
 from hil.twin.mechanism import Parameter
 
 FloatArray = NDArray[np.float64]
-Key = tuple[str, int, int]
 
 # Torque that the motor channel is trusted to tell, over the noise of the torque channel. A fine encoder tells much
 # less, but details that no owner asks for lie there too: how friction meets zero speed, the side force of a lead error.
@@ -40,59 +39,10 @@ EDGE_STEP_S, LAST_EDGE_STEP_S = 0.03, 0.001
 # A light nut chatters in its gap: contacts come and go with the least change, and only a wide difference sees past them
 # (Moré and Wild 2012: the step grows with the noise of a function). Of logarithms.
 CHATTER_STEP = 0.03
-# Periods, or orders, further apart than this factor are two causes.
-_APART = 1.1
-# One set: Coulomb friction that differs by direction, alike at every speed, is its band shifted by a constant torque.
-SAME = ("asymmetric_friction", "constant_load")
 # An owner who believes a mass or a stiffness is not wrong by more than this factor: beyond it lie the valleys in which
 # a wrong structure is mended with absurd parameters.
 TRUST = 3.0
 _LOST = 1e6      # residuals beyond say no more than that the hypothesis is lost
-
-
-@dataclass(frozen=True)
-class Term:
-    """A mechanism in a hypothesis, with the values it starts from; those left out at the end are the defaults."""
-
-    effect: str
-    variant: int
-    values: tuple[float, ...]
-    slot: int = 0       # which of those of its effect
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "values", BY_ID[self.effect].complete(self.values))
-
-    @property
-    def key(self) -> Key:
-        """Effect, variant and slot: its own among the terms of a hypothesis."""
-        return self.effect, self.variant, self.slot
-
-
-def ambiguous(one: Term) -> bool:
-    """Whether a mechanism is one of the set that no motion tells apart."""
-    return one.effect in SAME and one.variant == 0
-
-
-def repeats(one: Term | Active, other: Term | Active) -> bool:
-    """Whether a mechanism is another over again: the same effect and, where it has one, the same period or order."""
-    if one.effect != other.effect:
-        return False
-    for name, value, other_value in zip(BY_ID[one.effect].names, one.values, other.values, strict=True):
-        if name in ("period_m", "cycles_per_rev"):
-            return max(value, other_value) < _APART * min(value, other_value)
-    return True
-
-
-def compatible(found: Sequence[Term | Active]) -> bool:
-    """Whether mechanisms can act at once: each as often as it may, and none over again."""
-    effects = [one.effect for one in found]
-    return (all(effects.count(effect) <= BY_ID[effect].most for effect in effects)
-            and not any(repeats(one, other) for one, other in combinations(found, 2)))
-
-
-def distinct(terms: Sequence[Term]) -> bool:
-    """Whether terms can act at once and some motion tells them apart."""
-    return compatible(terms) and sum(map(ambiguous, terms)) < 2
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from hil.bench import Bench
 from hil.diagnosis.energy import Energy
-from hil.diagnosis.model import Term
+from hil.diagnosis.terms import Term
 from hil.twin.library import BY_ID
 
 FloatArray = NDArray[np.float64]

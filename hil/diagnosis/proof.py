@@ -17,7 +17,7 @@ from hil.diagnosis.evidence import against
 from hil.diagnosis.explain import TIED, noise_ratios
 from hil.diagnosis.fit import Fit, evaluate, fit, in_parallel
 from hil.diagnosis.floor import REPEATS, all_laps, unrepeated
-from hil.diagnosis.model import Term
+from hil.diagnosis.terms import Term
 from hil.measured import Measured
 
 

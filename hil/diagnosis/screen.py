@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from hil.diagnosis.evidence import whitened, whitening
 from hil.diagnosis.fit import POOL, Fit
-from hil.diagnosis.model import Term
 from hil.diagnosis.starts import Start
+from hil.diagnosis.terms import Term
 from hil.measured import Measured
 from hil.twin.library import BY_ID
 

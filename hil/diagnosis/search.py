@@ -22,15 +22,12 @@ from hil.diagnosis.model import (
     TORQUE_ACCURACY,
     TRUST,
     Model,
-    Term,
-    compatible,
-    distinct,
     inertia,
     observer_time_s,
-    repeats,
 )
 from hil.diagnosis.screen import Lead, screen
 from hil.diagnosis.starts import Start
+from hil.diagnosis.terms import Term, compatible, distinct, repeats
 from hil.measured import Measured
 from hil.twin.library import BY_ID
 

@@ -15,8 +15,8 @@ import numpy as np
 from hil.bench import Bench
 from hil.diagnosis.explain import MATERIAL, NEEDED
 from hil.diagnosis.fit import POOL, Fit
-from hil.diagnosis.model import Term
 from hil.diagnosis.starts import NEEDS_TABLE
+from hil.diagnosis.terms import Term
 from hil.measured import Measured
 from hil.twin.library import BY_ID, LIBRARY
 

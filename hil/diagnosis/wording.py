@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from hil.bench import Bench
-from hil.diagnosis.model import Term
+from hil.diagnosis.terms import Term
 from hil.twin.library import BY_ID
 from hil.twin.mechanism import Dimension
 

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from scipy.signal import welch
 
 from hil.diagnosis.diagnose import Diagnosis
-from hil.diagnosis.model import Term
+from hil.diagnosis.terms import Term
 from hil.report import look
 from hil.report.diagnose_curves import drive, friction, lost_motion
 from hil.report.diagnose_view import (

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from hil.diagnosis.diagnose import NEXT_EXPERIMENT, Diagnosis
-from hil.diagnosis.model import Term
 from hil.diagnosis.result import FitFigures, Location, Verdict
+from hil.diagnosis.terms import Term
 from hil.diagnosis.wording import label, number, title
 from hil.report import figures, plots
 from hil.report.compare_report import write_bench

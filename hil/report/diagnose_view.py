@@ -12,7 +12,7 @@ from hil.diagnosis.diagnose import Diagnosis
 from hil.diagnosis.disturbance import Disturbance, disturbance
 from hil.diagnosis.energy import without_terms
 from hil.diagnosis.fit import Fit
-from hil.diagnosis.model import Term
+from hil.diagnosis.terms import Term
 from hil.measured import Measured
 from hil.report import look
 from hil.report.look import FloatArray

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from hil.bench import Bench, load_bench
-from hil.diagnosis.model import Model, Term
+from hil.diagnosis.model import Model
+from hil.diagnosis.terms import Term
 from hil.profile import Profile
 from hil.recording import Recording
 from hil.trajectory import plan

@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from hil.diagnosis import search
 from hil.diagnosis.explain import MATERIAL
 from hil.diagnosis.fit import POOL, Fit, evaluate, fit
-from hil.diagnosis.model import Term
 from hil.diagnosis.screen import Lead
 from hil.diagnosis.starts import Start, starts
+from hil.diagnosis.terms import Term
 from hil.measured import Measured
 from hil.proof.peers.case import Answer, read_case
 

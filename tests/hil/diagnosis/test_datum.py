@@ -7,8 +7,9 @@ import pytest
 from diagnosis_runs import bench, changed, recorded
 
 from hil.compare import compare
-from hil.diagnosis.model import Model, Term
+from hil.diagnosis.model import Model
 from hil.diagnosis.preflight import prepare
+from hil.diagnosis.terms import Term
 
 OWNER = bench()
 PLAY = Term("backlash", 0, (20e-6,))

@@ -16,7 +16,8 @@ from hil.diagnosis.evidence import against
 from hil.diagnosis.experiment import Experiment, separating, showing
 from hil.diagnosis.explain import TIED, Explanation, Rival
 from hil.diagnosis.fit import Fit, fit
-from hil.diagnosis.model import Model, Term
+from hil.diagnosis.model import Model
+from hil.diagnosis.terms import Term
 from hil.diagnosis.testable import not_testable
 from hil.measured import Measured, take
 from hil.profile import Profile, load_profile

@@ -10,8 +10,9 @@ from hil.diagnosis import search
 from hil.diagnosis.explain import Explanation, Rival
 from hil.diagnosis.findings import diagnosed_bench, findings, renamed
 from hil.diagnosis.fit import Fit, fit
-from hil.diagnosis.model import Model, Term, compatible, repeats
+from hil.diagnosis.model import Model
 from hil.diagnosis.proof import prove
+from hil.diagnosis.terms import Term, compatible, distinct, repeats
 from hil.measured import Measured, take
 
 OWNER = bench()
@@ -53,6 +54,13 @@ def test_the_same_period_is_the_same_cause() -> None:
     assert not repeats(SIX, Term("torque_ripple", 0, (0.02, 6.0, 0.0)))
     assert compatible([SIX, FIFTEEN])
     assert not compatible([SIX, FIFTEEN, Term("cogging_torque", 0, (0.1, 30.0, 0.0))])
+
+
+def test_the_same_torque_is_not_named_twice() -> None:
+    load, friction = Term("constant_load", 0, (0.1,)), Term("asymmetric_friction", 0, (0.05,))
+    assert compatible([load, friction])      # of what a bench knows of its axis
+    assert not distinct([load, friction])
+    assert distinct([load, Term("asymmetric_friction", 1, (0.05,)), SIX])     # with speed it is another torque
 
 
 def test_a_mechanism_is_offered_again_at_another_order() -> None:

@@ -10,9 +10,10 @@ from hil.diagnosis.explain import Explanation, Rival
 from hil.diagnosis.findings import diagnosed_bench, findings, renamed, standard_errors
 from hil.diagnosis.fit import Fit, evaluate, fit
 from hil.diagnosis.judge import judge
-from hil.diagnosis.model import Model, Term
+from hil.diagnosis.model import Model
 from hil.diagnosis.proof import explained_share, prove
 from hil.diagnosis.result import Verdict
+from hil.diagnosis.terms import Term
 from hil.diagnosis.testable import not_testable
 from hil.measured import Measured, take
 

@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from hil.diagnosis.energy import Energy, energies
 from hil.diagnosis.fit import Fit, evaluate
 from hil.diagnosis.locate import _range, locate, phase_shares, windows
-from hil.diagnosis.model import Model, Term
+from hil.diagnosis.model import Model
 from hil.diagnosis.periods import Lock, lock
 from hil.diagnosis.phases import phases
 from hil.diagnosis.result import Location, PhaseKind
+from hil.diagnosis.terms import Term
 from hil.measured import Measured, take
 
 FloatArray = NDArray[np.float64]

@@ -10,9 +10,10 @@ from diagnosis_runs import bench, recorded
 from hil.diagnosis.diagnose import Diagnosis
 from hil.diagnosis.explain import Explanation
 from hil.diagnosis.fit import evaluate
-from hil.diagnosis.model import Model, Term
+from hil.diagnosis.model import Model
 from hil.diagnosis.proof import Proof
 from hil.diagnosis.result import Result, Unexplained, Verdict
+from hil.diagnosis.terms import Term
 from hil.diagnosis.testable import _typical
 from hil.measured import take
 from hil.report.diagnose_figures import convincing

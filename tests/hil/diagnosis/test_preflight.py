@@ -9,8 +9,8 @@ import pytest
 from diagnosis_runs import bench, changed, recorded
 
 from hil.bench import load_bench
-from hil.diagnosis.model import Term
 from hil.diagnosis.preflight import _factor_between, prepare, regress
+from hil.diagnosis.terms import Term
 from hil.errors import InputError
 from hil.recording import Recording
 

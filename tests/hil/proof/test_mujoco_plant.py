@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from drivers.sim.reality import record
-from hil.diagnosis.model import Model, Term, observer_time_s
+from hil.diagnosis.model import Model, observer_time_s
+from hil.diagnosis.terms import Term
 from hil.measured import take
 from hil.proof.drafts import stage
 from hil.proof.mujoco_model import EFFECTS

@@ -1,0 +1,65 @@
+"""Where the search begins: the owner's values beside those that the refit has bent, and play on a light nut."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from diagnosis_runs import recorded
+
+from hil.bench import load_bench
+from hil.diagnosis import search
+from hil.diagnosis.diagnose import diagnose
+from hil.diagnosis.fit import Fit
+from hil.diagnosis.model import CHATTER_STEP, Model, inertia
+from hil.diagnosis.terms import Term
+
+
+def bent(model: Model, **factors: float) -> Fit:
+    """A fit that has multiplied nominal values."""
+    x = model.initial()
+    for index, coordinate in enumerate(model.coordinates[:model.nominal_count]):
+        x[index] += np.log(factors.get(coordinate.name, 1.0))
+    return Fit(model, x, np.zeros(1), np.zeros((1, 0)), ())
+
+
+def test_springs_and_shares_of_the_masses_are_the_owners_and_the_rest_is_refitted() -> None:
+    owner = load_bench("reference_7dof")
+    term = Term("cogging_torque", 0, (0.1, 6.0, 0.2))
+    base = bent(Model(owner, (term,)), motor_inertia_kg_m2=2.0, table_mass_kg=0.5, nut_support_stiffness_n_m=0.4,
+                damping_ratio=5.0, coulomb_torque_n_m=1.2)
+    everything, hidden = search._believed(base)
+    refitted, terms = base.model.resolved(hidden)
+    assert base.model.resolved(everything)[0].axis == owner.axis
+    assert inertia(refitted) == pytest.approx(inertia(base.model.resolved(base.x)[0]))
+    axis = refitted.axis
+    assert axis.motor_inertia_kg_m2 / owner.axis.motor_inertia_kg_m2 == pytest.approx(
+        axis.table_mass_kg / owner.axis.table_mass_kg)
+    assert axis.nut_support_stiffness_n_m == pytest.approx(owner.axis.nut_support_stiffness_n_m)
+    assert axis.damping_ratio == pytest.approx(owner.axis.damping_ratio)
+    assert axis.coulomb_torque_n_m == pytest.approx(1.2 * owner.axis.coulomb_torque_n_m)
+    assert terms[0].values == pytest.approx(term.values)
+
+
+def test_without_springs_there_is_one_such_point() -> None:
+    assert len(search._believed(bent(Model(load_bench("emps_symmetric"), ())))) == 1
+
+
+def test_differences_are_wide_where_a_nut_may_chatter() -> None:
+    owner = load_bench("reference_7dof")
+    plain = {c.name: c.step for c in Model(owner, ()).coordinates}
+    loose = {c.name: c.step for c in Model(owner, (Term("backlash", 0, (4e-6,)),)).coordinates}
+    assert max(plain.values()) < CHATTER_STEP
+    assert all(loose[name] == CHATTER_STEP for name in plain)
+
+
+def test_play_on_a_light_nut_beside_wrong_springs() -> None:
+    """The nut of the 7-dof chain chatters in 5 um; the owner's spring is too stiff, the table too light."""
+    owner = load_bench("reference_7dof")
+    axis = owner.axis
+    true = {"nut_support_stiffness_n_m": 0.75 * axis.nut_support_stiffness_n_m,
+            "table_mass_kg": 1.2 * axis.table_mass_kg}
+    truth = owner.model_copy(update={"axis": axis.model_copy(update=true)})
+    play = Term("backlash", 1, (5e-6,))
+    found = diagnose([recorded(truth, play, times=2)], [recorded(truth, play, seed=2)], owner)
+    assert [one.effect for one in found.result.missing] == ["backlash"]
+    assert found.result.missing[0].parameters["gap_m"].value == pytest.approx(5e-6, rel=0.05)

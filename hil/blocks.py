@@ -77,8 +77,8 @@ def compare_blocks(measured: Measured, bench: Bench,
         f"deviation: what the twin's mechanics need less or more, up to {OBSERVER_RAD_S / (2.0 * np.pi):.0f} Hz"))
     if measured.table_m.size:
         ratio = bench.axis.ratio_m_rad
-        simulated = Response(motor, table, measured.torque_command, measured.torque)
-        datum = datum_m(measured.response, simulated, ratio, measured.judged)
+        held = Response(motor, table, measured.torque_command, measured.torque + correction)
+        datum = datum_m(measured.response, held, ratio, measured.judged)
         blocks.append(BlockDeviation(
             "transmission and table", "measured motor position (twin held on it)", "table less motor position", "m",
             measured.table_m - datum - ratio * measured.motor, table - ratio * motor, measured.noise.table_m))

@@ -22,7 +22,7 @@ from hil.diagnosis.explain import ALIKE, TIED, Explanation
 from hil.diagnosis.findings import rivals_of
 from hil.diagnosis.fit import Fit, fit, in_parallel, jacobian, splits
 from hil.diagnosis.model import FloatArray, Model
-from hil.diagnosis.terms import SAME, ambiguous, distinct
+from hil.diagnosis.terms import SAME, ambiguous, compatible
 from hil.diagnosis.testable import not_testable
 from hil.diagnosis.wording import number, title
 from hil.measured import Measured
@@ -169,7 +169,7 @@ def _group(explanation: Explanation, final: Fit, index: int, runs: Sequence[Meas
         if rival.tied:
             other = rival.fit.model.resolved(rival.fit.x)[1][-1]
             model = replace(final.model, terms=(*terms[:index], other, *terms[index + 1:]))
-            if not distinct(model.terms):
+            if not compatible(model.terms):
                 continue      # it was found later, as a cause of its own
             x = np.concatenate([final.x[:model.nominal_count], model.initial()[model.nominal_count:]])
             group.append(_hypothesis(other.effect, fit(model, runs, x, evaluations=12)))

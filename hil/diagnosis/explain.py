@@ -21,7 +21,7 @@ from hil.diagnosis.fit import Fit, evaluate, fit, in_parallel
 from hil.diagnosis.floor import REPEATS, all_laps, unrepeated
 from hil.diagnosis.model import LAST_EDGE_STEP_S, scales
 from hil.diagnosis.screen import Lead
-from hil.diagnosis.terms import Key, Term
+from hil.diagnosis.terms import FRICTION, Key, Term, ambiguous
 from hil.measured import Measured
 
 FloatArray = NDArray[np.float64]
@@ -95,6 +95,7 @@ def explain(bench: Bench, runs: Sequence[Measured], progress: Progress = lambda 
     owner = evaluate(base.model, runs)
     nominal, rivals, needed, first_leads = base, dict[Key, list[Rival]](), dict[Key, float](), list[Lead]()
     repeated = all_laps(runs)
+    tried = [_kinds(base)]
     while len(base.model.terms) < MOST_TERMS:
         progress(f"screening the library beside {len(base.model.terms)} terms")
         leads = [lead for lead in search.leads(base, runs) if claimable(lead.term, base.model.resolved(base.x)[0])]
@@ -121,10 +122,10 @@ def explain(bench: Bench, runs: Sequence[Measured], progress: Progress = lambda 
             (Rival(other, against(best, other, filters), (other.cost - best.cost) / rows)
              for other in found),
             key=lambda rival: rival.evidence)
-        before = base
         base, needed = _pruned(best, nominal, runs)
-        if len(base.model.terms) == len(before.model.terms) and before.cost - base.cost < MATERIAL * rows:
-            break       # what was added went again, or took the place of another
+        if _kinds(base) in tried:
+            break       # what was added went again
+        tried.append(_kinds(base))
         if len(base.model.terms) >= _IN_VAIN and excess(base) > MOST * excess(nominal):
             break
     final = fit(base.model, runs, base.x, evaluations=40)
@@ -161,8 +162,10 @@ def claimable(term: Term, bench: Bench) -> bool:
 
     Counting errs as a sawtooth, whose fundamental is 1/pi of a count: an error of the linear encoder up to there is
     how counting looks at one feed, and no more. Static friction below Coulomb friction is no Stribeck effect,
-    whatever it fits.
+    whatever it fits, and what differs by direction by more than Coulomb friction is none: it would drive the axis.
     """
+    if ambiguous(term) and term.effect == FRICTION:
+        return abs(term.values[0]) <= bench.axis.physics().coulomb_n_m
     if term.effect == "stribeck_friction":
         return term.values[0] > bench.axis.physics().coulomb_n_m
     if term.effect == "scale_interpolation_error" and bench.encoders.table is not None:
@@ -171,11 +174,16 @@ def claimable(term: Term, bench: Bench) -> bool:
     return True
 
 
+def _kinds(found: Fit) -> list[tuple[str, int]]:
+    """Effect and variant of each term, whatever their order."""
+    return sorted((term.effect, term.variant) for term in found.model.terms)
+
+
 def _simplest(tied: list[Fit]) -> Fit:
     """Of explanations that the evidence does not tell apart, the one with the fewest parameters. A constant torque
     and friction that differs by direction, alike at every speed, are the same on every motion: the second is named,
     most axes lie flat."""
-    return min(tied, key=lambda found: (found.x.size, _last(found).key[:2] != ("asymmetric_friction", 0)))
+    return min(tied, key=lambda found: (found.x.size, _last(found).key[:2] != (FRICTION, 0)))
 
 
 def _last(found: Fit) -> Term:

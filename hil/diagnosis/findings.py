@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from hil.bench import Bench, MechanismEntry
 from hil.diagnosis.confidence import confidence
-from hil.diagnosis.explain import TIED, Explanation, Rival, noise_ratios
+from hil.diagnosis.explain import TIED, Explanation, Rival, claimable, noise_ratios
 from hil.diagnosis.fit import Fit
 from hil.diagnosis.proof import Ablation
 from hil.diagnosis.result import Correction, Finding, Value
 from hil.diagnosis.result import Rival as RivalText
-from hil.diagnosis.terms import SAME, Key, Term, ambiguous
+from hil.diagnosis.terms import FRICTION, LOAD, SAME, Key, Term, ambiguous
 from hil.diagnosis.wording import NOMINAL_UNITS, number, sentence, title
 from hil.measured import Measured
 from hil.twin.library import BY_ID
@@ -31,12 +31,17 @@ _BLOCK_ROWS = 200    # longer than residuals remember: 0.2 s at 1 kHz
 
 
 def renamed(found: Fit) -> Fit:
-    """The fit with a constant load called asymmetric friction, which is the same torque and the commoner cause."""
-    load, friction = SAME[1], SAME[0]
-    if any(term.effect == friction for term in found.model.terms):
+    """The fit with a constant load called asymmetric friction, where it may be that and the bench knows of no load: the
+    same torque, and the commoner cause."""
+    bench, resolved = found.model.resolved(found.x)
+    if any(one.effect == FRICTION for one in resolved) or any(entry.effect == LOAD for entry in bench.mechanisms):
         return found
-    terms = tuple(replace(term, effect=friction) if term.effect == load else term for term in found.model.terms)
-    return replace(found, model=replace(found.model, terms=terms))
+
+    def called(term: Term, fitted: Term) -> Term:
+        rather = term.effect == LOAD and claimable(replace(fitted, effect=FRICTION), bench)
+        return replace(term, effect=FRICTION) if rather else term
+
+    return replace(found, model=replace(found.model, terms=tuple(map(called, found.model.terms, resolved))))
 
 
 def findings(explanation: Explanation, final: Fit, ablations: Sequence[Ablation], train: Sequence[Measured],
@@ -53,7 +58,7 @@ def findings(explanation: Explanation, final: Fit, ablations: Sequence[Ablation]
         rivals = rivals_of(explanation, term)
         tied = [rival.fit.model.terms[-1].effect for rival in rivals if rival.tied]
         if ambiguous(term):
-            tied.append(next(name for name in SAME if name != term.effect))
+            tied += [name for name in SAME if name != term.effect and claimable(replace(term, effect=name), bench)]
         margin = min((rival.evidence for rival in rivals if rival.fit.model.terms[-1].effect not in tied),
                      default=explanation.needed.get(_key(explanation, term), math.inf))
         result.append((ablation.train, Finding(
@@ -126,7 +131,7 @@ def _factor(ablation: Ablation) -> float:
 def _key(explanation: Explanation, term: Term) -> Key:
     """The key under which the search knows a term that was renamed."""
     known = set(explanation.rivals) | set(explanation.needed)
-    return term.key if term.key in known or term.effect not in SAME else replace(term, effect=SAME[1]).key
+    return term.key if term.key in known or term.effect not in SAME else replace(term, effect=LOAD).key
 
 
 def rivals_of(explanation: Explanation, term: Term) -> list[Rival]:

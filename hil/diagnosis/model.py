@@ -37,7 +37,7 @@ FASTEST_OBSERVER_TICKS, FASTEST_OBSERVER_S, SLOWEST_OBSERVER_S = 2.0, 0.002, 0.0
 # Differences by which the edges of a window are moved: first wide, then by a tick.
 EDGE_STEP_S, LAST_EDGE_STEP_S = 0.03, 0.001
 # A light nut chatters in its gap: contacts come and go with the least change, and only a wide difference sees past them
-# (Moré and Wild 2012: the step grows with the noise of a function). Of logarithms.
+# (Moré and Wild 2012: the step grows with the noise of a function). Relative.
 CHATTER_STEP = 0.03
 # An owner who believes a mass or a stiffness is not wrong by more than this factor: beyond it lie the valleys in which
 # a wrong structure is mended with absurd parameters.
@@ -113,8 +113,10 @@ class Model:
             step = 0.01 / (start * max(turns, 1.0))
         if parameter.low > 0.0:
             return Coordinate(name, start, True, parameter.low, parameter.high, step)
+        scale = abs(start) or 1.0
         linear_step = step if parameter.name in ("start_s", "end_s") else max(step, 1e-3)
-        return Coordinate(name, abs(start) or 1.0, False, parameter.low, parameter.high, linear_step)
+        return Coordinate(name, scale, False, parameter.low, parameter.high,
+                          min(linear_step, 0.1 * (parameter.high - parameter.low) / scale))
 
     @property
     def _chatters(self) -> bool:

@@ -117,7 +117,9 @@ def _pairs(start: Start) -> list[tuple[int, int]]:
 def _directions(start: Start) -> list[tuple[float, ...]]:
     """Values that span what the start may become: its strength, or sine and cosine of each harmonic."""
     if start.phase < 0:
-        return [start.values]
+        values = list(start.values)
+        values[start.strength] += start.known
+        return [tuple(values)]
     found = []
     for strength, phase in _pairs(start):
         for angle in (0.0, np.pi / 2.0):
@@ -144,5 +146,5 @@ def _scaled(start: Start, coefficients: FloatArray) -> tuple[float, ...]:
             wanted = max(wanted, smallest)
         elif abs(wanted) < smallest:
             wanted = smallest
-        values[strength] = min(max(wanted, parameter.low), parameter.high)
+        values[strength] = min(max(start.known + wanted, parameter.low), parameter.high)
     return tuple(values)

@@ -27,7 +27,7 @@ from hil.diagnosis.model import (
 )
 from hil.diagnosis.screen import Lead, screen
 from hil.diagnosis.starts import Start
-from hil.diagnosis.terms import Term, compatible, distinct, repeats
+from hil.diagnosis.terms import Term, compatible, repeats
 from hil.measured import Measured
 from hil.twin.library import BY_ID
 
@@ -60,7 +60,8 @@ def leads(base: Fit, runs: Sequence[Measured]) -> list[Lead]:
     fitted, terms = base.model.resolved(base.x)
     blocks = [base.model.blocks(base.x, run) for run in runs]
     scene = catalogue.scene(runs, fitted, blocks, base.model.observer_s)
-    points = [start for start in catalogue.starts(scene, base.model.bench) if _offered(start, base.model, terms)]
+    points = [_from_known(start, base.model) for start in catalogue.starts(scene, base.model.bench)
+              if _offered(start, base.model, terms)]
     best: dict[str, list[Lead]] = {}
     for lead in screen(base, runs, points):
         best.setdefault(lead.term.effect, []).append(lead)
@@ -79,7 +80,16 @@ def _offered(start: Start, model: Model, terms: Sequence[Term]) -> bool:
     """Whether there is room for a start beside the terms; what it says again of the bench's mechanisms gives way."""
     new = Term(start.effect, start.variant, start.values)
     known = [entry.active() for entry in model.kept]
-    return distinct((*terms, new)) and compatible((*terms, new, *(other for other in known if not repeats(new, other))))
+    return compatible((*terms, new, *(other for other in known if not repeats(new, other))))
+
+
+def _from_known(start: Start, model: Model) -> Start:
+    """The start, counted from the strength of that mechanism of the bench whose place it takes."""
+    new = Term(start.effect, start.variant, start.values)
+    taken = [entry.active() for entry in model.kept if repeats(new, entry.active())]
+    if start.phase >= 0 or start.strength < 0 or not taken or taken[0].variant != start.variant:
+        return start
+    return replace(start, known=taken[0].values[start.strength])
 
 
 def race(base: Fit, found: Sequence[Lead], runs: Sequence[Measured]) -> list[Fit]:
@@ -157,7 +167,7 @@ def race(base: Fit, found: Sequence[Lead], runs: Sequence[Measured]) -> list[Fit
     best: dict[str, Fit] = {}
     for result in results:
         effect = result.model.terms[-1].effect
-        if not distinct(result.model.resolved(result.x)[1]):
+        if not compatible(result.model.resolved(result.x)[1]):
             continue
         if effect not in best or result.cost < best[effect].cost:
             best[effect] = result

@@ -26,7 +26,8 @@ FloatArray = NDArray[np.float64]
 class Start:
     """Parameter values of one variant, and which of them are strength and phase (-1: no phase).
 
-    Further pairs of strength and phase follow the first for so many `harmonics`.
+    Further pairs of strength and phase follow the first for so many `harmonics`. Without a phase, the strength counts
+    from what is `known`.
     """
 
     effect: str
@@ -35,6 +36,7 @@ class Start:
     strength: int = 0
     phase: int = -1
     harmonics: int = 1
+    known: float = 0.0      # of the strength, what the bench has of it already
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,7 +14,7 @@ Key = tuple[str, int, int]
 # Periods, or orders, further apart than this factor are two causes.
 _APART = 1.1
 # One set: Coulomb friction that differs by direction, alike at every speed, is its band shifted by a constant torque.
-SAME = ("asymmetric_friction", "constant_load")
+SAME = FRICTION, LOAD = "asymmetric_friction", "constant_load"
 
 
 @dataclass(frozen=True)
@@ -35,15 +35,16 @@ class Term:
         return self.effect, self.variant, self.slot
 
 
-def ambiguous(one: Term) -> bool:
+def ambiguous(one: Term | Active) -> bool:
     """Whether a mechanism is one of the set that no motion tells apart."""
     return one.effect in SAME and one.variant == 0
 
 
 def repeats(one: Term | Active, other: Term | Active) -> bool:
-    """Whether a mechanism is another over again: the same effect and, where it has one, the same period or order."""
+    """Whether a mechanism is another over again: the same effect and, where it has one, the same period or order; or
+    the other of two that no motion tells apart."""
     if one.effect != other.effect:
-        return False
+        return ambiguous(one) and ambiguous(other)
     for name, value, other_value in zip(BY_ID[one.effect].names, one.values, other.values, strict=True):
         if name in ("period_m", "cycles_per_rev"):
             return max(value, other_value) < _APART * min(value, other_value)
@@ -55,8 +56,3 @@ def compatible(found: Sequence[Term | Active]) -> bool:
     effects = [one.effect for one in found]
     return (all(effects.count(effect) <= BY_ID[effect].most for effect in effects)
             and not any(repeats(one, other) for one, other in combinations(found, 2)))
-
-
-def distinct(terms: Sequence[Term]) -> bool:
-    """Whether terms can act at once and some motion tells them apart."""
-    return compatible(terms) and sum(map(ambiguous, terms)) < 2

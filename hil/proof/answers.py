@@ -1,7 +1,7 @@
 """What is right to answer about a concealed effect: its block, where it shows, and the parameters that can be compared.
 
-A form that the library has not (GMS or damped bristles, an atan or exponential Stribeck curve, a yielding base) keeps
-its name; compared are those parameters only that mean the same in both laws.
+A form that the library has not (damped bristles, an atan Stribeck curve), or not quite (GMS with other knees), keeps
+its name; compared are those parameters only that mean the same in both laws. An exponential Stribeck curve is left out.
 """
 
 from __future__ import annotations

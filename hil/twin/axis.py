@@ -30,8 +30,8 @@ FloatArray = NDArray[np.float64]
 # step, modes are exact.
 FINE_STEP_S = 20e-6
 COARSE_STEP_S = 200e-6
-# The step is fine while the motor turns slower than this [rad/s], or could reverse within two ticks.
-SLOW_RAD_S = 0.02
+# The step is fine while the motor moves slower than this, or could reverse within two ticks. Alike for a lead of 10 mm.
+SLOW_RAD_S, SLOW_M_S = 0.02, 32e-6
 
 _NOTHING = np.empty(0)
 _ANSWER = "torque"      # the recorded channel that is an answer of the axis only, and no input of any block
@@ -151,7 +151,7 @@ class Twin:
         constants[layout.COARSE_STEPS] = self._steps(self.coarse_step_s)
         constants[layout.OBSERVER] = self.observer_s
         constants[layout.FINE_STEPS] = self._steps(self.fine_step_s)
-        constants[layout.SLOW_VELOCITY] = SLOW_RAD_S / physics.angle_per_unit
+        constants[layout.SLOW_VELOCITY] = SLOW_M_S if physics.linear else SLOW_RAD_S
         second = [BY_ID[active.effect] for active in self.active if active.variant == 1]
         constants[layout.PLAY] = float(any(mechanism.play for mechanism in second))
         constants[layout.SLIPS] = float(any(mechanism.slips for mechanism in second))

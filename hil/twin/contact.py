@@ -19,8 +19,8 @@ from numba import njit
 COMPILE: Any = {"fastmath": {"reassoc", "nsz", "contract", "arcp"}, "error_model": "numpy"}
 
 # Maxwell slip (Iwan 1966; Al-Bender et al. 2005): springs in parallel, each of which slips at a force of its own. Their
-# shares of the stiffness and of the bound follow Dahl's curve F = Fc (1 - exp(-K x / Fc)) by chords between these
-# K x / Fc.
+# shares of the stiffness and of the bound follow Dahl's curve F = Fc (1 - exp(-x / x0)) by chords between these x / x0,
+# of which the first one's slope is the stiffness K: K x0 = 0.93 Fc.
 _CHORDS = np.array([0.0, 0.15, 0.35, 0.6, 0.95, 1.4, 2.0, 2.8, 4.0])
 _SLOPES = np.diff(np.append(1.0 - np.exp(-_CHORDS[:-1]), 1.0)) / np.diff(_CHORDS)
 ELEMENTS = _SLOPES.size

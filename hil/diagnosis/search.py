@@ -102,24 +102,20 @@ def race(base: Fit, found: Sequence[Lead], runs: Sequence[Measured]) -> list[Fit
     known = {tuple(x): jacobian(searched, x, searched.residuals(x, runs), runs) for x in (base.x, *_believed(base))}
 
     def near(lead: Lead) -> Fit:
-        """A first fit, with the derivatives of the base or at the owner's values; of the first leads also of the other
-        variants, which may do so little at first that they seem likelier."""
-        own = [term for term in (lead.term, *lead.others) if term.variant == lead.term.variant]
-        rest = [term for term in lead.others if term.variant != lead.term.variant]
-        begun = [likeliest(own, base.x)]
-        if lead in good[:_SPRINTERS]:
-            begun += [owners(own), *([likeliest(rest, base.x)] if rest else [])]
+        """A first fit, with the derivatives of the base or at the owner's values."""
+        begun = [likeliest(lead, base.x), *([owners(lead)] if lead in good[:_SPRINTERS] else [])]
         found = [fit(first.model, runs, first.x, soft=_SOFT, evaluations=_NEAR,
                      held=known[tuple(first.x[:base.x.size])]) for first in begun]
         return min(found, key=lambda result: soft_cost(result.residuals, _SOFT))
 
-    def owners(points: Sequence[Term]) -> Fit:
-        """The likeliest of some points at values of the owner."""
-        return min((likeliest(points, x) for x in _believed(base)), key=lambda found: soft_cost(found.residuals, _SOFT))
+    def owners(lead: Lead) -> Fit:
+        """The likeliest point of a lead at values of the owner."""
+        return min((likeliest(lead, x) for x in _believed(base)),
+                   key=lambda found: soft_cost(found.residuals, _SOFT))
 
-    def likeliest(points: Sequence[Term], x: FloatArray) -> Fit:
-        """The one of some points that leaves least beside what is known at `x`."""
-        models = [replace(searched, terms=(*base.model.terms, term)) for term in points]
+    def likeliest(lead: Lead, x: FloatArray) -> Fit:
+        """The point of a lead that leaves least beside what is known at `x`."""
+        models = [replace(searched, terms=(*base.model.terms, term)) for term in (lead.term, *lead.others)]
         begun = [evaluate(model, runs, np.concatenate([x, model.initial()[x.size:]])) for model in models]
         return min(begun, key=lambda found: soft_cost(found.residuals, _SOFT))
 
@@ -129,7 +125,7 @@ def race(base: Fit, found: Sequence[Lead], runs: Sequence[Measured]) -> list[Fit
     def afresh(found: Fit) -> Fit:
         """From the owner's values, with derivatives of its own."""
         lead = next(lead for lead in good if lead.term.effect == found.model.terms[-1].effect)
-        first = owners([term for term in (lead.term, *lead.others) if term.variant == found.model.terms[-1].variant])
+        first = owners(lead)
         again = fit(first.model, runs, first.x, soft=_SOFT, evaluations=_SPRINT)
         return finish(again) if gained(again) > 0.0 else again
 

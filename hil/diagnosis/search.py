@@ -99,7 +99,8 @@ def race(base: Fit, found: Sequence[Lead], runs: Sequence[Measured]) -> list[Fit
     it; how far exactly those are that lost is nobody's question.
     """
     searched = replace(base.model, torque_accuracy=SEARCH_ACCURACY)
-    known = {tuple(x): jacobian(searched, x, searched.residuals(x, runs), runs) for x in (base.x, *_believed(base))}
+    believed = _believed(base)
+    known = {tuple(x): jacobian(searched, x, searched.residuals(x, runs), runs) for x in (base.x, *believed)}
 
     def near(lead: Lead) -> Fit:
         """A first fit, with the derivatives of the base or at the owner's values."""
@@ -110,7 +111,7 @@ def race(base: Fit, found: Sequence[Lead], runs: Sequence[Measured]) -> list[Fit
 
     def owners(lead: Lead) -> Fit:
         """The likeliest point of a lead at values of the owner."""
-        return min((likeliest(lead, x) for x in _believed(base)),
+        return min((likeliest(lead, x) for x in believed),
                    key=lambda found: soft_cost(found.residuals, _SOFT))
 
     def likeliest(lead: Lead, x: FloatArray) -> Fit:

@@ -103,8 +103,16 @@ def race(base: Fit, found: Sequence[Lead], runs: Sequence[Measured]) -> list[Fit
     known = {tuple(x): jacobian(searched, x, searched.residuals(x, runs), runs) for x in (base.x, *believed)}
 
     def near(lead: Lead) -> Fit:
-        """A first fit, with the derivatives of the base or at the owner's values."""
-        begun = [likeliest(lead, base.x), *([owners(lead)] if lead in good[:_SPRINTERS] else [])]
+        """A first fit, with the derivatives of the base or at the owner's values.
+
+        Of the first leads the variant that the screen prefers starts too: another may do so little that it is likelier.
+        """
+        begun = [likeliest(lead, base.x)]
+        if lead in good[:_SPRINTERS]:
+            begun.append(owners(lead))
+            if begun[0].model.terms[-1].variant != lead.term.variant:
+                begun.append(likeliest(replace(lead, others=tuple(
+                    term for term in lead.others if term.variant == lead.term.variant)), base.x))
         found = [fit(first.model, runs, first.x, soft=_SOFT, evaluations=_NEAR,
                      held=known[tuple(first.x[:base.x.size])]) for first in begun]
         return min(found, key=lambda result: soft_cost(result.residuals, _SOFT))

@@ -1,6 +1,6 @@
 """The blind diagnosis of cases: a process of its own that is given the folder of recordings and nothing else.
 
-    python -m hil.proof.blind CASES ANSWERS [--jobs N]
+    python -m hil.proof.blind CASES ANSWERS [--jobs N] [--hours H]
 
 reads CASES/NAME/{train_*.parquet, holdout.parquet, bench.yaml} and writes ANSWERS/NAME/diagnosis.json, with the next
 experiment as a profile where one is proposed, or error.json where the diagnosis failed. Cases with an answer are
@@ -11,10 +11,13 @@ import contract holds that.
 from __future__ import annotations
 
 import os
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from itertools import islice
+from math import inf
 from multiprocessing import get_context
 from pathlib import Path
+from time import monotonic
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -30,8 +33,9 @@ DIAGNOSIS, ERROR = "diagnosis.json", "error.json"
 def diagnose_cases(cases: Annotated[Path, typer.Argument(help="Folder with a folder for each case")],
                    answers: Annotated[Path, typer.Argument(help="Folder for the answers")],
                    jobs: Annotated[int, typer.Option(min=1, help="Cases at once, each on its share of the cores")] = 1,
-                   ) -> None:
-    """Diagnose every case that has no answer yet; prints the name of each when it is done."""
+                   hours: Annotated[float, typer.Option(min=0.0, help="After which no case is begun")] = inf) -> None:
+    """Diagnose every case that has no answer yet, in order of their names; prints each name when it is done."""
+    end_s = monotonic() + 3600.0 * hours
     # each process spreads its work over its cores itself; threads of the linear algebra get into its way
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     todo = [place for place in sorted(cases.iterdir()) if not answered(answers / place.name)]
@@ -41,11 +45,16 @@ def diagnose_cases(cases: Annotated[Path, typer.Argument(help="Folder with a fol
         shares.put(share)
     try:
         with ProcessPoolExecutor(jobs, context, _keep_to, (shares,)) as pool:
-            running = {pool.submit(diagnose_case, place, answers / place.name): place.name for place in todo}
+            waiting, running = iter(todo), dict[Future[None], str]()
             try:
-                for done in as_completed(running):
-                    done.result()
-                    print(running[done], flush=True)
+                while True:
+                    for place in islice(waiting, jobs - len(running) if monotonic() < end_s else 0):
+                        running[pool.submit(diagnose_case, place, answers / place.name)] = place.name
+                    if not running:
+                        break
+                    for done in wait(running, return_when=FIRST_COMPLETED).done:
+                        done.result()
+                        print(running.pop(done), flush=True)
             except BaseException:     # stopped, or nobody listens any more: no case is begun
                 pool.shutdown(wait=False, cancel_futures=True)
                 raise

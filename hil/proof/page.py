@@ -49,7 +49,7 @@ def write_proof(scores: Scores, others: Mapping[str, Scores], folder: Path) -> N
     missed = [goal for goal in goals if goal.met is False]
     told = sum(goal.met is not None for goal in goals)
     heading, about = "Proof: concealed effects, diagnosed blind", (
-        f"{len(scores.cases)} cases, seed {seal['seed']}, sealed {seal['sealed_at']}")
+        f"{_of(len(scores.cases), seal['cases'])} cases, seed {seal['seed']}, sealed {seal['sealed_at']}")
     verdict = f"{told - len(missed)} of {told} goals reached." + (
         f" Not reached: {', '.join(goal.name for goal in missed)}." if missed else "")
     before = [goals_table(goals), *([others_table(scores, others)] if others else []), verdicts_table(scores)]
@@ -74,6 +74,10 @@ def write_proof(scores: Scores, others: Mapping[str, Scores], folder: Path) -> N
     write_text(folder / MARKDOWN, "\n\n".join(part for part in parts if part) + "\n")
     write_json(folder / SCORES, _scores_json(scores, goals, seal)
                | {"others": {name: [_goal_json(goal) for goal in other.goals] for name, other in others.items()}})
+
+
+def _of(scored: int, sealed: int) -> str:
+    return f"{scored}" if scored == sealed else f"The first {scored} of {sealed}"
 
 
 def _add(page: Page, table: Table) -> None:

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
+from math import inf
 from pathlib import Path
 
 from hil.errors import HilError, InputError
@@ -26,9 +27,12 @@ Tell = Callable[[str, float | None], None]       # what is going on, and the sha
 
 
 def prove(folder: Path, planned: Sequence[Planned], seed: int, jobs: int, say: Say, tell: Tell,
-          plant: str = "simulated", only: Sequence[str] = ()) -> Scores:
+          plant: str = "simulated", only: Sequence[str] = (), hours: float = inf) -> Scores:
     """Do what is still to be done of a proof in `folder`, on a plant of `plan.PLANTS`, and score it; `only` are the
     tiers that it was planned of, where not of all.
+
+    After `hours` no case is begun, and those that have an answer are scored: cases lie in mixed order, whatever time is
+    given, it is a fair sample.
 
     Raises InputError where `folder` holds another proof, HilError where what was sealed has changed or the blind
     process failed.
@@ -56,26 +60,31 @@ def prove(folder: Path, planned: Sequence[Planned], seed: int, jobs: int, say: S
     say(f"sealed: SHA-256 {about['truths_sha256']}, {about['cases']} cases, {about['sealed_at']}")
     names = [case.name for case in planned]
     diagnose_blind(folder / CASES, folder / ANSWERS, names, about["code_sha256"], jobs,
-                   lambda share: tell("diagnosing blind", share))
-    truths = unseal(folder)
+                   lambda share: tell("diagnosing blind", share), hours)
+    truths = {name: truth for name, truth in unseal(folder).items() if answered(folder / ANSWERS / name)}
+    if len(truths) < len(names):
+        say(f"{len(truths)} of {len(names)} cases have an answer and are scored; the same again goes on")
     tell("running proposed motions", 0.0)
     again = record_again(folder, folder / ANSWERS, truths, jobs,
                          lambda share: tell("running proposed motions", share))
     diagnose_blind(folder / AGAIN / CASES, folder / AGAIN / ANSWERS, again, about["code_sha256"], jobs,
                    lambda share: tell("diagnosing again", share))
     tell("scoring", None)
-    return score(truths, read_replies(folder / ANSWERS, names), read_replies(folder / AGAIN / ANSWERS, again))
+    return score(truths, read_replies(folder / ANSWERS, truths), read_replies(folder / AGAIN / ANSWERS, again))
 
 
 def score_others(folder: Path) -> dict[str, Scores]:
-    """Scores of other methods by name, whose answers lie in DIR/peers/METHOD/NAME/diagnosis.json."""
+    """Scores of other methods by name, of the cases whose answers lie in DIR/peers/METHOD/NAME."""
     truths = unseal(folder)
-    return {place.name: score(truths, read_replies(place, truths)) for place in sorted((folder / PEERS).glob("*/"))}
+    answers = {place.name: read_replies(place, truths) for place in sorted((folder / PEERS).glob("*/"))}
+    return {method: score({name: truths[name] for name in replies}, replies)
+            for method, replies in answers.items() if replies}
 
 
 def diagnose_blind(cases: Path, answers: Path, names: Sequence[str], code: str, jobs: int,
-                   told: Callable[[float], None]) -> None:
-    """Have all cases without an answer diagnosed by another process, by the code that was sealed."""
+                   told: Callable[[float], None], hours: float = inf) -> None:
+    """Have all cases without an answer diagnosed by another process, by the code that was sealed; none is begun after
+    `hours`."""
     done = sum(answered(answers / name) for name in names)
     if done == len(names):
         return
@@ -84,7 +93,7 @@ def diagnose_blind(cases: Path, answers: Path, names: Sequence[str], code: str, 
                          "answers of two would mix: give another --out")
     told(done / len(names))
     blind = [sys.executable, "-W", _UNCLEAN, "-m", "hil.proof.blind", str(cases.resolve()), str(answers.resolve()),
-             "--jobs", str(jobs)]
+             "--jobs", str(jobs), "--hours", str(hours)]
     with subprocess.Popen(blind, stdout=subprocess.PIPE, text=True, start_new_session=True) as process:
         try:
             for _ in process.stdout or ():

@@ -73,11 +73,14 @@ def score(truths: Mapping[str, Truth], replies: Mapping[str, Reply],
 
 
 def lead(scores: Scores, others: Mapping[str, Scores]) -> Goal:
-    """Points of the rate of singles named first by which a method is ahead of the best of the others."""
+    """Points of the rate of singles named first by which a method is ahead of the best of the others, on the cases
+    that this one answered."""
     rates = {name: rate(case.top for case in other.of_tier("single")).value for name, other in others.items()}
     best = max(rates, key=lambda name: rates[name] or 0.0, default="")
-    own, singles = rate(case.top for case in scores.of_tier("single")).value, scores.of_tier("single")
-    ahead = None if own is None or rates.get(best) is None else own - (rates[best] or 0.0)
+    theirs = {case.truth.name for case in others[best].of_tier("single")} if best else set()
+    singles = [case for case in scores.of_tier("single") if case.truth.name in theirs]
+    own = rate(case.top for case in singles).value
+    ahead = None if own is None or rates[best] is None else own - (rates[best] or 0.0)
     return Goal("ahead of the best other method", ahead, low=0.20, of=len(singles), detail=best)
 
 

@@ -52,7 +52,8 @@ def others_table(scores: Scores, others: Mapping[str, Scores]) -> Table:
         (goal.name, Number(_text(goal, goal.value)), *(Number(_text(goal, row[goal.name].value)) for row in rows))
         for goal in scores.goals if isinstance(goal.measured, Rate)
         and any(row[goal.name].value is not None for row in rows)],
-        "The same recordings, the same score. What a method does not say counts as wrong.")
+        "The same recordings, the same score. What a method does not say counts as wrong; each is scored on the cases "
+        "that it was given.")
 
 
 def verdicts_table(scores: Scores) -> Table:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from diagnosis_runs import bench, recorded
+from diagnosis_runs import bench, changed, recorded
 
-from hil.diagnosis.explain import Explanation, Rival
+from hil.diagnosis.explain import Explanation, Rival, noise_ratios
 from hil.diagnosis.findings import diagnosed_bench, findings, renamed, standard_errors
-from hil.diagnosis.fit import Fit, evaluate, fit
+from hil.diagnosis.fit import FLOOR, Fit, evaluate, fit
 from hil.diagnosis.judge import judge
 from hil.diagnosis.model import Model
 from hil.diagnosis.proof import explained_share, prove
@@ -35,6 +35,20 @@ def test_a_twin_at_the_noise_has_no_mismatch() -> None:
     found = runs()
     right = believed(found)
     assert judge(right, right, right, found, runs(seed=2)) is Verdict.NO_MISMATCH
+
+
+@pytest.mark.parametrize(("damping", "noise_rad"), [(0.03, 5e-5), (0.01, 2e-4), (0.005, 2e-4)])
+def test_noise_of_the_motor_encoder_rings_in_the_table_and_is_no_physics(damping: float, noise_rad: float) -> None:
+    truth = bench(damping_ratio=damping)
+    recording = recorded(truth)
+    noise = np.random.default_rng(3).normal(0.0, noise_rad, len(recording))
+    run = take(changed(recording, motor_position_rad=recording["motor_position_rad"] + noise), truth)
+    right = evaluate(Model(truth, observer_s=0.002), [run])
+    table = right.parts[1]
+    assert float(table @ table) > FLOOR * table.size            # what white noise of both encoders does not explain
+    assert noise_ratios(right, run)["table"] == pytest.approx(1.0, abs=0.1)
+    softer = evaluate(Model(bench(damping_ratio=damping, stiffness_n_m=4e7), observer_s=0.002), [run])
+    assert noise_ratios(softer, run)["table"] > 2.0 * FLOOR     # and physics is none of that noise
 
 
 def test_a_trifle_is_no_parameter_error() -> None:

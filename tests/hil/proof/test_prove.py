@@ -19,6 +19,7 @@ from hil.errors import HilError, InputError
 from hil.proof.blind import DIAGNOSIS, ERROR
 from hil.proof.conceal import TIERS
 from hil.proof.effects import LIBRARY
+from hil.proof.page import write_proof
 from hil.proof.plan import FULL, Planned, counts, plan
 from hil.proof.run import ANSWERS, diagnose_blind, prove, score_others
 from hil.proof.score import Scores
@@ -176,9 +177,25 @@ def test_answers_are_kept_and_scored(copy: Path) -> None:
     found = prove(copy, QUICK, 7, 1, told.append, quiet)
     assert told == [f"sealed: SHA-256 {data(copy / SEAL)['truths_sha256']}, 2 cases, {data(copy / SEAL)['sealed_at']}"]
     assert [case.right for case in found.cases] == [False, True]
+
+
+def test_another_method_is_scored_on_what_it_answered(copy: Path) -> None:
     (copy / "peers" / "silent").mkdir(parents=True)
-    assert {name: [case.reply.verdict for case in other.cases] for name, other in score_others(copy).items()} == {
-        "silent": ["no_answer", "no_answer"]}
+    (copy / "peers" / "begun" / "case_0001").mkdir(parents=True)
+    write_json(copy / "peers" / "begun" / "case_0001" / DIAGNOSIS, {"verdict": "no_mismatch", "missing": []})
+    assert {name: [(case.truth.name, case.right) for case in other.cases]
+            for name, other in score_others(copy).items()} == {"begun": [("case_0001", True)]}
+
+
+def test_when_time_is_up_what_is_answered_is_scored(copy: Path) -> None:
+    answer(copy, "case_0001")
+    told: list[str] = []
+    found = prove(copy, QUICK, 7, 1, told.append, quiet, hours=0.0)
+    assert [(case.truth.name, case.right) for case in found.cases] == [("case_0001", True)]
+    assert told[-1] == "1 of 2 cases have an answer and are scored; the same again goes on"
+    write_proof(found, {}, copy)
+    assert (copy / "proof.md").read_text().count("The first 1 of 2 cases, seed 7, sealed ") == 1
+    assert not (copy / ANSWERS / "case_0000").exists()
 
 
 def test_another_plan_other_code_and_another_folder_are_refused(copy: Path, tmp_path: Path) -> None:

@@ -297,7 +297,8 @@ def test_the_page_holds_scores_pictures_and_the_worst_cases(tmp_path: Path) -> N
     found = scores((truth("single", load), named), (truth("ladder", load), named), (truth("null"), false),
                    (truth("novel", concealed("novel_hammering")), {"verdict": "unexplained", "missing": []}))
     write_json(tmp_path / SEAL, {
-        "truths_sha256": "00ff", "seed": 3, "sealed_at": "then", "command": "hil prove --cases 4 --seed 3 --out DIR",
+        "truths_sha256": "00ff", "seed": 3, "cases": 4, "sealed_at": "then",
+        "command": "hil prove --cases 4 --seed 3 --out DIR",
         "git_commit": None, "git_changed": None, "versions": {"numpy": "2"}})
     write_proof(found, {"other": found}, tmp_path)
     pictures = ("power", "confusion", "calibration", "errors", "times")

@@ -4,7 +4,8 @@
 
 r: residuals of the hypothesis, J: their derivatives by its parameters, D: change of the residuals when a
 mechanism is switched on at a start, W: weights against wild instants. Because a is free, only what
-no parameter can explain counts (Rao's score test with nuisance parameters).
+no parameter can explain counts (Rao's score test with nuisance parameters). Where the mechanism acts instead of one
+that the bench knows, r and D are those without that one.
 """
 
 from __future__ import annotations
@@ -89,14 +90,17 @@ def screen(base: Fit, runs: Sequence[Measured], starts: Sequence[Start]) -> list
 
     def lead(start: Start) -> Lead:
         directions = [direction(start, values) for values in _directions(start)]
-        return max((scored(start, directions, view) for view in views), key=lambda found: found.share)
+        gone = direction(start, _scaled(start, np.zeros(2 * start.harmonics))) if start.instead else np.zeros(
+            base.residuals.size)
+        return max((scored(start, directions, gone, view) for view in views), key=lambda found: found.share)
 
-    def scored(start: Start, directions: list[FloatArray], view: _View) -> Lead:
+    def scored(start: Start, directions: list[FloatArray], gone: FloatArray, view: _View) -> Lead:
         energy = float(view.residual @ view.residual)
-        span = np.stack([view.of(change) for change in directions], axis=1)
-        products, target = span.T @ span, -(span.T @ view.residual)
+        without = view.residual + view.of(gone) if start.instead else view.residual
+        span = np.stack([view.of(change - gone) for change in directions], axis=1)
+        products, target = span.T @ span, -(span.T @ without)
         coefficients = np.asarray(np.linalg.pinv(products, hermitian=True) @ target, dtype=np.float64)
-        share = float(target @ coefficients) / energy
+        share = 1.0 - (float(without @ without) - float(target @ coefficients)) / energy
         if start.strength < 0:
             # a start that cannot be scaled also counts as it stands
             whole = float(2.0 * target[0] - products[0, 0]) / energy

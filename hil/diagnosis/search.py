@@ -84,11 +84,13 @@ def _offered(start: Start, model: Model, terms: Sequence[Term]) -> bool:
 
 
 def _from_known(start: Start, model: Model) -> Start:
-    """The start, counted from the strength of that mechanism of the bench whose place it takes."""
+    """The start, counted from the strength of that mechanism of the bench whose place it takes, where it can be."""
     new = Term(start.effect, start.variant, start.values)
     taken = [entry.active() for entry in model.kept if repeats(new, entry.active())]
-    if start.phase >= 0 or start.strength < 0 or not taken or taken[0].variant != start.variant:
+    if start.strength < 0 or not taken:
         return start
+    if start.phase >= 0 or taken[0].variant != start.variant:
+        return replace(start, instead=True)
     return replace(start, known=taken[0].values[start.strength])
 
 

@@ -27,7 +27,7 @@ class Start:
     """Parameter values of one variant, and which of them are strength and phase (-1: no phase).
 
     Further pairs of strength and phase follow the first for so many `harmonics`. Without a phase, the strength counts
-    from what is `known`.
+    from what is `known`. What acts `instead` of something that the bench knows takes that away whatever its strength.
     """
 
     effect: str
@@ -37,6 +37,7 @@ class Start:
     phase: int = -1
     harmonics: int = 1
     known: float = 0.0      # of the strength, what the bench has of it already
+    instead: bool = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""Weights: beside what the bench knows of them, and heavier than any friction."""
+"""Weights and friction beside what the bench knows of them, and weights heavier than any friction."""
 
 from __future__ import annotations
 
@@ -6,9 +6,11 @@ import pytest
 from diagnosis_runs import bench, recorded
 
 from hil.bench import Bench, MechanismEntry
+from hil.diagnosis import search
 from hil.diagnosis.diagnose import diagnose
 from hil.diagnosis.explain import claimable
 from hil.diagnosis.terms import Term
+from hil.measured import take
 
 OWNER = bench()
 COULOMB_N_M = OWNER.axis.physics().coulomb_n_m
@@ -28,6 +30,22 @@ def test_a_load_that_is_known_too_small_is_corrected_not_doubled(effect: str, pa
     (entry,) = found.bench.mechanisms
     assert entry.effect == effect
     assert entry.parameters[parameter] == pytest.approx(0.8, rel=0.01)
+
+
+def test_another_law_takes_the_place_of_what_is_known() -> None:
+    """Friction that differs the more the faster, where the owner knows of a difference that is alike at every speed."""
+    truth = Term("asymmetric_friction", 1, (0.15,))
+    owner = knowing("asymmetric_friction", "offset_torque_n_m", 0.2)
+    train = [recorded(OWNER, truth)]
+    lead = search.leads(search.nominal(owner, [take(train[0], owner)]), [take(train[0], owner)])[0]
+    assert (lead.term.effect, lead.term.variant) == ("asymmetric_friction", 1)
+    assert lead.share > 0.7
+    assert lead.term.values[0] == pytest.approx(0.15, rel=0.1)
+    found = diagnose(train, [recorded(OWNER, truth, seed=2)], owner)
+    assert [one.effect for one in found.result.missing] == ["asymmetric_friction"]
+    (entry,) = found.bench.mechanisms
+    assert (entry.effect, entry.variant) == ("asymmetric_friction", "with speed")
+    assert entry.parameters["offset_torque_n_m"] == pytest.approx(0.15, rel=0.02)
 
 
 def test_a_weight_above_coulomb_friction_is_no_friction() -> None:

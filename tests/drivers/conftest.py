@@ -1,6 +1,37 @@
-"""Hypothesis for the driver tests: the same examples every run, and no verdict by the speed of the machine."""
+"""Hypothesis for the driver tests, and the rig on every kind of bus.
 
+The same examples every run, and no verdict by the speed of the machine.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+from drive_rig import Rig, in_process
 from hypothesis import settings
+
+from drivers.bus import BusConfig, PumpedPort, PythonCanPort, open_bus
+from drivers.modelled import ModelledBus
 
 settings.register_profile("drivers", deadline=None, derandomize=True)
 settings.load_profile("drivers")
+
+
+@pytest.fixture(params=["in-process", "modelled", "virtual"])
+def make(request: pytest.FixtureRequest) -> Iterator[Callable[..., Rig]]:
+    ports: list[PythonCanPort] = []
+
+    def build(**options: Any) -> Rig:
+        if request.param == "in-process":
+            return in_process(**options)
+        if request.param == "modelled":
+            bus = ModelledBus(1_000_000)
+            return Rig(bus.port(), bus.port(), reply_s=0.0005, **options)
+        ports.extend(PythonCanPort(open_bus(BusConfig("virtual", "test_drive"))) for _ in range(2))
+        return Rig(PumpedPort(ports[-2], ports[-1]), ports[-1], **options)
+
+    yield build
+    for port in ports:
+        port.close()

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 from drivers.base import DriveGoal, DriveSample, ServoLike
 from drivers.bus import CanPort
 from drivers.canopen_drive import CanopenDrive, DriveSettings
 from drivers.canopen_encoder import CanopenEncoder, EncoderSettings
 from drivers.canopen_master import CanopenMaster
+from drivers.inprocess import InProcessBus
 from drivers.sim.drive_node import SimulatedDrive
 from drivers.sim.encoder_node import SimulatedEncoder
 
@@ -83,3 +85,9 @@ class Rig:
     @property
     def _csp(self) -> bool:
         return self.settings.mode == 8
+
+
+def in_process(**options: Any) -> Rig:
+    """A rig on a bus within the process."""
+    bus = InProcessBus()
+    return Rig(bus.port(), bus.port(), **options)

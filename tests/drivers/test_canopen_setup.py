@@ -1,0 +1,90 @@
+"""What set-up of a drive refuses, on the simulated drive and on canopen's own SDO server."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+
+import canopen
+import pytest
+from drive_rig import Rig, in_process
+
+from drivers.base import ConfigurationError, IdentityError, ResponseTimeout
+from drivers.bus import BusConfig, PythonCanPort, open_bus
+from drivers.canopen_drive import DriveSettings
+from drivers.canopen_setup import EDS_FOLDER, DeviceSetup, SetupNetwork
+from drivers.cia402 import DriveState, Mode
+
+
+def test_no_answer_names_node_and_object() -> None:
+    with pytest.raises(ResponseTimeout, match=r"node 7, object 0x1000:00 \(Device type\): no SDO answer"):
+        in_process(settings=DriveSettings(node_id=7)).set_up()
+
+
+def test_another_device_is_refused(make: Callable[..., Rig]) -> None:
+    rig = make(settings=DriveSettings(serial_number=4711))
+    with pytest.raises(IdentityError, match=r"another serial number than described; given: 0x1; allowed: 0x1267"):
+        rig.set_up()
+    assert rig.node.state is DriveState.SWITCH_ON_DISABLED
+
+
+def test_an_encoder_is_no_drive() -> None:
+    with pytest.raises(IdentityError, match=r"another device profile.*0x196.*0x192"):
+        in_process(settings=DriveSettings(node_id=6)).set_up()
+
+
+def test_a_mode_the_drive_refuses_is_reported() -> None:
+    rig = in_process(settings=DriveSettings(mode=Mode.CYCLIC_SYNC_VELOCITY))  # no loops inside this drive
+    with pytest.raises(ConfigurationError, match=r"0x6060:00 \(Modes of operation\): the device refuses.*0x06090030"):
+        rig.set_up()
+
+
+def test_a_period_that_cannot_be_expressed_is_refused() -> None:
+    with pytest.raises(ConfigurationError, match=r"period cannot be expressed; given: 0\.0011112 s"):
+        in_process(settings=DriveSettings(period_s=0.0011112)).set_up()
+
+
+# -- an independent SDO server ----------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def local_node() -> Iterator[tuple[SetupNetwork, canopen.LocalNode]]:
+    """canopen's LocalNode behind its own Notifier thread, our set-up in front of a virtual bus."""
+    network = canopen.Network()
+    network.NOTIFIER_CYCLE = 0.05
+    network.bus = open_bus(BusConfig("virtual", "test_local_node"))
+    node = network.create_node(5, str(EDS_FOLDER / "servo_drive.eds"))
+    network.connect()
+    port = PythonCanPort(open_bus(BusConfig("virtual", "test_local_node")))
+    yield SetupNetwork(port), node
+    network.disconnect()
+    port.close()
+    assert threading.active_count() == 1
+
+
+def test_set_up_against_canopens_server(local_node: tuple[SetupNetwork, canopen.LocalNode]) -> None:
+    network, node = local_node
+    with DeviceSetup(network, 5, EDS_FOLDER / "servo_drive.eds") as device:
+        device.check_identity(402)
+        device.set_interpolation_time(0.00025)
+        assert (node.sdo[0x60C2][1].raw, node.sdo[0x60C2][2].raw) in ((25, -5), (250, -6))
+        entries = (device.entry(0x6041), device.entry(0x6064), device.entry(0x6077))
+        device.map_pdo(0x1800, entries, 1, 0x185)
+        assert [node.sdo[0x1A00][k].raw for k in range(4)] == [3, 0x60410010, 0x60640020, 0x60770010]
+        assert node.sdo[0x1800][1].raw == 0x40000185
+        with pytest.raises(ConfigurationError, match=r"0x6041:00 \(Statusword\): the device refuses.*0x06010002"):
+            device.write(0x6041, 0, 1)
+        with pytest.raises(ConfigurationError, match="EDS does not know the object"):
+            device.read(0x5FFF)
+
+
+def test_a_setting_that_reads_back_differently_is_refused(
+    local_node: tuple[SetupNetwork, canopen.LocalNode],
+) -> None:
+    network, node = local_node
+    node.add_read_callback(lambda index, subindex, od: 25 if index == 0x1006 else None)
+    with (
+        DeviceSetup(network, 5, EDS_FOLDER / "servo_drive.eds") as device,
+        pytest.raises(ConfigurationError, match=r"0x1006:00 .*another value.*given: 20 \(0x14\).*keeps 25 \(0x19\)"),
+    ):
+        device.write(0x1006, 0, 20)

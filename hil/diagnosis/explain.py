@@ -156,7 +156,7 @@ def noise_ratios(found: Fit, run: Measured) -> dict[str, float]:
     blocks = found.model.blocks(found.x, run)
     ratios = {name: float(np.mean((blocks[name] / noise[name])[run.judged] ** 2)) for name in blocks}
     if ratios.get("table", 0.0) > 1.0:
-        ratios["table"] /= max(1.0 + _rung(found, run, blocks["table"]) / run.noise.table_m**2, 1.0)
+        ratios["table"] /= max(1.0, 1.0 + _rung(found, run, blocks["table"]) / run.noise.table_m**2)
     return ratios
 
 

@@ -25,7 +25,7 @@ def judge(owner: Fit, nominal: Fit, final: Fit, train: Sequence[Measured], held_
         far = max(ratio for run in (*train, *held_out) for ratio in noise_ratios(final, run).values()) > _FAR**2
         guessed = left > MOST or (left > _MUCH and far)
         return Verdict.MISSING_PHYSICS if final.at_floor or not guessed else Verdict.UNEXPLAINED
-    if any(ratio > FLOOR for run in train for ratio in noise_ratios(nominal, run).values()):
+    if not all(ratio <= FLOOR for run in train for ratio in noise_ratios(nominal, run).values()):
         return Verdict.UNEXPLAINED
     return Verdict.NO_MISMATCH if owner.at_floor or not refit_matters(owner, nominal) \
         else Verdict.PARAMETER_ERROR

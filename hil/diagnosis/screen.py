@@ -4,8 +4,8 @@
 
 r: residuals of the hypothesis, J: their derivatives by its parameters, D: change of the residuals when a
 mechanism is switched on at a start, W: weights against wild instants. Because a is free, only what
-no parameter can explain counts (Rao's score test with nuisance parameters). Where the mechanism acts instead of one
-that the bench knows, r and D are those without that one.
+no parameter can explain counts (Rao's score test with nuisance parameters). Where another law acts instead of one that
+the bench knows, and can be scaled, r and D are those without that one.
 """
 
 from __future__ import annotations
@@ -100,7 +100,8 @@ def screen(base: Fit, runs: Sequence[Measured], starts: Sequence[Start]) -> list
         span = np.stack([view.of(change - gone) for change in directions], axis=1)
         products, target = span.T @ span, -(span.T @ without)
         coefficients = np.asarray(np.linalg.pinv(products, hermitian=True) @ target, dtype=np.float64)
-        share = 1.0 - (float(without @ without) - float(target @ coefficients)) / energy
+        left = without + span @ coefficients
+        share = 1.0 - float(left @ left) / energy
         if start.strength < 0:
             # a start that cannot be scaled also counts as it stands
             whole = float(2.0 * target[0] - products[0, 0]) / energy

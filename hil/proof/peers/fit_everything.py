@@ -54,7 +54,7 @@ def _weak(lead: Lead, start: Start) -> Term:
     values = list(lead.term.values)
     if start.strength >= 0:
         for n in range(start.harmonics):
-            values[start.strength + 2 * n] *= lead.share
+            values[start.strength + 2 * n] *= max(lead.share, 0.01)
     return replace(lead.term, values=tuple(values))
 
 

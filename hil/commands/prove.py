@@ -28,8 +28,9 @@ def prove(
                                          "be installed (make peers)")] = Plant.SIMULATED,
     only: Annotated[list[str] | None, typer.Option("--only", help="A tier to draw from, as single or pair; may be "
                                                    "repeated; left out: all")] = None,
-    hours: Annotated[float | None, typer.Option(min=0.0, help="After which no case is begun and those answered are "
-                                                "scored; the same again goes on; left out: never")] = None,
+    hours: Annotated[float | None, typer.Option(min=0.0, help="Of diagnosing, after which no case is begun; the "
+                                                "first that are answered are scored, the same again goes on; left "
+                                                "out: no end")] = None,
     jobs: Annotated[int | None, typer.Option(min=1, help="Cases diagnosed at once; left out: one per core")] = None,
 ) -> None:
     """Conceal effects in simulated axes, seal what they are, diagnose the recordings blind, unseal and score."""
@@ -51,11 +52,14 @@ def prove(
     planned = plan(count, seed, plant, only or ())
     tiers = [tier for tier in PLANTS[plant] if tier in (only or ())]
     # ended by a service or kill: like ctrl-C, with all processes that were started
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
-    with progress() as tell:
-        scores = run(folder, planned, seed, jobs or os.cpu_count() or 1, out.print, tell, plant, tiers,
-                     inf if hours is None else hours)
-        tell("writing the report", None)
-        write_proof(scores, score_others(folder), folder)
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        with progress() as tell:
+            scores = run(folder, planned, seed, jobs or os.cpu_count() or 1, out.print, tell, plant, tiers,
+                         inf if hours is None else hours)
+            tell("writing the report", None)
+            write_proof(scores, score_others(folder, scores), folder)
+    finally:
+        signal.signal(signal.SIGTERM, before)
     table(HEADERS, [goal_row(goal) for goal in scores.goals])
     out.print(f"\nReport: {folder / 'report.html'}")

@@ -37,9 +37,14 @@ def record_again(folder: Path, answers: Path, truths: Mapping[str, Truth], jobs:
     todo = [name for name in names if not (folder / AGAIN / CASES / name).exists()]
     with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
         runs = [pool.submit(_record, folder, answers / name / NEXT_EXPERIMENT, truths[name]) for name in todo]
-        for done, run in enumerate(as_completed(runs), 1):
-            run.result()
-            told(done / len(todo))
+        try:
+            for done, run in enumerate(as_completed(runs), 1):
+                run.result()
+                told(done / len(todo))
+        except BaseException:
+            for run in runs:
+                run.cancel()
+            raise
     return names
 
 

@@ -56,7 +56,8 @@ def diagnose_cases(cases: Annotated[Path, typer.Argument(help="Folder with a fol
                         done.result()
                         print(running.pop(done), flush=True)
             except BaseException:     # stopped, or nobody listens any more: no case is begun
-                pool.shutdown(wait=False, cancel_futures=True)
+                for case in running:
+                    case.cancel()
                 raise
     except BrokenProcessPool:
         typer.echo("a process that diagnosed was ended from outside, perhaps for want of memory; run the same again "

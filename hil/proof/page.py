@@ -55,7 +55,7 @@ def write_proof(scores: Scores, others: Mapping[str, Scores], folder: Path) -> N
     before = [goals_table(goals), *([others_table(scores, others)] if others else []), verdicts_table(scores)]
     after = [effects_table(scores), *worst_tables(scores)]
 
-    page = Page(heading, about, verdict, not missed)
+    page = Page(heading, about, verdict, told > 0 and not missed)
     for table in before:
         _add(page, table)
     for name, draw, caption in _PICTURES:

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
+from itertools import takewhile
 from math import inf
 from pathlib import Path
 
@@ -31,8 +32,8 @@ def prove(folder: Path, planned: Sequence[Planned], seed: int, jobs: int, say: S
     """Do what is still to be done of a proof in `folder`, on a plant of `plan.PLANTS`, and score it; `only` are the
     tiers that it was planned of, where not of all.
 
-    After `hours` no case is begun, and those that have an answer are scored: cases lie in mixed order, whatever time is
-    given, it is a fair sample.
+    After `hours` of diagnosing no case is begun, and the first ones, up to one without an answer, are scored: cases lie
+    in mixed order, so that they are a fair sample, where all that were quick would not be.
 
     Raises InputError where `folder` holds another proof, HilError where what was sealed has changed or the blind
     process failed.
@@ -61,9 +62,10 @@ def prove(folder: Path, planned: Sequence[Planned], seed: int, jobs: int, say: S
     names = [case.name for case in planned]
     diagnose_blind(folder / CASES, folder / ANSWERS, names, about["code_sha256"], jobs,
                    lambda share: tell("diagnosing blind", share), hours)
-    truths = {name: truth for name, truth in unseal(folder).items() if answered(folder / ANSWERS / name)}
+    sealed = unseal(folder)
+    truths = {name: sealed[name] for name in takewhile(lambda name: answered(folder / ANSWERS / name), names)}
     if len(truths) < len(names):
-        say(f"{len(truths)} of {len(names)} cases have an answer and are scored; the same again goes on")
+        say(f"the first {len(truths)} of {len(names)} cases have an answer and are scored; the same again goes on")
     tell("running proposed motions", 0.0)
     again = record_again(folder, folder / ANSWERS, truths, jobs,
                          lambda share: tell("running proposed motions", share))
@@ -73,9 +75,9 @@ def prove(folder: Path, planned: Sequence[Planned], seed: int, jobs: int, say: S
     return score(truths, read_replies(folder / ANSWERS, truths), read_replies(folder / AGAIN / ANSWERS, again))
 
 
-def score_others(folder: Path) -> dict[str, Scores]:
-    """Scores of other methods by name, of the cases whose answers lie in DIR/peers/METHOD/NAME."""
-    truths = unseal(folder)
+def score_others(folder: Path, scores: Scores) -> dict[str, Scores]:
+    """Scores of other methods by name, of those cases of `scores` whose answers lie in DIR/peers/METHOD/NAME."""
+    truths = {case.truth.name: case.truth for case in scores.cases}
     answers = {place.name: read_replies(place, truths) for place in sorted((folder / PEERS).glob("*/"))}
     return {method: score({name: truths[name] for name in replies}, replies)
             for method, replies in answers.items() if replies}
@@ -86,7 +88,7 @@ def diagnose_blind(cases: Path, answers: Path, names: Sequence[str], code: str, 
     """Have all cases without an answer diagnosed by another process, by the code that was sealed; none is begun after
     `hours`."""
     done = sum(answered(answers / name) for name in names)
-    if done == len(names):
+    if done == len(names) or hours <= 0.0:
         return
     if code_sha256() != code:
         raise InputError(f"{cases.parent}: was sealed for a diagnosis by other code than this (SHA-256 {code}); "

@@ -73,14 +73,13 @@ def score(truths: Mapping[str, Truth], replies: Mapping[str, Reply],
 
 
 def lead(scores: Scores, others: Mapping[str, Scores]) -> Goal:
-    """Points of the rate of singles named first by which a method is ahead of the best of the others, on the cases
-    that this one answered."""
-    rates = {name: rate(case.top for case in other.of_tier("single")).value for name, other in others.items()}
-    best = max(rates, key=lambda name: rates[name] or 0.0, default="")
-    theirs = {case.truth.name for case in others[best].of_tier("single")} if best else set()
-    singles = [case for case in scores.of_tier("single") if case.truth.name in theirs]
-    own = rate(case.top for case in singles).value
-    ahead = None if own is None or rates[best] is None else own - (rates[best] or 0.0)
+    """Points of the rate of singles named first by which a method is ahead of the best of the others, of those that
+    answered all singles."""
+    singles = scores.of_tier("single")
+    hits = {name: sum(case.top for case in other.of_tier("single")) for name, other in others.items()
+            if {case.truth.name for case in other.of_tier("single")} == {case.truth.name for case in singles}}
+    best = max(hits, key=lambda name: hits[name], default="")
+    ahead = (sum(case.top for case in singles) - hits[best]) / len(singles) if best and singles else None
     return Goal("ahead of the best other method", ahead, low=0.20, of=len(singles), detail=best)
 
 

@@ -60,7 +60,8 @@ def draw_cases(folder: Path, planned: Sequence[Planned], seed: int, jobs: int, t
                 case_drawn.result()
                 told((len(planned) - len(todo) + done) / len(planned))
         except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
+            for case_drawn in drawn:
+                case_drawn.cancel()
             raise
 
 

@@ -46,14 +46,15 @@ def goal_row(goal: Goal) -> tuple[str, ...]:
 
 
 def others_table(scores: Scores, others: Mapping[str, Scores]) -> Table:
-    """Rates of other methods on the same cases, by the same score."""
+    """Rates of other methods by the same score, of so many of the cases."""
     rows = [{goal.name: goal for goal in other.goals} for other in others.values()]
-    return Table("Beside other methods", ("", "this diagnosis", *others), [
+    headers = [f"{name} ({len(found.cases)} cases)" for name, found in {"this diagnosis": scores, **others}.items()]
+    return Table("Beside other methods", ("", *headers), [
         (goal.name, Number(_text(goal, goal.value)), *(Number(_text(goal, row[goal.name].value)) for row in rows))
         for goal in scores.goals if isinstance(goal.measured, Rate)
         and any(row[goal.name].value is not None for row in rows)],
-        "The same recordings, the same score. What a method does not say counts as wrong; each is scored on the cases "
-        "that it was given.")
+        "The same recordings, the same score. What a method does not say counts as wrong; where it was not given all "
+        "cases, its rates are of those that it was given.")
 
 
 def verdicts_table(scores: Scores) -> Table:

@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import sys
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,7 @@ from hil.proof.effects import LIBRARY
 from hil.proof.page import write_proof
 from hil.proof.plan import FULL, Planned, counts, plan
 from hil.proof.run import ANSWERS, diagnose_blind, prove, score_others
-from hil.proof.score import Scores
+from hil.proof.score import Scores, score
 from hil.proof.seal import CASES, SEAL, SEALED, code_sha256, draw_cases, read_seal, seal, sha256, unseal
 from hil.report.output import write_json
 from hil.twin.library import BY_ID
@@ -183,19 +184,29 @@ def test_another_method_is_scored_on_what_it_answered(copy: Path) -> None:
     (copy / "peers" / "silent").mkdir(parents=True)
     (copy / "peers" / "begun" / "case_0001").mkdir(parents=True)
     write_json(copy / "peers" / "begun" / "case_0001" / DIAGNOSIS, {"verdict": "no_mismatch", "missing": []})
+    found = score(unseal(copy), {})
     assert {name: [(case.truth.name, case.right) for case in other.cases]
-            for name, other in score_others(copy).items()} == {"begun": [("case_0001", True)]}
+            for name, other in score_others(copy, found).items()} == {"begun": [("case_0001", True)]}
+    assert score_others(copy, replace(found, cases=found.cases[:1])) == {}
 
 
 def test_when_time_is_up_what_is_answered_is_scored(copy: Path) -> None:
-    answer(copy, "case_0001")
+    answer(copy, "case_0000")
     told: list[str] = []
     found = prove(copy, QUICK, 7, 1, told.append, quiet, hours=0.0)
-    assert [(case.truth.name, case.right) for case in found.cases] == [("case_0001", True)]
-    assert told[-1] == "1 of 2 cases have an answer and are scored; the same again goes on"
+    assert [(case.truth.name, case.right) for case in found.cases] == [("case_0000", False)]
+    assert told[-1] == "the first 1 of 2 cases have an answer and are scored; the same again goes on"
     write_proof(found, {}, copy)
     assert (copy / "proof.md").read_text().count("The first 1 of 2 cases, seed 7, sealed ") == 1
-    assert not (copy / ANSWERS / "case_0000").exists()
+    assert not (copy / ANSWERS / "case_0001").exists()
+
+
+def test_a_quick_case_behind_one_without_an_answer_is_not_scored(copy: Path) -> None:
+    answer(copy, "case_0001")
+    found = prove(copy, QUICK, 7, 1, quiet, quiet, hours=0.0)
+    assert found.cases == ()
+    write_proof(found, {}, copy)
+    assert "0 of 0 goals reached" in (copy / "proof.md").read_text()
 
 
 def test_another_plan_other_code_and_another_folder_are_refused(copy: Path, tmp_path: Path) -> None:

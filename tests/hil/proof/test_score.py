@@ -129,7 +129,7 @@ def test_another_method_is_scored_by_its_names_alone(tmp_path: Path) -> None:
         write_json(tmp_path / name / DIAGNOSIS, {"verdict": "missing_physics", "missing": [{"effect": effect}]})
     (tmp_path / "c").mkdir()
     write_json(tmp_path / "c" / ERROR, {"kind": "ValueError", "error": "singular"})
-    truths = {name: truth("single", concealed("backlash")) for name in "abcd"}
+    truths = {name: truth("single", concealed("backlash"), name=name) for name in "abcd"}
     replies = read_replies(tmp_path, truths)
     assert set(replies) == {"a", "b", "c"}
     assert (replies["c"].verdict, replies["c"].statement) == ("error", "ValueError: singular")
@@ -139,6 +139,9 @@ def test_another_method_is_scored_by_its_names_alone(tmp_path: Path) -> None:
                          for name in truths})  # fmt: skip
     ahead = lead(own, {"other": other, "blank": score(truths, {})})
     assert (ahead.value, ahead.detail, ahead.met) == (0.75, "other", True)
+    begun = score({"a": truths["a"]}, replies)
+    assert lead(own, {"other": other, "begun": begun}) == ahead         # which answered one case, rightly
+    assert lead(own, {"begun": begun}).met is None
 
 
 def test_an_answer_that_cannot_be_read_says_what_to_do(tmp_path: Path) -> None:

@@ -26,6 +26,7 @@ _SLOPES = np.diff(np.append(1.0 - np.exp(-_CHORDS[:-1]), 1.0)) / np.diff(_CHORDS
 ELEMENTS = _SLOPES.size
 STIFFNESS_SHARES = -np.diff(_SLOPES, append=0.0) / _SLOPES[0]
 YIELD_SHARES = -np.diff(_SLOPES, append=0.0) * _CHORDS[1:]
+_NEWTON, _SOLVED = 20, 1e-9     # steps at most, each some Fc / K nearer, and what may be missed of the velocity
 
 
 @njit(**COMPILE)
@@ -42,31 +43,51 @@ def rigid(free, gain, bound, viscous, shift, opposing):  # type: ignore[no-untyp
 
 
 @njit(**COMPILE)
-def elastic(free, gain, bound, viscous, shift, opposing, stiffness, deflection, step):  # type: ignore[no-untyped-def]
-    """Friction torque and new deflection of an elastic contact (Dahl 1968), implicit in velocity.
+def _late(gain, stiffness, step):  # type: ignore[no-untyped-def]
+    """Weight of the end of a step against its begin: one half, of second order, where the step resolves the swinging of
+    the motor in the contact; towards one, which damps it, where it does not."""
+    swung = (gain * stiffness * step) ** 2
+    return 0.5 + 0.5 * swung / (1.0 + swung)
 
-    dz/dt = v (1 - sign(v) K z / Fc),  F = K z + c v + shift + drag
+
+@njit(**COMPILE)
+def elastic(free, gain, bound, viscous, shift, opposing, stiffness, deflection, step, before):  # type: ignore[no-untyped-def]
+    """Friction torque over a step and deflection after it of an elastic contact (Dahl 1968), at velocity `before` it.
+
+    dF/dx = K (1 - sign(v) F / Fc), solved exactly along the travel x of the step, which goes by the velocity that is
+    sought: Newton's method.
     """
     pull = stiffness * deflection
     sign = 1.0 if free - gain * (pull + shift) > 0.0 else -1.0
     if sign * (free - gain * (pull + shift + opposing)) <= 0.0:
         return free / gain, deflection
-    yielding = 1.0 - sign * pull / bound if bound > 0.0 else 0.0
-    yielding = max(yielding, 0.0)
-    steady = pull + shift + opposing
-    velocity = (free - gain * steady) / (1.0 + gain * (stiffness * step * yielding + viscous))
-    after = deflection + step * velocity * yielding
-    limit = bound / stiffness
-    after = min(max(after, -limit), limit)
-    return stiffness * after + shift + opposing + viscous * velocity, after
+    if bound <= 0.0:
+        steady = shift + opposing
+        return steady + viscous * (free - gain * steady) / (1.0 + gain * viscous), 0.0
+    late = _late(gain, stiffness, step)
+    pull = min(max(pull, -bound), bound)
+    turned = -(1.0 - late) / late * before          # the velocity at which the travel is none
+    missed = free - gain * (pull + shift + opposing + viscous * turned) - turned
+    target = bound if missed > 0.0 else -bound
+    velocity, after = turned, pull
+    for _ in range(_NEWTON):
+        velocity += missed / (1.0 + gain * (viscous + late * late * step * stiffness * (1.0 - after / target)))
+        travel = step * ((1.0 - late) * before + late * velocity)
+        after = target + (pull - target) * np.exp(-stiffness * abs(travel) / bound)
+        force = (1.0 - late) * pull + late * after + shift + opposing
+        missed = free - gain * (force + viscous * velocity) - velocity
+        if abs(missed) <= _SOLVED * (abs(free) + gain * bound):
+            break
+    return force + viscous * velocity, after / stiffness
 
 
 @njit(**COMPILE)
-def slipping(free, gain, bound, viscous, shift, opposing, stiffness, elements, step):  # type: ignore[no-untyped-def]
-    """Friction torque of a contact of Maxwell slip elements, implicit in velocity; advances their torques (ELEMENTS,).
+def slipping(free, gain, bound, viscous, shift, opposing, stiffness, elements, step, before):  # type: ignore[no-untyped-def]
+    """Friction torque over a step of a contact of Maxwell slip elements, at velocity `before` it; advances their torques
+    (ELEMENTS,).
 
-    F = sum of f_i + c v + shift + drag,  f_i = f_i + k_i v h within +-y_i: linear in v piece by piece, hence solved by
-    Newton's method in at most one step for each element.
+    f_i = f_i + k_i x within +-y_i, x the travel of the step: linear in the velocity that is sought piece by piece, hence
+    solved by Newton's method in at most one step for each element.
     """
     pull = 0.0
     for i in range(ELEMENTS):
@@ -76,27 +97,28 @@ def slipping(free, gain, bound, viscous, shift, opposing, stiffness, elements, s
     sign = 1.0 if free - gain * (pull + shift) > 0.0 else -1.0
     if sign * (free - gain * (pull + shift + opposing)) <= 0.0:
         return free / gain
-    if sign * pull >= (1.0 - 1e-12) * bound:      # all slip already, and go on
+    if sign * pull >= (1.0 - 1e-12) * bound and sign * before >= 0.0:      # all slip already, and go on
         steady = pull + shift + opposing
         return steady + viscous * (free - gain * steady) / (1.0 + gain * viscous)
-    steady, held, velocity = pull, stiffness, 0.0
+    late = _late(gain, stiffness, step)
+    velocity = -(1.0 - late) / late * before
+    after, held = pull, stiffness
     for _ in range(ELEMENTS + 1):
-        before = held
-        missed = free - gain * (steady + shift + opposing + viscous * velocity) - velocity
-        velocity += missed / (1.0 + gain * (held * step + viscous))
-        steady = held = 0.0
+        held_before = held
+        force = (1.0 - late) * pull + late * after + shift + opposing
+        missed = free - gain * (force + viscous * velocity) - velocity
+        velocity += missed / (1.0 + gain * (viscous + late * late * step * held))
+        travel = step * ((1.0 - late) * before + late * velocity)
+        after = held = 0.0
         for i in range(ELEMENTS):
-            torque = elements[i] + STIFFNESS_SHARES[i] * stiffness * step * velocity
+            torque = elements[i] + STIFFNESS_SHARES[i] * stiffness * travel
             limit = YIELD_SHARES[i] * bound
             if abs(torque) < limit:
                 held += STIFFNESS_SHARES[i] * stiffness
-            steady += min(max(torque, -limit), limit)
-        if held == before:
+            after += min(max(torque, -limit), limit)
+        if held == held_before:
             break
-    pull = 0.0
     for i in range(ELEMENTS):
         limit = YIELD_SHARES[i] * bound
-        torque = elements[i] + STIFFNESS_SHARES[i] * stiffness * step * velocity
-        elements[i] = min(max(torque, -limit), limit)
-        pull += elements[i]
-    return pull + shift + opposing + viscous * velocity
+        elements[i] = min(max(elements[i] + STIFFNESS_SHARES[i] * stiffness * travel, -limit), limit)
+    return (1.0 - late) * pull + late * after + shift + opposing + viscous * velocity

@@ -165,11 +165,11 @@ def _build_advance(digest: str) -> Any:
             if stiffness > 0.0 and constants[layout.SLIPS] > 0.0:
                 friction = _slipping_contact(
                     free, gain, rest * bound, rest * viscous, shift, opposing, stiffness,
-                    own[layout.SLIP_ELEMENTS:], h)
+                    own[layout.SLIP_ELEMENTS:], h, speed)
             elif stiffness > 0.0:
                 friction, own[layout.BRISTLE_DEFLECTION] = _bristle_contact(
                     free, gain, rest * bound, rest * viscous, shift, opposing, stiffness,
-                    own[layout.BRISTLE_DEFLECTION], h)
+                    own[layout.BRISTLE_DEFLECTION], h, speed)
             else:
                 friction = _contact(free, gain, rest * bound, rest * viscous, shift, opposing)
             guide = 0.0

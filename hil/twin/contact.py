@@ -83,11 +83,11 @@ def elastic(free, gain, bound, viscous, shift, opposing, stiffness, deflection, 
 
 @njit(**COMPILE)
 def slipping(free, gain, bound, viscous, shift, opposing, stiffness, elements, step, before):  # type: ignore[no-untyped-def]
-    """Friction torque over a step of a contact of Maxwell slip elements, at velocity `before` it; advances their torques
-    (ELEMENTS,).
+    """Friction torque over a step of a contact of Maxwell slip elements, at velocity `before` it; advances their
+    torques (ELEMENTS,).
 
-    f_i = f_i + k_i x within +-y_i, x the travel of the step: linear in the velocity that is sought piece by piece, hence
-    solved by Newton's method in at most one step for each element.
+    f_i = f_i + k_i x within +-y_i, x the travel of the step: linear in the velocity that is sought piece by piece,
+    hence solved by Newton's method in at most one step for each element.
     """
     pull = 0.0
     for i in range(ELEMENTS):

@@ -133,7 +133,8 @@ def test_so_does_that_of_dahls_contact(free, gain, viscous, bound, stiffness, sh
     target = np.copysign(bound, travel)
     wanted = target + (pull - target) * np.exp(-stiffness * abs(travel) / bound)
     assert abs(stiffness * after) <= bound * (1.0 + 1e-12)
+    # what may be missed of the velocity, as torque of the contact
+    solved = 1e-6 * bound + 2.0 * contact._SOLVED * (abs(free) + gain * bound) * stiffness * STEP_S
     if torque != free / gain:
-        assert stiffness * after == pytest.approx(wanted, abs=1e-6 * bound)
-        assert torque == pytest.approx((1.0 - late) * pull + late * wanted + shift + viscous * velocity,
-                                       abs=1e-6)
+        assert stiffness * after == pytest.approx(wanted, abs=solved)
+        assert torque == pytest.approx((1.0 - late) * pull + late * wanted + shift + viscous * velocity, abs=solved)

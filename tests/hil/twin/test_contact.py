@@ -134,7 +134,8 @@ def test_so_does_that_of_dahls_contact(free, gain, viscous, bound, stiffness, sh
     wanted = target + (pull - target) * np.exp(-stiffness * abs(travel) / bound)
     assert abs(stiffness * after) <= bound * (1.0 + 1e-12)
     # what may be missed of the velocity, as torque of the contact
-    solved = 1e-6 * bound + 2.0 * contact._SOLVED * (abs(free) + gain * bound) * stiffness * STEP_S
+    missed = 2.0 * contact._SOLVED * (abs(free) + gain * bound)
+    solved = 1e-6 * bound + missed * (viscous + stiffness * STEP_S)
     if torque != free / gain:
         assert stiffness * after == pytest.approx(wanted, abs=solved)
         assert torque == pytest.approx((1.0 - late) * pull + late * wanted + shift + viscous * velocity, abs=solved)

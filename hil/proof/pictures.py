@@ -91,7 +91,7 @@ def calibration_figure(scores: Scores) -> Figure | None:
     style(axes, "share that is right")
     axes.set_xlim(-0.02, 1.08)
     axes.set_ylim(-0.06, 1.04)
-    axes.legend(loc="upper left")
+    axes.legend(loc="lower right")
     return figure
 
 

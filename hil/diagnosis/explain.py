@@ -44,6 +44,7 @@ WORTH = 0.02
 # Terms that together leave more than this of what is above the floor are a fit, not an explanation: more of the
 # mismatch is not understood than is. After so many of them the search ends.
 MOST, _IN_VAIN = 0.5, 3
+_ENDED = 40             # evaluations, within which a fit that began near its end gets there
 # The same law may be written in another form. What a term leaves below this share of the energy that it took from a
 # channel, a twentieth in rms, may be its own form, and no second mechanism.
 FORM = 0.0025
@@ -122,13 +123,15 @@ def explain(bench: Bench, runs: Sequence[Measured], progress: Progress = lambda 
             (Rival(other, against(best, other, filters), (other.cost - best.cost) / rows)
              for other in found),
             key=lambda rival: rival.evidence)
-        base, needed = _pruned(best, nominal, runs)
+        best, needed = _pruned(best, nominal, runs)
+        # to its end: what a fit that is on its way leaves looks like something else
+        base = fit(best.model, runs, best.x, evaluations=_ENDED, slopes=best.jacobian)
         if _kinds(base) in tried:
             break       # what was added went again
         tried.append(_kinds(base))
         if len(base.model.terms) >= _IN_VAIN and excess(base) > MOST * excess(nominal):
             break
-    final = fit(base.model, runs, base.x, evaluations=40)
+    final = fit(base.model, runs, base.x, evaluations=_ENDED)
     kept = {term.key for term in final.model.terms}
     return Explanation(owner, nominal, final, {key: value for key, value in rivals.items() if key in kept}, needed,
                        tuple(first_leads))

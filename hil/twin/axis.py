@@ -100,14 +100,19 @@ class Twin:
     observer_s: float = loops.OBSERVER_S
 
     @cached_property
-    def modal(self) -> Modal:
-        """Modes of the chain, with those mechanisms that change the chain."""
+    def chain(self) -> Chain:
+        """The chain of the axis, with those mechanisms that change it."""
         chain = self.physics.chain
         for active in self.active:
             mechanism = BY_ID[active.effect]
             if mechanism.stage is Stage.CHAIN:
                 chain = mechanism.contribution(chain, active.values, active.variant)
-        modes = modal(chain)
+        return chain
+
+    @cached_property
+    def modal(self) -> Modal:
+        """Modes of the chain."""
+        modes = modal(self.chain)
         return modes if self.modes is None else truncate(modes, self.modes)
 
     def _steps(self, longest_s: float) -> int:
@@ -128,7 +133,13 @@ class Twin:
         chain = self.physics.chain      # the coordinates that mechanisms add come after it, and stay
         for row, place in ((layout.TABLE_IMPULSE, chain.table), (layout.MOTOR_IMPULSE, chain.motor)):
             rows[row] = chain.inertia_kg_m2 @ chain.side(place) @ modes.shape[:len(chain.names)]
+        rows[layout.SHAPE_DAMPER] = -2.0 * modes.damping_ratio * modes.frequency_rad_s * self._table_side
         return rows
+
+    @cached_property
+    def _table_side(self) -> FloatArray:
+        """All behind the transmission moving as one, in modal coordinates (m,)."""
+        return np.asarray(self.chain.inertia_kg_m2 @ self.chain.side(self.chain.table) @ self.modal.shape)
 
     @cached_property
     def _constants(self) -> FloatArray:
@@ -144,10 +155,9 @@ class Twin:
         constants[layout.SCREW] = chain.screw_stiffness_n_m_rad
         constants[layout.SCREW_APART] = float(not np.array_equal(chain.screw, chain.transmission))
         elastic = (self.modal.frequency_rad_s > 0.0) & (self.modal.transmission != 0.0)
-        if elastic.any():
-            # what of the modal damping acts in the transmission: so much that no mode is driven where it is taken away
-            damping = 2.0 * self.modal.damping_ratio * self.modal.frequency_rad_s
-            constants[layout.DAMPER] = np.min(damping[elastic] / self.modal.transmission[elastic] ** 2)
+        # C s and s^T C s: what of the damping resists the two sides of the transmission moving apart as two bodies. In
+        # play it is gone; where a lead errs, it counts from where that puts the table. What is left drives no mode.
+        constants[layout.DAMPER] = -self._modes[layout.SHAPE_DAMPER] @ self._table_side
         constants[layout.COARSE_STEPS] = self._steps(self.coarse_step_s)
         constants[layout.OBSERVER] = self.observer_s
         constants[layout.FINE_STEPS] = self._steps(self.fine_step_s)

@@ -59,9 +59,9 @@ def _build_advance(digest: str) -> Any:
         assert digest
         n = delta.shape[1]
         own = memory[layout.OWN]
-        ratio, period = constants[layout.RATIO], constants[layout.PERIOD]
+        ratio, period, damper = constants[layout.RATIO], constants[layout.PERIOD], constants[layout.DAMPER]
         at_motor, at_table, at_spring = modes[layout.SHAPE_MOTOR], modes[layout.SHAPE_TABLE], modes[layout.SHAPE_SPRING]
-        at_screw = modes[layout.SHAPE_SCREW]
+        at_screw, at_damper = modes[layout.SHAPE_SCREW], modes[layout.SHAPE_DAMPER]
         positions, velocities = delta[0], delta[1]
         any_on = codes[layout.ON_ANY] > 0
         position = table = table_speed = stretch = stretch_rate = 0.0
@@ -97,20 +97,23 @@ def _build_advance(digest: str) -> Any:
             push = 0.0
             if codes[layout.ON_TABLE_FORCE]:
                 push = _table_force(0.0, at, values, codes, memory) * ratio
-            spring = screw = 0.0
+            spring = damped = screw = 0.0
             bent = effective = stretch + 0.5 * h * stretch_rate
             if codes[layout.ON_TRANSMISSION]:
                 effective = _transmission(bent, at, values, codes, memory)
                 extra = effective - bent
                 floating = effective == 0.0
-                rate = -stretch_rate if floating else (extra - own[layout.SPRING_EXTRA]) / h
+                apart = along(at_damper, velocities) / damper if damper > 0.0 else 0.0
+                rate = -apart if floating else (extra - own[layout.SPRING_EXTRA]) / h
                 own[layout.FLOATING] = 1.0 if floating else 0.0
                 own[layout.SPRING_EXTRA] = extra
-                spring = -(constants[layout.SPRING] * extra + constants[layout.DAMPER] * rate)
+                spring = -constants[layout.SPRING] * extra
+                damped = -rate
                 if constants[layout.PLAY] > 0.0 and not floating:
-                    pressing = constants[layout.SPRING] * effective + constants[layout.DAMPER] * (stretch_rate + rate)
+                    pressing = constants[layout.SPRING] * effective + damper * (apart + rate)
                     if pressing * effective < 0.0:      # flanks with play push, they do not pull
-                        spring += pressing
+                        spring += constants[layout.SPRING] * effective
+                        damped += apart + rate
             if codes[layout.ON_SCREW]:
                 if constants[layout.SCREW_APART] > 0.0:
                     effective = along(at_screw, positions) + 0.5 * h * along(at_screw, velocities)
@@ -119,7 +122,8 @@ def _build_advance(digest: str) -> Any:
             free = table_free = 0.0
             if any_on:
                 for i in range(n):
-                    g = at_motor[i] * drive + at_table[i] * push + at_spring[i] * spring + at_screw[i] * screw
+                    g = (at_motor[i] * drive + at_table[i] * push + at_spring[i] * spring + at_damper[i] * damped
+                         + at_screw[i] * screw)
                     d, v = positions[i], velocities[i]
                     positions[i] = from_position[i] * d + from_velocity[i] * v + from_torque[i] * g
                     moved = rate_position[i] * d + rate_velocity[i] * v + rate_torque[i] * g

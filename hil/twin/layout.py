@@ -9,8 +9,8 @@ from __future__ import annotations
 from hil.twin.library import SLOTS
 
 # Rows of `modes` (MODE_ROWS, n): exact discretisation for the coarse and the fine step, then shapes.
-COARSE, FINE, SHAPE_MOTOR, SHAPE_TABLE, SHAPE_SPRING, SHAPE_SCREW, TABLE_IMPULSE, MOTOR_IMPULSE, MODE_ROWS = (
-    0, 6, 12, 13, 14, 15, 16, 17, 18)
+(COARSE, FINE, SHAPE_MOTOR, SHAPE_TABLE, SHAPE_SPRING, SHAPE_SCREW, SHAPE_DAMPER, TABLE_IMPULSE, MOTOR_IMPULSE,
+ MODE_ROWS) = (0, 6, *range(12, 20))
 
 # Entries of `constants`.
 (PERIOD, RATIO, ANGLE_PER_UNIT, COULOMB, VISCOUS, SPRING, DAMPER, COARSE_STEPS, FINE_STEPS, SLOW_VELOCITY,

@@ -122,7 +122,7 @@ class Twin:
     @cached_property
     def _modes(self) -> FloatArray:
         modes = self.modal
-        rows = np.empty((layout.MODE_ROWS, modes.frequency_rad_s.size))
+        rows = np.empty((layout.COUPLING + modes.frequency_rad_s.size, modes.frequency_rad_s.size))
         period = self.gains.period_s
         rows[layout.COARSE:layout.COARSE + 6] = discretise(modes, period / self._steps(self.coarse_step_s))
         rows[layout.FINE:layout.FINE + 6] = discretise(modes, period / self._steps(self.fine_step_s))
@@ -133,7 +133,11 @@ class Twin:
         chain = self.physics.chain      # the coordinates that mechanisms add come after it, and stay
         for row, place in ((layout.TABLE_IMPULSE, chain.table), (layout.MOTOR_IMPULSE, chain.motor)):
             rows[row] = chain.inertia_kg_m2 @ chain.side(place) @ modes.shape[:len(chain.names)]
-        rows[layout.SHAPE_DAMPER] = -2.0 * modes.damping_ratio * modes.frequency_rad_s * self._table_side
+        own = np.diag(2.0 * modes.damping_ratio * modes.frequency_rad_s)
+        given = self.chain.damping_n_m_s_rad
+        damping = own if given is None else modes.shape.T @ given @ modes.shape
+        rows[layout.COUPLING:] = damping - own
+        rows[layout.SHAPE_DAMPER] = -damping @ self._table_side
         return rows
 
     @cached_property
@@ -178,6 +182,7 @@ class Twin:
     def _mechanisms(self) -> tuple[FloatArray, NDArray[np.int64]]:
         values = np.zeros((len(SLOTS), PARAMETERS))
         codes = np.zeros(layout.CODES, dtype=np.int64)
+        codes[layout.ON_COUPLING] = codes[layout.ON_ANY] = self.chain.damping_n_m_s_rad is not None
         free = dict(enumerate(SLOTS))
         for active in self.active:
             mechanism = BY_ID[active.effect]

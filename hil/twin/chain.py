@@ -34,7 +34,8 @@ class Chain:
     `damping_ratio` holds one modal damping ratio per mode, in ascending frequency, 0 for the rigid
     body. `transmission @ q` is the deflection of the transmission spring, motor side minus table
     side [rad]; zeros where the chain has none. `screw @ q` is the deflection of the screw between its bearing and
-    the nut; where that is no spring of its own, it is the transmission's.
+    the nut; where that is no spring of its own, it is the transmission's. `damping_n_m_s_rad` (n, n) is [C] where
+    the damping is not modal: the modes then share it, and `damping_ratio` is what each has of its own.
     """
 
     inertia_kg_m2: FloatArray
@@ -48,6 +49,7 @@ class Chain:
     transmission_stiffness_n_m_rad: float
     screw: FloatArray
     screw_stiffness_n_m_rad: float
+    damping_n_m_s_rad: FloatArray | None = None
 
     def side(self, place: int) -> FloatArray:
         """1 for each coordinate on the same side of the transmission as `place`, else 0; shape (n,)."""

@@ -124,6 +124,8 @@ def _build_advance(digest: str) -> Any:
                 for i in range(n):
                     g = (at_motor[i] * drive + at_table[i] * push + at_spring[i] * spring + at_damper[i] * damped
                          + at_screw[i] * screw)
+                    if codes[layout.ON_COUPLING]:
+                        g -= along(modes[layout.COUPLING + i], velocities)
                     d, v = positions[i], velocities[i]
                     positions[i] = from_position[i] * d + from_velocity[i] * v + from_torque[i] * g
                     moved = rate_position[i] * d + rate_velocity[i] * v + rate_torque[i] * g

@@ -1,6 +1,6 @@
 """Where what stands in the arrays that the compiled kernels share.
 
-`modes` (MODE_ROWS, n), `constants` (CONSTANTS,), `codes` (CODES,) and `memory` (slots + 1, WIDTH) are packed by
+`modes` (COUPLING + n, n), `constants` (CONSTANTS,), `codes` (CODES,) and `memory` (slots + 1, WIDTH) are packed by
 `hil.twin.axis`; beside them go `values` (slots, PARAMETERS), those of the mechanisms.
 """
 
@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from hil.twin.library import SLOTS
 
-# Rows of `modes` (MODE_ROWS, n): exact discretisation for the coarse and the fine step, then shapes.
+# Rows of `modes` (COUPLING + n, n): exact discretisation for the coarse and the fine step, shapes, then the damping
+# that modes share.
 (COARSE, FINE, SHAPE_MOTOR, SHAPE_TABLE, SHAPE_SPRING, SHAPE_SCREW, SHAPE_DAMPER, TABLE_IMPULSE, MOTOR_IMPULSE,
- MODE_ROWS) = (0, 6, *range(12, 20))
+ COUPLING) = (0, 6, *range(12, 20))
 
 # Entries of `constants`.
 (PERIOD, RATIO, ANGLE_PER_UNIT, COULOMB, VISCOUS, SPRING, DAMPER, COARSE_STEPS, FINE_STEPS, SLOW_VELOCITY,
@@ -19,8 +20,8 @@ from hil.twin.library import SLOTS
 
 # Entries of `codes`: variant + 1 of the mechanism in each slot (0: off), then whether each stage is entered.
 (ON_CURRENT, ON_TORQUE, ON_MOTOR_TORQUE, ON_COULOMB, ON_FRICTION_SCALE, ON_DRAG, ON_BIAS, ON_BRISTLE,
- ON_TABLE_SHARE, ON_TRANSMISSION, ON_SCREW, ON_TABLE_FORCE, ON_MOTOR_READING, ON_TABLE_READING, ON_ANY, CODES) = range(
-    len(SLOTS), len(SLOTS) + 16)
+ ON_TABLE_SHARE, ON_TRANSMISSION, ON_SCREW, ON_TABLE_FORCE, ON_MOTOR_READING, ON_TABLE_READING, ON_ANY, ON_COUPLING,
+ CODES) = range(len(SLOTS), len(SLOTS) + 17)
 
 # Rows of `memory` (slots + 1, WIDTH): each mechanism's own, then the kernel's.
 OWN = len(SLOTS)

@@ -7,10 +7,16 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hil.twin.chain import Chain
+from hil.twin.frequency import modal_damping
 from hil.twin.mechanism import Block, Dimension, Mechanism, Parameter, Stage
 from hil.twin.modal import modal
+
+FloatArray = NDArray[np.float64]
+
+_MOST = 0.99        # a modal damping ratio stays below 1
 
 
 def _with_structure(chain: Chain, parameters: Sequence[float], variant: int = 0) -> Chain:
@@ -18,14 +24,19 @@ def _with_structure(chain: Chain, parameters: Sequence[float], variant: int = 0)
     frequency_hz, damping_ratio, mass_ratio = parameters[:3]
     if mass_ratio <= 0.0:
         return chain
-    extended = (_on_the_table, _under_the_axis)[variant](chain, (2.0 * math.pi * frequency_hz) ** 2, mass_ratio)
-    # The new damping belongs to the elastic mode in which the added mass has most of its energy
+    omega = 2.0 * math.pi * frequency_hz
+    extended, spring = (_on_the_table, _under_the_axis)[variant](chain, omega**2, mass_ratio)
+    stiffness = extended.stiffness_n_m_rad[-1, -1]
+    damping = np.pad(modal_damping(chain, modal(chain)), (0, 1))
+    damping += 2.0 * damping_ratio / omega * stiffness * np.outer(spring, spring)
     modes = modal(extended)
-    energy = np.where(modes.frequency_rad_s > 0.0, modes.shape[len(chain.names)] ** 2, -1.0)
-    return replace(extended, damping_ratio=np.insert(chain.damping_ratio, int(energy.argmax()), damping_ratio))
+    elastic = np.where(modes.frequency_rad_s > 0.0, modes.frequency_rad_s, np.inf)
+    # each mode is damped by what its shape takes of the dampers (modal strain energy, Johnson and Kienholz 1982)
+    ratio = np.einsum("im,ij,jm->m", modes.shape, damping, modes.shape) / (2.0 * elastic)
+    return replace(extended, damping_ratio=np.minimum(ratio, _MOST), damping_n_m_s_rad=damping)
 
 
-def _on_the_table(chain: Chain, square: float, mass_ratio: float) -> Chain:
+def _on_the_table(chain: Chain, square: float, mass_ratio: float) -> tuple[Chain, FloatArray]:
     """A mass that sways on the table."""
     n, table = len(chain.names), chain.table
     inertia = mass_ratio * chain.inertia_kg_m2[table, table]
@@ -33,10 +44,10 @@ def _on_the_table(chain: Chain, square: float, mass_ratio: float) -> Chain:
     extended.inertia_kg_m2[n, n] = inertia
     extended.stiffness_n_m_rad[np.ix_((table, n), (table, n))] += inertia * square * np.array([[1.0, -1.0],
                                                                                               [-1.0, 1.0]])
-    return extended
+    return extended, np.eye(n + 1)[n] - np.eye(n + 1)[table]
 
 
-def _under_the_axis(chain: Chain, square: float, mass_ratio: float) -> Chain:
+def _under_the_axis(chain: Chain, square: float, mass_ratio: float) -> tuple[Chain, FloatArray]:
     """A machine base that yields, with the linear encoder on it: all that travels with the nut is seen from it, and
     has its motion as well."""
     n = len(chain.names)
@@ -46,7 +57,7 @@ def _under_the_axis(chain: Chain, square: float, mass_ratio: float) -> Chain:
     extended.inertia_kg_m2[:n, n] = extended.inertia_kg_m2[n, :n] = travelling
     extended.inertia_kg_m2[n, n] = table / mass_ratio + travelling.sum()
     extended.stiffness_n_m_rad[n, n] = (table / mass_ratio + table) * square
-    return extended
+    return extended, np.eye(n + 1)[n]
 
 
 def _longer(chain: Chain) -> Chain:

@@ -13,17 +13,18 @@ from hil.diagnosis.proof import explained_share
 from hil.diagnosis.result import Verdict
 from hil.measured import Measured
 
-# Names are not believed beside so much that has none: a twentieth of the energy above the floor, where that still
-# stands so many times above the noise of a channel. The same law in another form leaves less.
-_MUCH, _FAR = 0.05, 5.0
+# Names are not believed beside so much that has none: a twentieth of the energy above the floor and more, where that
+# share, times how far it stands above the noise of a channel, is more than a quarter: a twentieth at five times the
+# noise, a sixth at one and a half. The same law in another form leaves less.
+_MUCH, _FAR = 0.05, 0.25
 
 
 def judge(owner: Fit, nominal: Fit, final: Fit, train: Sequence[Measured], held_out: Sequence[Measured]) -> Verdict:
     """The verdict on the bench's own values, their refit, and the refit with the terms found."""
     if final.model.terms:
         left = 1.0 - explained_share(nominal, final, held_out or train)
-        far = max(ratio for run in (*train, *held_out) for ratio in noise_ratios(final, run).values()) > _FAR**2
-        guessed = left > MOST or (left > _MUCH and far)
+        above = max(ratio for run in (*train, *held_out) for ratio in noise_ratios(final, run).values()) ** 0.5
+        guessed = left > MOST or (left > _MUCH and left * above > _FAR)
         return Verdict.MISSING_PHYSICS if final.at_floor or not guessed else Verdict.UNEXPLAINED
     if not all(ratio <= FLOOR for run in train for ratio in noise_ratios(nominal, run).values()):
         return Verdict.UNEXPLAINED

@@ -30,6 +30,14 @@ def same_law(effect: str) -> tuple[str, ...]:
     return tuple(sorted(next((law for law in SAME_LAW if effect in law), {effect})))
 
 
+def inseparable(effect: str) -> frozenset[str]:
+    """Ids of the library that no motion tells apart from this one or beside it: what says the same, and a constant
+    torque beside a spring, whose rest it moves."""
+    own = frozenset(same_law(effect))
+    constant = next(law for law in SAME_LAW if "constant_load" in law)
+    return own | constant if effect == "spring_load" else own | {"spring_load"} if own & constant else own
+
+
 def block(effect: str) -> str:
     """Block of the chain in which an effect lives."""
     return str(BY_ID[effect].block) if effect in BY_ID else _NOVEL_BLOCKS[effect]

@@ -10,7 +10,7 @@ from math import inf
 
 from hil.proof import motions
 from hil.proof.ambiguity import ambiguous
-from hil.proof.answers import block, same_law
+from hil.proof.answers import block, inseparable, same_law
 from hil.proof.axes import Belief
 from hil.proof.axis_kinds import Kind
 from hil.proof.chance import Rng
@@ -51,7 +51,7 @@ def pair(rng: Rng, effect: str | None, kind: Kind | None) -> Draft | None:
     first = name_on(on.axis, effect, kind is not None, rng)
     if first is None:
         return None
-    others = [name for name in applicable(on.axis) if name not in same_law(first)]
+    others = [name for name in applicable(on.axis) if name not in inseparable(first)]
     if rng.random() < _OTHER_BLOCK:
         others = [name for name in others if block(name) != block(first)]
     return two(rng, on, (first, str(rng.choice(others))), VISIBLE, VISIBLE, (0.0, inf))
@@ -74,7 +74,7 @@ def masked(rng: Rng, effect: str | None, kind: Kind | None) -> Draft | None:
     name = name_on(on.axis, effect, kind is not None, rng)
     if name is None or hard:
         return one(rng, on, name, _MASKED) if name else None
-    others = [other for other in applicable(on.axis) if other not in same_law(name)]
+    others = [other for other in applicable(on.axis) if other not in inseparable(name)]
     return two(rng, on, (name, str(rng.choice(others))), _MASKED, VISIBLE, _MASKING)
 
 

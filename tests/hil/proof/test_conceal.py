@@ -14,7 +14,7 @@ from drivers.sim.effects import CATALOGUE, Effect
 from drivers.sim.reality import record
 from hil.bench import load_bench
 from hil.proof import motions
-from hil.proof.answers import compared
+from hil.proof.answers import compared, inseparable
 from hil.proof.axes import WRONG_BY, draw_axis
 from hil.proof.axis_kinds import KINDS, Kind
 from hil.proof.conceal import RECORDINGS, TIERS, Case, _turn, draw, rerun, write
@@ -183,6 +183,14 @@ def test_a_pair_and_a_rival(cases: dict[str, Case]) -> None:
     assert all(VISIBLE[0] <= concealed.size <= VISIBLE[1] for concealed in (first, second))
     truth = cases["ambiguous"].truth
     assert truth.rivals[0] not in truth.effects[0].same_law
+
+
+def test_what_no_motion_tells_apart_is_not_paired() -> None:
+    assert inseparable("constant_load") == inseparable("spring_load") == {
+        "constant_load", "asymmetric_friction", "spring_load"}
+    for effect in BY_ID:
+        assert effect in inseparable(effect)
+        assert all(effect in inseparable(other) for other in inseparable(effect))
 
 
 def test_another_run_of_a_case_is_of_the_same_axis(cases: dict[str, Case]) -> None:

@@ -8,6 +8,7 @@ motor: its encoder resolves far less than what the noise of the torque moves it 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 from hil.bench import Bench
 from hil.channels import AXIS_CHANNELS, CHANNELS
 from hil.diagnosis.fit import Fit
-from hil.diagnosis.floor import Floor, Laps, floor, laps
+from hil.diagnosis.floor import Floor, Laps, floor, laps, shaken
 from hil.diagnosis.model import scales
 from hil.diagnosis.result import ChannelFit, FitFigures, Mode
 from hil.measured import Measured
@@ -63,6 +64,7 @@ class _Set:
     owner: list[Residuals]
     nominal: list[Residuals]
     final: list[Residuals]
+    shaken: list[dict[str, float]]     # rms by which the noise of the encoders moves the axis in closed loop
     laps: list[Laps | None]
 
     def rms(self, found: list[Residuals], channel: str, mode: Mode) -> float:
@@ -75,9 +77,10 @@ class _Set:
 
         What one hypothesis does differently from lap to lap is its own, and no noise: the lowest is the floor.
         """
-        return [min((floor(_of(entry, mode)[channel], _white(run, final, channel, mode), repeated)
+        return [min((floor(_of(entry, mode)[channel], _white(run, final, channel, mode, moved), repeated)
                      for entry in pair), key=lambda found: found.rms)
-                for *pair, run, repeated in zip(self.nominal, self.final, self.runs, self.laps, strict=True)]
+                for *pair, run, moved, repeated in zip(
+                    self.nominal, self.final, self.runs, self.shaken, self.laps, strict=True)]
 
 
 def fit_table(owner: Fit, nominal: Fit, final: Fit, train: Sequence[Measured],
@@ -86,7 +89,7 @@ def fit_table(owner: Fit, nominal: Fit, final: Fit, train: Sequence[Measured],
 
     def gathered(runs: Sequence[Measured]) -> _Set:
         of = [[residuals(found, run) for run in runs] for found in (owner, nominal, final)]
-        return _Set(runs, of[0], of[1], of[2], [laps(run) for run in runs])
+        return _Set(runs, of[0], of[1], of[2], [shaken(final, run) for run in runs], [laps(run) for run in runs])
 
     trained, validated = gathered(train), gathered(held_out)
 
@@ -120,11 +123,13 @@ def _of(found: Residuals, mode: Mode) -> dict[str, FloatArray]:
     return found.closed_loop if mode is Mode.CLOSED_LOOP else found.blocks
 
 
-def _white(run: Measured, found: Fit, channel: str, mode: Mode) -> float:
-    """White noise of a channel; block by block the motor counts from the torque that the torque channel can see."""
+def _white(run: Measured, found: Fit, channel: str, mode: Mode, moved: dict[str, float]) -> float:
+    """White noise of a channel; block by block the motor counts from the torque that the torque channel can see, in
+    closed loop all move with what the controller answers to the noise."""
     if mode is Mode.BLOCKS:
         return _rms(scales(run, found.model.bench, found.model.observer_s)[channel][run.judged])
-    return {"motor": _rms(run.motor_noise[run.judged]), "table": run.noise.table_m, "torque": run.noise.torque}[channel]
+    sensor = {"motor": _rms(run.motor_noise[run.judged]), "table": run.noise.table_m, "torque": run.noise.torque}
+    return math.hypot(sensor[channel], moved[channel])
 
 
 def _rms(values: FloatArray) -> float:

@@ -5,7 +5,7 @@ Where the same set-points come again after a lag p, what the axis does again is 
     sigma^2 = mean (r_k - r_{k+p})^2 / 2        over all rows k whose set-points repeat
 
 sigma is the non-repeatable part of the residual r, the rest of its energy repeats lap by lap and is physics that a
-better twin would explain.
+better twin would explain. In closed loop the axis itself moves with the noise of its encoders: see `shaken`.
 """
 
 from __future__ import annotations
@@ -60,6 +60,32 @@ def floor(residual: FloatArray, white: float, laps: Laps | None) -> Floor:
     if laps is None:
         return Floor(white, "white_noise")
     return Floor(max(laps.noise(residual), white), "repeated_laps")
+
+
+def shaken(found: Fit, run: Measured) -> dict[str, float]:
+    """By how much the axis moves, rms of motor, table and torque, because its encoders count and are noisy.
+
+    The twin in closed loop twice, with encoders that are right and with some that are not: what they differ by no twin
+    foretells, since nobody knows where between two counts the axis began.
+    """
+    twin, bench = found.model.twin(found.x), found.model.bench
+    quiet = found.model.respond(found.x, run)
+    motor, table = bench.encoders.motor, bench.encoders.table
+    count = motor.resolution_m if bench.axis.linear else 2.0 * np.pi / motor.counts_per_rev
+    rng = np.random.default_rng(0)
+    misread = np.array([_misread(quiet.motor_position, count or 0.0, run.motor_noise, rng),
+                        _misread(quiet.table_position_m, table.resolution_m if table else 0.0, run.noise.table_m, rng)])
+    moved = twin.simulate(run.position_command_m, run.velocity_command_m_s, run.start, run.table_m, misread)
+    return {name: float(np.sqrt(np.mean((a - b)[run.judged] ** 2))) for name, a, b in (
+        ("motor", moved.motor_position, quiet.motor_position),
+        ("table", moved.table_position_m, quiet.table_position_m), ("torque", moved.torque, quiet.torque))}
+
+
+def _misread(values: FloatArray, count: float, noise: FloatArray | float, rng: np.random.Generator) -> FloatArray:
+    """What an encoder says beside the truth (n,): its counting, and white noise for what is more than that."""
+    counted = count * np.round(values / count) - values if count else np.zeros_like(values)
+    more = np.sqrt(np.maximum(np.square(noise) - count**2 / 12.0, 0.0))
+    return np.asarray(counted + more * rng.standard_normal(values.size))
 
 
 def laps(run: Measured) -> Laps | None:

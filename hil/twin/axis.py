@@ -34,6 +34,7 @@ COARSE_STEP_S = 200e-6
 SLOW_RAD_S, SLOW_M_S = 0.02, 32e-6
 
 _NOTHING = np.empty(0)
+_RIGHT = np.empty((2, 0))
 _ANSWER = "torque"      # the recorded channel that is an answer of the axis only, and no input of any block
 
 
@@ -225,14 +226,16 @@ class Twin:
         return self._constants, self._modes, *self._mechanisms
 
     def simulate(self, position_command_m: FloatArray, velocity_command_m_s: FloatArray,
-                 start: Start = _AT_REST, measured_table_m: FloatArray = _NOTHING) -> Response:
+                 start: Start = _AT_REST, measured_table_m: FloatArray = _NOTHING,
+                 misread: FloatArray = _RIGHT) -> Response:
         """The axis in closed loop over set-points (n,), one per control tick, from `start`.
 
-        `measured_table_m` (n,) holds a table that floats in a gap, see `hil.twin.loops`.
+        `measured_table_m` (n,) holds a table that floats in a gap, see `hil.twin.loops`. `misread` (2, n): what the
+        motor encoder [motor units] and the table encoder [m] tell the controller too much.
         """
         delta, memory = self.state(start)
         channels = loops.closed_loop(self.loop_gains, self._controller(start), position_command_m,
-                                      velocity_command_m_s, measured_table_m, *self.arrays(), delta, memory)
+                                      velocity_command_m_s, misread, measured_table_m, *self.arrays(), delta, memory)
         return self._channels(Response(*channels))
 
     def drive(self, torque_command: FloatArray, start: Start = _AT_REST) -> Response:

@@ -34,12 +34,13 @@ def _correct(impulse, error, period, time_constant, modes, delta):  # type: igno
 
 def _build_closed_loop(digest: str) -> Any:
     @njit(cache=True, nogil=True, **COMPILE)
-    def closed_loop(gains, state, position_command, velocity_command, measured_table, constants, modes,  # type: ignore[no-untyped-def]
-                    values, codes, delta, memory):
+    def closed_loop(gains, state, position_command, velocity_command, misread, measured_table, constants,  # type: ignore[no-untyped-def]
+                    modes, values, codes, delta, memory):
         """Controller and axis from tick to tick: motor, table, torque command, torque, each (n,).
 
         Where `measured_table` (n,) is given (else empty), it holds a table that floats in a gap:
-        its flight is nobody's to predict from the commands, a bounce early or late would stay for good.
+        its flight is nobody's to predict from the commands, a bounce early or late would stay for good. `misread`
+        (2, n), or (2, 0), is what motor and table encoder tell the controller beside where they are.
         """
         assert digest
         n = position_command.size
@@ -50,7 +51,11 @@ def _build_closed_loop(digest: str) -> Any:
             if measured_table.size and memory[layout.OWN, layout.FLOATING] == 0.0:
                 told += 1
                 datum += (measured_table[k] - table[k] - datum) / told
-            inputs = control.Inputs(position_command[k], velocity_command[k], motor[k], table[k])
+            seen_motor, seen_table = motor[k], table[k]
+            if misread.size:
+                seen_motor += misread[0, k]
+                seen_table += misread[1, k]
+            inputs = control.Inputs(position_command[k], velocity_command[k], seen_motor, seen_table)
             state, outputs = _control_step(gains, state, inputs)
             command[k] = outputs.torque_n_m
             if told > 0 and memory[layout.OWN, layout.FLOATING] > 0.0:

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from diagnosis_runs import RIG, bench, recorded
 
 from hil.bench import load_bench
-from hil.diagnosis.floor import floor, laps
-from hil.diagnosis.model import Model
+from hil.diagnosis.fit import evaluate
+from hil.diagnosis.floor import floor, laps, shaken
+from hil.diagnosis.model import Model, observer_time_s
+from hil.diagnosis.terms import Term
 from hil.importing import import_recording
 from hil.measured import Measured, take
+from hil.proof.conceal import draw, rerun
+from hil.twin.library import BY_ID
 
 EMPS = RIG.parent / "emps" / "DATA_EMPS.mat"
 
@@ -62,3 +68,22 @@ def test_the_emps_record_has_its_published_floor() -> None:
     left = model.closed_loop(model.initial(), run)
     assert found.noise(left["motor"]) == pytest.approx(0.2e-6, rel=0.15)
     assert 0.3 <= found.noise(left["torque"]) <= 0.37
+
+
+def test_in_closed_loop_the_axis_moves_with_what_its_encoders_count() -> None:
+    """Runs of a simulated axis with coarse counts that begin within some of them differ by what `shaken` says."""
+    case = draw("single", 101966, 20261130)
+    axis, last, rng = case.draft.axis, case.draft.runs[2], np.random.default_rng(3)
+    starts_m = rng.uniform(0.0, 2e-6, 4)
+    tables_m = np.array([rerun(case.draft, replace(last, position_m=np.array(last.position_m) + start_m), 5)[
+        "table_position_m"][50:] - start_m for start_m in starts_m])
+    tables_m -= tables_m.mean(axis=1, keepdims=True)
+    differ_m = np.sqrt(np.mean(np.var(tables_m, axis=0, ddof=1)))
+    exact = case.bench.model_copy(update={"axis": case.bench.axis.model_copy(update=case.truth.true_parameters)})
+    run = take(case.recordings[2], exact)
+    limit = Term("torque_saturation", BY_ID["torque_saturation"].variants.index("hidden"),
+                 (case.truth.effects[0].parameters["limit_n_m"],))
+    model = Model(exact, (limit,), 0.3, observer_time_s([run], exact))
+    moved_m = shaken(evaluate(model, [run]), run)["table"]
+    assert differ_m > 1.5 * axis.table_noise_m
+    assert np.hypot(run.noise.table_m, moved_m) == pytest.approx(differ_m, rel=0.3)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 import os
 import shutil
@@ -11,60 +10,18 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import chdir, redirect_stderr, redirect_stdout
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pytest
 import yaml
+from command_line import hil, process, refused
 from compare_runs import bench_with, record
 
-from hil.cli import main
-from hil.demo import CONCEALED
-from hil.recording import read_recording
 from hil.report.compare_report import write_bench
 
 SWEEP = Path(__file__).parents[2] / "profiles" / "friction_sweep.yaml"
-
-
-class Ran(NamedTuple):
-    """What came of a command."""
-
-    returncode: int
-    stdout: str
-    stderr: str
-
-
-def hil(folder: Path, *arguments: str) -> Ran:
-    """Run the entry point in a folder, without a terminal."""
-    out, err = io.StringIO(), io.StringIO()
-    before = sys.argv
-    sys.argv = ["hil", *arguments]
-    try:
-        with chdir(folder), redirect_stdout(out), redirect_stderr(err), pytest.raises(SystemExit) as ended:
-            main()
-    finally:
-        sys.argv = before
-    return Ran(int(ended.value.code or 0), out.getvalue(), err.getvalue())
-
-
-def process(folder: Path, *arguments: str) -> Ran:
-    """Run `hil` as a process of its own."""
-    ran = subprocess.run([sys.executable, "-m", "hil.cli", *arguments], cwd=folder, capture_output=True, text=True,
-                         timeout=120, check=False)
-    return Ran(ran.returncode, ran.stdout, ran.stderr)
-
-
-def refused(folder: Path, *arguments: str, code: int = 2) -> str:
-    """The message of a command that must fail with `code` and leave nothing behind."""
-    before = sorted(folder.rglob("*"))
-    ran = hil(folder, *arguments)
-    assert ran.returncode == code, ran.stderr
-    assert "Traceback" not in ran.stderr
-    assert not ran.stdout
-    assert sorted(folder.rglob("*")) == before
-    return ran.stderr
 
 
 @pytest.fixture(scope="module")
@@ -170,37 +127,6 @@ def test_a_missing_encoder_is_refused(folder: Path) -> None:
                           ("motor_position_rad", "motor_position_rad missing")):
         bad = changed(folder, "run.csv", channel, "something_else")
         assert said in refused(folder, "compare", bad.name, "--bench", "bench.yaml")
-
-
-def test_the_demo_finds_what_it_conceals(tmp_path: Path) -> None:
-    ran = hil(tmp_path, "demo", "--virtual", "--effect", "backlash", "--seed", "7", "--out", "demo")
-    assert ran.returncode == 0, ran.stderr
-    assert "backlash" not in ran.stderr.split("fitting")[0]                  # nothing is said before it is found
-    assert "The twin leaves something out" in ran.stdout.split("Diagnosis")[0]
-    assert "Concealed: backlash; found: backlash. It found what was concealed." in ran.stdout
-    for report in ("compare.html", "report.html"):
-        assert str(tmp_path / "demo" / report) in ran.stdout
-        assert (tmp_path / "demo" / report).is_file()
-    recorded = read_recording(tmp_path / "demo" / "learn.parquet").metadata["bench"]["simulation"]
-    truth, found = recorded["effects"][0], json.loads((tmp_path / "demo" / "diagnosis.json").read_text())
-    value = found["missing"][0]["parameters"]["gap_m"]["value"]
-    assert value == pytest.approx(truth["parameters"]["gap_m"], rel=0.03)
-    assert found["parameter_corrections"]["table_mass_kg"]["value"] == pytest.approx(
-        recorded["axis"]["table_mass_kg"], rel=0.02)
-    assert "effects" not in (tmp_path / "demo" / "bench.diagnosed.yaml").read_text()   # what it knows, it has found
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("effect", CONCEALED)
-def test_the_demo_finds_each_of_its_effects(tmp_path: Path, effect: str) -> None:
-    ran = hil(tmp_path, "demo", "--virtual", "--effect", effect, "--seed", "5", "--out", "demo")
-    assert ran.returncode == 0, ran.stderr
-    assert "It found what was concealed." in ran.stdout
-
-
-def test_the_demo_refuses_an_effect_that_it_does_not_know(tmp_path: Path) -> None:
-    message = refused(tmp_path, "demo", "--effect", "ghost")
-    assert message.startswith("--effect: given ghost, allowed periodic_lead_error, backlash")
 
 
 def test_import_by_a_map(folder: Path) -> None:

@@ -1,4 +1,4 @@
-"""The proof as it is run: plan, seal, the blind process, going on after an interruption, and a small proof itself."""
+"""The proof as it is run: seal, the blind process, going on after an interruption, and a small proof itself."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import json
 import shutil
 import subprocess
 import sys
-from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,7 +20,7 @@ from hil.proof.blind import DIAGNOSIS, ERROR
 from hil.proof.conceal import TIERS
 from hil.proof.effects import LIBRARY
 from hil.proof.page import write_proof
-from hil.proof.plan import FULL, Planned, counts, plan
+from hil.proof.plan import Planned, plan
 from hil.proof.run import ANSWERS, diagnose_blind, prove, score_others
 from hil.proof.score import Scores, score
 from hil.proof.seal import CASES, SEAL, SEALED, code_sha256, draw_cases, read_seal, seal, sha256, unseal
@@ -58,42 +57,6 @@ def answer(folder: Path, name: str, **more: Any) -> None:
     """Put an answer there."""
     (folder / ANSWERS / name).mkdir(parents=True)
     write_json(folder / ANSWERS / name / DIAGNOSIS, {"verdict": "no_mismatch", "missing": [], **more})
-
-
-def test_the_full_proof_has_the_cases_that_were_promised() -> None:
-    assert set(FULL) == set(TIERS)
-    assert counts(sum(FULL.values())) == FULL
-    assert (FULL["single"], FULL["pair"], FULL["masked"], FULL["novel"]) == (300, 200, 100, 60)
-    assert FULL["null"] + FULL["parameters_only"] == 300
-
-
-@pytest.mark.parametrize("cases", [1, 6, 9, 40, 333])
-def test_a_plan_mixes_the_tiers_in_their_shares(cases: int) -> None:
-    planned = plan(cases, 3)
-    assert planned == plan(cases, 3)
-    assert planned != plan(cases, 4)
-    assert [case.name for case in planned] == [f"case_{place:04d}" for place in range(cases)]
-    found = Counter(case.tier for case in planned)
-    assert all(abs(found[tier] - cases * FULL[tier] / sum(FULL.values())) < 1.0 for tier in TIERS)
-    for tier in found:
-        numbers = sorted(case.number for case in planned if case.tier == tier)
-        assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
-    if cases >= 40:
-        tiers = [case.tier for case in planned]
-        assert tiers != sorted(tiers, key=TIERS.index)
-
-
-@pytest.mark.parametrize("cases", [0, -3, 10_001])
-def test_a_plan_of_no_cases_is_refused(cases: int) -> None:
-    with pytest.raises(InputError, match=rf"--cases: given {cases}, allowed 1 to 10000"):
-        plan(cases, 1)
-
-
-def test_a_plan_of_some_tiers_has_no_others() -> None:
-    planned = plan(30, 3, only=("single", "null"))
-    assert Counter(case.tier for case in planned) == {"single": 20, "null": 10}
-    with pytest.raises(InputError, match="--only: given novell, allowed single, pair"):
-        plan(30, 3, only=("novell",))
 
 
 def test_a_seal_holds_the_truth_and_every_file(sealed: Path) -> None:

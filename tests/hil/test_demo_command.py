@@ -1,0 +1,43 @@
+"""`hil demo` as a newcomer meets it: what it conceals it finds, and it says so."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from command_line import hil, refused
+
+from hil.demo import CONCEALED
+from hil.recording import read_recording
+
+
+def test_the_demo_finds_what_it_conceals(tmp_path: Path) -> None:
+    ran = hil(tmp_path, "demo", "--virtual", "--effect", "backlash", "--seed", "7", "--out", "demo")
+    assert ran.returncode == 0, ran.stderr
+    assert "backlash" not in ran.stderr.split("fitting")[0]                  # nothing is said before it is found
+    assert "The twin leaves something out" in ran.stdout.split("Diagnosis")[0]
+    assert "Concealed: backlash; found: backlash. It found what was concealed." in ran.stdout
+    for report in ("compare.html", "report.html"):
+        assert str(tmp_path / "demo" / report) in ran.stdout
+        assert (tmp_path / "demo" / report).is_file()
+    recorded = read_recording(tmp_path / "demo" / "learn.parquet").metadata["bench"]["simulation"]
+    truth, found = recorded["effects"][0], json.loads((tmp_path / "demo" / "diagnosis.json").read_text())
+    value = found["missing"][0]["parameters"]["gap_m"]["value"]
+    assert value == pytest.approx(truth["parameters"]["gap_m"], rel=0.03)
+    assert found["parameter_corrections"]["table_mass_kg"]["value"] == pytest.approx(
+        recorded["axis"]["table_mass_kg"], rel=0.02)
+    assert "effects" not in (tmp_path / "demo" / "bench.diagnosed.yaml").read_text()   # what it knows, it has found
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("effect", CONCEALED)
+def test_the_demo_finds_each_of_its_effects(tmp_path: Path, effect: str) -> None:
+    ran = hil(tmp_path, "demo", "--virtual", "--effect", effect, "--seed", "5", "--out", "demo")
+    assert ran.returncode == 0, ran.stderr
+    assert "It found what was concealed." in ran.stdout
+
+
+def test_the_demo_refuses_an_effect_that_it_does_not_know(tmp_path: Path) -> None:
+    message = refused(tmp_path, "demo", "--effect", "ghost")
+    assert message.startswith("--effect: given ghost, allowed periodic_lead_error, backlash")

@@ -13,7 +13,6 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from hil.errors import FieldError
-from hil.twin.axis import Physics
 from hil.twin.chain import (
     LINEAR_LEAD_M,
     RECONSTRUCTED_TABLE_1,
@@ -23,6 +22,7 @@ from hil.twin.chain import (
     seven_dof,
     two_mass,
 )
+from hil.twin.physics import Physics
 
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]

@@ -17,8 +17,9 @@ from hil import control as law
 from hil.axis_models import Axis, NotNegative, OneMass, Positive, _Model, model_of
 from hil.bench_hardware import DriveSection, SimulationSection
 from hil.errors import FieldError, InputError
-from hil.twin.axis import Active, Twin
+from hil.twin.axis import Twin
 from hil.twin.library import BY_ID
+from hil.twin.physics import Active
 from hil.yamlfile import load_model
 
 _MA_PER_RPM = 1e-3 * 60.0 / (2.0 * math.pi)    # mA/rpm in A s/rad

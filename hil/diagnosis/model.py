@@ -20,9 +20,10 @@ from hil.bench import Bench, MechanismEntry
 from hil.diagnosis.terms import Term, repeats
 from hil.differences import differences
 from hil.measured import Measured
-from hil.twin.axis import Active, Response, Twin
+from hil.twin.axis import Response, Twin
 from hil.twin.library import BY_ID
 from hil.twin.mechanism import Parameter
+from hil.twin.physics import Active
 
 FloatArray = NDArray[np.float64]
 

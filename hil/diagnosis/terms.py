@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
-from hil.twin.axis import Active
 from hil.twin.library import BY_ID
+from hil.twin.physics import Active
 
 Key = tuple[str, int, int]
 

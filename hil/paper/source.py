@@ -11,8 +11,9 @@ from hil.control import Gains, make_gains
 from hil.moves import Motion
 from hil.profile import Profile
 from hil.trajectory import Trajectory, plan
-from hil.twin.axis import Physics, Response, Twin
+from hil.twin.axis import Response, Twin
 from hil.twin.chain import RECONSTRUCTED_TABLE_1, Chain, FloatArray, seven_dof, two_mass
+from hil.twin.physics import Physics
 
 LEAD_M = 0.010
 RATIO_M_RAD = LEAD_M / (2.0 * pi)

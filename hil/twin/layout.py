@@ -1,7 +1,7 @@
 """Where what stands in the arrays that the compiled kernels share.
 
 `modes` (COUPLING + n, n), `constants` (CONSTANTS,), `codes` (CODES,) and `memory` (slots + 1, WIDTH) are packed by
-`hil.twin.axis`; beside them go `values` (slots, PARAMETERS), those of the mechanisms.
+`hil.twin.packing`; beside them go `values` (slots, PARAMETERS), those of the mechanisms.
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ from hil.twin.library import SLOTS
 
 # Rows of `modes` (COUPLING + n, n): exact discretisation for the coarse and the fine step, shapes, then the damping
 # that modes share.
-(COARSE, FINE, SHAPE_MOTOR, SHAPE_TABLE, SHAPE_SPRING, SHAPE_SCREW, SHAPE_DAMPER, TABLE_IMPULSE, MOTOR_IMPULSE,
- COUPLING) = (0, 6, *range(12, 20))
+(COARSE, FINE, SHAPE_MOTOR, SHAPE_TABLE, SHAPE_SPRING, SHAPE_SCREW, SHAPE_DAMPER, TABLE_SIDE, TABLE_IMPULSE,
+ MOTOR_IMPULSE, COUPLING) = (0, 6, *range(12, 21))
 
 # Entries of `constants`.
 (PERIOD, RATIO, ANGLE_PER_UNIT, COULOMB, VISCOUS, SPRING, DAMPER, COARSE_STEPS, FINE_STEPS, SLOW_VELOCITY,

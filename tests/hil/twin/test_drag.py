@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from hil import control
-from hil.twin.axis import Active, Physics, Start, Twin
+from hil.twin.axis import Start, Twin
 from hil.twin.chain import LINEAR_LEAD_M, one_mass
+from hil.twin.physics import Active, Physics
 
 MASS_KG, COULOMB_N, VISCOUS_N_S_M = 100.0, 20.0, 200.0
 SPEED_M_S = COULOMB_N / VISCOUS_N_S_M      # at which viscous friction equals Coulomb friction

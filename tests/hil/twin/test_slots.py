@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from hil.bench import load_bench
-from hil.twin.axis import Active, Twin
+from hil.twin.axis import Twin
 from hil.twin.library import LIBRARY, SLOTS
+from hil.twin.physics import Active
 
 BENCH = load_bench("reference")
 TORQUE_N_M = 3.0 * np.sin(np.arange(600) * 2.0 * np.pi / 300.0)

@@ -11,13 +11,14 @@ from scipy.linalg import expm
 from scipy.optimize import brentq
 
 from hil.control import make_gains
-from hil.twin.axis import Active, Physics, Start, Twin
+from hil.twin.axis import Start, Twin
 from hil.twin.ballscrew import RECONSTRUCTED_TABLE_1
 from hil.twin.chain import one_mass, seven_dof, two_mass
 from hil.twin.frequency import modal_damping
 from hil.twin.library import BY_ID, LIBRARY
 from hil.twin.mechanism import Stage
 from hil.twin.modal import modal
+from hil.twin.physics import Active, Physics
 
 deflections = st.floats(-0.5, 0.5)   # rad: +-0.8 mm at the table
 lengths = st.floats(0.0, 1e-3)

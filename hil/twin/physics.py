@@ -1,0 +1,32 @@
+"""What a twin is made of: the nominal physics of an axis, and the mechanisms that are on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from hil.twin.chain import Chain
+
+
+@dataclass(frozen=True)
+class Active:
+    """A mechanism that is on: its id, its parameters in the library's order, its variant."""
+
+    effect: str
+    values: tuple[float, ...]
+    variant: int = 0
+
+
+@dataclass(frozen=True)
+class Physics:
+    """What the nominal twin knows of an axis, in motor units (rad, N m; on a linear axis m, N)."""
+
+    chain: Chain
+    coulomb_n_m: float
+    viscous_n_m_s_rad: float
+    linear: bool = False
+    angle_per_unit: float = 1.0     # motor angle per motor unit: 1, or 2 pi / screw lead on a linear axis
+
+    @property
+    def viscous_speed(self) -> float:
+        """Speed at which viscous friction equals Coulomb friction [rad/s, m/s]; 0 without viscous friction."""
+        return self.coulomb_n_m / self.viscous_n_m_s_rad if self.viscous_n_m_s_rad > 0.0 else 0.0

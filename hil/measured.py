@@ -223,17 +223,18 @@ def _jitter_s(motor: FloatArray, velocity: FloatArray, noise: float, period_s: f
     """Jitter of the instants of reading: by how much noise at constant feed exceeds `noise`, over the speed.
 
     Known from six blocks of 64 rows in which the set velocity is constant, from half of the fastest such feed on; with
-    less of them 0. Less than twice the noise is not told from counting.
+    less of them 0. Less than three times the noise is not told from counting, which at half a count per row makes 2.7.
     """
     variance = _white_blocks(motor)
     rows = 64 * variance.size
     speed = np.abs(np.diff(motor)[:rows].reshape(-1, 64).mean(axis=1)) / period_s
     steady = np.ptp(velocity[:rows].reshape(-1, 64), axis=1) <= 1e-6 * np.max(np.abs(velocity), initial=0.0)
+    steady &= moving(velocity)[:rows].reshape(-1, 64).all(axis=1)
     fast = steady & (speed > 0.5 * np.max(speed[steady], initial=0.0))
     if np.count_nonzero(fast) < 6:
         return 0.0
     more = (variance[fast] - noise**2) / speed[fast] ** 2
-    return float(np.sqrt(np.median(more))) if np.median(variance[fast]) > 2.0 * noise**2 else 0.0
+    return float(np.sqrt(np.median(more))) if np.median(variance[fast]) > 3.0 * noise**2 else 0.0
 
 
 def _coloured(signal: FloatArray) -> float:

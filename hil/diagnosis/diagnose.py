@@ -201,8 +201,8 @@ def _notes(table: dict[str, ChannelFit], proof: Proof, verdict: Verdict, explana
     if any(entry.floor_from == "repeated_laps" for entry in table.values()):
         notes.append("The noise floor is what does not repeat from lap to lap.")
     else:
-        notes.append("No motion repeats: the noise floor is the white noise of the sensors, so that "
-                     "disturbances of the axis count as mismatch.")
+        notes.append("No motion repeats: the noise floor is the white noise of the sensors, in closed loop with what "
+                     "the axis does because of it, so that disturbances of the axis count as mismatch.")
     blocks = [name for name, entry in table.items() if entry.mode is Mode.BLOCKS]
     if blocks:
         notes.append(f"Figures of {', '.join(blocks)} are block by block, fed with measured inputs: in closed loop the "

@@ -32,6 +32,10 @@ _NEAR = 30               # rows about a peak of the correlation in which the lag
 _SAME_M = 2e-6           # set-points closer than this are the same: printed ones are rounded
 _SETTLED_S = 0.3         # set-points must have been the same for so long: the axis remembers what came before
 _ENOUGH_S = 1.0          # of repeated motion, to call a floor measured
+# A channel that moves by less than this share of its sensor's noise may do so as it likes. One axis with coarse counts
+# was measured to move by three times its noise; a loop that is chaotic moves by tens and more.
+_LITTLE, _LARGE = 0.3, 5.0
+_HALF = 0.75             # of what all of the noise does is the most that half of it may do
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,20 +69,36 @@ def floor(residual: FloatArray, white: float, laps: Laps | None) -> Floor:
 def shaken(found: Fit, run: Measured) -> dict[str, float]:
     """By how much the axis moves, rms of motor, table and torque, because its encoders count and are noisy.
 
-    The twin in closed loop twice, with encoders that are right and with some that are not: what they differ by no twin
-    foretells, since nobody knows where between two counts the axis began.
+    The twin in closed loop with encoders that are right and with some that are not: what they differ by no twin
+    foretells, since nobody knows where between two counts the axis began. Only a little of it is noise: where half as
+    much does not move the axis by about half, or a channel moves by several times its sensor's noise, the loop is
+    chaotic, and 0 is returned.
     """
     twin, bench = found.model.twin(found.x), found.model.bench
     quiet = found.model.respond(found.x, run)
     motor, table = bench.encoders.motor, bench.encoders.table
     count = motor.resolution_m if bench.axis.linear else 2.0 * np.pi / motor.counts_per_rev
+    own_m = max(run.noise.table_m**2 - (bench.axis.ratio_m_rad * run.noise.motor) ** 2, 0.0) ** 0.5
     rng = np.random.default_rng(0)
     misread = np.array([_misread(quiet.motor_position, count or 0.0, run.motor_noise, rng),
-                        _misread(quiet.table_position_m, table.resolution_m if table else 0.0, run.noise.table_m, rng)])
-    moved = twin.simulate(run.position_command_m, run.velocity_command_m_s, run.start, run.table_m, misread)
-    return {name: float(np.sqrt(np.mean((a - b)[run.judged] ** 2))) for name, a, b in (
-        ("motor", moved.motor_position, quiet.motor_position),
-        ("table", moved.table_position_m, quiet.table_position_m), ("torque", moved.torque, quiet.torque))}
+                        _misread(quiet.table_position_m, table.resolution_m if table else 0.0, own_m, rng)])
+
+    def moved(share: float) -> dict[str, float]:
+        other = twin.simulate(run.position_command_m, run.velocity_command_m_s, run.start, run.table_m, share * misread)
+        return {name: _rms((a - b)[run.judged]) for name, a, b in (
+            ("motor", other.motor_position, quiet.motor_position),
+            ("table", other.table_position_m, quiet.table_position_m), ("torque", other.torque, quiet.torque))}
+
+    noise = {"motor": _rms(run.motor_noise[run.judged]), "table": run.noise.table_m, "torque": run.noise.torque}
+    full, half = moved(1.0), moved(0.5)
+    known = [name for name in full if noise[name] > 0.0]
+    calm = all(full[name] < _LITTLE * noise[name]
+               or (full[name] < _LARGE * noise[name] and half[name] < _HALF * full[name]) for name in known)
+    return full if calm else dict.fromkeys(full, 0.0)
+
+
+def _rms(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(values**2)))
 
 
 def _misread(values: FloatArray, count: float, noise: FloatArray | float, rng: np.random.Generator) -> FloatArray:

@@ -23,13 +23,18 @@ def judge(owner: Fit, nominal: Fit, final: Fit, train: Sequence[Measured], held_
     """The verdict on the bench's own values, their refit, and the refit with the terms found."""
     if final.model.terms:
         left = 1.0 - explained_share(nominal, final, held_out or train)
-        above = max(ratio for run in (*train, *held_out) for ratio in noise_ratios(final, run).values()) ** 0.5
-        guessed = left > MOST or (left > _MUCH and left * above > _FAR)
-        return Verdict.MISSING_PHYSICS if final.at_floor or not guessed else Verdict.UNEXPLAINED
+        above = max(ratio for run in (*train, *held_out) for ratio in noise_ratios(final, run).values())
+        return Verdict.MISSING_PHYSICS if final.at_floor or names_stand(left, above) else Verdict.UNEXPLAINED
     if not all(ratio <= FLOOR for run in train for ratio in noise_ratios(nominal, run).values()):
         return Verdict.UNEXPLAINED
     return Verdict.NO_MISMATCH if owner.at_floor or not refit_matters(owner, nominal) \
         else Verdict.PARAMETER_ERROR
+
+
+def names_stand(left: float, above: float) -> bool:
+    """Whether names stand beside a share `left` of the energy above the floor, where the channel that is furthest from
+    its noise has `above` times the noise's energy. Never where one of them is not a number."""
+    return left <= MOST and (left <= _MUCH or above <= FLOOR or left * above**0.5 <= _FAR)
 
 
 def refit_matters(owner: Fit, nominal: Fit) -> bool:

@@ -23,6 +23,7 @@ _motor_reading, _table_reading = stages.motor_reading, stages.table_reading
 _contact, _bristle_contact, _slipping_contact = contact.rigid, contact.elastic, contact.slipping
 # A motor slower than this sticks: what is left of its speed is rounding, which no step size may hang on.
 RESTING = 1e-9
+NUDGE = 1e-9        # of the deflection [motor units], to see its stiffness
 # `_nrt=False` below leaves out the counting of references to arrays, `forceinline` the handing over of arrays:
 # both cost more than the mathematics of a step.
 _COMPILE = contact.COMPILE
@@ -105,6 +106,10 @@ def _build_advance(digest: str) -> Any:
                 floating = effective == 0.0
                 apart = along(at_damper, velocities) / damper if damper > 0.0 else 0.0
                 rate = -apart if floating else (extra - own[layout.SPRING_EXTRA]) / h
+                if constants[layout.ALWAYS_FINE] > 0.0 and not floating:
+                    # what of it comes of the spring's bending counts as the sides move apart
+                    softer = (_transmission(bent + NUDGE, at, values, codes, memory) - effective) / NUDGE - 1.0
+                    rate += softer * (apart - stretch_rate)
                 own[layout.FLOATING] = 1.0 if floating else 0.0
                 own[layout.SPRING_EXTRA] = extra
                 spring = -constants[layout.SPRING] * extra

@@ -19,6 +19,7 @@ from hil.twin.physics import Active, Physics
 FloatArray = NDArray[np.float64]
 Arrays = tuple[FloatArray, FloatArray, FloatArray, NDArray[np.int64]]   # constants, modes, mechanism values and codes
 
+_ROUNDING = 1e-12       # of all damping
 # The step is fine while the motor moves slower than this, or could reverse within two ticks. Alike for a lead of 10 mm.
 SLOW_RAD_S, SLOW_M_S = 0.02, 32e-6
 
@@ -47,7 +48,10 @@ def pack_modes(own: Chain, chain: Chain, modes: Modal, period_s: float, steps: S
     given = chain.damping_n_m_s_rad
     damping = modal if given is None else modes.shape.T @ given @ modes.shape
     rows[layout.COUPLING:] = damping - modal
-    rows[layout.SHAPE_DAMPER] = -damping @ rows[layout.TABLE_SIDE]
+    # a side that is the whole axis is damped by rounding alone, which no play may take away
+    resisting = damping @ rows[layout.TABLE_SIDE]
+    some = resisting @ rows[layout.TABLE_SIDE] > _ROUNDING * np.trace(damping) * np.sum(rows[layout.TABLE_SIDE] ** 2)
+    rows[layout.SHAPE_DAMPER] = -resisting if some else 0.0
     return rows
 
 

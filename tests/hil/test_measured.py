@@ -23,6 +23,24 @@ def test_jitter_is_told_from_noise_by_the_speed(jitter_s: float) -> None:
     assert _jitter_s(position(1e-6, jitter_s), VELOCITY, 1e-6, PERIOD_S) == pytest.approx(jitter_s, rel=0.1)
 
 
+def test_a_short_fast_feed_tells_the_jitter_and_a_shorter_one_does_not() -> None:
+    for rows, told in ((7 * 64, True), (4 * 64, False)):
+        velocity = np.repeat([0.0, 400.0, 0.0], [1024, rows, 1024])
+        late_s = 2e-6 * np.random.default_rng(1).standard_normal(velocity.size)
+        found = _jitter_s(np.cumsum(velocity) * PERIOD_S + velocity * late_s, velocity, 1e-6, PERIOD_S)
+        assert found == (pytest.approx(2e-6, rel=0.2) if told else 0.0)
+
+
+def test_a_count_that_flickers_at_rest_is_no_jitter() -> None:
+    """Moves without any constant feed, dwells between them on the edge of a count."""
+    rng, count = np.random.default_rng(2), 6.3e-4
+    speed = np.concatenate([np.concatenate([np.zeros(700), 30.0 * np.sin(np.linspace(0.0, np.pi, 300))])
+                            for _ in range(4)])
+    position = np.cumsum(speed) * PERIOD_S + 0.5 * count
+    motor = count * np.round((position + 0.05 * count * rng.standard_normal(speed.size)) / count)
+    assert _jitter_s(motor, speed, count / np.sqrt(12.0), PERIOD_S) == 0.0
+
+
 def test_noise_without_jitter_has_none() -> None:
     motor = position(1e-5, 0.0)
     assert _white(motor) == pytest.approx(1e-5, rel=0.05)

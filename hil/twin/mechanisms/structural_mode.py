@@ -27,13 +27,19 @@ def _with_structure(chain: Chain, parameters: Sequence[float], variant: int = 0)
     omega = 2.0 * math.pi * frequency_hz
     extended, spring = (_on_the_table, _under_the_axis)[variant](chain, omega**2, mass_ratio)
     stiffness = extended.stiffness_n_m_rad[-1, -1]
-    damping = np.pad(modal_damping(chain, modal(chain)), (0, 1))
-    damping += 2.0 * damping_ratio / omega * stiffness * np.outer(spring, spring)
     modes = modal(extended)
     elastic = np.where(modes.frequency_rad_s > 0.0, modes.frequency_rad_s, np.inf)
-    # each mode is damped by what its shape takes of the dampers (modal strain energy, Johnson and Kienholz 1982)
-    ratio = np.einsum("im,ij,jm->m", modes.shape, damping, modes.shape) / (2.0 * elastic)
-    return replace(extended, damping_ratio=np.minimum(ratio, _MOST), damping_n_m_s_rad=damping)
+
+    def shared(damping: FloatArray) -> FloatArray:
+        # each mode is damped by what its shape takes of the dampers (modal strain energy, Johnson and Kienholz 1982)
+        return np.asarray(np.einsum("im,ij,jm->m", modes.shape, damping, modes.shape) / (2.0 * elastic))
+
+    old = np.pad(modal_damping(chain, modal(chain)), (0, 1))
+    new = 2.0 * damping_ratio / omega * stiffness * np.outer(spring, spring)
+    # a damper that no longer lets a mode swing is weakened until it does
+    share = float(np.min((_MOST - shared(old)) / np.maximum(shared(new), 1e-300), initial=1.0))
+    damping = old + share * new
+    return replace(extended, damping_ratio=shared(damping), damping_n_m_s_rad=damping)
 
 
 def _on_the_table(chain: Chain, square: float, mass_ratio: float) -> tuple[Chain, FloatArray]:
@@ -75,8 +81,8 @@ MECHANISM = Mechanism(
     sentence="A structure of {mass_ratio} of the table's mass sways at {frequency_hz}, damped by {damping_ratio}.",
     second_sentence="The machine base yields: it sways with the table at {frequency_hz}, damped by {damping_ratio}; "
                     "the table has {mass_ratio} of its mass.",
-    equation="m_a x_a'' + k_a (x_a - x) = 0, k_a = m_a (2 pi f)^2, m_a = mu m_table; modal damping ratio xi; or a base "
-             "of m_table / mu under the axis, which sways with the table at f",
+    equation="m_a x_a'' + k_a (x_a - x) = 0, k_a = m_a (2 pi f)^2, m_a = mu m_table, damped by xi where the table "
+             "is held; or a base of m_table / mu under the axis, which sways with the table at f",
     source="Den Hartog, Mechanical Vibrations, 4th ed. (1956), auxiliary mass on a spring",
     parameters=(
         Parameter("frequency_hz", Dimension.FREQUENCY, 1.0, 2000.0),

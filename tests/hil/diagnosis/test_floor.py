@@ -6,12 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis_runs import RIG, bench, recorded
+from diagnosis_runs import RIG, bench, moves, recorded
 
 from hil.bench import load_bench
 from hil.diagnosis.fit import evaluate
+from hil.diagnosis.fit_table import fit_table
 from hil.diagnosis.floor import floor, laps, shaken
 from hil.diagnosis.model import Model, observer_time_s
+from hil.diagnosis.result import Mode
 from hil.diagnosis.terms import Term
 from hil.importing import import_recording
 from hil.measured import Measured, take
@@ -84,6 +86,23 @@ def test_in_closed_loop_the_axis_moves_with_what_its_encoders_count() -> None:
     limit = Term("torque_saturation", BY_ID["torque_saturation"].variants.index("hidden"),
                  (case.truth.effects[0].parameters["limit_n_m"],))
     model = Model(exact, (limit,), 0.3, observer_time_s([run], exact))
-    moved_m = shaken(evaluate(model, [run]), run)["table"]
+    found = evaluate(model, [run])
+    moved_m = shaken(found, run)["table"]
     assert differ_m > 1.5 * axis.table_noise_m
     assert np.hypot(run.noise.table_m, moved_m) == pytest.approx(differ_m, rel=0.3)
+    table = fit_table(found, found, found, [run], [])["table_position_m"]
+    assert table.mode is Mode.CLOSED_LOOP
+    assert table.train.noise_floor_rms == pytest.approx(np.hypot(run.noise.table_m, moved_m))
+
+
+def test_a_loop_that_sticks_and_slips_has_no_noise_of_its_own_making() -> None:
+    """A twin that lacks the lead error of a chattering axis strays by a hundred times the noise of its sensors, and
+    so do two of its own runs from one another: that is no floor."""
+    sticking, lead = Term("stribeck_friction", 0, (2.2, 0.05)), Term("periodic_lead_error", 0, (4e-6, 0.3))
+    creep = moves([{"kind": "dwell", "duration_s": 0.2}, *(
+        {"kind": "sine_squared", "to_m": to_m, "feed_m_s": 0.0006} for to_m in (0.004, 0.0))])
+    run = take(recorded(bench(), sticking, lead, profile=creep), bench())
+    wrong = evaluate(Model(bench(), (sticking,), 0.01, observer_time_s([run], bench())), [run])
+    assert set(shaken(wrong, run).values()) == {0.0}
+    table = fit_table(wrong, wrong, wrong, [run], [])["table_position_m"]
+    assert table.train.after_rms > 50.0 * table.train.noise_floor_rms

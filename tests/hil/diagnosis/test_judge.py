@@ -9,7 +9,7 @@ from diagnosis_runs import bench, changed, recorded
 from hil.diagnosis.explain import Explanation, Rival, noise_ratios
 from hil.diagnosis.findings import diagnosed_bench, findings, renamed, standard_errors
 from hil.diagnosis.fit import FLOOR, Fit, evaluate, fit
-from hil.diagnosis.judge import judge
+from hil.diagnosis.judge import judge, names_stand
 from hil.diagnosis.model import Model
 from hil.diagnosis.proof import explained_share, prove
 from hil.diagnosis.result import Verdict
@@ -76,6 +76,14 @@ def test_a_mismatch_without_a_term_or_with_a_poor_one_is_unexplained() -> None:
     poor = believed(found, Term("constant_load", 0, (0.02,)))
     assert explained_share(plain, poor, held_out) < 0.5
     assert judge(plain, plain, poor, found, held_out) is Verdict.UNEXPLAINED
+
+
+@pytest.mark.parametrize(("left", "above", "stands"), [
+    (0.04, 50.0, True), (0.06, 5.2, False), (0.10, 1.6, True), (0.17, 1.6, False), (0.30, 1.25, True),
+    (0.30, 1.3, False), (0.51, 1.0, False), (np.nan, 1.0, False), (0.3, np.nan, False)])
+def test_names_stand_beside_what_is_little_or_hardly_above_the_noise(left: float, above: float, stands: bool) -> None:
+    """`above` in rms: the share that may be left falls as it stands further above the noise."""
+    assert names_stand(left, above**2) is stands
 
 
 def test_a_term_that_held_out_recordings_speak_against_is_dropped() -> None:

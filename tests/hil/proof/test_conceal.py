@@ -191,6 +191,9 @@ def test_what_no_motion_tells_apart_is_not_paired() -> None:
     for effect in BY_ID:
         assert effect in inseparable(effect)
         assert all(effect in inseparable(other) for other in inseparable(effect))
+    for number in (0, 3):
+        first, second = draw("pair", number, 4, effect="spring_load").truth.effects
+        assert second.effect not in inseparable(first.effect)
 
 
 def test_another_run_of_a_case_is_of_the_same_axis(cases: dict[str, Case]) -> None:

@@ -11,10 +11,8 @@ from scipy.linalg import expm
 from scipy.optimize import brentq
 
 from hil.control import make_gains
-from hil.twin.axis import Start, Twin
-from hil.twin.ballscrew import RECONSTRUCTED_TABLE_1
-from hil.twin.chain import one_mass, seven_dof, two_mass
-from hil.twin.frequency import modal_damping
+from hil.twin.axis import Twin
+from hil.twin.chain import one_mass, two_mass
 from hil.twin.library import BY_ID, LIBRARY
 from hil.twin.mechanism import Stage
 from hil.twin.modal import modal
@@ -192,34 +190,3 @@ def test_a_structure_close_to_the_mode_of_the_chain_shares_its_damping(variant: 
     moves = np.diff(found.table_position_m)
     left = moves - np.diff(expected)
     assert np.std(left) < 0.003 * np.std(moves)
-
-
-def test_a_lead_error_shakes_a_long_chain_as_its_equations_say() -> None:
-    """At constant feed, D q = (K s + i w C s) e with the motor's own shaking given: all but the motor, harmonic by
-    harmonic, s the table's side. The third harmonic runs close to the first mode."""
-    chain = seven_dof(RECONSTRUCTED_TABLE_1, 0.05)
-    modes = modal(chain)
-    turns_hz, amplitude_m, period_s = 0.9 * modes.frequency_rad_s[1] / (6.0 * pi), 2e-6, 1e-3
-    gains = make_gains(position_gain_1_s=10.0, velocity_gain_n_m_s_rad=0.1, ratio_m_rad=RATIO_M,
-                       velocity_integral_time_s=0.05)
-    twin = Twin(Physics(chain, 0.0, 0.01), gains, (Active(
-        "periodic_lead_error", (amplitude_m, 0.3, 0.5 * amplitude_m, 1.0, 0.4 * amplitude_m, -2.0), 0),))
-    speed = 2.0 * pi * turns_hz * RATIO_M
-    n = round(60.0 / turns_hz / period_s)
-    time_s = period_s * np.arange(n)
-    moved = twin.simulate(speed * time_s, np.full(n, speed), Start(0.0, speed))
-    last = slice(-round(30.0 / turns_hz / period_s), None)
-    angle, turned = moved.motor_position[last], 2.0 * pi * turns_hz * time_s[last]
-    waves = np.column_stack([np.ones(angle.size), *(wave(k * angle) for k in (1, 2, 3) for wave in (np.cos, np.sin))])
-    motor, table = (np.linalg.lstsq(waves, values[last] - turned, rcond=None)[0]
-                    for values in (moved.motor_position, moved.table_position_m / RATIO_M))
-    damping, side, rest = modal_damping(chain, modes), chain.side(chain.table), np.arange(7) != chain.motor
-    for k, size, phase in ((1, 1.0, 0.3), (2, 0.5, 1.0), (3, 0.4, -2.0)):
-        omega = 2.0 * pi * turns_hz * k
-        dynamic = chain.stiffness_n_m_rad + 1j * omega * damping - omega**2 * chain.inertia_kg_m2
-        error = size * amplitude_m / RATIO_M * np.exp(1j * (phase - 0.5 * pi))
-        shaken, found = (values[2 * k - 1] - 1j * values[2 * k] for values in (motor, table))
-        load = ((chain.stiffness_n_m_rad + 1j * omega * damping) @ side * error
-                - dynamic[:, chain.motor] * shaken)
-        expected = np.linalg.solve(dynamic[np.ix_(rest, rest)], load[rest])[-1]
-        assert found == pytest.approx(expected, abs=0.05 * abs(expected))

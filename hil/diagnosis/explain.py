@@ -23,6 +23,7 @@ from hil.diagnosis.model import LAST_EDGE_STEP_S, scales
 from hil.diagnosis.screen import Lead
 from hil.diagnosis.terms import FRICTION, Key, Term, ambiguous
 from hil.measured import Measured
+from hil.twin.library import BY_ID
 
 FloatArray = NDArray[np.float64]
 Progress = Callable[[str], None]
@@ -53,6 +54,7 @@ FORM = 0.0025
 # is material, 7 % of the noise in rms. A simulation of the axis by someone else differs by as much.
 ALIKE = 0.25 * MATERIAL
 
+_NEAR = 0.99                # of what is possible: not at its end
 _COUNTING = 1.25 / np.pi    # a quarter more than counting itself makes,
 _LONG_PERIOD_M = 1e-3       # which has no period as long as this
 
@@ -177,9 +179,13 @@ def claimable(term: Term, bench: Bench) -> bool:
     Counting errs as a sawtooth, whose fundamental is 1/pi of a count: an error of the linear encoder up to there is
     how counting looks at one feed, and no more. Static friction below Coulomb friction is no Stribeck effect,
     whatever it fits, and what differs by direction by more than Coulomb friction is none: it would drive the axis.
+    A spring whose rest lies as far away as can be is a constant load.
     """
     if ambiguous(term) and term.effect == FRICTION:
         return abs(term.values[0]) <= bench.axis.physics().coulomb_n_m
+    if term.effect == "spring_load":
+        rest = BY_ID[term.effect].parameters[1]
+        return _NEAR * rest.low < term.values[1] < _NEAR * rest.high
     if term.effect == "stribeck_friction":
         return term.values[0] > bench.axis.physics().coulomb_n_m
     if term.effect == "scale_interpolation_error" and bench.encoders.table is not None:

@@ -20,11 +20,13 @@ _MUCH, _FAR = 0.05, 0.25
 
 
 def judge(owner: Fit, nominal: Fit, final: Fit, train: Sequence[Measured], held_out: Sequence[Measured]) -> Verdict:
-    """The verdict on the bench's own values, their refit, and the refit with the terms found."""
+    """The verdict on the bench's own values, their refit, and the refit with the terms found; where these are not
+    believed, on the first two."""
     if final.model.terms:
         left = 1.0 - explained_share(nominal, final, held_out or train)
         above = max(ratio for run in (*train, *held_out) for ratio in noise_ratios(final, run).values())
-        return Verdict.MISSING_PHYSICS if final.at_floor or names_stand(left, above) else Verdict.UNEXPLAINED
+        if final.at_floor or names_stand(left, above):
+            return Verdict.MISSING_PHYSICS
     if not all(ratio <= FLOOR for run in train for ratio in noise_ratios(nominal, run).values()):
         return Verdict.UNEXPLAINED
     return Verdict.NO_MISMATCH if owner.at_floor or not refit_matters(owner, nominal) \

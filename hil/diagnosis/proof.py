@@ -84,7 +84,7 @@ def excess(found: Fit, runs: Sequence[Measured]) -> float:
 def explained_share(before: Fit, after: Fit, runs: Sequence[Measured]) -> float:
     """Share of the energy above the floor that `after` takes away from `before`, in [0, 1]."""
     left, was = excess(after, runs), excess(before, runs)
-    return min(max(1.0 - left / was, 0.0), 1.0) if was > 0.0 else 1.0
+    return min(max(1.0 - left / was, 0.0), 1.0) if was > 0.0 else float(left == 0.0)
 
 
 def _sum(found: Fit, runs: Sequence[Measured], of: Callable[[float], float]) -> float:

@@ -78,6 +78,13 @@ def test_a_mismatch_without_a_term_or_with_a_poor_one_is_unexplained() -> None:
     assert judge(plain, plain, poor, found, held_out) is Verdict.UNEXPLAINED
 
 
+def test_a_name_that_is_not_believed_beside_a_twin_at_the_noise_is_no_mismatch() -> None:
+    """What a term takes from one channel it may add to another: with all at the noise without it, nothing lacks."""
+    found = runs()
+    plain, made_up = believed(found), believed(found, LOAD)
+    assert judge(plain, plain, made_up, found, runs(seed=2)) is Verdict.NO_MISMATCH
+
+
 @pytest.mark.parametrize(("left", "above", "stands"), [
     (0.04, 50.0, True), (0.06, 5.2, False), (0.10, 1.6, True), (0.17, 1.6, False), (0.30, 1.25, True),
     (0.30, 1.3, False), (0.51, 1.0, False), (np.nan, 1.0, False), (0.3, np.nan, False)])

@@ -52,3 +52,8 @@ def test_a_weight_above_coulomb_friction_is_no_friction() -> None:
     assert claimable(Term("asymmetric_friction", 0, (-0.9 * COULOMB_N_M,)), OWNER)
     assert not claimable(Term("asymmetric_friction", 0, (1.1 * COULOMB_N_M,)), OWNER)
     assert claimable(Term("constant_load", 0, (3.0 * COULOMB_N_M,)), OWNER)
+
+
+@pytest.mark.parametrize(("rest_m", "spring"), [(0.4, True), (-3.0, True), (-9.98, False), (10.0, False)])
+def test_a_spring_that_rests_out_of_reach_is_a_load(rest_m: float, spring: bool) -> None:
+    assert claimable(Term("spring_load", 0, (20.0, rest_m)), OWNER) is spring

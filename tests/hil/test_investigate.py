@@ -46,12 +46,10 @@ def test_what_one_direction_hides_is_found_by_the_motion_that_it_designs(
     investigate([profile], str(bench), virtual=True, folder=out)
     rounds = [json.loads((out / f"round_{number + 1}" / "diagnosis.json").read_text())
               for number in range(len(list(out.glob("round_*"))))]
-    first, second, last = rounds
+    first, last = rounds
     assert first["verdict"] == "parameter_error"                   # of Coulomb friction: one direction tells no more
     assert {"constant_load", "asymmetric_friction"} <= set(first["not_testable"])
     assert "constant_load" in first["next_experiment"]["separates"]
-    # over short strokes a spring that is far from rest pushes alike: a longer motion tells
-    assert second["missing"][0]["equivalents"] == ["spring_load", "constant_load"]
     assert json.loads((out / "diagnosis.json").read_text())["missing"] == last["missing"]
     finding, = last["missing"]
     assert finding["effect"] == "asymmetric_friction"

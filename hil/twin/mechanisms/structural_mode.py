@@ -32,13 +32,13 @@ def _with_structure(chain: Chain, parameters: Sequence[float], variant: int = 0)
 
     def shared(damping: FloatArray) -> FloatArray:
         # each mode is damped by what its shape takes of the dampers (modal strain energy, Johnson and Kienholz 1982)
-        return np.asarray(np.einsum("im,ij,jm->m", modes.shape, damping, modes.shape) / (2.0 * elastic))
+        taken = np.einsum("im,ij,jm->m", modes.shape, damping, modes.shape)
+        return np.asarray(np.maximum(taken, 0.0) / (2.0 * elastic))
 
-    old = np.pad(modal_damping(chain, modal(chain)), (0, 1))
-    new = 2.0 * damping_ratio / omega * stiffness * np.outer(spring, spring)
-    # a damper that no longer lets a mode swing is weakened until it does
-    share = float(np.min((_MOST - shared(old)) / np.maximum(shared(new), 1e-300), initial=1.0))
-    damping = old + share * new
+    damping = np.pad(modal_damping(chain, modal(chain)), (0, 1))
+    damping += 2.0 * damping_ratio / omega * stiffness * np.outer(spring, spring)
+    # dampers that no longer let a mode swing are weakened until they do
+    damping *= min(_MOST / max(float(shared(damping).max()), _MOST), 1.0)
     return replace(extended, damping_ratio=shared(damping), damping_n_m_s_rad=damping)
 
 

@@ -128,7 +128,9 @@ def test_structural_mode_absorbs_the_table_at_its_own_frequency(chain, frequency
     assert abs(response[longer.table]) < 1e-7 * np.abs(response).max()
 
 
-@given(chain=chains, frequency=frequencies, ratio=ratios, damping=st.floats(1e-4, 0.9))
+@given(chain=st.sampled_from([one_mass(95.0), two_mass(335.0, 384.0, 5.64e7, 0.03, 0.010),
+                              two_mass(335.0, 384.0, 5.64e7, 0.97, 0.010)]),
+       frequency=frequencies, ratio=ratios, damping=st.floats(1e-4, 0.9))
 @PROPERTY
 def test_structural_mode_adds_one_mode_and_keeps_the_rest(chain, frequency, ratio, damping) -> None:
     longer = with_structure(chain, frequency, damping, ratio)
@@ -140,7 +142,8 @@ def test_structural_mode_adds_one_mode_and_keeps_the_rest(chain, frequency, rati
     table = chain.inertia_kg_m2[chain.table, chain.table]
     assert longer.inertia_kg_m2.sum() == pytest.approx(chain.inertia_kg_m2.sum() + ratio * table)
     assert longer.damping_ratio[0] == 0.0
-    assert 0.0 < longer.damping_ratio[-1] < 1.0
+    assert (longer.damping_ratio[1:] > 0.0).all()
+    assert (longer.damping_ratio < 1.0).all()
     resisting = longer.damping_n_m_s_rad
     np.testing.assert_allclose(resisting @ rigid, 0.0, atol=1e-6 * resisting.max())
     assert np.linalg.eigvalsh(resisting).min() > -1e-6 * resisting.max()

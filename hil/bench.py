@@ -205,6 +205,12 @@ class Bench(_Model):
         return Twin(self.axis.physics(), self.gains, tuple(entry.active() for entry in self.mechanisms))
 
     @property
+    def motor_count(self) -> float:
+        """Count of the motor encoder [rad, or m of a linear axis]; 0 where it is not known."""
+        motor = self.encoders.motor
+        return (motor.resolution_m or 0.0) if self.axis.linear else 2.0 * math.pi / motor.counts_per_rev
+
+    @property
     def has_table_encoder(self) -> bool:
         """Whether a linear encoder is there; never on a linear axis of one mass."""
         return self.encoders.table is not None and not isinstance(self.axis, OneMass)

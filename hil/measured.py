@@ -194,12 +194,11 @@ def _start(gains: control.Gains, channels: Channels, command: FloatArray) -> Sta
 
 def _noise(bench: Bench, velocity: FloatArray, motor: FloatArray, table: FloatArray, command: FloatArray,
            torque: FloatArray, period_s: float) -> Noise:
-    encoder = bench.encoders.motor
-    count = encoder.resolution_m if bench.axis.linear else 2.0 * np.pi / encoder.counts_per_rev
-    motor_noise, table_noise = max(_white(motor), (count or 0.0) / np.sqrt(12.0)), 0.0
+    motor_noise, table_noise = max(_white(motor), bench.motor_count / np.sqrt(12.0)), 0.0
     if table.size and bench.encoders.table is not None:
-        counting = np.hypot(bench.encoders.table.resolution_m, bench.axis.ratio_m_rad * (count or 0.0)) / np.sqrt(12.0)
-        table_noise = max(_white(table - bench.axis.ratio_m_rad * motor), float(counting))
+        ratio_m = bench.axis.ratio_m_rad
+        counting = np.hypot(bench.encoders.table.resolution_m, ratio_m * bench.motor_count) / np.sqrt(12.0)
+        table_noise = max(_white(table - ratio_m * motor), float(counting))
     of_torque = _white(torque) if np.array_equal(command, torque) else _coloured(torque - command)
     return Noise(motor_noise, table_noise, of_torque, _jitter_s(motor, velocity, motor_noise, period_s))
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from hil.bench import Bench
 from hil.channels import AXIS_CHANNELS, CHANNELS
 from hil.diagnosis.fit import Fit
-from hil.diagnosis.floor import Floor, Laps, floor, laps, shaken
+from hil.diagnosis.floor import Floor, Laps, floor, laps, rms, sensor_noise, shaken
 from hil.diagnosis.model import scales
 from hil.diagnosis.result import ChannelFit, FitFigures, Mode
 from hil.measured import Measured
@@ -127,10 +127,5 @@ def _white(run: Measured, found: Fit, channel: str, mode: Mode, moved: dict[str,
     """White noise of a channel; block by block the motor counts from the torque that the torque channel can see, in
     closed loop all move with what the controller answers to the noise."""
     if mode is Mode.BLOCKS:
-        return _rms(scales(run, found.model.bench, found.model.observer_s)[channel][run.judged])
-    sensor = {"motor": _rms(run.motor_noise[run.judged]), "table": run.noise.table_m, "torque": run.noise.torque}
-    return math.hypot(sensor[channel], moved[channel])
-
-
-def _rms(values: FloatArray) -> float:
-    return float(np.sqrt(np.mean(values**2)))
+        return rms(scales(run, found.model.bench, found.model.observer_s)[channel][run.judged])
+    return math.hypot(sensor_noise(run)[channel], moved[channel])

@@ -35,7 +35,7 @@ _ENOUGH_S = 1.0          # of repeated motion, to call a floor measured
 # A channel that moves by less than this share of its sensor's noise may do so as it likes. One axis with coarse counts
 # was measured to move by three times its noise; a loop that is chaotic moves by tens and more.
 _LITTLE, _LARGE = 0.3, 5.0
-_HALF = 0.75             # of what all of the noise does is the most that half of it may do
+_HALF = 0.75             # of what all of the noise does: half of it does 0.5 in a linear loop, 1 in a chaotic one
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,20 +76,19 @@ def shaken(found: Fit, run: Measured) -> dict[str, float]:
     """
     twin, bench = found.model.twin(found.x), found.model.bench
     quiet = found.model.respond(found.x, run)
-    motor, table = bench.encoders.motor, bench.encoders.table
-    count = motor.resolution_m if bench.axis.linear else 2.0 * np.pi / motor.counts_per_rev
+    table = bench.encoders.table
     own_m = max(run.noise.table_m**2 - (bench.axis.ratio_m_rad * run.noise.motor) ** 2, 0.0) ** 0.5
     rng = np.random.default_rng(0)
-    misread = np.array([_misread(quiet.motor_position, count or 0.0, run.motor_noise, rng),
+    misread = np.array([_misread(quiet.motor_position, bench.motor_count, run.motor_noise, rng),
                         _misread(quiet.table_position_m, table.resolution_m if table else 0.0, own_m, rng)])
 
     def moved(share: float) -> dict[str, float]:
         other = twin.simulate(run.position_command_m, run.velocity_command_m_s, run.start, run.table_m, share * misread)
-        return {name: _rms((a - b)[run.judged]) for name, a, b in (
+        return {name: rms((a - b)[run.judged]) for name, a, b in (
             ("motor", other.motor_position, quiet.motor_position),
             ("table", other.table_position_m, quiet.table_position_m), ("torque", other.torque, quiet.torque))}
 
-    noise = {"motor": _rms(run.motor_noise[run.judged]), "table": run.noise.table_m, "torque": run.noise.torque}
+    noise = sensor_noise(run)
     full, half = moved(1.0), moved(0.5)
     known = [name for name in full if noise[name] > 0.0]
     calm = all(full[name] < _LITTLE * noise[name]
@@ -97,7 +96,13 @@ def shaken(found: Fit, run: Measured) -> dict[str, float]:
     return full if calm else dict.fromkeys(full, 0.0)
 
 
-def _rms(values: FloatArray) -> float:
+def sensor_noise(run: Measured) -> dict[str, float]:
+    """Noise of the sensors of motor, table and torque over a run, rms."""
+    return {"motor": rms(run.motor_noise[run.judged]), "table": run.noise.table_m, "torque": run.noise.torque}
+
+
+def rms(values: FloatArray) -> float:
+    """Root mean square."""
     return float(np.sqrt(np.mean(values**2)))
 
 

@@ -1,4 +1,4 @@
-"""Damping of chains of many masses in the stepping kernel: where a lead errs, in play, where preload is lost."""
+"""Damping of chains in the stepping kernel: where a lead errs, in play, with lost preload, with a structure."""
 
 from math import pi
 
@@ -124,3 +124,13 @@ def test_a_structure_damped_beyond_all_measure_stays_finite(structure: tuple[flo
     found = twin(chain, Active("structural_mode", structure, 0)).drive(torque).table_position_m
     expected = driven(longer, longer.stiffness_n_m_rad, longer.damping_n_m_s_rad, torque)
     assert off(found, expected) < 0.02
+
+
+@pytest.mark.parametrize("variant", [0, 1])
+def test_a_structure_close_to_the_mode_of_the_chain_shares_its_damping(variant: int) -> None:
+    axis, structure = two_mass(335.0, 384.0, 5.64e7, 0.06, 0.010), (70.0, 0.005, 0.3)
+    longer = BY_ID["structural_mode"].contribution(axis, structure, variant)
+    torque = np.random.default_rng(1).standard_normal(400)
+    found = twin(axis, Active("structural_mode", structure, variant)).drive(torque).table_position_m
+    expected = driven(longer, longer.stiffness_n_m_rad, longer.damping_n_m_s_rad, torque)
+    assert off(found, expected) < 0.003

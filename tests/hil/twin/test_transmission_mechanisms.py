@@ -7,16 +7,12 @@ import pytest
 from contributions import AT_REST, PROPERTY, RATIO_M, call
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.linalg import expm
 from scipy.optimize import brentq
 
-from hil.control import make_gains
-from hil.twin.axis import Twin
 from hil.twin.chain import one_mass, two_mass
 from hil.twin.library import BY_ID, LIBRARY
 from hil.twin.mechanism import Stage
 from hil.twin.modal import modal
-from hil.twin.physics import Active, Physics
 
 deflections = st.floats(-0.5, 0.5)   # rad: +-0.8 mm at the table
 lengths = st.floats(0.0, 1e-3)
@@ -171,25 +167,3 @@ def test_structural_mode_damps_the_mode_it_brings(frequency_hz: float, mode: int
     assert longer.damping_ratio[mode] == pytest.approx(0.11, rel=0.01)
     assert longer.damping_ratio[3 - mode] == pytest.approx(0.03, rel=0.01)
     assert modal(longer).frequency_rad_s[mode] == pytest.approx(2.0 * pi * frequency_hz, rel=0.01)
-
-
-@pytest.mark.parametrize("variant", [0, 1])
-def test_a_structure_close_to_the_mode_of_the_chain_shares_its_damping(variant: int) -> None:
-    """The kernel against the matrix exponential of J q'' + C q' + K q = f, torques held from tick to tick."""
-    axis, structure = two_mass(335.0, 384.0, 5.64e7, 0.06, 0.010), (70.0, 0.005, 0.3)
-    torque = np.random.default_rng(1).standard_normal(400)
-    gains = make_gains(position_gain_1_s=10.0, velocity_gain_n_m_s_rad=0.1, ratio_m_rad=RATIO_M)
-    found = Twin(Physics(axis, 0.0, 0.0), gains, (Active("structural_mode", structure, variant),)).drive(torque)
-    chain = BY_ID["structural_mode"].contribution(axis, structure, variant)
-    n, none = len(chain.names), np.zeros((len(chain.names),) * 2)
-    slope = np.linalg.solve(np.block([[np.eye(n), none], [none, chain.inertia_kg_m2]]), np.block(
-        [[none, np.eye(n)], [-chain.stiffness_n_m_rad, -chain.damping_n_m_s_rad]]))
-    push = np.append(np.zeros(n), np.linalg.solve(chain.inertia_kg_m2, np.eye(n)[chain.motor]))
-    moved = expm(np.pad(np.column_stack([slope, push]), ((0, 1), (0, 0))) * gains.period_s)
-    state, expected = np.zeros(2 * n), []
-    for held in torque:
-        expected.append(state[chain.table] * RATIO_M)
-        state = (moved @ np.append(state, held))[:-1]
-    moves = np.diff(found.table_position_m)
-    left = moves - np.diff(expected)
-    assert np.std(left) < 0.003 * np.std(moves)

@@ -54,7 +54,7 @@ FORM = 0.0025
 # is material, 7 % of the noise in rms. A simulation of the axis by someone else differs by as much.
 ALIKE = 0.25 * MATERIAL
 
-_NEAR = 0.99                # of what is possible: not at its end
+_NEAR = 0.9                 # of what is possible: not at its end, nor on the way there
 _COUNTING = 1.25 / np.pi    # a quarter more than counting itself makes,
 _LONG_PERIOD_M = 1e-3       # which has no period as long as this
 
@@ -127,7 +127,7 @@ def explain(bench: Bench, runs: Sequence[Measured], progress: Progress = lambda 
             key=lambda rival: rival.evidence)
         best, needed = _pruned(best, nominal, runs)
         # to its end: what a fit that is on its way leaves looks like something else
-        base = fit(best.model, runs, best.x, evaluations=_ENDED, slopes=best.jacobian)
+        base = _claimed(fit(best.model, runs, best.x, evaluations=_ENDED, slopes=best.jacobian), runs)
         if _kinds(base) in tried:
             break       # what was added went again
         tried.append(_kinds(base))
@@ -179,7 +179,7 @@ def claimable(term: Term, bench: Bench) -> bool:
     Counting errs as a sawtooth, whose fundamental is 1/pi of a count: an error of the linear encoder up to there is
     how counting looks at one feed, and no more. Static friction below Coulomb friction is no Stribeck effect,
     whatever it fits, and what differs by direction by more than Coulomb friction is none: it would drive the axis.
-    A spring whose rest lies as far away as can be is a constant load.
+    A spring whose rest lies about as far away as can be is a constant load.
     """
     if ambiguous(term) and term.effect == FRICTION:
         return abs(term.values[0]) <= bench.axis.physics().coulomb_n_m
@@ -215,18 +215,33 @@ def _ablated(found: Fit, runs: Sequence[Measured]) -> dict[Key, tuple[float, Fit
     filters = whitening(found)
 
     def without(index: int) -> tuple[float, Fit]:
-        terms = found.model.terms
-        rest = replace(found.model, terms=terms[:index] + terms[index + 1:])
-        first = found.model.nominal_count + sum(len(term.values) for term in terms[:index])
-        columns = slice(first, first + len(terms[index].values))
-        other = fit(rest, runs, np.delete(found.x, columns), evaluations=6,
-                    slopes=np.delete(found.jacobian, columns, axis=1))
+        other = _without(found, index, runs)
         if found.cost > _CLEAR * other.cost:
-            other = fit(rest, runs, other.x, evaluations=12, slopes=other.jacobian)
+            other = fit(other.model, runs, other.x, evaluations=12, slopes=other.jacobian)
         return against(found, other, filters), other
 
     fits = in_parallel([partial(without, index) for index in range(len(found.model.terms))])
     return {term.key: result for term, result in zip(found.model.terms, fits, strict=True)}
+
+
+def _without(found: Fit, index: int, runs: Sequence[Measured]) -> Fit:
+    """A first fit without one of the terms."""
+    terms = found.model.terms
+    first = found.model.nominal_count + sum(len(term.values) for term in terms[:index])
+    columns = slice(first, first + len(terms[index].values))
+    return fit(replace(found.model, terms=terms[:index] + terms[index + 1:]), runs, np.delete(found.x, columns),
+               evaluations=6, slopes=np.delete(found.jacobian, columns, axis=1))
+
+
+def _claimed(found: Fit, runs: Sequence[Measured]) -> Fit:
+    """The fit without the terms whose values beside later ones are no longer what their names say."""
+    while True:
+        bench, terms = found.model.resolved(found.x)
+        lost = next((index for index, term in enumerate(terms) if not claimable(term, bench)), None)
+        if lost is None:
+            return found
+        rest = _without(found, lost, runs)
+        found = fit(rest.model, runs, rest.x, evaluations=_ENDED, slopes=rest.jacobian)
 
 
 def _pruned(found: Fit, nominal: Fit, runs: Sequence[Measured]) -> tuple[Fit, dict[Key, float]]:

@@ -129,6 +129,7 @@ class Mechanism:
     stage: Stage
     contribution: Callable[..., Any]
     variants: tuple[str, ...] = ("",)   # ways it may show: each is weighed in its own right
+    softens: bool = False               # whether it changes the stiffness of a spring of the chain
     play: bool = False                  # in the second variant the flanks of the transmission push only
     slips: bool = False                 # in the second variant the contact is of Maxwell slip elements
     second_stage: Stage | None = None   # where the second variant enters, if elsewhere

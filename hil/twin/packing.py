@@ -12,7 +12,7 @@ from hil import control
 from hil.twin import layout, stages
 from hil.twin.chain import Chain
 from hil.twin.library import BY_ID, SLOTS
-from hil.twin.mechanism import PARAMETERS, Stage
+from hil.twin.mechanism import PARAMETERS
 from hil.twin.modal import Modal, discretise
 from hil.twin.physics import Active, Physics
 
@@ -82,9 +82,10 @@ def pack_constants(physics: Physics, active: Sequence[Active], gains: control.Ga
     for at, first in ((layout.COARSE_GAINS, layout.COARSE), (layout.FINE_GAINS, layout.FINE)):
         per_torque = modes[first + 5]
         constants[at:at + 3] = motor * per_torque @ motor, motor * per_torque @ table, table * per_torque @ table
-    bends = any(BY_ID[one.effect].stage in (Stage.TRANSMISSION, Stage.SCREW) for one in active)
+    # what a spring gives beside the modes is held over a step, and modes of a long chain are faster than a coarse one
+    softens = any(BY_ID[one.effect].softens for one in active)
     elastic = np.count_nonzero(modes[layout.SHAPE_SPRING, 1:])
-    constants[layout.ALWAYS_FINE] = float(bends and elastic > 1)
+    constants[layout.ALWAYS_FINE] = float(softens and elastic > 1)
     return constants
 
 

@@ -35,5 +35,6 @@ MECHANISM = Mechanism(
     stage=Stage.TRANSMISSION,
     contribution=_free_play,
     variants=("oiled flanks", "dry flanks"),
+    softens=True,
     play=True,
 )

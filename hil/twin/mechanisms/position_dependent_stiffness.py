@@ -26,4 +26,5 @@ MECHANISM = Mechanism(
     parameters=(Parameter("relative_slope", Dimension.PER_LENGTH, -10.0, 10.0),),
     stage=Stage.SCREW,
     contribution=_stiffness_along_travel,
+    softens=True,
 )

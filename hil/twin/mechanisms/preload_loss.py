@@ -34,4 +34,5 @@ MECHANISM = Mechanism(
     ),
     stage=Stage.TRANSMISSION,
     contribution=_soft_zone,
+    softens=True,
 )

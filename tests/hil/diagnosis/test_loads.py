@@ -6,9 +6,11 @@ import pytest
 from diagnosis_runs import bench, recorded
 
 from hil.bench import Bench, MechanismEntry
-from hil.diagnosis import search
+from hil.diagnosis import explain, search
 from hil.diagnosis.diagnose import diagnose
 from hil.diagnosis.explain import claimable
+from hil.diagnosis.fit import fit
+from hil.diagnosis.model import Model
 from hil.diagnosis.terms import Term
 from hil.measured import take
 
@@ -54,6 +56,18 @@ def test_a_weight_above_coulomb_friction_is_no_friction() -> None:
     assert claimable(Term("constant_load", 0, (3.0 * COULOMB_N_M,)), OWNER)
 
 
-@pytest.mark.parametrize(("rest_m", "spring"), [(0.4, True), (-3.0, True), (-9.98, False), (10.0, False)])
+@pytest.mark.parametrize(("rest_m", "spring"), [(0.4, True), (-3.0, True), (-9.5, False), (10.0, False)])
 def test_a_spring_that_rests_out_of_reach_is_a_load(rest_m: float, spring: bool) -> None:
     assert claimable(Term("spring_load", 0, (20.0, rest_m)), OWNER) is spring
+
+
+def test_a_spring_that_a_later_fit_moves_out_of_reach_goes() -> None:
+    lag = Term("current_loop_lag", 0, (1e-3,))
+    runs = [take(recorded(OWNER, Term("constant_load", 0, (0.8,)), lag), OWNER)]
+    ratio_m_rad = OWNER.axis.ratio_m_rad
+    spring = Term("spring_load", 0, (0.8 / ratio_m_rad / 8.0, -8.0))
+    assert claimable(spring, OWNER)
+    found = fit(Model(OWNER, (spring, lag)), runs)
+    (out_of_reach, _) = found.model.resolved(found.x)[1]
+    assert not claimable(out_of_reach, OWNER)
+    assert [term.effect for term in explain._claimed(found, runs).model.terms] == ["current_loop_lag"]

@@ -1,44 +1,43 @@
-"""python -m hil.proof.peers CASES OUT --method NAME
+"""python -m hil.proof.peers CASES OUT [--method NAME]... [--jobs N] [--first N]
 
-reads CASES/CASE/{train_1, train_2, holdout}.parquet and bench.yaml, writes OUT/CASE/diagnosis.json, or error.json where
-the method failed. Cases with an answer are left out. What lies in DIR/peers/NAME is scored by `hil prove --out DIR`.
+reads CASES/CASE/{train_1, train_2, holdout}.parquet and bench.yaml, writes OUT/NAME/CASE/diagnosis.json, or error.json
+where the method failed. Cases with an answer are left out. What lies in DIR/peers is scored by `hil prove --out DIR`.
 """
 
 from __future__ import annotations
 
 import sys
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
-from time import monotonic
 from typing import Annotated
 
 import typer
 
 from hil.errors import HilError, InputError
-from hil.proof.blind import DIAGNOSIS, ERROR, answered
-from hil.proof.peers import METHODS
-from hil.report.output import write_json
+from hil.proof.blind import answered
+from hil.proof.peers import METHODS, SLOW
+from hil.proof.peers.answer import answer_case
+from hil.proof.side_by_side import side_by_side
 
 Name = StrEnum("Name", {name: name for name in METHODS})    # type: ignore[misc]   # choices of the command line
+_QUICK = [Name(name) for name in METHODS if name not in SLOW]
 
 
 def answer_cases(cases: Annotated[Path, typer.Argument(help="Folder with a folder for each case")],
-                 out: Annotated[Path, typer.Argument(help="Folder for the answers")],
-                 method: Annotated[Name, typer.Option(help="Who answers")]) -> None:
-    """Have every case that has no answer yet answered by another method; prints the name of each when it is done."""
-    for place in sorted(cases.iterdir()):
-        answer = out / place.name
-        if answered(answer):
-            continue
-        answer.mkdir(parents=True, exist_ok=True)
-        begin = monotonic()
-        try:
-            found = METHODS[method](place)
-        except (InputError, ValueError, ArithmeticError) as error:     # a wrong answer, but an answer
-            write_json(answer / ERROR, {"kind": type(error).__name__, "error": str(error)})
-        else:
-            write_json(answer / DIAGNOSIS, found | {"runtime_s": monotonic() - begin})
-        print(place.name, flush=True)
+                 out: Annotated[Path, typer.Argument(help="Folder for the answers, a folder for each method")],
+                 method: Annotated[list[Name], typer.Option(help="Who answers")] = _QUICK,
+                 jobs: Annotated[int, typer.Option(min=1, help="Cases at once, each on its share of the cores")] = 1,
+                 first: Annotated[int | None, typer.Option(min=1, help="Only so many cases, which lie in mixed order")]
+                 = None) -> None:
+    """Have other methods answer every case that they have not answered yet; prints the name of each that is done."""
+    if not cases.is_dir():
+        raise InputError(f"{cases}: no such folder, allowed the folder of cases of a proof, DIR/cases")
+    names = [str(name) for name in method]
+    todo = [place for place in sorted(cases.iterdir())[:first]
+            if not all(answered(out / name / place.name) for name in names)]
+    for done in side_by_side(partial(answer_case, out=out, methods=names), todo, jobs):
+        print(done, flush=True)
 
 
 if __name__ == "__main__":

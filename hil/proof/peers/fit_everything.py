@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +22,7 @@ from hil.diagnosis.screen import Lead
 from hil.diagnosis.starts import Start, starts
 from hil.diagnosis.terms import Term
 from hil.measured import Measured
-from hil.proof.peers.case import Answer, read_case
+from hil.proof.peers.case import Answer, Case
 
 EVALUATIONS = 12         # a minute on two cores for half a minute of recordings
 SIGNIFICANT = 2.0        # standard errors
@@ -33,9 +32,8 @@ _STRENGTH = {"structural_mode": 2}
 _NEVER_ZERO = ("stribeck_friction", "presliding_hysteresis", "torque_saturation")
 
 
-def fit_everything(folder: Path, evaluations: int = EVALUATIONS) -> Answer:
-    """The answer of one fit of everything about a case folder."""
-    case = read_case(folder)
+def fit_everything(case: Case, evaluations: int = EVALUATIONS) -> Answer:
+    """The answer of one fit of everything about a case."""
     begun = {start.effect: start for start in starts(case.scene, case.bench)}
     terms = tuple(_weak(lead, begun[lead.term.effect]) for lead in search.leads(case.nominal, case.train))
     model = replace(case.nominal.model, terms=terms)

@@ -12,17 +12,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import log
-from pathlib import Path
 
-from hil.proof.peers.case import Answer, read_case
+from hil.proof.peers.case import Answer, Case
 from hil.proof.peers.regressors import PLANT, Equation, equations, forward, named
 
 _MOST = 20           # terms
 
 
-def forward_selection(folder: Path, blocks: Sequence[str] = PLANT) -> Answer:
-    """The answer of FROLS about a case folder."""
-    case = read_case(folder)
+def forward_selection(case: Case, blocks: Sequence[str] = PLANT) -> Answer:
+    """The answer of FROLS about a case."""
     return case.answer(named([(equation, select(equation)) for equation in equations(case, case.train, blocks)]))
 
 

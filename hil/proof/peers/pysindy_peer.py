@@ -9,13 +9,12 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from hil.errors import HilError
-from hil.proof.peers.case import Answer, read_case
+from hil.proof.peers.case import Answer, Case
 from hil.proof.peers.regressors import PLANT, Equation, equations, named
 
 _THRESHOLDS = np.geomspace(0.02, 5.0, 16)      # contribution of a term, in units of noise
@@ -23,14 +22,13 @@ _RIDGE = 1e-3                                  # of the energy of a term
 _BLOCK = 200                                   # rows that count as one observation: errors in a row resemble each other
 
 
-def pysindy(folder: Path, blocks: Sequence[str] = PLANT) -> Answer:
-    """The answer of PySINDy about a case folder. Raises HilError where PySINDy is not installed."""
+def pysindy(case: Case, blocks: Sequence[str] = PLANT) -> Answer:
+    """The answer of PySINDy about a case. Raises HilError where PySINDy is not installed."""
     try:
         from pysindy import STLSQ
     except ModuleNotFoundError as error:
         raise HilError(f"--method pysindy: {error.name} is not installed, allowed are methods without it; install what "
                        "the proof measures against with: make peers") from None
-    case = read_case(folder)
     train, held_out = equations(case, case.train, blocks), equations(case, case.held_out, blocks)
     return case.answer(named([(one, select(one, other, STLSQ)) for one, other in zip(train, held_out, strict=True)]))
 

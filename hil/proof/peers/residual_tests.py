@@ -12,8 +12,6 @@ residual away names the effect. Whiteness is not asked for: encoders count, whic
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
@@ -21,7 +19,7 @@ from scipy.stats import norm
 from hil.diagnosis.explain import MATERIAL
 from hil.diagnosis.model import scales
 from hil.measured import Measured
-from hil.proof.peers.case import Answer, Case, read_case
+from hil.proof.peers.case import Answer, Case
 from hil.proof.peers.regressors import Equation, equations
 
 FloatArray = NDArray[np.float64]
@@ -31,9 +29,8 @@ _LAGS = 200          # rows, up to which a signal remembers
 _CHANNELS = {"motor": "motor", "transmission": "table"}
 
 
-def residual_tests(folder: Path) -> Answer:
-    """The answer of the residual tests about a case folder."""
-    case = read_case(folder)
+def residual_tests(case: Case) -> Answer:
+    """The answer of the residual tests about a case."""
     found = equations(case, case.train, residuals=lambda run: _prediction_errors(case, run))
     count = sum(equation.terms.shape[1] for equation in found)
     bound = float(norm.ppf(1.0 - 0.5 * (1.0 - _LEVEL) / count))

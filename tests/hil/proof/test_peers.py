@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -12,7 +13,10 @@ import pytest
 
 from hil.errors import HilError
 from hil.proof.conceal import Case, draw, write
-from hil.proof.peers import METHODS, signals
+from hil.proof.peers import METHODS, SLOW, signals
+from hil.proof.peers.answer import answer_case
+from hil.proof.peers.case import Case as Prepared
+from hil.proof.peers.case import read_case
 from hil.proof.peers.fit_everything import fit_everything
 from hil.proof.peers.forward_selection import select
 from hil.proof.peers.pysindy_peer import pysindy
@@ -20,7 +24,7 @@ from hil.proof.peers.regressors import Equation, named
 from hil.proof.replies import reply_of
 from hil.twin.library import BY_ID
 
-QUICK = [name for name in METHODS if name != "fit_everything"]
+QUICK = [name for name in METHODS if name not in SLOW]
 
 
 @pytest.fixture(scope="module")
@@ -34,12 +38,18 @@ def folder(concealed: Case, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write(concealed, tmp_path_factory.mktemp("cases"))
 
 
+@pytest.fixture(scope="module")
+def case(folder: Path) -> Prepared:
+    return read_case(folder)
+
+
 @pytest.mark.parametrize("method", QUICK)
-def test_a_large_effect_is_named_first_in_the_form_of_the_interface(method: str, folder: Path, concealed: Case) -> None:
+def test_a_large_effect_is_named_first_in_the_form_of_the_interface(
+        method: str, case: Prepared, concealed: Case) -> None:
     if method.startswith("pysindy"):
         pytest.importorskip("pysindy", reason="not installed: make peers")
     assert concealed.truth.effects[0].size > 5.0
-    answer = METHODS[method](folder)
+    answer = METHODS[method](case)
     reply = reply_of(json.loads(json.dumps(answer)))
     assert reply.verdict == "missing_physics"
     assert reply.named[0].effect == "external_force"
@@ -47,40 +57,53 @@ def test_a_large_effect_is_named_first_in_the_form_of_the_interface(method: str,
 
 
 @pytest.mark.long
-def test_one_fit_of_everything_names_it_too(folder: Path) -> None:
-    assert "external_force" in [found["effect"] for found in fit_everything(folder)["missing"]]
+def test_one_fit_of_everything_names_it_too(case: Prepared) -> None:
+    assert "external_force" in [found["effect"] for found in fit_everything(case)["missing"]]
 
 
-def test_one_fit_of_everything_answers_in_the_form_of_the_interface(folder: Path) -> None:
+def test_one_fit_of_everything_answers_in_the_form_of_the_interface(case: Prepared) -> None:
     """After two steps, which take it nowhere yet."""
-    reply = reply_of(fit_everything(folder, evaluations=2))
+    reply = reply_of(fit_everything(case, evaluations=2))
     assert all(found.effect in BY_ID for found in reply.named)
 
 
 @pytest.mark.parametrize(("tier", "verdict"), [("null", "no_mismatch"), ("parameters_only", "parameter_error")])
 def test_with_nothing_to_name_the_parameters_are_judged(tier: str, verdict: str, tmp_path: Path) -> None:
-    answer = METHODS["residual_tests"](write(draw(tier, 1, 3, axis="one_mass"), tmp_path))
+    answer = METHODS["residual_tests"](read_case(write(draw(tier, 1, 3, axis="one_mass"), tmp_path)))
     assert answer == {"verdict": verdict, "missing": []}
 
 
-def test_without_pysindy_the_message_says_what_to_do(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_pysindy_the_message_says_what_to_do(case: Prepared, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pysindy", None)
     with pytest.raises(HilError, match=r"pysindy is not installed, allowed .*make peers") as raised:
-        pysindy(folder)
+        pysindy(case)
     assert raised.value.exit_code == 1
 
 
-def test_the_command_answers_every_case_once(folder: Path, tmp_path: Path) -> None:
-    (tmp_path / "case_0000").mkdir()
-    (tmp_path / "case_0000" / "diagnosis.json").write_text("{}", encoding="utf-8")
-    command = [sys.executable, "-m", "hil.proof.peers", str(folder.parent), str(tmp_path)]
-    done = subprocess.run([*command, "--method", "forward_selection"], capture_output=True, text=True, check=True)
+def test_the_command_has_each_method_answer_every_case_once(folder: Path, tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "hil.proof.peers", str(folder.parent), str(tmp_path), "--first", "1", "--jobs",
+               "2", "--method", "forward_selection", "--method", "residual_tests"]
+    kept = tmp_path / "residual_tests" / folder.name / "diagnosis.json"
+    kept.parent.mkdir(parents=True)
+    kept.write_text("{}", encoding="utf-8")
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
     assert done.stdout.split() == [folder.name]
-    answer = json.loads((tmp_path / folder.name / "diagnosis.json").read_text(encoding="utf-8"))
+    answer = json.loads((tmp_path / "forward_selection" / folder.name / "diagnosis.json").read_text(encoding="utf-8"))
     assert answer["verdict"] == "missing_physics"
     assert answer["runtime_s"] > 0.0
-    done = subprocess.run([*command, "--method", "forward_selection"], capture_output=True, text=True, check=True)
+    assert kept.read_text(encoding="utf-8") == "{}"
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
     assert done.stdout == ""
+
+
+def test_a_case_that_cannot_be_read_is_a_wrong_answer_of_each_method(folder: Path, tmp_path: Path) -> None:
+    broken = tmp_path / "cases" / "case_0000"
+    shutil.copytree(folder, broken)
+    (broken / "bench.yaml").write_text("axis: 3\n", encoding="utf-8")
+    answer_case(broken, tmp_path / "peers", ("forward_selection", "residual_tests"))
+    for method in ("forward_selection", "residual_tests"):
+        error = json.loads((tmp_path / "peers" / method / "case_0000" / "error.json").read_text(encoding="utf-8"))
+        assert error["kind"] == "InputError"
 
 
 def test_forward_selection_finds_the_terms_of_a_sum_and_stops_at_noise() -> None:

@@ -202,9 +202,9 @@ def test_the_blind_process_imports_nothing_that_knows(tmp_path: Path) -> None:
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     loaded = set(ran.stdout.split())
     assert "hil.diagnosis.diagnose" in loaded
-    assert {name for name in loaded if name.startswith("hil.proof.")} == {"hil.proof.blind"}
+    assert {name for name in loaded if name.startswith("hil.proof.")} == {"hil.proof.blind", "hil.proof.side_by_side"}
     assert not {name for name in loaded if name.startswith("drivers.sim") or name in ("hil.simulated", "hil.run")}
-    assert data(tmp_path / "answer" / ERROR)["kind"] == "InputError"
+    assert data(tmp_path / "answer" / "empty" / ERROR)["kind"] == "InputError"
 
 
 def test_a_case_that_fails_is_an_answer_and_not_tried_again(tmp_path: Path) -> None:

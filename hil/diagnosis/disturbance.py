@@ -36,14 +36,23 @@ class Disturbance:
 
 def disturbance(run: Measured, innovation: FloatArray, inertia: float, observer_s: float) -> Disturbance:
     """The disturbance torque of a run from the motor's innovation (n,) [motor units], measured minus twin."""
-    width = max(round(_SMOOTH_S / run.period_s), 1)
-    kernel = np.ones(width) / width
-    velocity = np.convolve(np.gradient(run.motor, run.period_s), kernel, "same")
-    torque = np.convolve(innovation, kernel, "same") * inertia / observer_s**2
+    width = _width(run.period_s)
+    velocity = smooth(np.gradient(run.motor, run.period_s), run.period_s)
+    torque = smooth(innovation, run.period_s) * inertia / observer_s**2
     slow = 2e-3 * np.max(np.abs(velocity), initial=1e-9)
     sliding = np.convolve((np.abs(velocity) < slow).astype(float), np.ones(3 * width), "same") == 0
     sliding[: 10 * width] = sliding[-3 * width:] = False
     return Disturbance(torque, velocity, sliding)
+
+
+def smooth(values: FloatArray, period_s: float) -> FloatArray:
+    """Means (n,) over as much time as leaves a disturbance."""
+    width = _width(period_s)
+    return np.convolve(values, np.ones(width) / width, "same")
+
+
+def _width(period_s: float) -> int:
+    return max(round(_SMOOTH_S / period_s), 1)
 
 
 def _harmonic_share(phase: FloatArray, signal: FloatArray) -> float:

@@ -18,6 +18,7 @@ from hil.diagnosis.fit import Fit
 from hil.diagnosis.fit_table import channel_names
 from hil.diagnosis.periods import Lock, lock
 from hil.diagnosis.phases import phases
+from hil.diagnosis.reaction import acting
 from hil.diagnosis.result import Location, Phase, PhaseKind
 from hil.measured import Measured
 from hil.twin.library import BY_ID
@@ -27,7 +28,7 @@ FloatArray = NDArray[np.float64]
 # Channel of the twin -> block whose output it is, and the part of the axis an engineer would look at
 BLOCKS = {"command": ("controller", "control law and its inputs"), "torque": ("drive", "drive and current loop"),
           "motor": ("motor_side", "motor, screw bearings and friction"),
-          "table": ("transmission", "ball screw, nut and table")}
+          "table": ("transmission", "ball screw, nut and linear encoder")}
 
 CONCENTRATED = 0.8       # share of the energy that a window or a range holds
 NARROW = 0.5             # of what the motion covers: a range beyond is no range
@@ -59,6 +60,8 @@ def locate(found: Fit, runs: Sequence[Measured], final: Fit) -> Location:
     if terms:
         mechanism = BY_ID[terms[0].effect]
         block, element = mechanism.block.value, mechanism.element
+    elif found is final and strongest[0] in ("motor", "table"):      # no refit moves it either
+        block, element = acting(found, runs) or (block, element)
     # with names, what the named physics does to the axis is known without noise
     seen = energies(without_terms(final), runs, final) if terms else energies(found, runs)
     locked = lock(seen, max(strongest, key=lambda name: shares[name]), bench, terms)

@@ -1,0 +1,62 @@
+"""What acts without a name: on the table, in the transmission, in the linear encoder, on the motor."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from diagnosis_runs import bench, changed, recorded
+
+from hil.diagnosis import search
+from hil.diagnosis.locate import locate
+from hil.diagnosis.reaction import acting, stiffness_between
+from hil.diagnosis.terms import Term
+from hil.measured import take
+from hil.recording import Recording
+from hil.twin.chain import serial_chain, two_mass
+
+OWNER = bench()
+
+
+def bursts() -> Recording:
+    """The linear encoder reads 5 um of noise for 0.2 s."""
+    clean = recorded(OWNER)
+    noisy = np.where(np.abs(clean.columns["time_s"] - 0.5) < 0.1, 5e-6, 0.0)
+    error_m = noisy * np.random.default_rng(3).standard_normal(noisy.size)
+    return changed(clean, table_position_m=clean.columns["table_position_m"] + error_m)
+
+
+@pytest.mark.parametrize(("recording", "block"), [
+    (recorded(OWNER, Term("external_force", 0, (150.0, 0.3, 0.6))), "table"),
+    (recorded(OWNER, Term("spring_load", 0, (3000.0, 0.02))), "table"),
+    (recorded(OWNER, Term("periodic_lead_error", 0, (3e-6, 0.4, 1e-6, 1.0, 0.0, 0.0))), "transmission"),
+    (bursts(), "sensor"),
+    (recorded(OWNER, Term("cogging_torque", 0, (0.1, 6.0, 0.2))), "motor_side"),
+    (recorded(OWNER, Term("torque_ripple", 0, (0.2, 6.0, 0.2))), "motor_side"),
+], ids=["push", "spring", "lead", "noise bursts", "cogging", "ripple"])
+def test_the_motor_tells_on_which_side_of_the_transmission_it_acts(recording: Recording, block: str) -> None:
+    runs = (take(recording, OWNER),)
+    left = search.nominal(OWNER, runs)
+    assert locate(left, runs, left).block == block
+
+
+def test_wrong_parameters_are_placed_where_they_show_and_not_where_they_seem_to_act() -> None:
+    """A heavier table loads the spring as a force on it would."""
+    runs = (take(recorded(bench(table_mass_kg=1.5 * OWNER.axis.table_mass_kg)), OWNER),)
+    refitted = search.nominal(OWNER, runs)
+    owner = search.evaluate(refitted.model, runs)
+    assert acting(owner, runs) is not None
+    assert locate(owner, runs, refitted).block in ("motor_side", "transmission")
+
+
+def test_without_a_second_encoder_nothing_is_told() -> None:
+    runs = (take(recorded(OWNER, Term("external_force", 0, (150.0, 0.3, 0.6))), OWNER),)
+    owner = OWNER.model_copy(update={"encoders": OWNER.encoders.model_copy(update={"table": None})})
+    blind = (take(changed(recorded(owner), table_position_m=None), owner),)
+    assert acting(search.nominal(owner, blind), blind) is None
+    assert acting(search.nominal(OWNER, runs), runs) is not None
+
+
+def test_the_stiffness_that_holds_the_table_is_that_of_the_springs_in_series() -> None:
+    assert stiffness_between(two_mass(10.0, 200.0, 1e8, 0.02, 0.01)) == pytest.approx(1e8 * (0.01 / (2 * np.pi)) ** 2)
+    chain = serial_chain([1e-3, 1e-3, 1e-3], [100.0, 50.0], 0.02, 0.01)
+    assert stiffness_between(chain) == pytest.approx(1.0 / (1.0 / 100.0 + 1.0 / 50.0))

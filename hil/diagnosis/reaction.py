@@ -34,7 +34,8 @@ ENCODER = (Block.SENSOR.value, "linear encoder")
 # anything else. On development axes forces had 0.9 to 5, errors of the transmission 0.6 at most, of encoders 0.1.
 _PASSED, _ALONE = 0.7, 0.5
 # Inertia that would stand so far out of what the motor feels anyway, and of which it feels less than this, is not
-# there: errors of the linear encoder had 0.02 at most, those of the transmission 0.5 and more.
+# there: errors of the linear encoder had 0.02 at most, those of the transmission 0.5 and more. Fewer rows than pass in
+# some ten of the means that a disturbance is smoothed by could be one knock.
 _STANDS_OUT, _MISSING, _FEW_S = 5.0, 0.25, 0.05
 _DEVIATION = 1.4826     # standard deviation of Gaussian noise over the median of its size
 

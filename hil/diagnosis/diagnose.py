@@ -10,12 +10,13 @@ import numpy as np
 
 from hil.bench import Bench
 from hil.diagnosis.experiment import Experiment, separating, showing
-from hil.diagnosis.explain import Explanation, explain, noise_ratios
+from hil.diagnosis.explain import Explanation, explain
 from hil.diagnosis.findings import corrections, diagnosed_bench, findings, renamed
 from hil.diagnosis.fit import FLOOR, Fit
 from hil.diagnosis.fit_table import channel_names, fit_table
 from hil.diagnosis.judge import judge
 from hil.diagnosis.locate import locate
+from hil.diagnosis.noise_ratios import noise_ratios
 from hil.diagnosis.preflight import prepare
 from hil.diagnosis.proof import Proof, explained_share, prove
 from hil.diagnosis.result import ChannelFit, Location, Mode, NextExperiment, Result, Unexplained, Verdict

@@ -12,20 +12,18 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hil.bench import Bench
 from hil.diagnosis import search
+from hil.diagnosis.claims import claimable
 from hil.diagnosis.evidence import against, whitening
 from hil.diagnosis.fit import Fit, evaluate, fit, in_parallel
 from hil.diagnosis.floor import REPEATS, all_laps, unrepeated
-from hil.diagnosis.model import LAST_EDGE_STEP_S, scales
+from hil.diagnosis.model import LAST_EDGE_STEP_S
 from hil.diagnosis.screen import Lead
-from hil.diagnosis.terms import FRICTION, Key, Term, ambiguous
+from hil.diagnosis.terms import FRICTION, Key, Term
 from hil.measured import Measured
-from hil.twin.library import BY_ID
 
-FloatArray = NDArray[np.float64]
 Progress = Callable[[str], None]
 
 MOST_TERMS = 8          # at once; more than an engineer could act on, and the search stays affordable
@@ -53,10 +51,6 @@ FORM = 0.0025
 # A rival that leaves no more than this beside the best is not refuted either, whatever the evidence: a quarter of what
 # is material, 7 % of the noise in rms. A simulation of the axis by someone else differs by as much.
 ALIKE = 0.25 * MATERIAL
-
-_NEAR = 0.9                 # of what is possible: not at its end, nor on the way there
-_COUNTING = 1.25 / np.pi    # a quarter more than counting itself makes,
-_LONG_PERIOD_M = 1e-3       # which has no period as long as this
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,45 +147,6 @@ def excess(found: Fit) -> float:
 def _bits(rows: int) -> float:
     """Share of white residuals that evidence of NEEDED takes away."""
     return 1.0 - float(np.exp(-NEEDED / rows))
-
-
-def noise_ratios(found: Fit, run: Measured) -> dict[str, float]:
-    """Mean square over noise of each channel, block by block."""
-    noise = scales(run, found.model.bench, found.model.observer_s)
-    blocks = found.model.blocks(found.x, run)
-    ratios = {name: float(np.mean((blocks[name] / noise[name])[run.judged] ** 2)) for name in blocks}
-    if ratios.get("table", 0.0) > 1.0:
-        ratios["table"] /= max(1.0, 1.0 + _rung(found, run, blocks["table"]) / run.noise.table_m**2)
-    return ratios
-
-
-def _rung(found: Fit, run: Measured, table: FloatArray) -> float:
-    """Variance [m^2] that noise of the motor encoder adds to `table` (n,), the block of the table that is fed with the
-    motor's measured motion, beyond what it adds to the table less the motor: a resonance of little damping rings."""
-    shaken = replace(run, motor=run.motor + run.motor_noise * np.random.default_rng(0).standard_normal(run.motor.size))
-    rings = float(np.var((found.model.blocks(found.x, shaken)["table"] - table)[run.judged]))
-    return rings - float(np.mean((found.model.bench.axis.ratio_m_rad * run.motor_noise[run.judged]) ** 2))
-
-
-def claimable(term: Term, bench: Bench) -> bool:
-    """Whether the values still are what the mechanism's name says, and whether the sensors can tell.
-
-    Counting errs as a sawtooth, whose fundamental is 1/pi of a count: an error of the linear encoder up to there is
-    how counting looks at one feed, and no more. Static friction below Coulomb friction is no Stribeck effect,
-    whatever it fits, and what differs by direction by more than Coulomb friction is none: it would drive the axis.
-    A spring whose rest lies about as far away as can be is a constant load.
-    """
-    if ambiguous(term) and term.effect == FRICTION:
-        return abs(term.values[0]) <= bench.axis.physics().coulomb_n_m
-    if term.effect == "spring_load":
-        rest = BY_ID[term.effect].parameters[1]
-        return _NEAR * rest.low < term.values[1] < _NEAR * rest.high
-    if term.effect == "stribeck_friction":
-        return term.values[0] > bench.axis.physics().coulomb_n_m
-    if term.effect == "scale_interpolation_error" and bench.encoders.table is not None:
-        amplitude_m, period_m, _ = term.values
-        return period_m > _LONG_PERIOD_M or amplitude_m > _COUNTING * bench.encoders.table.resolution_m
-    return True
 
 
 def _kinds(found: Fit) -> list[tuple[str, int]]:

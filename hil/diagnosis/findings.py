@@ -10,9 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hil.bench import Bench, MechanismEntry
+from hil.diagnosis.claims import claimable
 from hil.diagnosis.confidence import confidence
-from hil.diagnosis.explain import TIED, Explanation, Rival, claimable, noise_ratios
+from hil.diagnosis.explain import TIED, Explanation, Rival
 from hil.diagnosis.fit import Fit
+from hil.diagnosis.noise_ratios import noise_ratios
 from hil.diagnosis.proof import Ablation
 from hil.diagnosis.result import Correction, Finding, Value
 from hil.diagnosis.result import Rival as RivalText

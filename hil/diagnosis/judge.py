@@ -7,8 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from hil.diagnosis.evidence import against
-from hil.diagnosis.explain import MATERIAL, MOST, NEEDED, noise_ratios
+from hil.diagnosis.explain import MATERIAL, MOST, NEEDED
 from hil.diagnosis.fit import FLOOR, Fit
+from hil.diagnosis.noise_ratios import noise_ratios
 from hil.diagnosis.proof import explained_share
 from hil.diagnosis.result import Verdict
 from hil.measured import Measured

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hil.diagnosis.energy import Energy, energies, without_terms
-from hil.diagnosis.explain import noise_ratios
 from hil.diagnosis.fit import Fit
 from hil.diagnosis.fit_table import channel_names
+from hil.diagnosis.noise_ratios import noise_ratios
 from hil.diagnosis.periods import Lock, lock
 from hil.diagnosis.phases import phases
 from hil.diagnosis.reaction import acting

@@ -14,9 +14,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hil.diagnosis.evidence import against
-from hil.diagnosis.explain import TIED, noise_ratios
+from hil.diagnosis.explain import TIED
 from hil.diagnosis.fit import Fit, evaluate, fit, in_parallel
 from hil.diagnosis.floor import REPEATS, all_laps, unrepeated
+from hil.diagnosis.noise_ratios import noise_ratios
 from hil.diagnosis.terms import Term
 from hil.measured import Measured
 

@@ -41,7 +41,7 @@ def power_figure(scores: Scores) -> Figure | None:
     axes.set_title("Power: how large an effect must be", loc="left")
     style(axes, "share of the cases")
     axes.set_ylim(-0.03, 1.03)
-    axes.legend(loc="lower right")
+    _legend_above(axes)
     return figure
 
 
@@ -112,7 +112,7 @@ def errors_figure(scores: Scores) -> Figure | None:
         axes.plot([np.median(values)], [y], "|", color=look.DEVIATION, markersize=14, markeredgewidth=2)
     for goal, text, line in zip(_ERRORS, ("median", "90th percentile"), ("dashed", "dotted"), strict=True):
         axes.axvline(goal, color=look.COMMAND, linestyle=line, label=f"goal, {text}: {100 * goal:g} %")
-    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, frameon=False, fontsize=8, borderaxespad=0.2)
+    _legend_above(axes)
     axes.set_xscale("log")
     axes.set_yticks(range(len(names)), [title(name) for name in names], fontsize=8)
     axes.set_ylim(-0.7, len(names) - 0.3)
@@ -152,3 +152,8 @@ def _columns(counts: Counts) -> list[str]:
     """Answers in the order of the rows, others after them."""
     said = {column for row in counts.values() for column in row}
     return [row for row in counts if row in said] + sorted(said - set(counts))
+
+
+def _legend_above(axes: Axes) -> None:
+    """A legend beside the title: inside, it would hide points sooner or later."""
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, frameon=False, fontsize=8, borderaxespad=0.2)

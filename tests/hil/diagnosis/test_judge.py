@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from diagnosis_runs import bench, changed, recorded
 
-from hil.diagnosis.explain import Explanation, Rival, noise_ratios
+from hil.diagnosis.explain import Explanation, Rival
 from hil.diagnosis.findings import diagnosed_bench, findings, renamed, standard_errors
 from hil.diagnosis.fit import FLOOR, Fit, evaluate, fit
 from hil.diagnosis.judge import judge, names_stand
 from hil.diagnosis.model import Model
+from hil.diagnosis.noise_ratios import noise_ratios
 from hil.diagnosis.proof import explained_share, prove
 from hil.diagnosis.result import Verdict
 from hil.diagnosis.terms import Term

@@ -7,8 +7,8 @@ from diagnosis_runs import bench, recorded
 
 from hil.bench import Bench, MechanismEntry
 from hil.diagnosis import explain, search
+from hil.diagnosis.claims import claimable
 from hil.diagnosis.diagnose import diagnose
-from hil.diagnosis.explain import claimable
 from hil.diagnosis.fit import fit
 from hil.diagnosis.model import Model
 from hil.diagnosis.terms import Term

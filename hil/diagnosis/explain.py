@@ -121,7 +121,7 @@ def explain(bench: Bench, runs: Sequence[Measured], progress: Progress = lambda 
             key=lambda rival: rival.evidence)
         best, needed = _pruned(best, nominal, runs)
         # to its end: what a fit that is on its way leaves looks like something else
-        base = _claimed(fit(best.model, runs, best.x, evaluations=_ENDED, slopes=best.jacobian), runs)
+        base = claimed(fit(best.model, runs, best.x, evaluations=_ENDED, slopes=best.jacobian), runs)
         if _kinds(base) in tried:
             break       # what was added went again
         tried.append(_kinds(base))
@@ -188,8 +188,8 @@ def _without(found: Fit, index: int, runs: Sequence[Measured]) -> Fit:
                evaluations=6, slopes=np.delete(found.jacobian, columns, axis=1))
 
 
-def _claimed(found: Fit, runs: Sequence[Measured]) -> Fit:
-    """The fit without the terms whose values beside later ones are no longer what their names say."""
+def claimed(found: Fit, runs: Sequence[Measured]) -> Fit:
+    """The fit without the terms whose values beside the others are no longer what their names say."""
     while True:
         bench, terms = found.model.resolved(found.x)
         lost = next((index for index, term in enumerate(terms) if not claimable(term, bench)), None)

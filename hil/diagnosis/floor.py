@@ -33,7 +33,8 @@ _SAME_M = 2e-6           # set-points closer than this are the same: printed one
 _SETTLED_S = 0.3         # set-points must have been the same for so long: the axis remembers what came before
 _ENOUGH_S = 1.0          # of repeated motion, to call a floor measured
 # A channel that moves by less than this share of its sensor's noise may do so as it likes. One axis with coarse counts
-# was measured to move by three times its noise; a loop that is chaotic moves by tens and more.
+# was measured to move by three times its noise; a loop that is chaotic moves by tens and more. The torque is no measure
+# of that: one coarse count, and a loop of high gain, make many times the noise of a good current sensor.
 _LITTLE, _LARGE = 0.3, 5.0
 _HALF = 0.75             # of what all of the noise does: half of it does 0.5 in a linear loop, 1 in a chaotic one
 
@@ -71,8 +72,8 @@ def shaken(found: Fit, run: Measured) -> dict[str, float]:
 
     The twin in closed loop with encoders that are right and with some that are not: what they differ by no twin
     foretells, since nobody knows where between two counts the axis began. Only a little of it is noise: where half as
-    much does not move the axis by about half, or a channel moves by several times its sensor's noise, the loop is
-    chaotic, and 0 is returned.
+    much does not move the axis by about half, or motor or table move by several times their sensor's noise, the loop
+    is chaotic, and 0 is returned.
     """
     twin, bench = found.model.twin(found.x), found.model.bench
     quiet = found.model.respond(found.x, run)
@@ -92,7 +93,8 @@ def shaken(found: Fit, run: Measured) -> dict[str, float]:
     full, half = moved(1.0), moved(0.5)
     known = [name for name in full if noise[name] > 0.0]
     calm = all(full[name] < _LITTLE * noise[name]
-               or (full[name] < _LARGE * noise[name] and half[name] < _HALF * full[name]) for name in known)
+               or ((name == "torque" or full[name] < _LARGE * noise[name]) and half[name] < _HALF * full[name])
+               for name in known)
     return full if calm else dict.fromkeys(full, 0.0)
 
 

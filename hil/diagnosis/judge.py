@@ -26,7 +26,7 @@ def judge(owner: Fit, nominal: Fit, final: Fit, train: Sequence[Measured], held_
     if final.model.terms:
         left = 1.0 - explained_share(nominal, final, held_out or train)
         above = max(ratio for run in (*train, *held_out) for ratio in noise_ratios(final, run).values())
-        if final.at_floor or names_stand(left, above):
+        if names_stand(left, above) or (final.at_floor and (left <= MOST or above <= FLOOR)):
             return Verdict.MISSING_PHYSICS
     if not all(ratio <= FLOOR for run in train for ratio in noise_ratios(nominal, run).values()):
         return Verdict.UNEXPLAINED

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hil.diagnosis.evidence import against
-from hil.diagnosis.explain import TIED
+from hil.diagnosis.explain import TIED, claimed
 from hil.diagnosis.fit import Fit, evaluate, fit, in_parallel
 from hil.diagnosis.floor import REPEATS, all_laps, unrepeated
 from hil.diagnosis.noise_ratios import noise_ratios
@@ -69,7 +69,7 @@ def prove(nominal: Fit, final: Fit, train: Sequence[Measured], held_out: Sequenc
         dropped.append(worst)
         final = worst.without
         if final.model.terms:
-            final = fit(final.model, train, final.x)
+            final = claimed(fit(final.model, train, final.x), train)
 
 
 def energy(found: Fit, runs: Sequence[Measured]) -> float:
@@ -116,4 +116,7 @@ def _ablate(nominal: Fit, final: Fit, train: Sequence[Measured], held_out: Seque
 
 
 def _gain(found: Fit, without: Fit) -> float:
-    return against(found, without) + (found.x.size - without.x.size) * float(np.log(found.residuals.size))
+    """Evidence for the term. What leaves less is the better hypothesis, by whose noise both are judged: the harm that a
+    term does would not be seen behind the filter of what it leaves."""
+    paid = (found.x.size - without.x.size) * float(np.log(found.residuals.size))
+    return against(found, without) + paid if found.cost <= without.cost else paid - against(without, found)

@@ -52,7 +52,8 @@ def acting(found: Fit, runs: Sequence[Measured]) -> tuple[str, str] | None:
         blocks = found.model.blocks(found.x, run)
         seen = disturbance(run, blocks["motor"], inertia(fitted), observer_s)
         table = smooth(_observed(blocks["table"] / fitted.axis.ratio_m_rad, run, observer_s), run.period_s)
-        speed = np.gradient(smooth(table, run.period_s), run.period_s)
+        table = smooth(table, run.period_s)     # like the torque, which is smooth already, and once more below
+        speed = np.gradient(table, run.period_s)
         rows = np.flatnonzero(seen.sliding[run.judged]) + (run.judged.start or 0)
         felt.append(smooth(seen.torque, run.period_s)[rows])
         off.append(stiffness * (table[rows] - np.mean(table[rows])) if rows.size else table[rows])

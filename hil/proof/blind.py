@@ -19,7 +19,7 @@ from typing import Annotated
 import typer
 
 from hil.errors import HilError
-from hil.proof.side_by_side import side_by_side
+from hil.proof.side_by_side import cases_in, side_by_side
 from hil.report.output import write_json, write_profile
 
 DIAGNOSIS, ERROR = "diagnosis.json", "error.json"
@@ -30,7 +30,7 @@ def diagnose_cases(cases: Annotated[Path, typer.Argument(help="Folder with a fol
                    jobs: Annotated[int, typer.Option(min=1, help="Cases at once, each on its share of the cores")] = 1,
                    hours: Annotated[float, typer.Option(min=0.0, help="After which no case is begun")] = inf) -> None:
     """Diagnose every case that has no answer yet, in order of their names; prints each name when it is done."""
-    todo = [place for place in sorted(cases.iterdir()) if not answered(answers / place.name)]
+    todo = [place for place in cases_in(cases, answers) if not answered(answers / place.name)]
     for name in side_by_side(partial(diagnose_case, answers=answers), todo, jobs, hours):
         print(name, flush=True)
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from math import pi, remainder
 
 from hil.diagnosis.wording import title
 from hil.proof.answers import same_law
 from hil.proof.conceal import Concealed, Truth
+from hil.proof.distances import difference, overlap, relative_error
 from hil.proof.replies import ABSENT, FAILED, Named, Reply
 
 NORMAL_90 = 1.645            # standard errors to either side of a 90 % interval
@@ -82,6 +82,26 @@ class Marked:
         return tuple(named for named in self.reply.named if id(named) not in taken and not named.reported & open_laws)
 
     @property
+    def unanswered(self) -> bool:
+        """Whether there is no answer."""
+        return self.reply.verdict in (FAILED, ABSENT)
+
+    @property
+    def names_something(self) -> bool:
+        """Whether something is named, rightly or not; an answer that is wanting is as wrong."""
+        return bool(self.reply.named) or self.unanswered
+
+    @property
+    def names_too_much(self) -> bool:
+        """Whether something is named that is not there; an answer that is wanting is as wrong."""
+        return bool(self.spurious) or self.unanswered
+
+    @property
+    def blurred(self) -> bool:
+        """Whether the set named first holds more than what is concealed and what this motion cannot tell from it."""
+        return self.first is not None and bool(self.first.reported - self._laws(0))
+
+    @property
     def block_right(self) -> bool:
         """Whether the mismatch is placed in the block of a concealed effect."""
         return self.reply.location.get("block") in {effect.block for effect in self.truth.effects}
@@ -109,8 +129,9 @@ class Marked:
 
     @property
     def right(self) -> bool:
-        """Whether the answer as a whole is the right one: everything that is there named, and nothing else."""
-        if self.reply.verdict in (FAILED, ABSENT):
+        """Whether the answer as a whole is the right one: everything that is there named, and nothing else. Below the
+        noise it is right to name nothing, too."""
+        if self.unanswered:
             return False
         if self.truth.tier == "ambiguous":
             return self.set_reported and not self.spurious
@@ -127,7 +148,7 @@ class Marked:
         """What is wrong with the answer, in words; empty where it is right."""
         if self.right:
             return ""
-        if self.reply.verdict in (FAILED, ABSENT):
+        if self.unanswered:
             return "There is no diagnosis."
         if self.spurious:
             return f"It names {_listed(named.effect for named in self.spurious)}, which is not there."
@@ -145,18 +166,14 @@ class Marked:
         return any(named is found for found in self.matched)
 
     def parameter_errors(self) -> dict[str, float]:
-        """Relative errors of the parameters of what was named first and rightly.
-
-        A harmonic counts by its amplitude: its error is relative to the first amplitude, that of its phase [rad] is
-        weighted with its own.
-        """
-        return {name: _error(name, value, self._known()) for name, (value, _) in self._estimated().items()
+        """Relative errors of the parameters of what was named first and rightly."""
+        return {name: relative_error(name, value, self._known()) for name, (value, _) in self._estimated().items()
                 if name not in _PLACES}
 
     def covered(self) -> dict[str, bool]:
         """Whether the 90 % interval of each parameter of what was named first and rightly holds the true value."""
         known = self._known()
-        return {name: _difference(name, value, known[name]) <= NORMAL_90 * deviation
+        return {name: difference(name, value, known[name]) <= NORMAL_90 * deviation
                 for name, (value, deviation) in self._estimated().items() if name != "cycles_per_rev"}
 
     def nominal_errors(self) -> dict[str, float]:
@@ -186,12 +203,10 @@ class Marked:
         """Intersection over union of the windows said and the true one; None for what has no window."""
         if self.concealed is None or "window_s" not in self.concealed.place:
             return None
-        begin, end = self.concealed.place["window_s"]    # type: ignore[misc]
         named = self.first.parameters if self.first else {}
         windows = ([(named["start_s"][0], named["end_s"][0])] if "start_s" in named
                    else self.reply.location.get("windows_s", []))
-        common = sum(max(min(b, end) - max(a, begin), 0.0) for a, b in windows)
-        return common / (end - begin + sum(b - a for a, b in windows) - common)
+        return overlap(windows, *self.concealed.place["window_s"])    # type: ignore[misc]
 
     def _said(self, name: str, in_location: str | None = None) -> float | None:
         """A number that the first finding has, or else the location."""
@@ -216,20 +231,6 @@ class Marked:
         """The same, with those that this motion cannot tell from the first one."""
         laws = self._law(index)
         return laws.union(*(({rival, *same_law(rival)}) for rival in self.truth.rivals)) if index == 0 else laws
-
-
-def _difference(name: str, value: float, true: float) -> float:
-    return abs(remainder(value - true, 2.0 * pi)) if name.startswith("phase") else abs(value - true)
-
-
-def _error(name: str, value: float, known: Mapping[str, float]) -> float:
-    difference = _difference(name, value, known[name])
-    first = next((size for other, size in known.items() if other.startswith("amplitude")), 0.0)
-    if name.startswith("phase"):
-        own = known.get(name.replace("phase", "amplitude").replace("_rad", "_m"), first)
-        return difference * (own / first if first else 1.0)
-    scale = first if name.startswith("amplitude") else abs(known[name])
-    return difference / scale if scale else float(difference > 0.0)
 
 
 def _listed(names: Iterable[str], last: str = "and") -> str:

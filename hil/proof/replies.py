@@ -68,11 +68,17 @@ def reply_of(data: dict[str, Any]) -> Reply:
     """The answer that a diagnosis.json holds."""
     return Reply(
         verdict=data["verdict"],
-        named=tuple(Named(found["effect"], tuple(found.get("equivalents", ())), found.get("confidence"),
+        named=tuple(Named(found["effect"], tuple(found.get("equivalents", ())), _confidence(found.get("confidence")),
                           _estimates(found.get("parameters", {}))) for found in data["missing"]),
         location=data.get("location") or {}, not_testable=tuple(data.get("not_testable", ())),
         nominal=_estimates(data.get("parameter_corrections", {})), over_floor=_over_floor(data.get("fit", {})),
         runtime_s=data.get("runtime_s"), statement=data.get("statement", ""))
+
+
+def _confidence(given: float | None) -> float | None:
+    if given is not None and not 0.0 <= given <= 1.0:
+        raise ValueError(f"confidence: given {given}, allowed 0 to 1")
+    return given
 
 
 def _estimates(found: dict[str, Any]) -> dict[str, tuple[float, float]]:

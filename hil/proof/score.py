@@ -96,18 +96,19 @@ def _named(cases: Sequence[Marked]) -> list[Goal]:
     worst = min(effects, key=lambda effect: effects[effect].value or 0.0, default="")
     nulls, wrong = _tier(cases, "null"), _tier(cases, "parameters_only")
     return [
-        Goal("nulls: something named", rate(bool(case.reply.named) for case in nulls), high=0.01),
+        Goal("nulls: something named", rate(case.names_something for case in nulls), high=0.01),
         Goal("nulls: right verdict", rate(case.right for case in nulls)),
-        Goal("wrong parameters: something named", rate(bool(case.reply.named) for case in wrong), high=0.02),
+        Goal("wrong parameters: something named", rate(case.names_something for case in wrong), high=0.02),
         Goal("wrong parameters: right verdict", rate(case.right for case in wrong)),
         Goal("detected where above the floor", rate(case.detected for case in above), low=0.95),
         Goal("singles: named first", rate(case.top for case in singles), low=0.92),
         Goal("singles: in the set named first", rate(case.in_set for case in singles), low=0.99),
+        Goal("singles: more in that set", rate(case.blurred for case in singles)),
         Goal("singles: worst effect", effects.get(worst), low=0.80, detail=worst),
-        Goal("singles: a spurious second", rate(bool(case.spurious) for case in singles)),
+        Goal("singles: a spurious second", rate(case.names_too_much for case in singles)),
         Goal("pairs: both named", rate(all(case.matched) for case in pairs), low=0.80),
         Goal("pairs: at least one named", rate(any(case.matched) for case in pairs), low=0.98),
-        Goal("pairs: a spurious third", rate(bool(case.spurious) for case in pairs), high=0.05),
+        Goal("pairs: a spurious third", rate(case.names_too_much for case in pairs), high=0.05),
         Goal("masked: what hides is named", rate(bool(case.matched[0]) for case in _tier(cases, "masked")))]
 
 
@@ -146,12 +147,13 @@ def _abstained(cases: Sequence[Marked]) -> list[Goal]:
     novel, poor = _tier(cases, "novel"), _tier(cases, "insufficient")
     return [
         Goal("novel: unexplained", rate(case.reply.verdict == "unexplained" for case in novel), low=0.90),
-        Goal("novel: something named", rate(bool(case.reply.named) for case in novel), high=0.05),
+        Goal("novel: something named", rate(case.names_something for case in novel), high=0.05),
         Goal("novel: block right", rate(case.block_right for case in novel)),
         Goal("ambiguous: reported as a set", rate(case.set_reported for case in _tier(cases, "ambiguous")), low=0.95),
+        Goal("ambiguous: more in that set", rate(case.blurred for case in _tier(cases, "ambiguous"))),
         Goal("ambiguous: resolved by motion", rate(case.resolved for case in _tier(cases, "ambiguous")), low=0.90),
         Goal("insufficient: called not testable", rate(case.called_untestable for case in poor)),
-        Goal("insufficient: something named", rate(bool(case.reply.named) for case in poor))]
+        Goal("insufficient: something named", rate(case.names_something for case in poor))]
 
 
 def _confidences(cases: Iterable[Marked]) -> list[tuple[float, bool]]:

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import os
+import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from itertools import islice
 from math import inf
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
 from pathlib import Path
+from threading import Thread
 from time import monotonic
 from typing import TYPE_CHECKING
 
-from hil.errors import HilError
+from hil.errors import HilError, InputError
 
 if TYPE_CHECKING:
     from multiprocessing.queues import Queue
@@ -52,6 +54,20 @@ def side_by_side(work: Callable[[Path], None], todo: Sequence[Path], jobs: int, 
                        ) from None
 
 
+def cases_in(folder: Path, answers: Path) -> list[Path]:
+    """The cases of a folder in order of their names; makes the folder of their answers.
+
+    Raises InputError where there is none, or where the other cannot be made.
+    """
+    if not any(folder.glob("*/bench.yaml")):
+        raise InputError(f"{folder}: holds no cases, allowed the folder of cases of a proof, DIR/cases")
+    try:
+        answers.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{answers}: cannot be made ({error.strerror}); give another folder") from None
+    return sorted(folder.iterdir())
+
+
 def _shares(jobs: int) -> list[set[int]]:
     """Cores of each process."""
     cores = sorted(os.sched_getaffinity(0))
@@ -59,5 +75,14 @@ def _shares(jobs: int) -> list[set[int]]:
 
 
 def _keep_to(shares: Queue[set[int]]) -> None:
-    """Keep this process to its share of the cores."""
+    """Keep this process to its share of the cores; let it end by ctrl-C, or with the process that it works for."""
+    signal.signal(signal.SIGINT, lambda signum, frame: os._exit(130))
+    Thread(target=_end_together, daemon=True).start()
     os.sched_setaffinity(0, shares.get())
+
+
+def _end_together() -> None:
+    """End this process when the one that it works for has ended, however it did: what is half done is done again."""
+    if (parent := parent_process()) is not None:
+        parent.join()
+    os._exit(1)

@@ -70,7 +70,8 @@ def effects_table(scores: Scores) -> Table:
     """Singles, effect by effect."""
     singles = scores.of_tier("single")
     columns = [by_effect(singles, lambda case: case.top), by_effect(singles, lambda case: case.in_set),
-               by_effect(singles, lambda case: not case.spurious), by_effect(singles, lambda case: case.block_right)]
+               by_effect(singles, lambda case: not case.names_too_much),
+               by_effect(singles, lambda case: case.block_right)]
     return Table("Singles, effect by effect",
                  ("effect", "cases", "named first", "in the set", "nothing else named", "block right"),
                  [(title(effect), Number(str(columns[0][effect].of)),

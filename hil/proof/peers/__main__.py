@@ -14,11 +14,11 @@ from typing import Annotated
 
 import typer
 
-from hil.errors import HilError, InputError
+from hil.errors import HilError
 from hil.proof.blind import answered
 from hil.proof.peers import METHODS, SLOW
 from hil.proof.peers.answer import answer_case
-from hil.proof.side_by_side import side_by_side
+from hil.proof.side_by_side import cases_in, side_by_side
 
 Name = StrEnum("Name", {name: name for name in METHODS})    # type: ignore[misc]   # choices of the command line
 _QUICK = [Name(name) for name in METHODS if name not in SLOW]
@@ -31,10 +31,8 @@ def answer_cases(cases: Annotated[Path, typer.Argument(help="Folder with a folde
                  first: Annotated[int | None, typer.Option(min=1, help="Only so many cases, which lie in mixed order")]
                  = None) -> None:
     """Have other methods answer every case that they have not answered yet; prints the name of each that is done."""
-    if not cases.is_dir():
-        raise InputError(f"{cases}: no such folder, allowed the folder of cases of a proof, DIR/cases")
     names = [str(name) for name in method]
-    todo = [place for place in sorted(cases.iterdir())[:first]
+    todo = [place for place in cases_in(cases, out)[:first]
             if not all(answered(out / name / place.name) for name in names)]
     for done in side_by_side(partial(answer_case, out=out, methods=names), todo, jobs):
         print(done, flush=True)

@@ -6,13 +6,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from time import monotonic
 
-from hil.errors import InputError
+from hil.errors import HilError, InputError
 from hil.proof.blind import DIAGNOSIS, ERROR, answered
 from hil.proof.peers import METHODS
 from hil.proof.peers.case import read_case
 from hil.report.output import write_json
-
-_FAILURES = (InputError, ValueError, ArithmeticError)       # a wrong answer, but an answer
 
 
 def answer_case(case: Path, out: Path, methods: Sequence[str]) -> None:
@@ -23,7 +21,7 @@ def answer_case(case: Path, out: Path, methods: Sequence[str]) -> None:
         answer.mkdir(parents=True, exist_ok=True)
     try:
         prepared = read_case(case)
-    except _FAILURES as error:
+    except Exception as error:
         for answer in todo:
             _fail(answer, error)
         return
@@ -32,11 +30,14 @@ def answer_case(case: Path, out: Path, methods: Sequence[str]) -> None:
         begin = monotonic()
         try:
             found = METHODS[answer.parent.name](prepared)
-        except _FAILURES as error:
+        except Exception as error:
             _fail(answer, error)
         else:
             write_json(answer / DIAGNOSIS, found | {"runtime_s": prepared_s + monotonic() - begin})
 
 
 def _fail(answer: Path, error: Exception) -> None:
+    """An answer is owed, and this is a wrong one; but a method that is not installed cannot give any."""
+    if isinstance(error, HilError) and not isinstance(error, InputError):
+        raise error
     write_json(answer / ERROR, {"kind": type(error).__name__, "error": str(error)})

@@ -95,6 +95,17 @@ def test_in_closed_loop_the_axis_moves_with_what_its_encoders_count() -> None:
     assert table.train.noise_floor_rms == pytest.approx(np.hypot(run.noise.table_m, moved_m))
 
 
+def test_one_coarse_count_in_a_stiff_loop_is_noise_and_no_chaos() -> None:
+    """The torque moves by many times the noise of its sensor, and by half as much for half a count."""
+    owner = bench()
+    coarse = owner.encoders.motor.model_copy(update={"counts_per_rev": 4000})
+    owner = owner.model_copy(update={"encoders": owner.encoders.model_copy(update={"motor": coarse})})
+    run = take(recorded(owner), owner)
+    moved = shaken(evaluate(Model(owner, observer_s=observer_time_s([run], owner)), [run]), run)
+    assert moved["torque"] > 5.0 * run.noise.torque
+    assert moved["motor"] > 0.0 < moved["table"]
+
+
 def test_a_loop_that_sticks_and_slips_has_no_noise_of_its_own_making() -> None:
     """A twin that lacks the lead error of a chattering axis strays by a hundred times the noise of its sensors, and
     so do two of its own runs from one another: that is no floor."""

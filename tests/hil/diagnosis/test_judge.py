@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from diagnosis_runs import bench, changed, recorded
 
+from hil.diagnosis import search
 from hil.diagnosis.explain import Explanation, Rival
 from hil.diagnosis.findings import diagnosed_bench, findings, renamed, standard_errors
 from hil.diagnosis.fit import FLOOR, Fit, evaluate, fit
@@ -104,6 +105,17 @@ def test_a_term_that_held_out_recordings_speak_against_is_dropped() -> None:
     assert kept.final is loaded
     assert kept.ablations[0].shown
     assert kept.ablations[0].train > 2.0
+
+
+@pytest.mark.parametrize("term", [Term("cogging_torque", 0, (0.1, 6.0, 0.2)), Term("current_loop_lag", 0, (1e-3,))])
+def test_what_makes_held_out_recordings_worse_than_a_refit_is_dropped_and_has_no_name(term: Term) -> None:
+    train, held_out = runs(term), runs(seed=2)          # the effect has gone
+    nominal, found = search.nominal(OWNER, train), believed(train, term)
+    proof = prove(nominal, found, train, held_out)
+    assert [ablation.term for ablation in proof.dropped] == [term]
+    assert judge(nominal, nominal, proof.final, train, held_out) is Verdict.UNEXPLAINED
+    # nor is it believed where it was not dropped
+    assert judge(nominal, nominal, found, train, held_out) is Verdict.UNEXPLAINED
 
 
 def test_a_term_that_speaks_of_one_lap_only_is_dropped_unless_it_is_seen_there() -> None:

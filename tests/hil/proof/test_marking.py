@@ -41,6 +41,8 @@ def test_pairs_are_matched_one_by_one() -> None:
 def test_an_ambiguous_case_wants_the_set_and_then_one_of_it() -> None:
     of = truth("ambiguous", concealed("spring_load"), rivals=("constant_load",))
     assert marked(of, finding("asymmetric_friction", "spring_load")).right
+    assert not marked(of, finding("asymmetric_friction", "spring_load")).blurred
+    assert marked(of, finding("asymmetric_friction", "spring_load", "backlash")).blurred
     alone = marked(of, finding("spring_load"))
     assert (alone.top, alone.set_reported, alone.resolved) == (True, False, False)
     assert alone.wrong == "It does not say that constant load cannot be told from what it names."
@@ -101,6 +103,8 @@ def test_places_by_name_or_else_by_location() -> None:
                   location={"frequency_hz": 51.0}).frequency_error() == pytest.approx(0.01)
     push = truth("single", concealed("external_force", place={"window_s": [2.0, 4.0]}))
     assert marked(push, location={"windows_s": [[1.0, 2.5], [3.0, 4.0]]}).window_overlap() == pytest.approx(1.5 / 3.0)
+    twice = marked(push, location={"windows_s": [[2.0, 3.0], [2.0, 3.0], [2.5, 3.5]]})
+    assert twice.window_overlap() == pytest.approx(1.5 / 2.0)
     assert marked(push, finding("external_force", start_s=(2.0, 0.0), end_s=(5.0, 0.0))
                   ).window_overlap() == pytest.approx(2.0 / 3.0)  # fmt: skip
     assert marked(push).window_overlap() == 0.0

@@ -210,6 +210,7 @@ def test_the_blind_process_imports_nothing_that_knows(tmp_path: Path) -> None:
 def test_a_case_that_fails_is_an_answer_and_not_tried_again(tmp_path: Path) -> None:
     for name in ("one", "two"):
         (tmp_path / CASES / name).mkdir(parents=True)
+        (tmp_path / CASES / name / "bench.yaml").touch()
     answer(tmp_path, "two")
     shares: list[float] = []
     for _ in range(2):

@@ -12,7 +12,7 @@ from proof_cases import concealed, finding, goals, scores, truth
 from hil.errors import HilError
 from hil.proof.blind import DIAGNOSIS, ERROR
 from hil.proof.page import write_proof
-from hil.proof.replies import read_replies, reply_of
+from hil.proof.replies import Reply, read_replies, reply_of
 from hil.proof.score import Goal, lead, score
 from hil.proof.seal import SEAL
 from hil.proof.statistics import Rate, confidence_bins, expected_calibration_error, quantile, rate
@@ -85,13 +85,14 @@ def test_rates_by_hand() -> None:
         "wrong parameters: something named": Rate(0, 1), "wrong parameters: right verdict": Rate(1, 1),
         "detected where above the floor": Rate(8, 10), "singles: named first": Rate(1, 4),
         "singles: in the set named first": Rate(2, 4), "singles: worst effect": Rate(0, 1),
-        "singles: a spurious second": Rate(0, 4), "pairs: both named": Rate(1, 2),
-        "pairs: at least one named": Rate(2, 2), "pairs: a spurious third": Rate(1, 2),
+        "singles: more in that set": Rate(1, 4), "singles: a spurious second": Rate(1, 4),
+        "pairs: both named": Rate(1, 2), "pairs: at least one named": Rate(2, 2), "pairs: a spurious third": Rate(1, 2),
         "masked: what hides is named": Rate(1, 1), "block right": Rate(1, 4),
         "parameters, 90 % intervals cover": Rate(1, 1), "held out ≤ 1.15 × floor if right": Rate(0, 1),
         "right where confidence ≥ 0.9": Rate(1, 3), "novel: unexplained": Rate(1, 2),
         "novel: something named": Rate(1, 2), "novel: block right": Rate(1, 2),
-        "ambiguous: reported as a set": Rate(1, 1), "ambiguous: resolved by motion": Rate(0, 1),
+        "ambiguous: reported as a set": Rate(1, 1), "ambiguous: more in that set": Rate(0, 1),
+        "ambiguous: resolved by motion": Rate(0, 1),
         "insufficient: called not testable": Rate(1, 1), "insufficient: something named": Rate(0, 1)}
     assert {name: goal.measured for name, goal in found.items() if isinstance(goal.measured, Rate)} == expected
     assert found["singles: worst effect"].detail == "spring_load"
@@ -105,6 +106,18 @@ def test_rates_by_hand() -> None:
     assert met["nulls: something named"] is False
     assert met["parameters, 90 % intervals cover"] is False
     assert met["nulls: right verdict"] is met["window overlap, median IoU"] is None
+
+
+def test_no_answer_at_all_reaches_no_goal() -> None:
+    """Silence names nothing; where a name would be wrong it is no less wrong."""
+    cases = [truth(tier, *effects) for tier, effects in (
+        ("single", [concealed("backlash")]), ("pair", [concealed("backlash"), concealed("torque_ripple")]),
+        ("null", []), ("parameters_only", []), ("novel", [concealed("novel_hammering")]),
+        ("ambiguous", [concealed("spring_load")]), ("insufficient", [concealed("backlash", size=0.1)]))]  # fmt: skip
+    truths = {str(at): of for at, of in enumerate(cases)}
+    failed = dict.fromkeys(truths, Reply("error"))
+    for replies in ({}, failed):
+        assert not [goal.name for goal in score(truths, replies).goals if goal.met]
 
 
 def test_tallies_by_hand() -> None:
@@ -149,6 +162,12 @@ def test_an_answer_that_cannot_be_read_says_what_to_do(tmp_path: Path) -> None:
     (tmp_path / "a" / DIAGNOSIS).write_text('{"verdict": "no_mismatch"}')
     with pytest.raises(HilError, match=r"a/diagnosis.json: cannot be read as an answer .*missing.*; remove the folder"):
         read_replies(tmp_path, ["a"])
+
+
+def test_a_confidence_that_is_none_is_no_answer() -> None:
+    for given in (float("nan"), 1.01, -0.1):
+        with pytest.raises(ValueError, match=r"confidence: given .* allowed 0 to 1"):
+            reply_of({"verdict": "missing_physics", "missing": [finding("backlash", confidence=given)]})
 
 
 def test_goals_as_text() -> None:

@@ -70,4 +70,4 @@ def test_a_spring_that_a_later_fit_moves_out_of_reach_goes() -> None:
     found = fit(Model(OWNER, (spring, lag)), runs)
     (out_of_reach, _) = found.model.resolved(found.x)[1]
     assert not claimable(out_of_reach, OWNER)
-    assert [term.effect for term in explain._claimed(found, runs).model.terms] == ["current_loop_lag"]
+    assert [term.effect for term in explain.claimed(found, runs).model.terms] == ["current_loop_lag"]

@@ -7,12 +7,11 @@ import resource
 import signal
 import subprocess
 import sys
-import time
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+from processes import DEADLINE_S, is_over, state_of, wait_for
 
 from hil.errors import HilError, InputError
 from hil.recorder import Recorder, run_metadata
@@ -20,7 +19,6 @@ from hil.recording import read_recording
 
 CHANNELS = ("time_s", "position_command_m", "velocity_command_m_s", "motor_position_rad", "torque_n_m")
 PERIOD_S = 0.001
-DEADLINE_S = 60.0   # a hang, not a measure of speed
 
 
 def row(k: int) -> tuple[float, ...]:
@@ -38,25 +36,6 @@ def assert_rows(path: Path, rows: int) -> None:
     expected = np.array([row(k) for k in range(rows)])
     for index, name in enumerate(CHANNELS):
         assert np.array_equal(recording[name], expected[:, index])
-
-
-def wait_for(condition: Callable[[], bool]) -> None:
-    end = time.monotonic() + DEADLINE_S
-    while not condition():
-        assert time.monotonic() < end, "waited in vain"
-        time.sleep(0.005)
-
-
-def state_of(pid: int) -> str:
-    """Letter of a process's state in /proc: T when stopped; empty or Z when it is over."""
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0]
-    except (FileNotFoundError, ProcessLookupError):
-        return ""
-
-
-def is_over(pid: int) -> bool:
-    return state_of(pid) in ("", "Z")
 
 
 def test_the_loop_s_side_is_light() -> None:

@@ -6,16 +6,15 @@ import os
 import signal
 import subprocess
 import sys
-import time
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from processes import DEADLINE_S, is_over, wait_for
 
 from hil.errors import InputError
 from hil.proof.side_by_side import cases_in
 
-# Two cases, each of which says which process works at it and would take a minute.
+# Two cases, each of which says which process works at it and would take longer than anybody waits.
 WORK = """
 import os, time
 from pathlib import Path
@@ -24,27 +23,11 @@ from hil.proof.side_by_side import side_by_side
 def work(place):
     (place / "part").write_text(str(os.getpid()))
     (place / "part").rename(place / "pid")
-    time.sleep(60.0)
+    time.sleep(300.0)
 
 if __name__ == "__main__":
     list(side_by_side(work, [Path("one"), Path("two")], 2))
 """
-
-
-def until(true: Callable[[], bool]) -> None:
-    """Wait for what must come within some seconds."""
-    end_s = time.monotonic() + 60.0
-    while not true():
-        assert time.monotonic() < end_s
-        time.sleep(0.05)
-
-
-def alive(pid: int) -> bool:
-    """Whether a process runs: one that has ended is gone, or waits for its parent to be told."""
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
-    except FileNotFoundError:
-        return False
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL, signal.SIGINT])
@@ -55,13 +38,13 @@ def test_workers_end_with_the_process_that_they_work_for(number: signal.Signals,
     pids = [tmp_path / name / "pid" for name in ("one", "two")]
     with subprocess.Popen([sys.executable, "work.py"], cwd=tmp_path, stderr=subprocess.PIPE, text=True,
                           start_new_session=True) as process:
-        until(lambda: all(path.exists() for path in pids))
+        wait_for(lambda: all(path.exists() for path in pids))
         if number == signal.SIGINT:
             os.killpg(process.pid, number)          # as a terminal does
         else:
             process.send_signal(number)
-        until(lambda: not any(alive(int(path.read_text())) for path in pids))
-        said = process.communicate(timeout=60.0)[1]
+        wait_for(lambda: all(is_over(int(path.read_text())) for path in pids))
+        said = process.communicate(timeout=DEADLINE_S)[1]
     assert process.returncode == -number
     assert "SpawnProcess" not in said
 

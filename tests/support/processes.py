@@ -1,0 +1,30 @@
+"""Waiting for what another process does, and whether it is over."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+DEADLINE_S = 60.0   # a hang, not a measure of speed
+
+
+def wait_for(condition: Callable[[], bool]) -> None:
+    """Wait until it is true; fails after DEADLINE_S."""
+    end = time.monotonic() + DEADLINE_S
+    while not condition():
+        assert time.monotonic() < end, "waited in vain"
+        time.sleep(0.005)
+
+
+def state_of(pid: int) -> str:
+    """Letter of a process's state in /proc: T when stopped; empty or Z when it is over."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0]
+    except (FileNotFoundError, ProcessLookupError):
+        return ""
+
+
+def is_over(pid: int) -> bool:
+    """Whether a process has ended; its parent may not have been told yet."""
+    return state_of(pid) in ("", "Z")

@@ -19,13 +19,16 @@ def claimable(term: Term, bench: Bench) -> bool:
     Counting errs as a sawtooth, whose fundamental is 1/pi of a count: an error of the linear encoder up to there is
     how counting looks at one feed, and no more. Static friction below Coulomb friction is no Stribeck effect,
     whatever it fits, and what differs by direction by more than Coulomb friction is none: it would drive the axis.
-    A spring whose rest lies about as far away as can be is a constant load.
+    A spring whose rest lies about as far away as can be is a constant load, a structure that sways about as fast as can
+    be is a mass.
     """
     if ambiguous(term) and term.effect == FRICTION:
         return abs(term.values[0]) <= bench.axis.physics().coulomb_n_m
     if term.effect == "spring_load":
         rest = BY_ID[term.effect].parameters[1]
         return _NEAR * rest.low < term.values[1] < _NEAR * rest.high
+    if term.effect == "structural_mode":
+        return term.values[0] < _NEAR * BY_ID[term.effect].parameters[0].high
     if term.effect == "stribeck_friction":
         return term.values[0] > bench.axis.physics().coulomb_n_m
     if term.effect == "scale_interpolation_error" and bench.encoders.table is not None:

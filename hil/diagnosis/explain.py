@@ -15,10 +15,11 @@ import numpy as np
 
 from hil.bench import Bench
 from hil.diagnosis import search
+from hil.diagnosis.bent import unbent
 from hil.diagnosis.claims import claimable
 from hil.diagnosis.evidence import against, whitening
 from hil.diagnosis.fit import Fit, evaluate, fit, in_parallel
-from hil.diagnosis.floor import REPEATS, all_laps, unrepeated
+from hil.diagnosis.floor import REPEATS, Laps, all_laps, unrepeated
 from hil.diagnosis.model import LAST_EDGE_STEP_S
 from hil.diagnosis.screen import Lead
 from hil.diagnosis.terms import FRICTION, Key, Term
@@ -32,7 +33,7 @@ MOST_TERMS = 8          # at once; more than an engineer could act on, and the s
 NEEDED = 20.0
 TIED = 10.0             # a rival closer than this is not refuted
 # A fit without a term that leaves so much more than the one with it, 1 / 0.7, is not carried to its end: more steps
-# would change the number, not the answer. Nearer ones are.
+# would change the number, not the answer. Nearer ones are. What takes less away may be the rest of something hidden.
 _CLEAR = 0.7
 # A term must also matter: take so much energy away, in units of the noise's: 14 % of the noise in rms.
 # Below lie the details in which two honest simulations of one axis differ.
@@ -99,15 +100,16 @@ def explain(bench: Bench, runs: Sequence[Measured], progress: Progress = lambda 
         first_leads = first_leads or leads
         rows = base.residuals.size
         promising = [lead for lead in leads if lead.share > _bits(rows) and lead.share * base.cost > MATERIAL * rows]
-        if not promising:
-            break
-        progress("fitting " + ", ".join(lead.term.effect for lead in promising[:3]))
-        found = [other for other in search.race(base, promising, runs)
-                 if claimable(_last(other), other.model.resolved(other.x)[0])]
-        differs = unrepeated(base, repeated)
-        best = next((other for other in found if against(other, base) >= NEEDED
-                     and gain(base, other, nominal) >= max(MATERIAL * rows, WORTH * excess(base))
-                     and REPEATS * unrepeated(other, repeated) <= differs), None)
+        found: list[Fit] = []
+        if promising:
+            progress("fitting " + ", ".join(lead.term.effect for lead in promising[:3]))
+            found = [other for other in search.race(base, promising, runs)
+                     if claimable(_last(other), other.model.resolved(other.x)[0])]
+        best = _worthwhile(found, base, nominal, repeated)
+        if (best is None or best.cost > _CLEAR * base.cost) and not owner.at_floor:
+            progress("fitting what bent springs may hide")
+            found = sorted([*found, *unbent(base, runs)], key=lambda other: other.cost)
+            best = _worthwhile(found, base, nominal, repeated)
         if best is None:
             break
         best = _simplest([best, *(other for other in found if other is not best and against(best, other) < TIED)])
@@ -131,6 +133,14 @@ def explain(bench: Bench, runs: Sequence[Measured], progress: Progress = lambda 
     kept = {term.key for term in final.model.terms}
     return Explanation(owner, nominal, final, {key: value for key, value in rivals.items() if key in kept}, needed,
                        tuple(first_leads))
+
+
+def _worthwhile(found: Sequence[Fit], base: Fit, nominal: Fit, repeated: Sequence[tuple[Measured, Laps]]) -> Fit | None:
+    """The first that explains so much more than the base that its last term is asked for, and repeats as well."""
+    enough = max(MATERIAL * base.residuals.size, WORTH * excess(base))
+    differs = unrepeated(base, repeated)
+    return next((other for other in found if against(other, base) >= NEEDED and gain(base, other, nominal) >= enough
+                 and REPEATS * unrepeated(other, repeated) <= differs), None)
 
 
 def gain(without: Fit, found: Fit, nominal: Fit) -> float:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from hil.bench import Bench
 from hil.diagnosis import starts as catalogue
 from hil.diagnosis.fit import POOL, Fit, evaluate, fit, in_parallel, jacobian, soft_cost
+from hil.diagnosis.likeness import likenesses
 from hil.diagnosis.model import (
     LAST_EDGE_STEP_S,
     SEARCH_ACCURACY,
@@ -101,8 +102,8 @@ def race(base: Fit, found: Sequence[Lead], runs: Sequence[Measured]) -> list[Fit
     it; how far exactly those are that lost is nobody's question.
     """
     searched = replace(base.model, torque_accuracy=SEARCH_ACCURACY)
-    believed = _believed(base)
-    known = {tuple(x): jacobian(searched, x, searched.residuals(x, runs), runs) for x in (base.x, *believed)}
+    trusted = believed(base)
+    known = {tuple(x): jacobian(searched, x, searched.residuals(x, runs), runs) for x in (base.x, *trusted)}
 
     def near(lead: Lead) -> Fit:
         """A first fit, with the derivatives of the base or at the owner's values.
@@ -121,7 +122,7 @@ def race(base: Fit, found: Sequence[Lead], runs: Sequence[Measured]) -> list[Fit
 
     def owners(lead: Lead) -> Fit:
         """The likeliest point of a lead at values of the owner."""
-        return min((likeliest(lead, x) for x in believed),
+        return min((likeliest(lead, x) for x in trusted),
                    key=lambda found: soft_cost(found.residuals, _SOFT))
 
     def likeliest(lead: Lead, x: FloatArray) -> Fit:
@@ -156,6 +157,18 @@ def race(base: Fit, found: Sequence[Lead], runs: Sequence[Measured]) -> list[Fit
         return in_parallel([partial(fit, model, runs, np.concatenate([
             found.x[:model.nominal_count], model.initial()[model.nominal_count:]])) for model in others])
 
+    def likes(found: Fit) -> list[Fit]:
+        """What the last term may pass for, from where it ended."""
+        bench, terms = found.model.resolved(found.x)
+        others = []
+        for alike in likenesses(terms, bench):
+            models = [replace(found.model, terms=(*terms[:-1], term)) for term in alike]
+            begun = in_parallel([partial(evaluate, model, runs, np.concatenate([
+                found.x[:model.nominal_count], model.initial()[model.nominal_count:]])) for model in models])
+            nearest = min(begun, key=lambda other: other.cost)
+            others.append(partial(fit, nearest.model, runs, nearest.x))
+        return in_parallel(others)
+
     def gained(found: Fit) -> float:
         return base.cost - found.cost
 
@@ -174,7 +187,8 @@ def race(base: Fit, found: Sequence[Lead], runs: Sequence[Measured]) -> list[Fit
     results = [leader, *reached, *in_parallel(again + [
         partial(finish, other) for other, result in zip(others, reached, strict=True)
         if result.cost < beaten and gained(result) > _BEHIND * gained(leader)])]
-    results += variants(min(results, key=lambda result: result.cost))
+    best_yet = min(results, key=lambda result: result.cost)
+    results += [*variants(best_yet), *likes(best_yet)]
     best: dict[str, Fit] = {}
     for result in results:
         effect = result.model.terms[-1].effect
@@ -185,7 +199,7 @@ def race(base: Fit, found: Sequence[Lead], runs: Sequence[Measured]) -> list[Fit
     return sorted(best.values(), key=lambda result: result.cost)
 
 
-def _believed(base: Fit) -> list[FloatArray]:
+def believed(base: Fit) -> list[FloatArray]:
     """The vector of a base with the owner's values, of all nominal parameters, and of those that a rigid body hides.
 
     The base may have bent its values to make up for what it lacks. What lies between motor and table bends the springs

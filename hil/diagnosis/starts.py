@@ -69,11 +69,7 @@ def scene(runs: Sequence[Measured], bench: Bench, blocks: Sequence[dict[str, Flo
     ratio = bench.axis.ratio_m_rad
     found = [estimate.disturbance(run, block["motor"], inertia(bench), observer_s)
              for run, block in zip(runs, blocks, strict=True)]
-    stretch = most_stretch = 0.0
-    if runs[0].table_m.size:
-        stretches = [run.table_m - ratio * run.motor for run in runs]
-        sizes = [np.percentile(np.abs(found - np.median(found)), (60.0, 99.9)) for found in stretches]
-        stretch, most_stretch = (float(value) for value in np.max(sizes, axis=0))
+    stretch, most_stretch = stretches(runs, ratio) if runs[0].table_m.size else (0.0, 0.0)
     longest = max(range(len(runs)), key=lambda i: runs[i].motor.size)
     travel = max(float(np.ptp(run.position_command_m)) for run in runs)
     lead = 2.0 * np.pi * ratio / physics.angle_per_unit
@@ -102,6 +98,14 @@ def scene(runs: Sequence[Measured], bench: Bench, blocks: Sequence[dict[str, Flo
         window=estimate.force_window(runs[longest], found[longest]),
         stretch=max(stretch, 0.5e-6), most_stretch=max(most_stretch, 1e-6),
     )
+
+
+def stretches(runs: Sequence[Measured], ratio_m_rad: float) -> tuple[float, float]:
+    """Table against motor [m], typical and most, of runs with a linear encoder."""
+    found = [run.table_m - ratio_m_rad * run.motor for run in runs]
+    typical, most = np.max([np.percentile(np.abs(stretch - np.median(stretch)), (60.0, 99.9)) for stretch in found],
+                           axis=0)
+    return float(typical), float(most)
 
 
 _SHORTEST_M = 1e-3       # along the travel: below, friction is not looked for

@@ -152,6 +152,7 @@ def _build_advance(digest: str) -> Any:
                 shift = _bias(0.0, at, values, codes, memory)
             if codes[layout.ON_TABLE_SHARE]:
                 share = _table_share(0.0, at, values, codes, memory)
+            rest = 1.0 - share
             if codes[layout.ON_BRISTLE]:
                 stiffness = _bristle(0.0, at, values, codes, memory)
             scale = 1.0
@@ -166,27 +167,26 @@ def _build_advance(digest: str) -> Any:
                     bound = max(_coulomb(bound, at, values, codes, memory), 0.0)
                 bound *= scale
                 if codes[layout.ON_DRAG]:
-                    opposing = _drag(0.0, at, values, codes, memory)
+                    opposing = scale * _drag(0.0, at, values, codes, memory)
                 if passes == 2:
-                    met = _contact(free, gain, (1.0 - share) * bound, (1.0 - share) * viscous, shift, opposing)
+                    met = _contact(free, gain, rest * bound, rest * viscous, shift, rest * opposing)
                     at = Moment(at.time_s, at.within_s, at.period_s, at.step_s, at.angle_rad,
                                 0.5 * (speed + free - gain * met), at.table_position_m, at.ratio_m,
                                 at.viscous_speed)
-            rest = 1.0 - share
             if stiffness > 0.0 and constants[layout.SLIPS] > 0.0:
                 friction = _slipping_contact(
-                    free, gain, rest * bound, rest * viscous, shift, opposing, stiffness,
+                    free, gain, rest * bound, rest * viscous, shift, rest * opposing, stiffness,
                     own[layout.SLIP_ELEMENTS:], h, speed)
             elif stiffness > 0.0:
                 friction, own[layout.BRISTLE_DEFLECTION] = _bristle_contact(
-                    free, gain, rest * bound, rest * viscous, shift, opposing, stiffness,
+                    free, gain, rest * bound, rest * viscous, shift, rest * opposing, stiffness,
                     own[layout.BRISTLE_DEFLECTION], h, speed)
             else:
-                friction = _contact(free, gain, rest * bound, rest * viscous, shift, opposing)
+                friction = _contact(free, gain, rest * bound, rest * viscous, shift, rest * opposing)
             guide = 0.0
             if share > 0.0:
                 guide = _contact(table_free - cross * friction, table_gain, share * bound, share * viscous,
-                                 0.0, 0.0)
+                                 0.0, share * opposing)
 
             for i in range(n):
                 g = at_motor[i] * friction + at_table[i] * guide

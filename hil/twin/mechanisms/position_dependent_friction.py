@@ -29,7 +29,7 @@ MECHANISM = Mechanism(
     source="Armstrong-Hélouvry, Control of Machines with Friction (1991), position-dependent friction",
     parameters=(
         Parameter("fraction", Dimension.RATIO, 0.0, 1.0),
-        Parameter("period_m", Dimension.LENGTH, 1e-3, 1.0),
+        Parameter("period_m", Dimension.LENGTH, 1e-4, 1.0),
         Parameter("phase_rad", Dimension.ANGLE, -2.0 * math.pi, 2.0 * math.pi),
     ),
     stage=Stage.COULOMB,

@@ -71,3 +71,9 @@ def test_a_spring_that_a_later_fit_moves_out_of_reach_goes() -> None:
     (out_of_reach, _) = found.model.resolved(found.x)[1]
     assert not claimable(out_of_reach, OWNER)
     assert [term.effect for term in explain.claimed(found, runs).model.terms] == ["current_loop_lag"]
+
+
+@pytest.mark.parametrize(("frequency_hz", "structure"), [
+    (120.0, True), (1700.0, True), (1900.0, False), (2000.0, False)])
+def test_a_structure_that_sways_as_fast_as_can_be_is_a_mass(frequency_hz: float, structure: bool) -> None:
+    assert claimable(Term("structural_mode", 0, (frequency_hz, 0.05, 0.3)), OWNER) is structure

@@ -27,7 +27,7 @@ def test_springs_and_shares_of_the_masses_are_the_owners_and_the_rest_is_refitte
     term = Term("cogging_torque", 0, (0.1, 6.0, 0.2))
     base = bent(Model(owner, (term,)), motor_inertia_kg_m2=2.0, table_mass_kg=0.5, nut_support_stiffness_n_m=0.4,
                 damping_ratio=5.0, coulomb_torque_n_m=1.2)
-    everything, hidden = search._believed(base)
+    everything, hidden = search.believed(base)
     refitted, terms = base.model.resolved(hidden)
     assert base.model.resolved(everything)[0].axis == owner.axis
     assert inertia(refitted) == pytest.approx(inertia(base.model.resolved(base.x)[0]))
@@ -41,7 +41,7 @@ def test_springs_and_shares_of_the_masses_are_the_owners_and_the_rest_is_refitte
 
 
 def test_without_springs_there_is_one_such_point() -> None:
-    assert len(search._believed(bent(Model(load_bench("emps_symmetric"), ())))) == 1
+    assert len(search.believed(bent(Model(load_bench("emps_symmetric"), ())))) == 1
 
 
 def test_differences_are_wide_where_a_nut_may_chatter() -> None:

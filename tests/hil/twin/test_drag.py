@@ -5,7 +5,7 @@ import pytest
 
 from hil import control
 from hil.twin.axis import Start, Twin
-from hil.twin.chain import LINEAR_LEAD_M, one_mass
+from hil.twin.chain import LINEAR_LEAD_M, one_mass, two_mass
 from hil.twin.physics import Active, Physics
 
 MASS_KG, COULOMB_N, VISCOUS_N_S_M = 100.0, 20.0, 200.0
@@ -72,3 +72,24 @@ def test_without_viscous_friction_there_is_no_such_speed() -> None:
     plain = twin(viscous=0.0).drive(force).motor_position
     for active in (thinning(500.0), with_speed(-4.0)):
         np.testing.assert_array_equal(twin(active, viscous=0.0).drive(force).motor_position, plain)
+
+
+@pytest.mark.parametrize(("active", "drag_n"), [
+    (Active("nonlinear_viscous_friction", (500.0,)), 500.0 * SPEED_M_S**2), (with_speed(6.0), 6.0),
+    (thinning(500.0), 500.0 * SPEED_M_S**2)], ids=["quadratic", "by direction", "thinning"])
+def test_a_share_of_all_friction_pulls_at_the_table(active, drag_n) -> None:
+    """At a steady speed the spring holds what the guideways take."""
+    stiffness_n_m, share, friction_n = 2e5, 0.6, 2.0 * COULOMB_N + drag_n
+    axis = Twin(Physics(two_mass(60.0, 40.0, stiffness_n_m, 0.1, LINEAR_LEAD_M), COULOMB_N, VISCOUS_N_S_M, linear=True),
+                GAINS, (active, Active("table_side_friction", (share,))))
+    found = axis.drive(np.full(10_000, friction_n))
+    assert speeds(found)[-1] == pytest.approx(SPEED_M_S, rel=1e-4)
+    assert found.motor_position[-1] - found.table_position_m[-1] == pytest.approx(share * friction_n / stiffness_n_m,
+                                                                                  rel=1e-4)
+
+
+def test_what_drifts_scales_drag_too() -> None:
+    warm = Active("friction_drift", (0.5, 1e-3))
+    quadratic = Active("nonlinear_viscous_friction", (500.0,))
+    found = twin(quadratic, warm).drive(np.full(10_000, 1.5 * (2.0 * COULOMB_N + 500.0 * SPEED_M_S**2)))
+    assert speeds(found)[-1] == pytest.approx(SPEED_M_S, rel=1e-4)

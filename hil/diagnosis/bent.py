@@ -1,0 +1,46 @@
+"""What a refit imitates by bending springs: a preload that is lost.
+
+A nut without preload is softer while it stays in its gap. Where other springs lie beside it, a refit bends these and
+their damping until little is left, and there a score test, which sees small changes only, finds no way back. So
+the mechanism is fitted from the owner's springs. With one spring alone, softer all the time, it would be that spring.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from hil.diagnosis.fit import Fit, fit, in_parallel
+from hil.diagnosis.model import LAST_EDGE_STEP_S, SEARCH_ACCURACY, TORQUE_ACCURACY
+from hil.diagnosis.search import believed
+from hil.diagnosis.starts import stretches
+from hil.diagnosis.terms import Term, compatible
+from hil.measured import Measured
+
+_EFFECT = "preload_loss"
+# Gap, in units of the largest stretch, and the stiffness in it. A nut that has lost its preload keeps a tenth to a half
+# of its stiffness; in the wider gap it stays, the narrower one it leaves.
+_STARTS = ((1.0, 0.15), (1.0, 0.4), (0.5, 0.15))
+_SOFT, _FIRST, _LONG = 30.0, 20, 25      # as a race fits from the owner's values, and evaluations
+
+
+def unbent(base: Fit, runs: Sequence[Measured]) -> list[Fit]:
+    """The base with a lost preload, fitted from the owner's springs, where that may be hidden; else nothing."""
+    bench, terms = base.model.resolved(base.x)
+    if bench.twin().modal.shape.shape[0] < 3 or not runs[0].table_m.size or not compatible(
+            (*terms, Term(_EFFECT, 0, (0.0, 1.0)), *(entry.active() for entry in base.model.kept))):
+        return []
+    widest_m = stretches(runs, bench.axis.ratio_m_rad)[1]
+    x = believed(base)[-1]
+
+    def begun(start: tuple[float, float]) -> Fit:
+        term = Term(_EFFECT, 0, (start[0] * widest_m, start[1]))
+        model = replace(base.model, terms=(*base.model.terms, term), torque_accuracy=SEARCH_ACCURACY)
+        return fit(model, runs, np.concatenate([x, model.initial()[x.size:]]), soft=_SOFT, evaluations=_FIRST)
+
+    best = min(in_parallel([partial(begun, start) for start in _STARTS]), key=lambda found: found.cost)
+    return [fit(replace(best.model, torque_accuracy=TORQUE_ACCURACY, edge_step_s=LAST_EDGE_STEP_S), runs, best.x,
+                evaluations=_LONG, slopes=best.jacobian)]

@@ -102,10 +102,9 @@ def _say(result: Result, truth: SimulationSection, believed: Bench) -> None:
     hidden, = truth.effects
     found = next((finding for finding in result.missing if finding.effect == hidden.effect), None)
     rows = []
-    for parameter in BY_ID[hidden.effect].parameters:
-        name, dimension = parameter.name, parameter.dimension
-        value = hidden.parameters[name]
-        seen = found.parameters[name] if found else None
+    dimensions = {parameter.name: parameter.dimension for parameter in BY_ID[hidden.effect].parameters}
+    for name, value in hidden.parameters.items():
+        dimension, seen = dimensions[name], found.parameters[name] if found else None
         rows.append((name, "–", said(math.remainder(value, 2.0 * math.pi) if name == "phase_rad" else value, dimension),
                      said(seen.value, dimension) if seen else "–", said(seen.std, dimension) if seen else "–"))
     for name, value in truth.axis.items():

@@ -21,19 +21,26 @@ from hil.diagnosis.terms import Term, compatible
 from hil.measured import Measured
 
 _EFFECT = "preload_loss"
-# Gap, in units of the largest stretch, and the stiffness in it. A nut that has lost its preload keeps a tenth to a half
-# of its stiffness; in the wider gap it stays, the narrower one it leaves.
+# Gap, in units of the largest stretch to one side, and the stiffness in it: a nut that has lost its preload keeps a
+# tenth to a half.
 _STARTS = ((1.0, 0.15), (1.0, 0.4), (0.5, 0.15))
 _SOFT, _FIRST, _LONG = 30.0, 20, 25      # as a race fits from the owner's values, and evaluations
 
 
-def unbent(base: Fit, runs: Sequence[Measured]) -> list[Fit]:
-    """The base with a lost preload, fitted from the owner's springs, where that may be hidden; else nothing."""
+_NARROWEST_M = 1e-6
+
+
+def may_hide(base: Fit, runs: Sequence[Measured]) -> bool:
+    """Whether the axis has several springs, a linear encoder that shows them, and no lost preload yet."""
     bench, terms = base.model.resolved(base.x)
-    if bench.twin().modal.shape.shape[0] < 3 or not runs[0].table_m.size or not compatible(
-            (*terms, Term(_EFFECT, 0, (0.0, 1.0)), *(entry.active() for entry in base.model.kept))):
-        return []
-    widest_m = stretches(runs, bench.axis.ratio_m_rad)[1]
+    known = [entry.active() for entry in base.model.kept]
+    return (len(bench.axis.physics().chain.names) > 2 and bool(runs[0].table_m.size)
+            and compatible((*terms, Term(_EFFECT, 0, (0.0, 1.0)), *known)))
+
+
+def unbent(base: Fit, runs: Sequence[Measured]) -> Fit:
+    """The base with a lost preload, fitted from the owner's springs."""
+    widest_m = max(stretches(runs, base.model.bench.axis.ratio_m_rad)[1], _NARROWEST_M)
     x = believed(base)[-1]
 
     def begun(start: tuple[float, float]) -> Fit:
@@ -42,5 +49,5 @@ def unbent(base: Fit, runs: Sequence[Measured]) -> list[Fit]:
         return fit(model, runs, np.concatenate([x, model.initial()[x.size:]]), soft=_SOFT, evaluations=_FIRST)
 
     best = min(in_parallel([partial(begun, start) for start in _STARTS]), key=lambda found: found.cost)
-    return [fit(replace(best.model, torque_accuracy=TORQUE_ACCURACY, edge_step_s=LAST_EDGE_STEP_S), runs, best.x,
-                evaluations=_LONG, slopes=best.jacobian)]
+    return fit(replace(best.model, torque_accuracy=TORQUE_ACCURACY, edge_step_s=LAST_EDGE_STEP_S), runs, best.x,
+               evaluations=_LONG)

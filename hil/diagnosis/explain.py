@@ -15,7 +15,7 @@ import numpy as np
 
 from hil.bench import Bench
 from hil.diagnosis import search
-from hil.diagnosis.bent import unbent
+from hil.diagnosis.bent import may_hide, unbent
 from hil.diagnosis.claims import claimable
 from hil.diagnosis.evidence import against, whitening
 from hil.diagnosis.fit import Fit, evaluate, fit, in_parallel
@@ -106,9 +106,9 @@ def explain(bench: Bench, runs: Sequence[Measured], progress: Progress = lambda 
             found = [other for other in search.race(base, promising, runs)
                      if claimable(_last(other), other.model.resolved(other.x)[0])]
         best = _worthwhile(found, base, nominal, repeated)
-        if (best is None or best.cost > _CLEAR * base.cost) and not owner.at_floor:
+        if (best is None or best.cost > _CLEAR * base.cost) and not owner.at_floor and may_hide(base, runs):
             progress("fitting what bent springs may hide")
-            found = sorted([*found, *unbent(base, runs)], key=lambda other: other.cost)
+            found = sorted([*found, unbent(base, runs)], key=lambda other: other.cost)
             best = _worthwhile(found, base, nominal, repeated)
         if best is None:
             break

@@ -1,7 +1,8 @@
 """What repeats with the screw may pass for on a motion that does not tell: the others, at values that do the same.
 
 While an axis moves one way at one feed, cogging, a torque constant that varies over a turn, and friction that varies
-along the screw are one thing. A search that found one of them has yet to give the others the same chance.
+along the screw are one thing. A search that found one of them has yet to give the others the same chance. Strengths are
+those at which they are one at a creep, where all torque is Coulomb friction; a fit from there finds the others.
 """
 
 from __future__ import annotations
@@ -34,13 +35,12 @@ def likenesses(terms: Sequence[Term], bench: Bench) -> list[list[Term]]:
         return []
     same = {"cogging_torque": (share * physics.coulomb_n_m, order), "torque_ripple": (share, order),
             "position_dependent_friction": (share, lead_m / order)}
-    return [[_term(effect, (*start, phase), rest) for phase in _PHASES]
-            for effect, start in same.items() if effect != last.effect and _possible(effect, start)]
-
-
-def _possible(effect: str, values: Sequence[float]) -> bool:
-    return all(parameter.low <= value <= parameter.high
-               for parameter, value in zip(BY_ID[effect].parameters, values, strict=False))
+    found = []
+    for effect, (strength, repeats) in same.items():
+        most, bounds, _ = BY_ID[effect].parameters
+        if effect != last.effect and bounds.low <= repeats <= bounds.high:
+            found.append([_term(effect, (min(strength, most.high), repeats, phase), rest) for phase in _PHASES])
+    return found
 
 
 def _term(effect: str, values: tuple[float, ...], rest: Sequence[Term]) -> Term:

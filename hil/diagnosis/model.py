@@ -111,8 +111,8 @@ class Model:
             # an edge is seen only where it lies: a wide difference sees it coming
             step = self.edge_step_s / max(abs(start), EDGE_STEP_S)
         elif parameter.name == "cycles_per_rev":
-            turns = self.travel_m / self.bench.axis.ratio_m_rad
-            step = 0.01 / (start * max(turns, 1.0))
+            angle_rad = self.travel_m / self.bench.axis.ratio_m_rad * self.bench.axis.physics().angle_per_unit
+            step = 0.01 / (start * max(angle_rad, 1.0))
         if parameter.low > 0.0:
             return Coordinate(name, start, True, parameter.low, parameter.high, step)
         scale = abs(start) or 1.0

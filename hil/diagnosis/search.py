@@ -62,7 +62,7 @@ def leads(base: Fit, runs: Sequence[Measured]) -> list[Lead]:
     blocks = [base.model.blocks(base.x, run) for run in runs]
     scene = catalogue.scene(runs, fitted, blocks, base.model.observer_s)
     points = [_from_known(start, base.model) for start in catalogue.starts(scene, base.model.bench)
-              if _offered(start, base.model, terms)]
+              if offered(Term(start.effect, start.variant, start.values), base.model, terms)]
     best: dict[str, list[Lead]] = {}
     for lead in screen(base, runs, points):
         best.setdefault(lead.term.effect, []).append(lead)
@@ -77,9 +77,8 @@ def leads(base: Fit, runs: Sequence[Measured]) -> list[Lead]:
     return [gathered(effect, same) for effect, same in best.items()]
 
 
-def _offered(start: Start, model: Model, terms: Sequence[Term]) -> bool:
-    """Whether there is room for a start beside the terms; what it says again of the bench's mechanisms gives way."""
-    new = Term(start.effect, start.variant, start.values)
+def offered(new: Term, model: Model, terms: Sequence[Term]) -> bool:
+    """Whether there is room for one more beside the terms; what it says again of the bench's mechanisms gives way."""
     known = [entry.active() for entry in model.kept]
     return compatible((*terms, new, *(other for other in known if not repeats(new, other))))
 
@@ -162,6 +161,8 @@ def race(base: Fit, found: Sequence[Lead], runs: Sequence[Measured]) -> list[Fit
         bench, terms = found.model.resolved(found.x)
         others = []
         for alike in likenesses(terms, bench):
+            if not offered(alike[0], base.model, terms[:-1]):
+                continue
             models = [replace(found.model, terms=(*terms[:-1], term)) for term in alike]
             begun = in_parallel([partial(evaluate, model, runs, np.concatenate([
                 found.x[:model.nominal_count], model.initial()[model.nominal_count:]])) for model in models])

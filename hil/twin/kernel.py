@@ -185,8 +185,15 @@ def _build_advance(digest: str) -> Any:
                 friction = _contact(free, gain, rest * bound, rest * viscous, shift, rest * opposing)
             guide = 0.0
             if share > 0.0:
-                guide = _contact(table_free - cross * friction, table_gain, share * bound, share * viscous,
-                                 0.0, share * opposing)
+                met, opposing = table_free - cross * friction, 0.0
+                if codes[layout.ON_DRAG]:   # at the table's own speed: at the motor's it would drive one that swings
+                    guide = _contact(met, table_gain, share * bound, share * viscous, 0.0, 0.0)
+                    at = Moment(at.time_s, at.within_s, at.period_s, at.step_s, at.angle_rad,
+                                0.5 * (table_speed + met - table_gain * guide), at.table_position_m, at.ratio_m,
+                                at.viscous_speed)
+                    opposing = scale * _drag(0.0, at, values, codes, memory)
+                # a torque that differs by direction, alike at every speed, stays on the motor: there it is a load
+                guide = _contact(met, table_gain, share * bound, share * viscous, 0.0, share * opposing)
 
             for i in range(n):
                 g = at_motor[i] * friction + at_table[i] * guide

@@ -43,7 +43,7 @@ def moves(segments: list[dict[str, Any]], times: int = 1) -> Profile:
 
 
 def recorded(truth: Bench, *terms: Term, seed: int = 1, times: int = 1, name: str = "run",
-             profile: Profile | None = None) -> Recording:
+             profile: Profile | None = None, torque_noise_n_m: float = 0.01) -> Recording:
     """What an axis that is `truth` with `terms` records over a profile, else over the segments, `times` times over."""
     trajectory = plan(profile or moves(SEGMENTS, times), truth.gains.period_s)
     model = Model(truth, terms)
@@ -57,7 +57,7 @@ def recorded(truth: Bench, *terms: Term, seed: int = 1, times: int = 1, name: st
         "motor_position_rad": np.round(answer.motor_position / count) * count,
         "table_position_m": np.round(answer.table_position_m / 0.5e-6) * 0.5e-6,
         "torque_command_n_m": answer.torque_command,
-        "torque_n_m": answer.torque + noise.normal(0.0, 0.01, n)}, truth.gains.period_s)
+        "torque_n_m": answer.torque + noise.normal(0.0, torque_noise_n_m, n)}, truth.gains.period_s)
 
 
 def changed(recording: Recording, **columns: object) -> Recording:

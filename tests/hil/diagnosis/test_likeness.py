@@ -7,13 +7,16 @@ from dataclasses import replace
 import pytest
 from diagnosis_runs import bench, moves, recorded
 
+from hil.bench import MechanismEntry
 from hil.diagnosis.diagnose import diagnose
 from hil.diagnosis.fit import evaluate, fit
 from hil.diagnosis.likeness import likenesses
 from hil.diagnosis.model import Model
+from hil.diagnosis.search import offered
 from hil.diagnosis.terms import Term
 from hil.measured import take
 from hil.recording import Recording
+from hil.twin.library import BY_ID
 
 OWNER = bench()
 LEAD_M = OWNER.axis.lead_m
@@ -51,6 +54,8 @@ def test_what_a_likeness_passes_for_is_where_it_came_from(truth: Term) -> None:
 def test_what_the_library_does_not_allow_and_what_does_not_turn_passes_for_nothing() -> None:
     fine = likenesses([Term("cogging_torque", 0, (0.2, 150.0, 0.0))], OWNER)     # friction repeats from 0.1 mm up
     assert [alike[0].effect for alike in fine] == ["torque_ripple"]
+    strong = likenesses([Term("cogging_torque", 0, (2.0, 4.0, 0.0))], OWNER)
+    assert [alike[0].values[0] for alike in strong if alike[0].effect == "torque_ripple"] == [0.5]
     assert likenesses([Term("constant_load", 0, (0.2,))], OWNER) == []
 
 
@@ -58,6 +63,18 @@ def test_beside_another_of_its_effect_a_likeness_takes_the_next_slot() -> None:
     first = Term("cogging_torque", 0, (0.1, 6.0, 0.0))
     (cogging, *_), _ = likenesses([first, TERMS[1]], OWNER)
     assert (cogging.effect, cogging.slot) == ("cogging_torque", 1)
+
+
+def test_what_there_is_no_room_for_is_not_tried() -> None:
+    """A third cogging, or one in the place of a cogging that the bench knows."""
+    two = [Term("cogging_torque", 0, (0.1, 6.0, 0.0)), Term("cogging_torque", 0, (0.1, 12.0, 0.0), 1)]
+    known = OWNER.model_copy(update={"mechanisms": tuple(
+        MechanismEntry(effect=term.effect, parameters=dict(zip(BY_ID[term.effect].names, term.values, strict=True)))
+        for term in two)})
+    cogging, ripple = (alike[0] for alike in likenesses([TERMS[1]], OWNER))
+    for model, terms in ((Model(OWNER, tuple(two)), two), (Model(known), [])):
+        assert not offered(cogging, model, terms)
+        assert offered(ripple, model, terms)
 
 
 def test_friction_along_the_screw_is_not_named_alone_where_it_goes_one_way() -> None:

@@ -93,3 +93,26 @@ def test_what_drifts_scales_drag_too() -> None:
     quadratic = Active("nonlinear_viscous_friction", (500.0,))
     found = twin(quadratic, warm).drive(np.full(10_000, 1.5 * (2.0 * COULOMB_N + 500.0 * SPEED_M_S**2)))
     assert speeds(found)[-1] == pytest.approx(SPEED_M_S, rel=1e-4)
+
+
+@pytest.mark.parametrize("contact", [(), (Active("presliding_hysteresis", (4e6,)),),
+                                     (Active("presliding_hysteresis", (4e6,), 1),)], ids=["rigid", "elastic", "slips"])
+@pytest.mark.parametrize("share", [0.3, 0.6, 1.0])
+@pytest.mark.parametrize("active", [Active("nonlinear_viscous_friction", (1e4,)), thinning(1e4), with_speed(15.0)],
+                         ids=["quadratic", "thinning", "by direction"])
+def test_drag_on_a_swinging_table_takes_energy_and_gives_none(active, share, contact) -> None:
+    """Motor and table are made to swing against each other, without damping in the spring, and left alone."""
+    motor_kg, table_kg, stiffness_n_m = 60.0, 40.0, 2e5
+    axis = Twin(Physics(two_mass(motor_kg, table_kg, stiffness_n_m, 0.0, LINEAR_LEAD_M), COULOMB_N, VISCOUS_N_S_M,
+                        linear=True), GAINS, (active, Active("table_side_friction", (share,)), *contact))
+    time_s = np.arange(1000) * GAINS.period_s
+    resonance_rad_s = np.sqrt(stiffness_n_m * (1.0 / motor_kg + 1.0 / table_kg))
+    found = axis.drive(np.where(time_s < 0.3, 1500.0 * np.sin(resonance_rad_s * time_s), 0.0))
+    motor_m, table_m = found.motor_position, found.table_position_m
+    energy = (0.5 * motor_kg * np.gradient(motor_m, GAINS.period_s)**2
+              + 0.5 * table_kg * np.gradient(table_m, GAINS.period_s)**2 + 0.5 * stiffness_n_m * (table_m - motor_m)**2)
+    alone = energy[305:]
+    assert np.all(np.isfinite(energy))
+    assert alone[0] > 5.0
+    assert alone.max() < 1.02 * alone[0]
+    assert alone[-100:].max() < 0.5 * alone[0]

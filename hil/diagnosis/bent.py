@@ -15,7 +15,7 @@ import numpy as np
 
 from hil.diagnosis.fit import Fit, fit, in_parallel
 from hil.diagnosis.model import LAST_EDGE_STEP_S, SEARCH_ACCURACY, TORQUE_ACCURACY
-from hil.diagnosis.search import believed
+from hil.diagnosis.search import LONG, SOFT, believed
 from hil.diagnosis.starts import stretches
 from hil.diagnosis.terms import Term, compatible
 from hil.measured import Measured
@@ -24,10 +24,8 @@ _EFFECT = "preload_loss"
 # Gap, in units of the largest stretch to one side, and the stiffness in it: a nut that has lost its preload keeps a
 # tenth to a half.
 _STARTS = ((1.0, 0.15), (1.0, 0.4), (0.5, 0.15))
-_SOFT, _FIRST, _LONG = 30.0, 20, 25      # as a race fits from the owner's values, and evaluations
-
-
-_NARROWEST_M = 1e-6
+_FIRST = 20              # evaluations of a first fit: far from the base, it has farther to go than a race's
+_NARROWEST_M = 1e-6      # gap to begin with where motor and table do not part at all
 
 
 def may_hide(base: Fit, runs: Sequence[Measured]) -> bool:
@@ -46,8 +44,8 @@ def unbent(base: Fit, runs: Sequence[Measured]) -> Fit:
     def begun(start: tuple[float, float]) -> Fit:
         term = Term(_EFFECT, 0, (start[0] * widest_m, start[1]))
         model = replace(base.model, terms=(*base.model.terms, term), torque_accuracy=SEARCH_ACCURACY)
-        return fit(model, runs, np.concatenate([x, model.initial()[x.size:]]), soft=_SOFT, evaluations=_FIRST)
+        return fit(model, runs, np.concatenate([x, model.initial()[x.size:]]), soft=SOFT, evaluations=_FIRST)
 
     best = min(in_parallel([partial(begun, start) for start in _STARTS]), key=lambda found: found.cost)
     return fit(replace(best.model, torque_accuracy=TORQUE_ACCURACY, edge_step_s=LAST_EDGE_STEP_S), runs, best.x,
-               evaluations=_LONG)
+               evaluations=LONG)

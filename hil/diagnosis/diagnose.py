@@ -14,6 +14,7 @@ from hil.diagnosis.explain import Explanation, explain
 from hil.diagnosis.findings import corrections, diagnosed_bench, findings, renamed
 from hil.diagnosis.fit import FLOOR, Fit
 from hil.diagnosis.fit_table import channel_names, fit_table
+from hil.diagnosis.forms import form_of
 from hil.diagnosis.judge import judge
 from hil.diagnosis.locate import locate
 from hil.diagnosis.noise_ratios import noise_ratios
@@ -87,12 +88,13 @@ def diagnose(train: Sequence[Recording], validate: Sequence[Recording], bench: B
         location = locate(found, runs, final)
     progress("judging the fit")
     table = fit_table(explanation.owner, explanation.nominal, final, runs, held_out)
-    missing = findings(explanation, proof.final, proof.ablations, runs, held_out) if named else ()
+    forms = form_of(proof.ablations)
+    missing = findings(explanation, proof.final, proof.ablations, forms, runs, held_out) if named else ()
     progress("testing what this motion can show")
     hidden = not_testable(final if named else explanation.nominal, runs)
     progress("looking for a motion that would tell more")
     # a cause that is named has only its rivals open; without one, what this motion hides may be it
-    experiment = (separating(explanation, proof.final, runs, held_out) if named
+    experiment = (separating(explanation, proof.final, forms, runs, held_out) if named
                   else showing(explanation.nominal, hidden, runs, held_out))
     notes += _notes(table, proof, verdict, explanation)
     notes += [experiment.note] if experiment else []

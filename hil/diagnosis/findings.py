@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -47,17 +47,19 @@ def renamed(found: Fit) -> Fit:
     return replace(found, model=replace(found.model, terms=tuple(map(called, found.model.terms, resolved))))
 
 
-def findings(explanation: Explanation, final: Fit, ablations: Sequence[Ablation], train: Sequence[Measured],
-             held_out: Sequence[Measured]) -> tuple[Finding, ...]:
-    """A finding for each term, the one that matters most first."""
+def findings(explanation: Explanation, final: Fit, ablations: Sequence[Ablation], forms: Mapping[int, int],
+             train: Sequence[Measured], held_out: Sequence[Measured]) -> tuple[Finding, ...]:
+    """A finding for each term that is not the form of another (`forms`), the one that matters most first."""
     deviations = standard_errors(final)
     left = math.sqrt(max(ratio for run in (*train, *held_out) for ratio in noise_ratios(final, run).values()))
     bench, terms = final.model.resolved(final.x)
     row = final.model.nominal_count
     result = []
-    for term, ablation in zip(terms, ablations, strict=True):
+    for index, (term, ablation) in enumerate(zip(terms, ablations, strict=True)):
         errors = deviations[row:row + len(term.values)]
         row += len(term.values)
+        if index in forms:
+            continue
         rivals = rivals_of(explanation, term)
         tied = [rival.fit.model.terms[-1].effect for rival in rivals if rival.tied]
         if ambiguous(term):
@@ -70,6 +72,7 @@ def findings(explanation: Explanation, final: Fit, ablations: Sequence[Ablation]
             rivals=tuple(RivalText(effect=rival.fit.model.terms[-1].effect, evidence=_text(rival, term, train))
                          for rival in rivals),
             parameters=_values(term, errors, bench), sentence=sentence(_normal(term), bench),
+            form=" ".join(sentence(_normal(terms[other]), bench) for other, law in forms.items() if law == index),
             needed=_needed(ablation))))
     return tuple(finding for _, finding in sorted(result, key=lambda pair: -pair[0]))
 

@@ -8,12 +8,11 @@ those at which they are one at a creep, where all torque is Coulomb friction; a 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import count
 
 import numpy as np
 
 from hil.bench import Bench
-from hil.diagnosis.terms import Term
+from hil.diagnosis.terms import Term, free_slot
 from hil.twin.library import BY_ID
 
 _PHASES = np.arange(8) * np.pi / 4.0     # the zero of the table is not the motor's, and the way back turns the sign
@@ -39,10 +38,6 @@ def likenesses(terms: Sequence[Term], bench: Bench) -> list[list[Term]]:
     for effect, (strength, repeats) in same.items():
         most, bounds, _ = BY_ID[effect].parameters
         if effect != last.effect and bounds.low <= repeats <= bounds.high:
-            found.append([_term(effect, (min(strength, most.high), repeats, phase), rest) for phase in _PHASES])
+            found.append([Term(effect, 0, (min(strength, most.high), repeats, phase), free_slot(effect, rest))
+                          for phase in _PHASES])
     return found
-
-
-def _term(effect: str, values: tuple[float, ...], rest: Sequence[Term]) -> Term:
-    used = [term.slot for term in rest if term.effect == effect]
-    return Term(effect, 0, values, next(slot for slot in count() if slot not in used))

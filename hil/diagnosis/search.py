@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from itertools import count
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +27,7 @@ from hil.diagnosis.model import (
 )
 from hil.diagnosis.screen import Lead, screen
 from hil.diagnosis.starts import Start
-from hil.diagnosis.terms import Term, compatible, repeats
+from hil.diagnosis.terms import Term, compatible, free_slot, repeats
 from hil.measured import Measured
 from hil.twin.library import BY_ID
 
@@ -40,20 +39,20 @@ _FINALISTS = 3        # of which are fitted to the end
 _OTHERS = 6           # starts of one mechanism that are weighed
 _NEAR = 6             # evaluations of a first fit with the derivatives of the base
 _SPRINT = 4           # and of the one after it
-_LONG = 25            # evaluations of a last fit
+LONG = 25             # evaluations of a last fit
 _BEATEN = 5.0         # times the energy that the leader leaves: a sprint that leaves more is not converged,
 _LEVEL = 1.5          # except where it is level with the leader, as far as that had come by then;
 _BEHIND = 0.5         # nor one that takes away less than this share of what the leader does
 _HOPELESS = 0.02      # a lead that explains this little of what the first explains is not fitted
 _EDGE_SHIFTS_S = np.arange(-15, 16) * 0.005     # of an edge, where it may have been missed
-_SOFT = 30.0          # residual from which a first fit hears less: far above noise, so that valleys stay convex
+SOFT = 30.0           # residual from which a first fit hears less: far above noise, so that valleys stay convex
 
 
 def nominal(bench: Bench, runs: Sequence[Measured]) -> Fit:
     """Fit of the nominal parameters alone."""
     travel = max(float(np.ptp(run.position_command_m)) for run in runs)
     model = Model(bench, (), travel, observer_time_s(runs, bench))
-    return fit(model, runs, fit(model, runs, soft=_SOFT, evaluations=8).x, evaluations=10)
+    return fit(model, runs, fit(model, runs, soft=SOFT, evaluations=8).x, evaluations=10)
 
 
 def leads(base: Fit, runs: Sequence[Measured]) -> list[Lead]:
@@ -68,8 +67,7 @@ def leads(base: Fit, runs: Sequence[Measured]) -> list[Lead]:
         best.setdefault(lead.term.effect, []).append(lead)
 
     def gathered(effect: str, same: Sequence[Lead]) -> Lead:
-        used = [term.slot for term in terms if term.effect == effect]
-        slot = next(slot for slot in count() if slot not in used)
+        slot = free_slot(effect, terms)
         first, *rest = (replace(term, slot=slot) for term in (
             same[0].term, *same[0].others, *(lead.term for lead in same[1:_OTHERS])))
         return Lead(first, same[0].share, tuple(rest))
@@ -115,36 +113,36 @@ def race(base: Fit, found: Sequence[Lead], runs: Sequence[Measured]) -> list[Fit
             if begun[0].model.terms[-1].variant != lead.term.variant:
                 begun.append(likeliest(replace(lead, others=tuple(
                     term for term in lead.others if term.variant == lead.term.variant)), base.x))
-        found = [fit(first.model, runs, first.x, soft=_SOFT, evaluations=_NEAR,
+        found = [fit(first.model, runs, first.x, soft=SOFT, evaluations=_NEAR,
                      held=known[tuple(first.x[:base.x.size])]) for first in begun]
-        return min(found, key=lambda result: soft_cost(result.residuals, _SOFT))
+        return min(found, key=lambda result: soft_cost(result.residuals, SOFT))
 
     def owners(lead: Lead) -> Fit:
         """The likeliest point of a lead at values of the owner."""
         return min((likeliest(lead, x) for x in trusted),
-                   key=lambda found: soft_cost(found.residuals, _SOFT))
+                   key=lambda found: soft_cost(found.residuals, SOFT))
 
     def likeliest(lead: Lead, x: FloatArray) -> Fit:
         """The point of a lead that leaves least beside what is known at `x`."""
         models = [replace(searched, terms=(*base.model.terms, term)) for term in (lead.term, *lead.others)]
         begun = [evaluate(model, runs, np.concatenate([x, model.initial()[x.size:]])) for model in models]
-        return min(begun, key=lambda found: soft_cost(found.residuals, _SOFT))
+        return min(begun, key=lambda found: soft_cost(found.residuals, SOFT))
 
     def sprint(found: Fit) -> Fit:
-        return fit(found.model, runs, found.x, soft=_SOFT, evaluations=_SPRINT, slopes=found.jacobian)
+        return fit(found.model, runs, found.x, soft=SOFT, evaluations=_SPRINT, slopes=found.jacobian)
 
     def afresh(found: Fit) -> Fit:
         """From the owner's values, with derivatives of its own."""
         lead = next(lead for lead in good if lead.term.effect == found.model.terms[-1].effect)
         first = owners(lead)
-        again = fit(first.model, runs, first.x, soft=_SOFT, evaluations=_SPRINT)
+        again = fit(first.model, runs, first.x, soft=SOFT, evaluations=_SPRINT)
         return finish(again) if gained(again) > 0.0 else again
 
     def finish(found: Fit) -> Fit:
         if any(coordinate.name.endswith("end_s") for coordinate in found.model.coordinates):
-            found = fit(found.model, runs, found.x, evaluations=_LONG, slopes=found.jacobian)
+            found = fit(found.model, runs, found.x, evaluations=LONG, slopes=found.jacobian)
             found = _edges_moved(found, runs)
-        found = fit(replace(found.model, edge_step_s=LAST_EDGE_STEP_S), runs, found.x, evaluations=_LONG,
+        found = fit(replace(found.model, edge_step_s=LAST_EDGE_STEP_S), runs, found.x, evaluations=LONG,
                     slopes=found.jacobian)
         return fit(replace(found.model, torque_accuracy=TORQUE_ACCURACY), runs, found.x, evaluations=_SPRINT)
 
@@ -237,7 +235,7 @@ def _edges_moved(found: Fit, runs: Sequence[Measured]) -> Fit:
         edges[:, index] = [coordinate.x(coordinate.value(x[index]) + shift_s) for shift_s in _EDGE_SHIFTS_S]
         edges = np.clip(edges, low, high)
         x = min(POOL.map(partial(evaluate, found.model, runs), edges), key=lambda other: other.cost).x
-    return fit(found.model, runs, x, evaluations=_LONG)
+    return fit(found.model, runs, x, evaluations=LONG)
 
 
 def unique(fits: Sequence[Fit]) -> list[Fit]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, count
 
 from hil.twin.library import BY_ID
 from hil.twin.physics import Active
@@ -49,6 +49,12 @@ def repeats(one: Term | Active, other: Term | Active) -> bool:
         if name in ("period_m", "cycles_per_rev"):
             return max(value, other_value) < _APART * min(value, other_value)
     return True
+
+
+def free_slot(effect: str, beside: Sequence[Term]) -> int:
+    """The first slot of an effect that none of its terms has."""
+    used = [term.slot for term in beside if term.effect == effect]
+    return next(slot for slot in count() if slot not in used)
 
 
 def compatible(found: Sequence[Term | Active]) -> bool:

@@ -85,6 +85,8 @@ def _finding(page: Page, diagnosis: Diagnosis, index: int, term: Term, picture: 
     page.picture(figures.save(shown.figure, picture), shown.caption)
     page.text(f"{finding.sentence} Confidence {_sure(finding.confidence)}: {finding.needed}.")
     page.text(f"{mechanism.equation} ({mechanism.source})")
+    if finding.form:
+        page.text(f"Its curve is another than this law by so little that it is no second cause: {finding.form}")
     page.table(("parameter", "value", "standard error", "unit"),
                [(name, Number(digits(entry.value, 4)), Number(digits(entry.std, 2)), entry.unit)
                 for name, entry in finding.parameters.items()])

@@ -33,7 +33,7 @@ def test_friction_that_differs_with_speed_is_no_constant_load() -> None:
     plain, right, rival = fitted(train), fitted(train, truth), fitted(train, load)
     explanation = Explanation(plain, plain, right, {truth.key: [Rival(rival, 500.0)]}, {truth.key: 900.0})
     final = renamed(right)
-    found, = findings(explanation, final, prove(plain, final, train, held_out).ablations, train, held_out)
+    found, = findings(explanation, final, prove(plain, final, train, held_out).ablations, {}, train, held_out)
     assert (found.effect, found.variant, found.equivalents) == ("asymmetric_friction", "with speed", ())
     assert [other.effect for other in found.rivals] == ["constant_load"]
     value = found.parameters["offset_torque_n_m"]
@@ -75,7 +75,7 @@ def test_two_of_a_name_are_two_findings_with_two_entries() -> None:
     plain, right = fitted(train), fitted(train, SIX, FIFTEEN)
     explanation = Explanation(plain, plain, right, {}, {SIX.key: 900.0, FIFTEEN.key: 800.0})
     proof = prove(plain, right, train, held_out)
-    found = findings(explanation, proof.final, proof.ablations, train, held_out)
+    found = findings(explanation, proof.final, proof.ablations, {}, train, held_out)
     assert [finding.effect for finding in found] == ["cogging_torque", "cogging_torque"]
     orders = [finding.parameters["cycles_per_rev"].value for finding in found]
     assert orders == pytest.approx([6.0, 15.0], abs=0.02)

@@ -144,7 +144,7 @@ def test_a_constant_load_is_called_by_its_commoner_name_and_both_are_listed() ->
     explanation = Explanation(plain, plain, loaded, {LOAD.key: [Rival(plain_with(train), 500.0)]}, {LOAD.key: 900.0})
     final = renamed(loaded)
     proof = prove(plain, final, train, runs(LOAD, seed=2))
-    found, = findings(explanation, proof.final, proof.ablations, train, runs(LOAD, seed=2))
+    found, = findings(explanation, proof.final, proof.ablations, {}, train, runs(LOAD, seed=2))
     assert found.effect == "asymmetric_friction"
     assert found.equivalents == ("constant_load",)
     assert [rival.effect for rival in found.rivals] == ["spring_load"]

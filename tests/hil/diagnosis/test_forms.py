@@ -1,0 +1,66 @@
+"""What mends the form of a friction curve is no second cause; all else is, and so is much more than a form takes."""
+
+from __future__ import annotations
+
+import pytest
+from diagnosis_runs import bench, recorded
+
+from hil.diagnosis.explain import Explanation
+from hil.diagnosis.findings import diagnosed_bench, findings
+from hil.diagnosis.fit import fit
+from hil.diagnosis.forms import OF_ITS_FORM, form_of
+from hil.diagnosis.model import Model
+from hil.diagnosis.proof import Proof, prove
+from hil.diagnosis.result import Finding
+from hil.diagnosis.terms import Term
+from hil.measured import take
+
+OWNER = bench()
+COULOMB = OWNER.axis.physics().coulomb_n_m
+FALLING = Term("stribeck_friction", 1, (2.0 * COULOMB, 2.0))
+RIPPLE = Term("cogging_torque", 0, (0.02 * COULOMB, 12.0, 0.5))
+
+
+def drag(share: float) -> Term:
+    """That takes a share of Coulomb friction at 100 rad/s."""
+    return Term("nonlinear_viscous_friction", 0, (share * COULOMB / 100.0**2,))
+
+
+def judged(*terms: Term) -> tuple[Proof, dict[int, int], tuple[Finding, ...]]:
+    """What is found on recordings of these terms, where these are what is fitted."""
+    train, held_out = ([take(recorded(OWNER, *terms, seed=seed, torque_noise_n_m=0.001), OWNER)] for seed in (1, 2))
+    plain, right = fit(Model(OWNER), train, evaluations=6), fit(Model(OWNER, terms), train, evaluations=6)
+    proof = prove(plain, right, train, held_out)
+    forms = form_of(proof.ablations)
+    explanation = Explanation(plain, plain, right, {}, {term.key: 900.0 for term in terms})
+    return proof, forms, findings(explanation, proof.final, proof.ablations, forms, train, held_out)
+
+
+@pytest.mark.parametrize("terms", [(FALLING, drag(0.02)), (drag(0.02), FALLING)])
+def test_a_little_drag_is_the_form_of_a_falling_curve(terms: tuple[Term, ...]) -> None:
+    proof, forms, found = judged(*terms)
+    falling, little = terms.index(FALLING), 1 - terms.index(FALLING)
+    assert forms == {little: falling}
+    assert proof.ablations[little].shown, "it does help: that is not why it is no cause"
+    finding, = found
+    assert finding.effect == "stribeck_friction"
+    assert "square of the speed" in finding.form
+    assert finding.parameters["static_torque_n_m"].value == pytest.approx(FALLING.values[0], rel=0.01)
+    assert {entry.effect for entry in diagnosed_bench(OWNER, proof.final).mechanisms} == {
+        "stribeck_friction", "nonlinear_viscous_friction"}, "the bench has the curve as it was fitted"
+
+
+def test_much_drag_is_a_cause_of_its_own() -> None:
+    proof, forms, found = judged(FALLING, drag(0.5))
+    smaller, larger = sorted(ablation.train - 1.0 for ablation in proof.ablations)
+    assert smaller > OF_ITS_FORM * larger
+    assert forms == {}
+    assert sorted(finding.effect for finding in found) == ["nonlinear_viscous_friction", "stribeck_friction"]
+    assert not any(finding.form for finding in found)
+
+
+def test_what_is_no_friction_curve_is_no_form_however_little_it_takes() -> None:
+    proof, forms, found = judged(FALLING, RIPPLE)
+    assert proof.ablations[1].train - 1.0 < OF_ITS_FORM * (proof.ablations[0].train - 1.0)
+    assert forms == {}
+    assert sorted(finding.effect for finding in found) == ["cogging_torque", "stribeck_friction"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Container, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -88,15 +88,15 @@ def diagnose(train: Sequence[Recording], validate: Sequence[Recording], bench: B
         location = locate(found, runs, final)
     progress("judging the fit")
     table = fit_table(explanation.owner, explanation.nominal, final, runs, held_out)
-    forms = form_of(proof.ablations)
+    forms = form_of(explanation, proof.ablations)
     missing = findings(explanation, proof.final, proof.ablations, forms, runs, held_out) if named else ()
     progress("testing what this motion can show")
     hidden = not_testable(final if named else explanation.nominal, runs)
     progress("looking for a motion that would tell more")
     # a cause that is named has only its rivals open; without one, what this motion hides may be it
-    experiment = (separating(explanation, proof.final, forms, runs, held_out) if named
+    experiment = (separating(explanation, proof.final, runs, held_out) if named
                   else showing(explanation.nominal, hidden, runs, held_out))
-    notes += _notes(table, proof, verdict, explanation)
+    notes += _notes(table, proof, forms, verdict, explanation)
     notes += [experiment.note] if experiment else []
     result = Result(
         verdict=verdict, statement="", location=location, missing=missing,
@@ -199,7 +199,8 @@ def shape(location: Location) -> str:
     return ", ".join(parts)
 
 
-def _notes(table: dict[str, ChannelFit], proof: Proof, verdict: Verdict, explanation: Explanation) -> list[str]:
+def _notes(table: dict[str, ChannelFit], proof: Proof, forms: Container[int], verdict: Verdict,
+           explanation: Explanation) -> list[str]:
     notes = []
     if any(entry.floor_from == "repeated_laps" for entry in table.values()):
         notes.append("The noise floor is what does not repeat from lap to lap.")
@@ -213,7 +214,8 @@ def _notes(table: dict[str, ChannelFit], proof: Proof, verdict: Verdict, explana
     notes += [f"{title(ablation.term.effect)} was dropped: it fits the training recordings, but held-out ones or "
               "repeated laps speak against it." for ablation in proof.dropped]
     notes += [f"{title(ablation.term.effect)} does not show in the held-out recordings: it is not proven there."
-              for ablation in proof.ablations if ablation.gain is not None and not ablation.shown]
+              for index, ablation in enumerate(proof.ablations)
+              if index not in forms and ablation.gain is not None and not ablation.shown]
     if verdict is Verdict.UNEXPLAINED and explanation.terms:
         tried = ", ".join(title(term.effect) for term in explanation.terms)
         notes.append(f"The nearest mechanisms ({tried}) leave too much of it, so that none is named.")

@@ -9,7 +9,7 @@ that there are: what these have fixed is free no more. The evidence must be had 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Container, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import permutations
@@ -60,15 +60,13 @@ class _Hypothesis:
     known: FloatArray
 
 
-def separating(explanation: Explanation, final: Fit, unnamed: Container[int], train: Sequence[Measured],
+def separating(explanation: Explanation, final: Fit, train: Sequence[Measured],
                held_out: Sequence[Measured]) -> Experiment | None:
     """The motion that tells the terms of `final` from the rivals that the recordings tie with them; None without any.
-    Of the terms that are `unnamed`, by index, nothing is asked.
 
     Of the motions that separate most of them it is the one with the most evidence per second for the hardest.
     """
-    groups = [_group(explanation, final, index, train) for index in range(len(final.model.terms))
-              if index not in unnamed]
+    groups = [_group(explanation, final, index, train) for index in range(len(final.model.terms))]
     pairs = [pair for group in groups for pair in permutations(group, 2)]
     if not pairs:
         if not any(map(ambiguous, final.model.terms)):

@@ -79,7 +79,7 @@ class Finding(_Part):
     rivals: tuple[Rival, ...] = ()
     parameters: dict[str, Value]
     sentence: str
-    form: str = Field("", description="how its curve departs from the law, where the fit has a term for it")
+    form: str = Field("", description="a term of the fit that only mends the form of its curve")
     needed: str = Field("", description="what leaving it out costs, on training and on held-out recordings")
 
 

@@ -86,7 +86,7 @@ def _finding(page: Page, diagnosis: Diagnosis, index: int, term: Term, picture: 
     page.text(f"{finding.sentence} Confidence {_sure(finding.confidence)}: {finding.needed}.")
     page.text(f"{mechanism.equation} ({mechanism.source})")
     if finding.form:
-        page.text(f"Its curve is another than this law by so little that it is no second cause: {finding.form}")
+        page.text(f"The fit mends the form of this curve by so little that it is no second cause: {finding.form}")
     page.table(("parameter", "value", "standard error", "unit"),
                [(name, Number(digits(entry.value, 4)), Number(digits(entry.std, 2)), entry.unit)
                 for name, entry in finding.parameters.items()])
@@ -133,7 +133,7 @@ def _fit(page: Page, diagnosis: Diagnosis, folder: Path) -> None:
     figures.save(figure, folder / "residuals.png")
     page.text(f"Measured less twin on {run.name}, before and after; the band is the noise floor (residuals.png).")
     page.plot(plots.over_time(run.time_s, panels))
-    if len(result.missing) > 1 or diagnosis.proof.dropped:
+    if (result.missing and len(diagnosis.proof.ablations) > 1) or diagnosis.proof.dropped:
         page.text("Each term left out in turn, everything else refitted: factor by which the residual energy grows.")
         page.table(("without", "training", "held out", "kept"),
                    [(label(ablation.term), Number(f"{number(ablation.train)} ×"),

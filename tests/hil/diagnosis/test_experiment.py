@@ -37,7 +37,7 @@ def runs(profile: Profile, *terms: Term, seed: int = 1, believed: Bench = OWNER)
 def designed(train: list[Measured], right: Fit, *others: Fit, tied: bool = False) -> Experiment:
     """The experiment for a fit and its rivals, as evidence on these recordings has them, or taken as tied."""
     rivals = [Rival(other, 0.0 if tied else against(right, other)) for other in others]
-    found = separating(Explanation(right, right, right, {right.model.terms[-1].key: rivals}), right, (), train, [])
+    found = separating(Explanation(right, right, right, {right.model.terms[-1].key: rivals}), right, train, [])
     assert found is not None
     return found
 
@@ -81,7 +81,7 @@ def test_a_cause_without_rivals_needs_no_experiment() -> None:
     play = Term("backlash", 0, (20e-6,))
     train = runs(ONE_WAY, play)
     right, nominal = fit(Model(OWNER, (play,)), train), fit(Model(OWNER), train)
-    assert separating(Explanation(nominal, nominal, right), right, (), train, []) is None
+    assert separating(Explanation(nominal, nominal, right), right, train, []) is None
 
 
 def test_what_a_motion_hides_is_shown_by_another() -> None:

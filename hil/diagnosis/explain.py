@@ -15,7 +15,7 @@ import numpy as np
 
 from hil.bench import Bench
 from hil.diagnosis import search
-from hil.diagnosis.bent import may_hide, unbent
+from hil.diagnosis.bent import from_owner, may_hide, unbent
 from hil.diagnosis.claims import claimable
 from hil.diagnosis.evidence import against, whitening
 from hil.diagnosis.fit import Fit, evaluate, fit, in_parallel
@@ -109,6 +109,11 @@ def explain(bench: Bench, runs: Sequence[Measured], progress: Progress = lambda 
         if (best is None or best.cost > _CLEAR * base.cost) and not owner.at_floor and may_hide(base, runs):
             progress("fitting what bent springs may hide")
             found = sorted([*found, unbent(base, runs)], key=lambda other: other.cost)
+            best = _worthwhile(found, base, nominal, repeated)
+        if best is None and not base.at_floor:
+            progress("searching again beside the owner's values")
+            found = [other for other in from_owner(base, runs)
+                     if claimable(_last(other), other.model.resolved(other.x)[0])]
             best = _worthwhile(found, base, nominal, repeated)
         if best is None:
             break

@@ -43,7 +43,8 @@ class Lead:
 
 @dataclass(frozen=True, eq=False)
 class _View:
-    """Residuals behind weights and filters, with what the parameters can explain taken out."""
+    """Residuals behind weights and filters, with what the parameters can explain taken out: those that the base has
+    derivatives by."""
 
     weights: FloatArray
     nuisance: FloatArray
@@ -61,7 +62,9 @@ class _View:
 def _view(base: Fit, white: bool) -> _View:
     filters = whitening(base) if white else None
     seen = base.residuals if filters is None else whitened(base.residuals, base.splits, filters)
-    slopes = base.jacobian if filters is None else whitened(base.jacobian, base.splits, filters)
+    slopes = base.jacobian
+    if filters is not None and slopes.size:
+        slopes = whitened(slopes, base.splits, filters)
     weights = np.concatenate([_weights(part) for part in np.split(seen, base.splits)])
     nuisance, _ = np.linalg.qr(weights[:, None] * slopes)
     residual = weights * seen

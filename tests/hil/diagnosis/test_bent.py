@@ -10,7 +10,7 @@ from diagnosis_runs import bench, recorded
 
 from hil.bench import Bench, MechanismEntry, load_bench
 from hil.diagnosis import search
-from hil.diagnosis.bent import may_hide, unbent
+from hil.diagnosis.bent import from_owner, may_hide, unbent
 from hil.diagnosis.explain import explain
 from hil.diagnosis.fit import evaluate
 from hil.diagnosis.model import Model
@@ -65,3 +65,19 @@ def test_beside_a_lost_preload_and_without_a_linear_encoder_it_is_not_looked_for
     assert may_hide(evaluate(Model(owner), [run]), [run])
     assert not may_hide(evaluate(Model(owner, (LOST,)), [run]), [run])
     assert not may_hide(evaluate(Model(owner), [run]), [replace(run, table_m=np.zeros(0))])
+
+
+def test_where_a_screen_beside_the_refit_finds_nothing_the_owners_values_are_searched(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    """A refit that nothing is found beside stands for those that lead astray: which do, depends on many digits."""
+    owner = bench(table_mass_kg=300.0)
+    pulled = Term("spring_load", 0, (6000.0, 0.02))
+    run, plain = (take(recorded(bench(), *terms), owner) for terms in ((pulled,), ()))
+    base = search.nominal(owner, [run])
+    first = from_owner(base, [run])[0]
+    assert first.cost < 1.1 * base.residuals.size < 0.1 * base.cost
+    monkeypatch.setattr(search, "race", lambda base, found, runs: [])
+    (spring,) = explain(owner, [run]).terms
+    assert spring.effect == "spring_load"
+    assert spring.values == pytest.approx(pulled.values, rel=0.02)
+    assert explain(owner, [plain]).terms == ()

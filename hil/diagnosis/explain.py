@@ -110,7 +110,7 @@ def explain(bench: Bench, runs: Sequence[Measured], progress: Progress = lambda 
             progress("fitting what bent springs may hide")
             found = sorted([*found, unbent(base, runs)], key=lambda other: other.cost)
             best = _worthwhile(found, base, nominal, repeated)
-        if best is None and not base.at_floor:
+        if best is None and not base.at_floor and excess(base) > MOST * excess(nominal):
             progress("searching again beside the owner's values")
             found = [other for other in from_owner(base, runs)
                      if claimable(_last(other), other.model.resolved(other.x)[0])]

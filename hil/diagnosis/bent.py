@@ -2,8 +2,8 @@
 
 A screen takes out of what is left, and of what a mechanism would do, all that parameters could explain if they were
 free to go anywhere. That is much more than they can: 94 % of what a spring did that pulls a table, 47 times the noise,
-where the refit explained a tenth. Where nothing more is found, and most of the mismatch is left, the library is screened
-again beside the values that the owner believes, with nothing taken out.
+where the refit explained a tenth. Where nothing more is found and most of the mismatch is left, the library is
+screened again beside the values that the owner believes, with nothing taken out.
 
 A nut without preload is softer while it stays in its gap. Where other springs lie beside it, a refit bends these and
 their damping until little is left, and there a score test, which sees small changes only, finds no way back. So

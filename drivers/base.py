@@ -87,26 +87,26 @@ class Condition(IntFlag):
     """What is wrong with a device, as seen from the loop; several bits may be set."""
 
     OK = 0
-    LATE = 1            # no answer to the last SYNC yet: the sample is one or more cycles old
-    STALE = 2           # more answers missed in a row than the settings allow
+    LATE = 1  # no answer to the last SYNC yet: the sample is one or more cycles old
+    STALE = 2  # more answers missed in a row than the settings allow
     HEARTBEAT_LOST = 4  # heartbeat consumer time-out
-    EMERGENCY = 8       # an EMCY with a non-zero error code is active
-    FAULT = 16          # drive in FAULT or FAULT REACTION ACTIVE
-    BUS_PASSIVE = 32    # error frames drove the controller to error passive
-    BUS_OFF = 64        # the controller left the bus
+    EMERGENCY = 8  # an EMCY with a non-zero error code is active
+    FAULT = 16  # drive in FAULT or FAULT REACTION ACTIVE
+    BUS_PASSIVE = 32  # error frames drove the controller to error passive
+    BUS_OFF = 64  # the controller left the bus
     NOT_OPERATIONAL = 128  # the node rebooted or left NMT operational by itself
-    ALARM = 256         # encoder: device alarm
-    CORRUPT = 512       # encoder: frames with a wrong checksum since the last read
-    LINE_LOST = 1024    # encoder: the serial line is gone
-    DISABLED = 2048     # the drive left OPERATION ENABLED by itself
+    ALARM = 256  # encoder: device alarm
+    CORRUPT = 512  # encoder: frames with a wrong checksum since the last read
+    LINE_LOST = 1024  # encoder: the serial line is gone
+    DISABLED = 2048  # the drive left OPERATION ENABLED by itself
 
 
 class DriveGoal(IntEnum):
     """What the loop wants of the drive; the controlwords follow from it and from the statusword."""
 
-    DISABLED = 0     # power stage off, READY TO SWITCH ON
-    ENABLED = 1      # OPERATION ENABLED
-    QUICK_STOP = 2   # decelerate on the quick-stop ramp, then off
+    DISABLED = 0  # power stage off, READY TO SWITCH ON
+    ENABLED = 1  # OPERATION ENABLED
+    QUICK_STOP = 2  # decelerate on the quick-stop ramp, then off
 
 
 class DriveSample(NamedTuple):

@@ -180,5 +180,3 @@ class PumpedPort:
 
     def close(self) -> None:
         self._port.close()
-
-

@@ -14,7 +14,7 @@ from drivers.base import Condition, DriveFault, DriveGoal, DriveSample
 from drivers.bus import BusState
 from drivers.canopen_master import CanopenMaster
 from drivers.cia402 import ENABLE_OPERATION, STATE_BY_STATUS, DriveState, Mode, next_controlword
-from drivers.drive_setup import (
+from drivers.cia402_setup import (
     CONTROLWORD,
     FEEDBACK,
     NO_INFO,
@@ -24,7 +24,7 @@ from drivers.drive_setup import (
     HomingSettings,
     set_up_drive,
 )
-from drivers.emergency import Emergency, decode_emergency
+from drivers.emcy import Emergency, decode_emergency
 from drivers.pdo import layout, saturate
 
 __all__ = ["TRIPPING", "CanopenDrive", "DriveInfo", "DriveSettings", "HomingSettings"]
@@ -47,9 +47,9 @@ class CanopenDrive:
         self._master, self.settings = master, settings
         self.goal = DriveGoal.DISABLED
         self.info = NO_INFO
-        self.tripped = Condition.OK          # what tripped the drive, until reset_fault
+        self.tripped = Condition.OK  # what tripped the drive, until reset_fault
         self.emergencies: list[Emergency] = []  # newest last
-        self.controlword_bits = 0            # mode-specific bits (homing start), or-ed in while enabled
+        self.controlword_bits = 0  # mode-specific bits (homing start), or-ed in while enabled
         self.malformed_frames = 0
         node_id = settings.node_id
         self._health, self._send = master.health, master.port.send
@@ -59,8 +59,8 @@ class CanopenDrive:
         self._take_mode(settings.mode)
         self._rad_per_count = self._n_m_per_mille = self._target_per_unit = 0.0
         self._statusword = 0
-        self._raw_counts = 0   # as the drive counts, wrapping
-        self._counts = 0       # unwrapped
+        self._raw_counts = 0  # as the drive counts, wrapping
+        self._counts = 0  # unwrapped
         self._torque = 0
         self._answered = self._set_up_at = 0  # number of the SYNC answered last
         self._sample_time_s = 0.0
@@ -209,6 +209,8 @@ class CanopenDrive:
         active = [emergency.text for emergency in self.emergencies if emergency.active]
         names = " | ".join(str(flag.name) for flag in Condition if flag in self.tripped)
         raise DriveFault(
-            f"tripped: {names}", where=self._name, given=active[-1] if active else self._health.last_error,
+            f"tripped: {names}",
+            where=self._name,
+            given=active[-1] if active else self._health.last_error,
             advice="Remove the cause, then reset the fault.",
         )

@@ -11,10 +11,10 @@ from typing import Final
 from drivers.base import Condition, ConfigurationError, EncoderError, EncoderSample
 from drivers.bus import BusState
 from drivers.canopen_master import NMT_PRE_OPERATIONAL, CanopenMaster
-from drivers.canopen_setup import EDS_FOLDER, DeviceSetup
 from drivers.counting import Unwrapper
-from drivers.emergency import Emergency, decode_emergency
+from drivers.emcy import Emergency, decode_emergency
 from drivers.pdo import EVERY_SYNC
+from drivers.sdo_setup import EDS_FOLDER, DeviceSetup
 
 _POSITION: Final = Struct("<i")
 _PLAIN_DIRECTION, _REVERSED = 0x0000, 0x0008  # 0x6000 bit 3: measuring direction
@@ -31,7 +31,7 @@ class EncoderSettings:
     eds: Path = EDS_FOLDER / "linear_encoder.eds"
     serial_number: int | None = None
     step_m: float | None = None
-    reversed: bool = False               # counts grow against the positive direction of the axis
+    reversed: bool = False  # counts grow against the positive direction of the axis
     heartbeat_s: float = 0.02
     missed_answers_allowed: int = 3
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Final
 
 from drivers.bus import BusHealth, CanPort
-from drivers.canopen_setup import SetupNetwork
+from drivers.sdo_setup import SetupNetwork
 
 SYNC: Final = 0x080
 NMT_START: Final = 1
@@ -36,7 +36,7 @@ class CanopenMaster:
         self._heartbeat_id = 0x700 + node_id
         self._heartbeat_due_s = 0.0
         self.health: BusHealth = port.health
-        self.syncs = 0          # SYNCs sent; samples count their age by it
+        self.syncs = 0  # SYNCs sent; samples count their age by it
         self.sync_time_s = 0.0  # when the last one was sent
 
     def nmt(self, command: int, node_id: int = 0, now_s: float | None = None) -> None:

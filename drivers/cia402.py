@@ -38,10 +38,10 @@ class Statusword(IntFlag):
     REMOTE = 1 << 9
     TARGET_REACHED = 1 << 10
     INTERNAL_LIMIT_ACTIVE = 1 << 11
-    FOLLOWS_COMMAND = 1 << 12   # CSP, CSV, CST: the drive follows the command value
-    FOLLOWING_ERROR = 1 << 13   # CSP
-    HOMING_ATTAINED = 1 << 12   # homing mode
-    HOMING_ERROR = 1 << 13      # homing mode
+    FOLLOWS_COMMAND = 1 << 12  # CSP, CSV, CST: the drive follows the command value
+    FOLLOWING_ERROR = 1 << 13  # CSP
+    HOMING_ATTAINED = 1 << 12  # homing mode
+    HOMING_ERROR = 1 << 13  # homing mode
 
 
 class Controlword(IntFlag):
@@ -52,7 +52,7 @@ class Controlword(IntFlag):
     QUICK_STOP = 1 << 2  # 0 asks for a quick stop
     ENABLE_OPERATION = 1 << 3
     HOMING_START = 1 << 4  # homing mode: rising edge starts, 0 interrupts
-    FAULT_RESET = 1 << 7   # rising edge
+    FAULT_RESET = 1 << 7  # rising edge
     HALT = 1 << 8
 
 
@@ -68,11 +68,11 @@ class Mode(IntEnum):
 
 # Commands, CiA 402-2 table "command coding".
 DISABLE_VOLTAGE: Final = 0x00
-QUICK_STOP: Final = int(Controlword.ENABLE_VOLTAGE)                        # 0x02
+QUICK_STOP: Final = int(Controlword.ENABLE_VOLTAGE)  # 0x02
 SHUTDOWN: Final = int(Controlword.ENABLE_VOLTAGE | Controlword.QUICK_STOP)  # 0x06
-SWITCH_ON: Final = SHUTDOWN | int(Controlword.SWITCH_ON)                    # 0x07
-ENABLE_OPERATION: Final = SWITCH_ON | int(Controlword.ENABLE_OPERATION)     # 0x0F
-FAULT_RESET: Final = int(Controlword.FAULT_RESET)                           # 0x80
+SWITCH_ON: Final = SHUTDOWN | int(Controlword.SWITCH_ON)  # 0x07
+ENABLE_OPERATION: Final = SWITCH_ON | int(Controlword.ENABLE_OPERATION)  # 0x0F
+FAULT_RESET: Final = int(Controlword.FAULT_RESET)  # 0x80
 
 
 def _decode(statusword: int) -> DriveState:
@@ -140,16 +140,14 @@ def next_controlword(
 class HomingPhase(IntEnum):
     """Course of a homing run; bit 4 of the controlword is high in STARTED and RUNNING."""
 
-    READY = 0    # bit 4 still low, so that setting it is an edge
+    READY = 0  # bit 4 still low, so that setting it is an edge
     STARTED = 1  # bit 4 set, but "attained" is left over from an earlier run: not yet taken back
     RUNNING = 2  # an "attained" from here on is a new one
-    DONE = 3     # proven: attained, target reached, no error, and at rest
-    FAILED = 4   # homing error, or the drive left OPERATION ENABLED
+    DONE = 3  # proven: attained, target reached, no error, and at rest
+    FAILED = 4  # homing error, or the drive left OPERATION ENABLED
 
 
-def next_homing_phase(
-    phase: HomingPhase, statusword: int, speed: float, standstill_speed: float
-) -> HomingPhase:
+def next_homing_phase(phase: HomingPhase, statusword: int, speed: float, standstill_speed: float) -> HomingPhase:
     """One cycle of homing; speed and standstill_speed in the same unit, measured by the caller.
 
     "Attained" alone proves nothing: it may be left over from an earlier run, or set while the axis still moves. DONE

@@ -1,7 +1,7 @@
 """A CAN bus inside one process and one thread: deterministic, in any time, about a microsecond per frame.
 
 A frame is handed to its listeners inside `send`, so a SYNC returns after every node has answered it. That is an ideal
-bus: no bit time, no arbitration, no errors. `drivers.modelled.ModelledBus` adds those.
+bus: no bit time, no arbitration, no errors. `drivers.modelled_bus.ModelledBus` adds those.
 
 One thread only sends; another may wait for frames (`AsBusABC` under canopen's own Notifier).
 """
@@ -108,9 +108,7 @@ class AsBusABC(can.BusABC):  # type: ignore[misc]  # python-can is not typed her
         super().__init__(channel=None)
 
     def _on_frame(self, can_id: int, data: bytes, time_s: float) -> None:
-        self._received.put(
-            can.Message(timestamp=time_s, arbitration_id=can_id, data=data, is_extended_id=False)
-        )
+        self._received.put(can.Message(timestamp=time_s, arbitration_id=can_id, data=data, is_extended_id=False))
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
         self._port.send(msg.arbitration_id, bytes(msg.data), self._clock())

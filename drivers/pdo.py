@@ -12,7 +12,7 @@ PDO_INVALID: Final = 1 << 31
 PDO_NO_RTR: Final = 1 << 30
 
 EVENT_DRIVEN: Final = 255  # transmission type: an RPDO acts at once
-EVERY_SYNC: Final = 1      # transmission type: a TPDO answers every SYNC, an RPDO acts at the next SYNC
+EVERY_SYNC: Final = 1  # transmission type: a TPDO answers every SYNC, an RPDO acts at the next SYNC
 
 _CODES: Final = {(8, False): "B", (16, False): "H", (32, False): "I", (64, False): "Q",
                  (8, True): "b", (16, True): "h", (32, True): "i", (64, True): "q"}  # fmt: skip

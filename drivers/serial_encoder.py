@@ -30,8 +30,8 @@ class SerialSettings:
     format: SerialFormat = SerialFormat.BINARY
     step_m: float = 0.5e-6
     reversed: bool = False
-    bits: int = 64                  # width of the device's counter, for its wrap-around (binary)
-    latency_s: float = 0.0          # from the instant of measuring to the arrival; taken off the time stamp
+    bits: int = 64  # width of the device's counter, for its wrap-around (binary)
+    latency_s: float = 0.0  # from the instant of measuring to the arrival; taken off the time stamp
     missed_reads_allowed: int = 10  # reads in a row without a new position before it counts as stale
 
 

@@ -24,11 +24,15 @@ from hil.commands.paper import paper
 from hil.commands.prove import prove
 from hil.commands.run import run
 from hil.commands.validate import validate
+from hil.compiled.kernel_cache import provide_kernel_cache
 from hil.errors import HilError
-from hil.kernel_cache import provide_kernel_cache
 
-app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False, add_completion=False,
-                  help="A servo bench that explains itself: control, twin, comparison.")
+app = typer.Typer(
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    add_completion=False,
+    help="A servo bench that explains itself: control, twin, comparison.",
+)
 
 # In the order of --help. A command's file imports nothing heavy at its top.
 COMMANDS: tuple[tuple[str, Callable[..., Any]], ...] = (

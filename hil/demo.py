@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from hil.bench import Bench
-from hil.bench_hardware import SimulatedEffect, SimulationSection
+from hil.bench.bench_file import Bench
+from hil.bench.hardware import SimulatedEffect, SimulationSection
 from hil.errors import InputError
-from hil.profile import Profile
+from hil.motion.profile import Profile
 
 LIMITS = {"velocity_m_s": 0.6, "acceleration_m_s2": 2.2, "jerk_m_s3": 100.0}
 REST: dict[str, Any] = {"kind": "dwell", "duration_s": 0.2}
@@ -24,20 +24,31 @@ def _reversal(stroke_m: float, feed_m_s: float) -> list[dict[str, Any]]:
 
 
 def _there_and_back(to_m: float, feed_m_s: float) -> list[dict[str, Any]]:
-    return [part for target in (to_m, 0.0)
-            for part in ({"kind": "sine_squared", "to_m": target, "feed_m_s": feed_m_s}, REST)]
+    return [
+        part
+        for target in (to_m, 0.0)
+        for part in ({"kind": "sine_squared", "to_m": target, "feed_m_s": feed_m_s}, REST)
+    ]
 
 
 def _profile(description: str, segments: list[dict[str, Any]]) -> Profile:
-    return Profile.model_validate({"schema_version": 1, "description": description, "limits": LIMITS,
-                                   "segments": [REST, *segments]})
+    return Profile.model_validate(
+        {"schema_version": 1, "description": description, "limits": LIMITS, "segments": [REST, *segments]}
+    )
 
 
-LEARN = _profile("creep through reversals, 100 mm at 7 and 22 m/min there and back", [
-    *_reversal(0.002, 0.004), *_reversal(0.01, 0.02), *_there_and_back(0.1, 0.116667),
-    {"kind": "repeat", "times": 2, "segments": _there_and_back(0.1, 0.366667)}])
-PROVE = _profile("another creep, 80 mm at 12 m/min there and back", [
-    *_reversal(0.004, 0.008), *_there_and_back(0.08, 0.2)])
+LEARN = _profile(
+    "creep through reversals, 100 mm at 7 and 22 m/min there and back",
+    [
+        *_reversal(0.002, 0.004),
+        *_reversal(0.01, 0.02),
+        *_there_and_back(0.1, 0.116667),
+        {"kind": "repeat", "times": 2, "segments": _there_and_back(0.1, 0.366667)},
+    ],
+)
+PROVE = _profile(
+    "another creep, 80 mm at 12 m/min there and back", [*_reversal(0.004, 0.008), *_there_and_back(0.08, 0.2)]
+)
 
 # What may be concealed: parameters by name with the range that they are drawn from. All of it is what an axis in
 # service has, and well above the noise of these moves.
@@ -64,6 +75,7 @@ def conceal(believed: Bench, seed: int, effect: str | None = None) -> tuple[Benc
     effect = effect or chosen
     parameters = {name: float(draw.uniform(*limits)) for name, limits in CONCEALED[effect].items()}
     axis = {name: float(getattr(believed.axis, name) * draw.uniform(*limits)) for name, limits in WRONG.items()}
-    simulation = SimulationSection(axis=axis, effects=(SimulatedEffect(effect=effect, parameters=parameters),),
-                                   seed=seed)
+    simulation = SimulationSection(
+        axis=axis, effects=(SimulatedEffect(effect=effect, parameters=parameters),), seed=seed
+    )
     return believed.model_copy(update={"simulation": simulation}), simulation

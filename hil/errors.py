@@ -1,8 +1,8 @@
 """Errors of the project; the command line turns each into its message and its exit code, without a trace.
 
-    HilError          1   something went wrong that the user can act on
-    └── InputError    2   a file or an argument is wrong; the message says what, where, what is allowed
-        └── FieldError    the same, at one field of a model whose file is known to the caller only
+HilError          1   something went wrong that the user can act on
+└── InputError    2   a file or an argument is wrong; the message says what, where, what is allowed
+    └── FieldError    the same, at one field of a model whose file is known to the caller only
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class FieldError(InputError, ValueError):
     """A value inside a model is wrong; `field` is its path, such as ("segments", 3, "to_m").
 
     Raised by validators and planners. It is a ValueError so that pydantic collects it, and
-    `hil.yamlfile.load_model` puts the file and the line in front.
+    `hil.files.yaml_model.load_model` puts the file and the line in front.
     """
 
     def __init__(self, field: FieldPath, message: str) -> None:

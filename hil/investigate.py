@@ -7,17 +7,17 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 
-from hil.bench import Bench
+from hil.bench.bench_file import Bench
 from hil.diagnosis.diagnose import NEXT_EXPERIMENT, Diagnosis, diagnose
 from hil.diagnosis.wording import title
 from hil.errors import HilError
-from hil.profile import Profile
-from hil.recording import Recording, read_recording
-from hil.report.output import write_json, write_profile
-from hil.run import RunResult
+from hil.files.output import write_json
+from hil.loop.run import RunResult
+from hil.motion.profile import Profile, write_profile
+from hil.recording.recording import Recording, read_recording
 
-Run = Callable[[Profile, Path, str], RunResult]      # profile, folder, name of the recording
-Progress = Callable[[], AbstractContextManager[Callable[[str, float | None], None]]]   # as hil.commands.console
+Run = Callable[[Profile, Path, str], RunResult]  # profile, folder, name of the recording
+Progress = Callable[[], AbstractContextManager[Callable[[str, float | None], None]]]  # as hil.report.console
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,8 +47,16 @@ class Investigation:
         return self.rounds[-1].diagnosis
 
 
-def investigate(profiles: Mapping[str, Profile], held_out: Mapping[str, Profile], bench: Bench, folder: Path, run: Run,
-                allowed: Callable[[Profile], bool], progress: Progress, rounds: int = 3) -> Investigation:
+def investigate(
+    profiles: Mapping[str, Profile],
+    held_out: Mapping[str, Profile],
+    bench: Bench,
+    folder: Path,
+    run: Run,
+    allowed: Callable[[Profile], bool],
+    progress: Progress,
+    rounds: int = 3,
+) -> Investigation:
     """Investigate a bench, beginning with profiles by name; `held_out` are run in the first round to prove on.
 
     Recordings, the profiles that were designed and each round's diagnosis.json go into `folder`/round_1 and so on.

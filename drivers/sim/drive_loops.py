@@ -7,7 +7,7 @@ import math
 from drivers.base import PlantLike, ServoLike, ServoTarget
 
 _LOOP_PERIOD_S = 0.001  # of the servo, where the SYNC is slower
-_AT_REST_RAD_S = 0.5    # a stop ramp has ended
+_AT_REST_RAD_S = 0.5  # a stop ramp has ended
 
 
 def ramp(velocity: float, wanted: float, acceleration: float, period_s: float) -> float:

@@ -13,11 +13,11 @@ from pathlib import Path
 from drivers.base import PlantLike, ServoLike, ServoTarget
 from drivers.bus import CanPort
 from drivers.cia402 import Controlword, DriveState, Mode, Statusword
-from drivers.sim.device import EDS_FOLDER, SimulatedDevice
-from drivers.sim.dictionary import key_of
+from drivers.sim.can_node import EDS_FOLDER, SimulatedDevice
+from drivers.sim.cia402_device import REMOTE, STATUS, next_state
 from drivers.sim.drive_loops import DriveLoops
 from drivers.sim.homing import Homing, HomingMethod, step_homing
-from drivers.sim.power_stage import REMOTE, STATUS, next_state
+from drivers.sim.object_dictionary import key_of
 from drivers.sim.sdo_server import AbortCode, SdoAbort
 
 _CONTROLWORD, _STATUSWORD = key_of(0x6040), key_of(0x6041)
@@ -75,8 +75,8 @@ class SimulatedDrive(SimulatedDevice):
         self._n_m_per_mille = self._rated_torque_mn_m / 1e6
         self._mille_per_n_m = 1e6 / self._rated_torque_mn_m
         self._counts_per_rad = self._counts_per_rev / self._travel_per_rev
-        self._torque_n_m = 0.0        # command in force in CST, set when an RPDO arrives
-        self._offset_counts = 0       # position = encoder counts - offset, set by homing
+        self._torque_n_m = 0.0  # command in force in CST, set when an RPDO arrives
+        self._offset_counts = 0  # position = encoder counts - offset, set by homing
         self._counts = round(self.plant.motor_position_rad * self._counts_per_rad)
         self._last_counts = self._counts
         self._homing: Homing | None = None

@@ -11,8 +11,8 @@ from pathlib import Path
 
 from drivers.base import PlantLike
 from drivers.bus import CanPort
-from drivers.sim.device import EDS_FOLDER, SimulatedDevice
-from drivers.sim.dictionary import key_of
+from drivers.sim.can_node import EDS_FOLDER, SimulatedDevice
+from drivers.sim.object_dictionary import key_of
 
 _POSITION, _OFFSET, _ALARMS = key_of(0x6004), key_of(0x6509), key_of(0x6503)
 _STEP, _RANGE, _PARAMETERS = key_of(0x6005, 1), key_of(0x6002), key_of(0x6000)

@@ -11,8 +11,8 @@ from drivers.sim.drive_loops import ramp
 class HomingMethod(IntEnum):
     """Homing methods of CiA 402 that the drive offers."""
 
-    INDEX_NEGATIVE = 33    # next index pulse in negative direction
-    INDEX_POSITIVE = 34    # next index pulse in positive direction
+    INDEX_NEGATIVE = 33  # next index pulse in negative direction
+    INDEX_POSITIVE = 34  # next index pulse in positive direction
     CURRENT_POSITION = 37  # where it stands
 
 
@@ -24,8 +24,8 @@ class Homing:
     """
 
     method: HomingMethod
-    speed: float          # counts/s, > 0
-    acceleration: float   # counts/s^2
+    speed: float  # counts/s, > 0
+    acceleration: float  # counts/s^2
     counts_per_rev: int
     started: bool = False
     velocity: float = 0.0

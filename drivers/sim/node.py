@@ -1,6 +1,6 @@
 """The simulated drive and encoder as a process of their own on a python-can bus, in wall-clock time.
 
-    python -m drivers.sim.node --bus udp_multicast --channel 239.74.163.2
+python -m drivers.sim.node --bus udp_multicast --channel 239.74.163.2
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 from drivers.bus import BusConfig, CanPort, PythonCanPort, open_bus
 from drivers.sim.axis import two_mass
-from drivers.sim.device import SimulatedDevice
+from drivers.sim.can_node import SimulatedDevice
 from drivers.sim.drive_node import SimulatedDrive
 from drivers.sim.encoder_node import SimulatedEncoder
 from drivers.sim.plant import Plant

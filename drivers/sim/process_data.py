@@ -10,13 +10,13 @@ from typing import Any, Final
 
 from drivers.bus import CanPort, Listener
 from drivers.pdo import PDO_INVALID, layout
-from drivers.sim.dictionary import Dictionary, Item, key_of
+from drivers.sim.object_dictionary import Dictionary, Item, key_of
 from drivers.sim.sdo_server import AbortCode, SdoAbort
 
 RPDO_COMMUNICATION, RPDO_MAPPING = 0x1400, 0x1600
 TPDO_COMMUNICATION, TPDO_MAPPING = 0x1800, 0x1A00
 _LENGTH_TOO_SHORT: Final = 0x8210  # EMCY: PDO not processed due to length error
-_LENGTH_EXCEEDED: Final = 0x8220   # EMCY: PDO length exceeded
+_LENGTH_EXCEEDED: Final = 0x8220  # EMCY: PDO length exceeded
 
 
 @dataclass(slots=True)
@@ -26,7 +26,7 @@ class _Pdo:
     packer: Struct
     keys: tuple[int, ...]
     get: Callable[[dict[int, Any]], Any]
-    pending: bytes = b""   # synchronous RPDO: waits for the SYNC; event-driven TPDO: sent last
+    pending: bytes = b""  # synchronous RPDO: waits for the SYNC; event-driven TPDO: sent last
     syncs: int = 0
 
 
@@ -48,7 +48,7 @@ class ProcessData:
         self._takers: list[tuple[int, Listener]] = []
         self._synchronous: list[_Pdo] = []  # RPDOs that wait for the SYNC
         self._every_sync: list[tuple[int, Callable[..., bytes], Callable[[dict[int, Any]], Any]]] = []
-        self._tpdos: list[_Pdo] = []        # of all other transmission types
+        self._tpdos: list[_Pdo] = []  # of all other transmission types
         self._operational = False
         for index in {key >> 8 for key in dictionary.items}:
             if RPDO_COMMUNICATION <= index < RPDO_MAPPING or TPDO_COMMUNICATION <= index < TPDO_MAPPING:
@@ -86,9 +86,7 @@ class ProcessData:
             # itemgetter of one key would return the bare value.
             get = itemgetter(*keys) if len(keys) > 1 else _tuple_getter(keys[0])
             packer = layout([item.entry for item in items])
-            pdos.append(
-                _Pdo(cob_id & 0x7FF, self._dictionary.number(communication + n, 2), packer, keys, get)
-            )
+            pdos.append(_Pdo(cob_id & 0x7FF, self._dictionary.number(communication + n, 2), packer, keys, get))
         return pdos
 
     def _mapped(self, index: int, count: int) -> list[Item]:

@@ -20,8 +20,14 @@ from drivers.sim.servo import SERVO_STATE, Servo, pack_servo, position_loop, sta
 
 @njit(cache=True)
 def _loop(
-    p: np.ndarray, s: np.ndarray, lines: np.ndarray, c: np.ndarray, command_m: np.ndarray, command_m_s: np.ndarray,
-    steps: int, rows: np.ndarray,
+    p: np.ndarray,
+    s: np.ndarray,
+    lines: np.ndarray,
+    c: np.ndarray,
+    command_m: np.ndarray,
+    command_m_s: np.ndarray,
+    steps: int,
+    rows: np.ndarray,
 ) -> None:
     plant, state, servo = p[0], s[0], c[0]
     memory: Any = np.zeros(1, SERVO_STATE)[0]
@@ -65,9 +71,7 @@ def record(
         servo = replace(servo, velocity_filter_s=lag_s)
     rows = np.empty((4, command_m.size))
     constants = pack_servo(servo, axis.drive_ratio_m_rad, period_s)
-    _loop(
-        plant.parameters, plant.state, plant.lines, constants, command_m, command_m_s, plant.steps_in(period_s), rows
-    )
+    _loop(plant.parameters, plant.state, plant.lines, constants, command_m, command_m_s, plant.steps_in(period_s), rows)
     channels = {
         "time_s": np.arange(command_m.size) * period_s,
         "position_command_m": command_m,

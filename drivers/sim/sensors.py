@@ -39,9 +39,7 @@ class Sensors:
             if not isfinite(value) or (value < 0 and not offset):
                 raise ValueError(f"sensors.{item.name}: must be finite and >= 0, got {value!r}")
         if self.torque_noise_correlation >= 1:
-            raise ValueError(
-                f"sensors.torque_noise_correlation: must be < 1, got {self.torque_noise_correlation!r}"
-            )
+            raise ValueError(f"sensors.torque_noise_correlation: must be < 1, got {self.torque_noise_correlation!r}")
 
 
 _INCREMENT = np.uint64(0x9E3779B97F4A7C15)

@@ -174,5 +174,3 @@ class DriveServo:
             position is not None, motor_position_rad,
         )  # fmt: skip
         return torque
-
-

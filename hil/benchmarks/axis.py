@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from hil.bench import Bench, load_bench
-from hil.bench_hardware import DriveSection, SimulationSection
-from hil.profile import Profile
-from hil.trajectory import Trajectory, plan
+from hil.bench.bench_file import Bench, load_bench
+from hil.bench.hardware import DriveSection, SimulationSection
+from hil.motion.profile import Profile
+from hil.motion.trajectory import Trajectory, plan
 
 MODES = 20
 
@@ -14,13 +14,17 @@ def moves() -> Profile:
     """100 mm at 7 and 22 m/min and back."""
     there_and_back = [
         {"kind": "sine_squared", "to_m": target, "feed_m_s": feed}
-        for feed in (0.116667, 0.366667) for target in (0.1, 0.0)]
+        for feed in (0.116667, 0.366667)
+        for target in (0.1, 0.0)
+    ]
     dwell = {"kind": "dwell", "duration_s": 0.2}
-    return Profile.model_validate({
-        "schema_version": 1,
-        "limits": {"velocity_m_s": 0.6, "acceleration_m_s2": 2.2, "jerk_m_s3": 100.0},
-        "segments": [dwell, *(segment for move in there_and_back for segment in (move, dwell))],
-    })
+    return Profile.model_validate(
+        {
+            "schema_version": 1,
+            "limits": {"velocity_m_s": 0.6, "acceleration_m_s2": 2.2, "jerk_m_s3": 100.0},
+            "segments": [dwell, *(segment for move in there_and_back for segment in (move, dwell))],
+        }
+    )
 
 
 def trajectory(period_s: float, laps: int = 1) -> Trajectory:
@@ -41,10 +45,15 @@ def twenty_modes(interface: str = "inprocess") -> Bench:
     mass_kg, stiffness_n_m = 335.0 + 384.0, 5.64e7
     data = reference.model_dump() | {
         "name": "20 modes",
-        "axis": {"model": "serial_chain", "lead_m": 0.010, "damping_ratio": 0.03,
-                 "inertias_kg_m2": [mass_kg * ratio**2 / MODES] * MODES,
-                 "stiffnesses_n_m_rad": [stiffness_n_m * ratio**2 * (MODES - 1)] * (MODES - 1),
-                 "coulomb_torque_n_m": 1.1, "viscous_torque_n_m_s_rad": 0.0064},
+        "axis": {
+            "model": "serial_chain",
+            "lead_m": 0.010,
+            "damping_ratio": 0.03,
+            "inertias_kg_m2": [mass_kg * ratio**2 / MODES] * MODES,
+            "stiffnesses_n_m_rad": [stiffness_n_m * ratio**2 * (MODES - 1)] * (MODES - 1),
+            "coulomb_torque_n_m": 1.1,
+            "viscous_torque_n_m_s_rad": 0.0064,
+        },
         # nothing of the loop depends on where the axis really is: it stands still, and that is no fault here
         "drive": DriveSection(interface=interface, following_error_m=10.0).model_dump(),
         "simulation": SimulationSection().model_dump(),

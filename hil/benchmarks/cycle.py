@@ -1,8 +1,8 @@
 """How long one whole cycle of the loop takes: SYNC, answers, P, PI, live twin of 20 modes, PDO packing, record.
 
-Measured from the deadline to the end of the cycle inside `hil.session`, back to back. The simulated devices answer;
-the axis behind them stands still, for physics is no part of the loop. On the in-process bus their work is part of the
-figure; on a python-can bus it is taken out, since real devices serve their end of the bus themselves.
+Measured from the deadline to the end of the cycle inside `hil.loop.session`, back to back. The simulated devices
+answer; the axis behind them stands still, for physics is no part of the loop. On the in-process bus their work is
+part of the figure; on a python-can bus it is taken out, since real devices serve their end of the bus themselves.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ from time import perf_counter_ns
 
 from hil.benchmarks.axis import moves, trajectory, twenty_modes
 from hil.benchmarks.figure import Figure, percentile
-from hil.clock import VirtualClock
-from hil.recorder import Recorder
-from hil.rig import Rig
-from hil.session import Session, make_cycle
+from hil.loop.clock import VirtualClock
+from hil.loop.devices import Rig
+from hil.loop.session import Session, make_cycle
+from hil.recording.writer import Recorder
 
 LOOPS = 4
 
@@ -77,7 +77,7 @@ def whole_cycle(interface: str) -> tuple[list[float], list[float]]:
             cycle = make_cycle(rig, 0.0)
             with Recorder(folder, "bench", cycle.channels, bench.gains.period_s, {}) as recorder:
                 Session(rig, cycle, motion, profile.motion_limits, watch, recorder).run()
-        if run:   # the first one compiles
+        if run:  # the first one compiles
             durations += [1e-9 * duration for duration in watch.durations_ns]
             devices += [1e-9 * duration for duration in watch.devices_ns]
     return durations, devices

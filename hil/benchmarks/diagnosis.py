@@ -15,12 +15,12 @@ from typing import Annotated
 
 import typer
 
-from hil.commands.console import table
 from hil.demo import LEARN, PROVE, conceal
-from hil.profile import Profile
-from hil.run import run_profile
-from hil.simulated import load_simulated
-from hil.trajectory import plan
+from hil.loop.run import run_profile
+from hil.loop.simulated_bench import load_simulated
+from hil.motion.profile import Profile
+from hil.motion.trajectory import plan
+from hil.report.console import table
 
 LENGTHS_S = (25.0, 50.0, 100.0, 200.0)
 _HIL = (sys.executable, "-c", "from hil.cli import main; main()")
@@ -37,9 +37,22 @@ def measure(effect: Annotated[str, typer.Option(help="What is concealed")] = "co
             profile = _repeated(LEARN, length_s, bench.gains.period_s)
             recorded = run_profile(bench, profile, place, f"train_{length_s:.0f}", virtual=True).recording
             begin = perf_counter()
-            subprocess.run([*_HIL, "diagnose", str(recorded), "--validate", str(held_out),
-                            "--bench", "reference", "--out", str(place / f"out_{length_s:.0f}")],
-                           check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            subprocess.run(
+                [
+                    *_HIL,
+                    "diagnose",
+                    str(recorded),
+                    "--validate",
+                    str(held_out),
+                    "--bench",
+                    "reference",
+                    "--out",
+                    str(place / f"out_{length_s:.0f}"),
+                ],
+                check=True,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+            )
             took_s = perf_counter() - begin
             rows.append((f"{length_s:.0f} s", f"{took_s:.1f} s", f"{took_s / length_s:.2f}"))
     table(("recording at 1 kHz", "diagnosis", "per second of recording"), rows)
@@ -49,8 +62,9 @@ def _repeated(profile: Profile, length_s: float, period_s: float) -> Profile:
     """A profile over and over, for as long as `length_s`."""
     data = profile.model_dump(mode="json")
     times = max(round(length_s / plan(profile, period_s).duration_s), 1)
-    return Profile.model_validate(data | {"segments": [
-        {"kind": "repeat", "times": times, "segments": data["segments"]}]})
+    return Profile.model_validate(
+        data | {"segments": [{"kind": "repeat", "times": times, "segments": data["segments"]}]}
+    )
 
 
 if __name__ == "__main__":

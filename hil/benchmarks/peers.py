@@ -12,19 +12,19 @@ from math import tanh
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from hil import control as law
-from hil.axis_models import TwoMass
+from hil.arrays import FloatArray
+from hil.bench.axis_models import TwoMass
 from hil.benchmarks.axis import trajectory, two_mass
 from hil.benchmarks.figure import Figure, best_of
-from hil.trajectory import Trajectory
+from hil.control import cascade as law
+from hil.motion.trajectory import Trajectory
 
 DURATION_S = 1.0
-SMOOTHING_RAD_S = 0.1        # vs of the smoothed friction: 1 % of the speed at 7 m/min
+SMOOTHING_RAD_S = 0.1  # vs of the smoothed friction: 1 % of the speed at 7 m/min
 MUJOCO_STEP_S = 1e-4
 TOLERANCE = 1e-6
-_Peer = Callable[["Axis", Trajectory], NDArray[np.float64]]
+_Peer = Callable[["Axis", Trajectory], FloatArray]
 
 
 class Axis:
@@ -47,17 +47,23 @@ class Axis:
         """d/dt of motor angle and speed, table angle and speed, integrator, under the continuous cascade."""
         motor, motor_speed, table, table_speed, integral = state
         gains = self.gains
-        reference = (gains.position_gain_1_s * (position_m - self.ratio * motor)
-                     + gains.velocity_feedforward * velocity_m_s)
+        reference = (
+            gains.position_gain_1_s * (position_m - self.ratio * motor) + gains.velocity_feedforward * velocity_m_s
+        )
         error = reference / self.ratio - motor_speed
         torque = gains.velocity_gain_n_m_s_rad * error + integral
         friction = self.coulomb * tanh(motor_speed / SMOOTHING_RAD_S) + self.viscous * motor_speed
         spring = self.stiffness * (motor - table) + self.damping * (motor_speed - table_speed)
-        return [motor_speed, (torque - friction - spring) / self.motor, table_speed, spring / self.table,
-                gains.integral_gain_n_m_rad * error]
+        return [
+            motor_speed,
+            (torque - friction - spring) / self.motor,
+            table_speed,
+            spring / self.table,
+            gains.integral_gain_n_m_rad * error,
+        ]
 
 
-def solve_ivp(axis: Axis, motion: Trajectory) -> NDArray[np.float64]:
+def solve_ivp(axis: Axis, motion: Trajectory) -> FloatArray:
     """scipy.integrate.solve_ivp, LSODA: table position (n,)."""
     from scipy.integrate import solve_ivp as integrate
 
@@ -66,24 +72,34 @@ def solve_ivp(axis: Axis, motion: Trajectory) -> NDArray[np.float64]:
     def rates(now_s: float, state: Any) -> list[float]:
         return axis.rates(state, float(np.interp(now_s, time_s, position)), float(np.interp(now_s, time_s, velocity)))
 
-    answer = integrate(rates, (0.0, time_s[-1]), np.zeros(5), method="LSODA", t_eval=time_s, rtol=TOLERANCE,
-                       atol=1e-9, max_step=0.01)
+    answer = integrate(
+        rates, (0.0, time_s[-1]), np.zeros(5), method="LSODA", t_eval=time_s, rtol=TOLERANCE, atol=1e-9, max_step=0.01
+    )
     return np.asarray(answer.y[2] * axis.ratio)
 
 
-def python_control(axis: Axis, motion: Trajectory) -> NDArray[np.float64]:
+def python_control(axis: Axis, motion: Trajectory) -> FloatArray:
     """control.input_output_response of a nonlinear system, its defaults but for the tolerance: table position (n,)."""
     import control
 
-    system = control.nlsys(lambda t, x, u, params: axis.rates(x, u[0], u[1]), lambda t, x, u, params: x[2] * axis.ratio,
-                           inputs=2, outputs=1, states=5)
+    system = control.nlsys(
+        lambda t, x, u, params: axis.rates(x, u[0], u[1]),
+        lambda t, x, u, params: x[2] * axis.ratio,
+        inputs=2,
+        outputs=1,
+        states=5,
+    )
     response = control.input_output_response(
-        system, motion.time_s, np.vstack([motion.position_m, motion.velocity_m_s]), np.zeros(5),
-        solve_ivp_kwargs={"rtol": TOLERANCE, "atol": 1e-9})
+        system,
+        motion.time_s,
+        np.vstack([motion.position_m, motion.velocity_m_s]),
+        np.zeros(5),
+        solve_ivp_kwargs={"rtol": TOLERANCE, "atol": 1e-9},
+    )
     return np.asarray(response.outputs)
 
 
-def mujoco(axis: Axis, motion: Trajectory) -> NDArray[np.float64]:
+def mujoco(axis: Axis, motion: Trajectory) -> FloatArray:
     """MuJoCo: two hinges joined by a spring, dry friction as a constraint, the project's control law: (n,)."""
     import mujoco as engine
 
@@ -123,7 +139,7 @@ def figures() -> Iterator[Figure]:
     axis, motion = Axis(), _first_second(trajectory(two_mass().gains.period_s))
     real = "x real time"
 
-    def simulate() -> NDArray[np.float64]:
+    def simulate() -> FloatArray:
         return axis.twin.simulate(motion.position_m, motion.velocity_m_s).table_position_m
 
     table = simulate()
@@ -133,17 +149,33 @@ def figures() -> Iterator[Figure]:
         try:
             answer = peer(axis, motion)
         except ModuleNotFoundError as error:
-            yield Figure(f"two-mass axis with friction: {name}", float("nan"), real,
-                         detail=f"not measured: {error.name} is not installed (make peers)")
+            yield Figure(
+                f"two-mass axis with friction: {name}",
+                float("nan"),
+                real,
+                detail=f"not measured: {error.name} is not installed (make peers)",
+            )
             continue
         speed = motion.duration_s / best_of(lambda peer=peer: peer(axis, motion), 2)  # type: ignore[misc]
         apart_m = float(np.sqrt(np.mean((answer - table) ** 2)))
-        yield Figure(f"two-mass axis with friction: {name}", speed, real,
-                     detail=f"twin {own / speed:.0f} x as fast; table {1e6 * apart_m:.2f} um rms from the twin's")
+        yield Figure(
+            f"two-mass axis with friction: {name}",
+            speed,
+            real,
+            detail=f"twin {own / speed:.0f} x as fast; table {1e6 * apart_m:.2f} um rms from the twin's",
+        )
 
 
 def _first_second(motion: Trajectory) -> Trajectory:
     count = round(DURATION_S / motion.period_s) + 1
-    return Trajectory(motion.period_s, motion.time_s[:count], motion.position_m[:count], motion.velocity_m_s[:count],
-                      motion.acceleration_m_s2[:count], motion.jerk_m_s3[:count], motion.segment[:count],
-                      motion.phase[:count], motion.runs)
+    return Trajectory(
+        motion.period_s,
+        motion.time_s[:count],
+        motion.position_m[:count],
+        motion.velocity_m_s[:count],
+        motion.acceleration_m_s2[:count],
+        motion.jerk_m_s3[:count],
+        motion.segment[:count],
+        motion.phase[:count],
+        motion.runs,
+    )

@@ -7,12 +7,12 @@ from time import perf_counter
 
 from hil.benchmarks.axis import moves, trajectory, twenty_modes, two_mass
 from hil.benchmarks.figure import Figure, best_of
-from hil.clock import VirtualClock
-from hil.recorder import Recorder
-from hil.rig import Rig
-from hil.session import Session, make_cycle
+from hil.loop.clock import VirtualClock
+from hil.loop.devices import Rig
+from hil.loop.session import Session, make_cycle
+from hil.loop.virtual import VirtualSession
+from hil.recording.writer import Recorder
 from hil.twin.axis import Twin
-from hil.virtual import VirtualSession
 
 REPEATS = 5
 TWIN_LAPS, TWIN_REPEATS = 10, 15
@@ -49,12 +49,31 @@ def figures() -> list[Figure]:
     plain = Twin(bench.axis.physics(), bench.gains, coarse_step_s=tick_s, fine_step_s=tick_s)
     real = "x real time"
     return [
-        Figure("whole bench in virtual time", whole_bench(VirtualSession), real, 200.0, False,
-               "2-dof reality at 10 us steps, live twin, recorder; same rows bit for bit as over the bus"),
-        Figure("whole bench in virtual time, every frame", whole_bench(Session), real, None, False,
-               "the same, each tick over CANopen frames"),
-        Figure("twin offline, closed loop, 20 modes", offline_twin(plain), real, 10_000.0, False,
-               "one exact step per tick"),
-        Figure("twin offline, closed loop, 20 modes, fine at reversals", offline_twin(whole), real, None, False,
-               "default steps: 50 per tick while the motor may reverse"),
+        Figure(
+            "whole bench in virtual time",
+            whole_bench(VirtualSession),
+            real,
+            200.0,
+            False,
+            "2-dof reality at 10 us steps, live twin, recorder; same rows bit for bit as over the bus",
+        ),
+        Figure(
+            "whole bench in virtual time, every frame",
+            whole_bench(Session),
+            real,
+            None,
+            False,
+            "the same, each tick over CANopen frames",
+        ),
+        Figure(
+            "twin offline, closed loop, 20 modes", offline_twin(plain), real, 10_000.0, False, "one exact step per tick"
+        ),
+        Figure(
+            "twin offline, closed loop, 20 modes, fine at reversals",
+            offline_twin(whole),
+            real,
+            None,
+            False,
+            "default steps: 50 per tick while the motor may reverse",
+        ),
     ]

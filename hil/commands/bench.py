@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from hil.commands.console import Progress, out, progress, table
+from hil.report.console import Progress, out, progress, table
 
 if TYPE_CHECKING:
     from hil.benchmarks.figure import Figure
@@ -18,16 +18,26 @@ def bench(
     file: Annotated[Path, typer.Option("--out", help="Where the figures go as JSON")] = Path("runs/bench.json"),
 ) -> None:
     """Measure the loop, the simulated bench and the twin on this machine, beside other simulators."""
-    from hil.realtime import machine_state, measure_jitter, now_text, real_time
-    from hil.report.output import write_json
+    from hil.files.output import write_json
+    from hil.loop.realtime import machine_state, measure_jitter, now_text, real_time
 
     with progress() as tell, real_time() as grants:
         figures = list(_figures(tell))
         tell("jitter of an empty loop", None)
         jitter = measure_jitter(0.001, 5.0)
-    table(("figure", "measured", "target", "met", "how"),
-          [(figure.name, _number(figure.value, figure.unit), _target(figure), {True: "yes", False: "no", None: ""}[
-              figure.met], figure.detail) for figure in figures])
+    table(
+        ("figure", "measured", "target", "met", "how"),
+        [
+            (
+                figure.name,
+                _number(figure.value, figure.unit),
+                _target(figure),
+                {True: "yes", False: "no", None: ""}[figure.met],
+                figure.detail,
+            )
+            for figure in figures
+        ],
+    )
     machine = machine_state()
     granted = [grant.setting for grant in grants if not grant.refused]
     refused = [f"{grant.setting} ({grant.refused})" for grant in grants if grant.refused]
@@ -35,19 +45,32 @@ def bench(
     out.print("machine: " + ", ".join(f"{name} {value}" for name, value in machine.items()), markup=False)
     out.print(f"granted: {', '.join(granted)}; refused: {', '.join(refused) or 'nothing'}", markup=False)
     file.parent.mkdir(parents=True, exist_ok=True)
-    write_json(file, {
-        "schema_version": 1, "time": now_text(), "machine": machine, "granted": granted, "refused": refused,
-        "jitter": vars(jitter),
-        "figures": [vars(figure) | {"met": figure.met, "value": None if figure.value != figure.value else figure.value}
-                    for figure in figures]})
+    write_json(
+        file,
+        {
+            "schema_version": 1,
+            "time": now_text(),
+            "machine": machine,
+            "granted": granted,
+            "refused": refused,
+            "jitter": vars(jitter),
+            "figures": [
+                vars(figure) | {"met": figure.met, "value": None if figure.value != figure.value else figure.value}
+                for figure in figures
+            ],
+        },
+    )
     out.print(f"\nFigures: {file}")
 
 
 def _figures(tell: Progress) -> Iterator[Figure]:
     from hil.benchmarks import cycle, peers, simulation
 
-    for what, measure in (("whole cycle of the loop", cycle.figures), ("simulation", simulation.figures),
-                          ("other simulators", peers.figures)):
+    for what, measure in (
+        ("whole cycle of the loop", cycle.figures),
+        ("simulation", simulation.figures),
+        ("other simulators", peers.figures),
+    ):
         tell(what, None)
         yield from measure()
 

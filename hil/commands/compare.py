@@ -7,25 +7,28 @@ from typing import Annotated
 
 import typer
 
-from hil.commands.console import out, progress, table
+from hil.report.console import out, progress, table
 
 
 def compare(
     run: Annotated[Path, typer.Argument(help="Recording: .parquet, .arrows or .csv", show_default=False)],
-    bench: Annotated[str | None, typer.Option(
-        help="Bench file, or the name of a shipped one; left out: the bench that is in the recording")] = None,
+    bench: Annotated[
+        str | None,
+        typer.Option(help="Bench file, or the name of a shipped one; left out: the bench that is in the recording"),
+    ] = None,
     fit: Annotated[bool, typer.Option("--fit", help="Fit the parameters of the axis to the recording first")] = False,
-    folder: Annotated[Path | None, typer.Option(
-        "--out", help="New folder for the report; left out: runs/compare-NAME-TIME")] = None,
+    folder: Annotated[
+        Path | None, typer.Option("--out", help="New folder for the report; left out: runs/compare-NAME-TIME")
+    ] = None,
 ) -> None:
     """Compare a recording with its twin: in closed loop from the same set-points, and block by block."""
-    from hil.bench import load_bench
-    from hil.compare import compare as compare_recording
-    from hil.measured import bench_of
-    from hil.recording import read_recording
+    from hil.bench.bench_file import load_bench
+    from hil.files.output import default_folder, new_folder
+    from hil.identification.compare import compare as compare_recording
+    from hil.identification.dataset import bench_of
+    from hil.recording.recording import read_recording
     from hil.report.compare_report import verdict, write_comparison
-    from hil.report.look import percent, quantity
-    from hil.report.output import default_folder, new_folder
+    from hil.report.style import percent, quantity
 
     recording = read_recording(run)
     believed = load_bench(bench) if bench else bench_of(recording)
@@ -34,7 +37,16 @@ def compare(
         result = compare_recording(recording, believed, fit=fit, progress=tell)
         tell("writing the report", None)
         write_comparison(result, part)
-    table(("measured less simulated", "rms", "largest", "relative"),
-          [(channel.label, quantity(channel.rms, channel.unit), quantity(channel.peak, channel.unit),
-            percent(channel.relative)) for channel in result.channels])
+    table(
+        ("measured less simulated", "rms", "largest", "relative"),
+        [
+            (
+                channel.label,
+                quantity(channel.rms, channel.unit),
+                quantity(channel.peak, channel.unit),
+                percent(channel.relative),
+            )
+            for channel in result.channels
+        ],
+    )
     out.print(f"\n{verdict(result)}\n\nReport: {folder / 'compare.html'}")

@@ -7,28 +7,42 @@ from typing import Annotated
 
 import typer
 
-from hil.commands.console import out, progress, table
+from hil.report.console import out, progress, table
 
 
 def diagnose(
-    runs: Annotated[list[Path], typer.Argument(metavar="RUN...", show_default=False,
-                                               help="Recordings to learn from: .parquet, .arrows or .csv")],
-    validate: Annotated[list[Path] | None, typer.Option(
-        "--validate", help="Recording of another motion to prove the result on; may be given several times; "
-        "left out: the last third of each recording")] = None,
-    bench: Annotated[str | None, typer.Option(
-        help="Bench or axis file, or the name of a shipped one; left out: the bench that is in the recording")] = None,
-    folder: Annotated[Path | None, typer.Option(
-        "--out", help="New folder for the results; left out: runs/diagnose-NAME-TIME")] = None,
+    runs: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="RUN...", show_default=False, help="Recordings to learn from: .parquet, .arrows or .csv"
+        ),
+    ],
+    validate: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--validate",
+            help="Recording of another motion to prove the result on; may be given several times; "
+            "left out: the last third of each recording",
+        ),
+    ] = None,
+    bench: Annotated[
+        str | None,
+        typer.Option(
+            help="Bench or axis file, or the name of a shipped one; left out: the bench that is in the recording"
+        ),
+    ] = None,
+    folder: Annotated[
+        Path | None, typer.Option("--out", help="New folder for the results; left out: runs/diagnose-NAME-TIME")
+    ] = None,
 ) -> None:
     """Find out what the twin leaves out: where, which physics, and whether modelling it helps."""
-    from hil.bench import load_bench
+    from hil.bench.bench_file import load_bench
     from hil.diagnosis.diagnose import diagnose as diagnose_recordings
-    from hil.measured import bench_of
-    from hil.recording import read_recording
-    from hil.report.diagnose_report import write_diagnosis
-    from hil.report.look import quantity
-    from hil.report.output import default_folder, new_folder
+    from hil.files.output import default_folder, new_folder
+    from hil.identification.dataset import bench_of
+    from hil.recording.recording import read_recording
+    from hil.report.diagnosis.report import write_diagnosis
+    from hil.report.style import quantity
 
     train = [read_recording(path) for path in runs]
     held_out = [read_recording(path) for path in validate or []]
@@ -39,9 +53,23 @@ def diagnose(
         tell("writing the report", None)
         write_diagnosis(diagnosis, part)
     result = diagnosis.result
-    table(("rms, held out" if result.fit and next(iter(result.fit.values())).validate_ else "rms", "before", "after",
-           "noise floor"),
-          [(name, *(quantity(value, entry.unit) for value in (
-              figures.before_rms, figures.after_rms, figures.noise_floor_rms)))
-           for name, entry in result.fit.items() for figures in (entry.validate_ or entry.train,)])
+    table(
+        (
+            "rms, held out" if result.fit and next(iter(result.fit.values())).validate_ else "rms",
+            "before",
+            "after",
+            "noise floor",
+        ),
+        [
+            (
+                name,
+                *(
+                    quantity(value, entry.unit)
+                    for value in (figures.before_rms, figures.after_rms, figures.noise_floor_rms)
+                ),
+            )
+            for name, entry in result.fit.items()
+            for figures in (entry.validate_ or entry.train,)
+        ],
+    )
     out.print(f"\n{result.statement}\n\nReport: {folder / 'report.html'}")

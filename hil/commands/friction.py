@@ -7,35 +7,42 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from hil.commands.console import out, progress, table
+from hil.report.console import out, progress, table
 
 if TYPE_CHECKING:
-    from hil.bench import Bench
+    from hil.bench.bench_file import Bench
 
 
 def friction(
-    run: Annotated[Path | None, typer.Argument(
-        help="Recording of a feed sweep; left out: --profile is run on --bench first", show_default=False)] = None,
+    run: Annotated[
+        Path | None,
+        typer.Argument(
+            help="Recording of a feed sweep; left out: --profile is run on --bench first", show_default=False
+        ),
+    ] = None,
     bench: Annotated[str | None, typer.Option(help="Bench file or shipped name")] = None,
     profile: Annotated[Path | None, typer.Option(help="Feed sweep to run, as profiles/friction_sweep.yaml")] = None,
     virtual: Annotated[bool, typer.Option("--virtual", help="Run it in virtual time (simulated bench)")] = False,
-    folder: Annotated[Path | None, typer.Option(
-        "--out", help="New folder for the report; left out: runs/friction-NAME-TIME")] = None,
+    folder: Annotated[
+        Path | None, typer.Option("--out", help="New folder for the report; left out: runs/friction-NAME-TIME")
+    ] = None,
 ) -> None:
     """Identify Coulomb and viscous friction from constant feeds in both directions."""
-    from hil.bench import load_bench
+    from hil.bench.bench_file import load_bench
     from hil.commands.run import named
     from hil.errors import InputError
-    from hil.friction import identify_friction
-    from hil.measured import bench_of
-    from hil.recording import read_recording
+    from hil.files.output import default_folder, new_folder
+    from hil.identification.dataset import bench_of
+    from hil.identification.friction import identify_friction
+    from hil.loop.simulated_bench import load_simulated
+    from hil.recording.recording import read_recording
     from hil.report.friction_report import rows_of, verdict, write_friction
-    from hil.report.output import default_folder, new_folder
-    from hil.simulated import load_simulated
 
     if (run is None) == (profile is None):
-        raise InputError("friction: given neither or both of a recording and --profile, allowed one; "
-                         "give a recording, or --profile with --bench to run it")
+        raise InputError(
+            "friction: given neither or both of a recording and --profile, allowed one; "
+            "give a recording, or --profile with --bench to run it"
+        )
     load = load_bench if profile is None else load_simulated
     believed = load(bench) if bench else None
     if run is None and believed is None:
@@ -61,8 +68,8 @@ def friction(
 
 def _run(bench: Bench, profile: Path, folder: Path, virtual: bool) -> Path:
     from hil.errors import HilError
-    from hil.profile import load_profile
-    from hil.run import run_profile
+    from hil.loop.run import run_profile
+    from hil.motion.profile import load_profile
 
     ran = run_profile(bench, load_profile(profile), folder, "run", virtual=virtual)
     if not ran.complete or ran.recording is None:

@@ -7,27 +7,36 @@ from typing import Annotated
 
 import typer
 
-from hil.commands.console import out
+from hil.report.console import out
 
 
 def import_(
     source: Annotated[Path, typer.Argument(help="Foreign recording: .csv, .mat or .parquet", show_default=False)],
-    map_file: Annotated[str, typer.Option(
-        "--map", help="Map of columns and units (YAML), or the name of a shipped one: emps", show_default=False)],
-    target: Annotated[Path | None, typer.Option(
-        "--out", help="Parquet file to write; left out: the name of the source in this folder")] = None,
+    map_file: Annotated[
+        str,
+        typer.Option(
+            "--map", help="Map of columns and units (YAML), or the name of a shipped one: emps", show_default=False
+        ),
+    ],
+    target: Annotated[
+        Path | None,
+        typer.Option("--out", help="Parquet file to write; left out: the name of the source in this folder"),
+    ] = None,
 ) -> None:
     """Import a foreign recording by a map of its columns, units and signs."""
-    from hil.importing import import_recording
-    from hil.recording import write_parquet
+    from hil.recording.importing import import_recording
+    from hil.recording.recording import write_parquet
 
     recording = import_recording(source, map_file)
     target = target or Path(f"{source.stem}.parquet")
     write_parquet(recording, target)
     out.print(f"{len(recording)} rows, {recording.metadata['clock']}")
     for channel, origin in recording.metadata["channels"].items():
-        out.print(f"  {channel} = {origin['factor']:.9g} x {origin['column']}"
-                  + (f" + {origin['offset']:g}" if origin["offset"] else ""), markup=False)
+        out.print(
+            f"  {channel} = {origin['factor']:.9g} x {origin['column']}"
+            + (f" + {origin['offset']:g}" if origin["offset"] else ""),
+            markup=False,
+        )
     for channel, how in recording.metadata["derived"].items():
         out.print(f"  {channel}: {how}", markup=False)
     out.print(f"Recording: {target}")

@@ -9,29 +9,42 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from hil.commands.console import err, out, progress, table
+from hil.report.console import err, out, progress, table
 
 if TYPE_CHECKING:
-    from hil.profile import Profile
-    from hil.run import RunResult
+    from hil.loop.run import RunResult
+    from hil.motion.profile import Profile
 
 
 def investigate(
-    profiles: Annotated[list[Path], typer.Argument(metavar="PROFILE...", show_default=False,
-                                                   help="Profiles to begin with, as profiles/identification.yaml")],
+    profiles: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="PROFILE...", show_default=False, help="Profiles to begin with, as profiles/identification.yaml"
+        ),
+    ],
     bench: Annotated[str, typer.Option(help="Bench file, or the name of a shipped one")] = "reference",
-    validate: Annotated[list[Path] | None, typer.Option(
-        "--validate", help="Profile of another motion to prove the result on; may be given several times; left out: "
-        "the last third of each recording")] = None,
+    validate: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--validate",
+            help="Profile of another motion to prove the result on; may be given several times; left out: "
+            "the last third of each recording",
+        ),
+    ] = None,
     rounds: Annotated[int, typer.Option(min=1, max=10, help="Rounds at most")] = 3,
     yes: Annotated[bool, typer.Option("--yes", help="On a real bench: run designed motions without asking")] = False,
-    virtual: Annotated[bool, typer.Option(
-        "--virtual/--wall", help="Simulated bench as fast as the machine allows, or wall-clock time")] = False,
-    force: Annotated[bool, typer.Option(
-        "--force", help="Arm although jitter or bus load exceed the budget of the bench")] = False,
+    virtual: Annotated[
+        bool, typer.Option("--virtual/--wall", help="Simulated bench as fast as the machine allows, or wall-clock time")
+    ] = False,
+    force: Annotated[
+        bool, typer.Option("--force", help="Arm although jitter or bus load exceed the budget of the bench")
+    ] = False,
     seed: Annotated[int | None, typer.Option(min=0, help="Of the simulated sensors; left out: the bench's")] = None,
-    folder: Annotated[Path | None, typer.Option(
-        "--out", help="New folder for recordings and results; left out: runs/investigate-BENCH-TIME")] = None,
+    folder: Annotated[
+        Path | None,
+        typer.Option("--out", help="New folder for recordings and results; left out: runs/investigate-BENCH-TIME"),
+    ] = None,
 ) -> None:
     """Run profiles, diagnose, and run the motion that separates what is left, until one cause remains.
 
@@ -41,18 +54,20 @@ def investigate(
     from hil.commands.run import named, say
     from hil.diagnosis.wording import title
     from hil.errors import InputError
+    from hil.files.output import default_folder, refuse_used
     from hil.investigate import investigate as investigate_bench
-    from hil.profile import load_profile
-    from hil.report.diagnose_report import write_diagnosis
-    from hil.report.output import default_folder, refuse_used
-    from hil.run import run_profile
-    from hil.simulated import load_simulated
-    from hil.supervision import Ending
+    from hil.loop.run import run_profile
+    from hil.loop.simulated_bench import load_simulated
+    from hil.loop.supervision import Ending
+    from hil.motion.profile import load_profile
+    from hil.report.diagnosis.report import write_diagnosis
 
     files = {path.stem: path for path in (*profiles, *(validate or []))}
     if len(files) < len(profiles) + len(validate or []):
-        raise InputError(f"PROFILE: given {', '.join(map(str, (*profiles, *(validate or []))))}, allowed files with "
-                         "names of their own: recordings are called like them")
+        raise InputError(
+            f"PROFILE: given {', '.join(map(str, (*profiles, *(validate or []))))}, allowed files with "
+            "names of their own: recordings are called like them"
+        )
     loaded = load_simulated(bench)
     first, proving = ({path.stem: load_profile(path) for path in paths} for paths in (profiles, validate or []))
     folder = folder or default_folder(f"investigate-{loaded.name}")
@@ -62,10 +77,18 @@ def investigate(
 
     def run(profile: Profile, place: Path, name: str) -> RunResult:
         with named(bench, files.get(name, place / f"{name}.yaml")):
-            ran = run_profile(loaded, profile, place, name, virtual=virtual, force=force,
-                              seed=next(seeds) if simulation else None,      # other noise in every run
-                              planned=lambda trajectory: err.print(
-                                  f"{name} on {loaded.name}: {trajectory.duration_s:.1f} s of motion ..."))
+            ran = run_profile(
+                loaded,
+                profile,
+                place,
+                name,
+                virtual=virtual,
+                force=force,
+                seed=next(seeds) if simulation else None,  # other noise in every run
+                planned=lambda trajectory: err.print(
+                    f"{name} on {loaded.name}: {trajectory.duration_s:.1f} s of motion ..."
+                ),
+            )
         say(ran, virtual)
         if ran.outcome.ending is Ending.INTERRUPTED:
             raise typer.Exit(130)
@@ -78,22 +101,32 @@ def investigate(
     with progress() as tell:
         tell("writing the report", None)
         write_diagnosis(found.diagnosis, folder)
-    table(("round", "motion", "found", "open"),
-          [(str(number), ", ".join(one.motions),
-            ", ".join(title(finding.effect) for finding in one.diagnosis.result.missing)
-            or title(one.diagnosis.result.verdict), ", ".join(map(title, one.open)) or "–")
-           for number, one in enumerate(found.rounds, 1)])
+    table(
+        ("round", "motion", "found", "open"),
+        [
+            (
+                str(number),
+                ", ".join(one.motions),
+                ", ".join(title(finding.effect) for finding in one.diagnosis.result.missing)
+                or title(one.diagnosis.result.verdict),
+                ", ".join(map(title, one.open)) or "–",
+            )
+            for number, one in enumerate(found.rounds, 1)
+        ],
+    )
     out.print(f"\n{found.diagnosis.result.statement}\n\n{found.ended}\n\nReport: {folder / 'report.html'}")
 
 
 def _confirmed(profile: Profile, period_s: float) -> bool:
     """Whether the user lets a real axis make a motion that nobody has looked at; without a terminal not."""
-    from hil.trajectory import plan
+    from hil.motion.trajectory import plan
 
     if not sys.stdin.isatty():
         return False
     trajectory, limits = plan(profile, period_s), profile.limits
-    err.print(f"Next motion: {profile.description}, {trajectory.duration_s:.1f} s, from "
-              f"{1e3 * trajectory.position_m.min():.1f} to {1e3 * trajectory.position_m.max():.1f} mm, up to "
-              f"{limits.velocity_m_s:g} m/s, {limits.acceleration_m_s2:g} m/s^2, {limits.jerk_m_s3:g} m/s^3.")
+    err.print(
+        f"Next motion: {profile.description}, {trajectory.duration_s:.1f} s, from "
+        f"{1e3 * trajectory.position_m.min():.1f} to {1e3 * trajectory.position_m.max():.1f} mm, up to "
+        f"{limits.velocity_m_s:g} m/s, {limits.acceleration_m_s2:g} m/s^2, {limits.jerk_m_s3:g} m/s^3."
+    )
     return typer.confirm("Run it on this bench?", default=False, err=True)

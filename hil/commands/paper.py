@@ -7,16 +7,17 @@ from typing import Annotated
 
 import typer
 
-from hil.commands.console import out, progress
+from hil.report.console import out, progress
 
 
 def paper(
-    folder: Annotated[Path | None, typer.Option(
-        "--out", help="New folder for the report; left out: runs/paper-TIME")] = None,
+    folder: Annotated[
+        Path | None, typer.Option("--out", help="New folder for the report; left out: runs/paper-TIME")
+    ] = None,
 ) -> None:
     """Reproduce the source paper: what it prints, what comes out, why they differ, and its figures."""
+    from hil.files.output import default_folder, new_folder
     from hil.paper import run_paper
-    from hil.report.output import default_folder, new_folder
     from hil.report.paper_report import verdict, write_paper
 
     folder = folder or default_folder("paper")

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from hil.commands.console import out, progress, table
+from hil.report.console import out, progress, table
 
 
 class Plant(StrEnum):
@@ -19,18 +19,34 @@ class Plant(StrEnum):
 
 
 def prove(
-    folder: Annotated[Path, typer.Option("--out", help="Folder for cases, answers and scores; one that was "
-                                         "interrupted goes on", show_default=False)],
+    folder: Annotated[
+        Path,
+        typer.Option(
+            "--out", help="Folder for cases, answers and scores; one that was interrupted goes on", show_default=False
+        ),
+    ],
     cases: Annotated[int | None, typer.Option("--cases", help="How many cases; left out: 40")] = None,
     full: Annotated[bool, typer.Option("--full", help="The whole proof, some 1200 cases: takes many hours")] = False,
     seed: Annotated[int, typer.Option(min=0, help="Of the draw")] = 1,
-    plant: Annotated[Plant, typer.Option("--plant", help="What moves the axes: our simulation, or MuJoCo, which must "
-                                         "be installed (make peers)")] = Plant.SIMULATED,
-    only: Annotated[list[str] | None, typer.Option("--only", help="A tier to draw from, as single or pair; may be "
-                                                   "repeated; left out: all")] = None,
-    hours: Annotated[float | None, typer.Option(min=0.0, help="Of diagnosing, after which no case is begun; the "
-                                                "first that are answered are scored, the same again goes on; left "
-                                                "out: no end")] = None,
+    plant: Annotated[
+        Plant,
+        typer.Option(
+            "--plant", help="What moves the axes: our simulation, or MuJoCo, which must be installed (make peers)"
+        ),
+    ] = Plant.SIMULATED,
+    only: Annotated[
+        list[str] | None,
+        typer.Option("--only", help="A tier to draw from, as single or pair; may be repeated; left out: all"),
+    ] = None,
+    hours: Annotated[
+        float | None,
+        typer.Option(
+            min=0.0,
+            help="Of diagnosing, after which no case is begun; the "
+            "first that are answered are scored, the same again goes on; left "
+            "out: no end",
+        ),
+    ] = None,
     jobs: Annotated[int | None, typer.Option(min=1, help="Cases diagnosed at once; left out: one per core")] = None,
 ) -> None:
     """Conceal effects in simulated axes, seal what they are, diagnose the recordings blind, unseal and score."""
@@ -39,11 +55,11 @@ def prove(
     from math import inf
 
     from hil.errors import InputError
-    from hil.proof.page import write_proof
-    from hil.proof.plan import PLANTS, plan
+    from hil.proof.draw.plan import PLANTS, plan
     from hil.proof.run import prove as run
     from hil.proof.run import score_others
-    from hil.proof.tables import HEADERS, goal_row
+    from hil.proof.score.page import write_proof
+    from hil.proof.score.tables import HEADERS, goal_row
 
     if full and cases is not None:
         raise InputError(f"--full: given with --cases {cases}, allowed one of them")
@@ -55,8 +71,17 @@ def prove(
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         with progress() as tell:
-            scores = run(folder, planned, seed, jobs or os.cpu_count() or 1, out.print, tell, plant, tiers,
-                         inf if hours is None else hours)
+            scores = run(
+                folder,
+                planned,
+                seed,
+                jobs or os.cpu_count() or 1,
+                out.print,
+                tell,
+                plant,
+                tiers,
+                inf if hours is None else hours,
+            )
             tell("writing the report", None)
             write_proof(scores, score_others(folder, scores), folder)
     finally:

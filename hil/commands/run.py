@@ -9,30 +9,33 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from hil.commands.console import err, out
+from hil.report.console import err, out
 
 if TYPE_CHECKING:
-    from hil.run import RunResult
+    from hil.loop.run import RunResult
 
 
 def run(
     profile: Annotated[Path, typer.Argument(help="Profile file, as profiles/reference.yaml", show_default=False)],
     bench: Annotated[str, typer.Option(help="Bench file, or the name of a shipped one")] = "reference",
-    virtual: Annotated[bool, typer.Option(
-        "--virtual/--wall", help="Simulated bench as fast as the machine allows, or wall-clock time")] = False,
-    force: Annotated[bool, typer.Option(
-        "--force", help="Arm although jitter or bus load exceed the budget of the bench")] = False,
+    virtual: Annotated[
+        bool, typer.Option("--virtual/--wall", help="Simulated bench as fast as the machine allows, or wall-clock time")
+    ] = False,
+    force: Annotated[
+        bool, typer.Option("--force", help="Arm although jitter or bus load exceed the budget of the bench")
+    ] = False,
     seed: Annotated[int | None, typer.Option(min=0, help="Of the simulated sensors; left out: the bench's")] = None,
-    folder: Annotated[Path | None, typer.Option(
-        "--out", help="Folder for the recording; left out: runs/NAME-TIME")] = None,
+    folder: Annotated[
+        Path | None, typer.Option("--out", help="Folder for the recording; left out: runs/NAME-TIME")
+    ] = None,
 ) -> None:
     """Run a profile on a bench and record it. ctrl-C stops the axis under control, a second one by the drive's ramp."""
     from hil.errors import HilError
-    from hil.profile import load_profile
-    from hil.report.output import default_folder
-    from hil.run import run_profile
-    from hil.simulated import load_simulated
-    from hil.supervision import Ending
+    from hil.files.output import default_folder
+    from hil.loop.run import run_profile
+    from hil.loop.simulated_bench import load_simulated
+    from hil.loop.supervision import Ending
+    from hil.motion.profile import load_profile
 
     folder = folder or default_folder(profile.stem)
     loaded = load_simulated(bench)
@@ -51,10 +54,10 @@ def run(
 @contextmanager
 def named(bench: str, profile: Path) -> Iterator[None]:
     """An error at a field of the bench or the profile names its file and line."""
-    from hil.bench import bench_path
+    from hil.bench.bench_file import bench_path
     from hil.errors import FieldError
-    from hil.profile import Profile
-    from hil.yamlfile import located
+    from hil.files.yaml_model import located
+    from hil.motion.profile import Profile
 
     try:
         yield

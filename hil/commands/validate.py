@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from hil.commands.console import out
+from hil.report.console import out
 
 
 def validate(
@@ -31,11 +31,11 @@ def _checked(path: Path) -> str:
     from pydantic import BaseModel, ConfigDict
 
     from hil.errors import FieldError
-    from hil.profile import load_profile
-    from hil.recording_map import RecordingMap
-    from hil.rig import check_runnable
-    from hil.simulated import load_simulated
-    from hil.yamlfile import load_model, located
+    from hil.files.yaml_model import load_model, located
+    from hil.loop.devices import check_runnable
+    from hil.loop.simulated_bench import load_simulated
+    from hil.motion.profile import load_profile
+    from hil.recording.import_map import RecordingMap
 
     class AnyFile(BaseModel):
         model_config = ConfigDict(extra="allow")
@@ -48,7 +48,7 @@ def _checked(path: Path) -> str:
     if "channels" in keys:
         return f"a map of {len(load_model(path, RecordingMap).channels)} channels"
     bench = load_simulated(path)
-    if bench.drive is not None or bench.simulation is not None:   # with neither it describes recordings only
+    if bench.drive is not None or bench.simulation is not None:  # with neither it describes recordings only
         try:
             check_runnable(bench)
         except FieldError as error:

@@ -8,29 +8,29 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hil.bench import Bench
+from hil.bench.bench_file import Bench
+from hil.diagnosis.estimation.fit import FLOOR, Fit
+from hil.diagnosis.estimation.noise_ratios import noise_ratios
 from hil.diagnosis.experiment import Experiment, separating, showing
-from hil.diagnosis.explain import Explanation, explain
-from hil.diagnosis.findings import corrections, diagnosed_bench, findings, renamed
-from hil.diagnosis.fit import FLOOR, Fit
-from hil.diagnosis.fit_table import channel_names, fit_table
-from hil.diagnosis.forms import form_of
-from hil.diagnosis.judge import judge
-from hil.diagnosis.locate import locate
-from hil.diagnosis.noise_ratios import noise_ratios
+from hil.diagnosis.location.locate import locate
 from hil.diagnosis.preflight import prepare
-from hil.diagnosis.proof import Proof, explained_share, prove
 from hil.diagnosis.result import ChannelFit, Location, Mode, NextExperiment, Result, Unexplained, Verdict
-from hil.diagnosis.testable import not_testable
+from hil.diagnosis.search.forward_selection import Explanation, explain
+from hil.diagnosis.verdict.cross_validation import Proof, explained_share, prove
+from hil.diagnosis.verdict.curve_forms import form_of
+from hil.diagnosis.verdict.findings import corrections, diagnosed_bench, findings, renamed
+from hil.diagnosis.verdict.fit_table import channel_names, fit_table
+from hil.diagnosis.verdict.judge import judge
+from hil.diagnosis.verdict.observability import not_testable
 from hil.diagnosis.wording import number, said, title
 from hil.errors import InputError
-from hil.measured import Measured
-from hil.recording import Recording
+from hil.identification.dataset import Measured
+from hil.recording.recording import Recording
 from hil.twin.mechanism import Dimension
 
 Progress = Callable[[str], None]
 
-TRAINED = 2.0 / 3.0       # of a recording, where none is held out
+TRAINED = 2.0 / 3.0  # of a recording, where none is held out
 NEXT_EXPERIMENT = "next_experiment.yaml"
 
 
@@ -43,18 +43,19 @@ class Diagnosis:
     """
 
     result: Result
-    bench: Bench                  # with corrected parameters and the new terms
+    bench: Bench  # with corrected parameters and the new terms
     owner: Bench
     train: tuple[Measured, ...]
     held_out: tuple[Measured, ...]
     explanation: Explanation
     proof: Proof
     final: Fit
-    experiment: Experiment | None = None     # what to run next; None where nothing is open
+    experiment: Experiment | None = None  # what to run next; None where nothing is open
 
 
-def diagnose(train: Sequence[Recording], validate: Sequence[Recording], bench: Bench,
-             progress: Progress = lambda text: None) -> Diagnosis:
+def diagnose(
+    train: Sequence[Recording], validate: Sequence[Recording], bench: Bench, progress: Progress = lambda text: None
+) -> Diagnosis:
     """Diagnose recordings of one axis against its bench, and prove the result on recordings of another motion.
 
     Without any of those, the last third of each recording is held out. Raises InputError for recordings that
@@ -68,10 +69,12 @@ def diagnose(train: Sequence[Recording], validate: Sequence[Recording], bench: B
         notes.append("No recording was held out: the last third of each is kept for validation.")
     twice = [held.name for held in validate for run in train if _same(held, run)]
     if twice:
-        raise InputError(f"--validate: given {', '.join(twice)}, which is a training recording too, allowed recordings "
-                         "of another motion; leave it out of one of them")
+        raise InputError(
+            f"--validate: given {', '.join(twice)}, which is a training recording too, allowed recordings "
+            "of another motion; leave it out of one of them"
+        )
     prepared = prepare([*train, *validate], bench)
-    runs, held_out = tuple(prepared[:len(train)]), tuple(prepared[len(train):])
+    runs, held_out = tuple(prepared[: len(train)]), tuple(prepared[len(train) :])
 
     explanation = explain(bench, runs, progress)
     progress("proving on held-out recordings")
@@ -79,7 +82,8 @@ def diagnose(train: Sequence[Recording], validate: Sequence[Recording], bench: B
     verdict = judge(explanation.owner, explanation.nominal, proof.final, runs, held_out)
     named = verdict is Verdict.MISSING_PHYSICS
     final = {Verdict.MISSING_PHYSICS: proof.final, Verdict.NO_MISMATCH: explanation.owner}.get(
-        verdict, explanation.nominal)
+        verdict, explanation.nominal
+    )
 
     progress("locating")
     location = None
@@ -94,17 +98,28 @@ def diagnose(train: Sequence[Recording], validate: Sequence[Recording], bench: B
     hidden = not_testable(final if named else explanation.nominal, runs)
     progress("looking for a motion that would tell more")
     # a cause that is named has only its rivals open; without one, what this motion hides may be it
-    experiment = (separating(explanation, proof.final, runs, held_out) if named
-                  else showing(explanation.nominal, hidden, runs, held_out))
+    experiment = (
+        separating(explanation, proof.final, runs, held_out)
+        if named
+        else showing(explanation.nominal, hidden, runs, held_out)
+    )
     notes += _notes(table, proof, forms, verdict, explanation)
     notes += [experiment.note] if experiment else []
     result = Result(
-        verdict=verdict, statement="", location=location, missing=missing,
+        verdict=verdict,
+        statement="",
+        location=location,
+        missing=missing,
         parameter_corrections={} if verdict is Verdict.NO_MISMATCH else corrections(bench, final),
-        fit=table, not_testable=hidden, unexplained=_unexplained(explanation, final, runs, held_out, location, verdict),
+        fit=table,
+        not_testable=hidden,
+        unexplained=_unexplained(explanation, final, runs, held_out, location, verdict),
         next_experiment=NextExperiment(profile=NEXT_EXPERIMENT, separates=experiment.separates)
-        if experiment and experiment.profile else None,
-        notes=tuple(notes), runtime_s=time.monotonic() - begin)
+        if experiment and experiment.profile
+        else None,
+        notes=tuple(notes),
+        runtime_s=time.monotonic() - begin,
+    )
     result = result.model_copy(update={"statement": statement(result)})
     after = bench if verdict is Verdict.NO_MISMATCH else diagnosed_bench(bench, final)
     return Diagnosis(result, after, bench, runs, held_out, explanation, proof, final, experiment)
@@ -114,18 +129,28 @@ def statement(result: Result) -> str:
     """The verdict as one sentence."""
     if result.verdict is Verdict.MISSING_PHYSICS:
         named = " ".join(finding.sentence for finding in result.missing)
-        name, entry = max(result.fit.items(), key=lambda item: (
-            item[1].mode is Mode.CLOSED_LOOP, item[1].train.before_rms / item[1].train.after_rms))
+        name, entry = max(
+            result.fit.items(),
+            key=lambda item: (item[1].mode is Mode.CLOSED_LOOP, item[1].train.before_rms / item[1].train.after_rms),
+        )
         found = entry.validate_ or entry.train
-        before, after, noise = (said(value, Dimension(entry.unit)) for value in (
-            found.before_rms, found.after_rms, found.noise_floor_rms))
-        return (f"Missing physics: {named} With it the twin leaves {after} rms of {name} on "
-                f"{'held-out' if entry.validate_ else 'these'} recordings instead of {before}; the noise is {noise}.")
+        before, after, noise = (
+            said(value, Dimension(entry.unit)) for value in (found.before_rms, found.after_rms, found.noise_floor_rms)
+        )
+        return (
+            f"Missing physics: {named} With it the twin leaves {after} rms of {name} on "
+            f"{'held-out' if entry.validate_ else 'these'} recordings instead of {before}; the noise is {noise}."
+        )
     if result.verdict is Verdict.PARAMETER_ERROR:
-        worst = sorted(result.parameter_corrections.items(),
-                       key=lambda item: -abs(np.log(max(item[1].value, 1e-300) / max(item[1].nominal, 1e-300))))
-        changes = ", ".join(f"{name} {100.0 * (entry.value / entry.nominal - 1.0):+.1f} %"
-                            for name, entry in worst[:3] if entry.nominal > 0.0)
+        worst = sorted(
+            result.parameter_corrections.items(),
+            key=lambda item: -abs(np.log(max(item[1].value, 1e-300) / max(item[1].nominal, 1e-300))),
+        )
+        changes = ", ".join(
+            f"{name} {100.0 * (entry.value / entry.nominal - 1.0):+.1f} %"
+            for name, entry in worst[:3]
+            if entry.nominal > 0.0
+        )
         return f"No physics is missing; parameters of the bench are wrong: {changes}."
     if result.verdict is Verdict.NO_MISMATCH:
         return "The twin explains these recordings down to their noise."
@@ -145,7 +170,8 @@ def _split(recordings: Sequence[Recording]) -> tuple[list[Recording], list[Recor
 def _same(one: Recording, other: Recording) -> bool:
     """Whether two recordings are one and the same."""
     return one.columns.keys() == other.columns.keys() and all(
-        np.array_equal(values, other[name]) for name, values in one.columns.items())
+        np.array_equal(values, other[name]) for name, values in one.columns.items()
+    )
 
 
 def _standstill(recording: Recording, row: int) -> int:
@@ -163,8 +189,14 @@ def _part(recording: Recording, rows: slice, what: str) -> Recording:
     return replace(recording, name=f"{recording.name} ({what})", columns=columns)
 
 
-def _unexplained(explanation: Explanation, final: Fit, train: Sequence[Measured], held_out: Sequence[Measured],
-                 location: Location | None, verdict: Verdict) -> Unexplained:
+def _unexplained(
+    explanation: Explanation,
+    final: Fit,
+    train: Sequence[Measured],
+    held_out: Sequence[Measured],
+    location: Location | None,
+    verdict: Verdict,
+) -> Unexplained:
     """Share of the excess that is left, and its shape."""
     before = explanation.owner if verdict is Verdict.PARAMETER_ERROR else explanation.nominal
     share = 0.0 if verdict is Verdict.NO_MISMATCH else 1.0 - explained_share(before, final, held_out or train)
@@ -199,23 +231,33 @@ def shape(location: Location) -> str:
     return ", ".join(parts)
 
 
-def _notes(table: dict[str, ChannelFit], proof: Proof, forms: Container[int], verdict: Verdict,
-           explanation: Explanation) -> list[str]:
+def _notes(
+    table: dict[str, ChannelFit], proof: Proof, forms: Container[int], verdict: Verdict, explanation: Explanation
+) -> list[str]:
     notes = []
     if any(entry.floor_from == "repeated_laps" for entry in table.values()):
         notes.append("The noise floor is what does not repeat from lap to lap.")
     else:
-        notes.append("No motion repeats: the noise floor is the white noise of the sensors, in closed loop with what "
-                     "the axis does because of it, so that disturbances of the axis count as mismatch.")
+        notes.append(
+            "No motion repeats: the noise floor is the white noise of the sensors, in closed loop with what "
+            "the axis does because of it, so that disturbances of the axis count as mismatch."
+        )
     blocks = [name for name, entry in table.items() if entry.mode is Mode.BLOCKS]
     if blocks:
-        notes.append(f"Figures of {', '.join(blocks)} are block by block, fed with measured inputs: in closed loop the "
-                     "twin strays from the recording by more than its noise although every block is at its floor.")
-    notes += [f"{title(ablation.term.effect)} was dropped: it fits the training recordings, but held-out ones or "
-              "repeated laps speak against it." for ablation in proof.dropped]
-    notes += [f"{title(ablation.term.effect)} does not show in the held-out recordings: it is not proven there."
-              for index, ablation in enumerate(proof.ablations)
-              if index not in forms and ablation.gain is not None and not ablation.shown]
+        notes.append(
+            f"Figures of {', '.join(blocks)} are block by block, fed with measured inputs: in closed loop the "
+            "twin strays from the recording by more than its noise although every block is at its floor."
+        )
+    notes += [
+        f"{title(ablation.term.effect)} was dropped: it fits the training recordings, but held-out ones or "
+        "repeated laps speak against it."
+        for ablation in proof.dropped
+    ]
+    notes += [
+        f"{title(ablation.term.effect)} does not show in the held-out recordings: it is not proven there."
+        for index, ablation in enumerate(proof.ablations)
+        if index not in forms and ablation.gain is not None and not ablation.shown
+    ]
     if verdict is Verdict.UNEXPLAINED and explanation.terms:
         tried = ", ".join(title(term.effect) for term in explanation.terms)
         notes.append(f"The nearest mechanisms ({tried}) leave too much of it, so that none is named.")

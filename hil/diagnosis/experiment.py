@@ -17,24 +17,25 @@ from typing import Any
 
 import numpy as np
 
-from hil.diagnosis.candidates import candidates, reach
-from hil.diagnosis.explain import ALIKE, TIED, Explanation
-from hil.diagnosis.findings import rivals_of
-from hil.diagnosis.fit import Fit, fit, in_parallel, jacobian, splits
-from hil.diagnosis.model import FloatArray, Model
-from hil.diagnosis.terms import SAME, ambiguous, compatible
-from hil.diagnosis.testable import not_testable
+from hil.arrays import FloatArray
+from hil.diagnosis.candidate_motions import candidates, reach
+from hil.diagnosis.estimation.fit import Fit, fit, in_parallel, jacobian, splits
+from hil.diagnosis.estimation.hypothesis import Model
+from hil.diagnosis.estimation.terms import SAME, ambiguous, compatible
+from hil.diagnosis.search.forward_selection import ALIKE, TIED, Explanation
+from hil.diagnosis.verdict.findings import rivals_of
+from hil.diagnosis.verdict.observability import not_testable
 from hil.diagnosis.wording import number, title
-from hil.measured import Measured
-from hil.profile import Profile
-from hil.trajectory import Trajectory, plan
+from hil.identification.dataset import Measured
+from hil.motion.profile import Profile
+from hil.motion.trajectory import Trajectory, plan
 from hil.twin.axis import Start
 
-ONCE = "external_force"      # belongs to its moment: nobody expects it again on another motion
+ONCE = "external_force"  # belongs to its moment: nobody expects it again on another motion
 
-_SURE = 2.0      # times as visible as needed must be what a motion shows that nobody has made yet
+_SURE = 2.0  # times as visible as needed must be what a motion shows that nobody has made yet
 
-Question = tuple[str, ...]   # two effects to be told apart, or one to be shown
+Question = tuple[str, ...]  # two effects to be told apart, or one to be shown
 Answers = Mapping[Question, float]
 
 
@@ -60,8 +61,9 @@ class _Hypothesis:
     known: FloatArray
 
 
-def separating(explanation: Explanation, final: Fit, train: Sequence[Measured],
-               held_out: Sequence[Measured]) -> Experiment | None:
+def separating(
+    explanation: Explanation, final: Fit, train: Sequence[Measured], held_out: Sequence[Measured]
+) -> Experiment | None:
     """The motion that tells the terms of `final` from the rivals that the recordings tie with them; None without any.
 
     Of the motions that separate most of them it is the one with the most evidence per second for the hardest.
@@ -86,21 +88,32 @@ def separating(explanation: Explanation, final: Fit, train: Sequence[Measured],
         found, least = dict.fromkeys(asked, np.inf), enough(trajectory)
         for truth, other in pairs:
             question = tuple(sorted((truth.effect, other.effect)))
-            if found[question] >= least:     # not already open the other way round
+            if found[question] >= least:  # not already open the other way round
                 run = _imagined(truth, trajectory, train[0])
                 found[question] = min(found[question], _left(other, run) - _own(truth, run))
         return found
 
-    best = _best((*train, *held_out), final.model, len(asked), answers, enough,
-                 lambda one: (len(one.answered), one.worth / one.duration_s))
+    best = _best(
+        (*train, *held_out),
+        final.model,
+        len(asked),
+        answers,
+        enough,
+        lambda one: (len(one.answered), one.worth / one.duration_s),
+    )
     if best is None:
         return Experiment(None, (), f"No motion within the reach of these recordings tells {_pairs(asked)}.")
-    return Experiment(best.profile, best.effects, f"{best.what} is expected to tell {_pairs(best.answered)}, with "
-                      f"evidence of {number(best.worth)} or more, where {TIED:g} is very strong.")
+    return Experiment(
+        best.profile,
+        best.effects,
+        f"{best.what} is expected to tell {_pairs(best.answered)}, with "
+        f"evidence of {number(best.worth)} or more, where {TIED:g} is very strong.",
+    )
 
 
-def showing(found: Fit, hidden: Sequence[str], train: Sequence[Measured],
-            held_out: Sequence[Measured]) -> Experiment | None:
+def showing(
+    found: Fit, hidden: Sequence[str], train: Sequence[Measured], held_out: Sequence[Measured]
+) -> Experiment | None:
     """The motion that shows most per second of the mechanisms that the recordings cannot show; None where all show."""
     if not hidden:
         return None
@@ -110,12 +123,19 @@ def showing(found: Fit, hidden: Sequence[str], train: Sequence[Measured],
         run = _imagined(expected, trajectory, train[0])
         residuals = expected.model.residuals(expected.x, [run])
         slope = jacobian(expected.model, expected.x, residuals, [run])
-        still = not_testable(Fit(expected.model, expected.x, residuals, slope, splits(expected.model, [run])), [run],
-                             hidden, _SURE)
+        still = not_testable(
+            Fit(expected.model, expected.x, residuals, slope, splits(expected.model, [run])), [run], hidden, _SURE
+        )
         return {(effect,): float(effect not in still) for effect in hidden}
 
-    best = _best((*train, *held_out), found.model, len(hidden), answers, lambda _: 1.0,
-                 lambda one: len(one.answered) / one.duration_s)
+    best = _best(
+        (*train, *held_out),
+        found.model,
+        len(hidden),
+        answers,
+        lambda _: 1.0,
+        lambda one: len(one.answered) / one.duration_s,
+    )
     names = ", ".join(map(title, best.effects if best else hidden))
     if best is None:
         return Experiment(None, (), f"No motion within the reach of these recordings shows {names}.")
@@ -142,8 +162,14 @@ class _Tested:
         return f"A motion of {self.duration_s:.0f} s ({self.profile.description})"
 
 
-def _best(runs: Sequence[Measured], model: Model, questions: int, answers: Callable[[Trajectory], Answers],
-          enough: Callable[[Trajectory], float], rank: Callable[[_Tested], Any]) -> _Tested | None:
+def _best(
+    runs: Sequence[Measured],
+    model: Model,
+    questions: int,
+    answers: Callable[[Trajectory], Answers],
+    enough: Callable[[Trajectory], float],
+    rank: Callable[[_Tested], Any],
+) -> _Tested | None:
     """The candidate of the highest rank. Long ones are tried only for what no shorter one answers."""
 
     def test(profile: Profile) -> _Tested:
@@ -168,10 +194,10 @@ def _group(explanation: Explanation, final: Fit, index: int, runs: Sequence[Meas
     for rival in rivals_of(explanation, terms[index]):
         if rival.tied:
             other = rival.fit.model.resolved(rival.fit.x)[1][-1]
-            model = replace(final.model, terms=(*terms[:index], other, *terms[index + 1:]))
+            model = replace(final.model, terms=(*terms[:index], other, *terms[index + 1 :]))
             if not compatible(model.terms):
-                continue      # it was found later, as a cause of its own
-            x = np.concatenate([final.x[:model.nominal_count], model.initial()[model.nominal_count:]])
+                continue  # it was found later, as a cause of its own
+            x = np.concatenate([final.x[: model.nominal_count], model.initial()[model.nominal_count :]])
             group.append(_hypothesis(other.effect, fit(model, runs, x, evaluations=12)))
     return group
 
@@ -179,8 +205,12 @@ def _group(explanation: Explanation, final: Fit, index: int, runs: Sequence[Meas
 def _hypothesis(effect: str, found: Fit) -> _Hypothesis:
     """What a fit expects of another motion."""
     terms = found.model.terms
-    stays = np.concatenate([np.ones(found.model.nominal_count, dtype=bool),
-                            *(np.full(len(term.values), term.effect != ONCE) for term in terms)])
+    stays = np.concatenate(
+        [
+            np.ones(found.model.nominal_count, dtype=bool),
+            *(np.full(len(term.values), term.effect != ONCE) for term in terms),
+        ]
+    )
     model = replace(found.model, terms=tuple(term for term in terms if term.effect != ONCE))
     return _Hypothesis(effect, model, found.x[stays], _triangle(found.jacobian[:, stays]))
 
@@ -196,10 +226,17 @@ def _imagined(truth: _Hypothesis, trajectory: Trajectory, like: Measured) -> Mea
     start = Start(float(position[0]))
     answer = truth.model.twin(truth.x).simulate(position, velocity, start)
     return replace(
-        like, name="imagined", position_command_m=position, velocity_command_m_s=velocity, start=start, left_out=0,
-        motor=answer.motor_position, table_m=answer.table_position_m if like.table_m.size else like.table_m,
+        like,
+        name="imagined",
+        position_command_m=position,
+        velocity_command_m_s=velocity,
+        start=start,
+        left_out=0,
+        motor=answer.motor_position,
+        table_m=answer.table_position_m if like.table_m.size else like.table_m,
         torque_command=answer.torque_command,
-        torque=answer.torque_command if like.torque_is_command else answer.torque)
+        torque=answer.torque_command if like.torque_is_command else answer.torque,
+    )
 
 
 def _own(truth: _Hypothesis, run: Measured) -> float:

@@ -14,31 +14,47 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
-from hil.bench import Bench
+from hil.arrays import FloatArray
+from hil.bench.bench_file import Bench
 from hil.channels import AXIS_CHANNELS
 from hil.diagnosis.wording import number
 from hil.errors import InputError
-from hil.measured import Measured, take
-from hil.recording import Recording
+from hil.identification.dataset import Measured, take
+from hil.recording.recording import Recording
 
-FloatArray = NDArray[np.float64]
-
-SHORTEST_S = 2.0            # there, back, and time to settle
-LEAST_TRAVEL_COUNTS = 50    # of the motor encoder: below this there is no motion to speak of
+SHORTEST_S = 2.0  # there, back, and time to settle
+LEAST_TRAVEL_COUNTS = 50  # of the motor encoder: below this there is no motion to speak of
 LEAST_MOVING_S = 0.5
-# Nominal parameters may be wrong by a factor of three (see `hil.diagnosis.model`), units are wrong by more.
+# Nominal parameters may be wrong by a factor of three (`hil.diagnosis.estimation.hypothesis`), units by more.
 WRONG_BY = 4.0
-SLOPE_TOLERANCE = 0.2       # of positions against set-points; following errors are below 5 %
-_RELATED = 0.5              # of the variance of a channel, that the other must tell
-_AWAY, _AWAY_M = 0.01, 1e-3 # of the travel, and at least: a loop that rests so far from its set-points is none
-SATURATED = 0.5             # share of the moving rows at the limit
-_SMOOTH_S = 0.021           # window of the derivatives of the motor position
+SLOPE_TOLERANCE = 0.2  # of positions against set-points; following errors are below 5 %
+_RELATED = 0.5  # of the variance of a channel, that the other must tell
+_AWAY, _AWAY_M = 0.01, 1e-3  # of the travel, and at least: a loop that rests so far from its set-points is none
+SATURATED = 0.5  # share of the moving rows at the limit
+_SMOOTH_S = 0.021  # window of the derivatives of the motor position
 
-_POSITION_UNITS = {1e3: "mm", 1e6: "µm", 1e9: "nm", 180.0 / math.pi: "degrees", 0.5 / math.pi: "revolutions",
-                   1e-3: "km", 39.37: "inches"}
-_TORQUE_UNITS = {1e3: "mN m", 1e6: "µN m", 1e2: "N cm", 1e-3: "kN m", 1.0 / 9.81: "kgf m", 9.81: "N m times 9.81",
-                 10.2: "kgf cm", 141.6: "ozf in", 0.7376: "lbf ft", 2.0 * math.pi: "N m times 2 pi",
-                 1.0 / (2.0 * math.pi): "N m per 2 pi"}
+_POSITION_UNITS = {
+    1e3: "mm",
+    1e6: "µm",
+    1e9: "nm",
+    180.0 / math.pi: "degrees",
+    0.5 / math.pi: "revolutions",
+    1e-3: "km",
+    39.37: "inches",
+}
+_TORQUE_UNITS = {
+    1e3: "mN m",
+    1e6: "µN m",
+    1e2: "N cm",
+    1e-3: "kN m",
+    1.0 / 9.81: "kgf m",
+    9.81: "N m times 9.81",
+    10.2: "kgf cm",
+    141.6: "ozf in",
+    0.7376: "lbf ft",
+    2.0 * math.pi: "N m times 2 pi",
+    1.0 / (2.0 * math.pi): "N m per 2 pi",
+}
 
 
 def prepare(recordings: Sequence[Recording], bench: Bench) -> list[Measured]:
@@ -62,13 +78,17 @@ def prepare(recordings: Sequence[Recording], bench: Bench) -> list[Measured]:
 def _raw_problems(recording: Recording, bench: Bench) -> Iterator[str]:
     duration = len(recording) * recording.period_s
     if duration < SHORTEST_S:
-        yield (f"{recording.name}: too short: given {duration:.3g} s, allowed {SHORTEST_S:g} s or more; "
-               "record a motion there and back")
+        yield (
+            f"{recording.name}: too short: given {duration:.3g} s, allowed {SHORTEST_S:g} s or more; "
+            "record a motion there and back"
+        )
     names = AXIS_CHANNELS[recording.kind]
     for name in (names.position_command, names.velocity_command, names.motor_position, names.torque):
         if name not in recording.columns:
-            yield (f"{recording.name}: {name} is not recorded, allowed are recordings with it; "
-                   f"record it (there are {', '.join(recording.columns)})")
+            yield (
+                f"{recording.name}: {name} is not recorded, allowed are recordings with it; "
+                f"record it (there are {', '.join(recording.columns)})"
+            )
 
 
 def _problems(run: Measured, bench: Bench) -> Iterator[str]:
@@ -78,12 +98,16 @@ def _problems(run: Measured, bench: Bench) -> Iterator[str]:
     moving = run.moving
     moved = float(np.ptp(run.motor)) * ratio
     if np.ptp(command) == 0.0 or top == 0.0:
-        yield ("without excitation: the set-points do not move; a twin at standstill says nothing: "
-               "record a motion with reversals and several feeds")
+        yield (
+            "without excitation: the set-points do not move; a twin at standstill says nothing: "
+            "record a motion with reversals and several feeds"
+        )
         return
     if moving.sum() * run.period_s < LEAST_MOVING_S:
-        yield (f"without excitation: the set-points move for {moving.sum() * run.period_s:.2g} s, allowed "
-               f"{LEAST_MOVING_S:g} s or more; record more motion")
+        yield (
+            f"without excitation: the set-points move for {moving.sum() * run.period_s:.2g} s, allowed "
+            f"{LEAST_MOVING_S:g} s or more; record more motion"
+        )
         return
     if np.ptp(run.motor) == 0.0:
         yield f"{names.motor_position} is frozen at {run.motor[0]:.6g} while the set-points move; check the encoder"
@@ -92,14 +116,18 @@ def _problems(run: Measured, bench: Bench) -> Iterator[str]:
         yield f"{names.torque} is frozen at {run.torque[0]:.6g} while the axis moves; check the channel"
         return
     if moved < LEAST_TRAVEL_COUNTS * math.sqrt(12.0) * run.noise.motor * ratio:
-        yield (f"without excitation: the motor moves by {moved * 1e6:.3g} µm, {LEAST_TRAVEL_COUNTS} counts of its "
-               "encoder or less; record a longer motion")
+        yield (
+            f"without excitation: the motor moves by {moved * 1e6:.3g} µm, {LEAST_TRAVEL_COUNTS} counts of its "
+            "encoder or less; record a longer motion"
+        )
         return
-    found = [*_position_problems(run, ratio, names.motor_position, names.table_position),
-             *_set_point_problems(run, names.velocity_command)]
+    found = [
+        *_position_problems(run, ratio, names.motor_position, names.table_position),
+        *_set_point_problems(run, names.velocity_command),
+    ]
     yield from found
     yield from _saturation(run, bench, moving)
-    if not found:    # the torque is judged by the measured motion
+    if not found:  # the torque is judged by the measured motion
         yield from _torque_problems(run, bench)
 
 
@@ -110,16 +138,20 @@ def _position_problems(run: Measured, ratio: float, motor: str, table: str) -> I
     if abs(slope - 1.0) > SLOPE_TOLERANCE:
         yield f"{motor}: {_factor(slope, _POSITION_UNITS, 'the set-points')}"
     elif abs(away_m) > max(_AWAY * float(np.ptp(run.position_command_m)), _AWAY_M):
-        yield (f"{motor}: lies {1e3 * away_m:.4g} mm behind the set-points at rest: their zeros differ; "
-               "shift it in the import map")
+        yield (
+            f"{motor}: lies {1e3 * away_m:.4g} mm behind the set-points at rest: their zeros differ; "
+            "shift it in the import map"
+        )
     if not run.table_m.size:
         return
     if np.ptp(run.table_m) == 0.0:
         yield f"{table} is frozen at {run.table_m[0]:.6g} while the axis moves; check the linear encoder"
         return
     if np.ptp(run.table_m - ratio * run.motor) < 1e-12:
-        yield (f"{table} is a copy of the motor position, allowed the linear encoder's own reading; "
-               "record it, or write 'table: null' under encoders in the bench file")
+        yield (
+            f"{table} is a copy of the motor position, allowed the linear encoder's own reading; "
+            "record it, or write 'table: null' under encoders in the bench file"
+        )
     slope = _factor_between(run.position_command_m, run.table_m)
     if abs(slope - 1.0) > SLOPE_TOLERANCE:
         yield f"{table}: {_factor(slope, _POSITION_UNITS, 'the set-points')}"
@@ -139,8 +171,10 @@ def _torque_problems(run: Measured, bench: Bench) -> Iterator[str]:
     if not run.torque_is_command:
         slope = _slope(run.torque_command, run.torque)
         if slope < 0.0 and _correlation(run.torque_command, run.torque) < -0.5:
-            yield (f"{names.torque} runs against {names.torque_command} (slope {slope:.3g}): one of them has the wrong "
-                   "sign; correct it in the import map")
+            yield (
+                f"{names.torque} runs against {names.torque_command} (slope {slope:.3g}): one of them has the wrong "
+                "sign; correct it in the import map"
+            )
             return
         # a drive that saturates gives less than asked for, but no eighth of it
         if _correlation(run.torque_command, run.torque) > 0.5 and not 0.5 / WRONG_BY < slope < 2.0 * WRONG_BY:
@@ -151,8 +185,10 @@ def _torque_problems(run: Measured, bench: Bench) -> Iterator[str]:
         return
     (j, _, coulomb, _), errors = measured
     if j < -3.0 * errors[0]:
-        yield (f"{names.torque} has the wrong sign: the inertia that it gives is {j:.3g} ± {errors[0]:.1g}, and no "
-               "mass is negative; correct the sign of the channel, or of the encoder")
+        yield (
+            f"{names.torque} has the wrong sign: the inertia that it gives is {j:.3g} ± {errors[0]:.1g}, and no "
+            "mass is negative; correct the sign of the channel, or of the encoder"
+        )
         return
     factors = [j / inertia] if j > 5.0 * errors[0] else []
     if physics.coulomb_n_m > 0.0 and coulomb > 5.0 * errors[2]:
@@ -179,7 +215,7 @@ def regress(run: Measured) -> tuple[list[float], list[float]] | None:
         return None
     basis = np.stack([acceleration, velocity, np.sign(velocity), np.ones_like(velocity)], axis=1)[rows]
     if np.ptp(basis[:, 2]) == 0.0:
-        basis[:, 3] = 0.0       # one direction only: offset and Coulomb friction are one
+        basis[:, 3] = 0.0  # one direction only: offset and Coulomb friction are one
     solution, *_ = np.linalg.lstsq(basis, torque[rows], rcond=None)
     left = torque[rows] - basis @ solution
     # smoothing leaves one independent sample per window
@@ -194,8 +230,10 @@ def _saturation(run: Measured, bench: Bench, moving: NDArray[np.bool_]) -> Itera
     level = limit if math.isfinite(limit) and peak <= 1.01 * limit else peak
     share = float(np.mean(np.abs(run.torque_command[moving]) >= 0.999 * level))
     if share > SATURATED:
-        yield (f"saturated throughout: the command is at its limit of {level:.4g} in {100.0 * share:.0f} % of the "
-               f"motion, allowed {100.0 * SATURATED:.0f} %; the loop is open there and tells nothing: move slower")
+        yield (
+            f"saturated throughout: the command is at its limit of {level:.4g} in {100.0 * share:.0f} % of the "
+            f"motion, allowed {100.0 * SATURATED:.0f} %; the loop is open there and tells nothing: move slower"
+        )
 
 
 def _slope(over: FloatArray, values: FloatArray) -> float:
@@ -229,5 +267,7 @@ def _factor(factor: float, units: dict[float, str], against: str) -> str:
     size = abs(factor)
     near = min(units, key=lambda unit: abs(math.log(max(size, 1e-300) / unit)))
     looks = f": it looks like {units[near]}" if abs(math.log(max(size, 1e-300) / near)) < math.log(1.6) else ""
-    return (f"{sign}is {number(size)} × what {against} ask for{looks}; correct its unit in the import map, "
-            "or the bench file")
+    return (
+        f"{sign}is {number(size)} × what {against} ask for{looks}; correct its unit in the import map, "
+        "or the bench file"
+    )

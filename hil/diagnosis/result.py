@@ -163,8 +163,11 @@ class Result(_Part):
 
 def schema() -> dict[str, Any]:
     """JSON Schema of diagnosis.json."""
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "diagnosis.json",
-            **Result.model_json_schema(by_alias=True, mode="serialization")}
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "diagnosis.json",
+        **Result.model_json_schema(by_alias=True, mode="serialization"),
+    }
 
 
 def write_schema(path: Path = SCHEMA_FILE) -> None:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from hil.bench import Bench
-from hil.diagnosis.terms import Term
+from hil.bench.bench_file import Bench
+from hil.diagnosis.estimation.terms import Term
 from hil.twin.library import BY_ID
 from hil.twin.mechanism import Dimension
 
@@ -15,16 +15,26 @@ _SAID: dict[Dimension, tuple[tuple[float, float, str], ...]] = {
     Dimension.TIME: ((1.0, 1.0, "s"), (1e-3, 1e3, "ms"), (0.0, 1e6, "µs")),
     Dimension.ANGLE: ((1e-2, 1.0, "rad"), (0.0, 1e6, "µrad")),
     Dimension.RATIO: ((0.0, 100.0, "%"),),
-    Dimension.COUNT: ((0.0, 1.0, ""),),      # sentences say what is counted
+    Dimension.COUNT: ((0.0, 1.0, ""),),  # sentences say what is counted
 }
 
 # Units of the nominal parameters, which their names hold in short
 NOMINAL_UNITS = {
-    "motor_mass_kg": "kg", "table_mass_kg": "kg", "mass_kg": "kg", "motor_inertia_kg_m2": "kg m^2",
-    "stiffness_n_m": "N/m", "nut_support_stiffness_n_m": "N/m", "nut_stiffness_n_m": "N/m",
-    "coupling_stiffness_n_m_rad": "N m/rad", "damping_ratio": "1", "inertia_scale": "1", "stiffness_scale": "1",
-    "coulomb_torque_n_m": "N m", "viscous_torque_n_m_s_rad": "N m s/rad",
-    "coulomb_force_n": "N", "viscous_force_n_s_m": "N s/m",
+    "motor_mass_kg": "kg",
+    "table_mass_kg": "kg",
+    "mass_kg": "kg",
+    "motor_inertia_kg_m2": "kg m^2",
+    "stiffness_n_m": "N/m",
+    "nut_support_stiffness_n_m": "N/m",
+    "nut_stiffness_n_m": "N/m",
+    "coupling_stiffness_n_m_rad": "N m/rad",
+    "damping_ratio": "1",
+    "inertia_scale": "1",
+    "stiffness_scale": "1",
+    "coulomb_torque_n_m": "N m",
+    "viscous_torque_n_m_s_rad": "N m s/rad",
+    "coulomb_force_n": "N",
+    "viscous_force_n_s_m": "N s/m",
 }
 
 
@@ -49,8 +59,10 @@ def said(value: float, dimension: Dimension, linear: bool = False) -> str:
 def sentence(term: Term, bench: Bench) -> str:
     """The mechanism's sentence with its values, and the variant that it takes."""
     mechanism, linear = BY_ID[term.effect], bench.axis.linear
-    values = {parameter.name: said(value, parameter.dimension, linear)
-              for parameter, value in zip(mechanism.parameters, term.values, strict=True)}
+    values = {
+        parameter.name: said(value, parameter.dimension, linear)
+        for parameter, value in zip(mechanism.parameters, term.values, strict=True)
+    }
     values["viscous_speed"] = said(bench.axis.physics().viscous_speed, Dimension.MOTOR_SPEED, linear)
     variant = mechanism.variants[term.variant]
     text = (mechanism.second_sentence if term.variant == 1 else "") or mechanism.sentence
@@ -63,8 +75,11 @@ def label(term: Term) -> str:
     values = dict(zip(BY_ID[term.effect].names, term.values, strict=True))
     if BY_ID[term.effect].most == 1:
         return title(term.effect)
-    where = (f"every {said(values['period_m'], Dimension.LENGTH)}" if "period_m" in values
-             else f"{number(values['cycles_per_rev'])} times per revolution")
+    where = (
+        f"every {said(values['period_m'], Dimension.LENGTH)}"
+        if "period_m" in values
+        else f"{number(values['cycles_per_rev'])} times per revolution"
+    )
     return f"{title(term.effect)}, {where}"
 
 

@@ -12,10 +12,10 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
+from hil.arrays import FloatArray
 from hil.paper import figures, source, tables
 from hil.paper.tables import Row, Verdict
-from hil.twin.chain import FloatArray
-from hil.twin.modal import modal
+from hil.twin.structure.modal import modal
 
 __all__ = ["PaperResult", "Picture", "Row", "Verdict", "run_paper"]
 
@@ -84,22 +84,41 @@ def _save(out: Path, figure: str, file: str, caption: str, drawing: Figure) -> P
 def _pictures() -> list[tuple[str, str, str, Figure]]:
     two, seven = source.chains().values()
     pictures = [
-        ("Fig. 6", "modes.png", "First three modes of the 7-dof model: the second mainly axial, between nut and "
-         "table; the third mainly torsional, in the screw.", figures.mode_shapes()),
+        (
+            "Fig. 6",
+            "modes.png",
+            "First three modes of the 7-dof model: the second mainly axial, between nut and "
+            "table; the third mainly torsional, in the screw.",
+            figures.mode_shapes(),
+        ),
     ]
     for figure, feed in (("Fig. 7", 7.0), ("Fig. 8", 22.0)):
         run = source.simulate(seven, feed)
-        caption = (f"7-dof model against the command at {feed:g} m/min; the source's measurement is not printed as "
-                   "numbers. The ripple of 250 and 500 Hz in torque and jerk is the 4 ms stair of the position loop.")
+        caption = (
+            f"7-dof model against the command at {feed:g} m/min; the source's measurement is not printed as "
+            "numbers. The ripple of 250 and 500 Hz in torque and jerk is the 4 ms stair of the position loop."
+        )
         pictures.append((figure, f"move_{feed:.0f}_m_min.png", caption, figures.move_over_time([("7-dof", run)])))
     pictures += [
         ("Fig. 9a", "bode_tf1.png", "Primary transfer function, motor angle over torque.", figures.bode_transfer(1)),
         ("Fig. 9b", "bode_tf2.png", "Secondary transfer function, table over motor.", figures.bode_transfer(2)),
-        ("Fig. 9c", "bode_closed_loop.png", "Position loop, command to table, without and with feed-forward.",
-         figures.bode_closed_loop()),
-        ("Fig. 10", "move_30_m_min.png", "2-dof against 7-dof model at 30 m/min.",
-         figures.move_over_time([("7-dof", source.simulate(seven, 30.0)), ("2-dof", source.simulate(two, 30.0))])),
-        ("Sec. 3.3.3", "nut_travel.png", "What the position of the nut changes: the source suspects it of the "
-         "delays it cannot explain.", figures.nut_travel()),
+        (
+            "Fig. 9c",
+            "bode_closed_loop.png",
+            "Position loop, command to table, without and with feed-forward.",
+            figures.bode_closed_loop(),
+        ),
+        (
+            "Fig. 10",
+            "move_30_m_min.png",
+            "2-dof against 7-dof model at 30 m/min.",
+            figures.move_over_time([("7-dof", source.simulate(seven, 30.0)), ("2-dof", source.simulate(two, 30.0))]),
+        ),
+        (
+            "Sec. 3.3.3",
+            "nut_travel.png",
+            "What the position of the nut changes: the source suspects it of the delays it cannot explain.",
+            figures.nut_travel(),
+        ),
     ]
     return pictures

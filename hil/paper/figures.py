@@ -11,15 +11,16 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
-from hil.moves import Motion
+from hil.arrays import FloatArray
+from hil.motion.pieces import Motion
+from hil.motion.trajectory import Trajectory
 from hil.paper import source
 from hil.paper.tables import bandwidth_hz
-from hil.trajectory import Trajectory
-from hil.twin import frequency
-from hil.twin.chain import RECONSTRUCTED_TABLE_1, FloatArray, seven_dof
-from hil.twin.modal import modal
+from hil.twin.structure import frequency
+from hil.twin.structure.chain import RECONSTRUCTED_TABLE_1, seven_dof
+from hil.twin.structure.modal import modal
 
-COMMAND, TWO, SEVEN, AXIAL = "#444444", "#d55e00", "#0072b2", "#009e73"   # told apart by the colour-blind
+COMMAND, TWO, SEVEN, AXIAL = "#444444", "#d55e00", "#0072b2", "#009e73"  # told apart by the colour-blind
 _MODEL_STYLE = {"2-dof": {"color": TWO, "linestyle": "--"}, "7-dof": {"color": SEVEN, "linestyle": "-"}}
 
 
@@ -72,8 +73,7 @@ def bode_closed_loop() -> Figure:
         for feedforward, width in ((0.0, 2.0), (1.0, 1.0)):
             law = source.gains(feedforward)
             response = frequency.closed_loop(modal(chain), law, frequency_hz)
-            label = (f"{name}, feed-forward {feedforward:.0%}: "
-                     f"-3 dB at {bandwidth_hz(name, feedforward):.1f} Hz")
+            label = f"{name}, feed-forward {feedforward:.0%}: -3 dB at {bandwidth_hz(name, feedforward):.1f} Hz"
             _bode(magnitude, phase, frequency_hz, response, label=label, linewidth=width, **_MODEL_STYLE[name])
     magnitude.axhline(-3.0, color="black", linewidth=0.8, linestyle=":")
     magnitude.axvline(2.32, color="black", linewidth=0.8, linestyle=":")
@@ -99,8 +99,9 @@ def _bode_axes() -> tuple[Figure, Axes, Axes]:
     return figure, magnitude, phase
 
 
-def _bode(magnitude: Axes, phase: Axes, frequency_hz: FloatArray, response: frequency.ComplexArray,
-          **style: Any) -> None:
+def _bode(
+    magnitude: Axes, phase: Axes, frequency_hz: FloatArray, response: frequency.ComplexArray, **style: Any
+) -> None:
     magnitude.plot(frequency_hz, 20.0 * np.log10(np.abs(response)), **style)
     degrees = np.degrees(np.unwrap(np.angle(response)))
     # unwrapping leaves the start free by whole turns: start in (-360, 0]
@@ -121,8 +122,18 @@ def move_over_time(runs: Sequence[tuple[str, source.Run]]) -> Figure:
         signals = (position, run.following_error_m * 1e6, velocity, acceleration, jerk, run.response.torque)
         for axis, values in zip(axes, signals, strict=True):
             axis.plot(run.command.time_s, values, label=f"{name}, table" if axis is axes[0] else None, **style)
-    for axis, label in zip(axes, ("position [mm]", "following error [µm]", "velocity [m/min]",
-                                  "acceleration [m/s²]", "jerk [m/s³]", "motor torque [N m]"), strict=True):
+    for axis, label in zip(
+        axes,
+        (
+            "position [mm]",
+            "following error [µm]",
+            "velocity [m/min]",
+            "acceleration [m/s²]",
+            "jerk [m/s³]",
+            "motor torque [N m]",
+        ),
+        strict=True,
+    ):
         axis.set_ylabel(label)
         axis.grid(alpha=0.3)
     peak_m_min = float(np.max(first.command.velocity_m_s)) * 60.0
@@ -155,8 +166,9 @@ def nut_travel() -> Figure:
     stiffness.legend()
     for mode in range(1, 7):
         frequencies.plot(nut_m * 1e3, hz[:, mode], color=SEVEN)
-        frequencies.annotate(f"mode {mode + 1}", (400.0, hz[-1, mode]), xytext=(4, 0), textcoords="offset points",
-                             va="center")
+        frequencies.annotate(
+            f"mode {mode + 1}", (400.0, hz[-1, mode]), xytext=(4, 0), textcoords="offset points", va="center"
+        )
     frequencies.set_ylabel("frequency [Hz]")
     frequencies.set_xlabel("nut position [mm]")
     frequencies.set_xlim(0.0, 440.0)

@@ -6,17 +6,19 @@ from math import sqrt
 
 import numpy as np
 
-from hil.twin.chain import FloatArray
-from hil.twin.frequency import ComplexArray, laplace
+from hil.arrays import FloatArray
+from hil.twin.structure.frequency import ComplexArray, laplace
 
 
 def modal_matrix_eq_5(m1: float, m2: float) -> FloatArray:
     """[phi] of Eq. 5, its (1, 2) entry with the printed minus sign; Eq. 10 uses a plus there."""
     total = m1 + m2
-    return np.array([
-        [1.0 / np.sqrt(total), -np.sqrt(m2 / (m1 * total))],
-        [1.0 / np.sqrt(total), -np.sqrt(m1 / (m2 * total))],
-    ])
+    return np.array(
+        [
+            [1.0 / np.sqrt(total), -np.sqrt(m2 / (m1 * total))],
+            [1.0 / np.sqrt(total), -np.sqrt(m1 / (m2 * total))],
+        ]
+    )
 
 
 def rigid_acceleration_eq_6(shape: FloatArray) -> float:

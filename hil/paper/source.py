@@ -7,20 +7,21 @@ from math import pi
 
 import numpy as np
 
-from hil.control import Gains, make_gains
-from hil.moves import Motion
-from hil.profile import Profile
-from hil.trajectory import Trajectory, plan
+from hil.arrays import FloatArray
+from hil.control.cascade import Gains, make_gains
+from hil.motion.pieces import Motion
+from hil.motion.profile import Profile
+from hil.motion.trajectory import Trajectory, plan
 from hil.twin.axis import Response, Twin
-from hil.twin.chain import RECONSTRUCTED_TABLE_1, Chain, FloatArray, seven_dof, two_mass
 from hil.twin.physics import Physics
+from hil.twin.structure.chain import RECONSTRUCTED_TABLE_1, Chain, seven_dof, two_mass
 
 LEAD_M = 0.010
 RATIO_M_RAD = LEAD_M / (2.0 * pi)
-MOTOR_MASS_KG, TABLE_MASS_KG, STIFFNESS_N_M = 335.0, 384.0, 5.64e7              # Eq. 22-23
-COULOMB_N_M, VISCOUS_N_M_S_RAD = 1.1, 0.0064                                   # Sec. 3.2.3
+MOTOR_MASS_KG, TABLE_MASS_KG, STIFFNESS_N_M = 335.0, 384.0, 5.64e7  # Eq. 22-23
+COULOMB_N_M, VISCOUS_N_M_S_RAD = 1.1, 0.0064  # Sec. 3.2.3
 POSITION_GAIN_1_S, INTEGRAL_TIME_S, TORQUE_CONSTANT_N_M_A = 36.84, 6.2e-3, 1.4  # Table 2
-VELOCITY_GAIN_N_M_S_RAD = 20e-3 * TORQUE_CONSTANT_N_M_A * 60.0 / (2.0 * pi)     # 20 mA/rpm x Kt
+VELOCITY_GAIN_N_M_S_RAD = 20e-3 * TORQUE_CONSTANT_N_M_A * 60.0 / (2.0 * pi)  # 20 mA/rpm x Kt
 STROKE_M = 0.100
 FEEDS_M_MIN = (7.0, 22.0, 30.0)
 
@@ -86,15 +87,17 @@ class Run:
 def simulate(chain: Chain, feed_m_min: float, velocity_feedforward: float = 1.0) -> Run:
     """A 100 mm move of an axis with friction by Eq. 24, from rest, in closed loop."""
     law = gains(velocity_feedforward)
-    profile = Profile.model_validate({
-        "schema_version": 1,
-        "limits": {"velocity_m_s": 0.6, "acceleration_m_s2": ACCELERATION_M_S2, "jerk_m_s3": JERK_M_S3},
-        "segments": [
-            {"kind": "dwell", "duration_s": 0.052},
-            {"kind": "sine_squared", "to_m": STROKE_M, "feed_m_s": feed_m_min / 60.0},
-            {"kind": "dwell", "duration_s": 0.252},
-        ],
-    })
+    profile = Profile.model_validate(
+        {
+            "schema_version": 1,
+            "limits": {"velocity_m_s": 0.6, "acceleration_m_s2": ACCELERATION_M_S2, "jerk_m_s3": JERK_M_S3},
+            "segments": [
+                {"kind": "dwell", "duration_s": 0.052},
+                {"kind": "sine_squared", "to_m": STROKE_M, "feed_m_s": feed_m_min / 60.0},
+                {"kind": "dwell", "duration_s": 0.252},
+            ],
+        }
+    )
     command = plan(profile, law.period_s)
     twin = Twin(Physics(chain, COULOMB_N_M, VISCOUS_N_M_S_RAD), law)
     return Run(feed_m_min, command, twin.simulate(command.position_m, command.velocity_m_s))

@@ -12,23 +12,32 @@ from math import inf
 from pathlib import Path
 
 from hil.errors import HilError, InputError
-from hil.proof.again import AGAIN, record_again
-from hil.proof.blind import answered
-from hil.proof.plan import PLANTS, Planned
-from hil.proof.replies import read_replies
-from hil.proof.score import Scores, score
+from hil.proof.answer.answers import read_replies
+from hil.proof.answer.blind import answered
+from hil.proof.answer.follow_up import AGAIN, record_again
+from hil.proof.draw.plan import PLANTS, Planned
+from hil.proof.score.scores import Scores, score
 from hil.proof.seal import CASES, SEAL, SEALED, code_sha256, draw_cases, read_seal, seal, unseal
 
 ANSWERS, PEERS = "answers", "peers"
 # Processes that are stopped by ctrl-C leave semaphores, which are then cleared away: nothing that a user can act on.
 _UNCLEAN = "ignore::UserWarning:multiprocessing.resource_tracker"
 
-Say = Callable[[str], None]                      # what is to be kept
-Tell = Callable[[str, float | None], None]       # what is going on, and the share that is done
+Say = Callable[[str], None]  # what is to be kept
+Tell = Callable[[str, float | None], None]  # what is going on, and the share that is done
 
 
-def prove(folder: Path, planned: Sequence[Planned], seed: int, jobs: int, say: Say, tell: Tell,
-          plant: str = "simulated", only: Sequence[str] = (), hours: float = inf) -> Scores:
+def prove(
+    folder: Path,
+    planned: Sequence[Planned],
+    seed: int,
+    jobs: int,
+    say: Say,
+    tell: Tell,
+    plant: str = "simulated",
+    only: Sequence[str] = (),
+    hours: float = inf,
+) -> Scores:
     """Do what is still to be done of a proof in `folder`, on a plant of `plan.PLANTS`, and score it; `only` are the
     tiers that it was planned of, where not of all.
 
@@ -56,21 +65,34 @@ def prove(folder: Path, planned: Sequence[Planned], seed: int, jobs: int, say: S
         draw_cases(folder, planned, seed, jobs, lambda share: tell("drawing cases", share), plant)
         about = seal(folder, planned, command, seed)
     elif about["command"] != command:
-        raise InputError(f"{folder / SEAL}: given {command}, allowed what was sealed, {about['command']}; or another "
-                         "--out")
+        raise InputError(
+            f"{folder / SEAL}: given {command}, allowed what was sealed, {about['command']}; or another --out"
+        )
     say(f"sealed: SHA-256 {about['truths_sha256']}, {about['cases']} cases, {about['sealed_at']}")
     names = [case.name for case in planned]
-    diagnose_blind(folder / CASES, folder / ANSWERS, names, about["code_sha256"], jobs,
-                   lambda share: tell("diagnosing blind", share), hours)
+    diagnose_blind(
+        folder / CASES,
+        folder / ANSWERS,
+        names,
+        about["code_sha256"],
+        jobs,
+        lambda share: tell("diagnosing blind", share),
+        hours,
+    )
     sealed = unseal(folder)
     truths = {name: sealed[name] for name in takewhile(lambda name: answered(folder / ANSWERS / name), names)}
     if len(truths) < len(names):
         say(f"the first {len(truths)} of {len(names)} cases have an answer and are scored; the same again goes on")
     tell("running proposed motions", 0.0)
-    again = record_again(folder, folder / ANSWERS, truths, jobs,
-                         lambda share: tell("running proposed motions", share))
-    diagnose_blind(folder / AGAIN / CASES, folder / AGAIN / ANSWERS, again, about["code_sha256"], jobs,
-                   lambda share: tell("diagnosing again", share))
+    again = record_again(folder, folder / ANSWERS, truths, jobs, lambda share: tell("running proposed motions", share))
+    diagnose_blind(
+        folder / AGAIN / CASES,
+        folder / AGAIN / ANSWERS,
+        again,
+        about["code_sha256"],
+        jobs,
+        lambda share: tell("diagnosing again", share),
+    )
     tell("scoring", None)
     return score(truths, read_replies(folder / ANSWERS, truths), read_replies(folder / AGAIN / ANSWERS, again))
 
@@ -79,23 +101,46 @@ def score_others(folder: Path, scores: Scores) -> dict[str, Scores]:
     """Scores of other methods by name, of those cases of `scores` whose answers lie in DIR/peers/METHOD/NAME."""
     truths = {case.truth.name: case.truth for case in scores.cases}
     answers = {place.name: read_replies(place, truths) for place in sorted((folder / PEERS).glob("*/"))}
-    return {method: score({name: truths[name] for name in replies}, replies)
-            for method, replies in answers.items() if replies}
+    return {
+        method: score({name: truths[name] for name in replies}, replies)
+        for method, replies in answers.items()
+        if replies
+    }
 
 
-def diagnose_blind(cases: Path, answers: Path, names: Sequence[str], code: str, jobs: int,
-                   told: Callable[[float], None], hours: float = inf) -> None:
+def diagnose_blind(
+    cases: Path,
+    answers: Path,
+    names: Sequence[str],
+    code: str,
+    jobs: int,
+    told: Callable[[float], None],
+    hours: float = inf,
+) -> None:
     """Have all cases without an answer diagnosed by another process, by the code that was sealed; none is begun after
     `hours`."""
     done = sum(answered(answers / name) for name in names)
     if done == len(names) or hours <= 0.0:
         return
     if code_sha256() != code:
-        raise InputError(f"{cases.parent}: was sealed for a diagnosis by other code than this (SHA-256 {code}); "
-                         "answers of two would mix: give another --out")
+        raise InputError(
+            f"{cases.parent}: was sealed for a diagnosis by other code than this (SHA-256 {code}); "
+            "answers of two would mix: give another --out"
+        )
     told(done / len(names))
-    blind = [sys.executable, "-W", _UNCLEAN, "-m", "hil.proof.blind", str(cases.resolve()), str(answers.resolve()),
-             "--jobs", str(jobs), "--hours", str(hours)]
+    blind = [
+        sys.executable,
+        "-W",
+        _UNCLEAN,
+        "-m",
+        "hil.proof.answer.blind",
+        str(cases.resolve()),
+        str(answers.resolve()),
+        "--jobs",
+        str(jobs),
+        "--hours",
+        str(hours),
+    ]
     with subprocess.Popen(blind, stdout=subprocess.PIPE, text=True, start_new_session=True) as process:
         try:
             for _ in process.stdout or ():
@@ -103,8 +148,10 @@ def diagnose_blind(cases: Path, answers: Path, names: Sequence[str], code: str, 
                 told(done / len(names))
             ended = process.wait()
         except BaseException:
-            os.killpg(process.pid, signal.SIGTERM)      # with the processes that it started
+            os.killpg(process.pid, signal.SIGTERM)  # with the processes that it started
             raise
     if ended:
-        raise HilError(f"{cases}: the blind diagnosis ended with code {ended} before all cases had an answer; run "
-                       "the same again to go on")
+        raise HilError(
+            f"{cases}: the blind diagnosis ended with code {ended} before all cases had an answer; run "
+            "the same again to go on"
+        )

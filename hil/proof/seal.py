@@ -25,21 +25,24 @@ from pathlib import Path
 from typing import Any
 
 from hil.errors import HilError, InputError
-from hil.proof.conceal import Concealed, Truth, draw, write
-from hil.proof.mujoco_plant import draw_mujoco
-from hil.proof.plan import Planned
-from hil.report.output import write_json
+from hil.files.output import write_json
+from hil.proof.draw.generator import Concealed, Truth, draw, write
+from hil.proof.draw.mujoco_plant import draw_mujoco
+from hil.proof.draw.plan import Planned
 
 CASES, SEALED, SEAL = "cases", "sealed", "seal.json"
 _TRUTHS = f"{SEALED}/truths.json"
 _PACKAGE = Path(__file__).parents[1]
+# What a diagnosis runs, beside the modules at the root.
+_ANSWERING = ("bench", "compiled", "control", "diagnosis", "files", "identification", "motion", "recording", "twin")
 _LIBRARIES = ("hil-servo", "numpy", "scipy", "numba")
 
-Told = Callable[[float], None]       # the share that is done
+Told = Callable[[float], None]  # the share that is done
 
 
-def draw_cases(folder: Path, planned: Sequence[Planned], seed: int, jobs: int, told: Told,
-               plant: str = "simulated") -> None:
+def draw_cases(
+    folder: Path, planned: Sequence[Planned], seed: int, jobs: int, told: Told, plant: str = "simulated"
+) -> None:
     """Draw and write cases of a plant, several at once; those that stand there already are left alone.
 
     Raises InputError where `folder` holds cases of another plan.
@@ -50,9 +53,14 @@ def draw_cases(folder: Path, planned: Sequence[Planned], seed: int, jobs: int, t
         if not part.exists():
             todo.append(case)
         elif {key: json.loads(part.read_text())["truth"][key] for key in ("tier", "number", "seed")} != {
-                "tier": case.tier, "number": case.number, "seed": seed}:
-            raise InputError(f"{part}: given a case of another plan, allowed one of --seed {seed} and as many --cases; "
-                             "give another --out")
+            "tier": case.tier,
+            "number": case.number,
+            "seed": seed,
+        }:
+            raise InputError(
+                f"{part}: given a case of another plan, allowed one of --seed {seed} and as many --cases; "
+                "give another --out"
+            )
     with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
         drawn = [pool.submit(_draw, folder, case, seed, plant) for case in todo]
         try:
@@ -69,9 +77,16 @@ def seal(folder: Path, planned: Sequence[Planned], command: str, seed: int) -> d
     """Put the truths together and seal them; returns what seal.json says."""
     parts = [_part(folder, case.name) for case in planned]
     write_json(folder / _TRUTHS, {path.stem: json.loads(path.read_text()) for path in parts})
-    about = {"truths_sha256": sha256(folder / _TRUTHS), "cases": len(planned), "seed": seed, "command": command,
-             "sealed_at": f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}", **_commit(), "code_sha256": code_sha256(),
-             "versions": {"python": platform.python_version(), **{name: version(name) for name in _LIBRARIES}}}
+    about = {
+        "truths_sha256": sha256(folder / _TRUTHS),
+        "cases": len(planned),
+        "seed": seed,
+        "command": command,
+        "sealed_at": f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}",
+        **_commit(),
+        "code_sha256": code_sha256(),
+        "versions": {"python": platform.python_version(), **{name: version(name) for name in _LIBRARIES}},
+    }
     write_json(folder / SEAL, about)
     for path in parts:
         path.unlink()
@@ -95,14 +110,17 @@ def unseal(folder: Path) -> dict[str, Truth]:
     if about is None:
         raise HilError(f"{folder}: nothing is sealed here; give the --out of hil prove")
     if not path.exists() or sha256(path) != about["truths_sha256"]:
-        raise HilError(f"{path}: is not what was sealed (SHA-256 {about['truths_sha256']}); nothing can be scored: "
-                       "give another --out")
+        raise HilError(
+            f"{path}: is not what was sealed (SHA-256 {about['truths_sha256']}); nothing can be scored: "
+            "give another --out"
+        )
     truths = {}
     for name, entry in json.loads(path.read_text(encoding="utf-8")).items():
         place = folder / CASES / name
         if not place.is_dir() or _digests(place) != entry["sha256"]:
-            raise HilError(f"{place}: recordings or bench are not what was sealed; nothing can be scored: "
-                           "give another --out")
+            raise HilError(
+                f"{place}: recordings or bench are not what was sealed; nothing can be scored: give another --out"
+            )
         truths[name] = truth_of(entry["truth"])
     return truths
 
@@ -110,8 +128,9 @@ def unseal(folder: Path) -> dict[str, Truth]:
 def truth_of(data: dict[str, Any]) -> Truth:
     """The truth of a case from plain data."""
     effects = tuple(Concealed(**{**effect, "same_law": tuple(effect["same_law"])}) for effect in data["effects"])
-    return Truth(**{**data, "effects": effects, "rivals": tuple(data["rivals"]),
-                    "not_testable": tuple(data["not_testable"])})
+    return Truth(
+        **{**data, "effects": effects, "rivals": tuple(data["rivals"]), "not_testable": tuple(data["not_testable"])}
+    )
 
 
 def sha256(path: Path) -> str:
@@ -123,7 +142,9 @@ def sha256(path: Path) -> str:
 def code_sha256() -> str:
     """SHA-256 of the code that a diagnosis runs: twin, diagnosis and what they stand on."""
     digest = hashlib.sha256()
-    for path in sorted([*_PACKAGE.glob("*.py"), *_PACKAGE.glob("diagnosis/**/*.py"), *_PACKAGE.glob("twin/**/*.py")]):
+    for path in sorted(
+        [*_PACKAGE.glob("*.py"), *(path for part in _ANSWERING for path in (_PACKAGE / part).rglob("*.py"))]
+    ):
         digest.update(path.relative_to(_PACKAGE).as_posix().encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()
 
@@ -149,14 +170,22 @@ def _part(folder: Path, name: str) -> Path:
 
 def _commit() -> dict[str, Any]:
     """The commit of the code and whether it was changed since; nothing where there is none."""
+
     def git(*arguments: str) -> str | None:
         try:
-            ran = subprocess.run(["git", "-C", str(_PACKAGE), *arguments], capture_output=True, text=True, check=True,
-                                 env={**os.environ, "GIT_OPTIONAL_LOCKS": "0"})
+            ran = subprocess.run(
+                ["git", "-C", str(_PACKAGE), *arguments],
+                capture_output=True,
+                text=True,
+                check=True,
+                env={**os.environ, "GIT_OPTIONAL_LOCKS": "0"},
+            )
         except (OSError, subprocess.CalledProcessError):
             return None
         return ran.stdout.strip()
 
     commit = git("rev-parse", "HEAD")
-    return {"git_commit": commit, "git_changed": bool(git("status", "--porcelain", "--", str(_PACKAGE)))
-            if commit else None}
+    return {
+        "git_commit": commit,
+        "git_changed": bool(git("status", "--porcelain", "--", str(_PACKAGE))) if commit else None,
+    }

@@ -6,16 +6,16 @@ from pathlib import Path
 
 import numpy as np
 
-from hil.axis_models import OneMass
-from hil.bench import Bench
-from hil.blocks import BlockDeviation
-from hil.compare import EXPLAINED, Comparison, Deviation
-from hil.fit import FitResult
-from hil.report import figures, look, plots
+from hil.bench.axis_models import OneMass
+from hil.bench.bench_file import Bench
+from hil.files.output import write_json, write_text
+from hil.identification.blocks import BlockDeviation
+from hil.identification.compare import EXPLAINED, Comparison, Deviation
+from hil.identification.nominal_fit import FitResult
+from hil.report import figures, plots, style
 from hil.report.figures import Line, Panel
-from hil.report.look import digits, percent, quantity
-from hil.report.output import write_json, write_text
 from hil.report.page import Number, Page
+from hil.report.style import digits, percent, quantity
 
 MOVE_MARGIN_S = 0.1
 
@@ -26,15 +26,21 @@ def write_comparison(result: Comparison, folder: Path) -> None:
     motion, blocks = motion_panels(result), block_panels(result)
     page = Page(f"{result.recording.name} against its twin", _lead(result), verdict(result), result.explained)
     page.heading("Measured over simulated")
-    page.text("The twin runs in closed loop from the set-points of the recording alone. Deviation: measured less "
-              "simulated; relative: rms of the deviation over rms of the measured channel.")
-    page.table(("channel", "rms deviation", "largest deviation", "relative"),
-               [_row(channel.label, channel) for channel in result.channels])
+    page.text(
+        "The twin runs in closed loop from the set-points of the recording alone. Deviation: measured less "
+        "simulated; relative: rms of the deviation over rms of the measured channel."
+    )
+    page.table(
+        ("channel", "rms deviation", "largest deviation", "relative"),
+        [_row(channel.label, channel) for channel in result.channels],
+    )
     page.plot(plots.over_time(time_s, motion))
     page.heading("Block by block")
     page.text("Each block is fed with what was measured, so that its deviation is its own.")
-    page.table(("block", "fed with", "output", "rms deviation", "largest deviation", "relative", "rms over noise"),
-               [_block_row(block, deviation) for block, deviation in result.blocks])
+    page.table(
+        ("block", "fed with", "output", "rms deviation", "largest deviation", "relative", "rms over noise"),
+        [_block_row(block, deviation) for block, deviation in result.blocks],
+    )
     page.plot(plots.over_time(time_s, blocks, [150, 120] * len(result.blocks)))
     if result.fit is not None:
         _fit(page, result.fit)
@@ -44,8 +50,10 @@ def write_comparison(result: Comparison, folder: Path) -> None:
     name = result.recording.name
     figures.save(figures.over_time(f"{name}: whole recording", time_s, motion), folder / "overview.png")
     move = figures.over_time(f"{name}: fastest move", time_s, motion, fastest_move(result))
-    page.picture(figures.save(move, folder / "move.png"),
-                 "The fastest move of the recording (move.png); the whole recording is overview.png.")
+    page.picture(
+        figures.save(move, folder / "move.png"),
+        "The fastest move of the recording (move.png); the whole recording is overview.png.",
+    )
     figures.save(figures.over_time(f"{name}: block by block", time_s, blocks), folder / "blocks.png")
     page.heading("How it was computed")
     page.items([*result.notes, *(f"{block.block}: {block.remark}." for block, _ in result.blocks if block.remark)])
@@ -58,15 +66,19 @@ def write_comparison(result: Comparison, folder: Path) -> None:
 def verdict(result: Comparison) -> str:
     """In words: does the twin explain the recording, and if not, where it fails."""
     torque, position = result.torque, result.channels[0]
-    figures_ = (f"{torque.label} deviates by {quantity(torque.rms, torque.unit)} rms, "
-                f"{digits(result.torque_over_noise)} × its noise; {position.label} by "
-                f"{quantity(position.rms, position.unit)} rms")
+    figures_ = (
+        f"{torque.label} deviates by {quantity(torque.rms, torque.unit)} rms, "
+        f"{digits(result.torque_over_noise)} × its noise; {position.label} by "
+        f"{quantity(position.rms, position.unit)} rms"
+    )
     if result.explained:
         return f"The twin explains this recording: {figures_}."
     worst = [(deviation.rms / block.noise, block.block) for block, deviation in result.blocks if block.noise > 0.0]
     if worst and max(worst)[0] <= EXPLAINED:
-        return (f"The control loop is not as the twin has it: {figures_}. Drive and axis by themselves are within "
-                f"{EXPLAINED:g} × their noise: look at gains, periods, and where the loops run (drive.mode).")
+        return (
+            f"The control loop is not as the twin has it: {figures_}. Drive and axis by themselves are within "
+            f"{EXPLAINED:g} × their noise: look at gains, periods, and where the loops run (drive.mode)."
+        )
     where = f" Furthest from its noise: {max(worst)[1]} ({digits(max(worst)[0])} ×)." if worst else ""
     todo = "" if result.fit else " The parameters may be wrong: --fit corrects them."
     return f"The twin leaves something out: {figures_}.{where}{todo}"
@@ -77,16 +89,21 @@ def motion_panels(result: Comparison) -> list[Panel]:
     chosen = [channel for channel in result.channels if channel.name != "motor_position"]
     panels = [_pair(channel.label, channel) for channel in chosen]
     position, torque = chosen[0], chosen[-1]
-    return [*panels, _difference(f"deviation of\n{position.label}", position, 0.0),
-            _difference(f"deviation of\n{torque.label}", torque, result.measured.noise.torque)]
+    return [
+        *panels,
+        _difference(f"deviation of\n{position.label}", position, 0.0),
+        _difference(f"deviation of\n{torque.label}", torque, result.measured.noise.torque),
+    ]
 
 
 def block_panels(result: Comparison) -> list[Panel]:
     """Output of each block, measured and simulated, and the deviation."""
     panels = []
     for block, deviation in result.blocks:
-        panels += [_pair(f"{block.block}:\n{block.output}", deviation),
-                   _difference("deviation", deviation, block.noise)]
+        panels += [
+            _pair(f"{block.block}:\n{block.output}", deviation),
+            _difference("deviation", deviation, block.noise),
+        ]
     return panels
 
 
@@ -115,23 +132,35 @@ def _lead(result: Comparison) -> str:
     seconds = len(result.recording) * result.recording.period_s
     parameters = "parameters fitted to this recording" if result.fit else "parameters of the bench file"
     mechanisms = ", ".join(entry.effect for entry in result.bench.mechanisms)
-    return (f"{seconds:.1f} s at {digits(1.0 / result.recording.period_s)} Hz · bench {result.bench.name} "
-            f"({result.bench.axis.model}{f', with {mechanisms}' if mechanisms else ''}) · {parameters}")
+    return (
+        f"{seconds:.1f} s at {digits(1.0 / result.recording.period_s)} Hz · bench {result.bench.name} "
+        f"({result.bench.axis.model}{f', with {mechanisms}' if mechanisms else ''}) · {parameters}"
+    )
 
 
 def _pair(label: str, channel: Deviation) -> Panel:
-    return Panel(label, channel.unit, (Line("measured", channel.measured, look.MEASURED, broad=True),
-                                       Line("simulated", channel.simulated, look.SIMULATED)))
+    return Panel(
+        label,
+        channel.unit,
+        (
+            Line("measured", channel.measured, style.MEASURED, broad=True),
+            Line("simulated", channel.simulated, style.SIMULATED),
+        ),
+    )
 
 
 def _difference(label: str, channel: Deviation, noise: float) -> Panel:
     values = np.where(np.arange(channel.measured.size) < channel.judged.start, 0.0, channel.values)
-    return Panel(label, channel.unit, (Line("measured less simulated", values, look.DEVIATION),), noise)
+    return Panel(label, channel.unit, (Line("measured less simulated", values, style.DEVIATION),), noise)
 
 
 def _row(label: str, deviation: Deviation) -> tuple[str, ...]:
-    return (label, Number(quantity(deviation.rms, deviation.unit)), Number(quantity(deviation.peak, deviation.unit)),
-            Number(percent(deviation.relative)))
+    return (
+        label,
+        Number(quantity(deviation.rms, deviation.unit)),
+        Number(quantity(deviation.peak, deviation.unit)),
+        Number(percent(deviation.relative)),
+    )
 
 
 def _block_row(block: BlockDeviation, deviation: Deviation) -> tuple[str, ...]:
@@ -142,28 +171,52 @@ def _block_row(block: BlockDeviation, deviation: Deviation) -> tuple[str, ...]:
 
 def _fit(page: Page, fit: FitResult) -> None:
     page.heading("Fitted parameters")
-    page.table(("parameter", "bench file", "fitted", "standard error", "change"),
-               [(parameter.name, Number(digits(parameter.nominal, 4)), Number(digits(parameter.value, 5)),
-                 Number(digits(parameter.standard_error, 2)),
-                 Number(f"{100.0 * (parameter.value / parameter.nominal - 1.0):+.1f} %"))
-                for parameter in fit.parameters])
-    page.text("Closed-loop output error over torque, motor position and table against motor; standard errors hold if "
-              "what is left is white noise. bench.fitted.yaml holds the bench with these values.")
+    page.table(
+        ("parameter", "bench file", "fitted", "standard error", "change"),
+        [
+            (
+                parameter.name,
+                Number(digits(parameter.nominal, 4)),
+                Number(digits(parameter.value, 5)),
+                Number(digits(parameter.standard_error, 2)),
+                Number(f"{100.0 * (parameter.value / parameter.nominal - 1.0):+.1f} %"),
+            )
+            for parameter in fit.parameters
+        ],
+    )
+    page.text(
+        "Closed-loop output error over torque, motor position and table against motor; standard errors hold if "
+        "what is left is white noise. bench.fitted.yaml holds the bench with these values."
+    )
 
 
 def _inverse_dynamics(page: Page, result: Comparison) -> None:
     fit, axis = result.inverse_dynamics, result.bench.axis
     assert fit is not None
     page.heading("Inverse-dynamics fit")
-    page.text("Force over measured motion, M a + Fv v + Fc sign(v) + F0, by least squares; relative error "
-              f"{percent(fit.relative_error)}.")
-    offset = next((entry.parameters["offset_torque_n_m"] for entry in result.bench.mechanisms
-                   if entry.effect == "asymmetric_friction"), 0.0)
+    page.text(
+        "Force over measured motion, M a + Fv v + Fc sign(v) + F0, by least squares; relative error "
+        f"{percent(fit.relative_error)}."
+    )
+    offset = next(
+        (
+            entry.parameters["offset_torque_n_m"]
+            for entry in result.bench.mechanisms
+            if entry.effect == "asymmetric_friction"
+        ),
+        0.0,
+    )
     assert isinstance(axis, OneMass)
-    rows = (("mass M", "kg", fit.inertia, fit.inertia_std_error, axis.mass_kg),
-            ("viscous friction Fv", "N s/m", fit.viscous, fit.viscous_std_error, axis.viscous_force_n_s_m),
-            ("Coulomb friction Fc", "N", fit.coulomb, fit.coulomb_std_error, axis.coulomb_force_n),
-            ("offset F0", "N", fit.offset, fit.offset_std_error, offset))
-    page.table(("parameter", "unit", "value", "standard error", "bench"),
-               [(name, unit, Number(digits(value, 5)), Number(digits(error, 2)), Number(digits(believed, 5)))
-                for name, unit, value, error, believed in rows])
+    rows = (
+        ("mass M", "kg", fit.inertia, fit.inertia_std_error, axis.mass_kg),
+        ("viscous friction Fv", "N s/m", fit.viscous, fit.viscous_std_error, axis.viscous_force_n_s_m),
+        ("Coulomb friction Fc", "N", fit.coulomb, fit.coulomb_std_error, axis.coulomb_force_n),
+        ("offset F0", "N", fit.offset, fit.offset_std_error, offset),
+    )
+    page.table(
+        ("parameter", "unit", "value", "standard error", "bench"),
+        [
+            (name, unit, Number(digits(value, 5)), Number(digits(error, 2)), Number(digits(believed, 5)))
+            for name, unit, value, error, believed in rows
+        ],
+    )

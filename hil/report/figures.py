@@ -9,10 +9,11 @@ from pathlib import Path
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from hil.report import look
-from hil.report.look import FloatArray, shown, thin
+from hil.arrays import FloatArray
+from hil.report import style
+from hil.report.style import shown, thin
 
-DRAWN_ROWS = 6000            # of a line in a picture: more than a picture has columns
+DRAWN_ROWS = 6000  # of a line in a picture: more than a picture has columns
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,7 +23,7 @@ class Line:
     label: str
     values: FloatArray
     colour: str
-    broad: bool = False      # lies under another line that may hide it
+    broad: bool = False  # lies under another line that may hide it
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +36,7 @@ class Panel:
     band: float = 0.0
 
     @property
-    def shown(self) -> look.Shown:
+    def shown(self) -> style.Shown:
         """How values are shown; one unit for the panel."""
         return shown(self.unit, max(float(abs(line.values).max()) for line in self.lines))
 
@@ -50,25 +51,38 @@ def over_time(title: str, time_s: FloatArray, panels: Sequence[Panel], rows: sli
         chosen = thin(tuple(lines), DRAWN_ROWS)
         unit = shown(panel.unit, max(float(abs(values).max()) for values in lines))
         if panel.band > 0.0:
-            axis.axhspan(-panel.band * unit.factor, panel.band * unit.factor, color=look.NOISE, alpha=0.35,
-                         label="noise, ±1 σ")
+            axis.axhspan(
+                -panel.band * unit.factor, panel.band * unit.factor, color=style.NOISE, alpha=0.35, label="noise, ±1 σ"
+            )
         for line, values in zip(panel.lines, lines, strict=True):
-            axis.plot(time_s[chosen], values[chosen] * unit.factor, color=line.colour, label=line.label,
-                      linewidth=2.6 if line.broad else 0.9, alpha=0.5 if line.broad else 1.0)
-        style(axis, f"{panel.label}\n[{unit.unit}]")
+            axis.plot(
+                time_s[chosen],
+                values[chosen] * unit.factor,
+                color=line.colour,
+                label=line.label,
+                linewidth=2.6 if line.broad else 0.9,
+                alpha=0.5 if line.broad else 1.0,
+            )
+        style_axis(axis, f"{panel.label}\n[{unit.unit}]")
     axes[0].set_title(title, loc="left")
     # above the first panel: inside, it would hide a line sooner or later
     labelled = [axis.get_legend_handles_labels() for axis in axes]
     known = {label: handle for handles, labels in labelled for handle, label in zip(handles, labels, strict=True)}
-    axes[0].legend(handles=list(known.values()), loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, frameon=False,
-                   borderaxespad=0.2)
+    axes[0].legend(
+        handles=list(known.values()),
+        loc="lower right",
+        bbox_to_anchor=(1.0, 1.0),
+        ncols=3,
+        frameon=False,
+        borderaxespad=0.2,
+    )
     axes[-1].set_xlabel("time [s]")
     axes[-1].set_xlim(time_s[0], time_s[-1])
     figure.align_ylabels(axes)
     return figure
 
 
-def style(axis: Axes, label: str) -> None:
+def style_axis(axis: Axes, label: str) -> None:
     """Label and grid of an axis."""
     axis.set_ylabel(label)
     axis.grid(alpha=0.3)

@@ -6,10 +6,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from hil.channels import AxisKind
-from hil.friction import FrictionResult
+from hil.identification.friction import FrictionResult
 
-MEASURED, LINE = "#0072b2", "#d55e00"   # told apart by the colour-blind
-_UNITS = {   # quantity, its unit, unit of viscous friction, label of the speed axis
+MEASURED, LINE = "#0072b2", "#d55e00"  # told apart by the colour-blind
+_UNITS = {  # quantity, its unit, unit of viscous friction, label of the speed axis
     AxisKind.ROTARY: ("torque", "N m", "N m s/rad", "motor speed [rad/s]"),
     AxisKind.LINEAR: ("force", "N", "N s/m", "speed [m/s]"),
 }
@@ -34,9 +34,11 @@ def friction_figure(result: FrictionResult) -> Figure:
     top.axvline(0.0, color="black", linewidth=0.8)
     top.set_ylabel(f"mean {quantity} [{unit}]")
     top.legend(loc="upper left")
-    text = (f"Coulomb {_value(result.coulomb, result.coulomb_std_error)} {unit}\n"
-            f"viscous {_value(result.viscous, result.viscous_std_error)} {viscous_unit}\n"
-            f"offset {_value(result.offset, result.offset_std_error)} {unit}")
+    text = (
+        f"Coulomb {_value(result.coulomb, result.coulomb_std_error)} {unit}\n"
+        f"viscous {_value(result.viscous, result.viscous_std_error)} {viscous_unit}\n"
+        f"offset {_value(result.offset, result.offset_std_error)} {unit}"
+    )
     top.text(0.98, 0.04, text, transform=top.transAxes, ha="right", va="bottom", family="monospace")
     top.set_title("Friction at constant feed (± standard error)", loc="left")
 

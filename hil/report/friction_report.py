@@ -7,14 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
-from hil.bench import Bench
+from hil.bench.bench_file import Bench
 from hil.channels import AxisKind
-from hil.friction import FrictionResult
+from hil.files.output import write_json
+from hil.identification.friction import FrictionResult
 from hil.report.figures import save
 from hil.report.friction_figure import friction_figure
-from hil.report.look import digits
-from hil.report.output import write_json
 from hil.report.page import Number, Page
+from hil.report.style import digits
 
 _UNITS = {AxisKind.ROTARY: ("N m", "N m s/rad", "rad/s"), AxisKind.LINEAR: ("N", "N s/m", "m/s")}
 SCHEMA_VERSION = 1
@@ -24,26 +24,46 @@ def write_friction(result: FrictionResult, name: str, bench: Bench | None, folde
     """Write friction.html, friction.png and friction.json; `bench` shows what its file believes beside it."""
     unit, _, speed_unit = _UNITS[result.kind]
     feeds = [abs(point.feed_m_s) * 60.0 for point in result.points]
-    page = Page(f"Friction of {name}",
-                f"{len(result.points)} stretches of constant feed, {digits(min(feeds))} to {digits(max(feeds))} m/min",
-                verdict(result, bench), True)
+    page = Page(
+        f"Friction of {name}",
+        f"{len(result.points)} stretches of constant feed, {digits(min(feeds))} to {digits(max(feeds))} m/min",
+        verdict(result, bench),
+        True,
+    )
     page.heading("Regression")
-    page.text("At constant feed nothing accelerates: the mean torque is Coulomb x sign(speed) + viscous x speed + "
-              f"offset. Points lie {digits(result.residual_rms)} {unit} rms about the line.")
-    page.table(("", "value", "standard error", "bench file"),
-               [(row[0], *(Number(text) for text in row[1:])) for row in rows_of(result, bench)])
-    page.picture(save(friction_figure(result), folder / "friction.png"),
-                 "Mean motor torque over speed, and below what the line leaves out.")
+    page.text(
+        "At constant feed nothing accelerates: the mean torque is Coulomb x sign(speed) + viscous x speed + "
+        f"offset. Points lie {digits(result.residual_rms)} {unit} rms about the line."
+    )
+    page.table(
+        ("", "value", "standard error", "bench file"),
+        [(row[0], *(Number(text) for text in row[1:])) for row in rows_of(result, bench)],
+    )
+    page.picture(
+        save(friction_figure(result), folder / "friction.png"),
+        "Mean motor torque over speed, and below what the line leaves out.",
+    )
     page.heading("Points")
     line = result.torque(np.array([point.speed for point in result.points]))
-    page.table((f"motor speed [{speed_unit}]", f"mean [{unit}]", f"line [{unit}]", "feed [m/min]", "from [s]",
-                "averaged [s]"),
-               [tuple(Number(digits(value, 4)) for value in (
-                   point.speed, point.torque, torque, point.feed_m_s * 60.0, point.start_s, point.duration_s))
-                for point, torque in zip(result.points, line.tolist(), strict=True)])
-    write_json(folder / "friction.json", {
-        "schema_version": SCHEMA_VERSION, "recording": name, "units": dict(zip(
-            ("coulomb", "viscous", "speed"), _UNITS[result.kind], strict=True)), **asdict(result)})
+    page.table(
+        (f"motor speed [{speed_unit}]", f"mean [{unit}]", f"line [{unit}]", "feed [m/min]", "from [s]", "averaged [s]"),
+        [
+            tuple(
+                Number(digits(value, 4))
+                for value in (point.speed, point.torque, torque, point.feed_m_s * 60.0, point.start_s, point.duration_s)
+            )
+            for point, torque in zip(result.points, line.tolist(), strict=True)
+        ],
+    )
+    write_json(
+        folder / "friction.json",
+        {
+            "schema_version": SCHEMA_VERSION,
+            "recording": name,
+            "units": dict(zip(("coulomb", "viscous", "speed"), _UNITS[result.kind], strict=True)),
+            **asdict(result),
+        },
+    )
     page.write(folder / "friction.html")
 
 
@@ -54,9 +74,11 @@ def verdict(result: FrictionResult, bench: Bench | None) -> str:
     believed = _believed(bench)
     if believed is None:
         return text + "."
-    changes = [f"{name} {100.0 * (value / nominal - 1.0):+.1f} %"
-               for name, value, nominal in zip(("Coulomb", "viscous"), (result.coulomb, result.viscous), believed,
-                                               strict=True) if nominal > 0.0]
+    changes = [
+        f"{name} {100.0 * (value / nominal - 1.0):+.1f} %"
+        for name, value, nominal in zip(("Coulomb", "viscous"), (result.coulomb, result.viscous), believed, strict=True)
+        if nominal > 0.0
+    ]
     return f"{text}; against the bench file: {', '.join(changes)}."
 
 

@@ -8,8 +8,8 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from hil.report import look
-from hil.report.output import write_text
+from hil.files.output import write_text
+from hil.report import style
 
 _CSS = f"""
 body {{ font: 15px/1.45 system-ui, "DejaVu Sans", sans-serif; color: #1c1c1c; margin: 0 auto; padding: 0 24px 60px;
@@ -17,14 +17,14 @@ body {{ font: 15px/1.45 system-ui, "DejaVu Sans", sans-serif; color: #1c1c1c; ma
 h1 {{ font-size: 24px; margin: 28px 0 4px; }} h2 {{ font-size: 19px; margin: 34px 0 8px; }}
 .lead {{ color: #555; margin: 0 0 14px; }}
 .verdict {{ border-left: 6px solid; padding: 10px 16px; margin: 14px 0 20px; background: #f6f6f4; font-size: 17px; }}
-.good {{ border-color: {look.GOOD}; }} .warning {{ border-color: {look.WARNING}; }}
+.good {{ border-color: {style.GOOD}; }} .warning {{ border-color: {style.WARNING}; }}
 table {{ border-collapse: collapse; margin: 8px 0 16px; }}
 th, td {{ padding: 4px 14px 4px 0; text-align: left; border-bottom: 1px solid #ddd; vertical-align: top; }}
 th {{ font-weight: 600; border-bottom: 2px solid #999; }}
 td.n, th.n {{ text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }}
 figure {{ margin: 16px 0 24px; }} figure img {{ max-width: 100%; border: 1px solid #ddd; }}
 figcaption {{ color: #444; max-width: 900px; }}
-ul {{ margin: 6px 0; padding-left: 22px; }} .yes {{ color: {look.GOOD}; }} .no {{ color: {look.WARNING}; }}
+ul {{ margin: 6px 0; padding-left: 22px; }} .yes {{ color: {style.GOOD}; }} .no {{ color: {style.WARNING}; }}
 @media print {{ body {{ max-width: none; }} }}
 """
 
@@ -38,8 +38,11 @@ class Page:
 
     def __init__(self, title: str, lead: str, verdict: str, good: bool) -> None:
         self.title = title
-        self._parts = [f"<h1>{escape(title)}</h1>", f'<p class="lead">{escape(lead)}</p>',
-                       f'<div class="verdict {"good" if good else "warning"}">{escape(verdict)}</div>']
+        self._parts = [
+            f"<h1>{escape(title)}</h1>",
+            f'<p class="lead">{escape(lead)}</p>',
+            f'<div class="verdict {"good" if good else "warning"}">{escape(verdict)}</div>',
+        ]
         self._plots: list[Any] = []
 
     def heading(self, text: str) -> None:
@@ -73,14 +76,16 @@ class Page:
     def plot(self, model: Any) -> None:
         """An interactive plot: a Bokeh model."""
         self._plots.append(model)
-        self._parts.append("")      # filled when written
+        self._parts.append("")  # filled when written
         self._parts[-1] = f"\0{len(self._plots) - 1}"
 
     def picture(self, path: Path, caption: str) -> None:
         """A PNG, carried inside the page."""
         data = base64.b64encode(path.read_bytes()).decode()
-        self._parts.append(f'<figure><img alt="{escape(caption)}" src="data:image/png;base64,{data}">'
-                           f"<figcaption>{escape(caption)}</figcaption></figure>")
+        self._parts.append(
+            f'<figure><img alt="{escape(caption)}" src="data:image/png;base64,{data}">'
+            f"<figcaption>{escape(caption)}</figcaption></figure>"
+        )
 
     def write(self, path: Path) -> None:
         """Write the page. Raises InputError where it cannot be written."""
@@ -93,5 +98,8 @@ class Page:
             head = Resources(mode="inline", components=["bokeh"]).render() + script
             parts = [divisions[int(part[1:])] if part.startswith("\0") else part for part in parts]
         body = "\n".join(parts)
-        write_text(path, f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{escape(self.title)}'
-                         f"</title><style>{_CSS}</style>{head}</head><body>\n{body}\n</body></html>\n")
+        write_text(
+            path,
+            f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{escape(self.title)}'
+            f"</title><style>{_CSS}</style>{head}</head><body>\n{body}\n</body></html>\n",
+        )

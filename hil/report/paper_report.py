@@ -5,23 +5,44 @@ from __future__ import annotations
 from pathlib import Path
 
 from hil.paper import PaperResult, Verdict
-from hil.report.look import digits
 from hil.report.page import Number, Page
+from hil.report.style import digits
 
 
 def write_paper(result: PaperResult, folder: Path) -> None:
     """Write paper.html beside the pictures and paper.json that `run_paper` wrote to `folder`."""
-    page = Page("The source paper, reproduced", f"{len(result.rows)} figures of the paper recomputed", verdict(result),
-                not _count(result, Verdict.DIFFERS))
+    page = Page(
+        "The source paper, reproduced",
+        f"{len(result.rows)} figures of the paper recomputed",
+        verdict(result),
+        not _count(result, Verdict.DIFFERS),
+    )
     page.heading("Printed and computed")
-    page.table(("where", "quantity", "unit", "printed", "computed", "outcome", "why they differ"),
-               [(row.where, row.quantity, row.unit, Number(_value(row.printed)), Number(_value(row.computed)),
-                 row.verdict.value, row.why) for row in result.rows], mark=5)
+    page.table(
+        ("where", "quantity", "unit", "printed", "computed", "outcome", "why they differ"),
+        [
+            (
+                row.where,
+                row.quantity,
+                row.unit,
+                Number(_value(row.printed)),
+                Number(_value(row.computed)),
+                row.verdict.value,
+                row.why,
+            )
+            for row in result.rows
+        ],
+        mark=5,
+    )
     page.heading("Modal matrix of the 7-dof model")
     page.text("Mass-normalised columns; the entries of Eq. 21 are lost in the source.")
-    page.table(("coordinate", *(f"{digits(float(hz))} Hz" for hz in result.frequencies_hz)),
-               [(name, *(Number(digits(float(value))) for value in row))
-                for name, row in zip(result.coordinates, result.modal_matrix, strict=True)])
+    page.table(
+        ("coordinate", *(f"{digits(float(hz))} Hz" for hz in result.frequencies_hz)),
+        [
+            (name, *(Number(digits(float(value))) for value in row))
+            for name, row in zip(result.coordinates, result.modal_matrix, strict=True)
+        ],
+    )
     page.heading("Figures")
     for picture in result.pictures:
         page.picture(folder / picture.file, f"{picture.figure}: {picture.caption}")
@@ -32,8 +53,10 @@ def write_paper(result: PaperResult, folder: Path) -> None:
 
 def verdict(result: PaperResult) -> str:
     """How many of the printed figures come out, and how many do not."""
-    return (f"{_count(result, Verdict.REPRODUCED)} of the printed figures come out, {_count(result, Verdict.DIFFERS)} "
-            f"differ, {_count(result, Verdict.NOT_COMPARABLE)} cannot be compared; the table says why.")
+    return (
+        f"{_count(result, Verdict.REPRODUCED)} of the printed figures come out, {_count(result, Verdict.DIFFERS)} "
+        f"differ, {_count(result, Verdict.NOT_COMPARABLE)} cannot be compared; the table says why."
+    )
 
 
 def _count(result: PaperResult, wanted: Verdict) -> int:

@@ -10,17 +10,18 @@ from bokeh.layouts import gridplot
 from bokeh.models import BoxAnnotation, ColumnDataSource, CrosshairTool, HoverTool, Range1d, Span
 from bokeh.plotting import figure
 
-from hil.report import look
+from hil.arrays import FloatArray
+from hil.report import style
 from hil.report.figures import Panel
-from hil.report.look import FloatArray, thin
+from hil.report.style import thin
 
-DRAWN_ROWS = 12_000          # of each panel: above it, least and greatest of each stretch
+DRAWN_ROWS = 12_000  # of each panel: above it, least and greatest of each stretch
 
 
 def over_time(time_s: FloatArray, panels: Sequence[Panel], heights: Sequence[int] = ()) -> Any:
     """Panels one above the other with one time axis, a common toolbar and a crosshair through all of them."""
     shared = Range1d(float(time_s[0]), float(time_s[-1]), bounds=(float(time_s[0]), float(time_s[-1])))
-    line = Span(dimension="height", line_color=look.NOISE, line_dash="dotted")
+    line = Span(dimension="height", line_color=style.NOISE, line_dash="dotted")
     cursor = CrosshairTool(overlay=line, dimensions="height")
     plots = []
     for index, panel in enumerate(panels):
@@ -29,11 +30,16 @@ def over_time(time_s: FloatArray, panels: Sequence[Panel], heights: Sequence[int
         plots.append(_panel(time_s, panel, shared, cursor, height + 40 * last + 26 * (index == 0), last))
     legend = plots[0].legend[0]
     legend.orientation, legend.padding, legend.border_line_alpha = "horizontal", 2, 0.0
-    plots[0].add_layout(legend, "above")      # inside, it would hide a line sooner or later
+    plots[0].add_layout(legend, "above")  # inside, it would hide a line sooner or later
     for plot in plots[1:]:
         plot.legend.visible = False
-    return gridplot([[plot] for plot in plots], merge_tools=True, sizing_mode="stretch_width", toolbar_location="right",
-                    toolbar_options={"logo": None})
+    return gridplot(
+        [[plot] for plot in plots],
+        merge_tools=True,
+        sizing_mode="stretch_width",
+        toolbar_location="right",
+        toolbar_options={"logo": None},
+    )
 
 
 def _panel(time_s: FloatArray, panel: Panel, shared: Range1d, cursor: CrosshairTool, height: int, last: bool) -> Any:
@@ -42,17 +48,28 @@ def _panel(time_s: FloatArray, panel: Panel, shared: Range1d, cursor: CrosshairT
     data = {"time_s": time_s[chosen].astype(np.float32)}
     data |= {f"y{i}": (line.values[chosen] * unit.factor).astype(np.float32) for i, line in enumerate(panel.lines)}
     source = ColumnDataSource(data)
-    plot = figure(height=height, x_range=shared, tools="xpan,xwheel_zoom,box_zoom,reset,save",
-                  active_scroll="xwheel_zoom", y_axis_label=f"{panel.label} [{unit.unit}]",
-                  x_axis_label="time [s]" if last else None)
+    plot = figure(
+        height=height,
+        x_range=shared,
+        tools="xpan,xwheel_zoom,box_zoom,reset,save",
+        active_scroll="xwheel_zoom",
+        y_axis_label=f"{panel.label} [{unit.unit}]",
+        x_axis_label="time [s]" if last else None,
+    )
     if panel.band > 0.0:
-        plot.add_layout(BoxAnnotation(bottom=-panel.band * unit.factor, top=panel.band * unit.factor,
-                                      fill_color=look.NOISE, fill_alpha=0.35, level="underlay"))
+        plot.add_layout(
+            BoxAnnotation(
+                bottom=-panel.band * unit.factor,
+                top=panel.band * unit.factor,
+                fill_color=style.NOISE,
+                fill_alpha=0.35,
+                level="underlay",
+            )
+        )
     drawn = []
     for i, line in enumerate(panel.lines):
-        style = {"line_width": 3.2, "line_alpha": 0.5} if line.broad else {"line_width": 1.1}
-        drawn.append(plot.line("time_s", f"y{i}", source=source, color=line.colour,
-                               legend_label=line.label, **style))
+        look = {"line_width": 3.2, "line_alpha": 0.5} if line.broad else {"line_width": 1.1}
+        drawn.append(plot.line("time_s", f"y{i}", source=source, color=line.colour, legend_label=line.label, **look))
     tips = [("time", "@time_s{0.0000} s")]
     tips += [(line.label, f"@y{i}{{0.0000}} {unit.unit}") for i, line in enumerate(panel.lines)]
     plot.add_tools(cursor, HoverTool(renderers=drawn[:1], tooltips=tips, mode="vline"))

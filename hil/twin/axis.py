@@ -12,19 +12,17 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from hil import control
-from hil.twin import loops
-from hil.twin.chain import Chain
+from hil.arrays import FloatArray
+from hil.control import cascade
 from hil.twin.library import BY_ID, SLOTS
 from hil.twin.mechanism import WIDTH, Stage
-from hil.twin.modal import Modal, modal, truncate
-from hil.twin.packing import Arrays, Steps, pack_constants, pack_mechanisms, pack_modes
 from hil.twin.physics import Active, Physics
-from hil.twin.settle import settle
-
-FloatArray = NDArray[np.float64]
+from hil.twin.stepping import loops
+from hil.twin.stepping.packing import Arrays, Steps, pack_constants, pack_mechanisms, pack_modes
+from hil.twin.stepping.static_equilibrium import settle
+from hil.twin.structure.chain import Chain
+from hil.twin.structure.modal import Modal, modal, truncate
 
 # Internal steps. Fine: the friction impulse of the step in which the motor reverses is right to Fc x 20 us, 0.003 N m
 # of velocity-loop torque on the reference axis, below its current noise. Coarse: sliding friction is constant over a
@@ -34,7 +32,7 @@ COARSE_STEP_S = 200e-6
 
 _NOTHING = np.empty(0)
 _RIGHT = np.empty((2, 0))
-_ANSWER = "torque"      # the recorded channel that is an answer of the axis only, and no input of any block
+_ANSWER = "torque"  # the recorded channel that is an answer of the axis only, and no input of any block
 
 
 class Response(NamedTuple):
@@ -67,7 +65,7 @@ class Twin:
     """
 
     physics: Physics
-    gains: control.Gains
+    gains: cascade.Gains
     active: Sequence[Active] = ()
     modes: int | None = None
     coarse_step_s: float = COARSE_STEP_S
@@ -92,14 +90,18 @@ class Twin:
 
     @cached_property
     def _arrays(self) -> Arrays:
-        steps = Steps(*(max(math.ceil(self.gains.period_s / longest_s - 1e-6), 1)
-                        for longest_s in (self.coarse_step_s, self.fine_step_s)))
+        steps = Steps(
+            *(
+                max(math.ceil(self.gains.period_s / longest_s - 1e-6), 1)
+                for longest_s in (self.coarse_step_s, self.fine_step_s)
+            )
+        )
         modes = pack_modes(self.physics.chain, self.chain, self.modal, self.gains.period_s, steps)
         constants = pack_constants(self.physics, self.active, self.gains, self.observer_s, modes, steps)
         return constants, modes, *pack_mechanisms(self.active, coupled=self.chain.damping_n_m_s_rad is not None)
 
     @cached_property
-    def loop_gains(self) -> control.Gains:
+    def loop_gains(self) -> cascade.Gains:
         """The gains, with the velocity filter of an active mechanism."""
         gains = self.gains
         for active in self.active:
@@ -122,17 +124,31 @@ class Twin:
         """Constants, modes, mechanism values and codes, as the kernel takes them."""
         return self._arrays
 
-    def simulate(self, position_command_m: FloatArray, velocity_command_m_s: FloatArray,
-                 start: Start = _AT_REST, measured_table_m: FloatArray = _NOTHING,
-                 misread: FloatArray = _RIGHT) -> Response:
+    def simulate(
+        self,
+        position_command_m: FloatArray,
+        velocity_command_m_s: FloatArray,
+        start: Start = _AT_REST,
+        measured_table_m: FloatArray = _NOTHING,
+        misread: FloatArray = _RIGHT,
+    ) -> Response:
         """The axis in closed loop over set-points (n,), one per control tick, from `start`.
 
-        `measured_table_m` (n,) holds a table that floats in a gap, see `hil.twin.loops`. `misread` (2, n): what the
-        motor encoder [motor units] and the table encoder [m] tell the controller too much.
+        `measured_table_m` (n,) holds a table that floats in a gap, see `hil.twin.stepping.loops`. `misread` (2, n):
+        what the motor encoder [motor units] and the table encoder [m] tell the controller too much.
         """
         delta, memory = self.state(start)
-        channels = loops.closed_loop(self.loop_gains, self._controller(start), position_command_m,
-                                      velocity_command_m_s, misread, measured_table_m, *self.arrays(), delta, memory)
+        channels = loops.closed_loop(
+            self.loop_gains,
+            self._controller(start),
+            position_command_m,
+            velocity_command_m_s,
+            misread,
+            measured_table_m,
+            *self.arrays(),
+            delta,
+            memory,
+        )
         return self._channels(Response(*channels))
 
     def drive(self, torque_command: FloatArray, start: Start = _AT_REST) -> Response:
@@ -141,23 +157,38 @@ class Twin:
         motor, table, torque = loops.open_loop(torque_command, *self.arrays(), delta, memory)
         return self._channels(Response(motor, table, torque_command, torque))
 
-    def observe(self, position_command_m: FloatArray, velocity_command_m_s: FloatArray, measured: Response,
-                start: Start = _AT_REST) -> Response:
-        """The axis block by block, each fed with measured inputs; see `hil.twin.loops`.
+    def observe(
+        self,
+        position_command_m: FloatArray,
+        velocity_command_m_s: FloatArray,
+        measured: Response,
+        start: Start = _AT_REST,
+    ) -> Response:
+        """The axis block by block, each fed with measured inputs; see `hil.twin.stepping.loops`.
 
         `measured.table_position_m` is empty without a linear encoder. Recorded lateness of a channel must
         have been undone, see `undelayed`.
         """
         delta, memory = self.state(start)
-        channels = loops.observe(self.loop_gains, self._controller(start), position_command_m, velocity_command_m_s,
-                                  measured.torque_command, measured.motor_position, measured.table_position_m,
-                                  *self.arrays(), delta, memory)
+        channels = loops.observe(
+            self.loop_gains,
+            self._controller(start),
+            position_command_m,
+            velocity_command_m_s,
+            measured.torque_command,
+            measured.motor_position,
+            measured.table_position_m,
+            *self.arrays(),
+            delta,
+            memory,
+        )
         response = Response(*channels)
-        for active in self.active:      # lateness of an input is taken back, that of the answer is simulated
+        for active in self.active:  # lateness of an input is taken back, that of the answer is simulated
             mechanism = BY_ID[active.effect]
             if mechanism.stage is Stage.CHANNEL and mechanism.variants[active.variant] == _ANSWER:
-                response = Response(*mechanism.contribution(tuple(response), active.values, active.variant,
-                                                            self.gains.period_s))
+                response = Response(
+                    *mechanism.contribution(tuple(response), active.values, active.variant, self.gains.period_s)
+                )
         return response
 
     def undelayed(self, measured: Response) -> Response:
@@ -171,15 +202,17 @@ class Twin:
                 measured = Response(*mechanism.contribution(tuple(measured), back, active.variant, self.gains.period_s))
         return measured
 
-    def _controller(self, start: Start) -> control.State:
+    def _controller(self, start: Start) -> cascade.State:
         ratio = self.gains.ratio_m_rad
-        return control.init(start.position_m / ratio, start.velocity_m_s / ratio, start.torque, self.gains.period_s,
-                            start.tick)
+        return cascade.init(
+            start.position_m / ratio, start.velocity_m_s / ratio, start.torque, self.gains.period_s, start.tick
+        )
 
     def _channels(self, response: Response) -> Response:
         for active in self.active:
             mechanism = BY_ID[active.effect]
             if mechanism.stage is Stage.CHANNEL:
-                response = Response(*mechanism.contribution(
-                    tuple(response), active.values, active.variant, self.gains.period_s))
+                response = Response(
+                    *mechanism.contribution(tuple(response), active.values, active.variant, self.gains.period_s)
+                )
         return response

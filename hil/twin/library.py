@@ -42,7 +42,7 @@ LIBRARY: tuple[Mechanism, ...] = (
     torque_dead_zone.MECHANISM,
     torque_saturation.MECHANISM,
     current_loop_lag.MECHANISM,
-    torque_constant_saturation.MECHANISM,    # K(angle, current) is the product: the ripple does not saturate it
+    torque_constant_saturation.MECHANISM,  # K(angle, current) is the product: the ripple does not saturate it
     torque_ripple.MECHANISM,
     cogging_torque.MECHANISM,
     constant_load.MECHANISM,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from hil.twin.chain import Chain
+from hil.twin.structure.chain import Chain
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Physics:
     coulomb_n_m: float
     viscous_n_m_s_rad: float
     linear: bool = False
-    angle_per_unit: float = 1.0     # motor angle per motor unit: 1, or 2 pi / screw lead on a linear axis
+    angle_per_unit: float = 1.0  # motor angle per motor unit: 1, or 2 pi / screw lead on a linear axis
 
     @property
     def viscous_speed(self) -> float:

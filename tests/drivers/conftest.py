@@ -13,7 +13,7 @@ from drive_rig import Rig, in_process
 from hypothesis import settings
 
 from drivers.bus import BusConfig, PumpedPort, PythonCanPort, open_bus
-from drivers.modelled import ModelledBus
+from drivers.modelled_bus import ModelledBus
 
 settings.register_profile("drivers", deadline=None, derandomize=True)
 settings.load_profile("drivers")

@@ -11,7 +11,7 @@ import pytest
 from drivers.base import BusError
 from drivers.bus import BusConfig, BusState, CanPort, PumpedPort, PythonCanPort, open_bus
 from drivers.inprocess import AsBusABC, InProcessBus
-from drivers.modelled import Fault, FaultKind, ModelledBus, frame_bits
+from drivers.modelled_bus import Fault, FaultKind, ModelledBus, frame_bits
 
 Seen = list[tuple[int, bytes, float]]
 

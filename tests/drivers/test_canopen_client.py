@@ -12,8 +12,8 @@ from canopen.sdo import SdoAbortedError
 from drive_rig import Mass
 
 from drivers.bus import BusConfig, PythonCanPort, open_bus
-from drivers.canopen_setup import EDS_FOLDER
 from drivers.inprocess import AsBusABC, InProcessBus
+from drivers.sdo_setup import EDS_FOLDER
 from drivers.sim.drive_node import SimulatedDrive
 from drivers.sim.encoder_node import SimulatedEncoder
 from drivers.sim.node import serve

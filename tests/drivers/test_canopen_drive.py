@@ -262,6 +262,6 @@ def test_the_loop_may_run_in_any_time_base() -> None:
     conditions = {rig.cycle().condition for _ in range(100)}
     assert conditions == {Condition.OK}
     rig.set_up()
-    rig.tick = 7          # and again, backwards
+    rig.tick = 7  # and again, backwards
     rig.master.start(rig.now_s)
     assert {rig.cycle().condition for _ in range(200)} == {Condition.OK}

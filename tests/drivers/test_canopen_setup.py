@@ -12,8 +12,8 @@ from drive_rig import Rig, in_process
 from drivers.base import ConfigurationError, IdentityError, ResponseTimeout
 from drivers.bus import BusConfig, PythonCanPort, open_bus
 from drivers.canopen_drive import DriveSettings
-from drivers.canopen_setup import EDS_FOLDER, DeviceSetup, SetupNetwork
 from drivers.cia402 import DriveState, Mode
+from drivers.sdo_setup import EDS_FOLDER, DeviceSetup, SetupNetwork
 
 
 def test_no_answer_names_node_and_object() -> None:

@@ -20,7 +20,7 @@ from drivers.cia402 import (
     next_homing_phase,
     state_of,
 )
-from drivers.sim.power_stage import STATUS, next_state
+from drivers.sim.cia402_device import STATUS, next_state
 
 S = DriveState
 

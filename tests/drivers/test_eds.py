@@ -11,9 +11,9 @@ import pytest
 from canopen.objectdictionary import ODVariable
 from drive_rig import Mass
 
-from drivers.canopen_setup import EDS_FOLDER, DeviceSetup, SetupNetwork
 from drivers.inprocess import InProcessBus
-from drivers.sim.device import SimulatedDevice
+from drivers.sdo_setup import EDS_FOLDER, DeviceSetup, SetupNetwork
+from drivers.sim.can_node import SimulatedDevice
 from drivers.sim.drive_node import SimulatedDrive
 from drivers.sim.encoder_node import SimulatedEncoder
 

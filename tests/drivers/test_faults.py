@@ -12,8 +12,8 @@ from drivers.base import Condition, DriveFault, DriveGoal, EncoderError
 from drivers.bus import BusState
 from drivers.canopen_drive import DriveSettings
 from drivers.cia402 import DriveState, Mode
-from drivers.emergency import decode_emergency
-from drivers.modelled import Fault, FaultKind, ModelledBus
+from drivers.emcy import decode_emergency
+from drivers.modelled_bus import Fault, FaultKind, ModelledBus
 from drivers.sim.servo import DriveServo, Servo
 
 TPDO, RPDO, ENCODER_TPDO, HEARTBEAT, SYNC = 0x185, 0x205, 0x186, 0x705, 0x080

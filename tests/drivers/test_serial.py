@@ -110,9 +110,7 @@ class Line:
     def __init__(self, format: SerialFormat = SerialFormat.BINARY, *, bits: int = 32, reversed: bool = False) -> None:
         self.plant = Mass(lead_m=2 * math.pi)  # table position = motor position
         self.simulated = SimulatedSerialEncoder(self.plant, format=format, bits=bits)
-        self.reader = SerialEncoder(
-            SerialSettings(self.simulated.device, format=format, bits=bits, reversed=reversed)
-        )
+        self.reader = SerialEncoder(SerialSettings(self.simulated.device, format=format, bits=bits, reversed=reversed))
         self.underway = 0
 
     def put(self, data: bytes) -> None:

@@ -5,16 +5,18 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from hil.bench import Bench, load_bench
-from hil.profile import Profile
-from hil.recording import Recording, read_recording
-from hil.run import run_profile
+from hil.bench.bench_file import Bench, load_bench
+from hil.loop.run import run_profile
+from hil.motion.profile import Profile
+from hil.recording.recording import Recording, read_recording
 
 LIMITS = {"velocity_m_s": 0.3, "acceleration_m_s2": 2.2, "jerk_m_s3": 100.0}
 THERE_AND_BACK = [
     {"kind": "dwell", "duration_s": 0.1},
-    {"kind": "sine_squared", "to_m": 0.04, "feed_m_s": 0.1}, {"kind": "dwell", "duration_s": 0.2},
-    {"kind": "sine_squared", "to_m": 0.0, "feed_m_s": 0.2}, {"kind": "dwell", "duration_s": 0.2},
+    {"kind": "sine_squared", "to_m": 0.04, "feed_m_s": 0.1},
+    {"kind": "dwell", "duration_s": 0.2},
+    {"kind": "sine_squared", "to_m": 0.0, "feed_m_s": 0.2},
+    {"kind": "dwell", "duration_s": 0.2},
 ]
 
 

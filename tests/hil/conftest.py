@@ -4,4 +4,4 @@ from __future__ import annotations
 
 import signal
 
-signal.signal(signal.SIGINT, signal.default_int_handler)     # a child would inherit that it is ignored
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a child would inherit that it is ignored

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from hil.bench import load_bench, shipped_benches
+from hil.bench.bench_file import load_bench, shipped_benches
 from hil.errors import InputError
 
 CHAIN = """\
@@ -19,11 +19,14 @@ control: {position_gain_1_s: 36.84, velocity_gain_n_m_s_rad: 0.27}
 """
 
 
-@pytest.mark.parametrize(("old", "new", "message"), [
-    ("lead_m: 0.010", "lead_m: 10", r"axis.lead_m: given 10, allowed less than or equal to 1 "),
-    ("position_period_s: 0.004", "position_period_s: 4", r"control.position_period_s: given 4, allowed .* 0.1 "),
-    ("{resolution_m: 0.5e-6}", "{resolution_m: 0.5}", r"encoders.table.resolution_m: given 0.5, allowed .* 0.001 "),
-])
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("lead_m: 0.010", "lead_m: 10", r"axis.lead_m: given 10, allowed less than or equal to 1 "),
+        ("position_period_s: 0.004", "position_period_s: 4", r"control.position_period_s: given 4, allowed .* 0.1 "),
+        ("{resolution_m: 0.5e-6}", "{resolution_m: 0.5}", r"encoders.table.resolution_m: given 0.5, allowed .* 0.001 "),
+    ],
+)
 def test_a_value_in_the_wrong_unit_is_refused(tmp_path: Path, old: str, new: str, message: str) -> None:
     text = shipped_benches()["reference"].read_text()
     assert old in text

@@ -31,8 +31,14 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     bench = bench_with()
     recording = record(path, bench)
     names = ("time_s", *recording.axis.predicted, "position_command_m", "velocity_command_m_s")
-    np.savetxt(path / "run.csv", np.column_stack([recording[name] for name in names]), delimiter=",",
-               header=",".join(names), comments="", fmt="%.9f")
+    np.savetxt(
+        path / "run.csv",
+        np.column_stack([recording[name] for name in names]),
+        delimiter=",",
+        header=",".join(names),
+        comments="",
+        fmt="%.9f",
+    )
     write_bench(bench, path / "bench.yaml")
     return path
 
@@ -60,17 +66,24 @@ def test_help_lists_the_commands_and_imports_nothing_heavy(tmp_path: Path) -> No
 @pytest.mark.parametrize("temporary", [True, False])
 def test_an_installation_that_cannot_be_written(tmp_path: Path, temporary: bool) -> None:
     for package in ("hil", "drivers"):
-        shutil.copytree(Path(__file__).parents[2] / package, tmp_path / package,
-                        ignore=shutil.ignore_patterns("__pycache__"))
+        shutil.copytree(
+            Path(__file__).parents[2] / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__")
+        )
     for folder in {source.parent for source in tmp_path.rglob("*.py")}:
-        (folder / "__pycache__").touch()     # a file in its place stops even root
+        (folder / "__pycache__").touch()  # a file in its place stops even root
     (tmp_path / "tmp").mkdir()
     environment = {"PATH": os.environ["PATH"], "XDG_CACHE_HOME": os.devnull, "TMPDIR": str(tmp_path / "tmp")}
     code = "from hil.cli import main; main()"
-    if not temporary:     # tempfile takes any folder it finds, so that none must be left
+    if not temporary:  # tempfile takes any folder it finds, so that none must be left
         code = "import tempfile; tempfile.tempdir = '/dev/null'; " + code
-    ran = subprocess.run([sys.executable, "-c", code, "validate", "hil/benches/reference.yaml"], cwd=tmp_path,
-                         env=environment, capture_output=True, text=True, check=False)
+    ran = subprocess.run(
+        [sys.executable, "-c", code, "validate", "hil/benches/reference.yaml"],
+        cwd=tmp_path,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert ran.returncode == (0 if temporary else 1), ran.stderr
     assert "Traceback" not in ran.stderr
     if temporary:
@@ -86,8 +99,9 @@ def test_compare_writes_a_report_and_says_where(folder: Path) -> None:
     assert "Report: report/compare.html" in ran.stdout
     assert ran.stderr.splitlines() == ["simulating ...", "block by block ...", "writing the report ..."]
     assert json.loads((folder / "report" / "compare.json").read_text())["explained"] is True
-    assert "report: exists and is not empty" in refused(folder, "compare", "run.csv", "--bench", "bench.yaml",
-                                                        "--out", "report")
+    assert "report: exists and is not empty" in refused(
+        folder, "compare", "run.csv", "--bench", "bench.yaml", "--out", "report"
+    )
 
 
 def test_a_run_of_the_bench_needs_no_bench_file(folder: Path) -> None:
@@ -99,8 +113,11 @@ def test_a_run_of_the_bench_needs_no_bench_file(folder: Path) -> None:
 
 def test_a_bad_bench_is_refused_with_its_line(folder: Path) -> None:
     line = (folder / "bench.yaml").read_text().splitlines().index("  table_mass_kg: 384.0") + 1
-    for new, said in ((": heavy", "given 'heavy', allowed a valid number"), ("_lb: 384.0", "given an unknown key"),
-                      (": -3", "given -3, allowed greater than 0")):
+    for new, said in (
+        (": heavy", "given 'heavy', allowed a valid number"),
+        ("_lb: 384.0", "given an unknown key"),
+        (": -3", "given -3, allowed greater than 0"),
+    ):
         bad = changed(folder, "bench.yaml", "table_mass_kg: 384.0", f"table_mass_kg{new}")
         message = refused(folder, "compare", "run.csv", "--bench", bad.name)
         assert f"{bad.name}:{line}: axis.table_mass_kg" in message
@@ -123,17 +140,28 @@ def test_a_bad_recording_is_refused(folder: Path) -> None:
 
 
 def test_a_missing_encoder_is_refused(folder: Path) -> None:
-    for channel, said in (("table_position_m", "table_position_m is not recorded"),
-                          ("motor_position_rad", "motor_position_rad missing")):
+    for channel, said in (
+        ("table_position_m", "table_position_m is not recorded"),
+        ("motor_position_rad", "motor_position_rad missing"),
+    ):
         bad = changed(folder, "run.csv", channel, "something_else")
         assert said in refused(folder, "compare", bad.name, "--bench", "bench.yaml")
 
 
 def test_import_by_a_map(folder: Path) -> None:
-    (folder / "map.yaml").write_text("about: a test\ntime: {column: time_s, unit: s}\nchannels:\n" + "".join(
-        f"  {name}: {{column: {name}, unit: {unit}}}\n" for name, unit in (
-            ("position_command_m", "m"), ("motor_position_rad", "rad"), ("table_position_m", "m"),
-            ("torque_command_n_m", "N m"), ("torque_n_m", "N m"))))
+    (folder / "map.yaml").write_text(
+        "about: a test\ntime: {column: time_s, unit: s}\nchannels:\n"
+        + "".join(
+            f"  {name}: {{column: {name}, unit: {unit}}}\n"
+            for name, unit in (
+                ("position_command_m", "m"),
+                ("motor_position_rad", "rad"),
+                ("table_position_m", "m"),
+                ("torque_command_n_m", "N m"),
+                ("torque_n_m", "N m"),
+            )
+        )
+    )
     ran = hil(folder, "import", "run.csv", "--map", "map.yaml", "--out", "imported.parquet")
     assert ran.returncode == 0, ran.stderr
     assert "velocity_command_m_s: central differences" in ran.stdout
@@ -156,11 +184,14 @@ def test_friction_on_the_bench_gives_the_values_of_the_axis(folder: Path) -> Non
     assert "given neither or both" in refused(folder, "friction")
 
 
-@pytest.mark.parametrize(("section", "values", "said"), [
-    ("drive", {"mode": "csp"}, "drive.mode: given csp with position_feedback: table"),
-    ("drive", {"encoder": {"interface": "none"}}, "drive.encoder.interface: given none with a table encoder"),
-    ("encoders", {"motor": {"counts_per_rev": 4096, "direction": -1}}, "encoders.motor.direction: given -1"),
-])
+@pytest.mark.parametrize(
+    ("section", "values", "said"),
+    [
+        ("drive", {"mode": "csp"}, "drive.mode: given csp with position_feedback: table"),
+        ("drive", {"encoder": {"interface": "none"}}, "drive.encoder.interface: given none with a table encoder"),
+        ("encoders", {"motor": {"counts_per_rev": 4096, "direction": -1}}, "encoders.motor.direction: given -1"),
+    ],
+)
 def test_validate_refuses_what_run_refuses(tmp_path: Path, section: str, values: dict[str, Any], said: str) -> None:
     data = bench_with().model_dump(mode="json")
     data["control"]["position_feedback"] = "table"
@@ -192,8 +223,9 @@ def test_what_a_run_refuses_names_file_and_line(folder: Path) -> None:
     (folder / "bare.yaml").write_text(text.split("drive:")[0])
     assert "bare.yaml:1: drive: given nothing" in refused(folder, "run", jog, "--bench", "bare.yaml", "--virtual")
     (folder / "short.yaml").write_text(text.split("drive:")[0] + "drive: {travel_m: [-0.01, 0.02]}\nsimulation: {}\n")
-    assert "jog.yaml:10: segments: given set-points" in refused(folder, "run", jog, "--bench", "short.yaml",
-                                                               "--virtual")
+    assert "jog.yaml:10: segments: given set-points" in refused(
+        folder, "run", jog, "--bench", "short.yaml", "--virtual"
+    )
     assert "--seed" in refused(folder, "run", jog, "--virtual", "--seed", "-1")
 
 
@@ -204,8 +236,13 @@ def test_wrong_usage_is_2(folder: Path) -> None:
 
 
 def test_ctrl_c_ends_with_130_and_leaves_nothing(folder: Path) -> None:
-    ran = subprocess.Popen([sys.executable, "-m", "hil.cli", "paper", "--out", "interrupted"], cwd=folder,
-                           stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    ran = subprocess.Popen(
+        [sys.executable, "-m", "hil.cli", "paper", "--out", "interrupted"],
+        cwd=folder,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
     assert ran.stderr is not None
     assert ran.stderr.readline() == "computing the paper ...\n"
     ran.send_signal(signal.SIGINT)
@@ -217,10 +254,14 @@ def test_ctrl_c_ends_with_130_and_leaves_nothing(folder: Path) -> None:
 
 def test_ctrl_c_during_a_run_stops_the_axis_and_keeps_the_recording(folder: Path) -> None:
     ran = subprocess.Popen(
-        [sys.executable, "-m", "hil.cli", "run", str(SWEEP), "--force", "--out", "stopped"], cwd=folder,
-        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+        [sys.executable, "-m", "hil.cli", "run", str(SWEEP), "--force", "--out", "stopped"],
+        cwd=folder,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
     stream = folder / "stopped" / "friction_sweep.arrows"
-    while ran.poll() is None and not (stream.exists() and stream.stat().st_size > 20_000):   # in the middle of it
+    while ran.poll() is None and not (stream.exists() and stream.stat().st_size > 20_000):  # in the middle of it
         time.sleep(0.05)
     ran.send_signal(signal.SIGINT)
     _, errors = ran.communicate(timeout=60)

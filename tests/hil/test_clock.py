@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 
-from hil.clock import VirtualClock, WallClock
+from hil.loop.clock import VirtualClock, WallClock
 
 
 def test_no_tick_comes_early_and_lateness_does_not_add_up() -> None:
@@ -25,7 +25,7 @@ def test_a_late_tick_keeps_the_deadlines_of_those_after_it() -> None:
     assert clock.wait(1) >= 0.007
     assert clock.wait(2) >= 0.002
     assert clock.since(2) >= 0.002
-    assert clock.wait(100) < 100 * 0.005   # from the start, not from the late tick
+    assert clock.wait(100) < 100 * 0.005  # from the start, not from the late tick
 
 
 def test_waiting_within_a_tick_ends() -> None:

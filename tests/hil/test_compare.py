@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 from compare_runs import bench_with, record
 
-from hil.bench import Bench, load_bench
-from hil.compare import Comparison, compare, low_pass
+from hil.bench.bench_file import Bench, load_bench
 from hil.errors import HilError, InputError
-from hil.fit import fit_nominal
-from hil.importing import import_recording
-from hil.measured import bench_of, take
-from hil.recording import Recording, read_recording
+from hil.identification.compare import Comparison, compare, low_pass
+from hil.identification.dataset import bench_of, take
+from hil.identification.nominal_fit import fit_nominal
+from hil.recording.importing import import_recording
+from hil.recording.recording import Recording, read_recording
 from hil.report.compare_report import verdict
 
 SHARED = Path(__file__).parents[2].parent / "shared" / "recordings"
@@ -67,11 +67,14 @@ def test_loops_in_the_drive_are_those_of_the_twin(tmp_path: Path, mode: str) -> 
     assert any(f"In {mode} the drive closes loops of its own" in note for note in result.notes)
 
 
-@pytest.mark.parametrize(("effect", "parameters", "block"), [
-    ("current_loop_lag", {"time_constant_s": 0.001}, "drive"),
-    ("constant_load", {"load_torque_n_m": 0.5}, "motor and load"),
-    ("periodic_lead_error", {"amplitude_m": 5e-6, "phase_rad": 0.5}, "transmission and table"),
-])
+@pytest.mark.parametrize(
+    ("effect", "parameters", "block"),
+    [
+        ("current_loop_lag", {"time_constant_s": 0.001}, "drive"),
+        ("constant_load", {"load_torque_n_m": 0.5}, "motor and load"),
+        ("periodic_lead_error", {"amplitude_m": 5e-6, "phase_rad": 0.5}, "transmission and table"),
+    ],
+)
 def test_a_concealed_effect_shows_in_its_block(
     tmp_path: Path, clean: Comparison, effect: str, parameters: dict[str, float], block: str
 ) -> None:
@@ -94,8 +97,13 @@ def test_another_gain_shows_in_the_controller_only(run: Recording, clean: Compar
 
 
 def test_the_fit_finds_the_true_parameters(tmp_path: Path) -> None:
-    true = {"motor_mass_kg": 300.0, "table_mass_kg": 420.0, "stiffness_n_m": 5e7, "coulomb_torque_n_m": 0.9,
-            "viscous_torque_n_m_s_rad": 0.008}
+    true = {
+        "motor_mass_kg": 300.0,
+        "table_mass_kg": 420.0,
+        "stiffness_n_m": 5e7,
+        "coulomb_torque_n_m": 0.9,
+        "viscous_torque_n_m_s_rad": 0.008,
+    }
     recording = record(tmp_path, bench_with({"axis": true}))
     bench = bench_of(recording)
     assert compare(recording, bench).torque_over_noise > 5.0
@@ -169,7 +177,7 @@ def test_emps_with_its_published_parameters() -> None:
     assert result.channel("acceleration_m_s2").relative <= 0.045
     assert result.inverse_dynamics is not None
     assert result.inverse_dynamics.relative_error == pytest.approx(0.0408, abs=5e-4)
-    assert "drive" not in block_rms(result)     # the force was not recorded apart from its command
+    assert "drive" not in block_rms(result)  # the force was not recorded apart from its command
     assert result.channel("force_n").relative > block_rms(result)["controller"] / 54.0
 
 
@@ -187,20 +195,23 @@ def test_the_null_rig_is_explained_on_another_motion() -> None:
     assert result.explained
 
 
-@pytest.mark.parametrize(("folder", "block"), [
-    ("stribeck", "motor and load"), ("lead", "transmission and table"), ("backlash", "transmission and table")])
+@pytest.mark.parametrize(
+    ("folder", "block"),
+    [("stribeck", "motor and load"), ("lead", "transmission and table"), ("backlash", "transmission and table")],
+)
 def test_the_other_rigs_are_not_explained_by_parameters(folder: str, block: str) -> None:
     bench, recording = _rig(f"{folder}/holdout.csv")
     result = compare(recording, bench, fit=True)
     assert not result.explained
-    over: dict[str, Any] = {part.block: deviation.rms / part.noise for part, deviation in result.blocks
-                            if part.noise > 0.0}
+    over: dict[str, Any] = {
+        part.block: deviation.rms / part.noise for part, deviation in result.blocks if part.noise > 0.0
+    }
     assert over[block] > 3.0
     assert over["drive"] < 1.1
 
 
 def test_a_fit_that_creeps_gives_its_best_and_says_so(run: Recording, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("hil.fit.MOST_STEPS", 2)
+    monkeypatch.setattr("hil.identification.nominal_fit.MOST_STEPS", 2)
     axis = bench_of(run).axis.model_copy(update={"coulomb_torque_n_m": 1.6, "stiffness_n_m": 3.0e7})
     wrong = bench_of(run).model_copy(update={"axis": axis})
     result = compare(run, wrong, fit=True)

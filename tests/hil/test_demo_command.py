@@ -9,13 +9,13 @@ import pytest
 from command_line import hil, refused
 
 from hil.demo import CONCEALED
-from hil.recording import read_recording
+from hil.recording.recording import read_recording
 
 
 def test_the_demo_finds_what_it_conceals(tmp_path: Path) -> None:
     ran = hil(tmp_path, "demo", "--virtual", "--effect", "backlash", "--seed", "7", "--out", "demo")
     assert ran.returncode == 0, ran.stderr
-    assert "backlash" not in ran.stderr.split("fitting")[0]                  # nothing is said before it is found
+    assert "backlash" not in ran.stderr.split("fitting")[0]  # nothing is said before it is found
     assert "The twin leaves something out" in ran.stdout.split("Diagnosis")[0]
     assert "Concealed: backlash; found: backlash. It found what was concealed." in ran.stdout
     for report in ("compare.html", "report.html"):
@@ -26,12 +26,15 @@ def test_the_demo_finds_what_it_conceals(tmp_path: Path) -> None:
     value = found["missing"][0]["parameters"]["gap_m"]["value"]
     assert value == pytest.approx(truth["parameters"]["gap_m"], rel=0.03)
     assert found["parameter_corrections"]["table_mass_kg"]["value"] == pytest.approx(
-        recorded["axis"]["table_mass_kg"], rel=0.02)
-    assert "effects" not in (tmp_path / "demo" / "bench.diagnosed.yaml").read_text()   # what it knows, it has found
+        recorded["axis"]["table_mass_kg"], rel=0.02
+    )
+    assert "effects" not in (tmp_path / "demo" / "bench.diagnosed.yaml").read_text()  # what it knows, it has found
 
 
-@pytest.mark.parametrize("effect", [
-    pytest.param(effect, marks=() if effect == "periodic_lead_error" else pytest.mark.long) for effect in CONCEALED])
+@pytest.mark.parametrize(
+    "effect",
+    [pytest.param(effect, marks=() if effect == "periodic_lead_error" else pytest.mark.long) for effect in CONCEALED],
+)
 def test_the_demo_finds_each_of_its_effects(tmp_path: Path, effect: str) -> None:
     ran = hil(tmp_path, "demo", "--virtual", "--effect", effect, "--seed", "5", "--out", "demo")
     assert ran.returncode == 0, ran.stderr

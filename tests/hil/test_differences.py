@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from hil.bench import load_bench
-from hil.differences import differences
+from hil.bench.bench_file import load_bench
+from hil.identification.residuals import differences
 from hil.twin.axis import Response
 
 BENCH = load_bench("reference")

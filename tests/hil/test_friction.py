@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from hil.channels import AxisKind
 from hil.errors import InputError
-from hil.friction import constant_feed_stretches, identify_friction
-from hil.importing import import_recording
-from hil.recording import Recording, read_recording
+from hil.identification.friction import constant_feed_stretches, identify_friction
+from hil.recording.importing import import_recording
+from hil.recording.recording import Recording, read_recording
 from hil.report.friction_figure import friction_figure
 
 SHARED = Path(__file__).parents[2].parent / "shared" / "recordings"
@@ -25,8 +25,13 @@ INERTIA_KG_M2 = 1.8e-3
 
 
 def sweep(
-    feeds_m_s: tuple[float, ...], coulomb: float = 1.1, viscous: float = 0.0064, offset: float = 0.2,
-    noise: float = 0.0, lag_s: float = 0.027, plateau_s: float = 0.6,
+    feeds_m_s: tuple[float, ...],
+    coulomb: float = 1.1,
+    viscous: float = 0.0064,
+    offset: float = 0.2,
+    noise: float = 0.0,
+    lag_s: float = 0.027,
+    plateau_s: float = 0.6,
 ) -> Recording:
     """Feeds with ramps between them; the axis follows with a lag, so that torque has transients."""
     pieces = [np.zeros(200)]
@@ -42,8 +47,10 @@ def sweep(
     torque += noise * np.random.default_rng(5).normal(size=torque.size)
     columns = {
         "time_s": np.linspace(0.0, (command.size - 1) * PERIOD_S, command.size),
-        "position_command_m": np.cumsum(command) * PERIOD_S, "velocity_command_m_s": command,
-        "motor_position_rad": np.cumsum(speed) * PERIOD_S, "torque_n_m": torque,
+        "position_command_m": np.cumsum(command) * PERIOD_S,
+        "velocity_command_m_s": command,
+        "motor_position_rad": np.cumsum(speed) * PERIOD_S,
+        "torque_n_m": torque,
     }
     return Recording("sweep", columns, PERIOD_S)
 
@@ -61,7 +68,8 @@ def test_known_friction_is_found_within_the_noise(coulomb: float, viscous: float
     assert result.viscous == pytest.approx(viscous, rel=0.02)
     assert result.offset == pytest.approx(offset, abs=0.005)
     for value, error, truth in (
-        (result.coulomb, result.coulomb_std_error, coulomb), (result.viscous, result.viscous_std_error, viscous),
+        (result.coulomb, result.coulomb_std_error, coulomb),
+        (result.viscous, result.viscous_std_error, viscous),
         (result.offset, result.offset_std_error, offset),
     ):
         assert abs(value - truth) < 6 * error + 1e-3 * abs(truth)
@@ -80,11 +88,14 @@ def test_low_speeds_can_be_left_out() -> None:
     assert result.torque(np.array([-10.0, 10.0])) == pytest.approx([-1.1 - 0.064 + 0.2, 1.1 + 0.064 + 0.2], rel=1e-3)
 
 
-@pytest.mark.parametrize("feeds", [
-    (0.01, 0.05, 0.12, 0.3),              # one direction
-    (0.05, -0.05, 0.05, -0.05),           # one speed
-    (0.05, -0.05),                        # too few
-])
+@pytest.mark.parametrize(
+    "feeds",
+    [
+        (0.01, 0.05, 0.12, 0.3),  # one direction
+        (0.05, -0.05, 0.05, -0.05),  # one speed
+        (0.05, -0.05),  # too few
+    ],
+)
 def test_a_recording_that_cannot_tell_is_refused(feeds: tuple[float, ...]) -> None:
     with pytest.raises(InputError, match=r"sweep: velocity_command_m_s: given \d forward and \d backward"):
         identify_friction(sweep(feeds))

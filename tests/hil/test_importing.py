@@ -17,9 +17,9 @@ from scipy.io import savemat
 
 from hil.channels import AxisKind
 from hil.errors import InputError
-from hil.importing import import_recording
-from hil.recording import read_recording, write_parquet
-from hil.units import UNITS, si_factor
+from hil.quantities import UNITS, si_factor
+from hil.recording.importing import import_recording
+from hil.recording.recording import read_recording, write_parquet
 
 EMPS = Path(__file__).parents[2].parent / "shared" / "recordings" / "emps" / "DATA_EMPS.mat"
 
@@ -34,8 +34,12 @@ MAP: dict[str, Any] = {
     },
 }
 T_MS = np.array([10.0, 11.0, 12.0, 13.0, 14.0])
-COLUMNS = {"t": T_MS, "x_set": np.array([0.0, 1.0, 4.0, 9.0, 16.0]), "enc": -4096 * np.arange(5.0),
-           "i": np.array([0.0, 1.0, 2.0, 3.0, 4.0])}
+COLUMNS = {
+    "t": T_MS,
+    "x_set": np.array([0.0, 1.0, 4.0, 9.0, 16.0]),
+    "enc": -4096 * np.arange(5.0),
+    "i": np.array([0.0, 1.0, 2.0, 3.0, 4.0]),
+}
 
 
 def changed(**channels: Any) -> dict[str, Any]:
@@ -103,8 +107,9 @@ def test_an_import_can_be_stored_and_read_back(tmp_path: Path) -> None:
 
 def test_csv_of_a_german_oscilloscope(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
-    path.write_text("Aufnahme 7\nGerät X\nt;x_set;enc;i\nms;mm;-;A\n10;0,5;0;0\n11;1,5;0;0\n12;2,5;0;0\n",
-                    encoding="latin-1")
+    path.write_text(
+        "Aufnahme 7\nGerät X\nt;x_set;enc;i\nms;mm;-;A\n10;0,5;0;0\n11;1,5;0;0\n12;2,5;0;0\n", encoding="latin-1"
+    )
     csv = {"delimiter": ";", "decimal_point": ",", "skip_lines": 2, "skip_rows": 1, "encoding": "latin-1"}
     recording = import_recording(path, write_map(tmp_path, {**MAP, "csv": csv}))
     np.testing.assert_allclose(recording["position_command_m"], [0.0005, 0.0015, 0.0025])
@@ -136,22 +141,35 @@ def test_matrix_columns_and_gains_of_a_mat_file(tmp_path: Path) -> None:
         import_recording(path, write_map(tmp_path, changed(torque_n_m={**torque, "gain": "both"})))
 
 
-@pytest.mark.parametrize(("entry", "expected"), [
-    ({"unit": "deg"}, pi / 180), ({"unit": "rev"}, 2 * pi), ({"unit": "mm"}, 2 * pi / 10),
-    ({"unit": "um"}, 2 * pi / 10e3), ({"unit": "counts", "counts_per_m": 1000}, 2 * pi / 10),
-    ({"unit": "rad", "scale": 3, "sign": -1}, -3),
-])
+@pytest.mark.parametrize(
+    ("entry", "expected"),
+    [
+        ({"unit": "deg"}, pi / 180),
+        ({"unit": "rev"}, 2 * pi),
+        ({"unit": "mm"}, 2 * pi / 10),
+        ({"unit": "um"}, 2 * pi / 10e3),
+        ({"unit": "counts", "counts_per_m": 1000}, 2 * pi / 10),
+        ({"unit": "rad", "scale": 3, "sign": -1}, -3),
+    ],
+)
 def test_a_motor_encoder_in_any_unit(tmp_path: Path, entry: dict[str, Any], expected: float) -> None:
     content = changed(motor_position_rad={"column": "i", **entry})
     recording = import_recording(write_csv(tmp_path), write_map(tmp_path, content))
     np.testing.assert_allclose(recording["motor_position_rad"], expected * np.arange(5))
 
 
-@pytest.mark.parametrize(("entry", "expected"), [
-    ({"unit": "rpm"}, 0.010 / 60), ({"unit": "m/min"}, 1 / 60), ({"unit": "mm/min"}, 1e-3 / 60),
-    ({"unit": "rad/s"}, 0.010 / (2 * pi)), ({"unit": "V", "gain": 0.1}, 0.1), ({"unit": "%", "rated": 0.5}, 0.005),
-    ({"unit": "permille", "rated": 0.5}, 0.0005),
-])
+@pytest.mark.parametrize(
+    ("entry", "expected"),
+    [
+        ({"unit": "rpm"}, 0.010 / 60),
+        ({"unit": "m/min"}, 1 / 60),
+        ({"unit": "mm/min"}, 1e-3 / 60),
+        ({"unit": "rad/s"}, 0.010 / (2 * pi)),
+        ({"unit": "V", "gain": 0.1}, 0.1),
+        ({"unit": "%", "rated": 0.5}, 0.005),
+        ({"unit": "permille", "rated": 0.5}, 0.0005),
+    ],
+)
 def test_a_velocity_command_in_any_unit(tmp_path: Path, entry: dict[str, Any], expected: float) -> None:
     content = changed(velocity_command_m_s={"column": "i", **entry})
     recording = import_recording(write_csv(tmp_path), write_map(tmp_path, content))
@@ -176,32 +194,38 @@ def damaged(name: str, row: int, value: Any) -> dict[str, Any]:
     return {**COLUMNS, name: values}
 
 
-@pytest.mark.parametrize(("ending", "columns", "message"), [
-    ("csv", damaged("enc", 2, "x"), r"log\.csv:4: enc: given 'x', allowed a finite number"),
-    ("csv", damaged("enc", 2, "nan"), r"log\.csv:4: enc: given 'nan'"),
-    ("csv", damaged("t", 2, 11.0), r"log\.csv:4: t: time_s: repeats"),
-    ("csv", damaged("t", 2, 9.0), r"log\.csv:4: t: time_s: runs back"),
-    ("csv", damaged("t", 4, 24.0), r"log\.csv:6: t: time_s: a step of 0\.011 s, allowed the period 0\.001 s"),
-    ("csv", {"t": T_MS}, r"log\.csv: column 'x_set' is missing; the file has t"),
-    ("mat", damaged("enc", 2, np.nan), r"log\.mat: row 3: enc: given nan"),
-    ("mat", damaged("t", 2, 9.0), r"log\.mat: row 3: t: time_s: runs back"),
-    ("mat", {"t": T_MS}, r"log\.mat: column 'x_set' is missing; the file has t"),
-    ("mat", {**COLUMNS, "enc": np.arange(4.0)}, r"log\.mat: enc: given 4 rows, x_set has 5"),
-    ("mat", {**COLUMNS, "enc": "text"}, r"log\.mat: enc: given values of the type .*U"),
-    ("parquet", damaged("i", 4, None), r"log\.parquet: row 5: i: given nan"),
-    ("parquet", {**COLUMNS, "i": list("abcde")}, r"log\.parquet: i: given string values"),
-    ("parquet", {"t": T_MS}, r"log\.parquet: column 'x_set' is missing; the file has t"),
-])
+@pytest.mark.parametrize(
+    ("ending", "columns", "message"),
+    [
+        ("csv", damaged("enc", 2, "x"), r"log\.csv:4: enc: given 'x', allowed a finite number"),
+        ("csv", damaged("enc", 2, "nan"), r"log\.csv:4: enc: given 'nan'"),
+        ("csv", damaged("t", 2, 11.0), r"log\.csv:4: t: time_s: repeats"),
+        ("csv", damaged("t", 2, 9.0), r"log\.csv:4: t: time_s: runs back"),
+        ("csv", damaged("t", 4, 24.0), r"log\.csv:6: t: time_s: a step of 0\.011 s, allowed the period 0\.001 s"),
+        ("csv", {"t": T_MS}, r"log\.csv: column 'x_set' is missing; the file has t"),
+        ("mat", damaged("enc", 2, np.nan), r"log\.mat: row 3: enc: given nan"),
+        ("mat", damaged("t", 2, 9.0), r"log\.mat: row 3: t: time_s: runs back"),
+        ("mat", {"t": T_MS}, r"log\.mat: column 'x_set' is missing; the file has t"),
+        ("mat", {**COLUMNS, "enc": np.arange(4.0)}, r"log\.mat: enc: given 4 rows, x_set has 5"),
+        ("mat", {**COLUMNS, "enc": "text"}, r"log\.mat: enc: given values of the type .*U"),
+        ("parquet", damaged("i", 4, None), r"log\.parquet: row 5: i: given nan"),
+        ("parquet", {**COLUMNS, "i": list("abcde")}, r"log\.parquet: i: given string values"),
+        ("parquet", {"t": T_MS}, r"log\.parquet: column 'x_set' is missing; the file has t"),
+    ],
+)
 def test_a_damaged_source_is_refused(tmp_path: Path, ending: str, columns: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=message):
         import_recording(write_source(tmp_path, ending, columns), write_map(tmp_path))
 
 
-@pytest.mark.parametrize(("name", "message"), [
-    ("log.xlsx", r"the ending '\.xlsx' cannot be imported, allowed \.csv, \.mat, \.parquet"),
-    ("log.mat", r"log\.mat: is no readable \.mat file"),
-    ("log.parquet", r"log\.parquet: is no readable Parquet file"),
-])
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("log.xlsx", r"the ending '\.xlsx' cannot be imported, allowed \.csv, \.mat, \.parquet"),
+        ("log.mat", r"log\.mat: is no readable \.mat file"),
+        ("log.parquet", r"log\.parquet: is no readable Parquet file"),
+    ],
+)
 def test_another_file_is_refused(tmp_path: Path, name: str, message: str) -> None:
     (tmp_path / name).write_bytes(b"something else")
     with pytest.raises(InputError, match=message):
@@ -210,23 +234,34 @@ def test_another_file_is_refused(tmp_path: Path, name: str, message: str) -> Non
         import_recording(tmp_path / "absent.csv", write_map(tmp_path))
 
 
-@pytest.mark.parametrize(("content", "message"), [
-    (changed(torque_n_m={"column": "i", "unit": "kg"}), r"channels\.torque_n_m\.unit: given 'kg', "
-                                                        "allowed N m, Nm, mN m, mNm, counts, A"),
-    (changed(torque_n_m={"column": "i", "unit": "mm"}), r"torque_n_m\.unit: given 'mm', allowed N m"),
-    ({**changed(motor_position_rad={"column": "enc", "unit": "mm"}), "lead_m": None},
-     r"unit: given 'mm', allowed rad, .*if lead_m is given"),
-    (changed(torque_n_m={"column": "i", "unit": "A"}), "unit: 'A' needs exactly one of torque_constant_n_m_a"),
-    (changed(torque_n_m={"column": "i", "unit": "A", "force_constant_n_a": 2.0}), "unit: given 'A'"),
-    (changed(torque_n_m={"column": "i", "unit": "N m", "gain": 2.0}), "gain: is of no use for the unit 'N m'"),
-    (changed(torque_n_m={"column": "i", "unit": "N m", "factor": 2.0}), "factor: given an unknown key"),
-    (changed(torque_n_m={"column": "i", "unit": "N m", "sign": 2}), "sign: given 2, allowed 1 or -1"),
-    (changed(torque_n_m={"column": "i", "unit": "N m", "scale": "2"}), "scale: given '2', allowed a valid number"),
-    (changed(torque={"column": "i", "unit": "N m"}), r"channels\.torque: is no channel, allowed position_command_m"),
-    (changed(torque_n_m=None), "torque_n_m and torque_command_n_m are missing"),
-    (changed(motor_position_rad=None), "motor_position_rad is missing"),
-    ({**MAP, "sample_rate_hz": 1000}, "given neither or both of time and sample_rate_hz"),
-])
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (
+            changed(torque_n_m={"column": "i", "unit": "kg"}),
+            r"channels\.torque_n_m\.unit: given 'kg', "
+            "allowed N m, Nm, mN m, mNm, counts, A",
+        ),
+        (changed(torque_n_m={"column": "i", "unit": "mm"}), r"torque_n_m\.unit: given 'mm', allowed N m"),
+        (
+            {**changed(motor_position_rad={"column": "enc", "unit": "mm"}), "lead_m": None},
+            r"unit: given 'mm', allowed rad, .*if lead_m is given",
+        ),
+        (changed(torque_n_m={"column": "i", "unit": "A"}), "unit: 'A' needs exactly one of torque_constant_n_m_a"),
+        (changed(torque_n_m={"column": "i", "unit": "A", "force_constant_n_a": 2.0}), "unit: given 'A'"),
+        (changed(torque_n_m={"column": "i", "unit": "N m", "gain": 2.0}), "gain: is of no use for the unit 'N m'"),
+        (changed(torque_n_m={"column": "i", "unit": "N m", "factor": 2.0}), "factor: given an unknown key"),
+        (changed(torque_n_m={"column": "i", "unit": "N m", "sign": 2}), "sign: given 2, allowed 1 or -1"),
+        (changed(torque_n_m={"column": "i", "unit": "N m", "scale": "2"}), "scale: given '2', allowed a valid number"),
+        (
+            changed(torque={"column": "i", "unit": "N m"}),
+            r"channels\.torque: is no channel, allowed position_command_m",
+        ),
+        (changed(torque_n_m=None), "torque_n_m and torque_command_n_m are missing"),
+        (changed(motor_position_rad=None), "motor_position_rad is missing"),
+        ({**MAP, "sample_rate_hz": 1000}, "given neither or both of time and sample_rate_hz"),
+    ],
+)
 def test_a_wrong_map_is_refused_with_line_and_field(tmp_path: Path, content: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=rf"map\.yaml:\d+: .*{message}"):
         import_recording(write_csv(tmp_path), write_map(tmp_path, content))
@@ -260,4 +295,4 @@ def test_the_shipped_map_imports_emps() -> None:
     velocity = (position[2:] - position[:-2]) / (2 * recording.period_s)
     error = recording["position_command_m"] - position
     force = 35.15065188248547 * 243.45 * (160.18 * error[2:] - velocity)
-    assert np.abs(force - recording["force_command_n"][2:]).max() < 1.0   # of 170 N
+    assert np.abs(force - recording["force_command_n"][2:]).max() < 1.0  # of 170 N

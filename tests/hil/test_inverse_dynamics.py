@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from hil.errors import InputError
-from hil.importing import import_recording
-from hil.inverse_dynamics import fit_inverse_dynamics
-from hil.least_squares import solve
-from hil.recording import Recording
+from hil.identification.inverse_dynamics import fit_inverse_dynamics
+from hil.identification.least_squares import solve
+from hil.recording.importing import import_recording
+from hil.recording.recording import Recording
 
 EMPS = Path(__file__).parents[2].parent / "shared" / "recordings" / "emps" / "DATA_EMPS.mat"
 
@@ -43,18 +43,23 @@ def test_known_parameters_are_found() -> None:
 def test_standard_errors_cover_the_error_under_noise() -> None:
     fit = fit_inverse_dynamics(swinging(noise_n=5.0), cut_at_end=49)
     for value, error, truth in (
-        (fit.inertia, fit.inertia_std_error, 80), (fit.viscous, fit.viscous_std_error, 150),
-        (fit.coulomb, fit.coulomb_std_error, 12), (fit.offset, fit.offset_std_error, 2),
+        (fit.inertia, fit.inertia_std_error, 80),
+        (fit.viscous, fit.viscous_std_error, 150),
+        (fit.coulomb, fit.coulomb_std_error, 12),
+        (fit.offset, fit.offset_std_error, 2),
     ):
         assert 0 < error < 0.05 * truth
         assert abs(value - truth) < 4 * error
 
 
-@pytest.mark.parametrize(("recording", "message"), [
-    (swinging(rows=500), "given 500 rows, allowed 1049 or more"),
-    (swinging(period_s=0.01), "given a period of 0.01 s, allowed less than 0.005 s"),
-    (swinging(one_way=True), "motion in one direction"),
-])
+@pytest.mark.parametrize(
+    ("recording", "message"),
+    [
+        (swinging(rows=500), "given 500 rows, allowed 1049 or more"),
+        (swinging(period_s=0.01), "given a period of 0.01 s, allowed less than 0.005 s"),
+        (swinging(one_way=True), "motion in one direction"),
+    ],
+)
 def test_an_unfit_recording_is_refused(recording: Recording, message: str) -> None:
     with pytest.raises(InputError, match=f"swinging: .*{message}"):
         fit_inverse_dynamics(recording)
@@ -80,7 +85,11 @@ def test_least_squares_solves_the_normal_equations_at_any_scale(seed: int, scale
     fit = solve(regressors, measured)
     residual = measured - regressors @ fit.values
     assert np.abs(regressors.T @ residual / np.array([1.0, scale, 1.0])).max() < 1e-10
-    covariance = residual @ residual / 37 * np.linalg.inv(regressors.T @ regressors / np.outer(
-        np.array([1.0, scale, 1.0]), np.array([1.0, scale, 1.0])))
+    covariance = (
+        residual
+        @ residual
+        / 37
+        * np.linalg.inv(regressors.T @ regressors / np.outer(np.array([1.0, scale, 1.0]), np.array([1.0, scale, 1.0])))
+    )
     np.testing.assert_allclose(fit.std_errors * np.array([1.0, scale, 1.0]), np.sqrt(np.diag(covariance)), rtol=1e-8)
     assert fit.relative_error == pytest.approx(np.linalg.norm(residual) / np.linalg.norm(measured))

@@ -12,23 +12,32 @@ import yaml
 from bench_runs import bench_with
 
 from hil.commands.investigate import _confirmed, investigate
-from hil.diagnosis.candidates import reach
+from hil.diagnosis.candidate_motions import reach
 from hil.errors import HilError, InputError
+from hil.identification.dataset import take
 from hil.investigate import investigate as investigate_bench
-from hil.measured import take
-from hil.profile import Profile, load_profile
-from hil.recording import read_recording
+from hil.loop.run import RunResult, run_profile
+from hil.motion.profile import Profile, load_profile
+from hil.motion.trajectory import plan
+from hil.recording.recording import read_recording
 from hil.report.compare_report import write_bench
-from hil.run import RunResult, run_profile
-from hil.trajectory import plan
 
 # noise enough to move a reading by a count: else counting looks like physics at a single feed
-LOAD = {"sensors": {"table_noise_m": 2e-7},
-        "effects": [{"effect": "constant_load", "parameters": {"load_torque_n_m": 0.1}}]}
-ONE_WAY = Profile.model_validate({
-    "schema_version": 1, "limits": {"velocity_m_s": 0.4, "acceleration_m_s2": 2.2, "jerk_m_s3": 100.0},
-    "segments": [{"kind": "dwell", "duration_s": 0.3}, {"kind": "sine_squared", "to_m": 0.34, "feed_m_s": 0.06137},
-                 {"kind": "dwell", "duration_s": 0.3}]})
+LOAD = {
+    "sensors": {"table_noise_m": 2e-7},
+    "effects": [{"effect": "constant_load", "parameters": {"load_torque_n_m": 0.1}}],
+}
+ONE_WAY = Profile.model_validate(
+    {
+        "schema_version": 1,
+        "limits": {"velocity_m_s": 0.4, "acceleration_m_s2": 2.2, "jerk_m_s3": 100.0},
+        "segments": [
+            {"kind": "dwell", "duration_s": 0.3},
+            {"kind": "sine_squared", "to_m": 0.34, "feed_m_s": 0.06137},
+            {"kind": "dwell", "duration_s": 0.3},
+        ],
+    }
+)
 
 
 def write_inputs(folder: Path) -> tuple[Path, Path]:
@@ -40,18 +49,21 @@ def write_inputs(folder: Path) -> tuple[Path, Path]:
 
 
 def test_what_one_direction_hides_is_found_by_the_motion_that_it_designs(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     profile, bench = write_inputs(tmp_path)
     out = tmp_path / "out"
     investigate([profile], str(bench), virtual=True, folder=out)
-    rounds = [json.loads((out / f"round_{number + 1}" / "diagnosis.json").read_text())
-              for number in range(len(list(out.glob("round_*"))))]
+    rounds = [
+        json.loads((out / f"round_{number + 1}" / "diagnosis.json").read_text())
+        for number in range(len(list(out.glob("round_*"))))
+    ]
     first, last = rounds
-    assert first["verdict"] == "parameter_error"                   # of Coulomb friction: one direction tells no more
+    assert first["verdict"] == "parameter_error"  # of Coulomb friction: one direction tells no more
     assert {"constant_load", "asymmetric_friction"} <= set(first["not_testable"])
     assert "constant_load" in first["next_experiment"]["separates"]
     assert json.loads((out / "diagnosis.json").read_text())["missing"] == last["missing"]
-    finding, = last["missing"]
+    (finding,) = last["missing"]
     assert finding["effect"] == "asymmetric_friction"
     assert finding["equivalents"] == ["constant_load"]
     assert finding["parameters"]["offset_torque_n_m"]["value"] == pytest.approx(0.1, rel=0.03)
@@ -79,8 +91,9 @@ def test_a_designed_motion_that_is_not_confirmed_is_not_run(tmp_path: Path) -> N
         asked.append(profile)
         return False
 
-    found = investigate_bench({"one_way": ONE_WAY}, {}, bench, tmp_path, run, allowed,
-                              lambda: nullcontext(lambda text, share: None))
+    found = investigate_bench(
+        {"one_way": ONE_WAY}, {}, bench, tmp_path, run, allowed, lambda: nullcontext(lambda text, share: None)
+    )
     assert found.ended == "next_experiment.yaml was not run: it was not confirmed."
     assert found.rounds[0].motions == ("one_way",)
     assert found.diagnosis.experiment is not None
@@ -102,8 +115,15 @@ def test_a_run_that_stops_ends_it_and_keeps_the_recording(tmp_path: Path) -> Non
         return run_profile(bench, profile, place, name, virtual=True)
 
     with pytest.raises(HilError, match=r"one_way stopped: .*following error"):
-        investigate_bench({"one_way": ONE_WAY}, {}, bench, tmp_path, run, lambda profile: True,
-                          lambda: nullcontext(lambda text, share: None))
+        investigate_bench(
+            {"one_way": ONE_WAY},
+            {},
+            bench,
+            tmp_path,
+            run,
+            lambda profile: True,
+            lambda: nullcontext(lambda text, share: None),
+        )
     assert (tmp_path / "round_1" / "one_way.parquet").is_file()
 
 

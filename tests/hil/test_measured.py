@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hil.measured import _jitter_s, _white
+from hil.identification.dataset import _jitter_s, _white
 
 PERIOD_S = 1e-3
 
@@ -34,8 +34,9 @@ def test_a_short_fast_feed_tells_the_jitter_and_a_shorter_one_does_not() -> None
 def test_a_count_that_flickers_at_rest_is_no_jitter() -> None:
     """Moves without any constant feed, dwells between them on the edge of a count."""
     rng, count = np.random.default_rng(2), 6.3e-4
-    speed = np.concatenate([np.concatenate([np.zeros(700), 30.0 * np.sin(np.linspace(0.0, np.pi, 300))])
-                            for _ in range(4)])
+    speed = np.concatenate(
+        [np.concatenate([np.zeros(700), 30.0 * np.sin(np.linspace(0.0, np.pi, 300))]) for _ in range(4)]
+    )
     position = np.cumsum(speed) * PERIOD_S + 0.5 * count
     motor = count * np.round((position + 0.05 * count * rng.standard_normal(speed.size)) / count)
     assert _jitter_s(motor, speed, count / np.sqrt(12.0), PERIOD_S) == 0.0

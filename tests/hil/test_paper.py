@@ -7,10 +7,10 @@ import matplotlib.image
 import numpy as np
 import pytest
 
-from hil.moves import Phase
+from hil.motion.pieces import Phase
 from hil.paper import PaperResult, Verdict, run_paper, source
 from hil.paper.tables import Row
-from hil.twin.chain import RECONSTRUCTED_TABLE_1, one_mass
+from hil.twin.structure.chain import RECONSTRUCTED_TABLE_1, one_mass
 
 NOTES = Path(__file__).parents[2] / "../shared/paper/paper-notes.md"
 
@@ -55,7 +55,7 @@ def test_what_does_not_hold_as_printed_is_said_with_both_values_and_a_reason(
 
 def test_the_misprints_of_the_appendix_matter(result: PaperResult) -> None:
     sign, damper = row(result, "Appendix, TF_4-5"), row(result, "Appendix, TF_3-4")
-    assert sign.computed == pytest.approx(1.0, abs=1e-3)   # at 1 Hz the table follows the motor
+    assert sign.computed == pytest.approx(1.0, abs=1e-3)  # at 1 Hz the table follows the motor
     assert sign.printed > 2.0
     assert damper.computed > 1.0
 
@@ -86,12 +86,18 @@ def test_the_verdict_follows_the_tolerance(printed: float) -> None:
 def test_the_folder_holds_the_pictures_and_the_numbers(result: PaperResult) -> None:
     written = json.loads((result.folder / "paper.json").read_text(encoding="utf-8"))
     assert {picture.figure for picture in result.pictures} >= {
-        "Fig. 6", "Fig. 7", "Fig. 8", "Fig. 9a", "Fig. 9b", "Fig. 9c", "Fig. 10"
+        "Fig. 6",
+        "Fig. 7",
+        "Fig. 8",
+        "Fig. 9a",
+        "Fig. 9b",
+        "Fig. 9c",
+        "Fig. 10",
     }
     for picture in result.pictures:
         pixels = matplotlib.image.imread(result.folder / picture.file)
         assert min(pixels.shape[:2]) > 500
-        assert pixels[..., :3].std() > 0.05   # not an empty page
+        assert pixels[..., :3].std() > 0.05  # not an empty page
     assert len(written["rows"]) == len(result.rows)
     assert {r["verdict"] for r in written["rows"]} == {verdict.value for verdict in Verdict}
     assert any("reconstruction" in text for text in written["assumptions"])

@@ -13,8 +13,8 @@ from bench_runs import MOVE, bench_with
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hil.realtime import Jitter, NotPunctual, check_punctual, machine_state, measure_jitter, real_time, report
-from hil.run import run_profile
+from hil.loop.realtime import Jitter, NotPunctual, check_punctual, machine_state, measure_jitter, real_time, report
+from hil.loop.run import run_profile
 
 
 def test_conditions_are_given_back() -> None:
@@ -22,7 +22,7 @@ def test_conditions_are_given_back() -> None:
     with real_time() as grants:
         assert not gc.isenabled()
         assert len({grant.setting for grant in grants}) == len(grants) == 5
-        for grant in grants:   # granted and in force, or refused with a reason
+        for grant in grants:  # granted and in force, or refused with a reason
             if grant.setting.startswith("core") and not grant.refused:
                 assert len(os.sched_getaffinity(0)) == 1
             if grant.setting.startswith("SCHED_FIFO") and not grant.refused:
@@ -68,10 +68,11 @@ def test_bus_load_beyond_the_budget_is_refused_or_overridden(tmp_path: Path) -> 
 
 
 def test_real_time_path_loads_neither_scipy_nor_plotting_nor_pyarrow() -> None:
-    modules = "hil.session, hil.run, hil.recorder, hil.realtime"
+    modules = "hil.loop.session, hil.loop.run, hil.recording.writer, hil.loop.realtime"
     # numba asks scipy for its version, which loads no more than the package's own frame
     names = "('scipy.linalg', 'scipy.optimize', 'scipy.signal', 'scipy.io', 'matplotlib', 'bokeh', 'pyarrow')"
     heavy = f"[name for name in {names} if name in sys.modules]"
-    found = subprocess.run([sys.executable, "-c", f"import sys, {modules}; print({heavy})"], capture_output=True,
-                           text=True, check=True)
+    found = subprocess.run(
+        [sys.executable, "-c", f"import sys, {modules}; print({heavy})"], capture_output=True, text=True, check=True
+    )
     assert found.stdout.strip() == "[]"

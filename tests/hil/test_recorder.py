@@ -14,8 +14,8 @@ import pytest
 from processes import DEADLINE_S, is_over, state_of, wait_for
 
 from hil.errors import HilError, InputError
-from hil.recorder import Recorder, run_metadata
-from hil.recording import read_recording
+from hil.recording.recording import read_recording
+from hil.recording.writer import Recorder, run_metadata
 
 CHANNELS = ("time_s", "position_command_m", "velocity_command_m_s", "motor_position_rad", "torque_n_m")
 PERIOD_S = 0.001
@@ -39,7 +39,7 @@ def assert_rows(path: Path, rows: int) -> None:
 
 
 def test_the_loop_s_side_is_light() -> None:
-    code = "import hil.recorder, sys; sys.exit(bool({'pyarrow', 'scipy', 'pydantic'} & set(sys.modules)))"
+    code = "import hil.recording.writer, sys; sys.exit(bool({'pyarrow', 'scipy', 'pydantic'} & set(sys.modules)))"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
@@ -55,7 +55,7 @@ def test_every_row_arrives_through_a_ring_much_smaller_than_the_run(tmp_path: Pa
 
 
 def test_a_second_run_into_the_same_folder_gets_a_new_name(tmp_path: Path) -> None:
-    first, second = recorder(tmp_path), recorder(tmp_path)   # at the same time
+    first, second = recorder(tmp_path), recorder(tmp_path)  # at the same time
     for k in range(10):
         first.record(row(k))
         second.record(row(k))
@@ -64,20 +64,20 @@ def test_a_second_run_into_the_same_folder_gets_a_new_name(tmp_path: Path) -> No
     assert second.close() == tmp_path / "run_2.parquet"
     third = recorder(tmp_path)
     assert third.stream_path == tmp_path / "run_3.arrows"
-    assert third.close() is None                             # without a row no file
+    assert third.close() is None  # without a row no file
     assert sorted(entry.name for entry in tmp_path.iterdir()) == ["run.parquet", "run_2.parquet"]
     assert (tmp_path / "run.parquet").read_bytes() == before
 
 
 def test_without_lossless_the_loop_never_waits_and_the_recording_has_no_gap(tmp_path: Path) -> None:
     run = recorder(tmp_path, ring_rows=64)
-    os.kill(run.writer_pid, signal.SIGSTOP)   # a disk that stalls
+    os.kill(run.writer_pid, signal.SIGSTOP)  # a disk that stalls
     wait_for(lambda: state_of(run.writer_pid) == "T")
     for k in range(100):
         run.record(row(k))
     os.kill(run.writer_pid, signal.SIGCONT)
     wait_for(lambda: run.rows_on_disk == 64)
-    run.record(row(100))                      # there is room again, but it would stand after a gap
+    run.record(row(100))  # there is room again, but it would stand after a gap
     path = run.close()
     assert path is not None
     assert_rows(path, 64)
@@ -119,11 +119,14 @@ def test_a_full_disk_is_reported_and_what_fitted_is_readable(tmp_path: Path) -> 
     assert "recovered" in recording.metadata
 
 
-@pytest.mark.parametrize(("channels", "message"), [
-    (("time_s", "speed"), "unknown: speed"),
-    (("time_s", "torque_n_m", "torque_n_m"), "each once"),
-    (("torque_n_m",), "allowed time_s"),
-])
+@pytest.mark.parametrize(
+    ("channels", "message"),
+    [
+        (("time_s", "speed"), "unknown: speed"),
+        (("time_s", "torque_n_m", "torque_n_m"), "each once"),
+        (("torque_n_m",), "allowed time_s"),
+    ],
+)
 def test_wrong_channels_are_refused_before_anything_is_written(
     tmp_path: Path, channels: tuple[str, ...], message: str
 ) -> None:
@@ -139,15 +142,16 @@ def test_a_folder_that_cannot_be_written_is_refused(tmp_path: Path) -> None:
 
 
 def test_metadata_tells_versions_and_everything_needed_to_repeat_a_run() -> None:
-    about = run_metadata(bench={"name": "b"}, profile={"name": "p"}, seed=3, commands=["hil", "run"],
-                         start_time="2024-01-01T00:00:00Z")
+    about = run_metadata(
+        bench={"name": "b"}, profile={"name": "p"}, seed=3, commands=["hil", "run"], start_time="2024-01-01T00:00:00Z"
+    )
     assert about["versions"]["numpy"] == np.__version__
     assert (about["bench"], about["seed"], about["commands"]) == ({"name": "b"}, 3, ["hil", "run"])
 
 
 LOOP = """
 import sys, time
-from hil.recorder import Recorder
+from hil.recording.writer import Recorder
 channels = ("time_s", "position_command_m", "velocity_command_m_s", "motor_position_rad", "torque_n_m")
 with Recorder(sys.argv[1], "run", channels, 0.001, {"seed": 7}) as run:
     print(run.writer_pid, flush=True)
@@ -166,8 +170,12 @@ class Loop:
     """A recording loop in a process of its own, which the tests end by force."""
 
     def __init__(self, folder: Path, rows: int) -> None:
-        self.process = subprocess.Popen([sys.executable, "-c", LOOP, str(folder), str(rows)], text=True,
-                                        stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+        self.process = subprocess.Popen(
+            [sys.executable, "-c", LOOP, str(folder), str(rows)],
+            text=True,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+        )
         assert self.process.stdout is not None
         self.output = self.process.stdout
         self.writer_pid = int(self.output.readline())
@@ -190,7 +198,7 @@ def test_a_loop_killed_mid_run_loses_no_row(tmp_path: Path) -> None:
     loop = Loop(tmp_path, rows=1000)
     loop.wait_for_rows(recorded=1000)
     loop.end(signal.SIGKILL)
-    wait_for(lambda: is_over(loop.writer_pid))   # it saves what is in the ring
+    wait_for(lambda: is_over(loop.writer_pid))  # it saves what is in the ring
     assert_rows(loop.stream, 1000)
     assert read_recording(loop.stream).metadata["recovered"].startswith("the run was not closed: 1000 rows")
 
@@ -212,7 +220,7 @@ def test_rows_reach_the_disk_without_further_rows_pushing_them(tmp_path: Path) -
     for k in range(5):
         run.record(row(k))
     wait_for(lambda: run.rows_on_disk == 5)
-    assert_rows(run.stream_path, 5)   # while the run is going on
+    assert_rows(run.stream_path, 5)  # while the run is going on
     run.close()
 
 

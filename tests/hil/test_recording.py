@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from hil.channels import CHANNELS, AxisKind
 from hil.errors import InputError
-from hil.recording import Recording, arrow_schema, read_recording, write_parquet
+from hil.recording.recording import Recording, arrow_schema, read_recording, write_parquet
 
 RIG = Path(__file__).parents[2].parent / "shared" / "recordings" / "rig"
 HEADER = "time_s,position_command_m,velocity_command_m_s,motor_position_rad,torque_n_m"
@@ -86,43 +86,52 @@ def test_a_linear_axis_is_known_by_its_channels(tmp_path: Path) -> None:
     assert read_recording(csv(tmp_path, *ROWS, header=header)).kind is AxisKind.LINEAR
 
 
-@pytest.mark.parametrize(("lines", "message"), [
-    ([*ROWS[:2], "0.002,0,0,abc,0.3"], r"run\.csv:4: motor_position_rad: given 'abc', allowed a finite"),
-    ([*ROWS[:2], "0.002,0,nan,0,0.3"], r"run\.csv:4: velocity_command_m_s: given 'nan'"),
-    ([*ROWS[:2], "0.002,0,0,inf,0.3"], r"run\.csv:4: motor_position_rad: given 'inf'"),
-    ([*ROWS[:2], "0.002,0,0,,0.3"], r"run\.csv:4: motor_position_rad: given an empty field"),
-    ([*ROWS[:2], "0.002,0,0,1_0,0.3"], r"run\.csv:4: motor_position_rad: given '1_0'"),
-    ([*ROWS[:2], "", "0.002,0,0"], r"run\.csv:5: given 3 fields, the header has 5; the row is cut"),
-    ([*ROWS[:2], ROWS[1], *ROWS[2:]], r"run\.csv:4: time_s: repeats \(a duplicate.* 0\.001 s after 0\.001"),
-    ([*ROWS[:3], ROWS[1]], r"run\.csv:5: time_s: runs back: given 0\.001 s after 0\.002 s"),
-    ([*ROWS[:2], *ROWS[3:]], r"run\.csv:4: time_s: a step of 0\.002 s, allowed the period 0\.001 s \+-1 %"),
-    (ROWS[:2], r"run\.csv:2: time_s: given 2 rows, allowed 3 or more"),
-    ([], r"run\.csv: there is no row 1 of numbers below the header"),
-])
-def test_a_damaged_csv_is_refused_with_file_line_and_column(
-    tmp_path: Path, lines: list[str], message: str
-) -> None:
+@pytest.mark.parametrize(
+    ("lines", "message"),
+    [
+        ([*ROWS[:2], "0.002,0,0,abc,0.3"], r"run\.csv:4: motor_position_rad: given 'abc', allowed a finite"),
+        ([*ROWS[:2], "0.002,0,nan,0,0.3"], r"run\.csv:4: velocity_command_m_s: given 'nan'"),
+        ([*ROWS[:2], "0.002,0,0,inf,0.3"], r"run\.csv:4: motor_position_rad: given 'inf'"),
+        ([*ROWS[:2], "0.002,0,0,,0.3"], r"run\.csv:4: motor_position_rad: given an empty field"),
+        ([*ROWS[:2], "0.002,0,0,1_0,0.3"], r"run\.csv:4: motor_position_rad: given '1_0'"),
+        ([*ROWS[:2], "", "0.002,0,0"], r"run\.csv:5: given 3 fields, the header has 5; the row is cut"),
+        ([*ROWS[:2], ROWS[1], *ROWS[2:]], r"run\.csv:4: time_s: repeats \(a duplicate.* 0\.001 s after 0\.001"),
+        ([*ROWS[:3], ROWS[1]], r"run\.csv:5: time_s: runs back: given 0\.001 s after 0\.002 s"),
+        ([*ROWS[:2], *ROWS[3:]], r"run\.csv:4: time_s: a step of 0\.002 s, allowed the period 0\.001 s \+-1 %"),
+        (ROWS[:2], r"run\.csv:2: time_s: given 2 rows, allowed 3 or more"),
+        ([], r"run\.csv: there is no row 1 of numbers below the header"),
+    ],
+)
+def test_a_damaged_csv_is_refused_with_file_line_and_column(tmp_path: Path, lines: list[str], message: str) -> None:
     with pytest.raises(InputError, match=message):
         read_recording(csv(tmp_path, *lines))
 
 
-@pytest.mark.parametrize(("header", "message"), [
-    ("time_s,position_command_m,velocity_command_m_s,motor_position_rad,torque",
-     r"run\.csv: torque_n_m missing, given the columns .*torque; .*hil import"),
-    ("time_s,time_s,velocity_command_m_s,motor_position_rad,torque_n_m", r"run\.csv:1: time_s: stands twice"),
-])
+@pytest.mark.parametrize(
+    ("header", "message"),
+    [
+        (
+            "time_s,position_command_m,velocity_command_m_s,motor_position_rad,torque",
+            r"run\.csv: torque_n_m missing, given the columns .*torque; .*hil import",
+        ),
+        ("time_s,time_s,velocity_command_m_s,motor_position_rad,torque_n_m", r"run\.csv:1: time_s: stands twice"),
+    ],
+)
 def test_a_wrong_header_is_refused(tmp_path: Path, header: str, message: str) -> None:
     with pytest.raises(InputError, match=message):
         read_recording(csv(tmp_path, *ROWS, header=header))
 
 
-@pytest.mark.parametrize(("name", "content", "message"), [
-    ("run.csv", b"", "the file is empty"),
-    ("run.csv", b"\x89PNG\r\n\x1a\n\x00\xff", "is not text of a CSV file"),
-    ("run.parquet", b"", "is no readable Parquet file"),
-    ("run.arrows", b"", "is no readable Arrow stream"),
-    ("run.xlsx", b"", r"the ending '\.xlsx' is no recording, allowed \.parquet"),
-])
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("run.csv", b"", "the file is empty"),
+        ("run.csv", b"\x89PNG\r\n\x1a\n\x00\xff", "is not text of a CSV file"),
+        ("run.parquet", b"", "is no readable Parquet file"),
+        ("run.arrows", b"", "is no readable Arrow stream"),
+        ("run.xlsx", b"", r"the ending '\.xlsx' is no recording, allowed \.parquet"),
+    ],
+)
 def test_another_file_is_refused(tmp_path: Path, name: str, content: bytes, message: str) -> None:
     (tmp_path / name).write_bytes(content)
     with pytest.raises(InputError, match=message):
@@ -146,8 +155,9 @@ def test_parquet_of_others_is_checked_like_csv(tmp_path: Path) -> None:
     pq.write_table(pa.table(columns), tmp_path / "nan.parquet")
     with pytest.raises(InputError, match=r"nan\.parquet: row 8: torque_n_m: given nan"):
         read_recording(tmp_path / "nan.parquet")
-    fields = [pa.field(n, pa.float64(), metadata={"unit": "kN m" if n == "torque_n_m" else CHANNELS[n].unit})
-              for n in columns]
+    fields = [
+        pa.field(n, pa.float64(), metadata={"unit": "kN m" if n == "torque_n_m" else CHANNELS[n].unit}) for n in columns
+    ]
     pq.write_table(pa.table(small().columns, schema=pa.schema(fields)), tmp_path / "unit.parquet")
     with pytest.raises(InputError, match=r"unit\.parquet: torque_n_m: given in kN m, allowed N m"):
         read_recording(tmp_path / "unit.parquet")
@@ -170,9 +180,7 @@ def stream(path: Path, recording: Recording, rows_per_batch: int) -> list[int]:
 
 
 @given(cut=st.integers(0, 30_000))
-def test_a_cut_stream_is_read_to_its_last_complete_batch(
-    tmp_path_factory: pytest.TempPathFactory, cut: int
-) -> None:
+def test_a_cut_stream_is_read_to_its_last_complete_batch(tmp_path_factory: pytest.TempPathFactory, cut: int) -> None:
     tmp_path = tmp_path_factory.mktemp("cut")
     recording = small(400)
     sizes = stream(tmp_path / "run.arrows", recording, 20)

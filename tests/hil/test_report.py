@@ -16,14 +16,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.image import imread
 
-from hil.bench import Bench, load_bench
-from hil.compare import compare
+from hil.bench.bench_file import Bench, load_bench
 from hil.errors import InputError
-from hil.measured import bench_of
-from hil.report import look
+from hil.files.output import new_folder, write_json
+from hil.identification.compare import compare
+from hil.identification.dataset import bench_of
+from hil.report import style
 from hil.report.compare_report import fastest_move, verdict, write_bench, write_comparison
 from hil.report.figures import Line, Panel
-from hil.report.output import new_folder, write_json
 from hil.report.page import Number, Page
 from hil.report.plots import over_time
 
@@ -35,9 +35,23 @@ def rendered(page: Path, profile: Path) -> str:
     if CHROMIUM is None:
         pytest.skip("no chromium to open the page with: apt-get install chromium")
     ran = subprocess.run(
-        [CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={profile}",
-         "--host-resolver-rules=MAP * ~NOTFOUND", "--virtual-time-budget=10000", "--enable-logging=stderr",
-         "--dump-dom", page.as_uri()], capture_output=True, text=True, timeout=120, check=True)
+        [
+            CHROMIUM,
+            "--headless",
+            "--no-sandbox",
+            "--disable-gpu",
+            f"--user-data-dir={profile}",
+            "--host-resolver-rules=MAP * ~NOTFOUND",
+            "--virtual-time-budget=10000",
+            "--enable-logging=stderr",
+            "--dump-dom",
+            page.as_uri(),
+        ],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=True,
+    )
     errors = [line for line in ran.stderr.splitlines() if "CONSOLE" in line and "[bokeh" not in line]
     assert not errors
     return ran.stdout
@@ -56,10 +70,16 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_the_report_is_complete(report: Path) -> None:
     assert {path.name for path in report.iterdir()} == {
-        "compare.html", "compare.json", "bench.fitted.yaml", "overview.png", "move.png", "blocks.png"}
+        "compare.html",
+        "compare.json",
+        "bench.fitted.yaml",
+        "overview.png",
+        "move.png",
+        "blocks.png",
+    }
     assert (report / "compare.html").stat().st_size < 8e6
     for picture in report.glob("*.png"):
-        assert np.ptp(imread(picture)) > 0.5     # neither blank nor cut
+        assert np.ptp(imread(picture)) > 0.5  # neither blank nor cut
     numbers = json.loads((report / "compare.json").read_text())
     assert numbers["explained"] is True
     assert numbers["channels"]["torque_n_m"]["unit"] == "N m"
@@ -109,7 +129,7 @@ def test_a_written_bench_reads_the_same(name: str, tmp_path: Path) -> None:
 def test_thinning_keeps_the_extremes(values: list[float], limit: int, count: int) -> None:
     column = np.array(values)
     columns = tuple(np.roll(column, shift) for shift in range(count))
-    rows = look.thin(columns, limit)
+    rows = style.thin(columns, limit)
     assert np.all(np.diff(rows) > 0)
     assert rows[0] == 0
     assert rows[-1] == column.size - 1
@@ -120,19 +140,28 @@ def test_thinning_keeps_the_extremes(values: list[float], limit: int, count: int
         assert values_of[rows].min() == values_of.min()
 
 
-@pytest.mark.parametrize(("value", "unit", "text"), [
-    (1.48e-7, "m", "0.148 µm"), (0.1, "m", "100 mm"), (0.0, "m", "0.00 µm"), (0.366667, "m/s", "22.0 m/min"),
-    (0.0098, "N m", "9.80 mN m"), (1.1, "N m", "1.10 N m"), (95.109, "kg", "95.1 kg"), (-2.5, "N", "-2.50 N"),
-    (3e-9, "N", "3.00e-09 N"),
-])
+@pytest.mark.parametrize(
+    ("value", "unit", "text"),
+    [
+        (1.48e-7, "m", "0.148 µm"),
+        (0.1, "m", "100 mm"),
+        (0.0, "m", "0.00 µm"),
+        (0.366667, "m/s", "22.0 m/min"),
+        (0.0098, "N m", "9.80 mN m"),
+        (1.1, "N m", "1.10 N m"),
+        (95.109, "kg", "95.1 kg"),
+        (-2.5, "N", "-2.50 N"),
+        (3e-9, "N", "3.00e-09 N"),
+    ],
+)
 def test_quantities_are_readable(value: float, unit: str, text: str) -> None:
-    assert look.quantity(value, unit) == text
+    assert style.quantity(value, unit) == text
 
 
 def test_long_recordings_stay_light(tmp_path: Path) -> None:
     time_s = np.arange(600_000) * 1e-3
     noise = np.random.default_rng(1).normal(size=(2, time_s.size))
-    lines = (Line("measured", noise[0], look.MEASURED, broad=True), Line("simulated", noise[1], look.SIMULATED))
+    lines = (Line("measured", noise[0], style.MEASURED, broad=True), Line("simulated", noise[1], style.SIMULATED))
     page = Page("long", "", "verdict", True)
     page.plot(over_time(time_s, [Panel("position", "m", lines)] * 16))
     page.write(tmp_path / "page.html")

@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 from bench_runs import MOVE, bench_with
 
-from hil.bench import Bench, shipped_benches
+from hil.bench.bench_file import Bench, shipped_benches
 from hil.errors import FieldError, HilError, InputError
-from hil.friction import identify_friction
-from hil.profile import load_profile
-from hil.recording import read_recording
-from hil.run import run_profile
-from hil.simulated import load_simulated
-from hil.supervision import Ending
+from hil.identification.friction import identify_friction
+from hil.loop.run import run_profile
+from hil.loop.simulated_bench import load_simulated
+from hil.loop.supervision import Ending
+from hil.motion.profile import load_profile
+from hil.recording.recording import read_recording
 
 ROOT = Path(__file__).parent.parent.parent
 
@@ -62,7 +62,7 @@ def test_wall_clock_gives_the_same_motion_and_a_jitter_certificate(tmp_path: Pat
 @pytest.mark.parametrize("interface", ["virtual", "udp_multicast"])
 def test_python_can_buses_carry_the_same_run(tmp_path: Path, interface: str) -> None:
     channel = "239.74.163.77" if interface == "udp_multicast" else "test_run"
-    virtual_ok = interface == "virtual"   # udp takes real time to arrive
+    virtual_ok = interface == "virtual"  # udp takes real time to arrive
     bench = bench_with(drive={"interface": interface, "channel": channel, "missed_answers": 50})
     ran = run_profile(bench, MOVE, tmp_path, "bus", virtual=virtual_ok, force=True)
     if not virtual_ok and not ran.complete:
@@ -77,7 +77,7 @@ def test_python_can_buses_carry_the_same_run(tmp_path: Path, interface: str) -> 
 
 @pytest.mark.parametrize("name", ["reference", "reference_7dof"])
 def test_friction_found_on_the_bench_is_that_of_the_axis(tmp_path: Path, name: str) -> None:
-    true = {"coulomb_torque_n_m": 1.25, "viscous_torque_n_m_s_rad": 0.0071}   # the owner believes 1.1 and 0.0064
+    true = {"coulomb_torque_n_m": 1.25, "viscous_torque_n_m_s_rad": 0.0071}  # the owner believes 1.1 and 0.0064
     bench = load_simulated(name)
     bench = bench.model_copy(update={"simulation": bench.simulation.model_copy(update={"axis": true})})
     ran = run_profile(bench, load_profile(ROOT / "profiles/friction_sweep.yaml"), tmp_path, "sweep", virtual=True)
@@ -86,19 +86,25 @@ def test_friction_found_on_the_bench_is_that_of_the_axis(tmp_path: Path, name: s
     assert result.viscous == pytest.approx(0.0071, rel=0.02)
 
 
-@pytest.mark.parametrize("name", sorted(name for name, path in shipped_benches().items()
-                                        if "simulation:" in path.read_text()))
+@pytest.mark.parametrize(
+    "name", sorted(name for name, path in shipped_benches().items() if "simulation:" in path.read_text())
+)
 def test_shipped_benches_run(tmp_path: Path, name: str) -> None:
     assert run_profile(load_simulated(name), MOVE, tmp_path, "run", virtual=True).complete
 
 
-@pytest.mark.parametrize(("changes", "message"), [
-    ({"drive": {"travel_m": (-0.01, 0.04)}}, r"set-points from 0 to 0.05 m, allowed -0.01 to 0.04 m"),
-    ({"drive": {"limits": {"velocity_m_s": 0.09, "acceleration_m_s2": 3.0, "jerk_m_s3": 200.0}}},
-     r"limits.velocity_m_s: given set-points up to 0.1, allowed 0.09 \(drive.limits.velocity_m_s of the bench\)"),
-    ({"encoders": {"motor": {"counts_per_rev": 4096, "direction": -1}}}, r"0x607E"),
-    ({"drive": {"mode": "csp"}, "control": {"position_feedback": "table"}}, r"csp with position_feedback: table"),
-])
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"drive": {"travel_m": (-0.01, 0.04)}}, r"set-points from 0 to 0.05 m, allowed -0.01 to 0.04 m"),
+        (
+            {"drive": {"limits": {"velocity_m_s": 0.09, "acceleration_m_s2": 3.0, "jerk_m_s3": 200.0}}},
+            r"limits.velocity_m_s: given set-points up to 0.1, allowed 0.09 \(drive.limits.velocity_m_s of the bench\)",
+        ),
+        ({"encoders": {"motor": {"counts_per_rev": 4096, "direction": -1}}}, r"0x607E"),
+        ({"drive": {"mode": "csp"}, "control": {"position_feedback": "table"}}, r"csp with position_feedback: table"),
+    ],
+)
 def test_what_cannot_be_run_is_refused_and_leaves_nothing(tmp_path: Path, changes: Any, message: str) -> None:
     with pytest.raises(FieldError, match=message):
         run_profile(bench_with(**changes), MOVE, tmp_path / "out", "run", virtual=True)
@@ -107,7 +113,7 @@ def test_what_cannot_be_run_is_refused_and_leaves_nothing(tmp_path: Path, change
 
 def test_real_bench_is_never_run_in_virtual_time(tmp_path: Path) -> None:
     data = bench_with().model_dump() | {"simulation": None}
-    data["drive"] |= {"interface": "socketcan", "channel": "nobody0"}     # nothing that could be opened
+    data["drive"] |= {"interface": "socketcan", "channel": "nobody0"}  # nothing that could be opened
     with pytest.raises(FieldError, match="real bench in virtual time"):
         run_profile(Bench.model_validate(data), MOVE, tmp_path, "run", virtual=True)
 
@@ -119,14 +125,23 @@ def test_a_drive_that_does_not_answer(tmp_path: Path) -> None:
         run_profile(Bench.model_validate(data), MOVE, tmp_path, "run")
 
 
-@pytest.mark.parametrize(("lines", "field"), [
-    ("simulation:\n  effects:\n  - {effect: backlsh, parameters: {}}", r"simulation.effects\[0\].*backlsh"),
-    ("simulation:\n  effects:\n  - {effect: backlash, parameters: {gap: 1.0e-5}}", r"simulation.effects\[0\].*gap_m"),
-    ("simulation:\n  axis: {motor_mass_kg: -3.0}", r"simulation.axis.motor_mass_kg.*greater than 0"),
-    ("simulation:\n  sensors: {table_noise: 1.0}", r"simulation.sensors.*table_noise"),
-    ("simulation: {}\ndrive: {travel_m: [0.3, 0.1]}", r"drive.travel_m: given \[0.3, 0.1\], allowed \[lower, upper\]"),
-    ("simulation: {}\ndrive: {node_id: 6}", r"drive.node_id: .*different ones"),
-])
+@pytest.mark.parametrize(
+    ("lines", "field"),
+    [
+        ("simulation:\n  effects:\n  - {effect: backlsh, parameters: {}}", r"simulation.effects\[0\].*backlsh"),
+        (
+            "simulation:\n  effects:\n  - {effect: backlash, parameters: {gap: 1.0e-5}}",
+            r"simulation.effects\[0\].*gap_m",
+        ),
+        ("simulation:\n  axis: {motor_mass_kg: -3.0}", r"simulation.axis.motor_mass_kg.*greater than 0"),
+        ("simulation:\n  sensors: {table_noise: 1.0}", r"simulation.sensors.*table_noise"),
+        (
+            "simulation: {}\ndrive: {travel_m: [0.3, 0.1]}",
+            r"drive.travel_m: given \[0.3, 0.1\], allowed \[lower, upper\]",
+        ),
+        ("simulation: {}\ndrive: {node_id: 6}", r"drive.node_id: .*different ones"),
+    ],
+)
 def test_a_wrong_bench_is_refused_with_file_and_line(tmp_path: Path, lines: str, field: str) -> None:
     text = shipped_benches()["reference"].read_text().split("drive:")[0]
     path = tmp_path / "bench.yaml"
@@ -137,14 +152,23 @@ def test_a_wrong_bench_is_refused_with_file_and_line(tmp_path: Path, lines: str,
 
 def test_command_line(tmp_path: Path) -> None:
     hil = [sys.executable, "-m", "hil.cli"]
-    done = subprocess.run([*hil, "run", str(ROOT / "profiles/reference_100mm_7.yaml"), "--virtual", "--out",
-                           str(tmp_path / "out")], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [*hil, "run", str(ROOT / "profiles/reference_100mm_7.yaml"), "--virtual", "--out", str(tmp_path / "out")],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert done.returncode == 0, done.stderr
     assert str(tmp_path / "out/reference_100mm_7.parquet") in done.stdout
     believed = tmp_path / "believed.yaml"
     believed.write_text(shipped_benches()["reference"].read_text().split("drive:")[0])
-    stopped = subprocess.run([*hil, "run", str(ROOT / "profiles/reference.yaml"), "--bench", str(believed),
-                              "--virtual"], capture_output=True, text=True, cwd=tmp_path, check=False)
+    stopped = subprocess.run(
+        [*hil, "run", str(ROOT / "profiles/reference.yaml"), "--bench", str(believed), "--virtual"],
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+        check=False,
+    )
     assert stopped.returncode == 2
     assert "drive: given nothing" in stopped.stderr
     assert "Traceback" not in stopped.stderr

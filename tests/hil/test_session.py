@@ -11,12 +11,12 @@ import pytest
 from bench_runs import MOVE, MOVING, Ran, bench_with, run
 
 from drivers.cia402 import DriveState
-from drivers.modelled import Fault, FaultKind, ModelledBus
-from hil.recording import read_recording
-from hil.rig import Rig
-from hil.session import STOP_SEGMENT, Session
-from hil.supervision import Ending
-from hil.trajectory import plan
+from drivers.modelled_bus import Fault, FaultKind, ModelledBus
+from hil.loop.devices import Rig
+from hil.loop.session import STOP_SEGMENT, Session
+from hil.loop.supervision import Ending
+from hil.motion.trajectory import plan
+from hil.recording.recording import read_recording
 
 SYNC, DRIVE_TPDO, ENCODER_TPDO, DRIVE_HEARTBEAT = 0x080, 0x185, 0x186, 0x705
 MANY = 100_000
@@ -36,7 +36,7 @@ def test_complete_run_follows_set_points_and_twin(tmp_path: Path) -> None:
     assert np.array_equal(recording["time_s"], np.arange(len(trajectory)) * 1e-3)
     assert abs(recording["table_position_m"][-1] - 0.05) < 5e-6
     assert np.abs(recording["table_position_m"] - recording["twin_table_position_m"]).max() < 2e-6
-    assert np.std(recording["torque_n_m"] - recording["twin_torque_n_m"]) < 0.015   # noise is 0.01
+    assert np.std(recording["torque_n_m"] - recording["twin_torque_n_m"]) < 0.015  # noise is 0.01
     assert set(recording["drive_state"]) == {DriveState.OPERATION_ENABLED}
     assert ran.rig.nodes.drive.state is DriveState.READY_TO_SWITCH_ON
 
@@ -85,15 +85,22 @@ def test_emergency_of_the_drive(tmp_path: Path) -> None:
     assert at_rest(ran)
 
 
-@pytest.mark.parametrize(("can_id", "count", "ending"), [
-    (DRIVE_TPDO, 2, Ending.COMPLETE), (DRIVE_TPDO, 10, Ending.DRIVE_FAULT),
-    (ENCODER_TPDO, 2, Ending.COMPLETE), (ENCODER_TPDO, MANY, Ending.ENCODER_FAULT),
-    (DRIVE_HEARTBEAT, 2, Ending.COMPLETE), (DRIVE_HEARTBEAT, MANY, Ending.DRIVE_FAULT),
-])
+@pytest.mark.parametrize(
+    ("can_id", "count", "ending"),
+    [
+        (DRIVE_TPDO, 2, Ending.COMPLETE),
+        (DRIVE_TPDO, 10, Ending.DRIVE_FAULT),
+        (ENCODER_TPDO, 2, Ending.COMPLETE),
+        (ENCODER_TPDO, MANY, Ending.ENCODER_FAULT),
+        (DRIVE_HEARTBEAT, 2, Ending.COMPLETE),
+        (DRIVE_HEARTBEAT, MANY, Ending.DRIVE_FAULT),
+    ],
+)
 def test_frames_lost_on_the_bus(tmp_path: Path, can_id: int, count: int, ending: Ending) -> None:
     bus = ModelledBus()
-    ran = run(tmp_path, bus=bus, script=lambda *_: {
-        MOVING: lambda: bus.inject(Fault(FaultKind.DROP, can_id, count=count))})
+    ran = run(
+        tmp_path, bus=bus, script=lambda *_: {MOVING: lambda: bus.inject(Fault(FaultKind.DROP, can_id, count=count))}
+    )
     assert ran.outcome.ending is ending
     assert at_rest(ran)
     assert ran.rig.nodes.drive.state not in (DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE)
@@ -105,8 +112,8 @@ def test_bus_off_leaves_the_drive_to_its_watchdog(tmp_path: Path) -> None:
     assert ran.outcome.ending is Ending.DRIVE_FAULT
     assert "BUS_OFF" in ran.outcome.reason
     drive = ran.rig.nodes.drive
-    assert drive.state is DriveState.OPERATION_ENABLED   # nobody could tell it
-    drive.tick(10.0)                                     # the master's heartbeat is overdue
+    assert drive.state is DriveState.OPERATION_ENABLED  # nobody could tell it
+    drive.tick(10.0)  # the master's heartbeat is overdue
     assert drive.state is DriveState.FAULT_REACTION_ACTIVE
 
 
@@ -128,7 +135,7 @@ def test_blind_linear_encoder(tmp_path: Path, feedback: str) -> None:
     assert "ALARM" in ran.outcome.reason
     assert at_rest(ran)
     under_control = DriveState.QUICK_STOP_ACTIVE not in ran.recording["drive_state"]
-    assert under_control == (feedback == "motor")   # without its feedback the loop cannot stop the axis itself
+    assert under_control == (feedback == "motor")  # without its feedback the loop cannot stop the axis itself
 
 
 def test_blocked_axis_stops_by_following_error_then_by_the_drive(tmp_path: Path) -> None:
@@ -192,4 +199,4 @@ def test_exception_in_the_loop_stops_the_drive_and_closes_the_recording(tmp_path
     plant = rigs[0].nodes.plant
     before_rad = plant.motor_position_rad
     plant.advance(0.0, 0.001)
-    assert abs(plant.motor_position_rad - before_rad) < 1e-4   # 0.1 rad/s
+    assert abs(plant.motor_position_rad - before_rad) < 1e-4  # 0.1 rad/s

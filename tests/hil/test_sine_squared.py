@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from hil.errors import FieldError
-from hil.excitation import Chirp, Multisine, Spectrum, Wave
-from hil.moves import MotionLimits, Phase, Ramp
-from hil.sine_squared import bell_duration_s, ramp_duration_s, reversals, sine_squared
+from hil.motion.excitation import Chirp, Multisine, Spectrum, Wave
+from hil.motion.pieces import MotionLimits, Phase, Ramp
+from hil.motion.sine_squared import bell_duration_s, ramp_duration_s, reversals, sine_squared
 
 LIMITS = MotionLimits(0.3, 2.0, 50.0)
 
@@ -41,10 +41,13 @@ def test_a_rectangle_convolved_with_a_half_sine_is_the_same_move() -> None:
     assert convolved[: len(velocity)] == pytest.approx(velocity, abs=1e-3 * LIMITS.velocity_m_s)
 
 
-@pytest.mark.parametrize(("limits", "peak"), [
-    (MotionLimits(10.0, 2.0, 1e9), 2),   # acceleration decides
-    (MotionLimits(10.0, 1e9, 50.0), 3),   # jerk decides
-])
+@pytest.mark.parametrize(
+    ("limits", "peak"),
+    [
+        (MotionLimits(10.0, 2.0, 1e9), 2),  # acceleration decides
+        (MotionLimits(10.0, 1e9, 50.0), 3),  # jerk decides
+    ],
+)
 def test_the_shortest_bell_reaches_exactly_one_limit(limits: MotionLimits, peak: int) -> None:
     move = sine_squared(0.0, 0.1, limits)
     assert move.duration_s == pytest.approx(bell_duration_s(0.1, limits), rel=1e-14)
@@ -92,4 +95,4 @@ def test_a_multisine_has_its_lines_and_no_others_and_repeats() -> None:
     lines = np.abs(np.fft.rfft(x[:2000])) / 1000
     index = np.arange(4, 21)
     assert np.nonzero(lines > 1e-9)[0].tolist() == index.tolist()
-    assert lines[index] * index == pytest.approx(lines[4] * 4)   # equal velocity on every line
+    assert lines[index] * index == pytest.approx(lines[4] * 4)  # equal velocity on every line

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from hil.errors import FieldError, InputError
-from hil.moves import MotionLimits, Phase
-from hil.profile import load_profile
-from hil.trajectory import Trajectory, plan, replan, stop_from, time_optimal_duration_s
+from hil.motion.pieces import MotionLimits, Phase
+from hil.motion.profile import load_profile
+from hil.motion.trajectory import Trajectory, plan, replan, stop_from, time_optimal_duration_s
 
 PROFILES = Path(__file__).parents[2] / "profiles"
 SHIPPED = sorted(PROFILES.glob("*.yaml"))
@@ -30,8 +30,9 @@ def test_a_shipped_profile_holds_its_limits_and_is_consistent(path: Path, period
     profile = load_profile(path)
     t = plan(profile, period_s)
     assert t.time_s == pytest.approx(np.arange(len(t)) * period_s, abs=0)
-    for values, limit in zip((t.velocity_m_s, t.acceleration_m_s2, t.jerk_m_s3),
-                             profile.limits.model_dump().values(), strict=True):
+    for values, limit in zip(
+        (t.velocity_m_s, t.acceleration_m_s2, t.jerk_m_s3), profile.limits.model_dump().values(), strict=True
+    ):
         assert np.abs(values).max() <= limit * (1 + 1e-9)
     assert profile.position_min_m is not None
     assert profile.position_max_m is not None
@@ -40,8 +41,10 @@ def test_a_shipped_profile_holds_its_limits_and_is_consistent(path: Path, period
     assert (t.velocity_m_s[-1], t.acceleration_m_s2[-1], t.phase[-1]) == (0, 0, Phase.STANDSTILL)
     # each derivative integrates to the one above it: trapezoid, whose error the next derivative bounds
     limits = profile.limits
-    for value, slope, bound in ((t.position_m, t.velocity_m_s, limits.jerk_m_s3 * period_s**3 / 4),
-                                (t.velocity_m_s, t.acceleration_m_s2, 2 * limits.jerk_m_s3 * period_s)):
+    for value, slope, bound in (
+        (t.position_m, t.velocity_m_s, limits.jerk_m_s3 * period_s**3 / 4),
+        (t.velocity_m_s, t.acceleration_m_s2, 2 * limits.jerk_m_s3 * period_s),
+    ):
         step = np.diff(value) - (slope[1:] + slope[:-1]) / 2 * period_s
         assert np.abs(step).max() <= bound * (period_s if value is t.velocity_m_s else 1)
 
@@ -54,7 +57,7 @@ def test_the_reference_moves_are_those_of_the_source() -> None:
         assert trajectory.notes == ()
     constant = [np.mean(t.phase[t.segment == 1] == Phase.CONSTANT_FEED) for t in (slow, fast, lowered)]
     assert constant[0] > 0.8
-    assert 0 < constant[1] < 0.1   # "very little time at constant feed"
+    assert 0 < constant[1] < 0.1  # "very little time at constant feed"
     assert constant[2] == 0
     assert 22 < lowered.velocity_m_s.max() * 60 < 25
     assert lowered.notes[0].startswith("segments[1]: feed lowered from 0.5 m/s (30 m/min) to ")
@@ -67,10 +70,10 @@ def test_laps_repeat_sample_by_sample(name: str) -> None:
     pieces = {(run.name, run.lap): t.position_m[t.segment == index] for index, run in enumerate(t.runs)}
     repeated = [key for key in pieces if key[1] > 0]
     assert repeated
-    for place, lap in repeated[:-1]:   # the last run of all has one sample more
+    for place, lap in repeated[:-1]:  # the last run of all has one sample more
         assert np.array_equal(pieces[place, lap], pieces[place, 0])
     starts = np.array([run.start_s for run in t.runs])
-    assert starts / 0.004 == pytest.approx(np.round(starts / 0.004), abs=1e-9)   # the position loop's period
+    assert starts / 0.004 == pytest.approx(np.round(starts / 0.004), abs=1e-9)  # the position loop's period
 
 
 def test_a_feed_sweep_has_both_directions_at_every_feed() -> None:
@@ -113,7 +116,7 @@ def test_a_stop_in_the_middle_of_a_move_begins_where_the_axis_is() -> None:
     t = planned("reference_100mm_22")
     k = int(np.argmax(t.velocity_m_s))
     s = stop_from(t.position_m[k], t.velocity_m_s[k], t.acceleration_m_s2[k], LIMITS, PERIOD_S)
-    assert (s.position_m[0], s.velocity_m_s[0]) == (t.position_m[k], t.velocity_m_s[k])   # 0.37 m/s, beyond 0.3
+    assert (s.position_m[0], s.velocity_m_s[0]) == (t.position_m[k], t.velocity_m_s[k])  # 0.37 m/s, beyond 0.3
     assert s.velocity_m_s[-1] == 0
     assert np.abs(s.acceleration_m_s2).max() <= 2.0 * (1 + 1e-9)
     assert (np.diff(s.velocity_m_s) <= 1e-12).all()
@@ -124,7 +127,7 @@ def test_a_new_target_is_reached_in_the_shortest_time() -> None:
     optimum = time_optimal_duration_s(0.1, LIMITS)
     assert optimum <= t.duration_s < optimum + PERIOD_S
     assert t.position_m[-1] == pytest.approx(0.1, abs=1e-9)
-    assert len(replan(0.1, 0.0, 0.0, 0.1, LIMITS, PERIOD_S)) == 1   # already there
+    assert len(replan(0.1, 0.0, 0.0, 0.1, LIMITS, PERIOD_S)) == 1  # already there
     back = replan(0.0, 0.3, 1.0, -0.1, LIMITS, PERIOD_S)
     assert back.position_m.max() > 0
     assert back.position_m[-1] == pytest.approx(-0.1, abs=1e-9)
@@ -143,7 +146,9 @@ def test_states_must_be_finite(state: tuple[float, float, float]) -> None:
 
 
 def test_the_module_is_light_to_import() -> None:
-    code = ("import sys, hil.trajectory; heavy = {'scipy', 'matplotlib', 'pyarrow', 'bokeh', 'pydantic', 'yaml'}; "
-            "print(sorted(heavy & set(sys.modules)))")
+    code = (
+        "import sys, hil.motion.trajectory; heavy = {'scipy', 'matplotlib', 'pyarrow', 'bokeh', 'pydantic', 'yaml'}; "
+        "print(sorted(heavy & set(sys.modules)))"
+    )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"

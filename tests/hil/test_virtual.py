@@ -9,18 +9,20 @@ import numpy as np
 import pytest
 from bench_runs import bench_with, run
 
-from hil import virtual
 from hil.errors import HilError
-from hil.simulated import load_simulated
-from hil.supervision import Ending
-from hil.virtual import VirtualSession
+from hil.loop import virtual
+from hil.loop.simulated_bench import load_simulated
+from hil.loop.supervision import Ending
+from hil.loop.virtual import VirtualSession
 
 PUSH = {"effect": "external_force", "parameters": {"force_n": -9000.0, "start_s": 0.4, "end_s": 0.6}}
 CASES: dict[str, tuple[dict[str, Any], Ending]] = {
     "reference": ({}, Ending.COMPLETE),
     "table feedback": ({"control": {"position_feedback": "table"}}, Ending.COMPLETE),
-    "torque beyond the drive's greatest": ({"control": {"torque_limit_n_m": 1000.0}, "drive": {"rated_torque_n_m": 0.7,
-                                            "following_error_m": 0.1}}, Ending.COMPLETE),
+    "torque beyond the drive's greatest": (
+        {"control": {"torque_limit_n_m": 1000.0}, "drive": {"rated_torque_n_m": 0.7, "following_error_m": 0.1}},
+        Ending.COMPLETE,
+    ),
     "noisy sensors": ({"simulation": {"sensors": {"table_noise_m": 1e-6, "motor_noise_rad": 1e-5}}}, Ending.COMPLETE),
     "travel limit": ({"drive": {"travel_m": (-0.01, 0.03)}}, Ending.TRAVEL_LIMIT),
     "blocked": ({"simulation": {"effects": [PUSH]}, "drive": {"following_error_m": 0.001}}, Ending.FOLLOWING_ERROR),
@@ -30,7 +32,7 @@ CASES: dict[str, tuple[dict[str, Any], Ending]] = {
 
 @pytest.mark.parametrize("name", CASES)
 def test_same_bits_as_over_the_bus(tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(virtual, "SNAPSHOT_TICKS", 150)   # several in a run of 800 ticks
+    monkeypatch.setattr(virtual, "SNAPSHOT_TICKS", 150)  # several in a run of 800 ticks
     changes, ending = CASES[name]
     bench = bench_with(**changes)
     framed = run(tmp_path / "framed", bench)

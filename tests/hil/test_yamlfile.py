@@ -10,7 +10,7 @@ import pytest
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from hil.errors import FieldError, InputError, field_name
-from hil.yamlfile import load_model, located
+from hil.files.yaml_model import load_model, located
 
 
 class Colour(StrEnum):
@@ -55,56 +55,82 @@ def load(tmp_path: Path, text: str) -> Machine:
 
 
 def test_a_correct_file_gives_the_model(tmp_path: Path) -> None:
-    machine = load(tmp_path, "name: on\nnode_id: 0x1F\nparts:\n- {kind: wheel, radius_m: 1e-3}\n"
-                             "- {kind: arm, length_m: 2, colour: green}\n")
-    assert machine == Machine(name="on", node_id=31, parts=(
-        Wheel(kind="wheel", radius_m=0.001), Arm(kind="arm", length_m=2.0, colour=Colour.GREEN)))
+    machine = load(
+        tmp_path,
+        "name: on\nnode_id: 0x1F\nparts:\n- {kind: wheel, radius_m: 1e-3}\n- {kind: arm, length_m: 2, colour: green}\n",
+    )
+    assert machine == Machine(
+        name="on",
+        node_id=31,
+        parts=(Wheel(kind="wheel", radius_m=0.001), Arm(kind="arm", length_m=2.0, colour=Colour.GREEN)),
+    )
 
 
-@pytest.mark.parametrize(("text", "expected"), [
-    ("name: a\nparts:\n- kind: wheel\n  radius_m: long\n",
-     ":4: parts[0].radius_m: given 'long', allowed a valid number (radius [m]); correct the value"),
-    ("name: a\nparts:\n- kind: wheel\n  radius_m: '0.1'\n",
-     ":4: parts[0].radius_m: given '0.1', allowed a valid number"),
-    ("name: a\nparts:\n- kind: wheel\n  radius_m: -1\n",
-     ":4: parts[0].radius_m: given -1, allowed greater than 0"),
-    ("name: a\nparts:\n- kind: wheel\n  radius_m: .nan\n",
-     ":4: parts[0].radius_m: given nan, allowed a finite number"),
-    ("name: a\nparts:\n- kind: wheel\n  radius_m: .inf\n",
-     ":4: parts[0].radius_m: given inf, allowed a finite number"),
-    ("name: a\nparts:\n\n- kind: wheel\n",
-     ":4: parts[0].radius_m: given nothing, allowed a value (radius [m]); add this key"),
-    ("name: a\nparts:\n- kind: wheel\n  radius: 1\n  radius_m: 1\n",
-     ":4: parts[0].radius: given an unknown key, allowed one of kind, radius_m; did you mean radius_m?"),
-    ("name: a\nparts:\n- kind: weel\n",
-     ":3: parts[0].kind: given 'weel', allowed one of arm, wheel; did you mean wheel?"),
-    ("name: a\nparts:\n- length_m: 1\n",
-     ":3: parts[0].kind: given nothing, allowed one of arm, wheel; choose one"),
-    ("name: a\nparts:\n- {kind: arm, length_m: 1, colour: pink}\n",
-     ":3: parts[0].colour: given 'pink', allowed 'red' or 'green'"),
-    ("name: a\nspare:\n  kind: arm\n  length_m: 1\n  x: 1\n",
-     ":5: spare.x: given an unknown key, allowed one of kind, length_m"),
-    ("name: a\nparts:\n- kind: wheel\n  radius_m: 11\n",
-     ":4: parts[0].radius_m: given more than 10 m, allowed less"),
-    ("name: 5\n", ":1: name: given 5, allowed a valid string"),
-    ("name: a\nnode_id: 1.5\n", ":2: node_id: given 1.5, allowed a valid integer"),
-    ("name: a\nname: b\n", ":2: name: given twice, allowed once; remove one"),
-    ("name: &x a\n", ":1: given the anchor or alias 'x', allowed plain values"),
-    ("name: a\nparts: *x\n", ":2: given the anchor or alias 'x', allowed plain values"),
-    ("name: a\nparts: [1, 2\nnode_id: 3\n", ":3: broken YAML while parsing a flow sequence"),
-    ("name: a\n  parts: 1\n", ":2: broken YAML"),
-    ("name: a\n\tparts: 1\n", ":2: broken YAML"),
-    ("name: !!python/object:os.system a\n", ":1: broken YAML"),
-    ("name: a\n---\nname: b\n", ":2: broken YAML"),
-    ("", ":1: given an empty file"),
-    ("- 1\n", ":1: given a list, allowed a mapping of keys"),
-    ("name: a\nrange_m: [1.0]\n", ":2: range_m: given a list of 1, allowed one more value; add it"),
-    ("just text\n", ":1: given 'just text', allowed"),
-    ("? [a, b]\n: 1\n", ":1: broken YAML"),
-    ("name: \x07\n", ": not YAML text"),
-    ("node_id: " + "9" * 5000 + "\n", ": Exceeds the limit"),
-    ("[" * 3000, ": given hundreds of nested lists"),
-])
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (
+            "name: a\nparts:\n- kind: wheel\n  radius_m: long\n",
+            ":4: parts[0].radius_m: given 'long', allowed a valid number (radius [m]); correct the value",
+        ),
+        (
+            "name: a\nparts:\n- kind: wheel\n  radius_m: '0.1'\n",
+            ":4: parts[0].radius_m: given '0.1', allowed a valid number",
+        ),
+        ("name: a\nparts:\n- kind: wheel\n  radius_m: -1\n", ":4: parts[0].radius_m: given -1, allowed greater than 0"),
+        (
+            "name: a\nparts:\n- kind: wheel\n  radius_m: .nan\n",
+            ":4: parts[0].radius_m: given nan, allowed a finite number",
+        ),
+        (
+            "name: a\nparts:\n- kind: wheel\n  radius_m: .inf\n",
+            ":4: parts[0].radius_m: given inf, allowed a finite number",
+        ),
+        (
+            "name: a\nparts:\n\n- kind: wheel\n",
+            ":4: parts[0].radius_m: given nothing, allowed a value (radius [m]); add this key",
+        ),
+        (
+            "name: a\nparts:\n- kind: wheel\n  radius: 1\n  radius_m: 1\n",
+            ":4: parts[0].radius: given an unknown key, allowed one of kind, radius_m; did you mean radius_m?",
+        ),
+        (
+            "name: a\nparts:\n- kind: weel\n",
+            ":3: parts[0].kind: given 'weel', allowed one of arm, wheel; did you mean wheel?",
+        ),
+        ("name: a\nparts:\n- length_m: 1\n", ":3: parts[0].kind: given nothing, allowed one of arm, wheel; choose one"),
+        (
+            "name: a\nparts:\n- {kind: arm, length_m: 1, colour: pink}\n",
+            ":3: parts[0].colour: given 'pink', allowed 'red' or 'green'",
+        ),
+        (
+            "name: a\nspare:\n  kind: arm\n  length_m: 1\n  x: 1\n",
+            ":5: spare.x: given an unknown key, allowed one of kind, length_m",
+        ),
+        (
+            "name: a\nparts:\n- kind: wheel\n  radius_m: 11\n",
+            ":4: parts[0].radius_m: given more than 10 m, allowed less",
+        ),
+        ("name: 5\n", ":1: name: given 5, allowed a valid string"),
+        ("name: a\nnode_id: 1.5\n", ":2: node_id: given 1.5, allowed a valid integer"),
+        ("name: a\nname: b\n", ":2: name: given twice, allowed once; remove one"),
+        ("name: &x a\n", ":1: given the anchor or alias 'x', allowed plain values"),
+        ("name: a\nparts: *x\n", ":2: given the anchor or alias 'x', allowed plain values"),
+        ("name: a\nparts: [1, 2\nnode_id: 3\n", ":3: broken YAML while parsing a flow sequence"),
+        ("name: a\n  parts: 1\n", ":2: broken YAML"),
+        ("name: a\n\tparts: 1\n", ":2: broken YAML"),
+        ("name: !!python/object:os.system a\n", ":1: broken YAML"),
+        ("name: a\n---\nname: b\n", ":2: broken YAML"),
+        ("", ":1: given an empty file"),
+        ("- 1\n", ":1: given a list, allowed a mapping of keys"),
+        ("name: a\nrange_m: [1.0]\n", ":2: range_m: given a list of 1, allowed one more value; add it"),
+        ("just text\n", ":1: given 'just text', allowed"),
+        ("? [a, b]\n: 1\n", ":1: broken YAML"),
+        ("name: \x07\n", ": not YAML text"),
+        ("node_id: " + "9" * 5000 + "\n", ": Exceeds the limit"),
+        ("[" * 3000, ": given hundreds of nested lists"),
+    ],
+)
 def test_a_wrong_file_says_where_and_what(tmp_path: Path, text: str, expected: str) -> None:
     with pytest.raises(InputError) as caught:
         load(tmp_path, text)
@@ -135,7 +161,8 @@ def test_an_error_found_later_is_located(tmp_path: Path) -> None:
     path = tmp_path / "machine.yaml"
     path.write_text("name: a\n\nparts:\n- kind: wheel\n  radius_m: 1\n")
     assert str(located(path, FieldError(("parts", 0, "radius_m"), "too small"))) == (
-        f"{path}:5: parts[0].radius_m: too small")
+        f"{path}:5: parts[0].radius_m: too small"
+    )
 
 
 def test_field_errors_know_their_path() -> None:

@@ -21,20 +21,20 @@ from typing import Any
 import numpy as np
 import yaml
 
-from hil.bench import Bench, load_bench
+from hil.bench.bench_file import Bench, load_bench
 from hil.diagnosis.diagnose import diagnose
-from hil.importing import import_recording
-from hil.proof.conceal import draw
-from hil.proof.answers import same_law
-from hil.proof.side_by_side import side_by_side
-from hil.recording import Recording, read_recording, write_parquet
+from hil.proof.answer.worker_pool import side_by_side
+from hil.proof.draw.expected import same_law
+from hil.proof.draw.generator import draw
+from hil.recording.importing import import_recording
+from hil.recording.recording import Recording, read_recording, write_parquet
 
 HERE = Path(__file__).parent
 REFERENCE = HERE / "answers.json"
 RECORDINGS = HERE.parents[2] / "shared" / "recordings"
-HELD_OUT_CHANGE = 0.02       # relative change of a held-out rms that is printed
+HELD_OUT_CHANGE = 0.02  # relative change of a held-out rms that is printed
 SKIPPED = "skipped: its recordings are not beside the repository"
-SLOWER = 1.3                 # ratio of seconds that is printed
+SLOWER = 1.3  # ratio of seconds that is printed
 
 
 def main() -> int:
@@ -49,13 +49,21 @@ def main() -> int:
     todo = [Path(case["name"]) for case in cases if not answer_file(options.out, case["name"]).exists()]
     for number, name in enumerate(side_by_side(partial(answer, out=options.out), todo, options.jobs), 1):
         path = answer_file(options.out, name)
-        print(f"[{number}/{len(todo)}] {name}: {line(json.loads(path.read_text())) if path.exists() else SKIPPED}",
-              flush=True)
-    found = {case["name"]: json.loads(answer_file(options.out, case["name"]).read_text()) for case in cases
-             if answer_file(options.out, case["name"]).exists()}
+        print(
+            f"[{number}/{len(todo)}] {name}: {line(json.loads(path.read_text())) if path.exists() else SKIPPED}",
+            flush=True,
+        )
+    found = {
+        case["name"]: json.loads(answer_file(options.out, case["name"]).read_text())
+        for case in cases
+        if answer_file(options.out, case["name"]).exists()
+    }
     if options.store:
-        REFERENCE.write_text("{\n" + ",\n".join(
-            f"{json.dumps(name)}: {json.dumps(entry)}" for name, entry in sorted(found.items())) + "\n}\n")
+        REFERENCE.write_text(
+            "{\n"
+            + ",\n".join(f"{json.dumps(name)}: {json.dumps(entry)}" for name, entry in sorted(found.items()))
+            + "\n}\n"
+        )
         return 0
     return report(json.loads(REFERENCE.read_text()), found)
 
@@ -80,7 +88,7 @@ def answer(name: Path, out: Path) -> None:
     train, held_out, bench, wanted = recordings
     try:
         entry = compact(diagnose(train, held_out, bench).result.as_json())
-    except Exception as error:      # an exception is an answer too: the worst one
+    except Exception as error:  # an exception is an answer too: the worst one
         entry = {"verdict": "error", "error": f"{type(error).__name__}: {error}", "named": [], "seconds": 0.0}
     entry["wanted"] = wanted
     entry["data"] = digest([*train, *held_out])
@@ -90,8 +98,7 @@ def answer(name: Path, out: Path) -> None:
 
 
 def recorded(case: dict[str, Any], out: Path) -> tuple[list[Recording], list[Recording], Bench, Any] | None:
-    """Training and held-out recordings of a case, its bench, and the right answer: [verdict, [ids that are right]...].
-    """
+    """Training and held-out recordings of a case, its bench, and the right answer: [verdict, ids of each effect]."""
     if "folder" in case:
         folder = RECORDINGS / case["folder"]
         if not folder.is_dir():
@@ -114,48 +121,77 @@ def recorded(case: dict[str, Any], out: Path) -> tuple[list[Recording], list[Rec
         laws = [same_law(effect.effect) for effect in drawn.truth.effects]
         (place / "truth.json").write_text(json.dumps([drawn.truth.verdict, [list(law) for law in laws if law]]))
     train = [read_recording(place / f"train_{number}.parquet") for number in (1, 2)]
-    return (train, [read_recording(place / "holdout.parquet")], load_bench(place / "bench.yaml"),
-            json.loads((place / "truth.json").read_text()))
+    return (
+        train,
+        [read_recording(place / "holdout.parquet")],
+        load_bench(place / "bench.yaml"),
+        json.loads((place / "truth.json").read_text()),
+    )
 
 
 def digest(recordings: list[Recording]) -> str:
     """Digest of the recordings to six digits: another machine's linear algebra may change the last ones."""
-    text = ";".join(f"{name} {np.sqrt(np.mean(np.square(values))):.6g}" for recording in recordings
-                    for name, values in sorted(recording.columns.items()))
+    text = ";".join(
+        f"{name} {np.sqrt(np.mean(np.square(values))):.6g}"
+        for recording in recordings
+        for name, values in sorted(recording.columns.items())
+    )
     return hashlib.sha256(text.encode()).hexdigest()[:12]
 
 
 def compact(result: dict[str, Any]) -> dict[str, Any]:
     """The parts of diagnosis.json that are compared."""
-    rounded = lambda value: float(f"{value:.5g}")      # noqa: E731
+    rounded = lambda value: float(f"{value:.5g}")  # noqa: E731
     return {
         "verdict": result["verdict"],
-        "named": [[found["effect"], found["variant"], round(found["confidence"], 3), list(found["equivalents"])]
-                  for found in result["missing"]],
-        "parameters": {f"{found['effect']}.{name}": [rounded(entry["value"]), rounded(entry["std"])]
-                       for found in result["missing"] for name, entry in found["parameters"].items()},
-        "corrections": {name: [rounded(entry["value"]), rounded(entry["std"])]
-                        for name, entry in result["parameter_corrections"].items()},
-        "held_out": {name: [rounded(entry["validate"]["after_rms"]), rounded(entry["validate"]["noise_floor_rms"])]
-                     for name, entry in result["fit"].items() if entry["validate"]},
-        "block": (result["location"] or {}).get("block"), "not_testable": result["not_testable"],
-        "unexplained": rounded(result["unexplained"]["share"]), "seconds": round(result["runtime_s"], 1)}
+        "named": [
+            [found["effect"], found["variant"], round(found["confidence"], 3), list(found["equivalents"])]
+            for found in result["missing"]
+        ],
+        "parameters": {
+            f"{found['effect']}.{name}": [rounded(entry["value"]), rounded(entry["std"])]
+            for found in result["missing"]
+            for name, entry in found["parameters"].items()
+        },
+        "corrections": {
+            name: [rounded(entry["value"]), rounded(entry["std"])]
+            for name, entry in result["parameter_corrections"].items()
+        },
+        "held_out": {
+            name: [rounded(entry["validate"]["after_rms"]), rounded(entry["validate"]["noise_floor_rms"])]
+            for name, entry in result["fit"].items()
+            if entry["validate"]
+        },
+        "block": (result["location"] or {}).get("block"),
+        "not_testable": result["not_testable"],
+        "unexplained": rounded(result["unexplained"]["share"]),
+        "seconds": round(result["runtime_s"], 1),
+    }
 
 
 def right(entry: dict[str, Any]) -> bool:
     """Whether the verdict is right, every concealed effect is named or in a reported set, and nothing else is named."""
     verdict, laws = entry["wanted"]
     named = [{effect, *equivalents} for effect, _, _, equivalents in entry["named"]]
-    return bool(entry["verdict"] == verdict and (verdict != "missing_physics" or (
-        len(named) == len(laws) and all(any(found & set(law) for found in named) for law in laws))))
+    return bool(
+        entry["verdict"] == verdict
+        and (
+            verdict != "missing_physics"
+            or (len(named) == len(laws) and all(any(found & set(law) for found in named) for law in laws))
+        )
+    )
 
 
 def line(entry: dict[str, Any]) -> str:
     """An answer in one line."""
-    names = ", ".join(f"{effect}{f'/{variant}' if variant else ''} {confidence:.2f}"
-                      for effect, variant, confidence, _ in entry["named"])
-    return (f"{'right' if right(entry) else 'WRONG'} {entry['verdict']} [{names}] {entry['seconds']:.0f} s"
-            f"{' ' + entry['error'] if 'error' in entry else ''}")
+    names = ", ".join(
+        f"{effect}{f'/{variant}' if variant else ''} {confidence:.2f}"
+        for effect, variant, confidence, _ in entry["named"]
+    )
+    return (
+        f"{'right' if right(entry) else 'WRONG'} {entry['verdict']} [{names}] {entry['seconds']:.0f} s"
+        f"{' ' + entry['error'] if 'error' in entry else ''}"
+    )
 
 
 def report(before: dict[str, Any], after: dict[str, Any]) -> int:
@@ -170,10 +206,12 @@ def report(before: dict[str, Any], after: dict[str, Any]) -> int:
             print("".join(f"    {text}\n" for text in found), end="")
     both = sorted(set(before) & set(after))
     seconds = np.array([[before[name]["seconds"], after[name]["seconds"]] for name in both])
-    print(f"{len(both)} cases compared, {len(set(before) - set(after))} without an answer; right "
-          f"{sum(right(before[name]) for name in both)} -> {sum(right(after[name]) for name in both)}, "
-          f"right before and wrong now: {lost}; seconds {seconds[:, 0].sum():.0f} -> {seconds[:, 1].sum():.0f}, "
-          f"median {np.median(seconds[:, 0]):.1f} -> {np.median(seconds[:, 1]):.1f}")
+    print(
+        f"{len(both)} cases compared, {len(set(before) - set(after))} without an answer; right "
+        f"{sum(right(before[name]) for name in both)} -> {sum(right(after[name]) for name in both)}, "
+        f"right before and wrong now: {lost}; seconds {seconds[:, 0].sum():.0f} -> {seconds[:, 1].sum():.0f}, "
+        f"median {np.median(seconds[:, 0]):.1f} -> {np.median(seconds[:, 1]):.1f}"
+    )
     return int(lost > 0)
 
 

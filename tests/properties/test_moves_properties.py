@@ -10,10 +10,10 @@ from hypothesis import given, reject, settings
 from hypothesis import strategies as st
 
 from hil.errors import FieldError
-from hil.excitation import Chirp, Multisine, Spectrum, excitation
-from hil.moves import Motion, MotionLimits, Piece
-from hil.ruckig_moves import State, point_to_point, stop, time_optimal_duration_s
-from hil.sine_squared import reversals, sine_squared
+from hil.motion.excitation import Chirp, Multisine, Spectrum, excitation
+from hil.motion.pieces import Motion, MotionLimits, Piece
+from hil.motion.sine_squared import reversals, sine_squared
+from hil.motion.time_optimal import State, point_to_point, stop, time_optimal_duration_s
 
 TOLERANCE = 1e-9
 
@@ -74,11 +74,12 @@ def test_sine_squared_moves(start_m: float, stroke_m: float, limits: MotionLimit
 
 @given(position, stroke, st.integers(1, 5), limits_of)
 @settings(deadline=None)
-def test_reversals_turn_at_both_ends_and_come_back(start_m: float, stroke_m: float, cycles: int,
-                                                   limits: MotionLimits) -> None:
+def test_reversals_turn_at_both_ends_and_come_back(
+    start_m: float, stroke_m: float, cycles: int, limits: MotionLimits
+) -> None:
     try:
         move = reversals(start_m, stroke_m, cycles, limits)
-    except FieldError:   # too fast to turn within the stroke
+    except FieldError:  # too fast to turn within the stroke
         reject()
     motions = sampled(move.pieces)
     assert_within(motions, limits)
@@ -91,8 +92,11 @@ def test_reversals_turn_at_both_ends_and_come_back(start_m: float, stroke_m: flo
 def check_from_any_state(state: State, target_m: float, limits: MotionLimits) -> None:
     # what cannot be helped: the acceleration is brought to zero at full jerk, and the velocity goes on meanwhile
     carried = state.velocity_m_s + state.acceleration_m_s2 * abs(state.acceleration_m_s2) / (2 * limits.jerk_m_s3)
-    reach = MotionLimits(max(limits.velocity_m_s, abs(state.velocity_m_s), abs(carried)),
-                         max(limits.acceleration_m_s2, abs(state.acceleration_m_s2)), limits.jerk_m_s3)
+    reach = MotionLimits(
+        max(limits.velocity_m_s, abs(state.velocity_m_s), abs(carried)),
+        max(limits.acceleration_m_s2, abs(state.acceleration_m_s2)),
+        limits.jerk_m_s3,
+    )
     for move, target in ((point_to_point(state, target_m, limits), target_m), (stop(state, limits), None)):
         motions = sampled(move.pieces, 17)
         assert_within(motions, reach)
@@ -106,8 +110,9 @@ def test_three_thousand_random_states_stop_and_reach_new_targets() -> None:
     rng = np.random.default_rng(21)
     for _ in range(3000):
         limits = MotionLimits(*(10.0 ** rng.uniform([-3, -1, 0.5], [0.5, 1.5, 4])))
-        state = State(rng.uniform(-1, 1), limits.velocity_m_s * rng.uniform(-2, 2),
-                      limits.acceleration_m_s2 * rng.uniform(-2, 2))
+        state = State(
+            rng.uniform(-1, 1), limits.velocity_m_s * rng.uniform(-2, 2), limits.acceleration_m_s2 * rng.uniform(-2, 2)
+        )
         check_from_any_state(state, rng.uniform(-1, 1), limits)
 
 
@@ -125,11 +130,18 @@ def test_any_state_stops_and_reaches_a_new_target(state: State, target_m: float,
     check_from_any_state(state, target_m, limits)
 
 
-@given(st.sampled_from(Spectrum), st.booleans(), st.floats(0.5, 5), st.floats(6, 40), st.floats(1e-5, 1e-2),
-       st.just(0.0) | st.floats(1e-6, 0.05) | st.floats(-0.05, -1e-6))
+@given(
+    st.sampled_from(Spectrum),
+    st.booleans(),
+    st.floats(0.5, 5),
+    st.floats(6, 40),
+    st.floats(1e-5, 1e-2),
+    st.just(0.0) | st.floats(1e-6, 0.05) | st.floats(-0.05, -1e-6),
+)
 @settings(deadline=None, max_examples=40)
-def test_excitations_hold_limits_between_the_samples_too(spectrum: Spectrum, sweep: bool, start_hz: float,
-                                                         end_hz: float, amplitude_m: float, feed: float) -> None:
+def test_excitations_hold_limits_between_the_samples_too(
+    spectrum: Spectrum, sweep: bool, start_hz: float, end_hz: float, amplitude_m: float, feed: float
+) -> None:
     limits = MotionLimits(0.2, 2.0, 500.0)
     signal = Chirp(start_hz, end_hz, 4.0, spectrum) if sweep else Multisine(start_hz, end_hz, 2.0, spectrum)
     move = excitation(0.1, signal, 4.0, 0.5, amplitude_m, feed, limits)

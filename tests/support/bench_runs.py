@@ -8,24 +8,29 @@ from pathlib import Path
 from typing import Any
 
 from drivers.inprocess import InProcessBus
-from hil.bench import Bench
-from hil.clock import VirtualClock
-from hil.profile import Profile
-from hil.recorder import Recorder
-from hil.recording import Recording, read_recording
-from hil.rig import Rig
-from hil.run import _interruptible
-from hil.session import Outcome, Session, make_cycle
-from hil.simulated import load_simulated
-from hil.trajectory import plan
+from hil.bench.bench_file import Bench
+from hil.loop.clock import VirtualClock
+from hil.loop.devices import Rig
+from hil.loop.run import _interruptible
+from hil.loop.session import Outcome, Session, make_cycle
+from hil.loop.simulated_bench import load_simulated
+from hil.motion.profile import Profile
+from hil.motion.trajectory import plan
+from hil.recording.recording import Recording, read_recording
+from hil.recording.writer import Recorder
 
-MOVE = Profile.model_validate({
-    "schema_version": 1,
-    "limits": {"velocity_m_s": 0.6, "acceleration_m_s2": 2.2, "jerk_m_s3": 100.0},
-    "segments": [{"kind": "dwell", "duration_s": 0.1}, {"kind": "sine_squared", "to_m": 0.05, "feed_m_s": 0.1},
-                 {"kind": "dwell", "duration_s": 0.1}],
-})
-MOVING = 400     # a tick in the middle of the move
+MOVE = Profile.model_validate(
+    {
+        "schema_version": 1,
+        "limits": {"velocity_m_s": 0.6, "acceleration_m_s2": 2.2, "jerk_m_s3": 100.0},
+        "segments": [
+            {"kind": "dwell", "duration_s": 0.1},
+            {"kind": "sine_squared", "to_m": 0.05, "feed_m_s": 0.1},
+            {"kind": "dwell", "duration_s": 0.1},
+        ],
+    }
+)
+MOVING = 400  # a tick in the middle of the move
 
 
 class ScriptedClock(VirtualClock):
@@ -56,8 +61,14 @@ def bench_with(**changes: dict[str, Any]) -> Bench:
     return Bench.model_validate(data)
 
 
-def run(folder: Path, bench: Bench | None = None, script: Callable[[Rig, Session], Mapping[int, Callable[[], Any]]]
-        | None = None, profile: Profile = MOVE, bus: InProcessBus | None = None, kind: type[Session] = Session) -> Ran:
+def run(
+    folder: Path,
+    bench: Bench | None = None,
+    script: Callable[[Rig, Session], Mapping[int, Callable[[], Any]]] | None = None,
+    profile: Profile = MOVE,
+    bus: InProcessBus | None = None,
+    kind: type[Session] = Session,
+) -> Ran:
     """Run a profile; `script` says what happens at which tick of the clock (some five before the first row)."""
     bench = bench or bench_with()
     rig = Rig(bench, bus=bus)

@@ -37,8 +37,14 @@ def hil(folder: Path, *arguments: str) -> Ran:
 
 def process(folder: Path, *arguments: str) -> Ran:
     """Run `hil` as a process of its own."""
-    ran = subprocess.run([sys.executable, "-m", "hil.cli", *arguments], cwd=folder, capture_output=True, text=True,
-                         timeout=120, check=False)
+    ran = subprocess.run(
+        [sys.executable, "-m", "hil.cli", *arguments],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
     return Ran(ran.returncode, ran.stdout, ran.stderr)
 
 

@@ -9,20 +9,22 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hil.bench import Bench, load_bench
-from hil.diagnosis.model import Model
-from hil.diagnosis.terms import Term
-from hil.profile import Profile
-from hil.recording import Recording
-from hil.trajectory import plan
+from hil.bench.bench_file import Bench, load_bench
+from hil.diagnosis.estimation.hypothesis import Model
+from hil.diagnosis.estimation.terms import Term
+from hil.motion.profile import Profile
+from hil.motion.trajectory import plan
+from hil.recording.recording import Recording
 from hil.twin.axis import Start
 
 RIG = Path(__file__).parents[2].parent / "shared" / "recordings" / "rig"
 
 SEGMENTS = [
     {"kind": "dwell", "duration_s": 0.2},
-    {"kind": "sine_squared", "to_m": 0.06, "feed_m_s": 0.1}, {"kind": "dwell", "duration_s": 0.1},
-    {"kind": "sine_squared", "to_m": 0.0, "feed_m_s": 0.25}, {"kind": "dwell", "duration_s": 0.1},
+    {"kind": "sine_squared", "to_m": 0.06, "feed_m_s": 0.1},
+    {"kind": "dwell", "duration_s": 0.1},
+    {"kind": "sine_squared", "to_m": 0.0, "feed_m_s": 0.25},
+    {"kind": "dwell", "duration_s": 0.1},
     {"kind": "sine_squared", "to_m": 0.0015, "feed_m_s": 0.004},
     {"kind": "sine_squared", "to_m": 0.0, "feed_m_s": 0.004},
     {"kind": "dwell", "duration_s": 0.1},
@@ -37,13 +39,24 @@ def bench(**axis: float) -> Bench:
 
 def moves(segments: list[dict[str, Any]], times: int = 1) -> Profile:
     """A profile of segments, `times` times over."""
-    return Profile.model_validate({
-        "schema_version": 1, "limits": {"velocity_m_s": 0.4, "acceleration_m_s2": 2.2, "jerk_m_s3": 100.0},
-        "segments": [{"kind": "repeat", "times": times, "segments": segments}]})
+    return Profile.model_validate(
+        {
+            "schema_version": 1,
+            "limits": {"velocity_m_s": 0.4, "acceleration_m_s2": 2.2, "jerk_m_s3": 100.0},
+            "segments": [{"kind": "repeat", "times": times, "segments": segments}],
+        }
+    )
 
 
-def recorded(truth: Bench, *terms: Term, seed: int = 1, times: int = 1, name: str = "run",
-             profile: Profile | None = None, torque_noise_n_m: float = 0.01) -> Recording:
+def recorded(
+    truth: Bench,
+    *terms: Term,
+    seed: int = 1,
+    times: int = 1,
+    name: str = "run",
+    profile: Profile | None = None,
+    torque_noise_n_m: float = 0.01,
+) -> Recording:
     """What an axis that is `truth` with `terms` records over a profile, else over the segments, `times` times over."""
     trajectory = plan(profile or moves(SEGMENTS, times), truth.gains.period_s)
     model = Model(truth, terms)
@@ -51,13 +64,19 @@ def recorded(truth: Bench, *terms: Term, seed: int = 1, times: int = 1, name: st
     noise = np.random.default_rng(seed)
     count = 2.0 * np.pi / truth.encoders.motor.counts_per_rev
     n = answer.torque.size
-    return Recording(name, {
-        "time_s": np.arange(n) * truth.gains.period_s,
-        "position_command_m": trajectory.position_m, "velocity_command_m_s": trajectory.velocity_m_s,
-        "motor_position_rad": np.round(answer.motor_position / count) * count,
-        "table_position_m": np.round(answer.table_position_m / 0.5e-6) * 0.5e-6,
-        "torque_command_n_m": answer.torque_command,
-        "torque_n_m": answer.torque + noise.normal(0.0, torque_noise_n_m, n)}, truth.gains.period_s)
+    return Recording(
+        name,
+        {
+            "time_s": np.arange(n) * truth.gains.period_s,
+            "position_command_m": trajectory.position_m,
+            "velocity_command_m_s": trajectory.velocity_m_s,
+            "motor_position_rad": np.round(answer.motor_position / count) * count,
+            "table_position_m": np.round(answer.table_position_m / 0.5e-6) * 0.5e-6,
+            "torque_command_n_m": answer.torque_command,
+            "torque_n_m": answer.torque + noise.normal(0.0, torque_noise_n_m, n),
+        },
+        truth.gains.period_s,
+    )
 
 
 def changed(recording: Recording, **columns: object) -> Recording:
@@ -67,7 +86,7 @@ def changed(recording: Recording, **columns: object) -> Recording:
         if change is None:
             del new[name]
         else:
-            new[name] = change if isinstance(change, np.ndarray) else change * new[name]   # type: ignore[operator]
+            new[name] = change if isinstance(change, np.ndarray) else change * new[name]  # type: ignore[operator]
     return replace(recording, columns=new)
 
 

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-DEADLINE_S = 60.0   # a hang, not a measure of speed
+DEADLINE_S = 60.0  # a hang, not a measure of speed
 
 
 def wait_for(condition: Callable[[], bool]) -> None:

@@ -21,7 +21,11 @@ from hil.proof.peers.regressors import BLOCKS
 from hil.proof.peers.residual_tests import residual_tests
 
 METHODS: Mapping[str, Callable[[Case], Answer]] = {
-    "pysindy": pysindy, "pysindy_on_blocks": partial(pysindy, blocks=BLOCKS),
-    "forward_selection": forward_selection, "forward_selection_on_blocks": partial(forward_selection, blocks=BLOCKS),
-    "fit_everything": fit_everything, "residual_tests": residual_tests}
-SLOW = ("fit_everything",)    # minutes a case
+    "pysindy": pysindy,
+    "pysindy_on_blocks": partial(pysindy, blocks=BLOCKS),
+    "forward_selection": forward_selection,
+    "forward_selection_on_blocks": partial(forward_selection, blocks=BLOCKS),
+    "fit_everything": fit_everything,
+    "residual_tests": residual_tests,
+}
+SLOW = ("fit_everything",)  # minutes a case

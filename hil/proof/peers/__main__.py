@@ -15,25 +15,27 @@ from typing import Annotated
 import typer
 
 from hil.errors import HilError
-from hil.proof.blind import answered
+from hil.proof.answer.blind import answered
+from hil.proof.answer.worker_pool import cases_in, side_by_side
 from hil.proof.peers import METHODS, SLOW
 from hil.proof.peers.answer import answer_case
-from hil.proof.side_by_side import cases_in, side_by_side
 
-Name = StrEnum("Name", {name: name for name in METHODS})    # type: ignore[misc]   # choices of the command line
+Name = StrEnum("Name", {name: name for name in METHODS})  # type: ignore[misc]   # choices of the command line
 _QUICK = [Name(name) for name in METHODS if name not in SLOW]
 
 
-def answer_cases(cases: Annotated[Path, typer.Argument(help="Folder with a folder for each case")],
-                 out: Annotated[Path, typer.Argument(help="Folder for the answers, a folder for each method")],
-                 method: Annotated[list[Name], typer.Option(help="Who answers")] = _QUICK,
-                 jobs: Annotated[int, typer.Option(min=1, help="Cases at once, each on its share of the cores")] = 1,
-                 first: Annotated[int | None, typer.Option(min=1, help="Only so many cases, which lie in mixed order")]
-                 = None) -> None:
+def answer_cases(
+    cases: Annotated[Path, typer.Argument(help="Folder with a folder for each case")],
+    out: Annotated[Path, typer.Argument(help="Folder for the answers, a folder for each method")],
+    method: Annotated[list[Name], typer.Option(help="Who answers")] = _QUICK,
+    jobs: Annotated[int, typer.Option(min=1, help="Cases at once, each on its share of the cores")] = 1,
+    first: Annotated[int | None, typer.Option(min=1, help="Only so many cases, which lie in mixed order")] = None,
+) -> None:
     """Have other methods answer every case that they have not answered yet; prints the name of each that is done."""
     names = [str(name) for name in method]
-    todo = [place for place in cases_in(cases, out)[:first]
-            if not all(answered(out / name / place.name) for name in names)]
+    todo = [
+        place for place in cases_in(cases, out)[:first] if not all(answered(out / name / place.name) for name in names)
+    ]
     for done in side_by_side(partial(answer_case, out=out, methods=names), todo, jobs):
         print(done, flush=True)
 

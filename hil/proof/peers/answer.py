@@ -7,10 +7,10 @@ from pathlib import Path
 from time import monotonic
 
 from hil.errors import HilError, InputError
-from hil.proof.blind import DIAGNOSIS, ERROR, answered
+from hil.files.output import write_json
+from hil.proof.answer.blind import DIAGNOSIS, ERROR, answered
 from hil.proof.peers import METHODS
 from hil.proof.peers.case import read_case
-from hil.report.output import write_json
 
 
 def answer_case(case: Path, out: Path, methods: Sequence[str]) -> None:

@@ -11,15 +11,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from hil.bench import Bench, load_bench
-from hil.diagnosis import search
-from hil.diagnosis.fit import Fit, evaluate
-from hil.diagnosis.judge import refit_matters
+from hil.bench.bench_file import Bench, load_bench
+from hil.diagnosis.estimation.fit import Fit, evaluate
 from hil.diagnosis.preflight import prepare
 from hil.diagnosis.result import Verdict
-from hil.diagnosis.starts import Scene, scene
-from hil.measured import Measured
-from hil.recording import read_recording
+from hil.diagnosis.search import successive_halving
+from hil.diagnosis.search.initial_values import Scene, scene
+from hil.diagnosis.verdict.judge import refit_matters
+from hil.identification.dataset import Measured
+from hil.recording.recording import read_recording
 
 Answer = dict[str, Any]
 _TRAIN, _HELD_OUT = ("train_1", "train_2"), ("holdout",)
@@ -60,9 +60,15 @@ def read_case(folder: Path) -> Case:
     bench = load_bench(folder / "bench.yaml")
     names = (*_TRAIN, *_HELD_OUT)
     runs = prepare([read_recording(folder / f"{name}.parquet") for name in names], bench)
-    train, held_out = tuple(runs[:len(_TRAIN)]), tuple(runs[len(_TRAIN):])
-    nominal = search.nominal(bench, train)
+    train, held_out = tuple(runs[: len(_TRAIN)]), tuple(runs[len(_TRAIN) :])
+    nominal = successive_halving.nominal(bench, train)
     fitted, _ = nominal.model.resolved(nominal.x)
     blocks = [nominal.model.blocks(nominal.x, run) for run in train]
-    return Case(bench, train, held_out, evaluate(nominal.model, train), nominal,
-                scene(train, fitted, blocks, nominal.model.observer_s))
+    return Case(
+        bench,
+        train,
+        held_out,
+        evaluate(nominal.model, train),
+        nominal,
+        scene(train, fitted, blocks, nominal.model.observer_s),
+    )

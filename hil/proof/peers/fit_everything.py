@@ -13,19 +13,19 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from hil.diagnosis import search
-from hil.diagnosis.explain import MATERIAL
-from hil.diagnosis.fit import POOL, Fit, evaluate, fit
-from hil.diagnosis.screen import Lead
-from hil.diagnosis.starts import Start, starts
-from hil.diagnosis.terms import Term
-from hil.measured import Measured
+from hil.arrays import FloatArray
+from hil.diagnosis.estimation.fit import POOL, Fit, evaluate, fit
+from hil.diagnosis.estimation.terms import Term
+from hil.diagnosis.search import successive_halving
+from hil.diagnosis.search.forward_selection import MATERIAL
+from hil.diagnosis.search.initial_values import Start, starts
+from hil.diagnosis.search.score_test import Lead
+from hil.identification.dataset import Measured
 from hil.proof.peers.case import Answer, Case
 
-EVALUATIONS = 12         # a minute on two cores for half a minute of recordings
-SIGNIFICANT = 2.0        # standard errors
+EVALUATIONS = 12  # a minute on two cores for half a minute of recordings
+SIGNIFICANT = 2.0  # standard errors
 # The parameter that says how strong a mechanism is, where its start cannot be scaled and it is not the first.
 _STRENGTH = {"structural_mode": 2}
 # No value of these is without effect but infinity or that of another parameter: that they change nothing says the same.
@@ -35,15 +35,24 @@ _NEVER_ZERO = ("stribeck_friction", "presliding_hysteresis", "torque_saturation"
 def fit_everything(case: Case, evaluations: int = EVALUATIONS) -> Answer:
     """The answer of one fit of everything about a case."""
     begun = {start.effect: start for start in starts(case.scene, case.bench)}
-    terms = tuple(_weak(lead, begun[lead.term.effect]) for lead in search.leads(case.nominal, case.train))
+    terms = tuple(_weak(lead, begun[lead.term.effect]) for lead in successive_halving.leads(case.nominal, case.train))
     model = replace(case.nominal.model, terms=terms)
-    found = fit(model, case.train, np.concatenate([case.nominal.x, model.initial()[case.nominal.x.size:]]),
-                evaluations=evaluations)
-    significant = [index for index, term in enumerate(terms)
-                   if term.effect in _NEVER_ZERO or _strength_over_error(found, index, begun) > SIGNIFICANT]
+    found = fit(
+        model,
+        case.train,
+        np.concatenate([case.nominal.x, model.initial()[case.nominal.x.size :]]),
+        evaluations=evaluations,
+    )
+    significant = [
+        index
+        for index, term in enumerate(terms)
+        if term.effect in _NEVER_ZERO or _strength_over_error(found, index, begun) > SIGNIFICANT
+    ]
     grown = dict(zip(significant, POOL.map(lambda index: _without(found, index, case.train), significant), strict=True))
-    named = sorted((index for index in significant if grown[index] > MATERIAL * found.residuals.size),
-                   key=lambda index: -grown[index])
+    named = sorted(
+        (index for index in significant if grown[index] > MATERIAL * found.residuals.size),
+        key=lambda index: -grown[index],
+    )
     return case.answer([terms[index].effect for index in named])
 
 
@@ -67,7 +76,7 @@ def _strength_over_error(found: Fit, index: int, begun: dict[str, Start]) -> flo
     return float(value / max(error, 1e-300))
 
 
-def _standard_errors(found: Fit) -> NDArray[np.float64]:
+def _standard_errors(found: Fit) -> FloatArray:
     """Of each coordinate, as if all rows were independent: infinite where nothing depends on it."""
     normal = found.jacobian.T @ found.jacobian
     size = np.sqrt(np.maximum(np.diag(normal), 1e-300))

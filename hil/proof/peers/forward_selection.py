@@ -16,7 +16,7 @@ from math import log
 from hil.proof.peers.case import Answer, Case
 from hil.proof.peers.regressors import PLANT, Equation, equations, forward, named
 
-_MOST = 20           # terms
+_MOST = 20  # terms
 
 
 def forward_selection(case: Case, blocks: Sequence[str] = PLANT) -> Answer:

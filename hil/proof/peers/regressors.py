@@ -15,18 +15,16 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from hil.diagnosis.explain import MATERIAL
-from hil.measured import Measured
+from hil.arrays import FloatArray
+from hil.diagnosis.search.forward_selection import MATERIAL
+from hil.identification.dataset import Measured
 from hil.proof.peers.case import Case
 from hil.proof.peers.terms import MAKERS, Effects
 
-FloatArray = NDArray[np.float64]
-
 BLOCKS = tuple(MAKERS)
-PLANT = ("motor", "transmission")     # what others write equations for
-_DEPENDENT = 1e-6                     # share of a term that is left of it, below which the others say the same
+PLANT = ("motor", "transmission")  # what others write equations for
+_DEPENDENT = 1e-6  # share of a term that is left of it, below which the others say the same
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,8 +41,12 @@ class Equation:
     noise: float
 
 
-def equations(case: Case, runs: Sequence[Measured], blocks: Sequence[str] = BLOCKS,
-              residuals: Callable[[Measured], Mapping[str, FloatArray]] | None = None) -> list[Equation]:
+def equations(
+    case: Case,
+    runs: Sequence[Measured],
+    blocks: Sequence[str] = BLOCKS,
+    residuals: Callable[[Measured], Mapping[str, FloatArray]] | None = None,
+) -> list[Equation]:
     """The equations of some blocks of a case over runs, one after the other; the grids are those of the training
     recordings. Without a linear encoder there is no transmission.
 
@@ -56,14 +58,17 @@ def equations(case: Case, runs: Sequence[Measured], blocks: Sequence[str] = BLOC
             continue
         drafts = [MAKERS[block](run, case.fitted, case.scene) for run in runs]
         if residuals is not None:
-            drafts = [replace(draft, target=errors[block], noise=1.0) if block in errors else draft
-                      for draft, errors in zip(drafts, map(residuals, runs), strict=True)]
+            drafts = [
+                replace(draft, target=errors[block], noise=1.0) if block in errors else draft
+                for draft, errors in zip(drafts, map(residuals, runs), strict=True)
+            ]
         rows = np.concatenate([draft.table(run.period_s) for draft, run in zip(drafts, runs, strict=True)])
         count = 1 + len(drafts[0].nominal)
         basis, _ = np.linalg.qr(rows[:, 1:count])
         rows -= basis @ (basis.T @ rows)
-        found.append(Equation(block, rows[:, 0], rows[:, count:], drafts[0].effects,
-                              max(draft.noise for draft in drafts)))
+        found.append(
+            Equation(block, rows[:, 0], rows[:, count:], drafts[0].effects, max(draft.noise for draft in drafts))
+        )
     return found
 
 

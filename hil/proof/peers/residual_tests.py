@@ -13,19 +13,17 @@ residual away names the effect. Whiteness is not asked for: encoders count, whic
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import norm
 
-from hil.diagnosis.explain import MATERIAL
-from hil.diagnosis.model import scales
-from hil.measured import Measured
+from hil.arrays import FloatArray
+from hil.diagnosis.estimation.hypothesis import scales
+from hil.diagnosis.search.forward_selection import MATERIAL
+from hil.identification.dataset import Measured
 from hil.proof.peers.case import Answer, Case
 from hil.proof.peers.regressors import Equation, equations
 
-FloatArray = NDArray[np.float64]
-
-_LEVEL = 0.99        # of all tests of a case
-_LAGS = 200          # rows, up to which a signal remembers
+_LEVEL = 0.99  # of all tests of a case
+_LAGS = 200  # rows, up to which a signal remembers
 _CHANNELS = {"motor": "motor", "transmission": "table"}
 
 
@@ -69,5 +67,5 @@ def _outside(equation: Equation, bound: float) -> list[tuple[float, str]]:
 def _autocorrelation(values: FloatArray) -> FloatArray:
     """Of lags 0 to _LAGS."""
     size = 1 << (2 * values.size - 1).bit_length()
-    products = np.fft.irfft(np.abs(np.fft.rfft(values, size)) ** 2, size)[:_LAGS + 1]
+    products = np.fft.irfft(np.abs(np.fft.rfft(values, size)) ** 2, size)[: _LAGS + 1]
     return np.asarray(products / max(products[0], 1e-300), dtype=np.float64)

@@ -14,16 +14,15 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 from scipy.signal import bilinear, lfilter
 
-from hil import control
-from hil.bench import Bench
-from hil.measured import Measured
+from hil.arrays import FloatArray
+from hil.bench.bench_file import Bench
+from hil.control import cascade
+from hil.identification.dataset import Measured
 
-FloatArray = NDArray[np.float64]
-
-SMOOTH_S = 0.002             # standard deviation of the Gaussian: passes some 66 Hz
-_TRUNCATE = 8.0              # standard deviations: derivatives of a constant are zero to rounding
-_REACH = 4.0                 # up to which it sees anything to speak of
-SLIDING_M_S = 1e-4           # at the table: what is slower counts as rest
+SMOOTH_S = 0.002  # standard deviation of the Gaussian: passes some 66 Hz
+_TRUNCATE = 8.0  # standard deviations: derivatives of a constant are zero to rounding
+_REACH = 4.0  # up to which it sees anything to speak of
+SLIDING_M_S = 1e-4  # at the table: what is slower counts as rest
 
 
 def smooth(values: FloatArray, period_s: float, order: int = 0) -> FloatArray:
@@ -98,9 +97,14 @@ def law(run: Measured, bench: Bench) -> Callable[[FloatArray, float], FloatArray
         gains = bench.gains
         if filter_s > 0.0:
             gains = gains._replace(filter_coefficient=1.0 - math.exp(-gains.period_s / filter_s))
-        state = control.init(float(run.motor[0]), run.start.velocity_m_s / gains.ratio_m_rad, run.start.torque,
-                             gains.period_s, run.start.tick)
-        torque, _ = control.replay(gains, state, run.position_command_m, run.velocity_command_m_s, motor, feedback)
+        state = cascade.init(
+            float(run.motor[0]),
+            run.start.velocity_m_s / gains.ratio_m_rad,
+            run.start.torque,
+            gains.period_s,
+            run.start.tick,
+        )
+        torque, _ = cascade.replay(gains, state, run.position_command_m, run.velocity_command_m_s, motor, feedback)
         return np.asarray(torque, dtype=np.float64)
 
     return command

@@ -13,22 +13,22 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from hil.bench import Bench
-from hil.diagnosis.starts import Scene
-from hil.measured import Measured
+from hil.arrays import FloatArray
+from hil.bench.bench_file import Bench
+from hil.diagnosis.search.initial_values import Scene
+from hil.identification.dataset import Measured
 from hil.proof.peers import signals
 
-FloatArray = NDArray[np.float64]
 Effects = tuple[str, ...]
 
 _DELAYS_S = (0.25e-3, 0.5e-3, 1e-3, 2e-3)
 _STRIBECK_M_S = (1.5e-3, 5e-3, 15e-3)
 _BRISTLES_M = (1e-6, 4e-6, 16e-6)
 _WARMING_S = (2.0, 6.0, 20.0)
-_LIMITS = (0.65, 0.75, 0.85, 0.95)         # of the largest torque
-_DEAD_ZONES = (0.03, 0.1, 0.3)             # of Coulomb friction
+_LIMITS = (0.65, 0.75, 0.85, 0.95)  # of the largest torque
+_DEAD_ZONES = (0.03, 0.1, 0.3)  # of Coulomb friction
 _MODES_HZ = (15.0, 22.0, 32.0, 47.0, 68.0, 100.0)
-_PLAY = (0.02, 0.1, 0.5)                   # of the largest acceleration; the last is a soft zone
+_PLAY = (0.02, 0.1, 0.5)  # of the largest acceleration; the last is a soft zone
 
 
 @dataclass
@@ -58,6 +58,7 @@ class Draft:
 
     def table(self, period_s: float) -> FloatArray:
         """Target, nominal columns and terms side by side, of the rows that count."""
+
         def shown(values: FloatArray) -> FloatArray:
             return signals.smooth(values, period_s) if self.smooth else values
 
@@ -81,16 +82,16 @@ def _drive(run: Measured, bench: Bench, scene: Scene) -> Draft:
     return draft
 
 
-def _add_torque_path(draft: Draft, run: Measured, torque: FloatArray, scene: Scene, sign: float, *late: str,
-                     negative: Effects = ()) -> None:
+def _add_torque_path(
+    draft: Draft, run: Measured, torque: FloatArray, scene: Scene, sign: float, *late: str, negative: Effects = ()
+) -> None:
     """What does not come through of a torque: late, behind a lag, beyond a limit, within a dead zone.
 
     Made of the command: the measured torque would explain its own noise.
     """
     for time_s in _DELAYS_S:
         draft.add(sign * (torque - signals.delayed(torque, time_s, run.period_s)), *late, negative=negative)
-        draft.add(sign * (torque - signals.lagged(torque, time_s, run.period_s)), "current_loop_lag",
-                  negative=negative)
+        draft.add(sign * (torque - signals.lagged(torque, time_s, run.period_s)), "current_loop_lag", negative=negative)
     for share in _LIMITS:
         limit = share * scene.peak_torque
         draft.add(sign * (torque - np.clip(torque, -limit, limit)), "torque_saturation")
@@ -107,16 +108,20 @@ def _motor(run: Measured, bench: Bench, scene: Scene) -> Draft:
     speed, friction = np.abs(ratio * velocity), way + velocity / scene.peak_speed
     command = signals.at_rows(run.torque_command)
     nominal = [acceleration, velocity, signals.smooth(way, period_s)]
-    if run.table_m.size:    # and what the modes of a longer chain add to first order
+    if run.table_m.size:  # and what the modes of a longer chain add to first order
         nominal += [signals.smooth(run.table_m, period_s, order) for order in (2, 4)]
-    draft = Draft(signals.at_rows(run.torque), run.noise.torque, nominal,
-                  _judged(run) & signals.sliding(ratio * velocity, period_s))
+    draft = Draft(
+        signals.at_rows(run.torque),
+        run.noise.torque,
+        nominal,
+        _judged(run) & signals.sliding(ratio * velocity, period_s),
+    )
     draft.add(np.ones(motor.size), "asymmetric_friction", "constant_load")
     draft.add(speed, "asymmetric_friction")
     draft.add(position, "spring_load")
     draft.add(_window(time_s, scene), "external_force")
     for slow_m_s in _STRIBECK_M_S:
-        draft.add(way * np.exp(-(speed / slow_m_s) ** 2), "stribeck_friction")
+        draft.add(way * np.exp(-((speed / slow_m_s) ** 2)), "stribeck_friction")
         draft.add(way * np.exp(-speed / slow_m_s), "stribeck_friction")
     distance = signals.since_reversal(position, way)
     for length_m in _BRISTLES_M:
@@ -160,8 +165,7 @@ def _transmission(run: Measured, bench: Bench, scene: Scene) -> Draft:
     draft.add(_window(time_s, scene), "external_force")
     for share in _PLAY:
         width = share * float(np.max(np.abs(acceleration)))
-        draft.add(np.clip(acceleration, -width, width) / width,
-                  "preload_loss" if share == _PLAY[-1] else "backlash")
+        draft.add(np.clip(acceleration, -width, width) / width, "preload_loss" if share == _PLAY[-1] else "backlash")
     for frequency_hz in _MODES_HZ:
         draft.add(signals.swayed(signals.curvature(table, period_s), frequency_hz, period_s), "structural_mode")
     return draft
@@ -179,4 +183,8 @@ def _judged(run: Measured) -> NDArray[np.bool_]:
 
 
 MAKERS: Mapping[str, Callable[[Measured, Bench, Scene], Draft]] = {
-    "controller": _controller, "drive": _drive, "motor": _motor, "transmission": _transmission}
+    "controller": _controller,
+    "drive": _drive,
+    "motor": _motor,
+    "transmission": _transmission,
+}

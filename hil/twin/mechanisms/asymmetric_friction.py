@@ -10,9 +10,7 @@ from hil.twin.mechanism import PARAMETERS, Block, Dimension, Mechanism, Moment, 
 
 
 @njit
-def _offset(
-    value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]
-) -> float:
+def _offset(value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]) -> float:
     offset, variant = parameters[0], parameters[PARAMETERS - 1]
     if variant == 0.0:
         return value + offset
@@ -27,10 +25,10 @@ MECHANISM = Mechanism(
     element="ball nut, seals and guideways",
     sentence="Friction in positive direction is {offset_torque_n_m} above the mean of both directions.",
     second_sentence="Friction differs by direction, the more the faster: at {viscous_speed}, where viscous friction "
-                    "equals Coulomb friction, it is {offset_torque_n_m} above the mean of both in positive direction.",
+    "equals Coulomb friction, it is {offset_torque_n_m} above the mean of both in positive direction.",
     equation="T_f = Fc sign(v) + T_0; at rest T_0 - Fc <= T_f <= T_0 + Fc; with speed: T_0 |v| / v_r, v_r = Fc / c",
     source="Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30 (1994) 1083, direction dependence; its "
-           "slope over speed differs by direction too: Armstrong-Hélouvry, Control of Machines with Friction (1991)",
+    "slope over speed differs by direction too: Armstrong-Hélouvry, Control of Machines with Friction (1991)",
     parameters=(Parameter("offset_torque_n_m", Dimension.TORQUE, -1e3, 1e3),),
     stage=Stage.BIAS,
     contribution=_offset,

@@ -13,9 +13,7 @@ from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, S
 
 
 @njit
-def _free_play(
-    value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]
-) -> float:
+def _free_play(value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]) -> float:
     half = 0.5 * parameters[0] / at.ratio_m
     if value > half:
         return value - half

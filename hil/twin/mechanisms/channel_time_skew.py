@@ -6,33 +6,36 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hil.arrays import FloatArray
 from hil.twin.mechanism import Block, Dimension, Mechanism, Parameter, Stage
 
-Channels = tuple[NDArray[np.float64], ...]   # motor position, table position, torque command, torque
+Channels = tuple[FloatArray, ...]  # motor position, table position, torque command, torque
 
-_VARIANTS = {"table_position": 1, "torque": 3, "motor_position": 0}   # name: index in Channels
+_VARIANTS = {"table_position": 1, "torque": 3, "motor_position": 0}  # name: index in Channels
 
 
 def _skewed(channels: Channels, parameters: Sequence[float], variant: int, period_s: float) -> Channels:
     """The channels, each (n,), with that of the variant late by the delay; its ends are held."""
     name, late = list(_VARIANTS.items())[variant]
     delayed = _delayed_mean if name == "torque" else _delayed
-    return tuple(delayed(channel, parameters[0] / period_s) if index == late else channel
-                 for index, channel in enumerate(channels))
+    return tuple(
+        delayed(channel, parameters[0] / period_s) if index == late else channel
+        for index, channel in enumerate(channels)
+    )
 
 
-def _delayed_mean(means: NDArray[np.float64], periods: float) -> NDArray[np.float64]:
+def _delayed_mean(means: FloatArray, periods: float) -> FloatArray:
     """Means over each period (n,) of what is held over it, later by a number of periods."""
     whole = math.floor(periods)
     f, last = periods - whole, means.size - 1
     nearest = np.arange(means.size) - whole
-    return np.asarray((1.0 - f) * means[np.clip(nearest, 0, last)] + f * means[np.clip(nearest - 1, 0, last)],
-                      dtype=np.float64)
+    return np.asarray(
+        (1.0 - f) * means[np.clip(nearest, 0, last)] + f * means[np.clip(nearest - 1, 0, last)], dtype=np.float64
+    )
 
 
-def _delayed(samples: NDArray[np.float64], periods: float) -> NDArray[np.float64]:
+def _delayed(samples: FloatArray, periods: float) -> FloatArray:
     """Samples (n,) later by a number of periods: cubic convolution, continuous in delay and slope."""
     whole = math.floor(periods)
     f = periods - whole

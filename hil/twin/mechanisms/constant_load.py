@@ -13,9 +13,7 @@ from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, S
 
 
 @njit
-def _load(
-    value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]
-) -> float:
+def _load(value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]) -> float:
     return value - parameters[0]
 
 

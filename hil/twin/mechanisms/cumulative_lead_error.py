@@ -10,9 +10,7 @@ from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, S
 
 
 @njit
-def _longer_lead(
-    value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]
-) -> float:
+def _longer_lead(value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]) -> float:
     # the motor position is the table's, but for deflections of the order of the error
     return value + parameters[0] * at.table_position_m / at.ratio_m
 

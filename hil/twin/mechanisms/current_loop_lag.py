@@ -11,9 +11,7 @@ from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, S
 
 
 @njit
-def _lagging_current(
-    value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]
-) -> float:
+def _lagging_current(value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]) -> float:
     # memory: the torque at the end of the last step, and whether there was one
     if memory[1] == 0.0:
         memory[0] = value

@@ -14,9 +14,7 @@ from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, S
 
 
 @njit
-def _eccentric_reading(
-    value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]
-) -> float:
+def _eccentric_reading(value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]) -> float:
     return value + parameters[0] * math.sin(at.angle_rad + parameters[1])
 
 

@@ -10,9 +10,7 @@ from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, S
 
 
 @njit
-def _push(
-    value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]
-) -> float:
+def _push(value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]) -> float:
     force_n, start_s, end_s = parameters[0], parameters[1], parameters[2]
     if at.step_s <= 0.0:
         return value + force_n if start_s <= at.time_s < end_s else value

@@ -11,9 +11,7 @@ from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, S
 
 
 @njit
-def _warming(
-    value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]
-) -> float:
+def _warming(value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]) -> float:
     fraction, time_constant_s = parameters[0], parameters[1]
     if time_constant_s <= 0.0:
         return value * (1.0 + fraction)

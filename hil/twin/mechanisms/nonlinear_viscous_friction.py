@@ -14,9 +14,7 @@ from hil.twin.mechanism import PARAMETERS, Block, Dimension, Mechanism, Moment, 
 
 
 @njit
-def _drag(
-    value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]
-) -> float:
+def _drag(value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]) -> float:
     quadratic, variant = parameters[0], parameters[PARAMETERS - 1]
     speed = abs(at.velocity)
     if variant == 0.0:
@@ -34,11 +32,11 @@ MECHANISM = Mechanism(
     element="lubricant of nut and bearings",
     sentence="Drag departs from linear in speed by {quadratic_n_m_s2_rad2} times the square of the speed.",
     second_sentence="Drag rises steeply from rest and then ever less, with the root of the speed: at {viscous_speed} "
-                    "by {quadratic_n_m_s2_rad2} times the square of that speed.",
+    "by {quadratic_n_m_s2_rad2} times the square of that speed.",
     equation="F = Fc sign(v) + c v + q v |v|; thinning: + q v_r^2 sqrt(|v| / v_r) sign(v), q >= 0, v_r = Fc / c, "
-             "which for q v_r^2 = 2 Fc is the law of Casson, |F| = (sqrt(Fc) + sqrt(c |v|))^2",
+    "which for q v_r^2 = 2 Fc is the law of Casson, |F| = (sqrt(Fc) + sqrt(c |v|))^2",
     source="Olsson et al., Friction models and friction compensation, European J. Control 4 (1998) 176; thinning: "
-           "Casson, in Mill (ed.), Rheology of Disperse Systems (1959) 84",
+    "Casson, in Mill (ed.), Rheology of Disperse Systems (1959) 84",
     parameters=(Parameter("quadratic_n_m_s2_rad2", Dimension.MOTOR_DRAG, -1e5, 1e5),),
     stage=Stage.DRAG,
     contribution=_drag,

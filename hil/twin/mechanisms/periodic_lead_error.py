@@ -14,9 +14,7 @@ from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, S
 
 
 @njit
-def _wobble(
-    value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]
-) -> float:
+def _wobble(value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]) -> float:
     error = 0.0
     for harmonic in range(3):
         amplitude_m, phase = parameters[2 * harmonic], parameters[2 * harmonic + 1]
@@ -30,7 +28,7 @@ MECHANISM = Mechanism(
     block=Block.TRANSMISSION,
     element="ball screw",
     sentence="The lead errs with the angle of the screw: by {amplitude_m} once, {amplitude_2_m} twice and "
-             "{amplitude_3_m} three times per revolution.",
+    "{amplitude_3_m} three times per revolution.",
     equation="x = r theta + sum over n = 1, 2, 3 of A_n sin(n theta + phi_n)",
     source="ISO 3408-3:2006, travel variation within 2 pi rad; ISO 230-2, bidirectional positioning",
     parameters=(

@@ -11,9 +11,7 @@ from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, S
 
 
 @njit
-def _level_along_travel(
-    value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]
-) -> float:
+def _level_along_travel(value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]) -> float:
     fraction, period_m, phase_rad = parameters[0], parameters[1], parameters[2]
     if period_m <= 0.0:
         return value

@@ -10,9 +10,7 @@ from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, S
 
 
 @njit
-def _soft_zone(
-    value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]
-) -> float:
+def _soft_zone(value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]) -> float:
     half, ratio = 0.5 * parameters[0] / at.ratio_m, parameters[1]
     if value > half:
         return value - (1.0 - ratio) * half

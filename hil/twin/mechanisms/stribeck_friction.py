@@ -14,9 +14,7 @@ from hil.twin.mechanism import PARAMETERS, Block, Dimension, Mechanism, Moment, 
 
 
 @njit
-def _stribeck_level(
-    value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]
-) -> float:
+def _stribeck_level(value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]) -> float:
     static, stribeck_velocity = parameters[0], parameters[1]
     if stribeck_velocity <= 0.0:
         return value
@@ -38,7 +36,7 @@ MECHANISM = Mechanism(
     sentence="Friction falls from {static_torque_n_m} at rest as speed passes {stribeck_velocity_rad_s}.",
     equation="F(v) = Fc + (Fs - Fc) s(v/vs); s(u) = exp(-u^2), exp(-u) or 1/(1 + u^2)",
     source="Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30 (1994) 1083: Gaussian; Tustin (1947): "
-           "exponential; Hess and Soom (1990): Lorentzian",
+    "exponential; Hess and Soom (1990): Lorentzian",
     parameters=(
         Parameter("static_torque_n_m", Dimension.TORQUE, 0.0, 1e4),
         Parameter("stribeck_velocity_rad_s", Dimension.MOTOR_SPEED, 1e-5, 1e3),

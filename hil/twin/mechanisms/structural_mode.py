@@ -7,16 +7,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from hil.twin.chain import Chain
-from hil.twin.frequency import modal_damping
+from hil.arrays import FloatArray
 from hil.twin.mechanism import Block, Dimension, Mechanism, Parameter, Stage
-from hil.twin.modal import modal
+from hil.twin.structure.chain import Chain
+from hil.twin.structure.frequency import modal_damping
+from hil.twin.structure.modal import modal
 
-FloatArray = NDArray[np.float64]
-
-_MOST = 0.99        # a modal damping ratio stays below 1
+_MOST = 0.99  # a modal damping ratio stays below 1
 
 
 def _with_structure(chain: Chain, parameters: Sequence[float], variant: int = 0) -> Chain:
@@ -48,8 +46,9 @@ def _on_the_table(chain: Chain, square: float, mass_ratio: float) -> tuple[Chain
     inertia = mass_ratio * chain.inertia_kg_m2[table, table]
     extended = _longer(chain)
     extended.inertia_kg_m2[n, n] = inertia
-    extended.stiffness_n_m_rad[np.ix_((table, n), (table, n))] += inertia * square * np.array([[1.0, -1.0],
-                                                                                              [-1.0, 1.0]])
+    extended.stiffness_n_m_rad[np.ix_((table, n), (table, n))] += (
+        inertia * square * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    )
     return extended, np.eye(n + 1)[n] - np.eye(n + 1)[table]
 
 
@@ -68,10 +67,15 @@ def _under_the_axis(chain: Chain, square: float, mass_ratio: float) -> tuple[Cha
 
 def _longer(chain: Chain) -> Chain:
     """The chain with one more coordinate that nothing holds yet."""
-    return replace(chain, inertia_kg_m2=np.pad(chain.inertia_kg_m2, (0, 1)),
-                   stiffness_n_m_rad=np.pad(chain.stiffness_n_m_rad, (0, 1)),
-                   damping_ratio=np.append(chain.damping_ratio, 0.0), names=(*chain.names, "structure"),
-                   transmission=np.append(chain.transmission, 0.0), screw=np.append(chain.screw, 0.0))
+    return replace(
+        chain,
+        inertia_kg_m2=np.pad(chain.inertia_kg_m2, (0, 1)),
+        stiffness_n_m_rad=np.pad(chain.stiffness_n_m_rad, (0, 1)),
+        damping_ratio=np.append(chain.damping_ratio, 0.0),
+        names=(*chain.names, "structure"),
+        transmission=np.append(chain.transmission, 0.0),
+        screw=np.append(chain.screw, 0.0),
+    )
 
 
 MECHANISM = Mechanism(
@@ -80,9 +84,9 @@ MECHANISM = Mechanism(
     element="machine base, column or screw torsion",
     sentence="A structure of {mass_ratio} of the table's mass sways at {frequency_hz}, damped by {damping_ratio}.",
     second_sentence="The machine base yields: it sways with the table at {frequency_hz}, damped by {damping_ratio}; "
-                    "the table has {mass_ratio} of its mass.",
+    "the table has {mass_ratio} of its mass.",
     equation="m_a x_a'' + k_a (x_a - x) = 0, k_a = m_a (2 pi f)^2, m_a = mu m_table, damped by xi where the table "
-             "is held; or a base of m_table / mu under the axis, which sways with the table at f",
+    "is held; or a base of m_table / mu under the axis, which sways with the table at f",
     source="Den Hartog, Mechanical Vibrations, 4th ed. (1956), auxiliary mass on a spring",
     parameters=(
         Parameter("frequency_hz", Dimension.FREQUENCY, 1.0, 2000.0),

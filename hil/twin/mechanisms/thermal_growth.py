@@ -11,9 +11,7 @@ from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, S
 
 
 @njit
-def _grown_lead(
-    value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]
-) -> float:
+def _grown_lead(value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]) -> float:
     growth, time_constant_s = parameters[0], parameters[1]
     if time_constant_s > 0.0:
         growth *= -math.expm1(-at.time_s / time_constant_s)

@@ -17,7 +17,7 @@ def _saturating_torque_constant(
     falling = parameters[0]
     if falling <= 0.0:
         return value
-    most = 1.0 / math.sqrt(3.0 * falling)      # more current gives no more torque from here on
+    most = 1.0 / math.sqrt(3.0 * falling)  # more current gives no more torque from here on
     held = min(max(value, -most), most)
     return held * (1.0 - falling * held * held)
 

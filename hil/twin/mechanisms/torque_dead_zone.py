@@ -8,13 +8,11 @@ from numba import njit
 
 from hil.twin.mechanism import PARAMETERS, Block, Dimension, Mechanism, Moment, Parameter, Stage
 
-_GATE = 2.0        # from this variant on, the torque outside the zone is unchanged
+_GATE = 2.0  # from this variant on, the torque outside the zone is unchanged
 
 
 @njit
-def _dead_zone(
-    value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]
-) -> float:
+def _dead_zone(value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]) -> float:
     half_width = parameters[0]
     if abs(value) <= half_width:
         return 0.0

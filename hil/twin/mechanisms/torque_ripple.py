@@ -11,9 +11,7 @@ from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, S
 
 
 @njit
-def _rippling_torque(
-    value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]
-) -> float:
+def _rippling_torque(value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]) -> float:
     return value * (1.0 + parameters[0] * math.sin(parameters[1] * at.angle_rad + parameters[2]))
 
 

@@ -10,9 +10,7 @@ from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, S
 
 
 @njit
-def _limited_torque(
-    value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]
-) -> float:
+def _limited_torque(value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]) -> float:
     return min(max(value, -parameters[0]), parameters[0])
 
 

@@ -10,9 +10,7 @@ from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, S
 
 
 @njit
-def _time_constant(
-    value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]
-) -> float:
+def _time_constant(value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]) -> float:
     return value + parameters[0]
 
 

@@ -52,7 +52,7 @@ def test_dent_in_the_thread(position_m: float) -> None:
     plant.reset(position_m)
     error = plant.table_true_m - R * plant.motor_true_rad
     assert error == pytest.approx(8e-6 * exp(-(((position_m - 0.05) / 0.008) ** 2) / 2), abs=1e-12)
-    plant.advance(0.0, 0.05)   # at rest without a load: the slope is the derivative of the error
+    plant.advance(0.0, 0.05)  # at rest without a load: the slope is the derivative of the error
     assert plant.table_true_m - R * plant.motor_true_rad == pytest.approx(error, abs=1e-10)
 
 
@@ -74,7 +74,7 @@ def test_vibration_and_hammering_push_the_table() -> None:
     assert force == pytest.approx(expected, rel=1e-6)
     pulses = {"force_n": 80.0, "start_s": 0.01, "period_s": 0.02, "width_s": 0.005}
     plant = plant_with(frictionless(), Effect("novel_hammering", pulses), step_s=1e-3)
-    seen = [outer_force_n(plant) > 40.0 for _ in range(25)]     # every second of 50 steps
+    seen = [outer_force_n(plant) > 40.0 for _ in range(25)]  # every second of 50 steps
     assert sum(seen) == pytest.approx(25 * 0.8 / 4, abs=1.5)
     assert not any(seen[:4])
 
@@ -85,4 +85,4 @@ def test_torque_fades() -> None:
     assert outer_force_n(plant, torque_n_m=2.0) == pytest.approx(2.0 / R, rel=1e-3)
     plant.advance(0.0, 0.2)
     assert outer_force_n(plant, torque_n_m=2.0) == pytest.approx(0.7 * 2.0 / R, rel=1e-6)
-    assert plant.torque_n_m == pytest.approx(2.0)   # the current does not show it
+    assert plant.torque_n_m == pytest.approx(2.0)  # the current does not show it

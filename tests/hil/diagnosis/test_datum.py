@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from diagnosis_runs import bench, changed, recorded
 
-from hil.compare import compare
-from hil.diagnosis.model import Model
+from hil.diagnosis.estimation.hypothesis import Model
+from hil.diagnosis.estimation.terms import Term
 from hil.diagnosis.preflight import prepare
-from hil.diagnosis.terms import Term
+from hil.identification.compare import compare
 
 OWNER = bench()
 PLAY = Term("backlash", 0, (20e-6,))
@@ -40,23 +40,30 @@ def test_a_recording_may_begin_on_one_flank_of_a_gap(rest_s: float, shift_m: flo
     """As every axis with play does: only the twin begins in its middle."""
     whole = recorded(OWNER, PLAY, times=2)
     stands = np.flatnonzero(whole["velocity_command_m_s"] == 0.0)
-    begin = int(stands[stands > 1000][0]) + 20        # in a rest after a move
+    begin = int(stands[stands > 1000][0]) + 20  # in a rest after a move
     rest = np.full(round(rest_s / whole.period_s), begin)
     rows = np.concatenate([rest, np.arange(begin, whole["time_s"].size)])
     columns = {name: values[rows] for name, values in whole.columns.items()}
     columns["time_s"] = np.arange(rows.size) * whole.period_s
     columns["table_position_m"] = columns["table_position_m"] + shift_m
-    run, = prepare([changed(whole, **columns)], OWNER)
+    (run,) = prepare([changed(whole, **columns)], OWNER)
     model = Model(OWNER, (PLAY,))
     table = model.blocks(model.initial(), run)["table"][run.judged]
     assert np.sqrt(np.mean(table**2)) < 2.0 * run.noise.table_m
 
 
 @pytest.mark.parametrize("force_n", [8.0, 200.0])
-@pytest.mark.parametrize("term", [
-    Term("periodic_lead_error", 0, (5e-6, 1.0, 0.0, 0.0, 0.0, 0.0)), Term("spring_load", 0, (5e3, 0.05)),
-    Term("backlash", 0, (20e-6,)), Term("preload_loss", 0, (10e-6, 0.4)),
-    Term("preload_loss", 0, (10e-6, 0.0)), Term("position_dependent_stiffness", 0, (-5.0,))])
+@pytest.mark.parametrize(
+    "term",
+    [
+        Term("periodic_lead_error", 0, (5e-6, 1.0, 0.0, 0.0, 0.0, 0.0)),
+        Term("spring_load", 0, (5e3, 0.05)),
+        Term("backlash", 0, (20e-6,)),
+        Term("preload_loss", 0, (10e-6, 0.4)),
+        Term("preload_loss", 0, (10e-6, 0.0)),
+        Term("position_dependent_stiffness", 0, (-5.0,)),
+    ],
+)
 def test_an_axis_that_stands_has_stood_before(term: Term, force_n: float) -> None:
     """The twin begins at rest under whatever bends the transmission, it does not spring there."""
     model = Model(OWNER, (Term("external_force", 0, (force_n, 0.0, 10.0)), term))

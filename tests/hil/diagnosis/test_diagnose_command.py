@@ -9,7 +9,7 @@ from diagnosis_runs import bench, changed, recorded
 
 from hil.commands.diagnose import diagnose
 from hil.errors import InputError
-from hil.recording import Recording, write_parquet
+from hil.recording.recording import Recording, write_parquet
 from hil.report.compare_report import write_bench
 
 

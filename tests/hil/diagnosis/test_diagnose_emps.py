@@ -7,11 +7,11 @@ from functools import cache
 import pytest
 from diagnosis_runs import RIG
 
-from hil.bench import Bench, load_bench
-from hil.compare import compare
+from hil.bench.bench_file import Bench, load_bench
 from hil.diagnosis.diagnose import Diagnosis, diagnose
-from hil.importing import import_recording
-from hil.recording import Recording
+from hil.identification.compare import compare
+from hil.recording.importing import import_recording
+from hil.recording.recording import Recording
 
 EMPS = RIG.parent / "emps" / "DATA_EMPS.mat"
 
@@ -50,6 +50,8 @@ def test_the_held_out_force_falls_below_a_third() -> None:
 @pytest.mark.long
 def test_the_diagnosed_bench_says_the_same_to_a_comparison() -> None:
     found = diagnosed()
-    before, after = (compare(recording(), Bench.model_validate(bench.model_dump())).channel("force_n").rms
-                     for bench in (found.owner, found.bench))
+    before, after = (
+        compare(recording(), Bench.model_validate(bench.model_dump())).channel("force_n").rms
+        for bench in (found.owner, found.bench)
+    )
     assert after < before / 3.0

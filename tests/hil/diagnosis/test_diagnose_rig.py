@@ -11,12 +11,12 @@ import jsonschema
 import pytest
 from diagnosis_runs import rig
 
-from hil.bench import load_bench
+from hil.bench.bench_file import load_bench
 from hil.diagnosis.diagnose import Diagnosis, diagnose
 from hil.diagnosis.result import schema
-from hil.measured import take
-from hil.recording import read_recording
-from hil.report.diagnose_report import write_diagnosis
+from hil.identification.dataset import take
+from hil.recording.recording import read_recording
+from hil.report.diagnosis.report import write_diagnosis
 from hil.twin.library import BY_ID
 
 # As the README of the recordings has it

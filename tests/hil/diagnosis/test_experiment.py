@@ -9,20 +9,19 @@ import numpy as np
 import pytest
 from diagnosis_runs import bench, moves, recorded
 
-from hil.bench import Bench
-from hil.bench_hardware import SetPointLimits
-from hil.diagnosis.candidates import candidates, reach
-from hil.diagnosis.evidence import against
+from hil.bench.bench_file import Bench
+from hil.bench.hardware import SetPointLimits
+from hil.diagnosis.candidate_motions import candidates, reach
+from hil.diagnosis.estimation.fit import Fit, fit
+from hil.diagnosis.estimation.hypothesis import Model
+from hil.diagnosis.estimation.model_comparison import against
+from hil.diagnosis.estimation.terms import Term
 from hil.diagnosis.experiment import Experiment, separating, showing
-from hil.diagnosis.explain import TIED, Explanation, Rival
-from hil.diagnosis.fit import Fit, fit
-from hil.diagnosis.model import Model
-from hil.diagnosis.terms import Term
-from hil.diagnosis.testable import not_testable
-from hil.measured import Measured, take
-from hil.profile import Profile, load_profile
-from hil.report.output import write_profile
-from hil.trajectory import plan
+from hil.diagnosis.search.forward_selection import TIED, Explanation, Rival
+from hil.diagnosis.verdict.observability import not_testable
+from hil.identification.dataset import Measured, take
+from hil.motion.profile import Profile, load_profile, write_profile
+from hil.motion.trajectory import plan
 
 OWNER = bench()
 REST = {"kind": "dwell", "duration_s": 0.3}
@@ -53,7 +52,7 @@ def test_a_motion_is_designed_that_separates_what_one_way_ties() -> None:
     assert found.profile is not None
     assert found.separates == ("friction_drift", "position_dependent_friction")
     assert "is expected to tell friction drift from position dependent friction" in found.note
-    for right, wrong in ((first, second), (second, first)):       # whichever of the two is true
+    for right, wrong in ((first, second), (second, first)):  # whichever of the two is true
         truth = right.model.resolved(right.x)[1]
         both = [*runs(ONE_WAY, *truth), *runs(found.profile, *truth, seed=2)]
         a, b = (fit(found.model, both, found.x, evaluations=6) for found in (right, wrong))
@@ -61,10 +60,11 @@ def test_a_motion_is_designed_that_separates_what_one_way_ties() -> None:
 
 
 def test_no_motion_is_promised_that_gains_nothing() -> None:
-    lag = Term("current_loop_lag", 0, (1e-4,))      # of a tenth of a tick, on a motion without jerk
+    lag = Term("current_loop_lag", 0, (1e-4,))  # of a tenth of a tick, on a motion without jerk
     train = runs(SLOW, lag)
-    found = designed(train, fit(Model(OWNER, (lag,)), train),
-                     fit(Model(OWNER, (Term("transport_delay", 0, (1e-4,)),)), train))
+    found = designed(
+        train, fit(Model(OWNER, (lag,)), train), fit(Model(OWNER, (Term("transport_delay", 0, (1e-4,)),)), train)
+    )
     assert found.profile is None
     assert "No motion within the reach of these recordings tells current loop lag from transport delay" in found.note
 
@@ -95,7 +95,7 @@ def test_what_a_motion_hides_is_shown_by_another() -> None:
     assert found is not None
     assert found.profile is not None
     assert drift in found.separates
-    assert "torque_saturation" not in found.separates     # takes more torque than these limits ever ask for
+    assert "torque_saturation" not in found.separates  # takes more torque than these limits ever ask for
     shown = runs(found.profile, seed=2)
     assert drift not in not_testable(fit(Model(OWNER), shown), shown)
 
@@ -104,8 +104,16 @@ def test_what_a_motion_hides_is_shown_by_another() -> None:
 def test_candidates_keep_to_what_was_recorded(travel_m: tuple[float, float] | None, tmp_path: Path) -> None:
     assert OWNER.drive is not None
     owner = OWNER.model_copy(update={"drive": OWNER.drive.model_copy(update={"travel_m": travel_m})})
-    train = runs(moves([REST, {"kind": "sine_squared", "to_m": 0.06, "feed_m_s": 0.25},
-                        {"kind": "sine_squared", "to_m": 0.01, "feed_m_s": 0.1}]), believed=owner)
+    train = runs(
+        moves(
+            [
+                REST,
+                {"kind": "sine_squared", "to_m": 0.06, "feed_m_s": 0.25},
+                {"kind": "sine_squared", "to_m": 0.01, "feed_m_s": 0.1},
+            ]
+        ),
+        believed=owner,
+    )
     reached = reach(train, owner)
     short, long = candidates(reached)
     assert len(short) >= 5
@@ -142,9 +150,16 @@ def test_limits_of_the_bench_count_instead_of_what_was_recorded() -> None:
     assert profile.limits.model_dump() == limits.model_dump()
 
 
-@pytest.mark.parametrize(("change", "count"), [({"high_m": 0.0005}, 5), ({"velocity_m_s": 0.004}, 3),
-                                               ({"start_m": 0.1}, 7), ({"acceleration_m_s2": 0.01}, 3),
-                                               ({"acceleration_m_s2": 0.0}, 0)])
+@pytest.mark.parametrize(
+    ("change", "count"),
+    [
+        ({"high_m": 0.0005}, 5),
+        ({"velocity_m_s": 0.004}, 3),
+        ({"start_m": 0.1}, 7),
+        ({"acceleration_m_s2": 0.01}, 3),
+        ({"acceleration_m_s2": 0.0}, 0),
+    ],
+)
 def test_an_axis_that_may_do_little_still_gets_candidates(change: dict[str, float], count: int) -> None:
     reached = replace(reach(runs(ONE_WAY), OWNER), low_m=0.0, high_m=0.1)
     short, long = candidates(replace(reached, **change))

@@ -5,15 +5,15 @@ from __future__ import annotations
 import pytest
 from diagnosis_runs import bench, recorded
 
-from hil.bench import Bench, MechanismEntry
-from hil.diagnosis import search
-from hil.diagnosis.explain import Explanation, Rival
-from hil.diagnosis.findings import diagnosed_bench, findings, renamed
-from hil.diagnosis.fit import Fit, fit
-from hil.diagnosis.model import Model
-from hil.diagnosis.proof import prove
-from hil.diagnosis.terms import Term, compatible, repeats
-from hil.measured import Measured, take
+from hil.bench.bench_file import Bench, MechanismEntry
+from hil.diagnosis.estimation.fit import Fit, fit
+from hil.diagnosis.estimation.hypothesis import Model
+from hil.diagnosis.estimation.terms import Term, compatible, repeats
+from hil.diagnosis.search import successive_halving
+from hil.diagnosis.search.forward_selection import Explanation, Rival
+from hil.diagnosis.verdict.cross_validation import prove
+from hil.diagnosis.verdict.findings import diagnosed_bench, findings, renamed
+from hil.identification.dataset import Measured, take
 
 OWNER = bench()
 
@@ -33,7 +33,7 @@ def test_friction_that_differs_with_speed_is_no_constant_load() -> None:
     plain, right, rival = fitted(train), fitted(train, truth), fitted(train, load)
     explanation = Explanation(plain, plain, right, {truth.key: [Rival(rival, 500.0)]}, {truth.key: 900.0})
     final = renamed(right)
-    found, = findings(explanation, final, prove(plain, final, train, held_out).ablations, {}, train, held_out)
+    (found,) = findings(explanation, final, prove(plain, final, train, held_out).ablations, {}, train, held_out)
     assert (found.effect, found.variant, found.equivalents) == ("asymmetric_friction", "with speed", ())
     assert [other.effect for other in found.rivals] == ["constant_load"]
     value = found.parameters["offset_torque_n_m"]
@@ -59,15 +59,17 @@ def test_the_same_period_is_the_same_cause() -> None:
 def test_the_same_torque_is_not_named_twice() -> None:
     load, friction = Term("constant_load", 0, (0.1,)), Term("asymmetric_friction", 0, (0.05,))
     assert not compatible([load, friction])
-    assert compatible([load, Term("asymmetric_friction", 1, (0.05,)), SIX])     # with speed it is another torque
+    assert compatible([load, Term("asymmetric_friction", 1, (0.05,)), SIX])  # with speed it is another torque
 
 
 def test_a_mechanism_is_offered_again_at_another_order() -> None:
     train = runs(SIX, FIFTEEN)
-    offered = {lead.term.effect: lead.term for lead in search.leads(fitted(train, SIX), train)}
+    offered = {lead.term.effect: lead.term for lead in successive_halving.leads(fitted(train, SIX), train)}
     assert offered["cogging_torque"].slot == 1
     assert offered["cogging_torque"].values[1] == 15.0
-    assert "cogging_torque" not in {lead.term.effect for lead in search.leads(fitted(train, SIX, FIFTEEN), train)}
+    assert "cogging_torque" not in {
+        lead.term.effect for lead in successive_halving.leads(fitted(train, SIX, FIFTEEN), train)
+    }
 
 
 def test_two_of_a_name_are_two_findings_with_two_entries() -> None:
@@ -86,8 +88,13 @@ def test_two_of_a_name_are_two_findings_with_two_entries() -> None:
 
 def test_a_mechanism_that_the_bench_has_gives_way_to_the_one_found() -> None:
     def known(*terms: Term) -> Bench:
-        entries = tuple(MechanismEntry(effect=term.effect, parameters=dict(zip(
-            ("amplitude_n_m", "cycles_per_rev", "phase_rad"), term.values, strict=True))) for term in terms)
+        entries = tuple(
+            MechanismEntry(
+                effect=term.effect,
+                parameters=dict(zip(("amplitude_n_m", "cycles_per_rev", "phase_rad"), term.values, strict=True)),
+            )
+            for term in terms
+        )
         return OWNER.model_copy(update={"mechanisms": entries})
 
     found = Model(known(SIX, FIFTEEN), (Term("cogging_torque", 0, (0.4, 6.1, 0.5)),))

@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 from diagnosis_runs import RIG, bench, moves, recorded
 
-from hil.bench import load_bench
-from hil.diagnosis.fit import evaluate
-from hil.diagnosis.fit_table import fit_table
-from hil.diagnosis.floor import floor, laps, shaken
-from hil.diagnosis.model import Model, observer_time_s
+from hil.bench.bench_file import load_bench
+from hil.diagnosis.estimation.fit import evaluate
+from hil.diagnosis.estimation.hypothesis import Model, observer_time_s
+from hil.diagnosis.estimation.noise_floor import floor, laps, shaken
+from hil.diagnosis.estimation.terms import Term
 from hil.diagnosis.result import Mode
-from hil.diagnosis.terms import Term
-from hil.importing import import_recording
-from hil.measured import Measured, take
-from hil.proof.conceal import draw, rerun
+from hil.diagnosis.verdict.fit_table import fit_table
+from hil.identification.dataset import Measured, take
+from hil.proof.draw.generator import draw, rerun
+from hil.recording.importing import import_recording
 from hil.twin.library import BY_ID
 
 EMPS = RIG.parent / "emps" / "DATA_EMPS.mat"
@@ -77,14 +77,22 @@ def test_in_closed_loop_the_axis_moves_with_what_its_encoders_count() -> None:
     case = draw("single", 101966, 20261130)
     axis, last, rng = case.draft.axis, case.draft.runs[2], np.random.default_rng(3)
     starts_m = rng.uniform(0.0, 2e-6, 4)
-    tables_m = np.array([rerun(case.draft, replace(last, position_m=np.array(last.position_m) + start_m), 5)[
-        "table_position_m"][50:] - start_m for start_m in starts_m])
+    tables_m = np.array(
+        [
+            rerun(case.draft, replace(last, position_m=np.array(last.position_m) + start_m), 5)["table_position_m"][50:]
+            - start_m
+            for start_m in starts_m
+        ]
+    )
     tables_m -= tables_m.mean(axis=1, keepdims=True)
     differ_m = np.sqrt(np.mean(np.var(tables_m, axis=0, ddof=1)))
     exact = case.bench.model_copy(update={"axis": case.bench.axis.model_copy(update=case.truth.true_parameters)})
     run = take(case.recordings[2], exact)
-    limit = Term("torque_saturation", BY_ID["torque_saturation"].variants.index("hidden"),
-                 (case.truth.effects[0].parameters["limit_n_m"],))
+    limit = Term(
+        "torque_saturation",
+        BY_ID["torque_saturation"].variants.index("hidden"),
+        (case.truth.effects[0].parameters["limit_n_m"],),
+    )
     model = Model(exact, (limit,), 0.3, observer_time_s([run], exact))
     found = evaluate(model, [run])
     moved_m = shaken(found, run)["table"]
@@ -110,8 +118,12 @@ def test_a_loop_that_sticks_and_slips_has_no_noise_of_its_own_making() -> None:
     """A twin that lacks the lead error of a chattering axis strays by a hundred times the noise of its sensors, and
     so do two of its own runs from one another: that is no floor."""
     sticking, lead = Term("stribeck_friction", 0, (2.2, 0.05)), Term("periodic_lead_error", 0, (4e-6, 0.3))
-    creep = moves([{"kind": "dwell", "duration_s": 0.2}, *(
-        {"kind": "sine_squared", "to_m": to_m, "feed_m_s": 0.0006} for to_m in (0.004, 0.0))])
+    creep = moves(
+        [
+            {"kind": "dwell", "duration_s": 0.2},
+            *({"kind": "sine_squared", "to_m": to_m, "feed_m_s": 0.0006} for to_m in (0.004, 0.0)),
+        ]
+    )
     run = take(recorded(bench(), sticking, lead, profile=creep), bench())
     wrong = evaluate(Model(bench(), (sticking,), 0.01, observer_time_s([run], bench())), [run])
     assert set(shaken(wrong, run).values()) == {0.0}

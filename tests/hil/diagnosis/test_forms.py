@@ -7,15 +7,15 @@ from collections.abc import Mapping, Sequence
 import pytest
 from diagnosis_runs import bench, recorded
 
-from hil.diagnosis.explain import Explanation, Rival
-from hil.diagnosis.findings import diagnosed_bench, findings, standard_errors
-from hil.diagnosis.fit import fit
-from hil.diagnosis.forms import OF_ITS_FORM, form_of
-from hil.diagnosis.model import Model
-from hil.diagnosis.proof import Proof, prove
+from hil.diagnosis.estimation.fit import fit
+from hil.diagnosis.estimation.hypothesis import Model
+from hil.diagnosis.estimation.terms import Key, Term
 from hil.diagnosis.result import Finding
-from hil.diagnosis.terms import Key, Term
-from hil.measured import take
+from hil.diagnosis.search.forward_selection import Explanation, Rival
+from hil.diagnosis.verdict.cross_validation import Proof, prove
+from hil.diagnosis.verdict.curve_forms import OF_ITS_FORM, form_of
+from hil.diagnosis.verdict.findings import diagnosed_bench, findings, standard_errors
+from hil.identification.dataset import take
 
 OWNER = bench()
 COULOMB = OWNER.axis.physics().coulomb_n_m
@@ -28,14 +28,16 @@ def drag(share: float, variant: int = 0) -> Term:
     return Term("nonlinear_viscous_friction", variant, (share * COULOMB / 100.0**2,))
 
 
-def judged(terms: Sequence[Term], rivals: Mapping[Key, Term] | None = None) -> tuple[
-        Proof, dict[int, int], tuple[Finding, ...]]:
+def judged(
+    terms: Sequence[Term], rivals: Mapping[Key, Term] | None = None
+) -> tuple[Proof, dict[int, int], tuple[Finding, ...]]:
     """What is found on recordings of these terms, where these are what is fitted, and tied rivals of a term."""
     train, held_out = ([take(recorded(OWNER, *terms, seed=seed, torque_noise_n_m=0.001), OWNER)] for seed in (1, 2))
     plain, right = fit(Model(OWNER), train, evaluations=6), fit(Model(OWNER, tuple(terms)), train, evaluations=6)
     proof = prove(plain, right, train, held_out)
-    tied = {key: [Rival(fit(Model(OWNER, (rival,)), train, evaluations=1), 0.0)]
-            for key, rival in (rivals or {}).items()}
+    tied = {
+        key: [Rival(fit(Model(OWNER, (rival,)), train, evaluations=1), 0.0)] for key, rival in (rivals or {}).items()
+    }
     explanation = Explanation(plain, plain, right, tied, {term.key: 900.0 for term in terms})
     forms = form_of(explanation, proof.ablations)
     return proof, forms, findings(explanation, proof.final, proof.ablations, forms, train, held_out)
@@ -47,7 +49,7 @@ def test_a_little_drag_is_the_form_of_a_falling_curve(terms: tuple[Term, ...]) -
     falling, little = terms.index(FALLING), 1 - terms.index(FALLING)
     assert forms == {little: falling}
     assert proof.ablations[little].shown, "it does help: that is not why it is no cause"
-    finding, = found
+    (finding,) = found
     assert finding.effect == "stribeck_friction"
     assert "square of the speed" in finding.form
     static = finding.parameters["static_torque_n_m"]
@@ -55,7 +57,9 @@ def test_a_little_drag_is_the_form_of_a_falling_curve(terms: tuple[Term, ...]) -
     of_the_term = proof.final.model.nominal_count + sum(len(term.values) for term in terms[:falling])
     assert static.std == standard_errors(proof.final)[of_the_term]
     assert {entry.effect for entry in diagnosed_bench(OWNER, proof.final).mechanisms} == {
-        "stribeck_friction", "nonlinear_viscous_friction"}, "the bench has the curve as it was fitted"
+        "stribeck_friction",
+        "nonlinear_viscous_friction",
+    }, "the bench has the curve as it was fitted"
 
 
 def test_a_drag_that_may_be_something_else_is_told() -> None:
@@ -63,7 +67,8 @@ def test_a_drag_that_may_be_something_else_is_told() -> None:
     _, forms, found = judged((FALLING, drag(0.02)), {drag(0.02).key: load})
     assert forms == {}
     assert [finding.equivalents for finding in found if finding.effect == "nonlinear_viscous_friction"] == [
-        ("torque_constant_saturation",)]
+        ("torque_constant_saturation",)
+    ]
 
 
 def test_much_drag_is_a_cause_of_its_own() -> None:
@@ -75,9 +80,15 @@ def test_much_drag_is_a_cause_of_its_own() -> None:
     assert not any(finding.form for finding in found)
 
 
-@pytest.mark.parametrize("terms", [
-    (FALLING, RIPPLE), (FALLING, drag(0.01, variant=1)),
-    (Term("stribeck_friction", 1, (1.05 * COULOMB, 0.5)), drag(2.0))], ids=["cogging", "thinning", "low speed alone"])
+@pytest.mark.parametrize(
+    "terms",
+    [
+        (FALLING, RIPPLE),
+        (FALLING, drag(0.01, variant=1)),
+        (Term("stribeck_friction", 1, (1.05 * COULOMB, 0.5)), drag(2.0)),
+    ],
+    ids=["cogging", "thinning", "low speed alone"],
+)
 def test_nothing_else_is_a_form_however_little_it_takes(terms: tuple[Term, ...]) -> None:
     proof, forms, found = judged(terms)
     smaller, larger = sorted(ablation.train - 1.0 for ablation in proof.ablations)

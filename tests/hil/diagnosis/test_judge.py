@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 from diagnosis_runs import bench, changed, recorded
 
-from hil.diagnosis import search
-from hil.diagnosis.explain import Explanation, Rival
-from hil.diagnosis.findings import diagnosed_bench, findings, renamed, standard_errors
-from hil.diagnosis.fit import FLOOR, Fit, evaluate, fit
-from hil.diagnosis.judge import judge, names_stand
-from hil.diagnosis.model import Model
-from hil.diagnosis.noise_ratios import noise_ratios
-from hil.diagnosis.proof import explained_share, prove
+from hil.diagnosis.estimation.fit import FLOOR, Fit, evaluate, fit
+from hil.diagnosis.estimation.hypothesis import Model
+from hil.diagnosis.estimation.noise_ratios import noise_ratios
+from hil.diagnosis.estimation.terms import Term
 from hil.diagnosis.result import Verdict
-from hil.diagnosis.terms import Term
-from hil.diagnosis.testable import not_testable
-from hil.measured import Measured, take
+from hil.diagnosis.search import successive_halving
+from hil.diagnosis.search.forward_selection import Explanation, Rival
+from hil.diagnosis.verdict.cross_validation import explained_share, prove
+from hil.diagnosis.verdict.findings import diagnosed_bench, findings, renamed, standard_errors
+from hil.diagnosis.verdict.judge import judge, names_stand
+from hil.diagnosis.verdict.observability import not_testable
+from hil.identification.dataset import Measured, take
 
 OWNER = bench()
 LOAD = Term("constant_load", 0, (0.4,))
@@ -47,10 +47,10 @@ def test_noise_of_the_motor_encoder_rings_in_the_table_and_is_no_physics(damping
     run = take(changed(recording, motor_position_rad=recording["motor_position_rad"] + noise), truth)
     right = evaluate(Model(truth, observer_s=0.002), [run])
     table = right.parts[1]
-    assert float(table @ table) > FLOOR * table.size            # what white noise of both encoders does not explain
+    assert float(table @ table) > FLOOR * table.size  # what white noise of both encoders does not explain
     assert noise_ratios(right, run)["table"] == pytest.approx(1.0, abs=0.1)
     softer = evaluate(Model(bench(damping_ratio=damping, stiffness_n_m=4e7), observer_s=0.002), [run])
-    assert noise_ratios(softer, run)["table"] > 2.0 * FLOOR     # and physics is none of that noise
+    assert noise_ratios(softer, run)["table"] > 2.0 * FLOOR  # and physics is none of that noise
 
 
 def test_a_trifle_is_no_parameter_error() -> None:
@@ -87,16 +87,27 @@ def test_a_name_that_is_not_believed_beside_a_twin_at_the_noise_is_no_mismatch()
     assert judge(plain, plain, made_up, found, runs(seed=2)) is Verdict.NO_MISMATCH
 
 
-@pytest.mark.parametrize(("left", "above", "stands"), [
-    (0.04, 50.0, True), (0.06, 5.2, False), (0.10, 1.6, True), (0.17, 1.6, False), (0.30, 1.25, True),
-    (0.30, 1.3, False), (0.51, 1.0, False), (np.nan, 1.0, False), (0.3, np.nan, False)])
+@pytest.mark.parametrize(
+    ("left", "above", "stands"),
+    [
+        (0.04, 50.0, True),
+        (0.06, 5.2, False),
+        (0.10, 1.6, True),
+        (0.17, 1.6, False),
+        (0.30, 1.25, True),
+        (0.30, 1.3, False),
+        (0.51, 1.0, False),
+        (np.nan, 1.0, False),
+        (0.3, np.nan, False),
+    ],
+)
 def test_names_stand_beside_what_is_little_or_hardly_above_the_noise(left: float, above: float, stands: bool) -> None:
     """`above` in rms: the share that may be left falls as it stands further above the noise."""
     assert names_stand(left, above**2) is stands
 
 
 def test_a_term_that_held_out_recordings_speak_against_is_dropped() -> None:
-    train, held_out = runs(LOAD), runs(seed=2)          # the load has gone
+    train, held_out = runs(LOAD), runs(seed=2)  # the load has gone
     plain, loaded = believed(train), believed(train, LOAD)
     proof = prove(plain, loaded, train, held_out)
     assert proof.final is plain
@@ -109,8 +120,8 @@ def test_a_term_that_held_out_recordings_speak_against_is_dropped() -> None:
 
 @pytest.mark.parametrize("term", [Term("cogging_torque", 0, (0.1, 6.0, 0.2)), Term("current_loop_lag", 0, (1e-3,))])
 def test_what_makes_held_out_recordings_worse_than_a_refit_is_dropped_and_has_no_name(term: Term) -> None:
-    train, held_out = runs(term), runs(seed=2)          # the effect has gone
-    nominal, found = search.nominal(OWNER, train), believed(train, term)
+    train, held_out = runs(term), runs(seed=2)  # the effect has gone
+    nominal, found = successive_halving.nominal(OWNER, train), believed(train, term)
     proof = prove(nominal, found, train, held_out)
     assert [ablation.term for ablation in proof.dropped] == [term]
     assert judge(nominal, nominal, proof.final, train, held_out) is Verdict.UNEXPLAINED
@@ -130,9 +141,25 @@ def test_a_term_that_held_out_recordings_do_not_show_may_stay() -> None:
     late = Term("external_force", 0, (200.0, 1.0, 1.3))
     train = runs(late)
     held_out = [take(recorded(OWNER), OWNER)]
-    short = [Measured(**{**vars(run), **{name: getattr(run, name)[:900] for name in (
-        "position_command_m", "velocity_command_m_s", "motor", "table_m", "torque_command", "torque")}})
-        for run in held_out]
+    short = [
+        Measured(
+            **{
+                **vars(run),
+                **{
+                    name: getattr(run, name)[:900]
+                    for name in (
+                        "position_command_m",
+                        "velocity_command_m_s",
+                        "motor",
+                        "table_m",
+                        "torque_command",
+                        "torque",
+                    )
+                },
+            }
+        )
+        for run in held_out
+    ]
     proof = prove(believed(train), believed(train, late), train, short)
     assert not proof.dropped
     assert not proof.ablations[0].shown
@@ -144,7 +171,7 @@ def test_a_constant_load_is_called_by_its_commoner_name_and_both_are_listed() ->
     explanation = Explanation(plain, plain, loaded, {LOAD.key: [Rival(plain_with(train), 500.0)]}, {LOAD.key: 900.0})
     final = renamed(loaded)
     proof = prove(plain, final, train, runs(LOAD, seed=2))
-    found, = findings(explanation, proof.final, proof.ablations, {}, train, runs(LOAD, seed=2))
+    (found,) = findings(explanation, proof.final, proof.ablations, {}, train, runs(LOAD, seed=2))
     assert found.effect == "asymmetric_friction"
     assert found.equivalents == ("constant_load",)
     assert [rival.effect for rival in found.rivals] == ["spring_load"]
@@ -168,8 +195,10 @@ def test_standard_errors_cover_the_truth() -> None:
     errors = []
     for seed in range(6):
         scale = np.random.default_rng(seed).uniform(0.8, 1.25, len(OWNER.axis.NOMINAL))
-        truth = {name: float(getattr(OWNER.axis, name) * factor)
-                 for name, factor in zip(OWNER.axis.NOMINAL, scale, strict=True)}
+        truth = {
+            name: float(getattr(OWNER.axis, name) * factor)
+            for name, factor in zip(OWNER.axis.NOMINAL, scale, strict=True)
+        }
         found = fit(Model(OWNER), runs(seed=seed, **truth))
         errors.append((np.array(found.model.values(found.x)) - list(truth.values())) / standard_errors(found))
     assert 0.3 < float(np.sqrt(np.mean(np.square(errors)))) < 2.5
@@ -178,8 +207,8 @@ def test_standard_errors_cover_the_truth() -> None:
 def test_what_this_motion_cannot_show() -> None:
     train = runs()
     hidden = not_testable(fit(Model(OWNER), train, evaluations=4), train)
-    assert "torque_saturation" in hidden            # the torque stays far from its limit
-    assert "thermal_growth" in hidden               # three seconds
+    assert "torque_saturation" in hidden  # the torque stays far from its limit
+    assert "thermal_growth" in hidden  # three seconds
     assert not {"constant_load", "backlash", "stribeck_friction", "periodic_lead_error"} & set(hidden)
 
 

@@ -7,27 +7,31 @@ from dataclasses import replace
 import pytest
 from diagnosis_runs import bench, moves, recorded
 
-from hil.bench import MechanismEntry
+from hil.bench.bench_file import MechanismEntry
 from hil.diagnosis.diagnose import diagnose
-from hil.diagnosis.fit import evaluate, fit
-from hil.diagnosis.likeness import likenesses
-from hil.diagnosis.model import Model
-from hil.diagnosis.search import offered
-from hil.diagnosis.terms import Term
-from hil.measured import take
-from hil.recording import Recording
+from hil.diagnosis.estimation.fit import evaluate, fit
+from hil.diagnosis.estimation.hypothesis import Model
+from hil.diagnosis.estimation.terms import Term
+from hil.diagnosis.search.equivalents import likenesses
+from hil.diagnosis.search.successive_halving import offered
+from hil.identification.dataset import take
+from hil.recording.recording import Recording
 from hil.twin.library import BY_ID
 
 OWNER = bench()
 LEAD_M = OWNER.axis.lead_m
-TERMS = [Term("cogging_torque", 0, (0.2, 4.0, 0.7)), Term("position_dependent_friction", 0, (0.15, LEAD_M / 4.0, 0.7)),
-         Term("torque_ripple", 0, (0.1, 4.0, 0.7))]
+TERMS = [
+    Term("cogging_torque", 0, (0.2, 4.0, 0.7)),
+    Term("position_dependent_friction", 0, (0.15, LEAD_M / 4.0, 0.7)),
+    Term("torque_ripple", 0, (0.1, 4.0, 0.7)),
+]
 
 
 def one_way(truth: Term, feed_m_s: float, seed: int) -> Recording:
     """A stroke forwards, recorded until shortly before its end: at rest friction holds, and cogging does not."""
-    profile = moves([{"kind": "dwell", "duration_s": 0.2},
-                     {"kind": "sine_squared", "to_m": 0.08, "feed_m_s": feed_m_s}])
+    profile = moves(
+        [{"kind": "dwell", "duration_s": 0.2}, {"kind": "sine_squared", "to_m": 0.08, "feed_m_s": feed_m_s}]
+    )
     whole = recorded(OWNER, truth, seed=seed, profile=profile)
     rows = slice(0, round(0.95 * len(whole)))
     return replace(whole, columns={name: values[rows] for name, values in whole.columns.items()})
@@ -37,8 +41,11 @@ def one_way(truth: Term, feed_m_s: float, seed: int) -> Recording:
 def test_each_passes_for_the_other_on_a_way_forwards(truth: Term) -> None:
     run = take(one_way(truth, 0.02, 1), OWNER)
     with_nothing, with_truth = evaluate(Model(OWNER), [run]), evaluate(Model(OWNER, (truth,)), [run])
-    rival = next(alike for alike in likenesses([truth], OWNER)
-                 if alike[0].effect == ({term.effect for term in TERMS[:2]} - {truth.effect}).pop())
+    rival = next(
+        alike
+        for alike in likenesses([truth], OWNER)
+        if alike[0].effect == ({term.effect for term in TERMS[:2]} - {truth.effect}).pop()
+    )
     nearest = min((evaluate(Model(OWNER, (term,)), [run]) for term in rival), key=lambda found: found.cost)
     fitted = fit(nearest.model, [run])
     assert fitted.cost - with_truth.cost < 0.001 * (with_nothing.cost - with_truth.cost)
@@ -52,7 +59,7 @@ def test_what_a_likeness_passes_for_is_where_it_came_from(truth: Term) -> None:
 
 
 def test_what_the_library_does_not_allow_and_what_does_not_turn_passes_for_nothing() -> None:
-    fine = likenesses([Term("cogging_torque", 0, (0.2, 150.0, 0.0))], OWNER)     # friction repeats from 0.1 mm up
+    fine = likenesses([Term("cogging_torque", 0, (0.2, 150.0, 0.0))], OWNER)  # friction repeats from 0.1 mm up
     assert [alike[0].effect for alike in fine] == ["torque_ripple"]
     strong = likenesses([Term("cogging_torque", 0, (2.0, 4.0, 0.0))], OWNER)
     assert [alike[0].values[0] for alike in strong if alike[0].effect == "torque_ripple"] == [0.5]
@@ -68,9 +75,16 @@ def test_beside_another_of_its_effect_a_likeness_takes_the_next_slot() -> None:
 def test_what_there_is_no_room_for_is_not_tried() -> None:
     """A third cogging, or one in the place of a cogging that the bench knows."""
     two = [Term("cogging_torque", 0, (0.1, 6.0, 0.0)), Term("cogging_torque", 0, (0.1, 12.0, 0.0), 1)]
-    known = OWNER.model_copy(update={"mechanisms": tuple(
-        MechanismEntry(effect=term.effect, parameters=dict(zip(BY_ID[term.effect].names, term.values, strict=True)))
-        for term in two)})
+    known = OWNER.model_copy(
+        update={
+            "mechanisms": tuple(
+                MechanismEntry(
+                    effect=term.effect, parameters=dict(zip(BY_ID[term.effect].names, term.values, strict=True))
+                )
+                for term in two
+            )
+        }
+    )
     cogging, ripple = (alike[0] for alike in likenesses([TERMS[1]], OWNER))
     for model, terms in ((Model(OWNER, tuple(two)), two), (Model(known), [])):
         assert not offered(cogging, model, terms)

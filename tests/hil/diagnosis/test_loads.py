@@ -5,14 +5,14 @@ from __future__ import annotations
 import pytest
 from diagnosis_runs import bench, recorded
 
-from hil.bench import Bench, MechanismEntry
-from hil.diagnosis import explain, search
-from hil.diagnosis.claims import claimable
+from hil.bench.bench_file import Bench, MechanismEntry
 from hil.diagnosis.diagnose import diagnose
-from hil.diagnosis.fit import fit
-from hil.diagnosis.model import Model
-from hil.diagnosis.terms import Term
-from hil.measured import take
+from hil.diagnosis.estimation.fit import fit
+from hil.diagnosis.estimation.hypothesis import Model
+from hil.diagnosis.estimation.terms import Term
+from hil.diagnosis.search import forward_selection, successive_halving
+from hil.diagnosis.search.validity import claimable
+from hil.identification.dataset import take
 
 OWNER = bench()
 COULOMB_N_M = OWNER.axis.physics().coulomb_n_m
@@ -23,8 +23,9 @@ def knowing(effect: str, parameter: str, value: float) -> Bench:
     return OWNER.model_copy(update={"mechanisms": (MechanismEntry(effect=effect, parameters={parameter: value}),)})
 
 
-@pytest.mark.parametrize(("effect", "parameter"), [
-    ("constant_load", "load_torque_n_m"), ("asymmetric_friction", "offset_torque_n_m")])
+@pytest.mark.parametrize(
+    ("effect", "parameter"), [("constant_load", "load_torque_n_m"), ("asymmetric_friction", "offset_torque_n_m")]
+)
 def test_a_load_that_is_known_too_small_is_corrected_not_doubled(effect: str, parameter: str) -> None:
     truth = Term("constant_load", 0, (0.8,))
     found = diagnose([recorded(OWNER, truth)], [recorded(OWNER, truth, seed=2)], knowing(effect, parameter, 0.3))
@@ -39,7 +40,9 @@ def test_another_law_takes_the_place_of_what_is_known() -> None:
     truth = Term("asymmetric_friction", 1, (0.15,))
     owner = knowing("asymmetric_friction", "offset_torque_n_m", 0.2)
     train = [recorded(OWNER, truth)]
-    lead = search.leads(search.nominal(owner, [take(train[0], owner)]), [take(train[0], owner)])[0]
+    lead = successive_halving.leads(
+        successive_halving.nominal(owner, [take(train[0], owner)]), [take(train[0], owner)]
+    )[0]
     assert (lead.term.effect, lead.term.variant) == ("asymmetric_friction", 1)
     assert lead.share > 0.7
     assert lead.term.values[0] == pytest.approx(0.15, rel=0.1)
@@ -70,10 +73,11 @@ def test_a_spring_that_a_later_fit_moves_out_of_reach_goes() -> None:
     found = fit(Model(OWNER, (spring, lag)), runs)
     (out_of_reach, _) = found.model.resolved(found.x)[1]
     assert not claimable(out_of_reach, OWNER)
-    assert [term.effect for term in explain.claimed(found, runs).model.terms] == ["current_loop_lag"]
+    assert [term.effect for term in forward_selection.claimed(found, runs).model.terms] == ["current_loop_lag"]
 
 
-@pytest.mark.parametrize(("frequency_hz", "structure"), [
-    (120.0, True), (1700.0, True), (1900.0, False), (2000.0, False)])
+@pytest.mark.parametrize(
+    ("frequency_hz", "structure"), [(120.0, True), (1700.0, True), (1900.0, False), (2000.0, False)]
+)
 def test_a_structure_that_sways_as_fast_as_can_be_is_a_mass(frequency_hz: float, structure: bool) -> None:
     assert claimable(Term("structural_mode", 0, (frequency_hz, 0.05, 0.3)), OWNER) is structure

@@ -9,15 +9,15 @@ import pytest
 from diagnosis_runs import bench, recorded
 from numpy.typing import NDArray
 
-from hil.diagnosis.energy import Energy, energies
-from hil.diagnosis.fit import Fit, evaluate
-from hil.diagnosis.locate import _range, locate, phase_shares, windows
-from hil.diagnosis.model import Model
-from hil.diagnosis.periods import Lock, lock
-from hil.diagnosis.phases import phases
+from hil.diagnosis.estimation.fit import Fit, evaluate
+from hil.diagnosis.estimation.hypothesis import Model
+from hil.diagnosis.estimation.terms import Term
+from hil.diagnosis.location.locate import _range, locate, phase_shares, windows
+from hil.diagnosis.location.periodicity import Lock, lock
+from hil.diagnosis.location.phases import phases
+from hil.diagnosis.location.residual_energy import Energy, energies
 from hil.diagnosis.result import Location, PhaseKind
-from hil.diagnosis.terms import Term
-from hil.measured import Measured, take
+from hil.identification.dataset import Measured, take
 
 FloatArray = NDArray[np.float64]
 OWNER = bench()
@@ -30,11 +30,15 @@ def located(*terms: Term, named: bool = False) -> Location:
     return locate(without, [run], evaluate(Model(OWNER, terms), [run]) if named else without)
 
 
-@pytest.mark.parametrize(("term", "block", "channel"), [
-    (Term("constant_load", 0, (0.5,)), "motor_side", "motor_position_rad"),
-    (Term("periodic_lead_error", 0, (5e-6, 0.3)), "transmission", "table_position_m"),
-    (Term("current_loop_lag", 0, (1e-3,)), "drive", "torque_n_m"),
-    (Term("velocity_filter_lag", 0, (1e-3,)), "controller", "torque_command_n_m")])
+@pytest.mark.parametrize(
+    ("term", "block", "channel"),
+    [
+        (Term("constant_load", 0, (0.5,)), "motor_side", "motor_position_rad"),
+        (Term("periodic_lead_error", 0, (5e-6, 0.3)), "transmission", "table_position_m"),
+        (Term("current_loop_lag", 0, (1e-3,)), "drive", "torque_n_m"),
+        (Term("velocity_filter_lag", 0, (1e-3,)), "controller", "torque_command_n_m"),
+    ],
+)
 def test_the_block_is_found_without_a_name(term: Term, block: str, channel: str) -> None:
     found = located(term)
     assert found.block == block
@@ -74,8 +78,22 @@ def test_an_angle_locked_error_is_told_from_a_time_locked_one() -> None:
 def test_at_a_single_speed_nothing_is_claimed() -> None:
     run = take(recorded(OWNER), OWNER)
     rows = np.abs(np.abs(run.velocity_command_m_s) - 0.25) < 0.01
-    one = Measured(**{**vars(run), **{name: getattr(run, name)[rows] for name in (
-        "position_command_m", "velocity_command_m_s", "motor", "table_m", "torque_command", "torque")}})
+    one = Measured(
+        **{
+            **vars(run),
+            **{
+                name: getattr(run, name)[rows]
+                for name in (
+                    "position_command_m",
+                    "velocity_command_m_s",
+                    "motor",
+                    "table_m",
+                    "torque_command",
+                    "torque",
+                )
+            },
+        }
+    )
     seen = [Energy(one, np.zeros(one.motor.size), {"motor": np.sin(one.motor * 3.0)})]
     assert lock(seen, "motor", OWNER, ()).order_per_rev is None
 

@@ -8,16 +8,16 @@ import pytest
 from diagnosis_runs import bench, recorded
 
 from hil.diagnosis.diagnose import Diagnosis
-from hil.diagnosis.explain import Explanation
-from hil.diagnosis.fit import evaluate
-from hil.diagnosis.model import Model
-from hil.diagnosis.proof import Proof
+from hil.diagnosis.estimation.fit import evaluate
+from hil.diagnosis.estimation.hypothesis import Model
+from hil.diagnosis.estimation.terms import Term
 from hil.diagnosis.result import Result, Unexplained, Verdict
-from hil.diagnosis.terms import Term
-from hil.diagnosis.testable import _typical
-from hil.measured import take
-from hil.report.diagnose_figures import convincing
-from hil.report.diagnose_location import location_figure
+from hil.diagnosis.search.forward_selection import Explanation
+from hil.diagnosis.verdict.cross_validation import Proof
+from hil.diagnosis.verdict.observability import _typical
+from hil.identification.dataset import take
+from hil.report.diagnosis.figures import convincing
+from hil.report.diagnosis.location import location_figure
 from hil.report.figures import save
 from hil.twin.library import BY_ID
 
@@ -38,8 +38,17 @@ def diagnosis_of(effect: str, times: float = 3.0) -> Diagnosis:
     runs = [take(recorded(OWNER, term), OWNER)]
     plain, right = evaluate(Model(OWNER), runs), evaluate(Model(OWNER, (term,)), runs)
     explanation, proof = Explanation(plain, plain, right), Proof(right, (), ())
-    result = Result(verdict=Verdict.MISSING_PHYSICS, statement="", location=None, missing=(), parameter_corrections={},
-                    fit={}, not_testable=(), unexplained=Unexplained(share=0.0, description=""), runtime_s=0.0)
+    result = Result(
+        verdict=Verdict.MISSING_PHYSICS,
+        statement="",
+        location=None,
+        missing=(),
+        parameter_corrections={},
+        fit={},
+        not_testable=(),
+        unexplained=Unexplained(share=0.0, description=""),
+        runtime_s=0.0,
+    )
     return Diagnosis(result, OWNER, OWNER, tuple(runs), (), explanation, proof, right)
 
 
@@ -51,7 +60,7 @@ def test_every_mechanism_has_its_picture(effect: str, tmp_path: Path) -> None:
     assert shown.caption.endswith("Recordings: run.")
     axes = shown.figure.axes
     assert all(axis.get_xlabel() or axis is not axes[-1] for axis in axes)
-    assert all("[" in axis.get_ylabel() for axis in axes)      # a unit
+    assert all("[" in axis.get_ylabel() for axis in axes)  # a unit
 
 
 def test_the_location_has_its_picture(tmp_path: Path) -> None:

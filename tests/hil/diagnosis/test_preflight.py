@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from diagnosis_runs import bench, changed, recorded
 
-from hil.bench import load_bench
+from hil.bench.bench_file import load_bench
+from hil.diagnosis.estimation.terms import Term
 from hil.diagnosis.preflight import _factor_between, prepare, regress
-from hil.diagnosis.terms import Term
 from hil.errors import InputError
-from hil.recording import Recording
+from hil.recording.recording import Recording
 
 OWNER = bench()
 
@@ -32,10 +32,17 @@ def part(recording: Recording, rows: slice) -> Recording:
     return changed(recording, **{name: values[rows] for name, values in recording.columns.items()})
 
 
-@pytest.mark.parametrize("terms", [
-    (), (Term("backlash", 0, (50e-6,)),), (Term("stribeck_friction", 0, (2.0, 3.0)),),
-    (Term("constant_load", 0, (2.0,)),), (Term("current_loop_lag", 1, (2e-3,)),),
-    (Term("torque_saturation", 0, (3.0,)),)])
+@pytest.mark.parametrize(
+    "terms",
+    [
+        (),
+        (Term("backlash", 0, (50e-6,)),),
+        (Term("stribeck_friction", 0, (2.0, 3.0)),),
+        (Term("constant_load", 0, (2.0,)),),
+        (Term("current_loop_lag", 1, (2e-3,)),),
+        (Term("torque_saturation", 0, (3.0,)),),
+    ],
+)
 def test_physics_is_no_reason_to_refuse(terms: tuple[Term, ...]) -> None:
     """With parameters wrong by 30 % beside it."""
     truth = bench(motor_mass_kg=240.0, table_mass_kg=270.0, coulomb_torque_n_m=1.5)
@@ -67,9 +74,14 @@ def test_without_excitation(run: Recording) -> None:
     assert "without excitation: the set-points do not move" in refused(changed(run, **still))
 
 
-@pytest.mark.parametrize(("channel", "message"), [
-    ("motor_position_rad", "motor_position_rad is not recorded"), ("torque_n_m", "torque_n_m is not recorded"),
-    ("table_position_m", "table_position_m is not recorded, but the bench reference has a linear encoder")])
+@pytest.mark.parametrize(
+    ("channel", "message"),
+    [
+        ("motor_position_rad", "motor_position_rad is not recorded"),
+        ("torque_n_m", "torque_n_m is not recorded"),
+        ("table_position_m", "table_position_m is not recorded, but the bench reference has a linear encoder"),
+    ],
+)
 def test_missing_channel(run: Recording, channel: str, message: str) -> None:
     assert message in refused(changed(run, **{channel: None}))
 
@@ -84,21 +96,27 @@ def test_copied_channel(run: Recording) -> None:
     assert "table_position_m is a copy of the motor position" in refused(changed(run, table_position_m=copy))
 
 
-@pytest.mark.parametrize(("channel", "factor", "message"), [
-    ("motor_position_rad", -1.0, "motor_position_rad: has the wrong sign"),
-    ("motor_position_rad", 180.0 / math.pi, "looks like degrees"),
-    ("motor_position_rad", 0.5 / math.pi, "looks like revolutions"),
-    ("table_position_m", -1.0, "table_position_m: has the wrong sign"),
-    ("table_position_m", 1e3, "looks like mm"),
-    ("velocity_command_m_s", 60.0, "looks like m/min"),
-    ("torque_command_n_m", 1e-3, "torque_n_m: is 1000 × what torque_command_n_m ask for: it looks like mN m"),
-    ("torque_n_m", -1.0, "torque_n_m runs against torque_command_n_m")])
+@pytest.mark.parametrize(
+    ("channel", "factor", "message"),
+    [
+        ("motor_position_rad", -1.0, "motor_position_rad: has the wrong sign"),
+        ("motor_position_rad", 180.0 / math.pi, "looks like degrees"),
+        ("motor_position_rad", 0.5 / math.pi, "looks like revolutions"),
+        ("table_position_m", -1.0, "table_position_m: has the wrong sign"),
+        ("table_position_m", 1e3, "looks like mm"),
+        ("velocity_command_m_s", 60.0, "looks like m/min"),
+        ("torque_command_n_m", 1e-3, "torque_n_m: is 1000 × what torque_command_n_m ask for: it looks like mN m"),
+        ("torque_n_m", -1.0, "torque_n_m runs against torque_command_n_m"),
+    ],
+)
 def test_wrong_sign_or_unit_of_one_channel(run: Recording, channel: str, factor: float, message: str) -> None:
     assert message in refused(changed(run, **{channel: factor}))
 
 
-@pytest.mark.parametrize(("factor", "unit"), [
-    (1e3, "mN m"), (100.0, "N cm"), (1e-3, "kN m"), (2.0 * math.pi * 100.0, "N at the table"), (1.0 / 9.81, "")])
+@pytest.mark.parametrize(
+    ("factor", "unit"),
+    [(1e3, "mN m"), (100.0, "N cm"), (1e-3, "kN m"), (2.0 * math.pi * 100.0, "N at the table"), (1.0 / 9.81, "")],
+)
 def test_wrong_unit_of_the_torque(run: Recording, factor: float, unit: str) -> None:
     message = refused(changed(run, torque_n_m=factor, torque_command_n_m=factor))
     assert "what the inertia and friction of the bench (N m) ask for" in message

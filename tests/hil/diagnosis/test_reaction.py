@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from diagnosis_runs import bench, changed, recorded
 
-from hil.diagnosis import search
-from hil.diagnosis.locate import locate
-from hil.diagnosis.reaction import acting, stiffness_between
-from hil.diagnosis.terms import Term
-from hil.measured import take
-from hil.recording import Recording
-from hil.twin.chain import serial_chain, two_mass
+from hil.diagnosis.estimation.terms import Term
+from hil.diagnosis.location.locate import locate
+from hil.diagnosis.location.reaction_torque import acting, stiffness_between
+from hil.diagnosis.search import successive_halving
+from hil.identification.dataset import take
+from hil.recording.recording import Recording
+from hil.twin.structure.chain import serial_chain, two_mass
 
 OWNER = bench()
 
@@ -25,25 +25,29 @@ def bursts() -> Recording:
     return changed(clean, table_position_m=clean.columns["table_position_m"] + error_m)
 
 
-@pytest.mark.parametrize(("truth", "block"), [
-    (Term("external_force", 0, (150.0, 0.3, 0.6)), "table"),
-    (Term("spring_load", 0, (3000.0, 0.02)), "table"),
-    (Term("periodic_lead_error", 0, (3e-6, 0.4, 1e-6, 1.0, 0.0, 0.0)), "transmission"),
-    (None, "sensor"),
-    (Term("cogging_torque", 0, (0.1, 6.0, 0.2)), "motor_side"),
-    (Term("torque_ripple", 0, (0.2, 6.0, 0.2)), "motor_side"),
-], ids=["push", "spring", "lead", "noise bursts", "cogging", "ripple"])
+@pytest.mark.parametrize(
+    ("truth", "block"),
+    [
+        (Term("external_force", 0, (150.0, 0.3, 0.6)), "table"),
+        (Term("spring_load", 0, (3000.0, 0.02)), "table"),
+        (Term("periodic_lead_error", 0, (3e-6, 0.4, 1e-6, 1.0, 0.0, 0.0)), "transmission"),
+        (None, "sensor"),
+        (Term("cogging_torque", 0, (0.1, 6.0, 0.2)), "motor_side"),
+        (Term("torque_ripple", 0, (0.2, 6.0, 0.2)), "motor_side"),
+    ],
+    ids=["push", "spring", "lead", "noise bursts", "cogging", "ripple"],
+)
 def test_the_motor_tells_on_which_side_of_the_transmission_it_acts(truth: Term | None, block: str) -> None:
     runs = (take(recorded(OWNER, truth) if truth else bursts(), OWNER),)
-    left = search.nominal(OWNER, runs)
+    left = successive_halving.nominal(OWNER, runs)
     assert locate(left, runs, left).block == block
 
 
 def test_wrong_parameters_are_placed_where_they_show_and_not_where_they_seem_to_act() -> None:
     """A heavier table loads the spring as a force on it would."""
     runs = (take(recorded(bench(table_mass_kg=1.5 * OWNER.axis.table_mass_kg)), OWNER),)
-    refitted = search.nominal(OWNER, runs)
-    owner = search.evaluate(refitted.model, runs)
+    refitted = successive_halving.nominal(OWNER, runs)
+    owner = successive_halving.evaluate(refitted.model, runs)
     assert acting(owner, runs) is not None
     assert locate(owner, runs, refitted).block in ("motor_side", "transmission")
 
@@ -52,8 +56,8 @@ def test_without_a_second_encoder_nothing_is_told() -> None:
     runs = (take(recorded(OWNER, Term("external_force", 0, (150.0, 0.3, 0.6))), OWNER),)
     owner = OWNER.model_copy(update={"encoders": OWNER.encoders.model_copy(update={"table": None})})
     blind = (take(changed(recorded(owner), table_position_m=None), owner),)
-    assert acting(search.nominal(owner, blind), blind) is None
-    assert acting(search.nominal(OWNER, runs), runs) is not None
+    assert acting(successive_halving.nominal(owner, blind), blind) is None
+    assert acting(successive_halving.nominal(OWNER, runs), runs) is not None
 
 
 def test_the_stiffness_that_holds_the_table_is_that_of_the_springs_in_series() -> None:

@@ -10,31 +10,74 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hil.diagnosis.confidence import confidence
 from hil.diagnosis.result import SCHEMA_FILE, Result, schema
+from hil.diagnosis.verdict.confidence import confidence
 
 FIGURES = {"before_rms": 0.08, "after_rms": 0.0101, "noise_floor_rms": 0.0099, "owner_rms": 0.2}
 EXAMPLE: dict[str, Any] = {
-    "verdict": "missing_physics", "statement": "There are 24.7 µm of lost motion between screw and table.",
-    "location": {"block": "transmission", "element": "ball nut", "channels": ("table_position_m",),
-                 "phases": ({"kind": "reversal", "share": 0.9},), "windows_s": ((0.1, 0.2),)},
-    "missing": ({"effect": "backlash", "confidence": 0.9, "equivalents": ("preload_loss",),
-                 "rivals": ({"effect": "preload_loss", "evidence": "close"},),
-                 "parameters": {"gap_m": {"value": 2.4e-5, "std": 1e-8, "unit": "m"}}, "sentence": "lost motion"},),
+    "verdict": "missing_physics",
+    "statement": "There are 24.7 µm of lost motion between screw and table.",
+    "location": {
+        "block": "transmission",
+        "element": "ball nut",
+        "channels": ("table_position_m",),
+        "phases": ({"kind": "reversal", "share": 0.9},),
+        "windows_s": ((0.1, 0.2),),
+    },
+    "missing": (
+        {
+            "effect": "backlash",
+            "confidence": 0.9,
+            "equivalents": ("preload_loss",),
+            "rivals": ({"effect": "preload_loss", "evidence": "close"},),
+            "parameters": {"gap_m": {"value": 2.4e-5, "std": 1e-8, "unit": "m"}},
+            "sentence": "lost motion",
+        },
+    ),
     "parameter_corrections": {"motor_mass_kg": {"nominal": 335.0, "value": 330.0, "std": 0.1, "unit": "kg"}},
-    "fit": {"torque_n_m": {"unit": "N m", "mode": "closed_loop", "floor_from": "white_noise", "train": FIGURES,
-                           "validate": FIGURES}},
-    "not_testable": ("thermal_growth",), "unexplained": {"share": 0.01, "description": "noise"}, "runtime_s": 12.0,
+    "fit": {
+        "torque_n_m": {
+            "unit": "N m",
+            "mode": "closed_loop",
+            "floor_from": "white_noise",
+            "train": FIGURES,
+            "validate": FIGURES,
+        }
+    },
+    "not_testable": ("thermal_growth",),
+    "unexplained": {"share": 0.01, "description": "noise"},
+    "runtime_s": 12.0,
 }
-KEYS = {"schema_version", "verdict", "location", "missing", "parameter_corrections", "fit", "not_testable",
-        "unexplained", "next_experiment", "runtime_s"}
-LOCATION = {"block", "element", "channels", "phases", "windows_s", "position_m", "speed_m_s", "frequency_hz",
-            "period_m", "order_per_rev"}
+KEYS = {
+    "schema_version",
+    "verdict",
+    "location",
+    "missing",
+    "parameter_corrections",
+    "fit",
+    "not_testable",
+    "unexplained",
+    "next_experiment",
+    "runtime_s",
+}
+LOCATION = {
+    "block",
+    "element",
+    "channels",
+    "phases",
+    "windows_s",
+    "position_m",
+    "speed_m_s",
+    "frequency_hz",
+    "period_m",
+    "order_per_rev",
+}
 
 
 def test_the_shipped_schema_is_current() -> None:
-    assert json.loads(SCHEMA_FILE.read_text(encoding="utf-8")) == json.loads(json.dumps(schema())), \
+    assert json.loads(SCHEMA_FILE.read_text(encoding="utf-8")) == json.loads(json.dumps(schema())), (
         "run hil.diagnosis.result.write_schema()"
+    )
 
 
 def test_a_result_is_valid_by_its_schema_and_has_the_documented_keys() -> None:
@@ -46,9 +89,16 @@ def test_a_result_is_valid_by_its_schema_and_has_the_documented_keys() -> None:
     assert data["next_experiment"] is None
 
 
-@pytest.mark.parametrize(("path", "value"), [
-    (("verdict",), "maybe"), (("unexplained", "share"), 1.5), (("schema_version",), 2),
-    (("missing", 0, "confidence"), float("nan")), (("fit", "torque_n_m", "mode"), "open_loop")])
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        (("verdict",), "maybe"),
+        (("unexplained", "share"), 1.5),
+        (("schema_version",), 2),
+        (("missing", 0, "confidence"), float("nan")),
+        (("fit", "torque_n_m", "mode"), "open_loop"),
+    ],
+)
 def test_what_the_interface_does_not_allow_is_refused(path: tuple[str | int, ...], value: Any) -> None:
     data = json.loads(json.dumps(Result.model_validate(EXAMPLE).as_json()))
     part = data
@@ -64,7 +114,8 @@ LEFT, FACTORS, MARGINS = st.floats(0.0, 1e3), st.floats(0.0, 1e6), st.floats(-1e
 
 @given(LEFT, FACTORS, MARGINS, LEFT, FACTORS, MARGINS)
 def test_confidence_grows_with_each_thing_that_speaks_for_a_name(
-        left: float, factor: float, margin: float, less: float, more: float, clearer: float) -> None:
+    left: float, factor: float, margin: float, less: float, more: float, clearer: float
+) -> None:
     low = confidence(left, factor, margin)
     assert 0.0 <= low <= 1.0
     assert confidence(min(left, less), max(factor, more), max(margin, clearer)) >= low

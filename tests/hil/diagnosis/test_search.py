@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 from diagnosis_runs import recorded
 
-from hil.bench import load_bench
-from hil.diagnosis import search
+from hil.bench.bench_file import load_bench
 from hil.diagnosis.diagnose import diagnose
-from hil.diagnosis.fit import Fit
-from hil.diagnosis.model import CHATTER_STEP, Model, inertia
-from hil.diagnosis.terms import Term
+from hil.diagnosis.estimation.fit import Fit
+from hil.diagnosis.estimation.hypothesis import CHATTER_STEP, Model, inertia
+from hil.diagnosis.estimation.terms import Term
+from hil.diagnosis.search import successive_halving
 
 
 def bent(model: Model, **factors: float) -> Fit:
     """A fit that has multiplied nominal values."""
     x = model.initial()
-    for index, coordinate in enumerate(model.coordinates[:model.nominal_count]):
+    for index, coordinate in enumerate(model.coordinates[: model.nominal_count]):
         x[index] += np.log(factors.get(coordinate.name, 1.0))
     return Fit(model, x, np.zeros(1), np.zeros((1, 0)), ())
 
@@ -25,15 +25,22 @@ def bent(model: Model, **factors: float) -> Fit:
 def test_springs_and_shares_of_the_masses_are_the_owners_and_the_rest_is_refitted() -> None:
     owner = load_bench("reference_7dof")
     term = Term("cogging_torque", 0, (0.1, 6.0, 0.2))
-    base = bent(Model(owner, (term,)), motor_inertia_kg_m2=2.0, table_mass_kg=0.5, nut_support_stiffness_n_m=0.4,
-                damping_ratio=5.0, coulomb_torque_n_m=1.2)
-    everything, hidden = search.believed(base)
+    base = bent(
+        Model(owner, (term,)),
+        motor_inertia_kg_m2=2.0,
+        table_mass_kg=0.5,
+        nut_support_stiffness_n_m=0.4,
+        damping_ratio=5.0,
+        coulomb_torque_n_m=1.2,
+    )
+    everything, hidden = successive_halving.believed(base)
     refitted, terms = base.model.resolved(hidden)
     assert base.model.resolved(everything)[0].axis == owner.axis
     assert inertia(refitted) == pytest.approx(inertia(base.model.resolved(base.x)[0]))
     axis = refitted.axis
     assert axis.motor_inertia_kg_m2 / owner.axis.motor_inertia_kg_m2 == pytest.approx(
-        axis.table_mass_kg / owner.axis.table_mass_kg)
+        axis.table_mass_kg / owner.axis.table_mass_kg
+    )
     assert axis.nut_support_stiffness_n_m == pytest.approx(owner.axis.nut_support_stiffness_n_m)
     assert axis.damping_ratio == pytest.approx(owner.axis.damping_ratio)
     assert axis.coulomb_torque_n_m == pytest.approx(1.2 * owner.axis.coulomb_torque_n_m)
@@ -41,7 +48,7 @@ def test_springs_and_shares_of_the_masses_are_the_owners_and_the_rest_is_refitte
 
 
 def test_without_springs_there_is_one_such_point() -> None:
-    assert len(search.believed(bent(Model(load_bench("emps_symmetric"), ())))) == 1
+    assert len(successive_halving.believed(bent(Model(load_bench("emps_symmetric"), ())))) == 1
 
 
 def test_differences_are_wide_where_a_nut_may_chatter() -> None:
@@ -56,8 +63,10 @@ def test_play_on_a_light_nut_beside_wrong_springs() -> None:
     """The nut of the 7-dof chain chatters in 5 um; the owner's spring is too stiff, the table too light."""
     owner = load_bench("reference_7dof")
     axis = owner.axis
-    true = {"nut_support_stiffness_n_m": 0.75 * axis.nut_support_stiffness_n_m,
-            "table_mass_kg": 1.2 * axis.table_mass_kg}
+    true = {
+        "nut_support_stiffness_n_m": 0.75 * axis.nut_support_stiffness_n_m,
+        "table_mass_kg": 1.2 * axis.table_mass_kg,
+    }
     truth = owner.model_copy(update={"axis": axis.model_copy(update=true)})
     play = Term("backlash", 1, (5e-6,))
     found = diagnose([recorded(truth, play, times=2)], [recorded(truth, play, seed=2)], owner)

@@ -12,18 +12,18 @@ import pytest
 
 from drivers.sim.effects import CATALOGUE, Effect
 from drivers.sim.reality import record
-from hil.bench import load_bench
-from hil.proof import motions
-from hil.proof.answers import compared, inseparable
-from hil.proof.axes import WRONG_BY, draw_axis
-from hil.proof.axis_kinds import KINDS, Kind
-from hil.proof.conceal import RECORDINGS, TIERS, Case, _turn, draw, rerun, write
-from hil.proof.drafts import at_size, one, stage
-from hil.proof.effects import LIBRARY, NEED_TABLE, Scene, applicable, draw_effect
-from hil.proof.novel import draw_novel, novel
-from hil.proof.tiers import RUNGS, VISIBLE
-from hil.proof.visibility import Visibility
-from hil.recording import read_recording
+from hil.bench.bench_file import load_bench
+from hil.proof.draw import motions
+from hil.proof.draw.axes import WRONG_BY, draw_axis
+from hil.proof.draw.axis_kinds import KINDS, Kind
+from hil.proof.draw.cases import at_size, one, stage
+from hil.proof.draw.effect_size import Visibility
+from hil.proof.draw.effects import LIBRARY, NEED_TABLE, Scene, applicable, draw_effect
+from hil.proof.draw.expected import compared, inseparable
+from hil.proof.draw.generator import RECORDINGS, TIERS, Case, _turn, draw, rerun, write
+from hil.proof.draw.tiers import RUNGS, VISIBLE
+from hil.proof.draw.unknown_effects import draw_novel, novel
+from hil.recording.recording import read_recording
 from hil.twin.library import BY_ID
 
 # Tier, number and kind of axis of cases that are quickly drawn
@@ -143,8 +143,16 @@ def test_every_effect_can_be_drawn_and_run_on_each_axis(kind: Kind) -> None:
     for name in (*names * 2, *novel(axis)):
         effect = draw_effect(name, scene, rng) if name in LIBRARY else draw_novel(name, scene, rng)
         if isinstance(effect, Effect):
-            columns = record(axis.truth, axis.sensors, [effect], axis.servo, np.array(run.position_m[rows]),
-                             np.array(run.velocity_m_s[rows]), axis.period_s, step_s=2e-5)
+            columns = record(
+                axis.truth,
+                axis.sensors,
+                [effect],
+                axis.servo,
+                np.array(run.position_m[rows]),
+                np.array(run.velocity_m_s[rows]),
+                axis.period_s,
+                step_s=2e-5,
+            )
             assert all(np.all(np.isfinite(values)) for values in columns.values()), name
         seen.add(name)
     assert seen == {*names, *novel(axis)}
@@ -186,8 +194,11 @@ def test_a_pair_and_a_rival(cases: dict[str, Case]) -> None:
 
 
 def test_what_no_motion_tells_apart_is_not_paired() -> None:
-    assert inseparable("constant_load") == inseparable("spring_load") == {
-        "constant_load", "asymmetric_friction", "spring_load"}
+    assert (
+        inseparable("constant_load")
+        == inseparable("spring_load")
+        == {"constant_load", "asymmetric_friction", "spring_load"}
+    )
     for effect in BY_ID:
         assert effect in inseparable(effect)
         assert all(effect in inseparable(other) for other in inseparable(effect))

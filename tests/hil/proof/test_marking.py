@@ -7,8 +7,8 @@ from math import inf, pi
 import pytest
 from proof_cases import concealed, finding, marked, truth
 
-from hil.proof.marking import Marked
-from hil.proof.replies import reply_of
+from hil.proof.answer.answers import reply_of
+from hil.proof.score.grading import Marked
 
 
 def test_one_law_of_two_names_is_right_by_either() -> None:
@@ -46,8 +46,11 @@ def test_an_ambiguous_case_wants_the_set_and_then_one_of_it() -> None:
     alone = marked(of, finding("spring_load"))
     assert (alone.top, alone.set_reported, alone.resolved) == (True, False, False)
     assert alone.wrong == "It does not say that constant load cannot be told from what it names."
-    for later, resolved in ((finding("spring_load"), True), (finding("spring_load", "constant_load"), False),
-                            (finding("asymmetric_friction"), False)):
+    for later, resolved in (
+        (finding("spring_load"), True),
+        (finding("spring_load", "constant_load"), False),
+        (finding("asymmetric_friction"), False),
+    ):
         answer = reply_of({"verdict": "missing_physics", "missing": [later]})
         assert Marked(of, alone.reply, answer).resolved is resolved
 
@@ -70,13 +73,25 @@ def test_below_the_floor_silence_is_right_and_a_wrong_name_is_not() -> None:
 
 
 def test_parameter_errors_are_relative_and_harmonics_weighted() -> None:
-    of = truth("single", concealed("periodic_lead_error", amplitude_m=10e-6, phase_rad=3.1, amplitude_2_m=1e-6,
-                                   phase_2_rad=0.0))
-    case = marked(of, finding("periodic_lead_error", amplitude_m=(11e-6, 1e-6), phase_rad=(0.1 - pi, 0.01),
-                              amplitude_2_m=(2e-6, 0.1e-6), phase_2_rad=(0.5, 1.0), amplitude_3_m=(1e-6, 0.0)))
+    of = truth(
+        "single",
+        concealed("periodic_lead_error", amplitude_m=10e-6, phase_rad=3.1, amplitude_2_m=1e-6, phase_2_rad=0.0),
+    )
+    case = marked(
+        of,
+        finding(
+            "periodic_lead_error",
+            amplitude_m=(11e-6, 1e-6),
+            phase_rad=(0.1 - pi, 0.01),
+            amplitude_2_m=(2e-6, 0.1e-6),
+            phase_2_rad=(0.5, 1.0),
+            amplitude_3_m=(1e-6, 0.0),
+        ),
+    )
     turn = 2.0 * pi - 3.1 + 0.1 - pi
-    assert case.parameter_errors() == pytest.approx({
-        "amplitude_m": 0.1, "phase_rad": turn, "amplitude_2_m": 0.1, "phase_2_rad": 0.05})
+    assert case.parameter_errors() == pytest.approx(
+        {"amplitude_m": 0.1, "phase_rad": turn, "amplitude_2_m": 0.1, "phase_2_rad": 0.05}
+    )
     assert case.covered() == {"amplitude_m": True, "phase_rad": False, "amplitude_2_m": False, "phase_2_rad": True}
     assert marked(of, finding("backlash", gap_m=(1e-6, 1e-6))).parameter_errors() == {}
 
@@ -99,8 +114,9 @@ def test_places_by_name_or_else_by_location() -> None:
     assert marked(lead_error).period_error() is None
     mode = truth("single", concealed("structural_mode", place={"frequency_hz": 50.0}, frequency_hz=50.0))
     assert marked(mode, location={"frequency_hz": 51.0}).frequency_error() == pytest.approx(0.02)
-    assert marked(mode, finding("structural_mode", frequency_hz=(49.5, 1.0)),
-                  location={"frequency_hz": 51.0}).frequency_error() == pytest.approx(0.01)
+    assert marked(
+        mode, finding("structural_mode", frequency_hz=(49.5, 1.0)), location={"frequency_hz": 51.0}
+    ).frequency_error() == pytest.approx(0.01)
     push = truth("single", concealed("external_force", place={"window_s": [2.0, 4.0]}))
     assert marked(push, location={"windows_s": [[1.0, 2.5], [3.0, 4.0]]}).window_overlap() == pytest.approx(1.5 / 3.0)
     twice = marked(push, location={"windows_s": [[2.0, 3.0], [2.0, 3.0], [2.5, 3.5]]})

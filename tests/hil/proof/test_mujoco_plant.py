@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from drivers.sim.reality import record
-from hil.diagnosis.model import Model, observer_time_s
-from hil.diagnosis.terms import Term
-from hil.measured import take
-from hil.proof.drafts import stage
-from hil.proof.mujoco_model import EFFECTS
-from hil.proof.mujoco_plant import draw_mujoco, record_mujoco
-from hil.recording import Recording
+from hil.diagnosis.estimation.hypothesis import Model, observer_time_s
+from hil.diagnosis.estimation.terms import Term
+from hil.identification.dataset import take
+from hil.proof.draw.cases import stage
+from hil.proof.draw.mujoco_model import EFFECTS
+from hil.proof.draw.mujoco_plant import draw_mujoco, record_mujoco
+from hil.recording.recording import Recording
 from hil.twin.library import BY_ID
 
 pytest.importorskip("mujoco", reason="MuJoCo is not installed: make peers")
@@ -24,19 +24,29 @@ def test_the_nominal_axis_leaves_as_little_as_with_the_simulated_axis() -> None:
 
     def left(recording: Recording) -> dict[str, float]:
         measured, model = take(recording, axis.true_bench), Model(axis.true_bench)
-        return {name: float(np.sqrt(np.mean(values[measured.judged] ** 2)))
-                for name, values in model.closed_loop(model.initial(), measured).items()}
+        return {
+            name: float(np.sqrt(np.mean(values[measured.judged] ** 2)))
+            for name, values in model.closed_loop(model.initial(), measured).items()
+        }
 
     ours, theirs = left(Recording("run", simulated, axis.period_s)), left(record_mujoco(axis, None, run, 5))
     assert theirs["torque"] == pytest.approx(ours["torque"], rel=0.02)
     assert theirs["table"] == pytest.approx(ours["table"], rel=0.02)
-    assert theirs["motor"] < 2.0 * ours["motor"]      # half a step of time, see the model
+    assert theirs["motor"] < 2.0 * ours["motor"]  # half a step of time, see the model
 
 
-@pytest.mark.parametrize("effect", [
-    "constant_load", "cogging_torque", "backlash", pytest.param("periodic_lead_error", marks=pytest.mark.long),
-    pytest.param("spring_load", marks=pytest.mark.long), pytest.param("table_side_friction", marks=pytest.mark.long),
-    pytest.param("stribeck_friction", marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    "effect",
+    [
+        "constant_load",
+        "cogging_torque",
+        "backlash",
+        pytest.param("periodic_lead_error", marks=pytest.mark.long),
+        pytest.param("spring_load", marks=pytest.mark.long),
+        pytest.param("table_side_friction", marks=pytest.mark.long),
+        pytest.param("stribeck_friction", marks=pytest.mark.long),
+    ],
+)
 def test_what_mujoco_moves_is_what_the_library_says_of_an_effect(effect: str) -> None:
     case = draw_mujoco("single", EFFECTS.index(effect), 11)
     bench = case.draft.axis.true_bench
@@ -48,7 +58,7 @@ def test_what_mujoco_moves_is_what_the_library_says_of_an_effect(effect: str) ->
         model = Model(bench, terms, 0.3, observer_time_s([run], bench))
         return float(np.mean(model.residuals(model.initial(), [run]) ** 2))
 
-    variant = {"exponential": 1}.get(true.form, int(effect == "backlash"))     # its flanks push only
+    variant = {"exponential": 1}.get(true.form, int(effect == "backlash"))  # its flanks push only
     without, with_it = left(), left(Term(effect, variant, values))
     assert with_it < min(1.3, 1.0 + 0.1 * (without - 1.0)), (without, with_it)
 

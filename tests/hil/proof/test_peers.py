@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from hil.errors import HilError
-from hil.proof.conceal import Case, draw, write
+from hil.proof.answer.answers import reply_of
+from hil.proof.draw.generator import Case, draw, write
 from hil.proof.peers import METHODS, SLOW, signals
 from hil.proof.peers.answer import answer_case
 from hil.proof.peers.case import Case as Prepared
@@ -21,7 +22,6 @@ from hil.proof.peers.fit_everything import fit_everything
 from hil.proof.peers.forward_selection import select
 from hil.proof.peers.pysindy_peer import pysindy
 from hil.proof.peers.regressors import Equation, named
-from hil.proof.replies import reply_of
 from hil.twin.library import BY_ID
 
 QUICK = [name for name in METHODS if name not in SLOW]
@@ -45,7 +45,8 @@ def case(folder: Path) -> Prepared:
 
 @pytest.mark.parametrize("method", QUICK)
 def test_a_large_effect_is_named_first_in_the_form_of_the_interface(
-        method: str, case: Prepared, concealed: Case) -> None:
+    method: str, case: Prepared, concealed: Case
+) -> None:
     if method.startswith("pysindy"):
         pytest.importorskip("pysindy", reason="not installed: make peers")
     assert concealed.truth.effects[0].size > 5.0
@@ -81,8 +82,21 @@ def test_without_pysindy_the_message_says_what_to_do(case: Prepared, monkeypatch
 
 
 def test_the_command_has_each_method_answer_every_case_once(folder: Path, tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "hil.proof.peers", str(folder.parent), str(tmp_path), "--first", "1", "--jobs",
-               "2", "--method", "forward_selection", "--method", "residual_tests"]
+    command = [
+        sys.executable,
+        "-m",
+        "hil.proof.peers",
+        str(folder.parent),
+        str(tmp_path),
+        "--first",
+        "1",
+        "--jobs",
+        "2",
+        "--method",
+        "forward_selection",
+        "--method",
+        "residual_tests",
+    ]
     kept = tmp_path / "residual_tests" / folder.name / "diagnosis.json"
     kept.parent.mkdir(parents=True)
     kept.write_text("{}", encoding="utf-8")
@@ -109,7 +123,7 @@ def test_a_case_that_cannot_be_read_is_a_wrong_answer_of_each_method(folder: Pat
 def test_forward_selection_finds_the_terms_of_a_sum_and_stops_at_noise() -> None:
     rng = np.random.default_rng(1)
     terms = rng.standard_normal((2000, 30))
-    terms[:, 4] = 0.9 * terms[:, 3] + 0.1 * terms[:, 4]     # resembles one that is there
+    terms[:, 4] = 0.9 * terms[:, 3] + 0.1 * terms[:, 4]  # resembles one that is there
     target = 2.0 * terms[:, 3] - terms[:, 11] + 0.1 * terms[:, 20] + rng.standard_normal(2000)
     found = select(Equation("motor", target, terms, [(("",), ("",))] * 30, 1.0))
     assert found[:2] == [3, 11]
@@ -121,8 +135,13 @@ def test_the_mechanism_that_most_terms_speak_for_is_named_and_a_sign_can_tell() 
     x = np.random.default_rng(2).standard_normal((500, 3))
     pitch_or_spring = (("pitch", "spring"), ("pitch", "spring"))
     table = Equation("transmission", 2.0 * x[:, 0], x[:, :1], [pitch_or_spring], 1.0)
-    motor = Equation("motor", x[:, 0] - 3.0 * x[:, 1] + 0.1 * x[:, 2], x,
-                     [(("spring",), ("spring",)), (("late",), ("early",)), (("tiny",), ("tiny",))], 1.0)
+    motor = Equation(
+        "motor",
+        x[:, 0] - 3.0 * x[:, 1] + 0.1 * x[:, 2],
+        x,
+        [(("spring",), ("spring",)), (("late",), ("early",)), (("tiny",), ("tiny",))],
+        1.0,
+    )
     assert named([(table, [0])]) == ["pitch"]
     assert named([(table, [0]), (motor, [])]) == ["pitch"]
     assert named([(table, [0]), (motor, [0, 1, 2])]) == ["early", "spring"]

@@ -7,8 +7,8 @@ from collections import Counter
 import pytest
 
 from hil.errors import InputError
-from hil.proof.conceal import TIERS
-from hil.proof.plan import FULL, counts, plan
+from hil.proof.draw.generator import TIERS
+from hil.proof.draw.plan import FULL, counts, plan
 
 
 def test_the_full_proof_has_the_cases_that_were_promised() -> None:

@@ -16,15 +16,15 @@ from typer.testing import CliRunner
 
 from hil.cli import app
 from hil.errors import HilError, InputError
-from hil.proof.blind import DIAGNOSIS, ERROR
-from hil.proof.conceal import TIERS
-from hil.proof.effects import LIBRARY
-from hil.proof.page import write_proof
-from hil.proof.plan import Planned, plan
+from hil.files.output import write_json
+from hil.proof.answer.blind import DIAGNOSIS, ERROR
+from hil.proof.draw.effects import LIBRARY
+from hil.proof.draw.generator import TIERS
+from hil.proof.draw.plan import Planned, plan
 from hil.proof.run import ANSWERS, diagnose_blind, prove, score_others
-from hil.proof.score import Scores, score
+from hil.proof.score.page import write_proof
+from hil.proof.score.scores import Scores, score
 from hil.proof.seal import CASES, SEAL, SEALED, code_sha256, draw_cases, read_seal, seal, sha256, unseal
-from hil.report.output import write_json
 from hil.twin.library import BY_ID
 
 SEED, SMALL = 5, 6
@@ -66,7 +66,8 @@ def test_a_seal_holds_the_truth_and_every_file(sealed: Path) -> None:
     assert {path.name for path in (sealed / SEALED).iterdir()} == {"truths.json"}
     truths = unseal(sealed)
     assert [(truths[case.name].tier, truths[case.name].number) for case in QUICK] == [
-        (case.tier, case.number) for case in QUICK]
+        (case.tier, case.number) for case in QUICK
+    ]
     for name, entry in data(sealed / SEALED / "truths.json").items():
         assert set(entry["sha256"]) == {"train_1.parquet", "train_2.parquet", "holdout.parquet", "bench.yaml"}
         for file, digest in entry["sha256"].items():
@@ -148,8 +149,10 @@ def test_another_method_is_scored_on_what_it_answered(copy: Path) -> None:
     (copy / "peers" / "begun" / "case_0001").mkdir(parents=True)
     write_json(copy / "peers" / "begun" / "case_0001" / DIAGNOSIS, {"verdict": "no_mismatch", "missing": []})
     found = score(unseal(copy), {})
-    assert {name: [(case.truth.name, case.right) for case in other.cases]
-            for name, other in score_others(copy, found).items()} == {"begun": [("case_0001", True)]}
+    assert {
+        name: [(case.truth.name, case.right) for case in other.cases]
+        for name, other in score_others(copy, found).items()
+    } == {"begun": [("case_0001", True)]}
     assert score_others(copy, replace(found, cases=found.cases[:1])) == {}
 
 
@@ -196,14 +199,23 @@ def test_all_and_some_at_once_is_refused(tmp_path: Path) -> None:
 def test_the_blind_process_imports_nothing_that_knows(tmp_path: Path) -> None:
     """All that a diagnosis of a case loads, by what it would load: a case without recordings."""
     (tmp_path / "cases" / "empty").mkdir(parents=True)
-    code = ("import sys; from pathlib import Path; from hil.proof.blind import diagnose_case;"
-            f"diagnose_case(Path({str(tmp_path / 'cases' / 'empty')!r}), Path({str(tmp_path / 'answer')!r}));"
-            "print(*sorted(name for name in sys.modules if name.split('.')[0] in ('hil', 'drivers')))")
+    code = (
+        "import sys; from pathlib import Path; from hil.proof.answer.blind import diagnose_case;"
+        f"diagnose_case(Path({str(tmp_path / 'cases' / 'empty')!r}), Path({str(tmp_path / 'answer')!r}));"
+        "print(*sorted(name for name in sys.modules if name.split('.')[0] in ('hil', 'drivers')))"
+    )
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     loaded = set(ran.stdout.split())
     assert "hil.diagnosis.diagnose" in loaded
-    assert {name for name in loaded if name.startswith("hil.proof.")} == {"hil.proof.blind", "hil.proof.side_by_side"}
-    assert not {name for name in loaded if name.startswith("drivers.sim") or name in ("hil.simulated", "hil.run")}
+    assert {name for name in loaded if name.startswith("hil.proof.")} == {
+        "hil.proof.answer.blind",
+        "hil.proof.answer.worker_pool",
+    }
+    assert not {
+        name
+        for name in loaded
+        if name.startswith("drivers.sim") or name in ("hil.loop.simulated_bench", "hil.loop.run")
+    }
     assert data(tmp_path / "answer" / "empty" / ERROR)["kind"] == "InputError"
 
 
@@ -247,7 +259,9 @@ def test_a_small_proof(tmp_path: Path) -> None:
     diagnose_blind(tmp_path / "given", tmp_path / ANSWERS, ["x"], code_sha256(), 1, quiet)
     first, again = data(folder / ANSWERS / quickest / DIAGNOSIS), data(tmp_path / ANSWERS / "x" / DIAGNOSIS)
     assert (again["verdict"], [found["effect"] for found in again["missing"]]) == (
-        first["verdict"], [found["effect"] for found in first["missing"]])
+        first["verdict"],
+        [found["effect"] for found in first["missing"]],
+    )
     for name, correction in first["parameter_corrections"].items():
         assert again["parameter_corrections"][name]["value"] == pytest.approx(correction["value"], rel=1e-6)
 
@@ -258,8 +272,14 @@ def test_forty_cases(tmp_path: Path) -> None:
     planned = plan(40, 1)
     found: Scores = prove(tmp_path, planned, 1, 2, quiet, quiet)
     measured = {goal.name: goal.value for goal in found.goals}
-    least = {"detected where above the floor": 0.8, "singles: named first": 0.6, "singles: in the set named first": 0.7,
-             "pairs: at least one named": 0.6, "block right": 0.6, "right where confidence ≥ 0.9": 0.6}
+    least = {
+        "detected where above the floor": 0.8,
+        "singles: named first": 0.6,
+        "singles: in the set named first": 0.7,
+        "pairs: at least one named": 0.6,
+        "block right": 0.6,
+        "right where confidence ≥ 0.9": 0.6,
+    }
     assert {name: measured[name] for name, value in least.items() if (measured[name] or 0.0) < value} == {}
     most = {"nulls: something named": 0.2, "wrong parameters: something named": 0.2, "parameters, median error": 0.1}
     assert {name: measured[name] for name, value in most.items() if (measured[name] or 0.0) > value} == {}

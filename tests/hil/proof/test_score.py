@@ -10,15 +10,15 @@ import pytest
 from proof_cases import concealed, finding, goals, scores, truth
 
 from hil.errors import HilError
-from hil.proof.blind import DIAGNOSIS, ERROR
-from hil.proof.page import write_proof
-from hil.proof.replies import Reply, read_replies, reply_of
-from hil.proof.score import Goal, lead, score
+from hil.files.output import write_json
+from hil.proof.answer.answers import Reply, read_replies, reply_of
+from hil.proof.answer.blind import DIAGNOSIS, ERROR
+from hil.proof.score.confusion import confusion, power, verdicts
+from hil.proof.score.page import write_proof
+from hil.proof.score.scores import Goal, lead, score
+from hil.proof.score.statistics import Rate, confidence_bins, expected_calibration_error, quantile, rate
+from hil.proof.score.tables import goal_row
 from hil.proof.seal import SEAL
-from hil.proof.statistics import Rate, confidence_bins, expected_calibration_error, quantile, rate
-from hil.proof.tables import goal_row
-from hil.proof.tallies import confusion, power, verdicts
-from hil.report.output import write_json
 
 
 @pytest.mark.parametrize(("hits", "of", "low", "high"), [
@@ -49,7 +49,9 @@ def test_calibration_error_by_hand() -> None:
     # bin [0.9, 1]: 0.95 promised, 3 of 4 right; bin [0.6, 0.7): 0.65, 1 of 1
     bins = confidence_bins([0.95, 0.95, 0.95, 0.95, 0.65], [True, True, True, False, True])
     assert [(found.confidence, found.right) for found in bins] == [
-        (pytest.approx(0.65), Rate(1, 1)), (pytest.approx(0.95), Rate(3, 4))]
+        (pytest.approx(0.65), Rate(1, 1)),
+        (pytest.approx(0.95), Rate(3, 4)),
+    ]
     assert expected_calibration_error(bins) == pytest.approx((4 * 0.20 + 1 * 0.35) / 5)
     assert expected_calibration_error([]) is None
     assert confidence_bins([1.0], [True])[0].right == Rate(1, 1)
@@ -57,50 +59,92 @@ def test_calibration_error_by_hand() -> None:
 
 def test_rates_by_hand() -> None:
     single = truth("single", concealed("backlash", gap_m=10e-6))
-    right = {"verdict": "missing_physics", "location": {"block": "transmission"},
-             "missing": [finding("backlash", confidence=0.95, gap_m=(10.2e-6, 0.2e-6))],
-             "fit": {"table": {"validate": {"after_rms": 1.1, "noise_floor_rms": 1.0}},
-                     "torque": {"validate": {"after_rms": 1.2, "noise_floor_rms": 1.0}}}}
-    wrong = {"verdict": "missing_physics", "missing": [finding("preload_loss", "backlash", confidence=0.95)],
-             "location": {"block": "table"}}
+    right = {
+        "verdict": "missing_physics",
+        "location": {"block": "transmission"},
+        "missing": [finding("backlash", confidence=0.95, gap_m=(10.2e-6, 0.2e-6))],
+        "fit": {
+            "table": {"validate": {"after_rms": 1.1, "noise_floor_rms": 1.0}},
+            "torque": {"validate": {"after_rms": 1.2, "noise_floor_rms": 1.0}},
+        },
+    }
+    wrong = {
+        "verdict": "missing_physics",
+        "missing": [finding("preload_loss", "backlash", confidence=0.95)],
+        "location": {"block": "table"},
+    }
     nothing = {"verdict": "no_mismatch", "missing": []}
     pair = truth("pair", concealed("backlash"), concealed("torque_ripple"))
     both = {"verdict": "missing_physics", "missing": [finding("torque_ripple", confidence=0.55), finding("backlash")]}
     third = {"verdict": "missing_physics", "missing": [finding("backlash"), finding("spring_load")]}
     novel = truth("novel", concealed("novel_hammering"))
     unexplained = {"verdict": "unexplained", "missing": [], "location": {"block": "table"}}
-    found = goals(scores(
-        (single, right), (single, wrong), (single, None), (truth("single", concealed("spring_load")), nothing),
-        (pair, both), (pair, third), (truth("null"), nothing), (truth("null"), unexplained), (truth("null"), wrong),
-        (truth("parameters_only"), {"verdict": "parameter_error", "missing": [], "parameter_corrections": {
-            "table_mass_kg": {"value": 103.0, "std": 1.0}}}),
-        (novel, unexplained), (novel, both),
-        (truth("insufficient", concealed("backlash", size=0.1), not_testable=("backlash",)),
-         nothing | {"not_testable": ["backlash"]}),
-        (truth("ambiguous", concealed("spring_load"), rivals=("constant_load",)),
-         {"verdict": "missing_physics", "missing": [finding("constant_load", "spring_load")]}),
-        (truth("masked", concealed("torque_ripple", size=2.0), concealed("backlash")), both)))
+    found = goals(
+        scores(
+            (single, right),
+            (single, wrong),
+            (single, None),
+            (truth("single", concealed("spring_load")), nothing),
+            (pair, both),
+            (pair, third),
+            (truth("null"), nothing),
+            (truth("null"), unexplained),
+            (truth("null"), wrong),
+            (
+                truth("parameters_only"),
+                {
+                    "verdict": "parameter_error",
+                    "missing": [],
+                    "parameter_corrections": {"table_mass_kg": {"value": 103.0, "std": 1.0}},
+                },
+            ),
+            (novel, unexplained),
+            (novel, both),
+            (
+                truth("insufficient", concealed("backlash", size=0.1), not_testable=("backlash",)),
+                nothing | {"not_testable": ["backlash"]},
+            ),
+            (
+                truth("ambiguous", concealed("spring_load"), rivals=("constant_load",)),
+                {"verdict": "missing_physics", "missing": [finding("constant_load", "spring_load")]},
+            ),
+            (truth("masked", concealed("torque_ripple", size=2.0), concealed("backlash")), both),
+        )
+    )
     expected = {
-        "nulls: something named": Rate(1, 3), "nulls: right verdict": Rate(1, 3),
-        "wrong parameters: something named": Rate(0, 1), "wrong parameters: right verdict": Rate(1, 1),
-        "detected where above the floor": Rate(8, 10), "singles: named first": Rate(1, 4),
-        "singles: in the set named first": Rate(2, 4), "singles: worst effect": Rate(0, 1),
-        "singles: more in that set": Rate(1, 4), "singles: a spurious second": Rate(1, 4),
-        "pairs: both named": Rate(1, 2), "pairs: at least one named": Rate(2, 2), "pairs: a spurious third": Rate(1, 2),
-        "masked: what hides is named": Rate(1, 1), "block right": Rate(1, 4),
-        "parameters, 90 % intervals cover": Rate(1, 1), "held out ≤ 1.15 × floor if right": Rate(0, 1),
-        "right where confidence ≥ 0.9": Rate(1, 3), "novel: unexplained": Rate(1, 2),
-        "novel: something named": Rate(1, 2), "novel: block right": Rate(1, 2),
-        "ambiguous: reported as a set": Rate(1, 1), "ambiguous: more in that set": Rate(0, 1),
+        "nulls: something named": Rate(1, 3),
+        "nulls: right verdict": Rate(1, 3),
+        "wrong parameters: something named": Rate(0, 1),
+        "wrong parameters: right verdict": Rate(1, 1),
+        "detected where above the floor": Rate(8, 10),
+        "singles: named first": Rate(1, 4),
+        "singles: in the set named first": Rate(2, 4),
+        "singles: worst effect": Rate(0, 1),
+        "singles: more in that set": Rate(1, 4),
+        "singles: a spurious second": Rate(1, 4),
+        "pairs: both named": Rate(1, 2),
+        "pairs: at least one named": Rate(2, 2),
+        "pairs: a spurious third": Rate(1, 2),
+        "masked: what hides is named": Rate(1, 1),
+        "block right": Rate(1, 4),
+        "parameters, 90 % intervals cover": Rate(1, 1),
+        "held out ≤ 1.15 × floor if right": Rate(0, 1),
+        "right where confidence ≥ 0.9": Rate(1, 3),
+        "novel: unexplained": Rate(1, 2),
+        "novel: something named": Rate(1, 2),
+        "novel: block right": Rate(1, 2),
+        "ambiguous: reported as a set": Rate(1, 1),
+        "ambiguous: more in that set": Rate(0, 1),
         "ambiguous: resolved by motion": Rate(0, 1),
-        "insufficient: called not testable": Rate(1, 1), "insufficient: something named": Rate(0, 1)}
+        "insufficient: called not testable": Rate(1, 1),
+        "insufficient: something named": Rate(0, 1),
+    }
     assert {name: goal.measured for name, goal in found.items() if isinstance(goal.measured, Rate)} == expected
     assert found["singles: worst effect"].detail == "spring_load"
     assert found["parameters, median error"].value == pytest.approx(0.02)
     assert found["parameters of the bench, median"].value == pytest.approx(0.03)
     # 0.95 promised, 1 of 3 right; 0.55 promised, 2 of 3 right (pair and masked; not on the novel one)
-    assert found["confidence: calibration error"].value == pytest.approx(
-        (3 * (0.95 - 1 / 3) + 3 * (2 / 3 - 0.55)) / 6)
+    assert found["confidence: calibration error"].value == pytest.approx((3 * (0.95 - 1 / 3) + 3 * (2 / 3 - 0.55)) / 6)
     met = {name: goal.met for name, goal in found.items()}
     assert met["wrong parameters: something named"] is True
     assert met["nulls: something named"] is False
@@ -129,10 +173,15 @@ def test_tallies_by_hand() -> None:
                                                 "missing": [finding("asymmetric_friction")]}),
                    (truth("null"), right), (truth("novel", concealed("novel_hammering")), None)).cases  # fmt: skip
     assert [(rung.size, rung.detected, rung.named) for rung in power(cases)] == [
-        (0.5, Rate(1, 1), Rate(1, 1)), (3.0, Rate(2, 2), Rate(1, 2))]
+        (0.5, Rate(1, 1), Rate(1, 1)),
+        (3.0, Rate(2, 2), Rate(1, 2)),
+    ]
     assert confusion(cases) == {
-        "constant_load": {"constant_load": 1}, "backlash": {"backlash": 1, "unexplained": 1},
-        "novel_hammering": {"no_answer": 1}, "nothing": {"backlash": 1}}
+        "constant_load": {"constant_load": 1},
+        "backlash": {"backlash": 1, "unexplained": 1},
+        "novel_hammering": {"no_answer": 1},
+        "nothing": {"backlash": 1},
+    }
     assert verdicts(cases)["ladder"] == {"missing_physics": 2, "unexplained": 1}
 
 
@@ -153,7 +202,7 @@ def test_another_method_is_scored_by_its_names_alone(tmp_path: Path) -> None:
     ahead = lead(own, {"other": other, "blank": score(truths, {})})
     assert (ahead.value, ahead.detail, ahead.met) == (0.75, "other", True)
     begun = score({"a": truths["a"]}, replies)
-    assert lead(own, {"other": other, "begun": begun}) == ahead         # which answered one case, rightly
+    assert lead(own, {"other": other, "begun": begun}) == ahead  # which answered one case, rightly
     assert lead(own, {"begun": begun}).met is None
 
 
@@ -179,19 +228,41 @@ def test_goals_as_text() -> None:
 
 def test_the_page_holds_scores_pictures_and_the_worst_cases(tmp_path: Path) -> None:
     load = concealed("constant_load", size=5.0, load_torque_n_m=0.5)
-    named = {"verdict": "missing_physics", "runtime_s": 12.0, "statement": "Missing physics: the load.",
-             "missing": [finding("constant_load", confidence=0.9, load_torque_n_m=(0.51, 0.01))]}
+    named = {
+        "verdict": "missing_physics",
+        "runtime_s": 12.0,
+        "statement": "Missing physics: the load.",
+        "missing": [finding("constant_load", confidence=0.9, load_torque_n_m=(0.51, 0.01))],
+    }
     false = named | {"statement": "Missing physics: something."}
-    found = scores((truth("single", load), named), (truth("ladder", load), named), (truth("null"), false),
-                   (truth("novel", concealed("novel_hammering")), {"verdict": "unexplained", "missing": []}))
-    write_json(tmp_path / SEAL, {
-        "truths_sha256": "00ff", "seed": 3, "cases": 4, "sealed_at": "then",
-        "command": "hil prove --cases 4 --seed 3 --out DIR",
-        "git_commit": None, "git_changed": None, "versions": {"numpy": "2"}})
+    found = scores(
+        (truth("single", load), named),
+        (truth("ladder", load), named),
+        (truth("null"), false),
+        (truth("novel", concealed("novel_hammering")), {"verdict": "unexplained", "missing": []}),
+    )
+    write_json(
+        tmp_path / SEAL,
+        {
+            "truths_sha256": "00ff",
+            "seed": 3,
+            "cases": 4,
+            "sealed_at": "then",
+            "command": "hil prove --cases 4 --seed 3 --out DIR",
+            "git_commit": None,
+            "git_changed": None,
+            "versions": {"numpy": "2"},
+        },
+    )
     write_proof(found, {"other": found}, tmp_path)
     pictures = ("power", "confusion", "calibration", "errors", "times")
-    assert {path.name for path in tmp_path.iterdir()} == {SEAL, "scores.json", "report.html", "proof.md",
-                                                          *(f"{name}.png" for name in pictures)}
+    assert {path.name for path in tmp_path.iterdir()} == {
+        SEAL,
+        "scores.json",
+        "report.html",
+        "proof.md",
+        *(f"{name}.png" for name in pictures),
+    }
     page = (tmp_path / "report.html").read_text()
     assert "It names constant load, which is not there." in page
     assert "Missing physics: something." in page

@@ -12,13 +12,13 @@ import pytest
 from processes import DEADLINE_S, is_over, wait_for
 
 from hil.errors import InputError
-from hil.proof.side_by_side import cases_in
+from hil.proof.answer.worker_pool import cases_in
 
 # Two cases, each of which says which process works at it and would take longer than anybody waits.
 WORK = """
 import os, time
 from pathlib import Path
-from hil.proof.side_by_side import side_by_side
+from hil.proof.answer.worker_pool import side_by_side
 
 def work(place):
     (place / "part").write_text(str(os.getpid()))
@@ -36,11 +36,12 @@ def test_workers_end_with_the_process_that_they_work_for(number: signal.Signals,
     for name in ("one", "two"):
         (tmp_path / name).mkdir()
     pids = [tmp_path / name / "pid" for name in ("one", "two")]
-    with subprocess.Popen([sys.executable, "work.py"], cwd=tmp_path, stderr=subprocess.PIPE, text=True,
-                          start_new_session=True) as process:
+    with subprocess.Popen(
+        [sys.executable, "work.py"], cwd=tmp_path, stderr=subprocess.PIPE, text=True, start_new_session=True
+    ) as process:
         wait_for(lambda: all(path.exists() for path in pids))
         if number == signal.SIGINT:
-            os.killpg(process.pid, number)          # as a terminal does
+            os.killpg(process.pid, number)  # as a terminal does
         else:
             process.send_signal(number)
         wait_for(lambda: all(is_over(int(path.read_text())) for path in pids))

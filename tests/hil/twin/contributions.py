@@ -10,7 +10,7 @@ from hil.twin.mechanism import PARAMETERS, WIDTH, Moment
 PERIOD_S = 1e-3
 RATIO_M = 0.010 / (2.0 * np.pi)
 AT_REST = Moment(0.0, 0.0, PERIOD_S, PERIOD_S / 10, 0.0, 0.0, 0.0, RATIO_M, viscous_speed=160.0)
-PROPERTY = settings(deadline=None, derandomize=True)   # the first call of each contribution compiles it
+PROPERTY = settings(deadline=None, derandomize=True)  # the first call of each contribution compiles it
 
 moments = st.builds(
     Moment,
@@ -29,7 +29,7 @@ moments = st.builds(
 def row(parameters, variant=0):
     """The row of parameters that the kernel hands to a contribution: its own, zeros, then the variant."""
     values = np.zeros(PARAMETERS)
-    values[:len(parameters)] = parameters
+    values[: len(parameters)] = parameters
     values[-1] = variant
     return values
 

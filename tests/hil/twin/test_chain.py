@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hil.twin import elasticity
-from hil.twin.ballscrew import equivalent_two_mass
-from hil.twin.chain import RECONSTRUCTED_TABLE_1, Chain, one_mass, serial_chain, seven_dof, two_mass
-from hil.twin.modal import modal
+from hil.twin.structure import elasticity
+from hil.twin.structure.ballscrew import equivalent_two_mass
+from hil.twin.structure.chain import RECONSTRUCTED_TABLE_1, Chain, one_mass, serial_chain, seven_dof, two_mass
+from hil.twin.structure.modal import modal
 
 LEAD_M = 0.010
 R = LEAD_M / (2.0 * pi)
@@ -148,7 +148,7 @@ def test_sides_of_the_transmission() -> None:
 
 def test_one_mass_moves_as_a_whole() -> None:
     chain = one_mass(95.109)
-    assert chain.inertia_kg_m2[0, 0] == pytest.approx(95.109)   # r = 1: newtons and metres
+    assert chain.inertia_kg_m2[0, 0] == pytest.approx(95.109)  # r = 1: newtons and metres
     assert frequencies_hz(chain)[0] == 0.0
     assert one_mass(719.0, LEAD_M).inertia_kg_m2[0, 0] == pytest.approx(719.0 * R**2)
 

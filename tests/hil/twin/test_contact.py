@@ -5,11 +5,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hil.twin import contact
+from hil.twin.stepping import contact
 
 STIFFNESS, BOUND, STEP_S = 1000.0, 2.0, 1e-4
 YIELD_M = BOUND / STIFFNESS
-LIGHT = 1e-12      # a body so heavy that no friction changes its velocity: velocity gained per torque
+LIGHT = 1e-12  # a body so heavy that no friction changes its velocity: velocity gained per torque
 
 
 def friction_along(path, elements=None):
@@ -101,9 +101,16 @@ def test_a_closed_loop_ends_where_it_began() -> None:
     assert end == pytest.approx(begin, rel=1e-9)
 
 
-@given(free=st.floats(-0.5, 0.5), gain=st.floats(1e-3, 10.0), viscous=st.floats(0.0, 5.0), bound=st.floats(0.0, 3.0),
-       stiffness=st.floats(1.0, 1e6), shift=st.floats(-0.5, 0.5), before=st.floats(-0.5, 0.5),
-       start=st.lists(st.floats(-1.0, 1.0), min_size=contact.ELEMENTS, max_size=contact.ELEMENTS))
+@given(
+    free=st.floats(-0.5, 0.5),
+    gain=st.floats(1e-3, 10.0),
+    viscous=st.floats(0.0, 5.0),
+    bound=st.floats(0.0, 3.0),
+    stiffness=st.floats(1.0, 1e6),
+    shift=st.floats(-0.5, 0.5),
+    before=st.floats(-0.5, 0.5),
+    start=st.lists(st.floats(-1.0, 1.0), min_size=contact.ELEMENTS, max_size=contact.ELEMENTS),
+)
 @settings(max_examples=200, deadline=None)
 def test_the_step_solves_its_equation(free, gain, viscous, bound, stiffness, shift, before, start) -> None:
     limits = contact.YIELD_SHARES * bound
@@ -114,15 +121,22 @@ def test_the_step_solves_its_equation(free, gain, viscous, bound, stiffness, shi
     late = contact._late(gain, stiffness, STEP_S)
     travel = STEP_S * ((1.0 - late) * before + late * velocity)
     moved = np.clip(first + contact.STIFFNESS_SHARES * stiffness * travel, -limits, limits)
-    if torque != free / gain and not np.array_equal(elements, first):      # else friction holds it, or all slip on
+    if torque != free / gain and not np.array_equal(elements, first):  # else friction holds it, or all slip on
         mean = (1.0 - late) * first.sum() + late * moved.sum()
         assert torque == pytest.approx(mean + shift + viscous * velocity, abs=1e-8 * max(1.0, abs(torque)))
         np.testing.assert_allclose(elements, moved, atol=1e-8 * max(bound, 1.0))
 
 
-@given(free=st.floats(-0.5, 0.5), gain=st.floats(1e-3, 10.0), viscous=st.floats(0.0, 5.0), bound=st.floats(1e-3, 3.0),
-       stiffness=st.floats(1.0, 1e6), shift=st.floats(-0.5, 0.5), before=st.floats(-0.5, 0.5),
-       start=st.floats(-1.0, 1.0))
+@given(
+    free=st.floats(-0.5, 0.5),
+    gain=st.floats(1e-3, 10.0),
+    viscous=st.floats(0.0, 5.0),
+    bound=st.floats(1e-3, 3.0),
+    stiffness=st.floats(1.0, 1e6),
+    shift=st.floats(-0.5, 0.5),
+    before=st.floats(-0.5, 0.5),
+    start=st.floats(-1.0, 1.0),
+)
 @settings(max_examples=300, deadline=None)
 def test_so_does_that_of_dahls_contact(free, gain, viscous, bound, stiffness, shift, before, start) -> None:
     pull = start * bound

@@ -3,16 +3,22 @@
 import numpy as np
 import pytest
 
-from hil import control
+from hil.control import cascade
 from hil.twin.axis import Start, Twin
-from hil.twin.chain import LINEAR_LEAD_M, one_mass, two_mass
 from hil.twin.physics import Active, Physics
+from hil.twin.structure.chain import LINEAR_LEAD_M, one_mass, two_mass
 
 MASS_KG, COULOMB_N, VISCOUS_N_S_M = 100.0, 20.0, 200.0
-SPEED_M_S = COULOMB_N / VISCOUS_N_S_M      # at which viscous friction equals Coulomb friction
-GAINS = control.make_gains(position_gain_1_s=100.0, velocity_gain_n_m_s_rad=5000.0, ratio_m_rad=1.0,
-                           velocity_feedforward=0.0, velocity_integral_time_s=None, velocity_period_s=1e-3,
-                           position_period_s=1e-3)
+SPEED_M_S = COULOMB_N / VISCOUS_N_S_M  # at which viscous friction equals Coulomb friction
+GAINS = cascade.make_gains(
+    position_gain_1_s=100.0,
+    velocity_gain_n_m_s_rad=5000.0,
+    ratio_m_rad=1.0,
+    velocity_feedforward=0.0,
+    velocity_integral_time_s=None,
+    velocity_period_s=1e-3,
+    position_period_s=1e-3,
+)
 
 
 def twin(*active, coulomb=COULOMB_N, viscous=VISCOUS_N_S_M, **steps):
@@ -33,20 +39,27 @@ def speeds(found):
     return np.diff(found.motor_position) / GAINS.period_s
 
 
-@pytest.mark.parametrize(("active", "forwards", "backwards"), [
-    (thinning(500.0), 2.0 * COULOMB_N + 5.0, 2.0 * COULOMB_N + 5.0),
-    (with_speed(-4.0), 2.0 * COULOMB_N - 4.0, 2.0 * COULOMB_N + 4.0),
-])
+@pytest.mark.parametrize(
+    ("active", "forwards", "backwards"),
+    [
+        (thinning(500.0), 2.0 * COULOMB_N + 5.0, 2.0 * COULOMB_N + 5.0),
+        (with_speed(-4.0), 2.0 * COULOMB_N - 4.0, 2.0 * COULOMB_N + 4.0),
+    ],
+)
 def test_the_force_that_holds_the_speed_at_which_the_strength_is_told(active, forwards, backwards) -> None:
     for sign, force in ((1.0, forwards), (-1.0, backwards)):
         found = twin(active).drive(np.full(10_000, sign * force))
         assert speeds(found)[-1] == pytest.approx(sign * SPEED_M_S, rel=1e-4)
 
 
-@pytest.mark.parametrize("contact", [(), (Active("presliding_hysteresis", (4e6,)),),
-                                     (Active("presliding_hysteresis", (4e6,), 1),)], ids=["rigid", "elastic", "slips"])
-@pytest.mark.parametrize("active", [thinning(5e5), Active("nonlinear_viscous_friction", (1e8,))],
-                         ids=["thinning", "quadratic"])
+@pytest.mark.parametrize(
+    "contact",
+    [(), (Active("presliding_hysteresis", (4e6,)),), (Active("presliding_hysteresis", (4e6,), 1),)],
+    ids=["rigid", "elastic", "slips"],
+)
+@pytest.mark.parametrize(
+    "active", [thinning(5e5), Active("nonlinear_viscous_friction", (1e8,))], ids=["thinning", "quadratic"]
+)
 def test_drag_stops_a_coasting_axis_and_never_turns_it_round(active, contact) -> None:
     """One step per tick and drag that could stop the axis many times over within it."""
     coasting = twin(active, *contact, coarse_step_s=GAINS.period_s, fine_step_s=GAINS.period_s)
@@ -74,18 +87,28 @@ def test_without_viscous_friction_there_is_no_such_speed() -> None:
         np.testing.assert_array_equal(twin(active, viscous=0.0).drive(force).motor_position, plain)
 
 
-@pytest.mark.parametrize(("active", "drag_n"), [
-    (Active("nonlinear_viscous_friction", (500.0,)), 500.0 * SPEED_M_S**2), (with_speed(6.0), 6.0),
-    (thinning(500.0), 500.0 * SPEED_M_S**2)], ids=["quadratic", "by direction", "thinning"])
+@pytest.mark.parametrize(
+    ("active", "drag_n"),
+    [
+        (Active("nonlinear_viscous_friction", (500.0,)), 500.0 * SPEED_M_S**2),
+        (with_speed(6.0), 6.0),
+        (thinning(500.0), 500.0 * SPEED_M_S**2),
+    ],
+    ids=["quadratic", "by direction", "thinning"],
+)
 def test_a_share_of_all_friction_pulls_at_the_table(active, drag_n) -> None:
     """At a steady speed the spring holds what the guideways take."""
     stiffness_n_m, share, friction_n = 2e5, 0.6, 2.0 * COULOMB_N + drag_n
-    axis = Twin(Physics(two_mass(60.0, 40.0, stiffness_n_m, 0.1, LINEAR_LEAD_M), COULOMB_N, VISCOUS_N_S_M, linear=True),
-                GAINS, (active, Active("table_side_friction", (share,))))
+    axis = Twin(
+        Physics(two_mass(60.0, 40.0, stiffness_n_m, 0.1, LINEAR_LEAD_M), COULOMB_N, VISCOUS_N_S_M, linear=True),
+        GAINS,
+        (active, Active("table_side_friction", (share,))),
+    )
     found = axis.drive(np.full(10_000, friction_n))
     assert speeds(found)[-1] == pytest.approx(SPEED_M_S, rel=1e-4)
-    assert found.motor_position[-1] - found.table_position_m[-1] == pytest.approx(share * friction_n / stiffness_n_m,
-                                                                                  rel=1e-4)
+    assert found.motor_position[-1] - found.table_position_m[-1] == pytest.approx(
+        share * friction_n / stiffness_n_m, rel=1e-4
+    )
 
 
 def test_what_drifts_scales_drag_too() -> None:
@@ -95,22 +118,34 @@ def test_what_drifts_scales_drag_too() -> None:
     assert speeds(found)[-1] == pytest.approx(SPEED_M_S, rel=1e-4)
 
 
-@pytest.mark.parametrize("contact", [(), (Active("presliding_hysteresis", (4e6,)),),
-                                     (Active("presliding_hysteresis", (4e6,), 1),)], ids=["rigid", "elastic", "slips"])
+@pytest.mark.parametrize(
+    "contact",
+    [(), (Active("presliding_hysteresis", (4e6,)),), (Active("presliding_hysteresis", (4e6,), 1),)],
+    ids=["rigid", "elastic", "slips"],
+)
 @pytest.mark.parametrize("share", [0.3, 0.6, 1.0])
-@pytest.mark.parametrize("active", [Active("nonlinear_viscous_friction", (1e4,)), thinning(1e4), with_speed(15.0)],
-                         ids=["quadratic", "thinning", "by direction"])
+@pytest.mark.parametrize(
+    "active",
+    [Active("nonlinear_viscous_friction", (1e4,)), thinning(1e4), with_speed(15.0)],
+    ids=["quadratic", "thinning", "by direction"],
+)
 def test_drag_on_a_swinging_table_takes_energy_and_gives_none(active, share, contact) -> None:
     """Motor and table are made to swing against each other, without damping in the spring, and left alone."""
     motor_kg, table_kg, stiffness_n_m = 60.0, 40.0, 2e5
-    axis = Twin(Physics(two_mass(motor_kg, table_kg, stiffness_n_m, 0.0, LINEAR_LEAD_M), COULOMB_N, VISCOUS_N_S_M,
-                        linear=True), GAINS, (active, Active("table_side_friction", (share,)), *contact))
+    axis = Twin(
+        Physics(two_mass(motor_kg, table_kg, stiffness_n_m, 0.0, LINEAR_LEAD_M), COULOMB_N, VISCOUS_N_S_M, linear=True),
+        GAINS,
+        (active, Active("table_side_friction", (share,)), *contact),
+    )
     time_s = np.arange(1000) * GAINS.period_s
     resonance_rad_s = np.sqrt(stiffness_n_m * (1.0 / motor_kg + 1.0 / table_kg))
     found = axis.drive(np.where(time_s < 0.3, 1500.0 * np.sin(resonance_rad_s * time_s), 0.0))
     motor_m, table_m = found.motor_position, found.table_position_m
-    energy = (0.5 * motor_kg * np.gradient(motor_m, GAINS.period_s)**2
-              + 0.5 * table_kg * np.gradient(table_m, GAINS.period_s)**2 + 0.5 * stiffness_n_m * (table_m - motor_m)**2)
+    energy = (
+        0.5 * motor_kg * np.gradient(motor_m, GAINS.period_s) ** 2
+        + 0.5 * table_kg * np.gradient(table_m, GAINS.period_s) ** 2
+        + 0.5 * stiffness_n_m * (table_m - motor_m) ** 2
+    )
     alone = energy[305:]
     assert np.all(np.isfinite(energy))
     assert alone[0] > 5.0

@@ -6,9 +6,9 @@ from math import pi
 import numpy as np
 import pytest
 
-from hil import control
-from hil.twin.chain import RECONSTRUCTED_TABLE_1, seven_dof, two_mass
-from hil.twin.frequency import (
+from hil.control import cascade
+from hil.twin.structure.chain import RECONSTRUCTED_TABLE_1, seven_dof, two_mass
+from hil.twin.structure.frequency import (
     bandwidth_hz,
     closed_loop,
     modal_damping,
@@ -18,7 +18,7 @@ from hil.twin.frequency import (
     sampled_closed_loop,
     sampled_transfer,
 )
-from hil.twin.modal import Modal, discretise, modal
+from hil.twin.structure.modal import Modal, discretise, modal
 
 LEAD_M = 0.010
 R = LEAD_M / (2.0 * pi)
@@ -26,17 +26,17 @@ CHAINS = {
     "2-dof": two_mass(335.0, 384.0, 5.64e7, 0.03, LEAD_M),
     "7-dof": seven_dof(RECONSTRUCTED_TABLE_1, 0.03),
 }
-FREQUENCY_HZ = np.geomspace(1.0, 4000.0, 3000)   # rigid body to above the highest mode
+FREQUENCY_HZ = np.geomspace(1.0, 4000.0, 3000)  # rigid body to above the highest mode
 
 
-def make_gains(**changes) -> control.Gains:
+def make_gains(**changes) -> cascade.Gains:
     table_2 = {
         "position_gain_1_s": 36.84,
-        "velocity_gain_n_m_s_rad": 20e-3 * 1.4 * 60 / (2 * pi),   # Kp Kt
+        "velocity_gain_n_m_s_rad": 20e-3 * 1.4 * 60 / (2 * pi),  # Kp Kt
         "velocity_integral_time_s": 6.2e-3,
         "ratio_m_rad": R,
     }
-    return control.make_gains(**(table_2 | changes))
+    return cascade.make_gains(**(table_2 | changes))
 
 
 @pytest.mark.parametrize("name", CHAINS)
@@ -70,10 +70,17 @@ def test_the_recursion_takes_a_damper_of_its_own_for_every_spring() -> None:
     inertias, stiffnesses = RECONSTRUCTED_TABLE_1.reduced()
     damping = np.array([0.5, 0.2, 0.9, 0.1, 0.3, 0.04])
     # the matrices of dampers and springs have one pattern: put the dampers in the springs' place
-    springs = np.array([
-        [1, -1, 0, 0, 0, 0, 0], [0, 1, -1, 0, 0, 0, 0], [0, 0, 1, -1, 0, 0, 0],
-        [0, 0, 0, 0, 1, 0, 0], [0, 0, 0, 1, 1, -1, 0], [0, 0, 0, 0, 0, 1, -1],
-    ], dtype=float)
+    springs = np.array(
+        [
+            [1, -1, 0, 0, 0, 0, 0],
+            [0, 1, -1, 0, 0, 0, 0],
+            [0, 0, 1, -1, 0, 0, 0],
+            [0, 0, 0, 0, 1, 0, 0],
+            [0, 0, 0, 1, 1, -1, 0],
+            [0, 0, 0, 0, 0, 1, -1],
+        ],
+        dtype=float,
+    )
     matrix = springs.T @ np.diag(damping) @ springs
     recursive = recursive_transfer(inertias, stiffnesses, damping, FREQUENCY_HZ)
     for a, b in zip(recursive, natural_transfer(chain, matrix, FREQUENCY_HZ), strict=True):
@@ -85,7 +92,7 @@ def test_two_dof_transfer_functions_are_eq_3_and_eq_11() -> None:
     m1, m2, k, xi = 335.0, 384.0, 5.64e7, 0.03
     s = 2j * pi * FREQUENCY_HZ
     w = np.sqrt(k * (m1 + m2) / (m1 * m2))
-    c = 2 * xi * k / w   # the damper of Eq. 3 that gives the modal damping of Eq. 9
+    c = 2 * xi * k / w  # the damper of Eq. 3 that gives the modal damping of Eq. 9
     tf1, tf2 = modal_transfer(modes, FREQUENCY_HZ)
     eq_3 = (m2 * s**2 + c * s + k) / (s**2 * (m1 * m2 * s**2 + (m1 + m2) * (c * s + k)))
     np.testing.assert_allclose(tf1 * R**2, eq_3, rtol=1e-9)
@@ -125,7 +132,7 @@ def test_discretised_modes_driven_by_a_sine_answer_as_the_frequency_response_say
     modes, period_s = modal(CHAINS[name]), 1e-3
     time_s = np.arange(4000) * period_s
     answer = drive_modes(modes, np.sin(2 * pi * frequency_hz * time_s), period_s)
-    late = time_s > 2.0   # the slowest elastic mode has died away: exp(-0.03 * 2 pi 89 * 2) = 2e-15
+    late = time_s > 2.0  # the slowest elastic mode has died away: exp(-0.03 * 2 pi 89 * 2) = 2e-15
     z = np.exp(2j * pi * np.array([frequency_hz]) * period_s)
     for column, expected in enumerate(sampled_transfer(modes, period_s, z)):
         found = sine_gain(answer[late, column], time_s[late], frequency_hz, drift=True)
@@ -142,18 +149,18 @@ def test_with_a_short_period_the_sampled_response_is_the_continuous_one_behind_a
     np.testing.assert_allclose(table, tf1 * tf2 * hold, rtol=1e-4)
 
 
-def simulate_cascade(modes: Modal, gains: control.Gains, frequency_hz: float, delay_ticks: int) -> complex:
+def simulate_cascade(modes: Modal, gains: cascade.Gains, frequency_hz: float, delay_ticks: int) -> complex:
     """Drive the closed loop with a sine through the control law itself; complex gain to the table."""
     d = discretise(modes, gains.period_s)
     delta, speed = np.zeros((2, modes.frequency_rad_s.size))
     time_s = np.arange(8000) * gains.period_s
     w = 2 * pi * frequency_hz
-    state, waiting = control.init(0.0), [0.0] * delay_ticks
+    state, waiting = cascade.init(0.0), [0.0] * delay_ticks
     table = np.empty(time_s.size)
     for k, t in enumerate(time_s):
         motor_rad, table[k] = modes.shape[modes.motor] @ delta, R * (modes.shape[modes.table] @ delta)
         command, velocity = 1e-3 * np.sin(w * t), 1e-3 * w * np.cos(w * t)
-        state, outputs = control.step(gains, state, control.Inputs(command, velocity, motor_rad, table[k]))
+        state, outputs = cascade.step(gains, state, cascade.Inputs(command, velocity, motor_rad, table[k]))
         waiting.append(outputs.torque_n_m)
         force = modes.shape[modes.motor] * waiting.pop(0)
         delta, speed = (
@@ -191,7 +198,7 @@ def test_the_position_loop_of_table_2_has_a_bandwidth_of_6_6_hz_without_feed_for
         for name in ("2-dof", "7-dof")
     )
     assert two == pytest.approx(6.55, abs=0.05)
-    assert seven == pytest.approx(two, rel=0.03)   # "the bandwidth ... is the same in the two models"
+    assert seven == pytest.approx(two, rel=0.03)  # "the bandwidth ... is the same in the two models"
     with_feedforward = closed_loop(modal(CHAINS["2-dof"]), make_gains(), frequency_hz)
     assert bandwidth_hz(frequency_hz, with_feedforward) > 5.0 * two
 

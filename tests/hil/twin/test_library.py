@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from numba import float64, typeof
 
 from hil.twin import mechanisms
-from hil.twin.chain import two_mass
 from hil.twin.library import BY_ID, LIBRARY
 from hil.twin.mechanism import PARAMETERS, WIDTH, Block, Dimension, Moment, Stage
+from hil.twin.structure.chain import two_mass
 
 # The interface: id, block, and the parameters that a diagnosis reports by these names
 TABLE = {
@@ -54,8 +54,14 @@ NEUTRAL = {
     "position_dependent_friction": {"fraction": 0.0, "period_m": 0.02, "phase_rad": 1.0},
     "friction_drift": {"fraction": 0.0, "time_constant_s": 10.0},
     "preload_loss": {"zone_m": 1e-4, "stiffness_ratio": 1.0},
-    "periodic_lead_error": {"amplitude_m": 0.0, "phase_rad": 1.0, "amplitude_2_m": 0.0, "phase_2_rad": 0.0,
-                            "amplitude_3_m": 0.0, "phase_3_rad": 0.0},
+    "periodic_lead_error": {
+        "amplitude_m": 0.0,
+        "phase_rad": 1.0,
+        "amplitude_2_m": 0.0,
+        "phase_2_rad": 0.0,
+        "amplitude_3_m": 0.0,
+        "phase_3_rad": 0.0,
+    },
     "thermal_growth": {"relative_growth": 0.0, "time_constant_s": 10.0},
     "cogging_torque": {"amplitude_n_m": 0.0, "cycles_per_rev": 6.0, "phase_rad": 1.0},
     "torque_ripple": {"fraction": 0.0, "cycles_per_rev": 6.0, "phase_rad": 1.0},
@@ -68,11 +74,19 @@ NEUTRAL = {
 
 STEPPED = [mechanism for mechanism in LIBRARY if mechanism.stage not in (Stage.CHAIN, Stage.CHANNEL)]
 SUFFIX = {
-    Dimension.TORQUE: "_n_m", Dimension.MOTOR_SPEED: "_rad_s", Dimension.MOTOR_STIFFNESS: "_n_m_rad",
-    Dimension.MOTOR_DRAG: "_n_m_s2_rad2", Dimension.INVERSE_TORQUE_SQUARED: "_1_n2_m2", Dimension.ANGLE: "_rad",
-    Dimension.LENGTH: "_m", Dimension.TIME: "_s", Dimension.FORCE: "_n", Dimension.STIFFNESS: "_n_m",
-    Dimension.FREQUENCY: "_hz", Dimension.COUNT: "cycles_per_rev",
-}   # RATIO and PER_LENGTH bear no unit of their own
+    Dimension.TORQUE: "_n_m",
+    Dimension.MOTOR_SPEED: "_rad_s",
+    Dimension.MOTOR_STIFFNESS: "_n_m_rad",
+    Dimension.MOTOR_DRAG: "_n_m_s2_rad2",
+    Dimension.INVERSE_TORQUE_SQUARED: "_1_n2_m2",
+    Dimension.ANGLE: "_rad",
+    Dimension.LENGTH: "_m",
+    Dimension.TIME: "_s",
+    Dimension.FORCE: "_n",
+    Dimension.STIFFNESS: "_n_m",
+    Dimension.FREQUENCY: "_hz",
+    Dimension.COUNT: "cycles_per_rev",
+}  # RATIO and PER_LENGTH bear no unit of their own
 
 each = pytest.mark.parametrize("mechanism", LIBRARY, ids=lambda mechanism: mechanism.id)
 each_stepped = pytest.mark.parametrize("mechanism", STEPPED, ids=lambda mechanism: mechanism.id)
@@ -97,7 +111,7 @@ def fields(sentence):
 
 @each
 def test_bounds_units_and_text(mechanism) -> None:
-    assert len(mechanism.parameters) < PARAMETERS   # the last of the row is the variant
+    assert len(mechanism.parameters) < PARAMETERS  # the last of the row is the variant
     for parameter in mechanism.parameters:
         assert np.isfinite([parameter.low, parameter.high]).all()
         assert parameter.low < parameter.high
@@ -145,7 +159,8 @@ def test_neutral_structure_and_skew() -> None:
     channels = tuple(np.random.default_rng(1).normal(size=(4, 50)))
     for variant in range(3):
         np.testing.assert_array_equal(
-            BY_ID["channel_time_skew"].contribution(channels, (0.0,), variant, PERIOD_S), channels)
+            BY_ID["channel_time_skew"].contribution(channels, (0.0,), variant, PERIOD_S), channels
+        )
 
 
 @each_stepped

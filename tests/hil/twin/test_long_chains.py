@@ -7,17 +7,18 @@ import pytest
 from contributions import RATIO_M
 from scipy.linalg import expm
 
-from hil.control import make_gains
+from hil.control.cascade import make_gains
 from hil.twin.axis import Start, Twin
-from hil.twin.ballscrew import RECONSTRUCTED_TABLE_1
-from hil.twin.chain import one_mass, seven_dof, two_mass
-from hil.twin.frequency import modal_damping
 from hil.twin.library import BY_ID
-from hil.twin.modal import modal
 from hil.twin.physics import Active, Physics
+from hil.twin.structure.ballscrew import RECONSTRUCTED_TABLE_1
+from hil.twin.structure.chain import one_mass, seven_dof, two_mass
+from hil.twin.structure.frequency import modal_damping
+from hil.twin.structure.modal import modal
 
-GAINS = make_gains(position_gain_1_s=10.0, velocity_gain_n_m_s_rad=0.1, ratio_m_rad=RATIO_M,
-                   velocity_integral_time_s=0.05)
+GAINS = make_gains(
+    position_gain_1_s=10.0, velocity_gain_n_m_s_rad=0.1, ratio_m_rad=RATIO_M, velocity_integral_time_s=0.05
+)
 LONG = seven_dof(RECONSTRUCTED_TABLE_1, 0.05)
 
 
@@ -29,8 +30,10 @@ def twin(chain, *active):
 def driven(chain, stiffness, damping, torque):
     """Table [m] of J q'' + C q' + K q = f by the matrix exponential, torques (n,) at the motor held for a tick each."""
     n, none = len(chain.names), np.zeros((len(chain.names),) * 2)
-    slope = np.linalg.solve(np.block([[np.eye(n), none], [none, chain.inertia_kg_m2]]),
-                            np.block([[none, np.eye(n)], [-stiffness, -damping]]))
+    slope = np.linalg.solve(
+        np.block([[np.eye(n), none], [none, chain.inertia_kg_m2]]),
+        np.block([[none, np.eye(n)], [-stiffness, -damping]]),
+    )
     push = np.append(np.zeros(n), np.linalg.solve(chain.inertia_kg_m2, np.eye(n)[chain.motor]))
     moved = expm(np.pad(np.column_stack([slope, push]), ((0, 1), (0, 0))) * GAINS.period_s)
     state, table = np.zeros(2 * n), []
@@ -50,8 +53,11 @@ def test_a_lead_error_shakes_a_long_chain_as_its_equations_say() -> None:
     harmonic, s the table's side. The third harmonic runs close to the first mode."""
     chain, modes = LONG, modal(LONG)
     turns_hz, amplitude_m, period_s = 0.9 * modes.frequency_rad_s[1] / (6.0 * pi), 2e-6, 1e-3
-    axis = Twin(Physics(chain, 0.0, 0.01), GAINS, (Active(
-        "periodic_lead_error", (amplitude_m, 0.3, 0.5 * amplitude_m, 1.0, 0.4 * amplitude_m, -2.0), 0),))
+    axis = Twin(
+        Physics(chain, 0.0, 0.01),
+        GAINS,
+        (Active("periodic_lead_error", (amplitude_m, 0.3, 0.5 * amplitude_m, 1.0, 0.4 * amplitude_m, -2.0), 0),),
+    )
     speed = 2.0 * pi * turns_hz * RATIO_M
     n = round(60.0 / turns_hz / period_s)
     time_s = period_s * np.arange(n)
@@ -59,16 +65,17 @@ def test_a_lead_error_shakes_a_long_chain_as_its_equations_say() -> None:
     last = slice(-round(30.0 / turns_hz / period_s), None)
     angle, turned = moved.motor_position[last], 2.0 * pi * turns_hz * time_s[last]
     waves = np.column_stack([np.ones(angle.size), *(wave(k * angle) for k in (1, 2, 3) for wave in (np.cos, np.sin))])
-    motor, table = (np.linalg.lstsq(waves, values[last] - turned, rcond=None)[0]
-                    for values in (moved.motor_position, moved.table_position_m / RATIO_M))
+    motor, table = (
+        np.linalg.lstsq(waves, values[last] - turned, rcond=None)[0]
+        for values in (moved.motor_position, moved.table_position_m / RATIO_M)
+    )
     damping, side, rest = modal_damping(chain, modes), chain.side(chain.table), np.arange(7) != chain.motor
     for k, size, phase in ((1, 1.0, 0.3), (2, 0.5, 1.0), (3, 0.4, -2.0)):
         omega = 2.0 * pi * turns_hz * k
         dynamic = chain.stiffness_n_m_rad + 1j * omega * damping - omega**2 * chain.inertia_kg_m2
         error = size * amplitude_m / RATIO_M * np.exp(1j * (phase - 0.5 * pi))
         shaken, found = (values[2 * k - 1] - 1j * values[2 * k] for values in (motor, table))
-        load = ((chain.stiffness_n_m_rad + 1j * omega * damping) @ side * error
-                - dynamic[:, chain.motor] * shaken)
+        load = (chain.stiffness_n_m_rad + 1j * omega * damping) @ side * error - dynamic[:, chain.motor] * shaken
         expected = np.linalg.solve(dynamic[np.ix_(rest, rest)], load[rest])[-1]
         assert found == pytest.approx(expected, abs=0.05 * abs(expected))
 
@@ -80,9 +87,12 @@ def test_lost_preload_takes_its_share_of_the_damping_between_the_sides(ratio: fl
     found = twin(LONG, Active("preload_loss", (1e-3, ratio), 0)).drive(torque)
     damping, side, at = modal_damping(LONG, modal(LONG)), LONG.side(LONG.table), LONG.transmission
     resisting = damping @ side
-    expected = driven(LONG, LONG.stiffness_n_m_rad - (1.0 - ratio) * LONG.transmission_stiffness_n_m_rad
-                      * np.outer(at, at), damping - (1.0 - ratio) * np.outer(resisting, resisting) / (side @ resisting),
-                      torque)
+    expected = driven(
+        LONG,
+        LONG.stiffness_n_m_rad - (1.0 - ratio) * LONG.transmission_stiffness_n_m_rad * np.outer(at, at),
+        damping - (1.0 - ratio) * np.outer(resisting, resisting) / (side @ resisting),
+        torque,
+    )
     assert off(found.table_position_m, expected) < 0.01
 
 
@@ -111,8 +121,10 @@ def test_dry_flanks_hardly_pull() -> None:
 def test_one_mass_has_no_nut_whose_play_could_shake_it(structure: tuple[float, float, float]) -> None:
     torque = np.repeat([1.0, 0.0], [50, 5000])
     mode = Active("structural_mode", structure, 0)
-    plain, with_play = (twin(one_mass(95.0, 0.01), mode, *more).drive(torque).motor_position
-                        for more in ((), (Active("backlash", (2e-5,), 0),)))
+    plain, with_play = (
+        twin(one_mass(95.0, 0.01), mode, *more).drive(torque).motor_position
+        for more in ((), (Active("backlash", (2e-5,), 0),))
+    )
     np.testing.assert_allclose(with_play, plain, rtol=1e-9)
 
 

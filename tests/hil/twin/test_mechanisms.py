@@ -13,27 +13,31 @@ from hil.twin.library import BY_ID
 torques = st.floats(-12.0, 12.0)
 phases = st.floats(-2.0 * pi, 2.0 * pi)
 orders = st.integers(1, 48)
-REVOLUTION = np.arange(144) * 2.0 * pi / 144   # even steps over one revolution
+REVOLUTION = np.arange(144) * 2.0 * pi / 144  # even steps over one revolution
 
 
 def along(effect, value, *, variant=0, angles=REVOLUTION, **parameters):
     """The contribution at each angle."""
-    return np.array([call(effect, value, AT_REST._replace(angle_rad=angle), variant=variant, **parameters)
-                     for angle in angles])
+    return np.array(
+        [call(effect, value, AT_REST._replace(angle_rad=angle), variant=variant, **parameters) for angle in angles]
+    )
 
 
 # -- drive
 
 
-@given(commands=st.lists(torques, min_size=14, max_size=30), delay_s=st.floats(0.0, 0.012),
-       steps=st.sampled_from([1, 5, 7, 50]))
+@given(
+    commands=st.lists(torques, min_size=14, max_size=30),
+    delay_s=st.floats(0.0, 0.012),
+    steps=st.sampled_from([1, 5, 7, 50]),
+)
 @PROPERTY
 def test_transport_delay_holds_and_shifts(commands, delay_s, steps) -> None:
     """A held command late by d: its mean over a period mixes two neighbours by the fraction of d."""
     periods = delay_s / PERIOD_S
     whole, fraction = int(periods), periods % 1.0
     past = np.concatenate((np.full(whole + 1, commands[0]), commands))
-    expected = (1.0 - fraction) * past[1:len(commands) + 1] + fraction * past[:len(commands)]
+    expected = (1.0 - fraction) * past[1 : len(commands) + 1] + fraction * past[: len(commands)]
     np.testing.assert_allclose(per_tick("transport_delay", commands, steps, [delay_s]), expected, atol=1e-6)
 
 
@@ -86,9 +90,9 @@ def test_cogging_is_there_whatever_the_torque(value, amplitude, order, phase) ->
 def test_torque_constant_falls_with_the_square_of_the_current(value, coefficient) -> None:
     torque = call("torque_constant_saturation", value, coefficient_1_n2_m2=coefficient)
     assert torque == -call("torque_constant_saturation", -value, coefficient_1_n2_m2=coefficient)
-    assert torque * value >= 0.0   # never turns round
+    assert torque * value >= 0.0  # never turns round
     more = call("torque_constant_saturation", 1.1 * value, coefficient_1_n2_m2=coefficient)
-    assert abs(more) >= abs(torque) * (1.0 - 1e-12)    # more current never gives less
+    assert abs(more) >= abs(torque) * (1.0 - 1e-12)  # more current never gives less
     assume(3.0 * coefficient * value**2 < 1.0)
     assert value - torque == pytest.approx(coefficient * value**3, abs=1e-12)
 
@@ -112,7 +116,7 @@ def test_asymmetric_friction_shifts_the_band(offset, level, at) -> None:
     shift = call("asymmetric_friction", 0.0, at, offset_torque_n_m=offset)
     forward, backward = shift + level, shift - level
     assert (forward + backward) / 2.0 == pytest.approx(offset)
-    assert forward >= 0.0 >= backward   # still opposes both directions
+    assert forward >= 0.0 >= backward  # still opposes both directions
 
 
 @given(offset=st.floats(-1.0, 1.0), velocity=st.floats(0.0, 300.0))
@@ -130,8 +134,13 @@ def test_asymmetry_with_speed_is_the_same_torque_both_ways(offset, velocity) -> 
 @PROPERTY
 def test_stribeck_falls_from_static_to_coulomb(coulomb, static, stribeck) -> None:
     def level(velocity):
-        return call("stribeck_friction", coulomb, AT_REST._replace(velocity=velocity),
-                    static_torque_n_m=static, stribeck_velocity_rad_s=stribeck)
+        return call(
+            "stribeck_friction",
+            coulomb,
+            AT_REST._replace(velocity=velocity),
+            static_torque_n_m=static,
+            stribeck_velocity_rad_s=stribeck,
+        )
 
     assert level(0.0) == pytest.approx(static)
     assert level(stribeck) == pytest.approx(coulomb + (static - coulomb) / e)
@@ -139,13 +148,26 @@ def test_stribeck_falls_from_static_to_coulomb(coulomb, static, stribeck) -> Non
     assert level(-0.5 * stribeck) == level(0.5 * stribeck)
 
 
-@given(level=st.floats(0.1, 5.0), fraction=st.floats(0.0, 1.0), period=st.floats(1e-3, 1.0), phase=phases,
-       position=st.floats(-0.5, 0.5))
+@given(
+    level=st.floats(0.1, 5.0),
+    fraction=st.floats(0.0, 1.0),
+    period=st.floats(1e-3, 1.0),
+    phase=phases,
+    position=st.floats(-0.5, 0.5),
+)
 @PROPERTY
 def test_position_dependent_friction_repeats_and_never_pushes(level, fraction, period, phase, position) -> None:
     here, half, whole = (
-        call("position_dependent_friction", level, AT_REST._replace(table_position_m=position + shift * period),
-             fraction=fraction, period_m=period, phase_rad=phase) for shift in (0.0, 0.5, 1.0))
+        call(
+            "position_dependent_friction",
+            level,
+            AT_REST._replace(table_position_m=position + shift * period),
+            fraction=fraction,
+            period_m=period,
+            phase_rad=phase,
+        )
+        for shift in (0.0, 0.5, 1.0)
+    )
     assert whole == pytest.approx(here, abs=1e-6)
     assert (here + half) / 2.0 == pytest.approx(level, abs=1e-6)
     assert here >= -1e-9
@@ -161,33 +183,41 @@ def test_presliding_gives_the_contact_its_stiffness(stiffness, at) -> None:
 @PROPERTY
 def test_quadratic_drag_quadruples_at_double_speed(quadratic, velocity) -> None:
     def drag(speed):
-        return call("nonlinear_viscous_friction", 0.0, AT_REST._replace(velocity=speed),
-                    quadratic_n_m_s2_rad2=quadratic)
+        return call(
+            "nonlinear_viscous_friction", 0.0, AT_REST._replace(velocity=speed), quadratic_n_m_s2_rad2=quadratic
+        )
 
     assert drag(2.0 * velocity) == pytest.approx(4.0 * drag(velocity))
     assert drag(-velocity) == -drag(velocity)
-    assert drag(velocity) * velocity * quadratic >= 0.0   # q > 0 takes power, q < 0 gives some back
+    assert drag(velocity) * velocity * quadratic >= 0.0  # q > 0 takes power, q < 0 gives some back
 
 
 @given(quadratic=st.floats(0.0, 1e-3), velocity=st.floats(0.0, 300.0))
 @PROPERTY
 def test_drag_of_a_thinning_lubricant_rises_with_the_root_of_the_speed(quadratic, velocity) -> None:
     def drag(speed, variant=1):
-        return call("nonlinear_viscous_friction", 0.0, AT_REST._replace(velocity=speed), variant=variant,
-                    quadratic_n_m_s2_rad2=quadratic)
+        return call(
+            "nonlinear_viscous_friction",
+            0.0,
+            AT_REST._replace(velocity=speed),
+            variant=variant,
+            quadratic_n_m_s2_rad2=quadratic,
+        )
 
     assert drag(AT_REST.viscous_speed) == pytest.approx(drag(AT_REST.viscous_speed, variant=0))
     assert drag(4.0 * velocity) == pytest.approx(2.0 * drag(velocity))
     assert drag(-velocity) == -drag(velocity)
     quadratic = -quadratic
-    assert drag(velocity) == 0.0     # no lubricant makes friction fall like that
+    assert drag(velocity) == 0.0  # no lubricant makes friction fall like that
 
 
 @given(fraction=st.floats(-0.95, 5.0), tau=st.floats(1.0, 1e4))
 @PROPERTY
 def test_friction_drift_starts_cold_and_settles(fraction, tau) -> None:
-    cold, at_tau, warm = (call("friction_drift", 1.0, AT_REST._replace(time_s=multiple * tau),
-                               fraction=fraction, time_constant_s=tau) for multiple in (0.0, 1.0, 50.0))
+    cold, at_tau, warm = (
+        call("friction_drift", 1.0, AT_REST._replace(time_s=multiple * tau), fraction=fraction, time_constant_s=tau)
+        for multiple in (0.0, 1.0, 50.0)
+    )
     assert cold == 1.0
     assert at_tau == pytest.approx(1.0 + fraction * (1.0 - 1.0 / e))
     assert warm == pytest.approx(1.0 + fraction)
@@ -202,12 +232,25 @@ def test_table_side_friction_is_a_share(share, at) -> None:
     assert call("table_side_friction", 0.0, at, share=share) == share
 
 
-@given(force=st.floats(-1e3, 1e3), start=st.floats(0.0, 0.02), length=st.floats(0.0, 0.02),
-       step_s=st.sampled_from([1e-3, 2e-4, 3e-5]))
+@given(
+    force=st.floats(-1e3, 1e3),
+    start=st.floats(0.0, 0.02),
+    length=st.floats(0.0, 0.02),
+    step_s=st.sampled_from([1e-3, 2e-4, 3e-5]),
+)
 @PROPERTY
 def test_external_force_has_the_impulse_of_its_window(force, start, length, step_s) -> None:
-    pushes = [call("external_force", 0.0, AT_REST._replace(time_s=k * step_s, step_s=step_s),
-                   force_n=force, start_s=start, end_s=start + length) for k in range(int(0.045 / step_s))]
+    pushes = [
+        call(
+            "external_force",
+            0.0,
+            AT_REST._replace(time_s=k * step_s, step_s=step_s),
+            force_n=force,
+            start_s=start,
+            end_s=start + length,
+        )
+        for k in range(int(0.045 / step_s))
+    ]
     assert np.sum(pushes) * step_s == pytest.approx(force * length, abs=1e-9)
     assert np.abs(pushes).max() <= abs(force) * (1.0 + 1e-12)
 
@@ -215,8 +258,13 @@ def test_external_force_has_the_impulse_of_its_window(force, start, length, step
 @given(stiffness=st.floats(0.0, 1e5), rest=st.floats(-1.0, 1.0), offset=st.floats(-1.0, 1.0))
 @PROPERTY
 def test_spring_load_pulls_to_rest(stiffness, rest, offset) -> None:
-    force = call("spring_load", 0.0, AT_REST._replace(table_position_m=rest + offset),
-                 stiffness_n_m=stiffness, rest_position_m=rest)
+    force = call(
+        "spring_load",
+        0.0,
+        AT_REST._replace(table_position_m=rest + offset),
+        stiffness_n_m=stiffness,
+        rest_position_m=rest,
+    )
     assert force == pytest.approx(-stiffness * offset, abs=1e-6)
 
 
@@ -235,12 +283,22 @@ def test_encoder_eccentricity_once_per_revolution(amplitude, phase, value) -> No
 @given(amplitude=st.floats(0.0, 1e-5), period=st.floats(1e-5, 1e-3), phase=phases, position=st.floats(-0.5, 0.5))
 @PROPERTY
 def test_scale_interpolation_error_within_its_signal_period(amplitude, period, phase, position) -> None:
-    quarters = [call("scale_interpolation_error", x, AT_REST._replace(table_position_m=x),
-                     amplitude_m=amplitude, period_m=period, phase_rad=phase) - x
-                for x in position + period * np.arange(5) / 4.0]
+    quarters = [
+        call(
+            "scale_interpolation_error",
+            x,
+            AT_REST._replace(table_position_m=x),
+            amplitude_m=amplitude,
+            period_m=period,
+            phase_rad=phase,
+        )
+        - x
+        for x in position + period * np.arange(5) / 4.0
+    ]
     assert np.hypot(quarters[0], quarters[1]) == pytest.approx(amplitude, abs=1e-12)
-    np.testing.assert_allclose([quarters[2], quarters[3], quarters[4]],
-                               [-quarters[0], -quarters[1], quarters[0]], atol=1e-12)
+    np.testing.assert_allclose(
+        [quarters[2], quarters[3], quarters[4]], [-quarters[0], -quarters[1], quarters[0]], atol=1e-12
+    )
 
 
 @given(delay_s=st.floats(-0.01, 0.01), variant=st.integers(0, 2))

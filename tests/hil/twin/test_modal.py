@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
-from hil.twin.chain import RECONSTRUCTED_TABLE_1, one_mass, serial_chain, seven_dof, two_mass
-from hil.twin.modal import Modal, discretise, modal, truncate
+from hil.twin.structure.chain import RECONSTRUCTED_TABLE_1, one_mass, serial_chain, seven_dof, two_mass
+from hil.twin.structure.modal import Modal, discretise, modal, truncate
 
 LEAD_M = 0.010
 R = LEAD_M / (2.0 * pi)
@@ -52,10 +52,12 @@ def test_the_rigid_body_of_the_seven_dof_leaves_the_screw_axially_at_rest() -> N
 def test_two_mass_shapes_are_eq_5_with_its_sign_corrected() -> None:
     m1, m2 = 335.0, 384.0
     total = m1 + m2
-    expected = np.array([
-        [1 / np.sqrt(total), np.sqrt(m2 / (m1 * total))],
-        [1 / np.sqrt(total), -np.sqrt(m1 / (m2 * total))],
-    ])
+    expected = np.array(
+        [
+            [1 / np.sqrt(total), np.sqrt(m2 / (m1 * total))],
+            [1 / np.sqrt(total), -np.sqrt(m1 / (m2 * total))],
+        ]
+    )
     np.testing.assert_allclose(modal(two_mass(m1, m2, 5.64e7, 0.03, LEAD_M)).shape * R, expected, rtol=1e-12)
 
 
@@ -97,10 +99,12 @@ def test_discretisation_is_the_matrix_exponential(frequency_rad_s, damping_ratio
     # scaled to the time step, so that the matrix exponential is well conditioned
     generator = np.array([[0.0, 1.0, 0.0], [-w * w * period_s**2, -2 * xi * w * period_s, 1.0], [0, 0, 0]])
     exact = expm(generator)
-    found = np.array([
-        [d.a11[0], d.a12[0] / period_s, d.b1[0] / period_s**2],
-        [d.a21[0] * period_s, d.a22[0], d.b2[0] / period_s],
-    ])
+    found = np.array(
+        [
+            [d.a11[0], d.a12[0] / period_s, d.b1[0] / period_s**2],
+            [d.a21[0] * period_s, d.a22[0], d.b2[0] / period_s],
+        ]
+    )
     # expm itself loses digits as |generator| = (w T)^2 grows
     np.testing.assert_allclose(found, exact[:2], rtol=1e-9, atol=1e-12 * max(1.0, (w * period_s) ** 2))
 
@@ -128,7 +132,7 @@ def test_an_undamped_free_mode_keeps_its_energy_for_a_million_steps() -> None:
 def test_a_rigid_axis_under_constant_force_falls_as_half_a_t_squared() -> None:
     d = discretise(modal(one_mass(4.0)), 1e-3)
     x = v = 0.0
-    shape = 0.5   # 1 / sqrt(4 kg)
+    shape = 0.5  # 1 / sqrt(4 kg)
     for _ in range(1000):
         x, v = d.a11[0] * x + d.a12[0] * v + d.b1[0] * shape * 8.0, d.a22[0] * v + d.b2[0] * shape * 8.0
     assert shape * x == pytest.approx(0.5 * 2.0 * 1.0**2, rel=1e-12)

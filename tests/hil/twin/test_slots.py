@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hil.bench import load_bench
+from hil.bench.bench_file import load_bench
 from hil.twin.axis import Twin
 from hil.twin.library import LIBRARY, SLOTS
 from hil.twin.physics import Active

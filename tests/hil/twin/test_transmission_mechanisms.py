@@ -9,12 +9,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
-from hil.twin.chain import one_mass, two_mass
 from hil.twin.library import BY_ID, LIBRARY
 from hil.twin.mechanism import Stage
-from hil.twin.modal import modal
+from hil.twin.structure.chain import one_mass, two_mass
+from hil.twin.structure.modal import modal
 
-deflections = st.floats(-0.5, 0.5)   # rad: +-0.8 mm at the table
+deflections = st.floats(-0.5, 0.5)  # rad: +-0.8 mm at the table
 lengths = st.floats(0.0, 1e-3)
 positions = st.floats(-1.0, 1.0)
 
@@ -30,12 +30,21 @@ def unloaded_table(effect, angle_rad, *, time_s=0.0, variant=0, **parameters):
     return brentq(deflection, rigid - 0.02, rigid + 0.02, xtol=1e-15)
 
 
-@given(angle=st.floats(-600.0, 600.0), amplitude=st.floats(0.0, 1e-4), phase=st.floats(-pi, pi),
-       third=st.floats(0.0, 1e-5))
+@given(
+    angle=st.floats(-600.0, 600.0), amplitude=st.floats(0.0, 1e-4), phase=st.floats(-pi, pi), third=st.floats(0.0, 1e-5)
+)
 @PROPERTY
 def test_periodic_lead_error_moves_the_table_with_the_angle(angle, amplitude, phase, third) -> None:
-    x = unloaded_table("periodic_lead_error", angle, amplitude_m=amplitude, phase_rad=phase, amplitude_2_m=0.0,
-                       phase_2_rad=0.0, amplitude_3_m=third, phase_3_rad=1.0)
+    x = unloaded_table(
+        "periodic_lead_error",
+        angle,
+        amplitude_m=amplitude,
+        phase_rad=phase,
+        amplitude_2_m=0.0,
+        phase_2_rad=0.0,
+        amplitude_3_m=third,
+        phase_3_rad=1.0,
+    )
     error = amplitude * np.sin(angle + phase) + third * np.sin(3.0 * angle + 1.0)
     assert x - RATIO_M * angle == pytest.approx(error, abs=1e-11)
 
@@ -52,7 +61,8 @@ def test_cumulative_lead_error_grows_along_the_travel(angle, slope) -> None:
 def test_thermal_growth_starts_cold_and_settles(angle, growth, tau) -> None:
     cold, at_tau, warm = (
         unloaded_table("thermal_growth", angle, time_s=multiple * tau, relative_growth=growth, time_constant_s=tau)
-        for multiple in (0.0, 1.0, 50.0))
+        for multiple in (0.0, 1.0, 50.0)
+    )
     assert cold == pytest.approx(RATIO_M * angle, abs=1e-12)
     assert warm == pytest.approx(unloaded_table("cumulative_lead_error", angle, slope_m_m=growth), abs=1e-12)
     assert at_tau - cold == pytest.approx((1.0 - 1.0 / e) * (warm - cold), rel=2e-3, abs=1e-12)
@@ -90,8 +100,9 @@ def test_preload_loss_is_continuous_with_the_two_stiffnesses(a, b, zone, ratio) 
 @PROPERTY
 def test_position_dependent_stiffness_is_nominal_at_zero_and_never_negative(slope, x) -> None:
     def factor(position):
-        return call("position_dependent_stiffness", 1.0, AT_REST._replace(table_position_m=position),
-                    relative_slope=slope)
+        return call(
+            "position_dependent_stiffness", 1.0, AT_REST._replace(table_position_m=position), relative_slope=slope
+        )
 
     assert factor(0.0) == 1.0
     assert factor(x) >= 0.0
@@ -124,9 +135,14 @@ def test_structural_mode_absorbs_the_table_at_its_own_frequency(chain, frequency
     assert abs(response[longer.table]) < 1e-7 * np.abs(response).max()
 
 
-@given(chain=st.sampled_from([one_mass(95.0), two_mass(335.0, 384.0, 5.64e7, 0.03, 0.010),
-                              two_mass(335.0, 384.0, 5.64e7, 0.97, 0.010)]),
-       frequency=frequencies, ratio=ratios, damping=st.floats(1e-4, 0.9))
+@given(
+    chain=st.sampled_from(
+        [one_mass(95.0), two_mass(335.0, 384.0, 5.64e7, 0.03, 0.010), two_mass(335.0, 384.0, 5.64e7, 0.97, 0.010)]
+    ),
+    frequency=frequencies,
+    ratio=ratios,
+    damping=st.floats(1e-4, 0.9),
+)
 @PROPERTY
 def test_structural_mode_adds_one_mode_and_keeps_the_rest(chain, frequency, ratio, damping) -> None:
     longer = with_structure(chain, frequency, damping, ratio)
@@ -151,8 +167,9 @@ def test_structural_mode_adds_one_mode_and_keeps_the_rest(chain, frequency, rati
 def test_a_yielding_base_has_the_modes_of_the_chain_seen_from_the_ground(frequency: float, ratio: float) -> None:
     """Motor, table and base in absolute coordinates: the nut pulls table and base together, a spring holds the base."""
     motor, table, stiffness = 335.0, 384.0, 5.64e7
-    longer = BY_ID["structural_mode"].contribution(two_mass(motor, table, stiffness, 0.03, 2.0 * pi),
-                                                   (frequency, 0.01, ratio), 1)
+    longer = BY_ID["structural_mode"].contribution(
+        two_mass(motor, table, stiffness, 0.03, 2.0 * pi), (frequency, 0.01, ratio), 1
+    )
     base = table / ratio
     nut = np.array([1.0, -1.0, 1.0])
     held = np.diag([0.0, 0.0, (base + table) * (2.0 * pi * frequency) ** 2]) + stiffness * np.outer(nut, nut)

@@ -1,0 +1,190 @@
+"""A simulated CANopen node (CiA 301): NMT, boot-up, heartbeat both ways, SDO server, EMCY, SYNC-driven PDOs.
+
+What kind of device it is, a subclass says: `process_sync` moves and measures, `process_rpdo` takes commands,
+`communication_lost` reacts to a silent master. Time comes with the frames; the node reads no clock. Its timers run with
+the SYNCs; where none come, somebody calls `tick`.
+"""
+
+from __future__ import annotations
+
+import struct
+from enum import IntEnum
+from pathlib import Path
+from typing import Final
+
+from drivers.bus import CanPort
+from drivers.sim.object_dictionary import Dictionary
+from drivers.sim.process_data import ProcessData
+from drivers.sim.sdo_server import AbortCode, SdoAbort, SdoServer
+
+EDS_FOLDER: Final = Path(__file__).parent.parent / "eds"
+_EMCY: Final = struct.Struct("<HB5s")
+HEARTBEAT_ERROR: Final = 0x8130  # EMCY: heartbeat consumer time-out, CiA 301 table 26
+
+
+class NmtState(IntEnum):
+    """NMT states as the heartbeat reports them."""
+
+    INITIALISING = 0
+    STOPPED = 4
+    OPERATIONAL = 5
+    PRE_OPERATIONAL = 127
+
+
+class NmtCommand(IntEnum):
+    """NMT commands of COB-ID 0."""
+
+    START = 1
+    STOP = 2
+    ENTER_PRE_OPERATIONAL = 128
+    RESET_NODE = 129
+    RESET_COMMUNICATION = 130
+
+
+class SimulatedDevice:
+    """One node on one port. ValueError for a node-ID outside 1..127."""
+
+    def __init__(self, port: CanPort, eds: Path, node_id: int) -> None:
+        if not 1 <= node_id <= 127:
+            raise ValueError(f"node_id must be 1..127, got {node_id}")
+        self.port, self.node_id = port, node_id
+        self.dictionary = Dictionary(eds, node_id)
+        self.values = self.dictionary.values
+        self.nmt_state = NmtState.INITIALISING
+        self.pdo = ProcessData(self.dictionary, port, self.process_rpdo, self.emergency)
+        self._sdo = SdoServer(self.dictionary.read, self.dictionary.write)
+        self._consumed: dict[int, float] = {}  # node-ID -> deadline, once its first heartbeat came
+        self._heartbeat_due_s = 0.0
+        self._timer_s = 0.0
+        self._last_s = 0.0
+        self.mute = False  # fault injection: the node computes on but sends nothing
+        self.dictionary.on_write(0x1016, self._on_consumer_written)
+        self.dictionary.on_write(0x1017, self._on_producer_written)
+        port.listen(0x000, self._on_nmt)
+        port.listen(0x080, self._on_sync)
+        port.listen(0x600 + node_id, self._on_sdo)
+        self._boot(0.0)
+
+    # -- what a subclass adds ---------------------------------------------------------------------------------------
+
+    def process_sync(self, now_s: float) -> None:
+        """Move and measure: called at every SYNC, before the TPDOs are packed."""
+
+    def process_rpdo(self, now_s: float) -> None:
+        """New set-points lie in `values`."""
+
+    def communication_lost(self, now_s: float) -> None:
+        """A consumed heartbeat timed out."""
+
+    # -- NMT, boot-up, timers ---------------------------------------------------------------------------------------
+
+    def _boot(self, now_s: float) -> None:
+        self._consumed.clear()
+        self.pdo.configure(operational=False)
+        self._send(0x700 + self.node_id, b"\0", now_s)
+        self._enter(NmtState.PRE_OPERATIONAL)
+        self._schedule(now_s)
+
+    def _enter(self, state: NmtState) -> None:
+        self.nmt_state = state
+        self.pdo.configure(operational=state is NmtState.OPERATIONAL)
+
+    def reset(self, now_s: float) -> None:
+        """Power cycle: dictionary as delivered, boot-up."""
+        self.dictionary.reset(0x1000, 0xFFFF)
+        self._boot(now_s)
+
+    def _on_nmt(self, can_id: int, data: bytes, now_s: float) -> None:
+        if len(data) != 2 or data[1] not in (0, self.node_id):
+            return
+        command = data[0]
+        if command == NmtCommand.START:
+            self._enter(NmtState.OPERATIONAL)
+        elif command == NmtCommand.STOP:
+            self._enter(NmtState.STOPPED)
+        elif command == NmtCommand.ENTER_PRE_OPERATIONAL:
+            self._enter(NmtState.PRE_OPERATIONAL)
+        elif command == NmtCommand.RESET_NODE:
+            self.reset(now_s)
+        elif command == NmtCommand.RESET_COMMUNICATION:
+            self.dictionary.reset(0x1000, 0x1FFF)
+            self._boot(now_s)
+
+    def tick(self, now_s: float) -> None:
+        """Heartbeat producer and consumers; cheap when nothing is due."""
+        if now_s < self._last_s:  # the time base was set anew: timers start over
+            self._consumed = dict.fromkeys(self._consumed, now_s + self._consumer_time_s())
+            self._heartbeat_due_s = now_s
+        self._last_s = now_s
+        period_s = self.dictionary.number(0x1017) / 1000
+        if period_s and now_s >= self._heartbeat_due_s:
+            self._send(0x700 + self.node_id, bytes([self.nmt_state]), now_s)
+            self._heartbeat_due_s = max(self._heartbeat_due_s + period_s, now_s)
+        for node_id, deadline_s in list(self._consumed.items()):
+            if now_s >= deadline_s:
+                del self._consumed[node_id]
+                self.emergency(HEARTBEAT_ERROR, 0x11, now_s, bytes([node_id]))
+                if self.dictionary.number(0x1029, 1) == 0 and self.nmt_state is NmtState.OPERATIONAL:
+                    self._enter(NmtState.PRE_OPERATIONAL)
+                self.communication_lost(now_s)
+        self._schedule(now_s)
+
+    def _schedule(self, now_s: float) -> None:
+        due = [*self._consumed.values()]
+        if self.dictionary.number(0x1017):
+            due.append(self._heartbeat_due_s)
+        self._last_s = now_s
+        self._timer_s = min(due, default=float("inf"))
+
+    def _consumer_time_s(self) -> float:
+        return (self.dictionary.number(0x1016, 1) & 0xFFFF) / 1000
+
+    def _on_consumer_written(self, index: int, subindex: int, value: int) -> None:
+        old = self.dictionary.number(0x1016, 1) >> 16 & 0x7F
+        node_id, time_ms = value >> 16 & 0x7F, value & 0xFFFF
+        self._consumed.clear()
+        if old:
+            self.port.ignore(0x700 + old, self._on_heartbeat)
+        if node_id and time_ms:
+            self.port.listen(0x700 + node_id, self._on_heartbeat)
+        elif value:
+            raise SdoAbort(AbortCode.INVALID_VALUE)
+
+    def _on_producer_written(self, index: int, subindex: int, value: int) -> None:
+        self._heartbeat_due_s = self._timer_s = self._last_s
+
+    def _on_heartbeat(self, can_id: int, data: bytes, now_s: float) -> None:
+        self._consumed[can_id - 0x700] = now_s + self._consumer_time_s()
+        self._schedule(now_s)
+
+    # -- SDO, SYNC, EMCY --------------------------------------------------------------------------------------------
+
+    def _on_sdo(self, can_id: int, data: bytes, now_s: float) -> None:
+        if self.nmt_state is NmtState.STOPPED:
+            return
+        response = self._sdo.answer(data)
+        if response is not None:
+            self._send(0x580 + self.node_id, response, now_s)
+
+    def _on_sync(self, can_id: int, data: bytes, now_s: float) -> None:
+        if now_s >= self._timer_s or now_s < self._last_s:
+            self.tick(now_s)
+        self._last_s = now_s
+        self.process_sync(now_s)
+        if not self.mute:
+            self.pdo.on_sync(now_s)  # holds no PDOs outside NMT operational
+
+    def emergency(self, code: int, register: int, now_s: float, detail: bytes = b"") -> None:
+        """Send an EMCY, keep it in 0x1003 (newest first) and in the error register; code 0: errors reset."""
+        self.values[0x1001_00] = register
+        if code:
+            history = [self.dictionary.number(0x1003, k) for k in range(1, 9)]
+            for k, entry in enumerate([code, *history[:7]], start=1):
+                self.values[0x1003_00 + k] = entry
+            self.values[0x1003_00] = min(self.dictionary.number(0x1003) + 1, 8)
+        if self.nmt_state is not NmtState.STOPPED:
+            self._send(0x080 + self.node_id, _EMCY.pack(code, register, detail), now_s)
+
+    def _send(self, can_id: int, data: bytes, now_s: float) -> None:
+        if not self.mute:
+            self.port.send(can_id, data, now_s)

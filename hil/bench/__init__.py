@@ -1,0 +1,1 @@
+"""Bench files: what the owner knows of axis, control, encoders and drive."""

@@ -1,0 +1,223 @@
+"""What the owner of an axis believes about it: one pydantic model per kind of axis.
+
+Each gives the twin's physics (`physics`) and names the parameters that may be wrong (`NOMINAL`), which the
+diagnosis refits before it looks for missing physics. Of them `MASSES` move, `SPRINGS` lie between motor and table.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import pi
+from typing import Annotated, ClassVar, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from hil.errors import FieldError
+from hil.twin.physics import Physics
+from hil.twin.structure.chain import (
+    LINEAR_LEAD_M,
+    RECONSTRUCTED_TABLE_1,
+    Chain,
+    one_mass,
+    serial_chain,
+    seven_dof,
+    two_mass,
+)
+
+Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+# up to a metre: a lead in millimetres is refused
+Lead = Annotated[float, Field(gt=0.0, le=1.0, allow_inf_nan=False)]
+Damping = Annotated[float, Field(ge=0.0, lt=1.0, description="modal damping ratio of the elastic modes")]
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class _Rotary(_Model):
+    """An axis driven by a motor and a screw; friction is given at the motor."""
+
+    lead_m: Lead = Field(description="travel of the table per motor revolution [m]")
+    coulomb_torque_n_m: NotNegative = Field(description="Coulomb friction at the motor [N m]")
+    viscous_torque_n_m_s_rad: NotNegative = Field(description="viscous friction at the motor [N m s/rad]")
+
+    @property
+    def ratio_m_rad(self) -> float:
+        """Table travel per radian of the motor, r = lead / 2 pi."""
+        return self.lead_m / (2.0 * pi)
+
+    @property
+    def linear(self) -> bool:
+        """Whether the motor side is in m and N."""
+        return False
+
+    def chain(self) -> Chain:
+        """The lumped chain of the axis."""
+        raise NotImplementedError
+
+    def physics(self) -> Physics:
+        """The nominal physics of the twin."""
+        return Physics(self.chain(), self.coulomb_torque_n_m, self.viscous_torque_n_m_s_rad)
+
+
+class TwoMass(_Rotary):
+    """Motor and table with a spring between them, seen at the table (Eq. 1)."""
+
+    NOMINAL: ClassVar[tuple[str, ...]] = (
+        "motor_mass_kg",
+        "table_mass_kg",
+        "stiffness_n_m",
+        "damping_ratio",
+        "coulomb_torque_n_m",
+        "viscous_torque_n_m_s_rad",
+    )
+    MASSES: ClassVar[tuple[str, ...]] = ("motor_mass_kg", "table_mass_kg")
+    SPRINGS: ClassVar[tuple[str, ...]] = ("stiffness_n_m", "damping_ratio")
+    model: Literal["two_mass"] = "two_mass"
+    motor_mass_kg: Positive = Field(description="motor inertia as translation at the table [kg]")
+    table_mass_kg: Positive = Field(description="table and screw at the table [kg]")
+    stiffness_n_m: Positive = Field(description="stiffness of the transmission at the table [N/m]")
+    damping_ratio: Damping = 0.03
+
+    def chain(self) -> Chain:
+        """The 2-dof chain."""
+        return two_mass(self.motor_mass_kg, self.table_mass_kg, self.stiffness_n_m, self.damping_ratio, self.lead_m)
+
+
+class Rigid(_Rotary):
+    """A motor and a screw stiff enough to be one mass with the table."""
+
+    NOMINAL: ClassVar[tuple[str, ...]] = ("mass_kg", "coulomb_torque_n_m", "viscous_torque_n_m_s_rad")
+    MASSES: ClassVar[tuple[str, ...]] = ("mass_kg",)
+    SPRINGS: ClassVar[tuple[str, ...]] = ()
+    model: Literal["rigid"] = "rigid"
+    mass_kg: Positive = Field(description="all moving mass and inertia at the table [kg]")
+
+    def chain(self) -> Chain:
+        """One mass."""
+        return one_mass(self.mass_kg, self.lead_m)
+
+
+class SevenDofAxis(_Rotary):
+    """The 7-dof drive of the source; defaults are the reconstruction of its lost Table 1."""
+
+    NOMINAL: ClassVar[tuple[str, ...]] = (
+        "motor_inertia_kg_m2",
+        "table_mass_kg",
+        "nut_support_stiffness_n_m",
+        "coupling_stiffness_n_m_rad",
+        "damping_ratio",
+        "coulomb_torque_n_m",
+        "viscous_torque_n_m_s_rad",
+    )
+    MASSES: ClassVar[tuple[str, ...]] = ("motor_inertia_kg_m2", "table_mass_kg")
+    SPRINGS: ClassVar[tuple[str, ...]] = ("nut_support_stiffness_n_m", "coupling_stiffness_n_m_rad", "damping_ratio")
+    model: Literal["seven_dof"] = "seven_dof"
+    lead_m: Lead = RECONSTRUCTED_TABLE_1.lead_m
+    motor_inertia_kg_m2: Positive = RECONSTRUCTED_TABLE_1.motor_inertia_kg_m2
+    table_mass_kg: Positive = RECONSTRUCTED_TABLE_1.table_mass_kg
+    coupling_stiffness_n_m_rad: Positive = RECONSTRUCTED_TABLE_1.coupling_stiffness_n_m_rad
+    nut_stiffness_n_m: Positive = RECONSTRUCTED_TABLE_1.nut_stiffness_n_m
+    nut_support_stiffness_n_m: Positive = RECONSTRUCTED_TABLE_1.nut_support_stiffness_n_m
+    nut_position_m: float | None = Field(None, description="nut from the front end of its travel [m]")
+    damping_ratio: Damping = 0.03
+
+    def chain(self) -> Chain:
+        """The 7-dof chain with the nut at its position."""
+        parameters = replace(
+            RECONSTRUCTED_TABLE_1,
+            lead_m=self.lead_m,
+            motor_inertia_kg_m2=self.motor_inertia_kg_m2,
+            table_mass_kg=self.table_mass_kg,
+            coupling_stiffness_n_m_rad=self.coupling_stiffness_n_m_rad,
+            nut_stiffness_n_m=self.nut_stiffness_n_m,
+            nut_support_stiffness_n_m=self.nut_support_stiffness_n_m,
+        )
+        return seven_dof(parameters, self.damping_ratio, self.nut_position_m)
+
+
+class SerialChain(_Rotary):
+    """Any number of inertias in a row, reduced to the motor shaft; the last spring is the nut."""
+
+    NOMINAL: ClassVar[tuple[str, ...]] = (
+        "inertia_scale",
+        "stiffness_scale",
+        "damping_ratio",
+        "coulomb_torque_n_m",
+        "viscous_torque_n_m_s_rad",
+    )
+    MASSES: ClassVar[tuple[str, ...]] = ("inertia_scale",)
+    SPRINGS: ClassVar[tuple[str, ...]] = ("stiffness_scale", "damping_ratio")
+    model: Literal["serial_chain"] = "serial_chain"
+    inertias_kg_m2: tuple[Positive, ...] = Field(min_length=2, description="from motor to table [kg m^2]")
+    stiffnesses_n_m_rad: tuple[Positive, ...] = Field(min_length=1, description="one fewer than inertias [N m/rad]")
+    inertia_scale: Positive = Field(1.0, description="factor on all inertias")
+    stiffness_scale: Positive = Field(1.0, description="factor on all stiffnesses")
+    damping_ratio: Damping = 0.03
+
+    @model_validator(mode="after")
+    def _one_spring_fewer(self) -> SerialChain:
+        springs, allowed = len(self.stiffnesses_n_m_rad), len(self.inertias_kg_m2) - 1
+        if springs != allowed:
+            raise FieldError(
+                ("stiffnesses_n_m_rad",), f"given {springs} values, allowed {allowed}: one fewer than inertias_kg_m2"
+            )
+        return self
+
+    def chain(self) -> Chain:
+        """The chain of n inertias."""
+        return serial_chain(
+            [j * self.inertia_scale for j in self.inertias_kg_m2],
+            [k * self.stiffness_scale for k in self.stiffnesses_n_m_rad],
+            self.damping_ratio,
+            self.lead_m,
+        )
+
+
+class OneMass(_Model):
+    """A linear axis: one mass, one encoder, newtons and metres."""
+
+    NOMINAL: ClassVar[tuple[str, ...]] = ("mass_kg", "coulomb_force_n", "viscous_force_n_s_m")
+    MASSES: ClassVar[tuple[str, ...]] = ("mass_kg",)
+    SPRINGS: ClassVar[tuple[str, ...]] = ()
+    model: Literal["one_mass"] = "one_mass"
+    mass_kg: Positive = Field(description="moving mass [kg]")
+    coulomb_force_n: NotNegative = Field(description="Coulomb friction [N]")
+    viscous_force_n_s_m: NotNegative = Field(description="viscous friction [N s/m]")
+    screw_lead_m: Lead | None = Field(None, description="lead of its screw, for orders per revolution [m]")
+
+    @property
+    def ratio_m_rad(self) -> float:
+        """1: motor and table share metres."""
+        return 1.0
+
+    @property
+    def linear(self) -> bool:
+        """Whether the motor side is in m and N."""
+        return True
+
+    def physics(self) -> Physics:
+        """The nominal physics of the twin."""
+        angle = 2.0 * pi / self.screw_lead_m if self.screw_lead_m else 1.0
+        return Physics(
+            one_mass(self.mass_kg, LINEAR_LEAD_M),
+            self.coulomb_force_n,
+            self.viscous_force_n_s_m,
+            linear=True,
+            angle_per_unit=angle,
+        )
+
+
+Axis = Annotated[TwoMass | SevenDofAxis | SerialChain | Rigid | OneMass, Field(discriminator="model")]
+
+
+def model_of(keys: set[str]) -> str:
+    """Which kind of axis a file without the key `model` describes, by the keys it has."""
+    if keys & {"coulomb_force_n", "viscous_force_n_s_m"}:
+        return "one_mass"
+    if "inertias_kg_m2" in keys:
+        return "serial_chain"
+    if keys & {"motor_inertia_kg_m2", "nut_stiffness_n_m"}:
+        return "seven_dof"
+    return "rigid" if "mass_kg" in keys else "two_mass"

@@ -1,0 +1,275 @@
+"""Bench files: the axis as its owner believes it, its control, drive, encoders, and what was learnt since.
+
+An axis file (the keys of `axis` at the top level, and `control`) is a bench too: the rest has defaults.
+`load_bench` refuses what it does not understand with file, line and field.
+"""
+
+from __future__ import annotations
+
+import math
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, model_validator
+
+from hil.bench.axis_models import Axis, NotNegative, OneMass, Positive, _Model, model_of
+from hil.bench.hardware import DriveSection, SimulationSection
+from hil.control import cascade as law
+from hil.errors import FieldError, InputError
+from hil.files.yaml_model import load_model
+from hil.twin.axis import Twin
+from hil.twin.library import BY_ID
+from hil.twin.physics import Active
+
+_MA_PER_RPM = 1e-3 * 60.0 / (2.0 * math.pi)  # mA/rpm in A s/rad
+
+
+# a period in milliseconds and a resolution in micrometres are refused
+Period = Annotated[float, Field(gt=0.0, le=0.1, allow_inf_nan=False, description="[s]")]
+Resolution = Annotated[float, Field(gt=0.0, le=1e-3, allow_inf_nan=False, description="table travel per count [m]")]
+
+
+class Control(_Model):
+    """The control law of `hil.control.cascade`, gains in SI or in the units of the source."""
+
+    position_gain_1_s: Positive = Field(description="Kv [1/s]")
+    velocity_feedforward: NotNegative = Field(1.0, description="1 is 100 %")
+    position_period_s: Period = 0.004
+    velocity_gain_n_m_s_rad: Positive | None = Field(None, description="Kp [N m s/rad]; or the next two")
+    velocity_gain_n_s_m: Positive | None = Field(None, description="Kp of a linear axis [N s/m]")
+    velocity_gain_ma_rpm: Positive | None = Field(None, description="Kp [mA/rpm], with torque_constant_n_m_a")
+    torque_constant_n_m_a: Positive | None = Field(None, description="Kt [N m/A]")
+    velocity_integral_time_s: Positive | None = Field(None, description="Ti [s]; absent: a P velocity loop")
+    velocity_integral_time_ms: Positive | None = Field(None, description="Ti [ms]")
+    velocity_period_s: Period = 0.001
+    torque_limit_n_m: Positive | None = None
+    force_limit_n: Positive | None = None
+    position_feedback: Literal["motor", "table"] = "motor"
+    velocity_estimate: Literal["backward_difference", "two_sample_mean"] = "backward_difference"
+    velocity_filter_time_constant_s: NotNegative = 0.0
+
+    @model_validator(mode="after")
+    def _one_gain(self) -> Control:
+        given = [self.velocity_gain_n_m_s_rad, self.velocity_gain_n_s_m, self.velocity_gain_ma_rpm]
+        if sum(value is not None for value in given) != 1:
+            raise FieldError(
+                ("velocity_gain_n_m_s_rad",),
+                "give the velocity gain once: velocity_gain_n_m_s_rad, "
+                "velocity_gain_n_s_m (linear axis) or velocity_gain_ma_rpm",
+            )
+        if self.velocity_gain_ma_rpm is not None and self.torque_constant_n_m_a is None:
+            raise FieldError(
+                ("torque_constant_n_m_a",), "given nothing, allowed a value in N m/A: velocity_gain_ma_rpm needs it"
+            )
+        if self.velocity_integral_time_s is not None and self.velocity_integral_time_ms is not None:
+            raise FieldError(("velocity_integral_time_ms",), "given twice; remove it or velocity_integral_time_s")
+        ticks = round(self.position_period_s / self.velocity_period_s)
+        if ticks < 1 or abs(ticks * self.velocity_period_s - self.position_period_s) > 1e-9:
+            raise FieldError(
+                ("position_period_s",),
+                f"given {self.position_period_s}, allowed a whole multiple of "
+                f"velocity_period_s = {self.velocity_period_s}",
+            )
+        return self
+
+    def gains(self, ratio_m_rad: float) -> law.Gains:
+        """The constants of the control law for an axis of this ratio [m/rad]."""
+        if self.velocity_gain_ma_rpm is not None and self.torque_constant_n_m_a is not None:
+            gain = self.velocity_gain_ma_rpm * _MA_PER_RPM * self.torque_constant_n_m_a
+        else:
+            gain = self.velocity_gain_n_m_s_rad or self.velocity_gain_n_s_m or 0.0
+        integral = self.velocity_integral_time_s
+        if self.velocity_integral_time_ms is not None:
+            integral = 1e-3 * self.velocity_integral_time_ms
+        return law.make_gains(
+            position_gain_1_s=self.position_gain_1_s,
+            velocity_gain_n_m_s_rad=gain,
+            ratio_m_rad=ratio_m_rad,
+            velocity_feedforward=self.velocity_feedforward,
+            velocity_integral_time_s=integral,
+            velocity_period_s=self.velocity_period_s,
+            position_period_s=self.position_period_s,
+            torque_limit_n_m=self.torque_limit_n_m or self.force_limit_n or law.INFINITE,
+            position_from_table=self.position_feedback == "table",
+            two_sample_mean=self.velocity_estimate == "two_sample_mean",
+            velocity_filter_time_constant_s=self.velocity_filter_time_constant_s,
+        )
+
+
+class MechanismEntry(_Model):
+    """A mechanism that the twin of this bench contains."""
+
+    effect: str
+    variant: str = ""
+    parameters: dict[str, float]
+
+    @model_validator(mode="after")
+    def _known(self) -> MechanismEntry:
+        if self.effect not in BY_ID:
+            raise FieldError(("effect",), f"given {self.effect!r}, allowed one of {', '.join(BY_ID)}")
+        mechanism = BY_ID[self.effect]
+        required = {parameter.name for parameter in mechanism.parameters if parameter.default is None}
+        if not required <= set(self.parameters) <= set(mechanism.names):
+            raise FieldError(
+                ("parameters",),
+                f"given {', '.join(self.parameters) or 'nothing'}, allowed exactly {', '.join(mechanism.names)}",
+            )
+        if self.variant and self.variant not in mechanism.variants:
+            allowed = ", ".join(variant or "none" for variant in mechanism.variants)
+            raise FieldError(("variant",), f"given {self.variant!r}, allowed one of {allowed}")
+        for parameter in mechanism.parameters:
+            value = self.parameters.get(parameter.name, parameter.default)
+            assert value is not None
+            if not parameter.low <= value <= parameter.high:
+                raise FieldError(
+                    ("parameters", parameter.name),
+                    f"given {value:g}, allowed {parameter.low:g} to {parameter.high:g} {parameter.dimension.value}",
+                )
+        return self
+
+    def active(self) -> Active:
+        """The entry as the twin takes it."""
+        mechanism = BY_ID[self.effect]
+        variant = mechanism.variants.index(self.variant) if self.variant else 0
+        return Active(
+            self.effect,
+            tuple(self.parameters.get(parameter.name, parameter.default or 0.0) for parameter in mechanism.parameters),
+            variant,
+        )
+
+
+class MotorEncoder(_Model):
+    """Motor encoder."""
+
+    counts_per_rev: Annotated[int, Field(gt=0)] = 2**20
+    resolution_m: Annotated[float | None, Field(gt=0.0, description="count of a linear axis [m]")] = None
+    direction: Literal[1, -1] = 1
+
+
+class TableEncoder(_Model):
+    """Linear encoder at the table."""
+
+    resolution_m: Resolution = 0.5e-6
+    direction: Literal[1, -1] = 1
+
+
+class Encoders(_Model):
+    """Encoders of the axis; `table: null` where there is none."""
+
+    motor: MotorEncoder = MotorEncoder()
+    table: TableEncoder | None = TableEncoder()
+
+
+_SECTIONS = {
+    "schema_version",
+    "name",
+    "description",
+    "axis",
+    "control",
+    "encoders",
+    "mechanisms",
+    "drive",
+    "simulation",
+}
+
+
+class Bench(_Model):
+    """A bench file."""
+
+    schema_version: Literal[1] = 1
+    name: str = ""
+    description: str = ""
+    axis: Axis
+    control: Control
+    encoders: Encoders = Encoders()
+    mechanisms: tuple[MechanismEntry, ...] = ()
+    drive: DriveSection | None = None
+    simulation: SimulationSection | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _lift_axis(cls, data: Any) -> Any:
+        """Accept an axis file: keys of the axis at the top level."""
+        if not isinstance(data, dict):
+            return data
+        data = dict(data)
+        if "axis" not in data:
+            data["axis"] = {key: data.pop(key) for key in list(data) if key not in _SECTIONS}
+        if isinstance(data["axis"], dict) and "model" not in data["axis"]:
+            data["axis"] = {"model": model_of(set(data["axis"])), **data["axis"]}
+        # from here on pydantic takes it for Python's own data, where strictly only a tuple is one
+        return _tuples(data)
+
+    @model_validator(mode="after")
+    def _room_for_mechanisms(self) -> Bench:
+        effects = [entry.effect for entry in self.mechanisms]
+        for effect in effects:
+            given, most = effects.count(effect), BY_ID[effect].most
+            if given > most:
+                raise FieldError(
+                    ("mechanisms",), f"given {effect} {given} times, allowed {most}: it cannot act more often at once"
+                )
+        return self
+
+    @model_validator(mode="after")
+    def _feedback_is_measured(self) -> Bench:
+        if self.control.position_feedback == "table" and not self.has_table_encoder:
+            raise FieldError(
+                ("control", "position_feedback"),
+                "given table, allowed motor: this bench has no linear encoder; describe it under encoders.table",
+            )
+        return self
+
+    @property
+    def gains(self) -> law.Gains:
+        """Constants of the control law."""
+        return self.control.gains(self.axis.ratio_m_rad)
+
+    def twin(self) -> Twin:
+        """The twin of this bench, with its mechanisms."""
+        return Twin(self.axis.physics(), self.gains, tuple(entry.active() for entry in self.mechanisms))
+
+    @property
+    def motor_count(self) -> float:
+        """Count of the motor encoder [rad, or m of a linear axis]; 0 where it is not known."""
+        motor = self.encoders.motor
+        return (motor.resolution_m or 0.0) if self.axis.linear else 2.0 * math.pi / motor.counts_per_rev
+
+    @property
+    def has_table_encoder(self) -> bool:
+        """Whether a linear encoder is there; never on a linear axis of one mass."""
+        return self.encoders.table is not None and not isinstance(self.axis, OneMass)
+
+
+def _tuples(data: Any) -> Any:
+    if isinstance(data, dict):
+        return {key: _tuples(value) for key, value in data.items()}
+    return tuple(_tuples(value) for value in data) if isinstance(data, list) else data
+
+
+def shipped_benches() -> dict[str, Path]:
+    """Name -> file of the benches that come with the package."""
+    folder = Path(str(resources.files("hil"))) / "benches"
+    return {path.stem: path for path in sorted(folder.glob("*.yaml"))}
+
+
+def bench_path(source: str | Path) -> Path:
+    """The file of a bench: a path, or the name of a shipped one. Raises InputError for a name not shipped."""
+    path = Path(source)
+    if path.suffix in (".yaml", ".yml"):
+        return path
+    shipped = shipped_benches()
+    if str(source) not in shipped:
+        raise InputError(f"{source}: no such bench; give a .yaml file or one of {', '.join(shipped)}")
+    return shipped[str(source)]
+
+
+def load_bench(source: str | Path) -> Bench:
+    """The bench of a file, or a shipped bench by its name.
+
+    Raises InputError with file, line, field, what was given and what is allowed.
+    """
+    path = bench_path(source)
+    bench = load_model(path, Bench)
+    return bench if bench.name else bench.model_copy(update={"name": path.stem})

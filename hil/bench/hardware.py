@@ -1,0 +1,105 @@
+"""The hardware sections of a bench file: `drive` (bus, drive, encoder, limits) and `simulation` (what a simulated bench
+really is). Plain data: `hil.loop.devices` makes the devices of it, `hil.loop.simulated_bench` the simulated ones."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from hil.bench.axis_models import NotNegative, Positive, _Model
+from hil.errors import FieldError
+
+NodeId = Annotated[int, Field(ge=1, le=127, description="CANopen node-ID")]
+Share = Annotated[float, Field(gt=0.0, le=1.0)]
+
+
+class DriveMode(StrEnum):
+    """Which loops run here: both (CST), the position loop (CSV), none (CSP)."""
+
+    CST = "cst"
+    CSV = "csv"
+    CSP = "csp"
+
+
+class EncoderConnection(_Model):
+    """How the linear encoder is connected; its resolution stands under `encoders`."""
+
+    interface: Literal["canopen", "serial", "none"] = "canopen"
+    node_id: NodeId = 6
+    eds: str | None = Field(None, description="EDS file of the encoder; absent: the shipped one")
+    serial_number: int | None = Field(None, description="object 0x1018:4; absent: any")
+    device: str | None = Field(None, description="serial line, as /dev/ttyUSB0; simulated: absent")
+    baudrate: Annotated[int, Field(gt=0)] = 921_600
+    format: Literal["binary", "ascii"] = "binary"
+    latency_s: NotNegative = 0.0
+
+
+class SetPointLimits(_Model):
+    """What no set-point may pass on this bench, whatever a profile asks for."""
+
+    velocity_m_s: Positive
+    acceleration_m_s2: Positive
+    jerk_m_s3: Positive
+
+
+class DriveSection(_Model):
+    """Bus, drive and linear encoder, and what the loop allows before it stops the axis."""
+
+    interface: Literal["inprocess", "virtual", "udp_multicast", "socketcan"] = "inprocess"
+    channel: str = Field("hil", description="socketcan: can0; udp_multicast: a group address")
+    bitrate: Annotated[int, Field(ge=10_000, le=1_000_000, description="bit/s")] = 1_000_000
+    mode: DriveMode = DriveMode.CST
+    node_id: NodeId = 5
+    master_node_id: NodeId = 1
+    eds: str | None = Field(None, description="EDS file of the drive; absent: the shipped one")
+    serial_number: int | None = Field(None, description="object 0x1018:4; absent: any")
+    rated_torque_n_m: Positive | None = Field(
+        None, description="object 0x6076, whose 1/1000 is the resolution of torque; absent: as the drive says [N m, N]"
+    )
+    heartbeat_s: Positive = 0.02
+    encoder: EncoderConnection = EncoderConnection()
+    travel_m: tuple[float, float] | None = Field(None, description="the axis is stopped outside [m]")
+    limits: SetPointLimits | None = Field(
+        None,
+        description="of every set-point; absent: those of the profile alone, "
+        "and designed experiments keep to what was recorded",
+    )
+    following_error_m: Positive = Field(0.005, description="the axis is stopped beyond [m]")
+    response: Share = Field(0.4, description="share of the period within which the answers to a SYNC are awaited")
+    missed_answers: Annotated[int, Field(ge=0, le=100)] = Field(3, description="in a row, before data count as stale")
+    jitter_p99: Share = Field(0.5, description="share of the period; lateness beyond: not armed")
+    overrun_s: Positive = Field(0.05, description="lateness at which the axis is stopped [s]")
+    bus_load: Share = Field(0.7, description="largest share of the bus's time at which the drive is armed")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> DriveSection:
+        if self.travel_m is not None and self.travel_m[0] >= self.travel_m[1]:
+            raise FieldError(("travel_m",), f"given {list(self.travel_m)}, allowed [lower, upper]; swap them")
+        ids = [self.node_id, self.master_node_id]
+        ids += [self.encoder.node_id] if self.encoder.interface == "canopen" else []
+        if len(set(ids)) != len(ids):
+            raise FieldError(
+                ("node_id",),
+                f"given the node-IDs {ids} of drive, master and encoder, allowed different ones; change one",
+            )
+        return self
+
+
+class SimulatedEffect(_Model):
+    """One effect that the simulated axis conceals: ids, forms and parameters as drivers/sim/effects.py lists them."""
+
+    effect: str
+    form: str = ""
+    parameters: dict[str, float] = Field({}, description="SI values by name")
+
+
+class SimulationSection(_Model):
+    """What a simulated bench really is, beside what its owner believes. Present: the devices are simulated."""
+
+    axis: dict[str, float] = Field({}, description="true values of keys of `axis`, where they differ")
+    effects: tuple[SimulatedEffect, ...] = ()
+    sensors: dict[str, float] = Field({}, description="as drivers/sim/sensors.py: offsets and noise")
+    seed: Annotated[int, Field(ge=0)] = 1
+    step_s: Positive = Field(1e-5, description="internal step of the simulated axis [s]")

@@ -1,0 +1,1 @@
+"""A hypothesis, its residuals, its fit, its noise floor, its evidence."""

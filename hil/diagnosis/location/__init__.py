@@ -1,0 +1,1 @@
+"""Where a mismatch acts: block, phase of motion, position, speed, period."""

@@ -1,0 +1,151 @@
+"""Where a mismatch is: block, channels, time windows, phases of motion, range of position and of speed, periods.
+
+Rows are weighted by the energy of their residual above the noise floor, block by block, so that energy shows where
+it arises. A range is claimed only where it is narrow against what the motion covers and where the same energy, cut
+into blocks that are dealt out at random (a block-permutation null), hardly ever concentrates so much.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from hil.arrays import FloatArray
+from hil.diagnosis.estimation.fit import Fit
+from hil.diagnosis.estimation.noise_ratios import noise_ratios
+from hil.diagnosis.location.periodicity import Lock, lock
+from hil.diagnosis.location.phases import phases
+from hil.diagnosis.location.reaction_torque import acting
+from hil.diagnosis.location.residual_energy import Energy, energies, without_terms
+from hil.diagnosis.result import Location, Phase, PhaseKind
+from hil.diagnosis.verdict.fit_table import channel_names
+from hil.identification.dataset import Measured
+from hil.twin.library import BY_ID
+
+# Channel of the twin -> block whose output it is, and the part of the axis an engineer would look at
+BLOCKS = {
+    "command": ("controller", "control law and its inputs"),
+    "torque": ("drive", "drive and current loop"),
+    "motor": ("motor_side", "motor, screw bearings and friction"),
+    "table": ("transmission", "ball screw, nut and linear encoder"),
+}
+
+CONCENTRATED = 0.8  # share of the energy that a window or a range holds
+NARROW = 0.5  # of what the motion covers: a range beyond is no range
+SURE = 0.01  # of the null may concentrate as much
+_SHUFFLES = 199
+_BLOCK_S = 0.1  # of time: longer than residuals remember
+_BINS = 40
+_WINDOWS = 5
+
+
+def block_shares(found: Fit, runs: Sequence[Measured]) -> dict[str, float]:
+    """Share of each channel of the twin in the energy above the floor, whatever its name."""
+    total = dict.fromkeys(noise_ratios(found, runs[0]), 0.0)
+    for run in runs:
+        for name, ratio in noise_ratios(found, run).items():
+            total[name] += run.motor.size * max(ratio - 1.0, 0.0)
+    whole = sum(total.values())
+    return {name: value / whole if whole > 0.0 else 0.0 for name, value in total.items()}
+
+
+def locate(found: Fit, runs: Sequence[Measured], final: Fit) -> Location:
+    """Where `found` misses the recordings; `final` is the hypothesis with the terms that explain it, if any do."""
+    bench, terms = final.model.bench, final.model.resolved(final.x)[1]
+    shares = block_shares(found, runs)
+    names = channel_names(bench, runs[0])
+    strongest = sorted((name for name in shares if shares[name] > 0.05), key=lambda name: -shares[name])
+    strongest = strongest or [max(shares, key=lambda name: shares[name])]
+    block, element = BLOCKS[strongest[0]]
+    if terms:
+        mechanism = BY_ID[terms[0].effect]
+        block, element = mechanism.block.value, mechanism.element
+    elif found is final and strongest[0] in ("motor", "table"):  # no refit moves it either
+        block, element = acting(found, runs) or (block, element)
+    # with names, what the named physics does to the axis is known without noise
+    seen = energies(without_terms(final), runs, final) if terms else energies(found, runs)
+    locked = lock(seen, max(strongest, key=lambda name: shares[name]), bench, terms)
+    return Location(
+        block=block,
+        element=element,
+        channels=tuple(names[name] for name in strongest),
+        phases=phase_shares(seen),
+        windows_s=windows(seen[0]),
+        position_m=_range([run.run.position_command_m for run in seen], seen),
+        speed_m_s=_range([np.abs(run.run.velocity_command_m_s) for run in seen], seen),
+        **_periods(locked),
+    )
+
+
+def phase_shares(seen: Sequence[Energy]) -> tuple[Phase, ...]:
+    """Share of each phase of motion in the energy, the largest first."""
+    total = dict.fromkeys(PhaseKind, 0.0)
+    for energy in seen:
+        kinds = phases(energy.run)
+        for kind in PhaseKind:
+            total[kind] += max(float(energy.rows[kinds == kind].sum()), 0.0)
+    whole = sum(total.values()) or 1.0
+    found = [Phase(kind=kind, share=value / whole) for kind, value in total.items()]
+    return tuple(sorted(found, key=lambda phase: -phase.share))
+
+
+def windows(energy: Energy) -> tuple[tuple[float, float], ...]:
+    """The fewest stretches of time that hold most of the energy; none where it is everywhere."""
+    run = energy.run
+    size = max(round(_BLOCK_S / run.period_s), 1)
+    starts = np.arange(0, energy.rows.size, size)
+    blocks = np.maximum(np.add.reduceat(energy.rows, starts), 0.0)
+    order = np.argsort(blocks)[::-1]
+    enough = int(np.searchsorted(np.cumsum(blocks[order]), CONCENTRATED * blocks.sum())) + 1
+    if blocks.sum() <= 0.0 or enough > NARROW * blocks.size:
+        return ()
+    chosen = np.zeros(blocks.size + 2, dtype=bool)
+    chosen[1:-1][order[:enough]] = True
+    edges = np.flatnonzero(np.diff(chosen.astype(int)))
+    spans = sorted(zip(edges[::2], edges[1::2], strict=True), key=lambda span: -blocks[span[0] : span[1]].sum())
+    begin, length = run.left_out * run.period_s, size * run.period_s
+    return tuple(
+        sorted((round(begin + float(a) * length, 3), round(begin + float(b) * length, 3)) for a, b in spans[:_WINDOWS])
+    )
+
+
+def _range(labels: Sequence[FloatArray], seen: Sequence[Energy]) -> tuple[float, float] | None:
+    """The narrowest range of a quantity that holds most of the energy, where that is a claim."""
+    size = max(round(_BLOCK_S / seen[0].run.period_s), 1)
+    low, high = min(float(x.min()) for x in labels), max(float(x.max()) for x in labels)
+    if high <= low:
+        return None
+    index = [np.minimum(((x - low) / (high - low) * _BINS).astype(int), _BINS - 1) for x in labels]
+    time = np.bincount(np.concatenate(index), minlength=_BINS).astype(float)
+
+    def spread(rows: Sequence[FloatArray]) -> tuple[float, int, int]:
+        held = np.maximum(np.bincount(np.concatenate(index), weights=np.concatenate(rows), minlength=_BINS), 0.0)
+        total = np.concatenate([[0.0], np.cumsum(held)])
+        visited = np.concatenate([[0.0], np.cumsum(time)]) / time.sum()
+        best = (1.0, 0, _BINS)
+        for first in range(_BINS):
+            last = int(np.searchsorted(total, total[first] + CONCENTRATED * total[-1]))
+            if last <= _BINS:
+                best = min(best, (float(visited[last] - visited[first]), first, last))
+        return best
+
+    share, first, last = spread([energy.rows for energy in seen])
+    if last - first > NARROW * _BINS:
+        return None
+    random = np.random.default_rng(0)
+    null = [spread([_dealt(energy.rows, size, random) for energy in seen])[0] for _ in range(_SHUFFLES)]
+    if (1 + sum(value <= share for value in null)) / (1 + _SHUFFLES) > SURE:
+        return None
+    width = (high - low) / _BINS
+    return low + first * width, low + last * width
+
+
+def _dealt(rows: FloatArray, size: int, random: np.random.Generator) -> FloatArray:
+    """Rows (n,) cut into blocks, dealt out anew."""
+    starts = np.arange(0, rows.size, size)
+    return np.concatenate([rows[start : start + size] for start in random.permutation(starts)])
+
+
+def _periods(locked: Lock) -> dict[str, float | None]:
+    return {"frequency_hz": locked.frequency_hz, "period_m": locked.period_m, "order_per_rev": locked.order_per_rev}

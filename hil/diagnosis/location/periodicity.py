@@ -1,0 +1,120 @@
+"""What a residual is locked to: the position of the table, the angle of the screw, or time.
+
+    share(p) = energy that a sin p + b cos p explains of the residual,   p = 2 pi x / period, n theta, or 2 pi f t
+
+The three are one and the same at a single speed. So rows of all speeds are taken together, and
+nothing is claimed where there is only one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hil.arrays import FloatArray
+from hil.bench.bench_file import Bench
+from hil.diagnosis.estimation.terms import Term
+from hil.diagnosis.location.residual_energy import Energy
+from hil.twin.library import BY_ID
+
+CLAIMED = 0.25  # share of the energy that one harmonic must explain
+APART = 1.5  # times the next best domain
+SPEEDS = 1.5  # ratio of feeds from which domains can be told apart
+LOWEST_HZ = 4.0  # below, the motion itself has its lines
+HIGHEST_ORDER = 48
+_MOST_ROWS = 20_000
+
+
+@dataclass(frozen=True)
+class Lock:
+    """Periods that are claimed; all None where nothing repeats."""
+
+    frequency_hz: float | None = None
+    period_m: float | None = None
+    order_per_rev: float | None = None
+
+
+def lock(seen: Sequence[Energy], channel: str, bench: Bench, terms: Sequence[Term]) -> Lock:
+    """What the first named term says of itself, else what the residual of `channel` shows."""
+    lead_m = _lead_m(bench)
+    if terms:
+        return _named(terms[0], lead_m)
+    moving = [
+        np.abs(energy.run.velocity_command_m_s) > 0.02 * np.max(np.abs(energy.run.velocity_command_m_s))
+        for energy in seen
+    ]
+    speeds = np.concatenate(
+        [np.abs(energy.run.velocity_command_m_s[rows]) for energy, rows in zip(seen, moving, strict=True)]
+    )
+    low, high = np.percentile(speeds, [10.0, 90.0])
+    if high < SPEEDS * low:
+        return Lock()
+    ratio = bench.axis.ratio_m_rad
+    x = np.concatenate([ratio * energy.run.motor[rows] for energy, rows in zip(seen, moving, strict=True)])
+    signal = np.concatenate([energy.parts[channel][rows] for energy, rows in zip(seen, moving, strict=True)])
+    time = np.concatenate([energy.run.time_s[rows] for energy, rows in zip(seen, moving, strict=True)])
+    period_s = seen[0].run.period_s
+    # a period that goes into the lead is an order of the screw
+    spans = [
+        float(p)
+        for p in np.geomspace(np.ptp(x) / 60.0, np.ptp(x) / 1.5, 200)
+        if not lead_m or lead_m / p < 0.5 or abs(lead_m / p - round(lead_m / p)) > lead_m / np.ptp(x)
+    ]
+    found: dict[str, tuple[float, float]] = {
+        "order": max(
+            ((_share(2.0 * np.pi * n * x / lead_m, signal), float(n)) for n in range(1, HIGHEST_ORDER + 1)),
+            default=(0.0, 0.0),
+        )
+        if lead_m
+        else (0.0, 0.0),
+        "period": max(((_share(2.0 * np.pi * x / p, signal), p) for p in spans), default=(0.0, 0.0)),
+        "frequency": _strongest_frequency(time, signal, period_s),
+    }
+    best = max(found, key=lambda name: found[name][0])
+    others = max(found[name][0] for name in found if name != best)
+    share, value = found[best]
+    if share < CLAIMED or share < APART * others:
+        return Lock()
+    if best == "order":
+        return Lock(period_m=lead_m / value, order_per_rev=value)
+    return Lock(period_m=value) if best == "period" else Lock(frequency_hz=value)
+
+
+def _named(term: Term, lead_m: float) -> Lock:
+    values = dict(zip(BY_ID[term.effect].names, term.values, strict=True))
+    order = values.get("cycles_per_rev")
+    if term.effect == "periodic_lead_error":  # of the strongest harmonic
+        order = 1.0 + float(np.argmax(term.values[::2]))
+    elif term.effect == "encoder_eccentricity":
+        order = 1.0
+    if order is not None:
+        return Lock(period_m=lead_m / order if lead_m else None, order_per_rev=order)
+    return Lock(frequency_hz=values.get("frequency_hz"), period_m=values.get("period_m"))
+
+
+def _lead_m(bench: Bench) -> float:
+    return float(getattr(bench.axis, "lead_m", None) or getattr(bench.axis, "screw_lead_m", None) or 0.0)
+
+
+def _share(phase: FloatArray, signal: FloatArray) -> float:
+    """Share of the energy that one harmonic explains."""
+    step = max(phase.size // _MOST_ROWS, 1)
+    phase, signal = phase[::step], signal[::step] - signal[::step].mean()
+    basis = np.stack([np.sin(phase), np.cos(phase)], axis=1)
+    basis -= basis.mean(axis=0)
+    solution, *_ = np.linalg.lstsq(basis, signal, rcond=None)
+    return float(1.0 - np.sum((signal - basis @ solution) ** 2) / max(float(signal @ signal), 1e-300))
+
+
+def _strongest_frequency(time: FloatArray, signal: FloatArray, period_s: float) -> tuple[float, float]:
+    """Share and frequency of the strongest line over time."""
+    rows = np.round((time - time.min()) / period_s).astype(int)
+    whole = np.bincount(rows, weights=signal - signal.mean())
+    size = 1 << (2 * whole.size - 1).bit_length()
+    spectrum = np.abs(np.fft.rfft(whole, size))
+    frequency = np.fft.rfftfreq(size, period_s)
+    spectrum[frequency < LOWEST_HZ] = 0.0
+    best = float(frequency[int(np.argmax(spectrum))])
+    return _share(2.0 * np.pi * best * time, signal), best

@@ -1,0 +1,87 @@
+"""On which side of the transmission acts what has no name: told by what the motor feels while the table is off.
+
+Where the table is off by e, reduced to the motor, the motor feels
+
+    k e        of a force on the table, which the transmission passes on
+    -J e''     of an error of the transmission, which moves the table against its inertia
+    0          of an error of the linear encoder, which moves nothing
+
+with the stiffness k between motor and table and the inertia J of the table. What it feels is the disturbance torque d
+of `hil.diagnosis.search.disturbance`; the share b of a reaction x that is there is <d, x> / <x, x>.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.signal import lfilter
+
+from hil.arrays import FloatArray
+from hil.diagnosis.estimation.fit import Fit
+from hil.diagnosis.estimation.hypothesis import inertia
+from hil.diagnosis.search.disturbance import disturbance, smooth
+from hil.identification.dataset import Measured
+from hil.twin.mechanism import Block
+from hil.twin.structure.chain import Chain
+
+TABLE = (Block.TABLE.value, "table, its guides, and what acts on them")
+ENCODER = (Block.SENSOR.value, "linear encoder")
+
+# A force shows at both ends: the motor feels more than half of k e, which refitted springs may bend, and hardly
+# anything else. On development axes forces had 0.9 to 5, errors of the transmission 0.6 at most, of encoders 0.1.
+_PASSED, _ALONE = 0.7, 0.5
+# Inertia that would stand so far out of what the motor feels anyway, and of which it feels less than this, is not
+# there: errors of the linear encoder had 0.02 at most, those of the transmission 0.5 and more. Fewer rows than pass in
+# some ten of the means that a disturbance is smoothed by could be one knock.
+_STANDS_OUT, _MISSING, _FEW_S = 5.0, 0.25, 0.05
+_DEVIATION = 1.4826  # standard deviation of Gaussian noise over the median of its size
+
+
+def acting(found: Fit, runs: Sequence[Measured]) -> tuple[str, str] | None:
+    """Block and element, where the motor tells that it is the table or the linear encoder; else None."""
+    fitted, _ = found.model.resolved(found.x)
+    chain = fitted.axis.physics().chain
+    if len(chain.names) < 2 or not all(run.table_m.size for run in runs):
+        return None
+    stiffness, table_inertia = stiffness_between(chain), float(chain.inertia_kg_m2[chain.table, chain.table])
+    observer_s, felt, off, moved = found.model.observer_s, list[FloatArray](), list[FloatArray](), list[FloatArray]()
+    for run in runs:
+        blocks = found.model.blocks(found.x, run)
+        seen = disturbance(run, blocks["motor"], inertia(fitted), observer_s)
+        table = smooth(_observed(blocks["table"] / fitted.axis.ratio_m_rad, run, observer_s), run.period_s)
+        table = smooth(table, run.period_s)  # like the torque, which is smooth already, and once more below
+        speed = np.gradient(table, run.period_s)
+        rows = np.flatnonzero(seen.sliding[run.judged]) + (run.judged.start or 0)
+        felt.append(smooth(seen.torque, run.period_s)[rows])
+        off.append(stiffness * (table[rows] - np.mean(table[rows])) if rows.size else table[rows])
+        moved.append(-table_inertia * np.gradient(speed, run.period_s)[rows])
+    torque, force, reaction = (np.concatenate(parts) for parts in (felt, off, moved))
+    if torque.size == 0:
+        return None
+    size = float(np.linalg.norm(torque - torque.mean()) * np.linalg.norm(force))
+    if _share(torque - torque.mean(), force) > _PASSED and torque @ force > _ALONE * size:
+        return TABLE
+    clear = np.abs(reaction) > _STANDS_OUT * _DEVIATION * np.median(np.abs(torque))
+    if np.count_nonzero(clear) * runs[0].period_s > _FEW_S and _share(torque[clear], reaction[clear]) < _MISSING:
+        return ENCODER
+    return None
+
+
+def stiffness_between(chain: Chain) -> float:
+    """Stiffness [motor units] with which the table is held while the motor stands."""
+    free = [place for place in range(len(chain.names)) if place != chain.motor]
+    at_table = np.eye(len(free))[free.index(chain.table)]
+    return 1.0 / float(at_table @ np.linalg.solve(chain.stiffness_n_m_rad[np.ix_(free, free)], at_table))
+
+
+def _observed(values: FloatArray, run: Measured, observer_s: float) -> FloatArray:
+    """Values (n,) as slow as the observer of the motor tells a torque: two lags of its time constant."""
+    kept = float(np.exp(-run.period_s / observer_s))
+    for _ in range(2):
+        values = lfilter([1.0 - kept], [1.0, -kept], values)
+    return np.asarray(values, dtype=np.float64)
+
+
+def _share(torque: FloatArray, reaction: FloatArray) -> float:
+    return float(torque @ reaction) / max(float(reaction @ reaction), 1e-300)

@@ -1,0 +1,1 @@
+"""The search for the mechanisms that explain a mismatch."""

@@ -1,0 +1,155 @@
+"""What acts on the axis beside the nominal physics, read off the measurement, to start searches from.
+
+    d = e J / tau^2
+
+with the motor's innovation e (see `hil.diagnosis.estimation.hypothesis`), the inertia J of the whole axis and the time
+constant tau of the observer: the torque whose effect the correction of the motor just holds.
+
+These are starting values only: every verdict comes from the closed-loop fit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hil.arrays import FloatArray
+from hil.identification.dataset import Measured
+
+_SMOOTH_S = 0.006  # of the innovations: passes 60 Hz
+_PASS_HZ = 60.0
+_ORDERS = np.arange(1, 49)  # of the motor angle; up to 48 slots or pole passings per revolution
+
+
+@dataclass(frozen=True, eq=False)
+class Disturbance:
+    """Disturbance torque (n,), velocity (n,) [motor units], and the rows where the axis slides."""
+
+    torque: FloatArray
+    velocity: FloatArray
+    sliding: NDArray[np.bool_]
+
+
+def disturbance(run: Measured, innovation: FloatArray, inertia: float, observer_s: float) -> Disturbance:
+    """The disturbance torque of a run from the motor's innovation (n,) [motor units], measured minus twin."""
+    width = _width(run.period_s)
+    velocity = smooth(np.gradient(run.motor, run.period_s), run.period_s)
+    torque = smooth(innovation, run.period_s) * inertia / observer_s**2
+    slow = 2e-3 * np.max(np.abs(velocity), initial=1e-9)
+    sliding = np.convolve((np.abs(velocity) < slow).astype(float), np.ones(3 * width), "same") == 0
+    sliding[: 10 * width] = sliding[-3 * width :] = False
+    return Disturbance(torque, velocity, sliding)
+
+
+def smooth(values: FloatArray, period_s: float) -> FloatArray:
+    """Means (n,) over as much time as leaves a disturbance."""
+    width = _width(period_s)
+    return np.convolve(values, np.ones(width) / width, "same")
+
+
+def _width(period_s: float) -> int:
+    return max(round(_SMOOTH_S / period_s), 1)
+
+
+def _harmonic_share(phase: FloatArray, signal: FloatArray) -> float:
+    """Share of a signal's energy that one harmonic of `phase` explains."""
+    basis = np.stack([np.sin(phase), np.cos(phase), np.ones_like(phase)], axis=1)
+    coefficients, *_ = np.linalg.lstsq(basis, signal, rcond=None)
+    centred = signal - signal.mean()
+    left = signal - basis @ coefficients
+    return 1.0 - float(left @ left) / max(float(centred @ centred), 1e-300)
+
+
+def orders(
+    runs: Sequence[Measured],
+    found: Sequence[Disturbance],
+    angle_per_unit: float,
+    most: int = 3,
+    weight: Sequence[FloatArray] | None = None,
+) -> list[float]:
+    """Orders per motor revolution in which the disturbance is strongest, best first, and always the first two.
+
+    Only rows slow enough for the differences to pass the order are used. Where those are less than some turns, high
+    orders fit anything; an unbalanced or bent screw shows once or twice a turn.
+    """
+    shares = []
+    for order in _ORDERS:
+        phases, signals = [], []
+        for index, (run, d) in enumerate(zip(runs, found, strict=True)):
+            rate = np.abs(d.velocity) * angle_per_unit * order / (2.0 * np.pi)
+            rows = d.sliding & (rate < _PASS_HZ) & (rate > 0.5)
+            phases.append(order * angle_per_unit * run.motor[rows])
+            signals.append((d.torque if weight is None else weight[index])[rows])
+        phase, signal = np.concatenate(phases), np.concatenate(signals)
+        step = max(phase.size // 10000, 1)
+        phase, signal = phase[::step], signal[::step]
+        shares.append(_harmonic_share(phase, signal) * min(1.0, phase.size / 1000.0) if phase.size > 100 else 0.0)
+    best = [float(_ORDERS[index]) for index in np.argsort(shares)[::-1][:most]]
+    return list(dict.fromkeys((*best, 1.0, 2.0)))
+
+
+def friction_periods(
+    runs: Sequence[Measured], found: Sequence[Disturbance], ratio: float, most: int = 4
+) -> list[float]:
+    """Periods along the travel [m], from 1 mm up, with which friction varies most, best first."""
+    x = [ratio * run.motor[d.sliding] for run, d in zip(runs, found, strict=True)]
+    friction = [d.torque[d.sliding] * np.sign(d.velocity[d.sliding]) for d in found]
+    return _periods(x, friction, 1e-4, 1e-3, most)
+
+
+def scale_periods(runs: Sequence[Measured], errors: Sequence[FloatArray], most: int = 2) -> list[float]:
+    """Periods [m] below 1 mm in which an error (n,) of the linear encoder repeats, best first."""
+    return [
+        period for period in _periods([run.table_m for run in runs], errors, 0.5e-6, 2e-6, most + 2) if period < 1e-3
+    ][:most]
+
+
+def _periods(
+    positions: Sequence[FloatArray], values: Sequence[FloatArray], bin_m: float, shortest_m: float, most: int
+) -> list[float]:
+    """Peaks of the spectrum of values over position [m]: averaged over bins, transformed, best first."""
+    x, y = np.concatenate(list(positions)), np.concatenate(list(values))
+    if x.size < 100 or np.ptp(x) < 4.0 * shortest_m:
+        return []
+    count = int(np.ceil(np.ptp(x) / bin_m))
+    index = np.minimum(((x - x.min()) / np.ptp(x) * count).astype(int), count - 1)
+    rows = np.bincount(index, minlength=count)
+    mean = np.bincount(index, weights=y, minlength=count) / np.maximum(rows, 1)
+    size = 4 * (1 << (count - 1).bit_length())  # padded: a peak is read to a quarter of its width
+    spectrum = np.abs(np.fft.rfft(np.where(rows > 0, mean - mean[rows > 0].mean(), 0.0), size))
+    frequency = np.fft.rfftfreq(size, float(np.ptp(x)) / count)
+    width = size // count + 1
+    spectrum[(frequency > 1.0 / shortest_m) | (frequency < 0.4 / np.ptp(x))] = 0.0
+    found = []
+    for _ in range(most):
+        peak = int(np.argmax(spectrum))
+        if spectrum[peak] == 0.0:
+            break
+        found.append(float(1.0 / frequency[peak]))
+        spectrum[max(peak - 2 * width, 0) : peak + 2 * width] = 0.0
+    return found
+
+
+def force_window(run: Measured, d: Disturbance) -> tuple[float, float, float]:
+    """Start, end [s] and level [motor units] of the constant disturbance that stands out most."""
+    block = max(int(0.02 / run.period_s), 1)
+    n = run.motor.size // block
+    mask = d.sliding[: n * block].reshape(n, block)
+    values = np.where(mask, d.torque[: n * block].reshape(n, block), 0.0).sum(axis=1)
+    counts = mask.sum(axis=1)
+    mean = values.sum() / max(counts.sum(), 1)
+    total = np.concatenate([[0.0], np.cumsum(values - mean * counts)])
+    count = np.concatenate([[0.0], np.cumsum(counts)])
+    stride = max(n // 600, 1)
+    total, count = total[::stride], count[::stride]
+    sums = np.subtract.outer(total, total).T
+    sizes = np.subtract.outer(count, count).T
+    rest = np.maximum(count[-1] - sizes, 1.0)
+    score = np.where(sizes > 5, sums**2 * (1.0 / np.maximum(sizes, 1.0) + 1.0 / rest), 0.0)
+    first, last = np.unravel_index(int(np.argmax(np.triu(score))), score.shape)
+    scale = block * stride * run.period_s
+    level = float(sums[first, last] / max(sizes[first, last], 1.0))
+    return float(first * scale), float(max(last, first + 1) * scale), level

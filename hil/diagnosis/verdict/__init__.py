@@ -1,0 +1,1 @@
+"""Verdict, findings and their confidence, cross-validation."""

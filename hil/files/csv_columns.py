@@ -1,0 +1,155 @@
+"""Read number columns of a CSV file fast (pyarrow), and say exactly which field is wrong when one is.
+
+The fast reader knows that something is wrong but not always where; then a slow second pass over the text
+finds the first bad field, so that an error always names line and column.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+from typing import TextIO
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.csv as pacsv
+
+from hil.arrays import FloatArray
+from hil.errors import InputError
+
+
+@dataclass(frozen=True)
+class CsvFormat:
+    """How a CSV file is written: `skip_lines` stand above the header, `skip_rows` between it and the data."""
+
+    delimiter: str = ","
+    decimal_point: str = "."
+    skip_lines: int = 0
+    skip_rows: int = 0
+    column_names: tuple[str, ...] | None = None  # for a file without a header
+    encoding: str = "utf-8"
+
+
+PLAIN = CsvFormat()
+
+
+def read_header(path: Path, form: CsvFormat = PLAIN) -> tuple[str, ...]:
+    """Names of the columns. Raises InputError for an empty file, a repeated name, or text that is no CSV."""
+    with _opened(path, form) as file:
+        lines = _rows(path, file, form)
+        line, names = next(lines, (0, []))
+    if form.column_names is not None:
+        names = list(form.column_names)
+    elif line == 0:
+        raise InputError(f"{path}: the file is empty; give a CSV file with a header and rows of numbers")
+    repeated = [name for name in dict.fromkeys(names) if names.count(name) > 1]
+    if repeated:
+        raise InputError(
+            f"{path}:{line}: {repeated[0]}: stands twice in the header, allowed once; rename or remove one"
+        )
+    return tuple(names)
+
+
+def read_columns(path: Path, wanted: Collection[str], form: CsvFormat = PLAIN) -> dict[str, FloatArray]:
+    """The columns named in `wanted`, as finite numbers of equal length.
+
+    Raises InputError with file, line and column: a missing column, text, an empty field, NaN or
+    infinity, a row of another length, no rows.
+    """
+    names = read_header(path, form)
+    missing = [name for name in wanted if name not in names]
+    if missing:
+        raise InputError(f"{path}: column {missing[0]!r} is missing; the file has {', '.join(names)}")
+    lines_above = line_of_row(path, 0, form) - 1
+    try:
+        table = pacsv.read_csv(
+            path,
+            read_options=pacsv.ReadOptions(
+                column_names=list(names), skip_rows=lines_above, encoding=form.encoding, use_threads=False
+            ),
+            parse_options=pacsv.ParseOptions(delimiter=form.delimiter),
+            convert_options=pacsv.ConvertOptions(
+                include_columns=list(wanted),
+                column_types=dict.fromkeys(wanted, pa.float64()),
+                decimal_point=form.decimal_point,
+            ),
+        )
+        columns = {name: table.column(name).to_numpy() for name in wanted}
+        problem = None
+    except (pa.ArrowInvalid, UnicodeDecodeError) as error:
+        columns, problem = {}, error
+    if problem is not None or not all(np.isfinite(values).all() for values in columns.values()):
+        _raise_first_bad_field(path, names, wanted, form)
+        raise InputError(f"{path}: cannot be read as CSV: {problem}; correct the file")
+    return columns
+
+
+def line_of_row(path: Path, row: int, form: CsvFormat = PLAIN) -> int:
+    """Line in the file (from 1) of data row `row` (from 0); blank lines and headers count as lines.
+
+    Raises InputError if the file has no such row.
+    """
+    with _opened(path, form) as file:
+        for line, _ in islice(_data_rows(path, file, form), row, None):
+            return line
+    raise InputError(f"{path}: there is no row {row + 1} of numbers below the header; give a file with rows")
+
+
+def _opened(path: Path, form: CsvFormat) -> TextIO:
+    try:
+        encoding = "utf-8-sig" if form.encoding.lower() in ("utf-8", "utf8") else form.encoding
+        return path.open(encoding=encoding, newline="")
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}); give the path of a CSV file") from None
+    except LookupError:
+        raise InputError(
+            f"{path}: given the encoding {form.encoding!r}, allowed one that Python knows; give utf-8 or latin-1"
+        ) from None
+
+
+def _rows(path: Path, file: TextIO, form: CsvFormat) -> Iterator[tuple[int, list[str]]]:
+    """Line number and fields of each line that is not blank, from the header on."""
+    reader = csv.reader(islice(file, form.skip_lines, None), delimiter=form.delimiter)
+    try:
+        for fields in reader:
+            if fields:
+                yield reader.line_num + form.skip_lines, fields
+    except (UnicodeDecodeError, csv.Error) as error:
+        line = reader.line_num + form.skip_lines + 1
+        raise InputError(f"{path}:{line}: is not text of a CSV file ({error}); give a CSV file") from None
+
+
+def _data_rows(path: Path, file: TextIO, form: CsvFormat) -> Iterator[tuple[int, list[str]]]:
+    return islice(_rows(path, file, form), (form.column_names is None) + form.skip_rows, None)
+
+
+def _raise_first_bad_field(path: Path, names: tuple[str, ...], wanted: Collection[str], form: CsvFormat) -> None:
+    places = sorted((names.index(name), name) for name in wanted)
+    with _opened(path, form) as file:
+        for line, fields in _data_rows(path, file, form):
+            if len(fields) != len(names):
+                raise InputError(
+                    f"{path}:{line}: given {len(fields)} fields, the header has {len(names)}; "
+                    "the row is cut or damaged: correct or remove it"
+                )
+            for index, name in places:
+                text = fields[index].strip()
+                if not _is_finite_number(text, form.decimal_point):
+                    given = repr(text) if text else "an empty field"
+                    raise InputError(
+                        f"{path}:{line}: {name}: given {given}, allowed a finite number; "
+                        "correct the value or cut the recording before it"
+                    )
+
+
+def _is_finite_number(text: str, decimal_point: str) -> bool:
+    if "_" in text or ("." in text and decimal_point != "."):  # Python reads 1_0, a CSV reader does not
+        return False
+    try:
+        return math.isfinite(float(text.replace(decimal_point, ".")))
+    except ValueError:
+        return False

@@ -1,0 +1,129 @@
+"""Friction identification at constant feed, as in Sec. 3.2.3 of the source.
+
+At constant feed nothing accelerates, so the mean torque is friction (Eq. 24, with the offset by which the
+directions differ, such as weight or a preloaded cable):
+
+    tau = tau_C sign(omega) + c omega + tau_0
+
+One point per stretch of constant feed, transients cut, both directions; least squares gives the three.
+A linear axis is the same in N, N s/m and m/s.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hil.arrays import FloatArray
+from hil.channels import AxisKind
+from hil.errors import InputError
+from hil.identification.least_squares import solve
+from hil.recording.recording import Recording
+
+FEED_TOLERANCE = 1e-3  # of the feed: what counts as constant
+FEED_RESOLUTION_M_S = 2e-6  # two of the last digits that recordings are usually printed with
+SETTLING_S = 0.15  # transient after the feed is reached; several time constants of a position loop
+ENDING_S = 0.01  # before the feed changes again
+AVERAGED_MIN_S = 0.1  # a shorter mean holds more of the last transient than of friction
+
+
+@dataclass(frozen=True)
+class FrictionPoint:
+    """Means over one stretch of constant feed."""
+
+    speed: float  # motor speed [rad/s], linear axis [m/s]
+    torque: float  # [N m], linear axis [N]
+    feed_m_s: float  # velocity set-point
+    start_s: float  # of what was averaged
+    duration_s: float
+
+
+@dataclass(frozen=True)
+class FrictionResult:
+    """Coulomb [N m], viscous [N m s/rad] and offset [N m], on a linear axis [N], [N s/m], [N].
+
+    The errors are standard errors of the regression: they say how well the line fits the points.
+    """
+
+    kind: AxisKind
+    points: tuple[FrictionPoint, ...]
+    coulomb: float
+    viscous: float
+    offset: float
+    coulomb_std_error: float
+    viscous_std_error: float
+    offset_std_error: float
+    residual_rms: float  # of the points about the line [N m] or [N]
+
+    def torque(self, speed: FloatArray) -> FloatArray:
+        """Friction of the line [N m] or [N] over speed [rad/s] or [m/s]."""
+        return np.asarray(self.coulomb * np.sign(speed) + self.viscous * speed + self.offset, dtype=np.float64)
+
+
+def identify_friction(
+    recording: Recording, *, settling_s: float = SETTLING_S, speed_min: float = 0.0
+) -> FrictionResult:
+    """Coulomb and viscous friction and offset of a recording with several feeds in both directions.
+
+    `settling_s` is cut after each feed is reached; points below `speed_min` [rad/s] or [m/s] are left out (at low
+    speed a Stribeck fall bends the line). The speed is that of the motor encoder.
+    Raises InputError if constant feeds are too few, too short, or of one direction.
+    """
+    points = tuple(
+        point for point in _points(recording, settling_s) if abs(point.speed) >= speed_min and point.speed != 0.0
+    )
+    speed = np.array([point.speed for point in points])
+    torque = np.array([point.torque for point in points])
+    forward, backward = int((speed > 0).sum()), int((speed < 0).sum())
+    # two speeds in one direction give the slope, one point in the other direction splits Coulomb and offset
+    if min(forward, backward) < 1 or len(points) < 4 or np.ptp(np.abs(speed)) < 0.1 * np.abs(speed).max():
+        raise InputError(
+            f"{recording.name}: velocity_command_m_s: given {forward} forward and {backward} backward stretches of "
+            f"constant feed, allowed 4 or more of different feeds and both directions, each longer than "
+            f"{settling_s + ENDING_S + AVERAGED_MIN_S:g} s; record profiles/friction_sweep.yaml"
+        )
+    fit = solve(np.column_stack([np.sign(speed), speed, np.ones_like(speed)]), torque)
+    coulomb, viscous, offset = fit.values.tolist()
+    errors = fit.std_errors.tolist()
+    return FrictionResult(
+        recording.kind, points, coulomb, viscous, offset, errors[0], errors[1], errors[2], fit.residual_rms
+    )
+
+
+def constant_feed_stretches(velocity_command_m_s: FloatArray) -> list[tuple[int, int]]:
+    """Stretches [first, end) in which the set-point stays within 0.1 % of its first value, standstill left out."""
+    velocity = velocity_command_m_s.tolist()
+    stretches = []
+    first = 0
+    for k in range(1, len(velocity) + 1):
+        feed = velocity[first]
+        if k == len(velocity) or abs(velocity[k] - feed) > FEED_TOLERANCE * abs(feed) + FEED_RESOLUTION_M_S:
+            if abs(feed) > FEED_RESOLUTION_M_S:
+                stretches.append((first, k))
+            first = k
+    return stretches
+
+
+def _points(recording: Recording, settling_s: float) -> list[FrictionPoint]:
+    names, period_s = recording.axis, recording.period_s
+    position, torque = recording[names.motor_position], recording[names.torque]
+    feed = recording[names.velocity_command]
+    cut, ending = round(settling_s / period_s), round(ENDING_S / period_s)
+    points = []
+    for first, end in constant_feed_stretches(feed):
+        first, end = first + cut, end - ending
+        if (end - first) * period_s < AVERAGED_MIN_S:
+            continue
+        duration_s = (end - first - 1) * period_s
+        speed = (position[end - 1] - position[first]) / duration_s
+        points.append(
+            FrictionPoint(
+                float(speed),
+                float(torque[first:end].mean()),
+                float(feed[first]),
+                float(recording["time_s"][first]),
+                duration_s,
+            )
+        )
+    return points

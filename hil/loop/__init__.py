@@ -1,0 +1,1 @@
+"""The control loop on a bench, real or simulated."""

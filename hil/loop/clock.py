@@ -1,0 +1,72 @@
+"""Clocks of the loop: the wall clock with absolute deadlines, and a virtual one that is always on time.
+
+Tick k is due at start + k x period, never at now + period: an error of one tick is not handed on to the next.
+"""
+
+from __future__ import annotations
+
+import time
+from typing import Protocol
+
+SPIN_S = 100e-6  # sleep up to here before the deadline, then spin: waking takes some 50 us
+
+
+class Clock(Protocol):
+    """When the ticks of a loop come."""
+
+    def start(self) -> None:
+        """Tick 0 is due now."""
+
+    def wait(self, tick: int) -> float:
+        """Return when the tick is due; how late that is [s]."""
+
+    def since(self, tick: int) -> float:
+        """Time since the tick was due [s]."""
+
+    def may_wait(self, tick: int, span_s: float) -> bool:
+        """Whether something may still happen within `span_s` after the tick was due."""
+
+
+class WallClock:
+    """Real time. Sleeps up to `spin_s` before a deadline, then spins; spinning all the time would have the kernel
+    throttle a real-time thread. A `spin_s` of 0 only sleeps."""
+
+    def __init__(self, period_s: float, spin_s: float = SPIN_S) -> None:
+        self._period_ns = round(period_s * 1e9)
+        self._spin_ns = round(spin_s * 1e9)
+        self._start_ns = 0
+
+    def start(self) -> None:
+        self._start_ns = time.perf_counter_ns()
+
+    def wait(self, tick: int) -> float:
+        deadline_ns = self._start_ns + tick * self._period_ns
+        now_ns = time.perf_counter_ns()
+        if now_ns < deadline_ns - self._spin_ns:
+            time.sleep((deadline_ns - self._spin_ns - now_ns) * 1e-9)
+            now_ns = time.perf_counter_ns()
+        while now_ns < deadline_ns:
+            now_ns = time.perf_counter_ns()
+        return (now_ns - deadline_ns) * 1e-9
+
+    def since(self, tick: int) -> float:
+        return (time.perf_counter_ns() - self._start_ns - tick * self._period_ns) * 1e-9
+
+    def may_wait(self, tick: int, span_s: float) -> bool:
+        return self.since(tick) < span_s
+
+
+class VirtualClock:
+    """Time that passes as fast as the machine allows: every tick is on time and takes none."""
+
+    def start(self) -> None:
+        """Nothing to do."""
+
+    def wait(self, tick: int) -> float:
+        return 0.0
+
+    def since(self, tick: int) -> float:
+        return 0.0
+
+    def may_wait(self, tick: int, span_s: float) -> bool:
+        return False

@@ -1,0 +1,175 @@
+"""Make this process as punctual as the machine allows, say what was granted, and measure what it is worth.
+
+Linux, without a module outside the standard library. Nothing here is needed for the loop to run: each setting is tried,
+and what was refused (mostly for want of rights) is reported with its reason.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import gc
+import math
+import os
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from hil.errors import HilError
+from hil.loop.clock import WallClock
+
+PRIORITY = 80  # SCHED_FIFO; the kernel's own interrupt threads run at 50
+_MCL_CURRENT, _MCL_FUTURE = 1, 2  # linux/mman.h
+_PR_SET_TIMERSLACK = 29  # linux/prctl.h
+
+
+class NotPunctual(HilError):
+    """The machine or the bus cannot keep the period: the drive was not armed."""
+
+
+@dataclass(frozen=True)
+class Grant:
+    """One setting: what was asked for, and why it was refused ("" if granted)."""
+
+    setting: str
+    refused: str = ""
+
+
+@dataclass(frozen=True)
+class Jitter:
+    """How late the ticks of a loop were [s]."""
+
+    ticks: int
+    p50_s: float
+    p99_s: float
+    max_s: float
+    missed: int  # a period or more late
+
+    @classmethod
+    def of(cls, lateness_s: list[float], period_s: float) -> Jitter:
+        """Of the lateness of each tick; nearest-rank percentiles."""
+        ordered = sorted(lateness_s) or [0.0]
+
+        def rank(part: float) -> float:
+            return ordered[max(0, math.ceil(part * len(ordered)) - 1)]
+
+        return cls(len(lateness_s), rank(0.5), rank(0.99), ordered[-1], sum(late >= period_s for late in ordered))
+
+    @property
+    def text(self) -> str:
+        """For a person."""
+        return (
+            f"p50 {1e6 * self.p50_s:.0f} us, p99 {1e6 * self.p99_s:.0f} us, largest {1e6 * self.max_s:.0f} us, "
+            f"{self.missed} of {self.ticks} ticks missed"
+        )
+
+
+@contextmanager
+def real_time(cpu: int | None = None, priority: int = PRIORITY) -> Iterator[tuple[Grant, ...]]:
+    """Ask for real-time conditions; gives what was granted, and takes all back that can be at the end.
+
+    cpu: the core to run on; None: the last one this process may use (interrupts mostly go to the first).
+    Compile and allocate before entering: the garbage collector stands still inside.
+    """
+    before = os.sched_getaffinity(0)
+    policy, parameters = os.sched_getscheduler(0), os.sched_getparam(0)
+    gc.collect()
+    gc.freeze()
+    gc.disable()
+    core = max(before) if cpu is None else cpu
+    grants = (
+        Grant("garbage collector off"),
+        _try("memory locked", _lock_memory),
+        _try("timer slack 1 ns", lambda: _check(_libc().prctl(_PR_SET_TIMERSLACK, 1, 0, 0, 0))),
+        _try(f"core {core}", lambda: os.sched_setaffinity(0, {core})),
+        _try(
+            f"SCHED_FIFO {priority}",
+            lambda: os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(priority)),
+        ),
+    )
+    try:
+        yield grants
+    finally:
+        if not grants[-1].refused:
+            os.sched_setscheduler(0, policy, parameters)
+        os.sched_setaffinity(0, before)
+        _libc().prctl(_PR_SET_TIMERSLACK, 0, 0, 0, 0)  # 0: the default of the thread
+        _libc().munlockall()
+        gc.enable()
+        gc.unfreeze()
+
+
+def measure_jitter(period_s: float, duration_s: float = 0.5, clock: WallClock | None = None) -> Jitter:
+    """Lateness of an empty loop."""
+    clock = clock or WallClock(period_s)
+    clock.start()
+    return Jitter.of([clock.wait(tick) for tick in range(1, max(2, round(duration_s / period_s)) + 1)], period_s)
+
+
+def machine_state() -> dict[str, Any]:
+    """What decides how punctual this machine can be: kernel, preemption, governor, throttling, cores."""
+
+    def read(path: str) -> str:
+        try:
+            return Path(path).read_text().strip()
+        except OSError:
+            return "unknown"
+
+    release = os.uname()
+    return {
+        "kernel": release.release,
+        "preempt_rt": "PREEMPT_RT" in release.version or read("/sys/kernel/realtime") == "1",
+        "governor": read("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor"),
+        "rt_runtime_us": read("/proc/sys/kernel/sched_rt_runtime_us"),
+        "cores": len(os.sched_getaffinity(0)),
+        "load_1_min": round(os.getloadavg()[0], 2),
+    }
+
+
+def check_punctual(jitter: Jitter, p99_limit_s: float) -> None:
+    """Raise NotPunctual when the p99 of the lateness exceeds what the bench allows."""
+    if jitter.p99_s > p99_limit_s:
+        raise NotPunctual(
+            f"drive.jitter_p99_s: the loop is late by {jitter.text}; allowed p99 {1e6 * p99_limit_s:.0f} us. The drive "
+            "was not armed: take load off the machine, give the rights for real-time scheduling (systemd/README.md), "
+            "raise the budget in the bench file, or arm all the same with --force"
+        )
+
+
+def report(grants: tuple[Grant, ...], jitter: Jitter) -> dict[str, Any]:
+    """Grants, jitter before arming and machine, as a recording keeps them."""
+    return {
+        "granted": [grant.setting for grant in grants if not grant.refused],
+        "refused": {grant.setting: grant.refused for grant in grants if grant.refused},
+        "jitter_before_arming": asdict(jitter),
+        "machine": machine_state(),
+    }
+
+
+def _try(setting: str, action: Callable[[], Any]) -> Grant:
+    try:
+        action()
+    except OSError as error:
+        return Grant(setting, error.strerror or str(error))
+    return Grant(setting)
+
+
+def _lock_memory() -> None:
+    _check(_libc().mlockall(_MCL_CURRENT | _MCL_FUTURE))
+
+
+def _libc() -> ctypes.CDLL:
+    return ctypes.CDLL(None, use_errno=True)
+
+
+def _check(result: int) -> None:
+    if result != 0:
+        code = ctypes.get_errno()
+        raise OSError(code, os.strerror(code))
+
+
+def now_text() -> str:
+    """Start of a run in ISO 8601, local time with its offset."""
+    return time.strftime("%Y-%m-%dT%H:%M:%S%z")

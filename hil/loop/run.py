@@ -1,0 +1,232 @@
+"""One run of a profile on a bench: open, set up, prepare for real time, arm, move, record."""
+
+from __future__ import annotations
+
+import contextlib
+import signal
+import sys
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+import numpy as np
+
+from hil.bench.bench_file import Bench
+from hil.bench.hardware import DriveSection, EncoderConnection, SimulationSection
+from hil.errors import FieldError
+from hil.loop.clock import Clock, VirtualClock, WallClock
+from hil.loop.devices import Rig
+from hil.loop.realtime import Jitter, NotPunctual, check_punctual, measure_jitter, now_text, real_time, report
+from hil.loop.session import Outcome, Session, make_cycle
+from hil.loop.simulated_bench import make_plant
+from hil.loop.supervision import Ending
+from hil.loop.virtual import VirtualSession
+from hil.motion.profile import Profile
+from hil.motion.trajectory import Trajectory, plan
+from hil.recording.writer import Recorder, run_metadata
+
+REHEARSED_TICKS = 50
+VIRTUAL_START = "virtual time"  # where a recording names the start of a run
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """What came of a run. `recording`: the Parquet file. `jitter` of its ticks, `doubts`: what was overridden."""
+
+    outcome: Outcome
+    recording: Path | None
+    jitter: Jitter
+    notes: tuple[str, ...]
+    doubts: tuple[str, ...]
+
+    @property
+    def complete(self) -> bool:
+        """Whether the profile was run to its end."""
+        return self.outcome.ending is Ending.COMPLETE
+
+
+def run_profile(
+    bench: Bench,
+    profile: Profile,
+    folder: str | Path,
+    name: str,
+    *,
+    virtual: bool = False,
+    force: bool = False,
+    seed: int | None = None,
+    planned: Callable[[Trajectory], None] | None = None,
+    rig: Rig | None = None,
+) -> RunResult:
+    """Run a profile on a bench and record it as `folder`/`name`.parquet.
+
+    virtual: as fast as the machine allows, by a clock that is always on time; simulated benches only. force: arm
+    although jitter or bus load exceed the budget. seed: of the simulated sensors, instead of the bench's. planned: told
+    the trajectory before the axis moves. rig: an opened one, left open.
+
+    Raises InputError for what cannot be run, NotPunctual for a budget exceeded, HilError for devices that fail.
+    """
+    section = bench.drive or DriveSection()
+    if virtual and bench.drive is not None and bench.simulation is None:  # before any device is opened
+        raise FieldError(("drive",), "given a real bench in virtual time, allowed the wall clock; leave --virtual")
+    if seed is None and bench.simulation is not None:
+        seed = bench.simulation.seed
+    with contextlib.ExitStack() as stack:
+        if rig is None:
+            rig = stack.enter_context(Rig(bench, seed))
+        rig.set_up()
+        sample = rig.drive.read(0.0)
+        encoder = rig.encoder.read(0.0) if rig.encoder is not None else None
+        gains = bench.gains
+        start_m = (
+            encoder.position_m
+            if encoder is not None and gains.position_from_table
+            else gains.ratio_m_rad * sample.motor_position_rad
+        )
+        trajectory = plan(profile, gains.period_s, start_m)
+        _check_set_points(trajectory, section)
+        if planned is not None:
+            planned(trajectory)
+        rehearse(bench, trajectory, profile)
+        cycle = make_cycle(rig, sample.motor_position_rad)
+        doubts = [_refused(force, lambda: _check_bus_load(rig, section))]
+        conditions: dict[str, Any] = {}
+        clock: Clock = VirtualClock()
+        if not virtual:
+            grants = stack.enter_context(real_time())
+            jitter = measure_jitter(gains.period_s)
+            doubts.append(_refused(force, lambda: check_punctual(jitter, section.jitter_p99 * gains.period_s)))
+            conditions = report(grants, jitter)
+            clock = WallClock(gains.period_s)
+        metadata = run_metadata(
+            bench=bench.model_dump(mode="json"),
+            profile=profile.model_dump(mode="json"),
+            seed=seed,
+            commands=sys.argv,
+            start_time=VIRTUAL_START if virtual else now_text(),
+        )
+        metadata |= {
+            "real_time": conditions,
+            "overridden": [doubt for doubt in doubts if doubt],
+            "segments": [run._asdict() for run in trajectory.runs],
+            "notes": list(trajectory.notes),
+        }
+        recorder = Recorder(folder, name, cycle.channels, gains.period_s, metadata, lossless=virtual)
+        ended = "failed"
+        try:
+            kind = VirtualSession if virtual else Session
+            session = kind(rig, cycle, trajectory, profile.motion_limits, clock, recorder)
+            with _interruptible(session):
+                outcome = session.run()
+            ended = f"{outcome.ending}: {outcome.reason}"
+        except BaseException as error:
+            ended = f"{type(error).__name__}: {error}"
+            raise
+        finally:
+            recording = recorder.close(ended)
+    notes = trajectory.notes
+    if recorder.path.stem != name:
+        notes += (
+            f"{name}.parquet or {name}.arrows of an earlier run is in {folder} and stays; this run is "
+            f"{recorder.path.name}",
+        )
+    return RunResult(
+        outcome,
+        recording,
+        Jitter.of(list(outcome.lateness_s), gains.period_s),
+        notes,
+        tuple(doubt for doubt in doubts if doubt),
+    )
+
+
+def _check_set_points(trajectory: Trajectory, section: DriveSection) -> None:
+    """Raise FieldError for set-points outside the travel or beyond the limits of the bench."""
+    if section.travel_m is not None:
+        low, high = float(trajectory.position_m.min()), float(trajectory.position_m.max())
+        if low < section.travel_m[0] or high > section.travel_m[1]:
+            raise FieldError(
+                ("segments",),
+                f"given set-points from {low:.6g} to {high:.6g} m, allowed "
+                f"{section.travel_m[0]:g} to {section.travel_m[1]:g} m (drive.travel_m of the bench); "
+                "move less far",
+            )
+    for name, allowed in section.limits.model_dump().items() if section.limits else ():
+        peak = float(np.max(np.abs(getattr(trajectory, name))))
+        if peak > allowed * (1.0 + 1e-9):
+            raise FieldError(
+                ("limits", name),
+                f"given set-points up to {peak:.6g}, allowed {allowed:g} (drive.limits.{name} of the bench); lower it",
+            )
+
+
+def _check_bus_load(rig: Rig, section: DriveSection) -> None:
+    load = rig.bus_load()
+    if load > section.bus_load:
+        raise NotPunctual(
+            f"drive.bus_load: SYNC, RPDO, TPDO and encoder take {100 * load:.0f} % of the bus at "
+            f"{section.bitrate} bit/s, allowed {100 * section.bus_load:.0f} %. The drive was not armed: "
+            "raise the bit rate or the period, or arm all the same with --force"
+        )
+
+
+def _refused(force: bool, check: Callable[[], None]) -> str:
+    """The text of a refusal that is overridden, "" where there is none."""
+    try:
+        check()
+    except NotPunctual as error:
+        if not force:
+            raise
+        return str(error)
+    return ""
+
+
+class _Rehearsal(VirtualClock):
+    """Asks for a stop after some ticks."""
+
+    def __init__(self) -> None:
+        self.session: Session | None = None
+
+    def wait(self, tick: int) -> float:
+        if tick == REHEARSED_TICKS and self.session is not None:
+            self.session.ask_stop()
+        return 0.0
+
+    def record(self, row: Sequence[float]) -> None:
+        """Nothing is recorded."""
+
+
+def rehearse(bench: Bench, trajectory: Trajectory, profile: Profile) -> None:
+    """Arm, begin and stop the run in virtual time on a simulated copy of the bench, so that all is compiled and at hand
+    before the real one."""
+    section = (bench.drive or DriveSection()).model_copy(
+        update={"interface": "inprocess", "encoder": EncoderConnection(), "eds": None, "serial_number": None}
+    )
+    copy = bench.model_copy(update={"drive": section, "simulation": bench.simulation or SimulationSection()})
+    plant = make_plant(copy)
+    plant.reset(float(trajectory.position_m[0]))
+    with Rig(copy, plant=plant) as rig:
+        rig.set_up()
+        clock = _Rehearsal()
+        cycle = make_cycle(rig, rig.drive.read(0.0).motor_position_rad)
+        clock.session = Session(rig, cycle, trajectory, profile.motion_limits, clock, clock)
+        clock.session.run()
+
+
+@contextlib.contextmanager
+def _interruptible(session: Session) -> Iterator[None]:
+    """ctrl-C and a request to terminate stop the axis instead of the program."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        session.ask_stop()
+
+    before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

@@ -1,0 +1,277 @@
+"""The loop: profile -> controller -> drive -> encoders -> recorder, with the live twin beside, tick by tick.
+
+    ARM        the drive is led to OPERATION ENABLED; until then its target is zero or where it stands
+    RUN        set-points of the trajectory, which begins where the axis stands
+    STOP       set-points of the shortest stop (ruckig), under control, from the state the axis is in
+    QUICK_STOP the drive stops by its own ramp, or has tripped; recorded until it is over
+    DISARM     power stage off
+
+The drive is stopped in a defined way whatever happens, and the recording ends readable:
+
+    drive trips (EMCY, fault, stale, heartbeat lost, bus-off, rebooted)  -> QUICK_STOP
+    linear encoder lost: fed back to the position loop -> QUICK_STOP, else -> STOP
+    following error, travel limit, loop too late, ctrl-C                -> STOP; a second time -> QUICK_STOP
+    exception in the loop                                               -> QUICK_STOP unrecorded, then the exception
+
+The same code runs on the wall clock and in virtual time.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Protocol
+
+from drivers.base import Condition, DriveGoal, DriverError, DriveSample, EncoderSample
+from drivers.cia402 import DriveState
+from hil.bench.hardware import DriveMode
+from hil.channels import AxisKind
+from hil.errors import HilError
+from hil.loop.clock import Clock
+from hil.loop.cycle import Cycle, Setpoint, Watch
+from hil.loop.devices import Rig
+from hil.loop.supervision import Ending, find
+from hil.motion.pieces import MotionLimits
+from hil.motion.trajectory import Trajectory, stop_from
+
+ARM_TIMEOUT_S = 2.0
+SETTLE_S = 0.1  # hold after a controlled stop
+QUICK_STOP_LIMIT_S = 2.0  # the longest a quick stop is waited for
+AFTERMATH_S = 0.1  # recorded after the power stage is off
+DISARM_TIMEOUT_S = 0.2
+STOP_SEGMENT = -1  # in the recording: set-points of a stop
+_POWERED = (DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE, DriveState.FAULT_REACTION_ACTIVE)
+_NO_ENCODER = EncoderSample(0.0, 0, 0.0, 0, Condition.OK)
+_SETPOINTS = {DriveMode.CST: Setpoint.TORQUE, DriveMode.CSV: Setpoint.VELOCITY, DriveMode.CSP: Setpoint.POSITION}
+
+
+class Phase(IntEnum):
+    """What the loop is doing."""
+
+    RUN = 0
+    STOP = 1
+    QUICK_STOP = 2
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a run ended: why, in words, and how late its ticks were [s]."""
+
+    ending: Ending
+    reason: str
+    rows: int
+    lateness_s: tuple[float, ...]
+
+
+class Rows(Protocol):
+    """What a session records to; a `Recorder`, or whatever else takes rows."""
+
+    def record(self, row: Sequence[float]) -> None: ...
+
+
+class Session:
+    """One run on an opened rig. The rig is set up and stands; `trajectory` begins where it stands.
+
+    `ask_stop` may be called from a signal handler.
+    """
+
+    def __init__(
+        self, rig: Rig, cycle: Cycle, trajectory: Trajectory, limits: MotionLimits, clock: Clock, recorder: Rows
+    ) -> None:
+        self._rig, self._cycle, self._clock, self._recorder = rig, cycle, clock, recorder
+        self._trajectory, self._limits = trajectory, limits
+        self._master, self._drive, self._encoder = rig.master, rig.drive, rig.encoder
+        gains = rig.bench.gains
+        self._period_s, self._ratio = gains.period_s, gains.ratio_m_rad
+        self._response_s = rig.section.response * gains.period_s
+        self._from_table = gains.position_from_table
+        self._now_s = 0.0  # of the tick: tick x period
+        self._bus_tick = 0  # ticks since the clock was started
+        self._stops_asked = 0
+        self._phase = Phase.RUN
+        self._ending, self._reason = Ending.COMPLETE, "the profile is done"
+        self._last_tick = len(trajectory) - 1  # of the phase
+        self._lateness_s: list[float] = []
+
+    def ask_stop(self) -> None:
+        """Stop the axis: under control the first time, by the drive's own ramp the second, at once the third."""
+        self._stops_asked += 1
+        if self._stops_asked > 2:
+            raise KeyboardInterrupt
+
+    def run(self) -> Outcome:
+        """Arm, run, stop, disarm. Raises HilError when the drive cannot be armed or a device fails in the loop;
+        whatever is raised, the drive is told to stop first."""
+        try:
+            self._clock.start()
+            self._master.start(0.0)
+            sample, seen = self._arm()
+            rows = self._loop(sample, seen)
+            self._disarm()
+        except BaseException as error:
+            self._abandon()
+            if isinstance(error, DriverError):
+                raise HilError(str(error)) from error
+            raise
+        return Outcome(self._ending, self._reason, rows, tuple(self._lateness_s))
+
+    # -- one tick -------------------------------------------------------------------------------------------------
+
+    def _exchange(self) -> tuple[DriveSample, EncoderSample]:
+        """Wait for the next tick, send SYNC, take in the answers."""
+        self._bus_tick = tick = self._bus_tick + 1
+        start_s = tick * self._period_s
+        self._lateness_s.append(self._clock.wait(tick))
+        self._master.sync(start_s)
+        self._now_s = now_s = start_s + self._response_s
+        drive, encoder = self._drive, self._encoder
+        self._master.poll(now_s)
+        sample = drive.read(now_s)
+        seen = _NO_ENCODER if encoder is None else encoder.read(now_s)
+        while (sample.age_cycles or seen.age_cycles) and self._clock.may_wait(tick, self._response_s):
+            self._master.poll(now_s, 1e-4)
+            sample = drive.read(now_s)
+            seen = _NO_ENCODER if encoder is None else encoder.read(now_s)
+        return sample, seen
+
+    def _arm(self) -> tuple[DriveSample, EncoderSample]:
+        """Tick until the drive is enabled; raises HilError if it does not come."""
+        self._drive.goal = DriveGoal.ENABLED
+        for _ in range(self._ticks(ARM_TIMEOUT_S)):
+            sample, seen = self._exchange()
+            if sample.enabled and not sample.age_cycles:
+                self._check_start(sample, seen)
+                return sample, seen
+            self._drive.check()
+            self._drive.command(self._now_s, 0.0)
+            if self._stops_asked:
+                raise HilError("interrupted while the drive was armed; nothing moved")
+        raise HilError(
+            f"the drive did not enable within {ARM_TIMEOUT_S:.0f} s: it is {sample.state.name}, statusword "
+            f"0x{sample.statusword:04X}; check its enable input and safe torque off"
+        )
+
+    def _check_start(self, sample: DriveSample, seen: EncoderSample) -> None:
+        start_m = self._trajectory.position_m[0]
+        actual_m = self._position_m(sample, seen)
+        if abs(actual_m - start_m) > self._rig.section.following_error_m:
+            raise HilError(
+                f"the axis stands at {actual_m:.6f} m, the set-points begin at {start_m:.6f} m: it moved "
+                "while the drive was armed; find out why"
+            )
+
+    def _loop(self, sample: DriveSample, seen: EncoderSample, tick: int = 0) -> int:
+        """From `tick` on, whose samples are given, to the end. Returns the rows recorded in all."""
+        cycle, drive, clock, record = self._cycle, self._drive, self._clock, self._recorder.record
+        step, row, exchange = cycle.step, cycle.row, self._exchange
+        cycle.follow(self._trajectory)
+        lateness = self._lateness_s
+        del lateness[:-1]
+        overrun_s = self._rig.section.overrun_s
+        last_index = len(self._trajectory) - 1
+        index = min(tick, last_index)
+        error_code, cycle_s = 0, 0.0
+        while True:
+            setpoint, passed = step(
+                tick,
+                index,
+                sample.motor_position_rad,
+                seen.position_m,
+                sample.torque_n_m,
+                int(sample.state),
+                error_code,
+                lateness[-1],
+                cycle_s,
+            )
+            drive.command(self._now_s, setpoint)
+            if tick:
+                record(row(tick - 1))
+            late = lateness[-1] > overrun_s
+            if sample.condition or seen.condition or passed or late or self._stops_asked or self._phase:
+                stop = self._supervise(tick, index, sample, seen, passed)
+                error_code = drive.emergencies[-1].code if drive.emergencies else 0
+                if stop is not None:
+                    cycle.follow(stop, STOP_SEGMENT)
+                    index, last_index = 0, len(stop) - 1
+            cycle_s = clock.since(self._bus_tick) - lateness[-1]
+            if tick >= self._last_tick:
+                break
+            sample, seen = exchange()
+            tick += 1
+            index += index < last_index
+        sample, seen = exchange()  # the torque of the last tick
+        record(cycle.complete(tick, sample.torque_n_m, cycle_s))
+        drive.command(self._now_s, setpoint)
+        return tick + 1
+
+    # -- when something is wrong ----------------------------------------------------------------------------------
+
+    def _supervise(
+        self, tick: int, index: int, sample: DriveSample, seen: EncoderSample, passed: int
+    ) -> Trajectory | None:
+        """Change the phase if need be; the stop that begins now, if one does."""
+        if self._phase is Phase.QUICK_STOP:
+            if sample.state not in _POWERED:
+                self._last_tick = min(self._last_tick, tick + self._ticks(AFTERMATH_S))
+            return None
+        stopping = self._phase is Phase.STOP
+        findings = find(self._rig, seen, passed, self._lateness_s[-1], self._stops_asked, stopping=stopping)
+        # an axis that is being stopped already: only what prevents that matters
+        found = next((finding for finding in findings if finding.quick or not stopping), None)
+        if found is None:
+            return None
+        if self._phase is Phase.RUN:
+            self._ending, self._reason = found.ending, found.reason
+        stop = self._stop(index, sample, seen, measured=passed != 0)
+        if found.quick:
+            self._phase = Phase.QUICK_STOP
+            self._drive.goal = DriveGoal.QUICK_STOP
+            self._last_tick = tick + self._ticks(QUICK_STOP_LIMIT_S)
+        else:
+            self._phase = Phase.STOP
+            self._last_tick = tick + len(stop) + self._ticks(SETTLE_S)
+        return stop
+
+    def _stop(self, index: int, sample: DriveSample, seen: EncoderSample, *, measured: bool) -> Trajectory:
+        """Shortest stop from the set-point, or from where the axis is when it does not follow."""
+        position, velocity, acceleration, _ = self._cycle.setpoints[index]
+        if measured:
+            position, velocity = self._position_m(sample, seen), self._cycle.velocity_m_s
+            acceleration = 0.0
+        return stop_from(float(position), float(velocity), float(acceleration), self._limits, self._period_s)
+
+    def _position_m(self, sample: DriveSample, seen: EncoderSample) -> float:
+        """Of the axis, as the position loop sees it."""
+        return seen.position_m if self._from_table else self._ratio * sample.motor_position_rad
+
+    def _disarm(self) -> None:
+        """Power stage off; the recording is over."""
+        self._drive.goal = DriveGoal.DISABLED
+        for _ in range(self._ticks(DISARM_TIMEOUT_S)):
+            sample, _ = self._exchange()
+            self._drive.command(self._now_s, 0.0)
+            if sample.state not in _POWERED:
+                return
+
+    def _abandon(self) -> None:
+        """After an exception: as many quick-stop commands as the bus still takes."""
+        self._drive.goal = DriveGoal.QUICK_STOP
+        for _ in range(self._ticks(DISARM_TIMEOUT_S)):
+            with contextlib.suppress(Exception):
+                self._exchange()
+            with contextlib.suppress(Exception):
+                self._drive.command(self._now_s, 0.0)
+
+    def _ticks(self, duration_s: float) -> int:
+        return round(duration_s / self._period_s)
+
+
+def make_cycle(rig: Rig, motor_position: float) -> Cycle:
+    """Controller and twin of a bench, for an axis at rest at this motor position [rad, m]."""
+    bench, section = rig.bench, rig.section
+    travel = section.travel_m or (float("-inf"), float("inf"))
+    kind = AxisKind.LINEAR if bench.axis.linear else AxisKind.ROTARY
+    watch = Watch(_SETPOINTS[section.mode], rig.encoder is not None, section.following_error_m, travel)
+    return Cycle(bench.twin(), kind, watch, motor_position)

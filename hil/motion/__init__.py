@@ -1,0 +1,1 @@
+"""From a profile file to the set-points of every tick."""

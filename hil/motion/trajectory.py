@@ -1,0 +1,182 @@
+"""Set-points over time: what the controller is given at every tick, computed before the motion starts.
+
+Moves come from two sources. Those of a profile have sine-squared velocity ramps, v = V sin^2(pi t/(2 Tr)), the
+shape the source's path generator makes. ruckig cannot make it, since its jerk is -J, 0 or +J and the jerk of
+this ramp is a cosine; a rectangular velocity convolved with a half sine of the length Tr is exactly it
+(hil.motion.sine_squared). ruckig gives the time-optimal bound, approach and jog, and the trajectories that start from
+any state: stop_from and replan (hil.motion.time_optimal). All are evaluated in closed form; nothing is differentiated
+numerically.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hil.errors import FieldError, InputError, field_name
+from hil.motion.pieces import MAX_DURATION_S, Array, Cubic, Motion, MotionLimits, Move, Phase
+from hil.motion.time_optimal import State, point_to_point, stop, time_optimal_duration_s
+
+if TYPE_CHECKING:
+    from hil.motion.profile import Profile
+
+__all__ = ["SegmentRun", "Trajectory", "plan", "replan", "stop_from", "time_optimal_duration_s"]
+
+APPROACH = "approach to start"
+SAMPLES_PER_PERIOD_MIN = 4  # of an excitation; fewer are no sine any more
+
+
+class SegmentRun(NamedTuple):
+    """One executed segment: its place in the profile, how often that ran before, and when [s]."""
+
+    name: str
+    kind: str
+    lap: int
+    start_s: float
+    end_s: float
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Set-points at t = k period_s; arrays of one length, read-only.
+
+    `segment` indexes `runs`, `phase` holds values of hil.motion.pieces.Phase. The last sample is at rest.
+    `notes` say what was changed to hold the limits.
+    """
+
+    period_s: float
+    time_s: Array
+    position_m: Array
+    velocity_m_s: Array
+    acceleration_m_s2: Array
+    jerk_m_s3: Array
+    segment: NDArray[np.int32]
+    phase: NDArray[np.uint8]
+    runs: tuple[SegmentRun, ...]
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if isinstance(value, np.ndarray):
+                value.setflags(write=False)
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+    @property
+    def duration_s(self) -> float:
+        return float(self.time_s[-1])
+
+
+def plan(profile: Profile, period_s: float, start_m: float | None = None) -> Trajectory:
+    """Set-points of a profile.
+
+    start_m: where the axis stands [m]; when it is not profile.start_m, a time-optimal approach comes first.
+    Each segment begins at a multiple of profile.grid_s after the approach.
+
+    Raises FieldError (an InputError): a period that is not positive, a start outside the travel, an excitation
+    too fast for the period.
+    """
+    _check_period(period_s)
+    timed: list[tuple[float, str, str, int, Move]] = []
+    notes: list[str] = []
+    slot = 0
+    if start_m is not None and start_m != profile.start_m:
+        approach = point_to_point(State(start_m), profile.start_m, profile.motion_limits)
+        profile.check_position(("start_m",), min(start_m, profile.start_m), max(start_m, profile.start_m))
+        timed.append((0.0, APPROACH, "approach", 0, approach))
+        slot = profile.slots(approach)
+    for run in profile.runs:
+        if run.move.highest_frequency_hz * period_s * SAMPLES_PER_PERIOD_MIN > 1:
+            raise FieldError(
+                run.field,
+                f"given {run.move.highest_frequency_hz:.6g} Hz at a control period of "
+                f"{period_s:.6g} s, allowed up to {1 / (SAMPLES_PER_PERIOD_MIN * period_s):.6g} Hz; "
+                "lower the band",
+            )
+        name = field_name(run.field)
+        timed.append((slot * profile.grid_s, name, run.kind, run.lap, run.move))
+        slot += profile.slots(run.move)
+        notes += [f"{name}: {note}" for note in run.move.notes if run.lap == 0]
+    ends = [start for start, *_ in timed[1:]] + [slot * profile.grid_s]
+    runs = tuple(
+        SegmentRun(name, kind, lap, start, end) for (start, name, kind, lap, _), end in zip(timed, ends, strict=True)
+    )
+    return _sampled([move for *_, move in timed], runs, period_s, tuple(notes))
+
+
+def stop_from(
+    position_m: float, velocity_m_s: float, acceleration_m_s2: float, limits: MotionLimits, period_s: float
+) -> Trajectory:
+    """Time-optimal stop from any state; ends wherever that is.
+
+    A velocity or acceleration beyond its limit is brought back in the shortest time. Raises InputError for
+    values that are not finite and for a state so far beyond the limits that it takes more than an hour.
+    """
+    state = State(position_m, velocity_m_s, acceleration_m_s2)
+    return _single("stop", stop(state, limits), state, limits, period_s)
+
+
+def replan(
+    position_m: float,
+    velocity_m_s: float,
+    acceleration_m_s2: float,
+    target_m: float,
+    limits: MotionLimits,
+    period_s: float,
+) -> Trajectory:
+    """Time-optimal motion from any state to rest at target_m; states beyond the limits as in stop_from."""
+    state = State(position_m, velocity_m_s, acceleration_m_s2)
+    return _single("replan", point_to_point(state, target_m, limits), state, limits, period_s)
+
+
+def _single(name: str, move: Move, state: State, limits: MotionLimits, period_s: float) -> Trajectory:
+    _check_period(period_s)
+    if move.duration_s > MAX_DURATION_S:
+        raise InputError(
+            f"{name}: given {state}, from which it takes {move.duration_s:.6g} s within {limits}, "
+            f"allowed up to {MAX_DURATION_S:.0f} s; raise the limits"
+        )
+    run = SegmentRun(name, name, 0, 0.0, move.duration_s)
+    return _sampled([move], (run,), period_s, move.notes)
+
+
+def _sampled(
+    moves: Sequence[Move], runs: tuple[SegmentRun, ...], period_s: float, notes: tuple[str, ...]
+) -> Trajectory:
+    """Every piece evaluated at the ticks that fall into it; rest after a move until the next one starts."""
+    count = _first_tick(runs[-1].end_s / period_s) + 1
+    time_s: Array = np.arange(count, dtype=np.float64) * period_s
+    motion = Motion(*(np.zeros(count) for _ in range(4)))
+    segment = np.zeros(count, np.int32)
+    phase = np.zeros(count, np.uint8)
+    for index, (move, run) in enumerate(zip(moves, runs, strict=True)):
+        start = round(run.start_s / period_s, 9)  # in ticks; whole where the grid is, so that laps are bit-identical
+        end = count if index == len(runs) - 1 else _first_tick(run.end_s / period_s)
+        segment[_first_tick(start) : end] = index
+        begin_s = 0.0
+        for piece in (*move.pieces, Cubic(run.end_s - run.start_s, Phase.STANDSTILL, move.end_m)):
+            end_s = begin_s + piece.duration_s
+            ticks = slice(_first_tick(start + begin_s / period_s), min(end, _first_tick(start + end_s / period_s)))
+            within_s = np.clip((np.arange(ticks.start, ticks.stop) - start) * period_s - begin_s, 0.0, piece.duration_s)
+            for whole, part in zip(motion, piece.at(within_s), strict=True):
+                whole[ticks] = part
+            phase[ticks] = piece.phase
+            begin_s = end_s
+    return Trajectory(period_s, time_s, *motion, segment, phase, runs, notes)
+
+
+def _first_tick(instant: float) -> int:
+    """The first whole number at or after an instant in ticks, but for rounding."""
+    return math.ceil(instant - 1e-9)
+
+
+def _check_period(period_s: float) -> None:
+    if not (period_s > 0 and math.isfinite(period_s)):
+        raise FieldError(("period_s",), f"given {period_s}, allowed a positive number; correct it")

@@ -1,0 +1,1 @@
+"""Blind diagnosis of cases by another process."""

@@ -1,0 +1,1 @@
+"""Random cases: axes, motions, concealed effects."""

@@ -1,0 +1,236 @@
+"""A two-mass axis and what it conceals, written for MuJoCo.
+
+A hinge (motor) and a slide (table) joined by a tendon with stiffness and damping (screw and nut). MuJoCo's own are
+friction loss, damping, springs, weight by gravity, play by joint limits, a body that sways on another. What it lacks
+acts as applied force, or as one of its parameters that changes while it runs.
+
+Friction loss is a soft constraint: where it should stick, MuJoCo creeps at
+
+    v = (1 - d) t / 2 x f / J        d: solimp, t: time constant of solref, f: torque held, J: inertia
+
+With the values below that is 2e-9 s x f / J, a nanometre per second at the table; a limit gives way in the same manner.
+Its integrator is of first order: positions are half a step ahead, 10 us, which encoders see as a following error of
+half a step times the feed. Against this project's twin with the true parameters, a recording of the nominal axis leaves
+as much of torque and table in closed loop as one of `drivers.sim`, within 2 % (`tests/hil/proof/test_mujoco_plant.py`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from math import atan, cos, exp, pi, sin
+from typing import Any
+
+from drivers.sim.effects import Effect
+from hil.proof.draw.axes import DrawnAxis
+
+Acting = Callable[[Any, Any], None]  # on a model and its state, before each step
+
+STEP_S = 2e-5
+_HARD = 0.9999  # of solimp: the most that MuJoCo takes
+_NUT = 0.01  # of the table's mass: the nut, where it has play
+_MOTOR, _TABLE, _SCREW = 0, 1, 0  # as MuJoCo counts joints and tendons
+EFFECTS = (
+    "constant_load",
+    "stribeck_friction",
+    "position_dependent_friction",
+    "nonlinear_viscous_friction",
+    "friction_drift",
+    "cogging_torque",
+    "table_side_friction",
+    "backlash",
+    "position_dependent_stiffness",
+    "cumulative_lead_error",
+    "periodic_lead_error",
+    "torque_ripple",
+    "structural_mode",
+    "external_force",
+    "spring_load",
+)
+
+
+def xml(axis: DrawnAxis, effect: Effect | None, step_s: float = STEP_S) -> str:
+    """The model with the effects that MuJoCo has of its own."""
+    stiff = f'"{2.0 * step_s} 1"'  # solref: the least time constant that is stable
+    own = _Own(effect)
+    true, ratio = axis.true, axis.truth.screw_ratio_m_rad
+    motor, table = true["motor_mass_kg"] * ratio**2, true["table_mass_kg"]
+    reduced = 1.0 / (1.0 / true["motor_mass_kg"] + 1.0 / table)
+    damping = 2.0 * true["damping_ratio"] * (true["stiffness_n_m"] * reduced) ** 0.5
+    share = own.value("table_side_friction", "share")
+    coulomb, viscous = true["coulomb_torque_n_m"], true["viscous_torque_n_m_s_rad"]
+    nut = mode = nut_end = ""
+    if own.is_a("backlash"):
+        half, table = 0.5 * own.value("backlash", "gap_m"), (1.0 - _NUT) * table
+        nut = (
+            f'<body><joint name="nut" type="slide" axis="1 0 0" limited="true" range="{-half} {half}" '
+            f'solreflimit={stiff} solimplimit="{_HARD} {_HARD} 1e-6"/>{_inertial(_NUT / (1 - _NUT) * table)}'
+            "</body>"
+        )
+        nut_end = '<joint joint="nut" coef="-1"/>'
+    if own.is_a("structural_mode"):
+        mass = own.value("structural_mode", "mass_ratio") * true["table_mass_kg"]
+        omega = 2.0 * pi * own.value("structural_mode", "frequency_hz")
+        mode = (
+            f'<body><joint name="mode" type="slide" axis="1 0 0" stiffness="{mass * omega**2}" '
+            f'damping="{2.0 * own.value("structural_mode", "damping_ratio") * mass * omega}"/>{_inertial(mass)}'
+            "</body>"
+        )
+    weight = own.value("constant_load", "load_torque_n_m") / ratio / table
+    friction = f'solreffriction={stiff} solimpfriction="{_HARD} {_HARD} 1"'
+    return f"""<mujoco><option timestep="{step_s}" gravity="{-weight} 0 0" integrator="implicitfast" solver="Newton"
+    iterations="50" tolerance="1e-12"><flag autoreset="disable"/></option><compiler autolimits="false"/><worldbody>
+  <body><joint name="motor" type="hinge" axis="1 0 0" damping="{(1.0 - share) * viscous}"
+    frictionloss="{(1.0 - share) * coulomb}" {friction}/>{_inertial(1e-3, motor)}</body>
+  <body name="table"><joint name="table" type="slide" axis="1 0 0" damping="{share * viscous / ratio**2}"
+    frictionloss="{share * coulomb / ratio}" {friction} stiffness="{own.value("spring_load", "stiffness_n_m")}"
+    springref="{own.value("spring_load", "rest_position_m")}"/>{_inertial(table)}{nut}{mode}</body></worldbody>
+  <tendon><fixed name="screw" stiffness="{true["stiffness_n_m"]}" damping="{damping}" springlength="0">
+    <joint joint="motor" coef="{ratio * (1.0 + own.value("cumulative_lead_error", "slope_m_m"))}"/>
+    <joint joint="table" coef="-1"/>{nut_end}</fixed></tendon>
+  <actuator><motor joint="motor"/></actuator></mujoco>"""
+
+
+def sag_m(axis: DrawnAxis, effect: Effect | None) -> float:
+    """By how much a weight has stretched the screw before the encoders were set to zero."""
+    load = _Own(effect).value("constant_load", "load_torque_n_m")
+    return load / axis.truth.screw_ratio_m_rad / float(axis.true["stiffness_n_m"])
+
+
+class _Own:
+    """Parameters of an effect, zero where another one or none is concealed."""
+
+    def __init__(self, effect: Effect | None) -> None:
+        self._effect = effect
+
+    def is_a(self, name: str) -> bool:
+        """Whether this effect is concealed."""
+        return self._effect is not None and self._effect.id == name
+
+    def value(self, name: str, parameter: str) -> float:
+        """A parameter of an effect."""
+        return self._effect.parameters[parameter] if self._effect is not None and self._effect.id == name else 0.0
+
+
+def _inertial(mass_kg: float, inertia_kg_m2: float = 1.0) -> str:
+    about = " ".join([f"{inertia_kg_m2:.17g}"] * 3)
+    return f'<inertial pos="0 0 0" mass="{mass_kg:.17g}" diaginertia="{about}"/>'
+
+
+def acting(axis: DrawnAxis, effect: Effect | None) -> Acting | None:
+    """What acts before each step for an effect that MuJoCo lacks; None for the others."""
+    return _ACTING[effect.id](axis, effect.parameters, effect.form) if effect and effect.id in _ACTING else None
+
+
+Values = Mapping[str, float]
+
+
+def _stribeck_friction(axis: DrawnAxis, p: Values, form: str) -> Acting:
+    coulomb, static, slow = axis.coulomb, p["static_torque_n_m"], p["stribeck_velocity_rad_s"]
+    shares: Mapping[str, Callable[[float], float]] = {
+        "gaussian": lambda u: exp(-u * u),
+        "exponential": lambda u: exp(-u),
+        "atan": lambda u: 1.0 - 2.0 / pi * atan(u),
+    }
+    share = shares[form]
+
+    def act(model: Any, data: Any) -> None:
+        model.dof_frictionloss[_MOTOR] = coulomb + (static - coulomb) * share(abs(data.qvel[_MOTOR]) / slow)
+
+    return act
+
+
+def _position_dependent_friction(axis: DrawnAxis, p: Values, form: str) -> Acting:
+    coulomb, wave, ratio = axis.coulomb, 2.0 * pi / p["period_m"], axis.truth.screw_ratio_m_rad
+
+    def act(model: Any, data: Any) -> None:
+        angle = wave * ratio * data.qpos[_MOTOR] + p["phase_rad"]
+        model.dof_frictionloss[_MOTOR] = coulomb * (1.0 + p["fraction"] * sin(angle))
+
+    return act
+
+
+def _friction_drift(axis: DrawnAxis, p: Values, form: str) -> Acting:
+    coulomb, viscous = axis.coulomb, axis.true["viscous_torque_n_m_s_rad"]
+
+    def act(model: Any, data: Any) -> None:
+        scale = 1.0 + p["fraction"] * (1.0 - exp(-data.time / p["time_constant_s"]))
+        model.dof_frictionloss[_MOTOR] = scale * coulomb
+        data.qfrc_applied[_MOTOR] = (1.0 - scale) * viscous * data.qvel[_MOTOR]
+
+    return act
+
+
+def _nonlinear_viscous_friction(axis: DrawnAxis, p: Values, form: str) -> Acting:
+    def act(model: Any, data: Any) -> None:
+        speed = data.qvel[_MOTOR]
+        data.qfrc_applied[_MOTOR] = -p["quadratic_n_m_s2_rad2"] * speed * abs(speed)
+
+    return act
+
+
+def _cogging_torque(axis: DrawnAxis, p: Values, form: str) -> Acting:
+    def act(model: Any, data: Any) -> None:
+        data.qfrc_applied[_MOTOR] = p["amplitude_n_m"] * sin(p["cycles_per_rev"] * data.qpos[_MOTOR] + p["phase_rad"])
+
+    return act
+
+
+def _torque_ripple(axis: DrawnAxis, p: Values, form: str) -> Acting:
+    def act(model: Any, data: Any) -> None:
+        wave = sin(p["cycles_per_rev"] * data.qpos[_MOTOR] + p["phase_rad"])
+        data.qfrc_applied[_MOTOR] = p["fraction"] * wave * data.ctrl[0]
+
+    return act
+
+
+def _position_dependent_stiffness(axis: DrawnAxis, p: Values, form: str) -> Acting:
+    stiffness = axis.true["stiffness_n_m"]
+
+    def act(model: Any, data: Any) -> None:
+        model.tendon_stiffness[_SCREW] = stiffness * (1.0 + p["relative_slope"] * data.qpos[_TABLE])
+
+    return act
+
+
+def _periodic_lead_error(axis: DrawnAxis, p: Values, form: str) -> Acting:
+    """By virtual work: with the error e(theta), tendon length L and its force F, the force of the stretch L + e is
+    F + k e, and it acts on the motor with the lever r + e'. The damper stays that of L."""
+    stiffness, ratio = axis.true["stiffness_n_m"], axis.truth.screw_ratio_m_rad
+    waves = [
+        (1, p["amplitude_m"], p["phase_rad"]),
+        (2, p["amplitude_2_m"], p["phase_2_rad"]),
+        (3, p["amplitude_3_m"], p["phase_3_rad"]),
+    ]
+
+    def act(model: Any, data: Any) -> None:
+        angle, table = data.qpos[_MOTOR], data.qpos[_TABLE]
+        error = sum(size * sin(order * angle + phase) for order, size, phase in waves)
+        slope = sum(order * size * cos(order * angle + phase) for order, size, phase in waves)
+        length = ratio * angle - table
+        data.qfrc_applied[_MOTOR] = -stiffness * (error * (ratio + slope) + length * slope)
+        data.qfrc_applied[_TABLE] = stiffness * error
+
+    return act
+
+
+def _external_force(axis: DrawnAxis, p: Values, form: str) -> Acting:
+    def act(model: Any, data: Any) -> None:
+        data.qfrc_applied[_TABLE] = p["force_n"] if p["start_s"] <= data.time < p["end_s"] else 0.0
+
+    return act
+
+
+_ACTING: Mapping[str, Callable[[DrawnAxis, Values, str], Acting]] = {
+    function.__name__[1:]: function
+    for function in (
+        _stribeck_friction,
+        _position_dependent_friction,
+        _friction_drift,
+        _nonlinear_viscous_friction,
+        _cogging_torque,
+        _torque_ripple,
+        _position_dependent_stiffness,
+        _periodic_lead_error,
+        _external_force,
+    )
+}

@@ -1,0 +1,1 @@
+"""Recordings: read, write while running, import from other formats."""

@@ -1,0 +1,97 @@
+"""Import a foreign recording by a map file (`hil.recording.import_map`)."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hil.arrays import FloatArray
+from hil.channels import CHANNELS, AxisChannels
+from hil.files.yaml_model import load_model
+from hil.quantities import si_factor
+from hil.recording.foreign_files import read_foreign
+from hil.recording.import_map import RecordingMap
+from hil.recording.recording import Recording, check_columns
+
+MAPS = Path(__file__).parents[1] / "maps"
+
+
+def import_recording(source: str | Path, map_path: str | Path) -> Recording:
+    """Read `source` (.csv, .mat, .parquet) by the map file `map_path`, or by a shipped map's name (emps).
+
+    What the recording lacks and can be had from what it holds is derived: velocity_command_m_s by central
+    differences of the position command; torque from torque command or the other way round (on a linear axis force).
+    The metadata say so (`derived`), and what came from where (`channels`).
+    Raises InputError with file, row and column; see `read_foreign` and `hil.recording.recording.check_columns`.
+    """
+    source, map_path = Path(source), _find_map(map_path)
+    the_map = load_model(map_path, RecordingMap)
+    wanted = [entry.column for entry in the_map.channels.values()]
+    if the_map.time is not None:
+        wanted.append(the_map.time.column)
+    gains = {entry.gain for entry in the_map.channels.values() if isinstance(entry.gain, str)}
+    foreign = read_foreign(source, wanted, sorted(gains), the_map.csv.format())
+
+    columns = {"time_s": _time_s(the_map, foreign.columns)}
+    origins = {}
+    for name, entry in the_map.channels.items():
+        gain = foreign.scalars[entry.gain] if isinstance(entry.gain, str) else 1.0
+        factor = entry.factor_to(CHANNELS[name].unit, the_map.lead_m, gain)
+        assert factor is not None  # the map was validated
+        columns[name] = factor * foreign.columns[entry.column] + entry.offset
+        origins[name] = {"column": entry.column, "factor": factor, "offset": entry.offset}
+    clock = the_map.time.column if the_map.time is not None else "sample_rate_hz"
+    period_s = check_columns(columns, lambda row: f"{foreign.place(row)}: {clock}")
+    derived = _derive(columns, the_map.axis, period_s)
+    metadata: dict[str, Any] = {
+        "source": source.name,
+        "source_sha256": _sha256(source),
+        "map": map_path.name,
+        "about": the_map.about,
+        "channels": origins,
+        "derived": derived,
+        "clock": _describe_clock(columns["time_s"], period_s),
+    }
+    return Recording(source.stem, columns, period_s, metadata)
+
+
+def _find_map(map_path: str | Path) -> Path:
+    shipped = MAPS / f"{map_path}.yaml"
+    return shipped if not Path(map_path).exists() and shipped.is_file() else Path(map_path)
+
+
+def _time_s(the_map: RecordingMap, raw: dict[str, FloatArray]) -> FloatArray:
+    if the_map.time is not None:
+        factor = si_factor(the_map.time.unit, "s")
+        assert factor is not None
+        return np.asarray(factor * raw[the_map.time.column], dtype=np.float64)
+    assert the_map.sample_rate_hz is not None
+    rows = next(iter(raw.values())).size
+    return np.asarray(np.arange(rows) / the_map.sample_rate_hz, dtype=np.float64)
+
+
+def _derive(columns: dict[str, FloatArray], axis: AxisChannels, period_s: float) -> dict[str, str]:
+    """Add the channels that follow from others; says how."""
+    derived = {}
+    if axis.velocity_command not in columns:
+        columns[axis.velocity_command] = np.gradient(columns[axis.position_command], period_s)
+        derived[axis.velocity_command] = f"central differences of {axis.position_command}"
+    for name, other in ((axis.torque, axis.torque_command), (axis.torque_command, axis.torque)):
+        if name not in columns:
+            columns[name] = columns[other].copy()
+            derived[name] = f"copy of {other}, the only one recorded"
+    return derived
+
+
+def _describe_clock(time_s: FloatArray, period_s: float) -> str:
+    """How far the stamps are from start + tick x period, so that one may judge to take them as equidistant."""
+    deviation_s = np.abs(time_s - time_s[0] - np.arange(time_s.size) * period_s).max()
+    return f"period {period_s:.9g} s; stamps within {deviation_s:.2g} s of start + tick x period"
+
+
+def _sha256(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

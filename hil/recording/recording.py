@@ -1,0 +1,245 @@
+"""Recordings: columns of the channel table at one period, read from and written to files.
+
+Parquet is the stored form (units in the schema), an Arrow stream (`.arrows`) the form while a run is going
+on, CSV with the canonical names the form of exchange. A foreign file goes through `hil.recording.importing`.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from hil.arrays import FloatArray
+from hil.channels import AXIS_CHANNELS, CHANNELS, AxisChannels, AxisKind
+from hil.errors import InputError
+from hil.files import csv_columns
+
+METADATA_KEY = b"hil"  # of the schema: the metadata as JSON
+CLOCK_TOLERANCE = 0.01  # of the period: what a step of a regular clock may deviate
+_STREAM_END = b"\xff\xff\xff\xff\x00\x00\x00\x00"  # Arrow IPC: the end-of-stream marker
+_FORMATS = ".parquet, .arrows (a run that was not closed) or .csv"
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """A run: columns of equal length (names and units of `hil.channels`), one row per period.
+
+    `metadata` holds what JSON can: bench, profile, versions, seed, and what was noticed while reading.
+    """
+
+    name: str
+    columns: dict[str, FloatArray]
+    period_s: float
+    metadata: dict[str, Any] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return len(next(iter(self.columns.values())))
+
+    def __getitem__(self, channel: str) -> FloatArray:
+        """The column of a channel; raises InputError, with the channels there are, if it was not recorded."""
+        if channel not in self.columns:
+            raise InputError(f"{self.name}: {channel} is not recorded; the recording has {', '.join(self.columns)}")
+        return self.columns[channel]
+
+    @property
+    def kind(self) -> AxisKind:
+        """Rotary or linear, as the name of the motor encoder's channel says."""
+        return AxisKind.LINEAR if "motor_position_m" in self.columns else AxisKind.ROTARY
+
+    @property
+    def axis(self) -> AxisChannels:
+        """Names of the channels of this kind of axis."""
+        return AXIS_CHANNELS[self.kind]
+
+
+def read_recording(path: str | Path) -> Recording:
+    """Read a Parquet, Arrow stream or canonical CSV file; the ending decides.
+
+    An Arrow stream that was cut off is read to its last complete batch; `metadata["recovered"]` then says
+    so. Columns that the channel table does not know are left out and listed in `metadata["unknown_columns"]`.
+    Raises InputError with file, row and column: no such file, not this format, a required channel missing
+    (time, set-points, motor encoder, torque or force), NaN or infinity, text, a clock that
+    repeats, runs back or is irregular.
+    """
+    path = Path(path)
+    readers = {".parquet": _read_parquet, ".arrows": _read_stream, ".csv": _read_csv}
+    if path.suffix.lower() not in readers:
+        raise InputError(
+            f"{path}: the ending {path.suffix!r} is no recording, allowed {_FORMATS}; "
+            "import a foreign file with: hil import FILE --map MAP.yaml"
+        )
+    if not path.is_file():
+        raise InputError(f"{path}: there is no such file; give the path of a recording: {_FORMATS}")
+    return readers[path.suffix.lower()](path)
+
+
+def check_columns(columns: Mapping[str, FloatArray], place: Callable[[int], str]) -> float:
+    """Period [s] of sound columns: finite, of a clock that is regular within 1 % of its period.
+
+    `place` tells where row i (from 0) stands, such as "file:line". Raises InputError.
+    """
+    for name, values in columns.items():
+        bad = np.flatnonzero(~np.isfinite(values))
+        if bad.size:
+            row = int(bad[0])
+            raise InputError(
+                f"{place(row)}: {name}: given {values[row]}, allowed a finite number; "
+                "correct the value or cut the recording before it"
+            )
+    time_s = columns["time_s"]
+    if time_s.size < 3:
+        raise InputError(f"{place(0)}: time_s: given {time_s.size} rows, allowed 3 or more; give a longer recording")
+    steps = np.diff(time_s)
+    # rounded to 1 ps: the mean of printed stamps is a period with float dust on it
+    period_s = round(float(np.median(steps)), 12)
+    bad = np.flatnonzero(steps <= 0.0)
+    if bad.size:
+        row = int(bad[0]) + 1
+        what = "runs back" if steps[row - 1] else "repeats (a duplicate row, or stamps with too few digits)"
+        raise InputError(
+            f"{place(row)}: time_s: {what}: "
+            f"given {time_s[row]:.9g} s after {time_s[row - 1]:.9g} s, allowed a growing time; "
+            "remove the row, or import the file with a sample rate"
+        )
+    bad = np.flatnonzero(np.abs(steps - period_s) > CLOCK_TOLERANCE * period_s)
+    if bad.size:
+        row = int(bad[0]) + 1
+        raise InputError(
+            f"{place(row)}: time_s: a step of {steps[row - 1]:.6g} s, allowed the period "
+            f"{period_s:.6g} s +-1 %; rows are missing: cut the recording there, or resample it"
+        )
+    return round(float((time_s[-1] - time_s[0]) / steps.size), 12)
+
+
+def write_parquet(recording: Recording, path: str | Path) -> None:
+    """Write a Parquet file, whole or not at all. Raises InputError if `path` exists or cannot be written."""
+    path = Path(path)
+    if path.exists():
+        raise InputError(f"{path}: the file exists and is not overwritten; give another name or remove it")
+    schema = arrow_schema(recording.columns, recording.metadata | {"period_s": recording.period_s})
+    table = pa.Table.from_arrays([pa.array(values) for values in recording.columns.values()], schema=schema)
+    write_table(table, path)
+
+
+def write_table(table: pa.Table, path: Path) -> None:
+    """Write a table in the stored form through a temporary file beside `path`. Raises InputError."""
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        # bytes of equal significance side by side compress better than whole floats
+        pq.write_table(
+            table,
+            part,
+            compression="zstd",
+            use_dictionary=False,
+            column_encoding=dict.fromkeys(table.column_names, "BYTE_STREAM_SPLIT"),
+        )
+        part.replace(path)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error}); choose a folder with rights and space") from None
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def arrow_schema(names: Mapping[str, object] | tuple[str, ...], metadata: Mapping[str, Any]) -> pa.Schema:
+    """Arrow schema of columns of the channel table: unit, meaning and sign of each with its field."""
+    fields = []
+    for name in names:
+        channel = CHANNELS[name]
+        about = {"unit": channel.unit, "meaning": channel.meaning, "sign": channel.sign}
+        fields.append(pa.field(name, pa.float64(), nullable=False, metadata=about))
+    return pa.schema(fields, metadata={METADATA_KEY: json.dumps(dict(metadata))})
+
+
+def _read_csv(path: Path) -> Recording:
+    names = csv_columns.read_header(path)
+    known = _known(path, names)
+    columns = csv_columns.read_columns(path, known)
+    period_s = check_columns(columns, lambda row: f"{path}:{csv_columns.line_of_row(path, row)}")
+    return Recording(path.stem, columns, period_s, {"source": path.name} | _unknown(names))
+
+
+def _read_parquet(path: Path) -> Recording:
+    try:
+        table = pq.read_table(path, memory_map=True)
+    except (pa.ArrowException, OSError) as error:
+        raise InputError(
+            f"{path}: is no readable Parquet file ({_first_line(error)}); it is cut or damaged: "
+            "read the .arrows file of the run if there is one"
+        ) from None
+    return _from_table(path, table, {})
+
+
+def _read_stream(path: Path) -> Recording:
+    batches = []
+    try:
+        with pa.OSFile(str(path)) as file, pa.ipc.open_stream(file) as stream:
+            schema = stream.schema
+            problem = ""
+            try:
+                batches.extend(stream)
+            except (pa.ArrowException, OSError) as error:
+                problem = _first_line(error)
+    except (pa.ArrowException, OSError) as error:
+        raise InputError(
+            f"{path}: is no readable Arrow stream ({_first_line(error)}); "
+            "nothing of the run was written yet, or it is another file"
+        ) from None
+    table = pa.Table.from_batches(batches, schema)
+    with path.open("rb") as raw:
+        raw.seek(-min(8, path.stat().st_size), os.SEEK_END)
+        closed = raw.read() == _STREAM_END
+    notes = {}
+    if problem or not closed:
+        notes["recovered"] = f"the run was not closed: {table.num_rows} rows in {len(batches)} complete batches" + (
+            ", the batch after them is cut and left out" if problem else ""
+        )
+    return _from_table(path, table, notes)
+
+
+def _from_table(path: Path, table: pa.Table, notes: dict[str, Any]) -> Recording:
+    known = _known(path, tuple(table.column_names))
+    for name in known:
+        about = table.schema.field(name)
+        unit = (about.metadata or {}).get(b"unit", CHANNELS[name].unit.encode()).decode()
+        if unit != CHANNELS[name].unit:
+            raise InputError(f"{path}: {name}: given in {unit}, allowed {CHANNELS[name].unit}; import it with a map")
+        if not (pa.types.is_floating(about.type) or pa.types.is_integer(about.type)):
+            raise InputError(f"{path}: {name}: given {about.type} values, allowed numbers; import it with a map")
+    # an empty value becomes NaN, which the check refuses with its row
+    columns = {name: table.column(name).to_numpy().astype(np.float64) for name in known}
+    period_s = check_columns(columns, lambda row: f"{path}: row {row + 1}")
+    metadata = json.loads((table.schema.metadata or {}).get(METADATA_KEY, b"{}"))
+    period_s = metadata.pop("period_s", period_s)
+    return Recording(path.stem, columns, period_s, metadata | _unknown(tuple(table.column_names)) | notes)
+
+
+def _known(path: Path, names: tuple[str, ...]) -> list[str]:
+    """The channels among the columns of a file, with those that every recording needs."""
+    kind = AxisKind.LINEAR if "motor_position_m" in names else AxisKind.ROTARY
+    axis = AXIS_CHANNELS[kind]
+    required = ("time_s", axis.position_command, axis.velocity_command, axis.motor_position, axis.torque)
+    missing = [name for name in required if name not in names]
+    if missing:
+        linear = " (a linear axis has motor_position_m and force_n)" if kind is AxisKind.ROTARY else ""
+        raise InputError(
+            f"{path}: {', '.join(missing)} missing, given the columns {', '.join(names)}; "
+            f"add them{linear}, or import the file with: hil import FILE --map MAP.yaml"
+        )
+    return [name for name in names if name in CHANNELS]
+
+
+def _unknown(names: tuple[str, ...]) -> dict[str, Any]:
+    unknown = [name for name in names if name not in CHANNELS]
+    return {"unknown_columns": unknown} if unknown else {}
+
+
+def _first_line(error: BaseException) -> str:
+    return str(error).splitlines()[0]

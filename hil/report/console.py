@@ -1,0 +1,53 @@
+"""What commands say on the terminal: results on stdout, progress on stderr."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+
+from rich.console import Console
+from rich.table import Table
+
+out = Console(highlight=False, soft_wrap=True)
+err = Console(stderr=True, highlight=False, soft_wrap=True)
+
+Progress = Callable[[str, float | None], None]  # what is going on, and the share that is done if that is known
+
+
+@contextmanager
+def progress() -> Iterator[Progress]:
+    """Progress bars of tasks by name; without a terminal one line per task."""
+    if not err.is_terminal:
+        seen: set[str] = set()
+
+        def line(task: str, share: float | None) -> None:
+            if task not in seen:
+                seen.add(task)
+                err.print(f"{task} ...")
+
+        yield line
+        return
+    from rich.progress import BarColumn, TaskID, TextColumn, TimeElapsedColumn
+    from rich.progress import Progress as Bars
+
+    with Bars(TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), console=err, transient=True) as bars:
+        tasks: dict[str, TaskID] = {}
+
+        def update(task: str, share: float | None) -> None:
+            if task not in tasks:
+                for other in tasks.values():
+                    bars.update(other, total=1.0, completed=1.0)
+                tasks[task] = bars.add_task(task, total=None if share is None else 1.0)
+            bars.update(tasks[task], completed=share or 0.0)
+
+        yield update
+
+
+def table(headers: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """Print a table; all columns but the first are set to the right."""
+    view = Table(box=None, pad_edge=False, header_style="bold")
+    for index, header in enumerate(headers):
+        view.add_column(header, justify="right" if index else "left")
+    for row in rows:
+        view.add_row(*row)
+    out.print(view)

@@ -1,0 +1,1 @@
+"""The compiled simulation of the twin: packed arrays, one step, loops over ticks."""

@@ -1,0 +1,1 @@
+"""Structure of the axis: elements, chain, modes, frequency response."""

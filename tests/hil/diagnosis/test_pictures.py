@@ -13,8 +13,8 @@ from hil.diagnosis.estimation.hypothesis import Model
 from hil.diagnosis.estimation.terms import Term
 from hil.diagnosis.result import Result, Unexplained, Verdict
 from hil.diagnosis.search.forward_selection import Explanation
-from hil.diagnosis.verdict.cross_validation import Proof
 from hil.diagnosis.search.initial_values import axis_facts
+from hil.diagnosis.verdict.cross_validation import Proof
 from hil.identification.dataset import take
 from hil.report.diagnosis.figures import convincing
 from hil.report.diagnosis.location import location_figure

@@ -118,9 +118,10 @@ def test_bounds_units_and_text(mechanism) -> None:
         assert parameter.name.endswith(SUFFIX.get(parameter.dimension, ""))
     assert fields(mechanism.sentence) <= set(mechanism.names)
     assert mechanism.sentence.endswith(".")
-    if mechanism.second_sentence:
-        assert fields(mechanism.second_sentence) <= {*mechanism.names, "viscous_speed"}
-        assert mechanism.second_sentence.endswith(".")
+    for variant in mechanism.variants:
+        if variant.sentence:
+            assert fields(variant.sentence) <= {*mechanism.names, "viscous_speed"}
+            assert variant.sentence.endswith(".")
         assert len(mechanism.variants) > 1
     assert mechanism.element
     assert mechanism.equation
@@ -149,7 +150,9 @@ def test_neutral_at_zero_strength(mechanism, at) -> None:
     for variant in range(len(mechanism.variants)):
         values = row([neutral[name] for name in mechanism.names], variant)
         first = at._replace(within_s=0.0)
-        assert mechanism.variants[variant].contribution(VALUE, first, values, np.zeros(WIDTH)) == pytest.approx(VALUE, rel=1e-12)
+        assert mechanism.variants[variant].contribution(VALUE, first, values, np.zeros(WIDTH)) == pytest.approx(
+            VALUE, rel=1e-12
+        )
 
 
 def test_neutral_structure_and_skew() -> None:

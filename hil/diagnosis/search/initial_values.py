@@ -18,7 +18,8 @@ from hil.diagnosis.estimation.hypothesis import inertia
 from hil.diagnosis.search import disturbance as estimate
 from hil.identification.dataset import Measured
 from hil.twin.library import LIBRARY
-from hil.twin.mechanism import AxisFacts, Role, Scene
+from hil.twin.mechanism import Role
+from hil.twin.scene import AxisFacts, Scene
 
 
 @dataclass(frozen=True)

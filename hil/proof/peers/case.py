@@ -20,7 +20,7 @@ from hil.diagnosis.search.initial_values import scene
 from hil.diagnosis.verdict.judge import refit_matters
 from hil.identification.dataset import Measured
 from hil.recording.recording import read_recording
-from hil.twin.mechanism import Scene
+from hil.twin.scene import Scene
 
 Answer = dict[str, Any]
 _TRAIN, _HELD_OUT = ("train_1", "train_2"), ("holdout",)

@@ -5,8 +5,11 @@ The order of the list is the order in which the contributions of one stage are c
 
 from __future__ import annotations
 
+import inspect
 import sys
+from pathlib import Path
 
+from hil.compiled.source_digest import add_source
 from hil.twin.mechanism import Mechanism, Role
 from hil.twin.mechanisms import (
     asymmetric_friction,
@@ -90,6 +93,8 @@ def register(mechanism: Mechanism) -> None:
     LIBRARY = (*LIBRARY, mechanism)
     SLOTS = (*SLOTS, *[mechanism] * mechanism.most)
     BY_ID[mechanism.id] = mechanism
+    for contribution in {variant.contribution for variant in mechanism.variants}:
+        add_source(Path(inspect.getfile(inspect.unwrap(contribution))))
 
 
 def names_of(*roles: Role) -> tuple[str, ...]:

@@ -26,9 +26,9 @@ def compare(
     from hil.files.output import default_folder, new_folder
     from hil.identification.compare import compare as compare_recording
     from hil.identification.dataset import bench_of
+    from hil.quantities import percent, quantity
     from hil.recording.recording import read_recording
     from hil.report.compare_report import verdict, write_comparison
-    from hil.report.style import percent, quantity
 
     recording = read_recording(run)
     believed = load_bench(bench) if bench else bench_of(recording)

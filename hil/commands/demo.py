@@ -42,9 +42,9 @@ def demo(
     # only now what takes seconds to import
     from hil.diagnosis.diagnose import diagnose
     from hil.identification.compare import compare
+    from hil.quantities import percent, quantity
     from hil.report.compare_report import verdict, write_comparison
-    from hil.report.diagnosis.report import write_diagnosis
-    from hil.report.style import percent, quantity
+    from hil.report.diagnosis_report import write_diagnosis
 
     with new_folder(folder) as part:
         learn, prove = _record(bench, part, virtual)
@@ -118,33 +118,35 @@ def _say(result: Result, truth: SimulationSection, believed: Bench) -> None:
     """What was concealed beside what was found."""
     import math
 
-    from hil.diagnosis.wording import NOMINAL_UNITS, number, said, title
+    from hil.diagnosis.wording import title
+    from hil.quantities import digits, quantity, unit_of
     from hil.twin.library import BY_ID
 
     (hidden,) = truth.effects
     found = next((finding for finding in result.missing if finding.effect == hidden.effect), None)
     rows = []
-    dimensions = {parameter.name: parameter.dimension for parameter in BY_ID[hidden.effect].parameters}
+    parameters = BY_ID[hidden.effect].parameters
+    units = {parameter.name: parameter.dimension.unit(linear=False) for parameter in parameters}
     for name, value in hidden.parameters.items():
-        dimension, seen = dimensions[name], found.parameters[name] if found else None
+        unit, seen = units[name], found.parameters[name] if found else None
         rows.append(
             (
                 name,
                 "–",
-                said(math.remainder(value, 2.0 * math.pi) if name == "phase_rad" else value, dimension),
-                said(seen.value, dimension) if seen else "–",
-                said(seen.std, dimension) if seen else "–",
+                quantity(math.remainder(value, 2.0 * math.pi) if name == "phase_rad" else value, unit),
+                quantity(seen.value, unit) if seen else "–",
+                quantity(seen.std, unit) if seen else "–",
             )
         )
     for name, value in truth.axis.items():
-        unit, fitted = NOMINAL_UNITS[name], result.parameter_corrections.get(name)
+        unit, fitted = unit_of(name), result.parameter_corrections.get(name)
         rows.append(
             (
                 name,
-                f"{number(getattr(believed.axis, name))} {unit}",
-                f"{number(value)} {unit}",
-                f"{number(fitted.value)} {unit}" if fitted else "–",
-                f"{number(fitted.std)} {unit}" if fitted else "–",
+                f"{digits(getattr(believed.axis, name))} {unit}",
+                f"{digits(value)} {unit}",
+                f"{digits(fitted.value)} {unit}" if fitted else "–",
+                f"{digits(fitted.std)} {unit}" if fitted else "–",
             )
         )
     table((title(hidden.effect), "bench file", "concealed", "found", "standard error"), rows)

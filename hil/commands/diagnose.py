@@ -40,9 +40,9 @@ def diagnose(
     from hil.diagnosis.diagnose import diagnose as diagnose_recordings
     from hil.files.output import default_folder, new_folder
     from hil.identification.dataset import bench_of
+    from hil.quantities import quantity
     from hil.recording.recording import read_recording
-    from hil.report.diagnosis.report import write_diagnosis
-    from hil.report.style import quantity
+    from hil.report.diagnosis_report import write_diagnosis
 
     train = [read_recording(path) for path in runs]
     held_out = [read_recording(path) for path in validate or []]

@@ -60,7 +60,7 @@ def investigate(
     from hil.loop.simulated_bench import load_simulated
     from hil.loop.supervision import Ending
     from hil.motion.profile import load_profile
-    from hil.report.diagnosis.report import write_diagnosis
+    from hil.report.diagnosis_report import write_diagnosis
 
     files = {path.stem: path for path in (*profiles, *(validate or []))}
     if len(files) < len(profiles) + len(validate or []):

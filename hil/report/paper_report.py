@@ -1,12 +1,10 @@
-"""The report of `hil paper`: the table printed / computed / why they differ, and the figures."""
-
-from __future__ import annotations
+"""Report of `hil paper`: printed and computed values, reasons for differences, and the figures."""
 
 from pathlib import Path
 
 from hil.paper import PaperResult, Verdict
+from hil.quantities import digits
 from hil.report.page import Number, Page
-from hil.report.style import digits
 
 
 def write_paper(result: PaperResult, folder: Path) -> None:
@@ -52,10 +50,11 @@ def write_paper(result: PaperResult, folder: Path) -> None:
 
 
 def verdict(result: PaperResult) -> str:
-    """How many of the printed figures come out, and how many do not."""
+    """Count the printed figures that are reproduced, differ, or cannot be compared."""
     return (
-        f"{_count(result, Verdict.REPRODUCED)} of the printed figures come out, {_count(result, Verdict.DIFFERS)} "
-        f"differ, {_count(result, Verdict.NOT_COMPARABLE)} cannot be compared; the table says why."
+        f"{_count(result, Verdict.REPRODUCED)} of the printed figures are reproduced, "
+        f"{_count(result, Verdict.DIFFERS)} differ, {_count(result, Verdict.NOT_COMPARABLE)} cannot be compared; "
+        "the table gives the reasons."
     )
 
 

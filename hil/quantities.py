@@ -11,24 +11,32 @@ from typing import NamedTuple
 # SI unit -> units of foreign recordings: value [SI unit] = factor x value [unit]
 _PER_SI = {
     "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0},
-    "m": {"m": 1.0, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "km": 1e3, "in": 0.0254},
+    "m": {"m": 1.0, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "in": 0.0254},
     "rad": {"rad": 1.0, "mrad": 1e-3, "deg": pi / 180, "rev": 2 * pi},
     "m/s": {"m/s": 1.0, "mm/s": 1e-3, "um/s": 1e-6, "m/min": 1 / 60, "mm/min": 1e-3 / 60, "in/min": 0.0254 / 60},
     "rad/s": {"rad/s": 1.0, "deg/s": pi / 180, "rev/s": 2 * pi, "rpm": 2 * pi / 60},
     "m/s^2": {"m/s^2": 1.0, "mm/s^2": 1e-3},
     "rad/s^2": {"rad/s^2": 1.0, "deg/s^2": pi / 180, "rev/s^2": 2 * pi},
-    "N m": {
-        "N m": 1.0, "Nm": 1.0, "mN m": 1e-3, "mNm": 1e-3, "uN m": 1e-6, "N cm": 1e-2, "kN m": 1e3,
-        "kgf m": 9.80665, "kgf cm": 0.0980665, "ozf in": 0.00706155, "lbf ft": 1.355818,
-    },
+    "N m": {"N m": 1.0, "Nm": 1.0, "mN m": 1e-3, "mNm": 1e-3},
     "N": {"N": 1.0, "kN": 1e3},
     "1": {"1": 1.0},
-}  # fmt: skip
+}
 UNITS: dict[str, tuple[str, float]] = {
     unit: (si, factor) for si, units in _PER_SI.items() for unit, factor in units.items()
 }
 """Unit -> (SI unit, factor): value [SI unit] = factor x value [unit]."""
 
+# units that no map may name, but that a recording may hold by mistake: factor to SI
+_MISREAD = {
+    "km": 1e3,
+    "uN m": 1e-6,
+    "N cm": 1e-2,
+    "kN m": 1e3,
+    "kgf m": 9.80665,
+    "kgf cm": 0.0980665,
+    "ozf in": 0.00706155,
+    "lbf ft": 1.355818,
+}
 _SPELLED = {"um": "µm", "um/s": "µm/s", "uN m": "µN m", "deg": "degrees", "rev": "revolutions", "in": "inches"}
 
 # a screw turns rad, rad/s, rad/s^2 into m, m/s, m/s^2
@@ -136,4 +144,5 @@ def units_of(si: str, lead_m: float | None = None) -> list[str]:
 
 def misread_factors(*units: str) -> dict[float, str]:
     """Factor by which a channel is wrong if it is in one of `units` but read as SI, with the unit's name."""
-    return {1.0 / UNITS[unit][1]: _SPELLED.get(unit, unit) for unit in units}
+    factors = {unit: factor for unit, (_, factor) in UNITS.items()} | _MISREAD
+    return {1.0 / factors[unit]: _SPELLED.get(unit, unit) for unit in units}

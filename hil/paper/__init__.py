@@ -1,6 +1,6 @@
-"""Reproduction of the source paper: what it prints, what comes out, why they differ, and its figures.
+"""Reproduction of the source paper: printed and computed values, reasons for differences, and its figures.
 
-`run_paper` computes and writes; how the result looks on a page is `hil.report`'s matter.
+`run_paper` computes and writes numbers and pictures; `hil.report.paper_report` writes the page.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from hil.arrays import FloatArray
 from hil.paper import figures, source, tables
-from hil.paper.tables import Row, Verdict
+from hil.paper.row import Row, Verdict
 from hil.twin.structure.modal import modal
 
 __all__ = ["PaperResult", "Picture", "Row", "Verdict", "run_paper"]
@@ -45,7 +45,7 @@ class PaperResult:
     modal_matrix: FloatArray
 
     def as_json(self) -> dict[str, Any]:
-        """What paper.json holds."""
+        """Content of paper.json."""
         return {
             "schema_version": SCHEMA_VERSION,
             "rows": [asdict(row) | {"verdict": row.verdict.value} for row in self.rows],

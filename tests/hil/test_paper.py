@@ -9,7 +9,7 @@ import pytest
 
 from hil.motion.pieces import Phase
 from hil.paper import PaperResult, Verdict, run_paper, source
-from hil.paper.tables import Row
+from hil.paper.row import Row
 from hil.twin.structure.chain import RECONSTRUCTED_TABLE_1, one_mass
 
 NOTES = Path(__file__).parents[2] / "../shared/paper/paper-notes.md"

@@ -90,9 +90,8 @@ def _residual_over(
         edges = np.linspace(float(x.min()), float(x.max()), count + 1)
         centre, points, spread = binned(x[used], measured[used], edges)
         _, curve, _ = binned(x[used], modelled[used], edges)
-        gaps = np.flatnonzero(np.diff(centre) > 1.5 * (edges[1] - edges[0])) + 1  # empty bins interrupt the line
         si = "%" if per_torque else unit_of_channel(diagnosis, channel)
-        factor, unit = reading_unit(si, float(np.abs(points).max()))
+        factor, unit = reading_unit(si, float(np.nanmax(np.abs(points))))
         figure = Figure(figsize=(10.0, 4.8), layout="constrained")
         axis = figure.subplots()
         axis.errorbar(
@@ -105,8 +104,7 @@ def _residual_over(
             linewidth=0.8,
             label=POINTS,
         )
-        line = np.insert(centre, gaps, np.nan), np.insert(curve * factor, gaps, np.nan)
-        axis.plot(*line, color=SIMULATED, linewidth=1.8, label=CURVE)
+        axis.plot(centre, curve * factor, color=SIMULATED, linewidth=1.8, label=CURVE)
         axis.axhline(0.0, color="black", linewidth=0.8)
         legend_above(axis)
         name = "friction" if against_motion else "change of the torque" if per_torque else CHANNEL_LABELS[channel]

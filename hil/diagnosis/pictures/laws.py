@@ -50,7 +50,7 @@ def friction_over_speed(diagnosis: Diagnosis, views: Sequence[View]) -> Captione
         )
         speed, friction, _ = binned(*_one_direction(simulated, sign), edges)
         label = f"twin with the findings, {name}"
-        axis.plot(speed * to_m_min, friction, color=SIMULATED, linestyle=dash, linewidth=1.8, label=label)
+        axis.plot(speed * to_m_min, friction, color=SIMULATED, marker=".", linestyle=dash, linewidth=1.8, label=label)
     for name, fit, dash in (
         ("bench file", diagnosis.explanation.owner, ":"),
         ("nominal twin, refitted", diagnosis.explanation.nominal, "-."),

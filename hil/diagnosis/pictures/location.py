@@ -52,7 +52,7 @@ def location_figure(diagnosis: Diagnosis) -> Figure:
     size = max(round(TIME_BIN_S / run.period_s), 1)
     starts = np.arange(0, rows.size, size)
     power = np.maximum(np.add.reduceat(rows, starts), 0.0) / size
-    axes["time"].fill_between(run.time_s[starts], power, color=DEVIATION, linewidth=0.0, step="post")
+    axes["time"].fill_between(run.time_s[starts], power, color=DEVIATION, alpha=0.45, linewidth=0.0, step="post")
     style_axis(axes["time"], ENERGY, "time [s]", f"Over time: {run.name}; grey: speed set-point")
     set_point = axes["time"].twinx()
     set_point.plot(run.time_s, 60.0 * run.velocity_command_m_s, color=COMMAND, linewidth=0.7)

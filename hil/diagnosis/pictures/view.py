@@ -110,13 +110,14 @@ def noise(run: Measured, channel: str) -> float:
 
 
 def binned(x: FloatArray, y: FloatArray, edges: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Centres (m,), medians (m,) and distances to the quartiles (2, m) of y in bins of x with enough samples."""
+    """Centres (m,), medians (m,) and distances to the quartiles (2, m) of y in bins of x; NaN with too few samples."""
     index = np.digitize(x, edges) - 1
-    groups = [y[index == i] for i in range(edges.size - 1)]
-    kept = [i for i, group in enumerate(groups) if group.size >= BIN_SAMPLES_MIN]
-    low, middle, high = np.array([np.percentile(groups[i], [25.0, 50.0, 75.0]) for i in kept]).reshape(-1, 3).T
-    centre = 0.5 * (edges[:-1] + edges[1:])[kept]
-    return centre, middle, np.stack([middle - low, high - middle])
+    quartiles = np.full((edges.size - 1, 3), np.nan)
+    for i in range(edges.size - 1):
+        if np.count_nonzero(index == i) >= BIN_SAMPLES_MIN:
+            quartiles[i] = np.percentile(y[index == i], [25.0, 50.0, 75.0])
+    low, middle, high = quartiles.T
+    return 0.5 * (edges[:-1] + edges[1:]), middle, np.stack([middle - low, high - middle])
 
 
 def angle(diagnosis: Diagnosis, view: View) -> FloatArray:

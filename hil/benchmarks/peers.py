@@ -1,13 +1,14 @@
-"""The same two-mass axis with friction under the same cascade in other people's simulators.
+"""The same two-mass axis with friction under the same cascade in other simulators.
 
 The elastic axis of the reference bench over the first second of the moves, in closed loop. Continuous solvers get the
-loops in continuous time and friction as Fc tanh(v / vs), as their users do; MuJoCo gets dry friction as its own
-constraint (`frictionloss`) and the loops at their periods. Each is optional: what is not installed is left out.
+loops in continuous time and friction as Fc tanh(v / vs), as is usual there; MuJoCo gets dry friction as its own
+constraint (`frictionloss`) and the loops at their periods. Each is optional and measured only if installed.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import fields, replace
 from math import tanh
 from typing import Any
 
@@ -167,15 +168,7 @@ def figures() -> Iterator[Figure]:
 
 
 def _first_second(motion: Trajectory) -> Trajectory:
-    count = round(DURATION_S / motion.period_s) + 1
-    return Trajectory(
-        motion.period_s,
-        motion.time_s[:count],
-        motion.position_m[:count],
-        motion.velocity_m_s[:count],
-        motion.acceleration_m_s2[:count],
-        motion.jerk_m_s3[:count],
-        motion.segment[:count],
-        motion.phase[:count],
-        motion.runs,
-    )
+    rows = slice(round(DURATION_S / motion.period_s) + 1)
+    columns: dict[str, Any] = {field.name: getattr(motion, field.name) for field in fields(motion)}
+    arrays: dict[str, Any] = {name: values[rows] for name, values in columns.items() if isinstance(values, np.ndarray)}
+    return replace(motion, **arrays)

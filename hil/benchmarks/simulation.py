@@ -1,4 +1,4 @@
-"""How much faster than real time the bench and the twin are simulated, at 1 kHz."""
+"""Speed of the simulated bench and of the twin relative to real time, at 1 kHz."""
 
 from __future__ import annotations
 

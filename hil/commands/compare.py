@@ -20,9 +20,8 @@ def compare(
     from hil.files.output import default_folder, new_folder
     from hil.identification.compare import compare as compare_recording
     from hil.identification.dataset import bench_of
-    from hil.quantities import percent, quantity
     from hil.recording.recording import read_recording
-    from hil.report.compare_report import verdict, write_comparison
+    from hil.report.compare_report import rows_of, verdict, write_comparison
 
     recording = read_recording(run)
     believed = load_bench(bench) if bench else bench_of(recording)
@@ -31,16 +30,5 @@ def compare(
         result = compare_recording(recording, believed, fit=fit, progress=tell)
         tell("writing the report")
         write_comparison(result, part)
-    table(
-        ("measured - simulated", "rms", "largest", "relative"),
-        [
-            (
-                channel.label,
-                quantity(channel.rms, channel.unit),
-                quantity(channel.peak, channel.unit),
-                percent(channel.relative),
-            )
-            for channel in result.channels
-        ],
-    )
+    table(("measured - simulated", "rms", "largest", "relative"), rows_of(result))
     out.print(f"\n{verdict(result)}\n\nReport: {folder / 'compare.html'}")

@@ -42,8 +42,7 @@ def demo(
     # only now what takes seconds to import
     from hil.diagnosis.diagnose import diagnose
     from hil.identification.compare import compare
-    from hil.quantities import percent, quantity
-    from hil.report.compare_report import verdict, write_comparison
+    from hil.report.compare_report import rows_of, verdict, write_comparison
     from hil.report.diagnosis_report import write_diagnosis
 
     with new_folder(folder) as part:
@@ -52,18 +51,7 @@ def demo(
             comparison = compare(learn, believed, progress=tell)
             tell("writing the comparison", None)
             write_comparison(comparison, part)
-        table(
-            ("measured less twin as the bench file has it", "rms", "largest", "relative"),
-            [
-                (
-                    channel.label,
-                    quantity(channel.rms, channel.unit),
-                    quantity(channel.peak, channel.unit),
-                    percent(channel.relative),
-                )
-                for channel in comparison.channels
-            ],
-        )
+        table(("measured - twin of the bench file", "rms", "largest", "relative"), rows_of(comparison))
         out.print(f"\n{verdict(comparison)}\n")
         with progress() as tell:
             diagnosis = diagnose([learn], [prove], believed, lambda text: tell(text, None))

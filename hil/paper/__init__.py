@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from hil.arrays import FloatArray
+from hil.files.output import write_json
 from hil.paper import figures, source, tables
 from hil.paper.row import Row, Verdict
 from hil.twin.structure.modal import modal
@@ -72,7 +72,7 @@ def run_paper(out: Path) -> PaperResult:
         frequencies_hz=tables.frequencies_hz("7-dof"),
         modal_matrix=modal(chain).shape,
     )
-    (out / "paper.json").write_text(json.dumps(result.as_json(), indent=1) + "\n", encoding="utf-8")
+    write_json(out / "paper.json", result.as_json())
     return result
 
 

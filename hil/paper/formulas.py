@@ -119,7 +119,7 @@ def transfer_functions() -> Iterator[Row]:
         0.0,
         worst,
         1e-9,
-        "the two forms are the same function; what is left is rounding",
+        "the two forms are the same function; the rest is rounding",
     )
     inertia, stiffness = RECONSTRUCTED_TABLE_1.reduced()
     beta_s = 2e-5  # dampers in proportion to the springs, c = beta k
@@ -148,7 +148,7 @@ def transfer_functions() -> Iterator[Row]:
     tf1, _ = recursion(inertia, stiffness, beta_s * stiffness, BAND_HZ, nut_sign=-1.0)
     yield Row(
         "Appendix, TF_3-4",
-        "largest change of |TF1| by the damper c_t3 left out of the denominator",
+        "largest change of |TF1| by the damper c_t3 missing in the denominator",
         "dB",
         0.0,
         float(np.max(np.abs(20.0 * np.log10(np.abs(tf1 / recursive[0]))))),

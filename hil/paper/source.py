@@ -1,4 +1,4 @@
-"""The axis of the source paper: what it states, what had to be assumed, and its moves simulated."""
+"""Axis of the source paper: stated and assumed parameters, and its simulated moves."""
 
 from __future__ import annotations
 

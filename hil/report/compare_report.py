@@ -27,7 +27,7 @@ def write_comparison(result: Comparison, folder: Path) -> None:
     )
     page.table(
         ("channel", "rms deviation", "largest deviation", "relative"),
-        [(channel.label, *_figures(channel)) for channel in result.channels],
+        rows_of(result),
     )
     page.plot(plots.over_time(time_s, motion_panels(result)))
     page.heading("Block by block")
@@ -54,6 +54,11 @@ def write_comparison(result: Comparison, folder: Path) -> None:
     if result.fit is not None:
         write_bench(result.bench, folder / "bench.fitted.yaml")
     page.write(folder / "compare.html")
+
+
+def rows_of(result: Comparison) -> list[tuple[str, ...]]:
+    """Rows of the table: channel, rms, largest and relative deviation."""
+    return [(channel.label, *_figures(channel)) for channel in result.channels]
 
 
 def verdict(result: Comparison) -> str:

@@ -25,10 +25,10 @@ DURATION_S = 1.0
 SMOOTHING_RAD_S = 0.1  # vs of the smoothed friction: 1 % of the speed at 7 m/min
 MUJOCO_STEP_S = 1e-4
 TOLERANCE = 1e-6
-_Peer = Callable[["Axis", Trajectory], FloatArray]
+_Peer = Callable[["PeerAxis", Trajectory], FloatArray]
 
 
-class Axis:
+class PeerAxis:
     """Parameters of the axis at the motor shaft, and its gains."""
 
     def __init__(self) -> None:
@@ -64,7 +64,7 @@ class Axis:
         ]
 
 
-def solve_ivp(axis: Axis, motion: Trajectory) -> FloatArray:
+def solve_ivp(axis: PeerAxis, motion: Trajectory) -> FloatArray:
     """scipy.integrate.solve_ivp, LSODA: table position (n,)."""
     from scipy.integrate import solve_ivp as integrate
 
@@ -79,7 +79,7 @@ def solve_ivp(axis: Axis, motion: Trajectory) -> FloatArray:
     return np.asarray(answer.y[2] * axis.ratio)
 
 
-def python_control(axis: Axis, motion: Trajectory) -> FloatArray:
+def python_control(axis: PeerAxis, motion: Trajectory) -> FloatArray:
     """control.input_output_response of a nonlinear system, its defaults but for the tolerance: table position (n,)."""
     import control
 
@@ -100,7 +100,7 @@ def python_control(axis: Axis, motion: Trajectory) -> FloatArray:
     return np.asarray(response.outputs)
 
 
-def mujoco(axis: Axis, motion: Trajectory) -> FloatArray:
+def mujoco(axis: PeerAxis, motion: Trajectory) -> FloatArray:
     """MuJoCo: two hinges joined by a spring, dry friction as a constraint, the project's control law: (n,)."""
     import mujoco as engine
 
@@ -137,7 +137,7 @@ PEERS: tuple[tuple[str, _Peer], ...] = (
 
 def figures() -> Iterator[Figure]:
     """Speed of the twin and of each peer that is installed, and how much faster the twin is."""
-    axis, motion = Axis(), _first_second(trajectory(two_mass().gains.period_s))
+    axis, motion = PeerAxis(), _first_second(trajectory(two_mass().gains.period_s))
     real = "x real time"
 
     def simulate() -> FloatArray:

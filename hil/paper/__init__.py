@@ -14,10 +14,10 @@ from matplotlib.figure import Figure
 from hil.arrays import FloatArray
 from hil.files.output import write_json
 from hil.paper import figures, source, tables
-from hil.paper.row import Row, Verdict
+from hil.paper.row import Reproduction, Row
 from hil.twin.structure.modal import modal
 
-__all__ = ["PaperResult", "Picture", "Row", "Verdict", "run_paper"]
+__all__ = ["PaperResult", "Picture", "Reproduction", "Row", "run_paper"]
 
 SCHEMA_VERSION = 1
 

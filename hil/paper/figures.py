@@ -109,7 +109,7 @@ def _bode(
     phase.plot(frequency_hz, degrees, **style)
 
 
-def move_over_time(runs: Sequence[tuple[str, source.Run]]) -> Figure:
+def move_over_time(runs: Sequence[tuple[str, source.SimulatedMove]]) -> Figure:
     """Position, following error, velocity, acceleration, jerk and torque of one move (Fig. 7, 8, 10)."""
     figure = Figure(figsize=(9.0, 12.0), layout="constrained")
     axes = figure.subplots(6, 1, sharex=True)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 
-class Verdict(StrEnum):
+class Reproduction(StrEnum):
     """Outcome of one comparison."""
 
     REPRODUCED = "reproduced"
@@ -25,9 +25,9 @@ class Row:
     why: str
 
     @property
-    def verdict(self) -> Verdict:
+    def verdict(self) -> Reproduction:
         """Whether the computed value lies within the tolerance of the printed one."""
         if self.printed is None or self.computed is None:
-            return Verdict.NOT_COMPARABLE
+            return Reproduction.NOT_COMPARABLE
         allowed = self.tolerance * (abs(self.printed) or 1.0)
-        return Verdict.REPRODUCED if abs(self.computed - self.printed) <= allowed else Verdict.DIFFERS
+        return Reproduction.REPRODUCED if abs(self.computed - self.printed) <= allowed else Reproduction.DIFFERS

@@ -10,7 +10,7 @@ from hil.diagnosis.wording import label, title, titles, where
 from hil.figures.drawing import save
 from hil.files.output import write_json
 from hil.motion.profile import write_profile
-from hil.quantities import change, digits, percent, quantity
+from hil.quantities import change, digits, percent, quantity, reading_unit
 from hil.report import plots
 from hil.report.compare_report import write_bench
 from hil.report.page import Number, Page
@@ -91,7 +91,7 @@ def _finding(page: Page, diagnosis: Diagnosis, index: int, folder: Path) -> None
         page.text(f"Reported as part of this curve, because it corrects the curve's form only slightly: {finding.form}")
     page.table(
         ("parameter", "value", "standard error", "unit"),
-        [(name, *_value(entry, 4), entry.unit) for name, entry in finding.parameters.items()],
+        [(name, *_value(entry)) for name, entry in finding.parameters.items()],
     )
     if finding.equivalents:
         page.text(f"This motion cannot distinguish it from: {titles(finding.equivalents)}.")
@@ -148,7 +148,8 @@ def _corrections(page: Page, result: Result) -> None:
                 name,
                 entry.unit,
                 Number(digits(entry.nominal, 4)),
-                *_value(entry, 5),
+                Number(digits(entry.value, 5)),
+                Number(digits(entry.std, 2)),
                 Number(change(entry.value, entry.nominal)),
             )
             for name, entry in result.parameter_corrections.items()
@@ -167,9 +168,10 @@ def _next_experiment(page: Page, diagnosis: Diagnosis, folder: Path) -> None:
         write_profile(folder / NEXT_EXPERIMENT, experiment.profile)
 
 
-def _value(entry: Value, significant: int) -> tuple[Number, Number]:
-    """Cells of a value and its standard error."""
-    return Number(digits(entry.value, significant)), Number(digits(entry.std, 2))
+def _value(entry: Value) -> tuple[str, ...]:
+    """Cells of a value, its standard error, and the unit in which both are shown."""
+    factor, unit = reading_unit(entry.unit, entry.value)
+    return Number(digits(entry.value * factor, 4)), Number(digits(entry.std * factor, 2)), unit
 
 
 def _figures(found: FitFigures, unit: str) -> list[Number]:

@@ -9,7 +9,7 @@ from hil.bench.bench_file import Bench
 from hil.figures.drawing import save
 from hil.files.output import write_json
 from hil.identification.friction import FrictionResult
-from hil.quantities import change, digits
+from hil.quantities import change, digits, quantity
 from hil.report.page import Number, Page
 
 SCHEMA_VERSION = 1
@@ -28,7 +28,7 @@ def write_friction(result: FrictionResult, name: str, bench: Bench | None, folde
     page.heading("Regression")
     page.text(
         f"At constant feed the acceleration is zero: mean {units.quantity} = Coulomb × sign(speed) + viscous × speed "
-        f"+ offset. The points scatter by {digits(result.residual_rms)} {units.coulomb} rms about the line."
+        f"+ offset. The points scatter by {quantity(result.residual_rms, units.coulomb)} rms about the line."
     )
     page.table(
         ("", "value", "standard error", "bench file"),

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from hil.paper import PaperResult, Verdict
+from hil.paper import PaperResult, Reproduction
 from hil.quantities import digits
 from hil.report.page import Number, Page
 
@@ -13,7 +13,7 @@ def write_paper(result: PaperResult, folder: Path) -> None:
         "The source paper, reproduced",
         f"{len(result.rows)} figures of the paper recomputed",
         verdict(result),
-        not _count(result, Verdict.DIFFERS),
+        not _count(result, Reproduction.DIFFERS),
     )
     page.heading("Printed and computed")
     page.table(
@@ -51,14 +51,14 @@ def write_paper(result: PaperResult, folder: Path) -> None:
 
 def verdict(result: PaperResult) -> str:
     """Count the printed figures that are reproduced, differ, or cannot be compared."""
+    reproduced, differ, incomparable = (_count(result, outcome) for outcome in Reproduction)
     return (
-        f"{_count(result, Verdict.REPRODUCED)} of the printed figures are reproduced, "
-        f"{_count(result, Verdict.DIFFERS)} differ, {_count(result, Verdict.NOT_COMPARABLE)} cannot be compared; "
+        f"{reproduced} of the printed figures are reproduced, {differ} differ, {incomparable} cannot be compared; "
         "the table gives the reasons."
     )
 
 
-def _count(result: PaperResult, wanted: Verdict) -> int:
+def _count(result: PaperResult, wanted: Reproduction) -> int:
     return sum(row.verdict is wanted for row in result.rows)
 
 

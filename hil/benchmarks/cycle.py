@@ -5,8 +5,6 @@ answer; their axis stands still, since its physics is not part of the loop. On t
 included; on a python-can bus it is excluded, since real devices serve their end of the bus themselves.
 """
 
-from __future__ import annotations
-
 import tempfile
 from time import perf_counter_ns
 

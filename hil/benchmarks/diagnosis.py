@@ -4,8 +4,6 @@ The simulated bench repeats the motion of `hil demo` with a concealed effect. Ea
 the first one also compiles the kernels that are not yet in numba's cache.
 """
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import tempfile

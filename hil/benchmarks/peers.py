@@ -5,8 +5,6 @@ loops in continuous time and friction as Fc tanh(v / vs), as is usual there; MuJ
 constraint (`frictionloss`) and the loops at their periods. Each is optional and measured only if installed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import fields, replace
 from math import tanh

@@ -1,7 +1,5 @@
 """Speed of the simulated bench and of the twin relative to real time, at 1 kHz."""
 
-from __future__ import annotations
-
 import tempfile
 from time import perf_counter
 

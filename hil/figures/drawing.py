@@ -1,7 +1,5 @@
 """Matplotlib figures in the style of every report. Matplotlib is loaded when this module is."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

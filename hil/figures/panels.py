@@ -1,7 +1,5 @@
 """Panels over a common time axis as data, and the colours of every picture."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

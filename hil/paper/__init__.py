@@ -3,8 +3,6 @@
 `run_paper` computes and writes numbers and pictures; `hil.report.paper_report` writes the page.
 """
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Pictures of the reproduction: modes, frequency responses, moves. Each returns a matplotlib figure."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import pi
 from typing import Any

@@ -1,7 +1,5 @@
 """Formulas of the source that do not hold as printed, and their comparison with the corrected ones."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from math import sqrt
 

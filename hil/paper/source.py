@@ -1,7 +1,5 @@
 """Axis of the source paper: stated and assumed parameters, and its simulated moves."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import pi
 

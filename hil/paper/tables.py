@@ -1,7 +1,5 @@
 """Table of the reproduction: printed value, computed value, and the reason for a difference."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from math import pi
 

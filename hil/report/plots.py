@@ -1,7 +1,5 @@
 """Interactive plots (Bokeh) of the panels of the pictures, with a common time axis and zoom."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -31,7 +31,7 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     add_completion=False,
-    help="A servo bench that explains itself: control, twin, comparison.",
+    help="Servo bench: real-time control, digital twin, comparison and diagnosis of recordings.",
 )
 
 # In the order of --help. A command's file imports nothing heavy at its top.

@@ -1,49 +1,47 @@
-"""Run, diagnose, run what the diagnosis asks for, diagnose again: until one cause remains or nothing is gained."""
+"""Alternate runs and diagnoses, each run designed by the last diagnosis, until no question is open."""
 
-from __future__ import annotations
-
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 
 from hil.bench.bench_file import Bench
 from hil.diagnosis.diagnose import NEXT_EXPERIMENT, Diagnosis, diagnose
-from hil.diagnosis.wording import title
+from hil.diagnosis.wording import titles
 from hil.errors import HilError
 from hil.files.output import write_json
 from hil.loop.run import RunResult
 from hil.motion.profile import Profile, write_profile
 from hil.recording.recording import Recording, read_recording
+from hil.report.console import Progress
 
 Run = Callable[[Profile, Path, str], RunResult]  # profile, folder, name of the recording
-Progress = Callable[[], AbstractContextManager[Callable[[str, float | None], None]]]  # as hil.report.console
 
 
 @dataclass(frozen=True, eq=False)
 class Round:
-    """What was run, and what all recordings up to here say."""
+    """Motions of a round, and the diagnosis of all recordings up to it."""
 
     motions: tuple[str, ...]
     diagnosis: Diagnosis
 
     @property
     def open(self) -> tuple[str, ...]:
-        """Mechanisms that another motion could tell apart or show."""
+        """Mechanisms that another motion could distinguish or show."""
         following = self.diagnosis.result.next_experiment
         return following.separates if following else ()
 
 
 @dataclass(frozen=True, eq=False)
 class Investigation:
-    """The rounds in order, and why the last was the last."""
+    """The rounds in order, and the reason why it ended."""
 
     rounds: tuple[Round, ...]
     ended: str
 
     @property
     def diagnosis(self) -> Diagnosis:
-        """What all recordings say."""
+        """Diagnosis of all recordings."""
         return self.rounds[-1].diagnosis
 
 
@@ -54,14 +52,14 @@ def investigate(
     folder: Path,
     run: Run,
     allowed: Callable[[Profile], bool],
-    progress: Progress,
+    progress: Callable[[], AbstractContextManager[Progress]],
     rounds: int = 3,
 ) -> Investigation:
-    """Investigate a bench, beginning with profiles by name; `held_out` are run in the first round to prove on.
+    """Investigate a bench, starting with `profiles` by name; `held_out` are run in the first round for validation.
 
-    Recordings, the profiles that were designed and each round's diagnosis.json go into `folder`/round_1 and so on.
-    `run` runs a profile on the bench; `allowed` is asked before a designed one is run. Raises HilError where a run does
-    not come to its end, InputError for recordings that cannot be diagnosed.
+    Writes recordings, designed profiles and each round's diagnosis.json to `folder`/round_1 and so on. `run` runs a
+    profile on the bench; `allowed` decides whether a designed one may be run. Raises HilError if a run stops early,
+    InputError for recordings that cannot be diagnosed.
     """
     train: list[Recording] = []
     proving: list[Recording] = []
@@ -72,16 +70,16 @@ def investigate(
         if not found:
             proving = [_recorded(run, profile, place, name) for name, profile in held_out.items()]
         with progress() as tell:
-            diagnosis = diagnose(train, proving, bench, lambda text: tell(text, None))
+            diagnosis = diagnose(train, proving, bench, tell)
         write_json(place / "diagnosis.json", diagnosis.result.as_json())
         found.append(Round(tuple(profiles), diagnosis))
         following = diagnosis.experiment.profile if diagnosis.experiment else None
         if following is None:
             return Investigation(tuple(found), _settled(diagnosis))
         if len(found) > 1 and set(found[-1].open) >= set(found[-2].open):
-            return Investigation(tuple(found), f"Nothing was gained. Open: {_open(found[-1].open)}.")
+            return Investigation(tuple(found), f"The last round answered no question. Open: {titles(found[-1].open)}.")
         if len(found) == rounds:
-            return Investigation(tuple(found), f"The last of {rounds} rounds is done. Open: {_open(found[-1].open)}.")
+            return Investigation(tuple(found), f"All {rounds} rounds are done. Open: {titles(found[-1].open)}.")
         if not allowed(following):
             return Investigation(tuple(found), f"{NEXT_EXPERIMENT} was not run: it was not confirmed.")
         name = f"{Path(NEXT_EXPERIMENT).stem}_{len(found)}"
@@ -93,15 +91,11 @@ def investigate(
 def _recorded(run: Run, profile: Profile, folder: Path, name: str) -> Recording:
     ran = run(profile, folder, name)
     if not ran.complete or ran.recording is None:
-        raise HilError(f"{name} stopped: {ran.outcome.ending}: {ran.outcome.reason}; what was recorded is in {folder}")
+        raise HilError(f"{name} stopped: {ran.outcome.ending}: {ran.outcome.reason}; the recording is in {folder}")
     return read_recording(ran.recording)
 
 
 def _settled(diagnosis: Diagnosis) -> str:
     if diagnosis.experiment:
         return diagnosis.experiment.note
-    return "Nothing is open that another motion could tell."
-
-
-def _open(effects: Sequence[str]) -> str:
-    return ", ".join(map(title, effects))
+    return "No question is open that another motion could answer."

@@ -1,9 +1,14 @@
-"""Units of foreign recordings and their factors to the SI units of the channel table."""
+"""Numbers with units: value to text, unit of a name, factor of a unit to SI.
 
-from __future__ import annotations
+Values are SI throughout the project; this is the one place that knows other units, for reading foreign recordings and
+for showing values on pages, in pictures and in messages.
+"""
 
+import math
 from math import pi
+from typing import NamedTuple
 
+# SI unit -> units of foreign recordings: value [SI unit] = factor x value [unit]
 _PER_SI = {
     "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0},
     "m": {"m": 1.0, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "in": 0.0254},
@@ -21,8 +26,99 @@ UNITS: dict[str, tuple[str, float]] = {
 }
 """Unit -> (SI unit, factor): value [SI unit] = factor x value [unit]."""
 
+# units that no map may name, but that a recording may hold by mistake: factor to SI
+_MISREAD = {
+    "km": 1e3,
+    "uN m": 1e-6,
+    "N cm": 1e-2,
+    "kN m": 1e3,
+    "kgf m": 9.80665,
+    "kgf cm": 0.0980665,
+    "ozf in": 0.00706155,
+    "lbf ft": 1.355818,
+}
+_SPELLED = {"um": "µm", "um/s": "µm/s", "uN m": "µN m", "deg": "degrees", "rev": "revolutions", "in": "inches"}
+
 # a screw turns rad, rad/s, rad/s^2 into m, m/s, m/s^2
 _SCREW = {"rad": "m", "rad/s": "m/s", "rad/s^2": "m/s^2"}
+
+# SI unit -> units in which engineers read it: (from this magnitude on, factor, unit), largest first
+_READ_IN: dict[str, tuple[tuple[float, float, str], ...]] = {
+    "m": ((10.0, 1.0, "m"), (1e-3, 1e3, "mm"), (0.0, 1e6, "µm")),
+    "m/s": ((1e-3, 60.0, "m/min"), (0.0, 6e4, "mm/min")),
+    "m/s^2": ((0.0, 1.0, "m/s²"),),
+    "m/s^3": ((0.0, 1.0, "m/s³"),),
+    "s": ((1.0, 1.0, "s"), (1e-3, 1e3, "ms"), (0.0, 1e6, "µs")),
+    "rad": ((0.1, 1.0, "rad"), (1e-4, 1e3, "mrad"), (0.0, 1e6, "µrad")),
+    "N m": ((0.1, 1.0, "N m"), (0.0, 1e3, "mN m")),
+    "N/m": ((1e5, 1e-6, "N/µm"), (0.0, 1.0, "N/m")),
+    "1": ((0.0, 100.0, "%"),),
+    "1/rev": ((0.0, 1.0, ""),),  # the sentence says what is counted
+}
+
+# endings of names of channels and parameters, longest first where one ends with another
+_ENDINGS = {
+    "stiffness_n_m": "N/m",
+    "n_m_s_rad": "N m s/rad",
+    "n_m_rad": "N m/rad",
+    "n_s_m": "N s/m",
+    "kg_m2": "kg m^2",
+    "m_s3": "m/s^3",
+    "m_s2": "m/s^2",
+    "rad_s": "rad/s",
+    "m_s": "m/s",
+    "1_s": "1/s",
+    "n_m": "N m",
+    "rad": "rad",
+    "kg": "kg",
+    "hz": "Hz",
+    "n": "N",
+    "m": "m",
+    "s": "s",
+}
+
+
+class ReadingUnit(NamedTuple):
+    """Unit in which values are shown: shown value = factor x SI value."""
+
+    factor: float
+    unit: str
+
+
+def unit_of(name: str) -> str:
+    """SI unit of a channel or parameter by the ending of its name: "torque_n_m" -> "N m"; "1" without an ending."""
+    padded = f"_{name}"
+    return next((unit for ending, unit in _ENDINGS.items() if padded.endswith(f"_{ending}")), "1")
+
+
+def reading_unit(unit: str, largest: float) -> ReadingUnit:
+    """Unit in which values of the SI unit `unit` up to the magnitude `largest` are shown."""
+    choices = _READ_IN.get(unit, ((0.0, 1.0, unit),))
+    return next(ReadingUnit(factor, shown) for start, factor, shown in choices if abs(largest) >= start or start == 0.0)
+
+
+def digits(value: float, significant: int = 3) -> str:
+    """Number with `significant` digits, without exponent from 1e-3 to 1e6."""
+    if value == 0.0 or 1e-3 <= abs(value) < 1e6:
+        decimals = max(significant - 1 - math.floor(math.log10(abs(value) or 1.0)), 0)
+        return f"{value:.{decimals}f}"
+    return f"{value:.{significant - 1}e}"
+
+
+def quantity(value: float, unit: str) -> str:
+    """Value of an SI unit as text with three digits, such as "24.7 µm"."""
+    factor, shown = reading_unit(unit, value)
+    return f"{digits(value * factor)} {shown}".rstrip()
+
+
+def percent(value: float) -> str:
+    """Ratio in percent with three digits; below 0.001 % only the bound."""
+    return f"{digits(100.0 * value)} %" if value >= 1e-5 else "< 0.001 %"
+
+
+def change(value: float, nominal: float) -> str:
+    """Relative change from `nominal` to `value` in percent; a dash where `nominal` is not positive."""
+    return f"{100.0 * (value / nominal - 1.0):+.1f} %" if nominal > 0.0 else "–"
 
 
 def si_factor(unit: str, si: str, lead_m: float | None = None) -> float | None:
@@ -42,5 +138,11 @@ def si_factor(unit: str, si: str, lead_m: float | None = None) -> float | None:
 
 
 def units_of(si: str, lead_m: float | None = None) -> list[str]:
-    """The units that convert to `si`."""
+    """Units that convert to `si`."""
     return [unit for unit in UNITS if si_factor(unit, si, lead_m) is not None]
+
+
+def misread_factors(*units: str) -> dict[float, str]:
+    """Factor by which a channel is wrong if it is in one of `units` but read as SI, with the unit's name."""
+    factors = {unit: factor for unit, (_, factor) in UNITS.items()} | _MISREAD
+    return {1.0 / factors[unit]: _SPELLED.get(unit, unit) for unit in units}

@@ -1,7 +1,5 @@
 """The axes and the motion that the benchmarks share."""
 
-from __future__ import annotations
-
 from hil.bench.bench_file import Bench, load_bench
 from hil.bench.hardware import DriveSection, SimulationSection
 from hil.motion.profile import Profile

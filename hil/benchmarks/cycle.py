@@ -1,11 +1,9 @@
-"""How long one whole cycle of the loop takes: SYNC, answers, P, PI, live twin of 20 modes, PDO packing, record.
+"""Duration of one whole cycle of the loop: SYNC, answers, P, PI, live twin of 20 modes, PDO packing, record.
 
 Measured from the deadline to the end of the cycle inside `hil.loop.session`, back to back. The simulated devices
-answer; the axis behind them stands still, for physics is no part of the loop. On the in-process bus their work is
-part of the figure; on a python-can bus it is taken out, since real devices serve their end of the bus themselves.
+answer; their axis stands still, since its physics is not part of the loop. On the in-process bus their work is
+included; on a python-can bus it is excluded, since real devices serve their end of the bus themselves.
 """
-
-from __future__ import annotations
 
 import tempfile
 from time import perf_counter_ns
@@ -21,18 +19,18 @@ LOOPS = 4
 
 
 class StandingAxis:
-    """A plant that does not move."""
+    """Plant at rest."""
 
     motor_position_rad = 0.0
     table_position_m = 0.0
     torque_n_m = 0.0
 
     def advance(self, torque_command_n_m: float, period_s: float) -> None:
-        """Nothing happens."""
+        """Do nothing."""
 
 
 class Stopwatch(VirtualClock):
-    """A clock that is always on time and notes how long each cycle took [ns]."""
+    """Clock that is always on time and records the duration of each cycle [ns]."""
 
     def __init__(self) -> None:
         self.durations_ns: list[int] = []
@@ -50,7 +48,7 @@ class Stopwatch(VirtualClock):
         return 0.0
 
     def serve_apart(self, rig: Rig) -> None:
-        """Take the time in which the devices serve their end of a python-can bus out of the cycle."""
+        """Exclude the time in which the devices serve their end of a python-can bus."""
         near, far = rig.ports
 
         def poll(now_s: float, timeout_s: float = 0.0) -> None:
@@ -63,7 +61,7 @@ class Stopwatch(VirtualClock):
 
 
 def whole_cycle(interface: str) -> tuple[list[float], list[float]]:
-    """Durations [s] of the cycles of several runs on a bus of this interface, and of the devices' work left out."""
+    """Durations [s] of the cycles of several runs on a bus, and of the excluded work of the devices."""
     bench, profile = twenty_modes(interface), moves()
     motion = trajectory(bench.gains.period_s)
     durations: list[float] = []

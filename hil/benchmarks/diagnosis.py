@@ -1,10 +1,8 @@
-"""How long a diagnosis takes over the length of a recording: python -m hil.benchmarks.diagnosis [--effect ID]
+"""Duration of a diagnosis over the length of a recording: python -m hil.benchmarks.diagnosis [--effect ID]
 
-The simulated bench moves as in `hil demo`, over and over, with an effect concealed. Each length is diagnosed in a
-process of its own, so that it starts cold; the first one also compiles what is not yet in numba's cache.
+The simulated bench repeats the motion of `hil demo` with a concealed effect. Each length is diagnosed in a new process;
+the first one also compiles the kernels that are not yet in numba's cache.
 """
-
-from __future__ import annotations
 
 import subprocess
 import sys
@@ -27,7 +25,9 @@ LENGTHS_S = (25.0, 50.0, 100.0, 200.0)
 _HIL = (sys.executable, "-c", "from hil.cli import main; main()")
 
 
-def measure(effect: Annotated[str, typer.Option(help="What is concealed")] = cogging_torque.MECHANISM.id) -> None:
+def measure(
+    effect: Annotated[str, typer.Option(help="Concealed effect.")] = cogging_torque.MECHANISM.id,
+) -> None:
     """Print the time of a diagnosis, cold, for each length."""
     bench, _ = conceal(load_simulated("reference"), 1, effect)
     rows: list[tuple[str, ...]] = []
@@ -38,29 +38,16 @@ def measure(effect: Annotated[str, typer.Option(help="What is concealed")] = cog
             profile = _repeated(LEARN, length_s, bench.gains.period_s)
             recorded = run_profile(bench, profile, place, f"train_{length_s:.0f}", virtual=True).recording
             begin = perf_counter()
-            subprocess.run(
-                [
-                    *_HIL,
-                    "diagnose",
-                    str(recorded),
-                    "--validate",
-                    str(held_out),
-                    "--bench",
-                    "reference",
-                    "--out",
-                    str(place / f"out_{length_s:.0f}"),
-                ],
-                check=True,
-                stdout=subprocess.DEVNULL,
-                stderr=subprocess.DEVNULL,
-            )
+            paths = {"--validate": held_out, "--bench": "reference", "--out": place / f"out_{length_s:.0f}"}
+            options = [str(text) for option in paths.items() for text in option]
+            subprocess.run([*_HIL, "diagnose", str(recorded), *options], check=True, capture_output=True)
             took_s = perf_counter() - begin
             rows.append((f"{length_s:.0f} s", f"{took_s:.1f} s", f"{took_s / length_s:.2f}"))
     table(("recording at 1 kHz", "diagnosis", "per second of recording"), rows)
 
 
 def _repeated(profile: Profile, length_s: float, period_s: float) -> Profile:
-    """A profile over and over, for as long as `length_s`."""
+    """A profile repeated to a length of about `length_s`."""
     data = profile.model_dump(mode="json")
     times = max(round(length_s / plan(profile, period_s).duration_s), 1)
     return Profile.model_validate(

@@ -1,13 +1,12 @@
-"""The same two-mass axis with friction under the same cascade in other people's simulators.
+"""The same two-mass axis with friction under the same cascade in other simulators.
 
 The elastic axis of the reference bench over the first second of the moves, in closed loop. Continuous solvers get the
-loops in continuous time and friction as Fc tanh(v / vs), as their users do; MuJoCo gets dry friction as its own
-constraint (`frictionloss`) and the loops at their periods. Each is optional: what is not installed is left out.
+loops in continuous time and friction as Fc tanh(v / vs), as is usual there; MuJoCo gets dry friction as its own
+constraint (`frictionloss`) and the loops at their periods. Each is optional and measured only if installed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
+from dataclasses import fields, replace
 from math import tanh
 from typing import Any
 
@@ -24,10 +23,10 @@ DURATION_S = 1.0
 SMOOTHING_RAD_S = 0.1  # vs of the smoothed friction: 1 % of the speed at 7 m/min
 MUJOCO_STEP_S = 1e-4
 TOLERANCE = 1e-6
-_Peer = Callable[["Axis", Trajectory], FloatArray]
+_Peer = Callable[["PeerAxis", Trajectory], FloatArray]
 
 
-class Axis:
+class PeerAxis:
     """Parameters of the axis at the motor shaft, and its gains."""
 
     def __init__(self) -> None:
@@ -63,7 +62,7 @@ class Axis:
         ]
 
 
-def solve_ivp(axis: Axis, motion: Trajectory) -> FloatArray:
+def solve_ivp(axis: PeerAxis, motion: Trajectory) -> FloatArray:
     """scipy.integrate.solve_ivp, LSODA: table position (n,)."""
     from scipy.integrate import solve_ivp as integrate
 
@@ -78,7 +77,7 @@ def solve_ivp(axis: Axis, motion: Trajectory) -> FloatArray:
     return np.asarray(answer.y[2] * axis.ratio)
 
 
-def python_control(axis: Axis, motion: Trajectory) -> FloatArray:
+def python_control(axis: PeerAxis, motion: Trajectory) -> FloatArray:
     """control.input_output_response of a nonlinear system, its defaults but for the tolerance: table position (n,)."""
     import control
 
@@ -99,7 +98,7 @@ def python_control(axis: Axis, motion: Trajectory) -> FloatArray:
     return np.asarray(response.outputs)
 
 
-def mujoco(axis: Axis, motion: Trajectory) -> FloatArray:
+def mujoco(axis: PeerAxis, motion: Trajectory) -> FloatArray:
     """MuJoCo: two hinges joined by a spring, dry friction as a constraint, the project's control law: (n,)."""
     import mujoco as engine
 
@@ -136,7 +135,7 @@ PEERS: tuple[tuple[str, _Peer], ...] = (
 
 def figures() -> Iterator[Figure]:
     """Speed of the twin and of each peer that is installed, and how much faster the twin is."""
-    axis, motion = Axis(), _first_second(trajectory(two_mass().gains.period_s))
+    axis, motion = PeerAxis(), _first_second(trajectory(two_mass().gains.period_s))
     real = "x real time"
 
     def simulate() -> FloatArray:
@@ -167,15 +166,7 @@ def figures() -> Iterator[Figure]:
 
 
 def _first_second(motion: Trajectory) -> Trajectory:
-    count = round(DURATION_S / motion.period_s) + 1
-    return Trajectory(
-        motion.period_s,
-        motion.time_s[:count],
-        motion.position_m[:count],
-        motion.velocity_m_s[:count],
-        motion.acceleration_m_s2[:count],
-        motion.jerk_m_s3[:count],
-        motion.segment[:count],
-        motion.phase[:count],
-        motion.runs,
-    )
+    rows = slice(round(DURATION_S / motion.period_s) + 1)
+    columns: dict[str, Any] = {field.name: getattr(motion, field.name) for field in fields(motion)}
+    arrays: dict[str, Any] = {name: values[rows] for name, values in columns.items() if isinstance(values, np.ndarray)}
+    return replace(motion, **arrays)

@@ -1,6 +1,4 @@
-"""How much faster than real time the bench and the twin are simulated, at 1 kHz."""
-
-from __future__ import annotations
+"""Speed of the simulated bench and of the twin relative to real time, at 1 kHz."""
 
 import tempfile
 from time import perf_counter

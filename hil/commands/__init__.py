@@ -1,2 +1,4 @@
-"""Commands of the program `hil`, one file each. A file imports at its top only what is light: `hil --help` reads them
-all; the work is imported inside the command."""
+"""Commands of the program `hil`, one file each.
+
+`hil --help` imports all of them, so a file imports only light modules at its top and the others in the command.
+"""

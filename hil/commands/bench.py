@@ -15,9 +15,9 @@ if TYPE_CHECKING:
 
 
 def bench(
-    file: Annotated[Path, typer.Option("--out", help="Where the figures go as JSON")] = Path("runs/bench.json"),
+    file: Annotated[Path, typer.Option("--out", help="JSON file for the figures.")] = Path("runs/bench.json"),
 ) -> None:
-    """Measure the loop, the simulated bench and the twin on this machine, beside other simulators."""
+    """Measure loop, simulated bench and twin on this machine, and compare them with other simulators."""
     from hil.files.output import write_json
     from hil.loop.realtime import machine_state, measure_jitter, now_text, real_time
 

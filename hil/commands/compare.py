@@ -1,25 +1,19 @@
 """hil compare."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from hil.commands.options import Out, RecordedBench
 from hil.report.console import out, progress, table
 
 
 def compare(
-    run: Annotated[Path, typer.Argument(help="Recording: .parquet, .arrows or .csv", show_default=False)],
-    bench: Annotated[
-        str | None,
-        typer.Option(help="Bench file, or the name of a shipped one; left out: the bench that is in the recording"),
-    ] = None,
-    fit: Annotated[bool, typer.Option("--fit", help="Fit the parameters of the axis to the recording first")] = False,
-    folder: Annotated[
-        Path | None, typer.Option("--out", help="New folder for the report; left out: runs/compare-NAME-TIME")
-    ] = None,
+    run: Annotated[Path, typer.Argument(help="Recording: .parquet, .arrows or .csv.", show_default=False)],
+    bench: RecordedBench = None,
+    fit: Annotated[bool, typer.Option("--fit", help="First fit the parameters of the axis to the recording.")] = False,
+    folder: Out = None,
 ) -> None:
     """Compare a recording with its twin: in closed loop from the same set-points, and block by block."""
     from hil.bench.bench_file import load_bench
@@ -27,26 +21,14 @@ def compare(
     from hil.identification.compare import compare as compare_recording
     from hil.identification.dataset import bench_of
     from hil.recording.recording import read_recording
-    from hil.report.compare_report import verdict, write_comparison
-    from hil.report.style import percent, quantity
+    from hil.report.compare_report import rows_of, verdict, write_comparison
 
     recording = read_recording(run)
     believed = load_bench(bench) if bench else bench_of(recording)
     folder = folder or default_folder(f"compare-{recording.name}")
     with new_folder(folder) as part, progress() as tell:
         result = compare_recording(recording, believed, fit=fit, progress=tell)
-        tell("writing the report", None)
+        tell("writing the report")
         write_comparison(result, part)
-    table(
-        ("measured less simulated", "rms", "largest", "relative"),
-        [
-            (
-                channel.label,
-                quantity(channel.rms, channel.unit),
-                quantity(channel.peak, channel.unit),
-                percent(channel.relative),
-            )
-            for channel in result.channels
-        ],
-    )
+    table(("measured - simulated", "rms", "largest", "relative"), rows_of(result))
     out.print(f"\n{verdict(result)}\n\nReport: {folder / 'compare.html'}")

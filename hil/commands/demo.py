@@ -42,9 +42,8 @@ def demo(
     # only now what takes seconds to import
     from hil.diagnosis.diagnose import diagnose
     from hil.identification.compare import compare
-    from hil.report.compare_report import verdict, write_comparison
-    from hil.report.diagnosis.report import write_diagnosis
-    from hil.report.style import percent, quantity
+    from hil.report.compare_report import rows_of, verdict, write_comparison
+    from hil.report.diagnosis_report import write_diagnosis
 
     with new_folder(folder) as part:
         learn, prove = _record(bench, part, virtual)
@@ -52,18 +51,7 @@ def demo(
             comparison = compare(learn, believed, progress=tell)
             tell("writing the comparison", None)
             write_comparison(comparison, part)
-        table(
-            ("measured less twin as the bench file has it", "rms", "largest", "relative"),
-            [
-                (
-                    channel.label,
-                    quantity(channel.rms, channel.unit),
-                    quantity(channel.peak, channel.unit),
-                    percent(channel.relative),
-                )
-                for channel in comparison.channels
-            ],
-        )
+        table(("measured - twin of the bench file", "rms", "largest", "relative"), rows_of(comparison))
         out.print(f"\n{verdict(comparison)}\n")
         with progress() as tell:
             diagnosis = diagnose([learn], [prove], believed, lambda text: tell(text, None))
@@ -118,7 +106,8 @@ def _say(result: Result, truth: SimulationSection, believed: Bench) -> None:
     """What was concealed beside what was found."""
     import math
 
-    from hil.diagnosis.wording import NOMINAL_UNITS, number, said, title
+    from hil.diagnosis.wording import title
+    from hil.quantities import digits, quantity, unit_of
     from hil.twin.library import BY_ID
     from hil.twin.mechanism import Role
 
@@ -128,27 +117,25 @@ def _say(result: Result, truth: SimulationSection, believed: Bench) -> None:
     parameters = {parameter.name: parameter for parameter in BY_ID[hidden.effect].parameters}
     for name, value in hidden.parameters.items():
         parameter, seen = parameters[name], found.parameters[name] if found else None
+        unit = parameter.dimension.unit(linear=False)
         rows.append(
             (
                 name,
                 "–",
-                said(
-                    math.remainder(value, 2.0 * math.pi) if parameter.role is Role.PHASE else value,
-                    parameter.dimension,
-                ),
-                said(seen.value, parameter.dimension) if seen else "–",
-                said(seen.std, parameter.dimension) if seen else "–",
+                quantity(math.remainder(value, 2.0 * math.pi) if parameter.role is Role.PHASE else value, unit),
+                quantity(seen.value, unit) if seen else "–",
+                quantity(seen.std, unit) if seen else "–",
             )
         )
     for name, value in truth.axis.items():
-        unit, fitted = NOMINAL_UNITS[name], result.parameter_corrections.get(name)
+        unit, fitted = unit_of(name), result.parameter_corrections.get(name)
         rows.append(
             (
                 name,
-                f"{number(getattr(believed.axis, name))} {unit}",
-                f"{number(value)} {unit}",
-                f"{number(fitted.value)} {unit}" if fitted else "–",
-                f"{number(fitted.std)} {unit}" if fitted else "–",
+                f"{digits(getattr(believed.axis, name))} {unit}",
+                f"{digits(value)} {unit}",
+                f"{digits(fitted.value)} {unit}" if fitted else "–",
+                f"{digits(fitted.std)} {unit}" if fitted else "–",
             )
         )
     table((title(hidden.effect), "bench file", "concealed", "found", "standard error"), rows)

@@ -1,56 +1,46 @@
 """hil diagnose."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from hil.commands.options import Out, RecordedBench
 from hil.report.console import out, progress, table
 
 
 def diagnose(
     runs: Annotated[
         list[Path],
-        typer.Argument(
-            metavar="RUN...", show_default=False, help="Recordings to learn from: .parquet, .arrows or .csv"
-        ),
+        typer.Argument(metavar="RUN...", show_default=False, help="Training recordings: .parquet, .arrows or .csv."),
     ],
     validate: Annotated[
         list[Path] | None,
         typer.Option(
             "--validate",
-            help="Recording of another motion to prove the result on; may be given several times; "
-            "left out: the last third of each recording",
+            help="Held-out recording of another motion, on which the result is validated; may be given several times. "
+            "Default: the last third of each recording.",
         ),
     ] = None,
-    bench: Annotated[
-        str | None,
-        typer.Option(
-            help="Bench or axis file, or the name of a shipped one; left out: the bench that is in the recording"
-        ),
-    ] = None,
-    folder: Annotated[
-        Path | None, typer.Option("--out", help="New folder for the results; left out: runs/diagnose-NAME-TIME")
-    ] = None,
+    bench: RecordedBench = None,
+    folder: Out = None,
 ) -> None:
-    """Find out what the twin leaves out: where, which physics, and whether modelling it helps."""
+    """Find physics that the twin lacks: where it acts, which mechanism it is, and whether modelling it helps."""
     from hil.bench.bench_file import load_bench
     from hil.diagnosis.diagnose import diagnose as diagnose_recordings
     from hil.files.output import default_folder, new_folder
     from hil.identification.dataset import bench_of
+    from hil.quantities import quantity
     from hil.recording.recording import read_recording
-    from hil.report.diagnosis.report import write_diagnosis
-    from hil.report.style import quantity
+    from hil.report.diagnosis_report import write_diagnosis
 
     train = [read_recording(path) for path in runs]
     held_out = [read_recording(path) for path in validate or []]
     believed = load_bench(bench) if bench else bench_of(train[0])
     folder = folder or default_folder(f"diagnose-{train[0].name}")
     with new_folder(folder) as part, progress() as tell:
-        diagnosis = diagnose_recordings(train, held_out, believed, lambda text: tell(text, None))
-        tell("writing the report", None)
+        diagnosis = diagnose_recordings(train, held_out, believed, tell)
+        tell("writing the report")
         write_diagnosis(diagnosis, part)
     result = diagnosis.result
     table(

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from hil.commands.options import Out
 from hil.report.console import out, progress, table
 
 if TYPE_CHECKING:
@@ -16,16 +17,16 @@ if TYPE_CHECKING:
 def friction(
     run: Annotated[
         Path | None,
-        typer.Argument(
-            help="Recording of a feed sweep; left out: --profile is run on --bench first", show_default=False
-        ),
+        typer.Argument(help="Recording of a feed sweep. Without it, --profile is run on --bench.", show_default=False),
     ] = None,
-    bench: Annotated[str | None, typer.Option(help="Bench file or shipped name")] = None,
-    profile: Annotated[Path | None, typer.Option(help="Feed sweep to run, as profiles/friction_sweep.yaml")] = None,
-    virtual: Annotated[bool, typer.Option("--virtual", help="Run it in virtual time (simulated bench)")] = False,
-    folder: Annotated[
-        Path | None, typer.Option("--out", help="New folder for the report; left out: runs/friction-NAME-TIME")
+    bench: Annotated[str | None, typer.Option(help="Bench file or name of a shipped bench.")] = None,
+    profile: Annotated[
+        Path | None, typer.Option(help="Feed sweep to run, such as profiles/friction_sweep.yaml.")
     ] = None,
+    virtual: Annotated[
+        bool, typer.Option("--virtual", help="Simulated bench: run --profile as fast as possible.")
+    ] = False,
+    folder: Out = None,
 ) -> None:
     """Identify Coulomb and viscous friction from constant feeds in both directions."""
     from hil.bench.bench_file import load_bench
@@ -53,13 +54,13 @@ def friction(
             assert believed is not None
             assert bench is not None
             assert profile is not None
-            tell("running the feed sweep", None)
+            tell("running the feed sweep")
             with named(bench, profile):
                 run = _run(believed, profile, part, virtual)
         recording = read_recording(run)
         if believed is None and "bench" in recording.metadata:
             believed = bench_of(recording)
-        tell("identifying", None)
+        tell("identifying")
         result = identify_friction(recording)
         write_friction(result, recording.name, believed, part)
     table(("", "value", "standard error", "bench file"), rows_of(result, believed))

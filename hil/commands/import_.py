@@ -1,7 +1,5 @@
 """hil import."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 
@@ -11,19 +9,19 @@ from hil.report.console import out
 
 
 def import_(
-    source: Annotated[Path, typer.Argument(help="Foreign recording: .csv, .mat or .parquet", show_default=False)],
+    source: Annotated[Path, typer.Argument(help="Foreign recording: .csv, .mat or .parquet.", show_default=False)],
     map_file: Annotated[
         str,
         typer.Option(
-            "--map", help="Map of columns and units (YAML), or the name of a shipped one: emps", show_default=False
+            "--map", help="Map of columns and units (YAML), or name of a shipped map: emps.", show_default=False
         ),
     ],
     target: Annotated[
         Path | None,
-        typer.Option("--out", help="Parquet file to write; left out: the name of the source in this folder"),
+        typer.Option("--out", help="Parquet file to write. Default: the name of the source, in this folder."),
     ] = None,
 ) -> None:
-    """Import a foreign recording by a map of its columns, units and signs."""
+    """Convert a foreign recording to Parquet by a map of its columns, units and signs."""
     from hil.recording.importing import import_recording
     from hil.recording.recording import write_parquet
 

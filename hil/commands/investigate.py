@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from hil.commands.options import Force, Out, RunBench, Seed, Virtual
 from hil.report.console import err, out, progress, table
 
 if TYPE_CHECKING:
@@ -20,39 +21,32 @@ def investigate(
     profiles: Annotated[
         list[Path],
         typer.Argument(
-            metavar="PROFILE...", show_default=False, help="Profiles to begin with, as profiles/identification.yaml"
+            metavar="PROFILE...", show_default=False, help="First profiles, such as profiles/identification.yaml."
         ),
     ],
-    bench: Annotated[str, typer.Option(help="Bench file, or the name of a shipped one")] = "reference",
+    bench: RunBench = "reference",
     validate: Annotated[
         list[Path] | None,
         typer.Option(
             "--validate",
-            help="Profile of another motion to prove the result on; may be given several times; left out: "
-            "the last third of each recording",
+            help="Profile of another motion, on which the result is validated; may be given several times. "
+            "Default: the last third of each recording.",
         ),
     ] = None,
-    rounds: Annotated[int, typer.Option(min=1, max=10, help="Rounds at most")] = 3,
-    yes: Annotated[bool, typer.Option("--yes", help="On a real bench: run designed motions without asking")] = False,
-    virtual: Annotated[
-        bool, typer.Option("--virtual/--wall", help="Simulated bench as fast as the machine allows, or wall-clock time")
-    ] = False,
-    force: Annotated[
-        bool, typer.Option("--force", help="Arm although jitter or bus load exceed the budget of the bench")
-    ] = False,
-    seed: Annotated[int | None, typer.Option(min=0, help="Of the simulated sensors; left out: the bench's")] = None,
-    folder: Annotated[
-        Path | None,
-        typer.Option("--out", help="New folder for recordings and results; left out: runs/investigate-BENCH-TIME"),
-    ] = None,
+    rounds: Annotated[int, typer.Option(min=1, max=10, help="Largest number of rounds.")] = 3,
+    yes: Annotated[bool, typer.Option("--yes", help="On a real bench: run designed motions without asking.")] = False,
+    virtual: Virtual = False,
+    force: Force = False,
+    seed: Seed = None,
+    folder: Out = None,
 ) -> None:
-    """Run profiles, diagnose, and run the motion that separates what is left, until one cause remains.
+    """Run profiles, diagnose them, and run newly designed motions until one cause remains.
 
-    Designed motions keep to what the set-points recorded so far have reached, and to drive.travel_m of the bench. On a
-    real bench each is shown and must be confirmed.
+    Designed motions stay within the travel and the limits of the recorded set-points and within drive.travel_m of the
+    bench. On a real bench each one is shown and must be confirmed.
     """
     from hil.commands.run import named, say
-    from hil.diagnosis.wording import title
+    from hil.diagnosis.wording import title, titles
     from hil.errors import InputError
     from hil.files.output import default_folder, refuse_used
     from hil.investigate import investigate as investigate_bench
@@ -60,13 +54,13 @@ def investigate(
     from hil.loop.simulated_bench import load_simulated
     from hil.loop.supervision import Ending
     from hil.motion.profile import load_profile
-    from hil.report.diagnosis.report import write_diagnosis
+    from hil.report.diagnosis_report import write_diagnosis
 
     files = {path.stem: path for path in (*profiles, *(validate or []))}
     if len(files) < len(profiles) + len(validate or []):
         raise InputError(
             f"PROFILE: given {', '.join(map(str, (*profiles, *(validate or []))))}, allowed files with "
-            "names of their own: recordings are called like them"
+            "names of their own: recordings take their names"
         )
     loaded = load_simulated(bench)
     first, proving = ({path.stem: load_profile(path) for path in paths} for paths in (profiles, validate or []))
@@ -84,7 +78,7 @@ def investigate(
                 name,
                 virtual=virtual,
                 force=force,
-                seed=next(seeds) if simulation else None,  # other noise in every run
+                seed=next(seeds) if simulation else None,  # different noise in every run
                 planned=lambda trajectory: err.print(
                     f"{name} on {loaded.name}: {trajectory.duration_s:.1f} s of motion ..."
                 ),
@@ -99,7 +93,7 @@ def investigate(
 
     found = investigate_bench(first, proving, loaded, folder, run, allowed, progress, rounds)
     with progress() as tell:
-        tell("writing the report", None)
+        tell("writing the report")
         write_diagnosis(found.diagnosis, folder)
     table(
         ("round", "motion", "found", "open"),
@@ -107,9 +101,9 @@ def investigate(
             (
                 str(number),
                 ", ".join(one.motions),
-                ", ".join(title(finding.effect) for finding in one.diagnosis.result.missing)
+                titles(finding.effect for finding in one.diagnosis.result.missing)
                 or title(one.diagnosis.result.verdict),
-                ", ".join(map(title, one.open)) or "–",
+                titles(one.open) or "–",
             )
             for number, one in enumerate(found.rounds, 1)
         ],
@@ -118,7 +112,7 @@ def investigate(
 
 
 def _confirmed(profile: Profile, period_s: float) -> bool:
-    """Whether the user lets a real axis make a motion that nobody has looked at; without a terminal not."""
+    """Ask whether a designed motion may be run on a real axis; False without a terminal."""
     from hil.motion.trajectory import plan
 
     if not sys.stdin.isatty():

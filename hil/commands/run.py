@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from hil.commands.options import Force, Out, RunBench, Seed, Virtual
 from hil.report.console import err, out
 
 if TYPE_CHECKING:
@@ -16,20 +17,14 @@ if TYPE_CHECKING:
 
 
 def run(
-    profile: Annotated[Path, typer.Argument(help="Profile file, as profiles/reference.yaml", show_default=False)],
-    bench: Annotated[str, typer.Option(help="Bench file, or the name of a shipped one")] = "reference",
-    virtual: Annotated[
-        bool, typer.Option("--virtual/--wall", help="Simulated bench as fast as the machine allows, or wall-clock time")
-    ] = False,
-    force: Annotated[
-        bool, typer.Option("--force", help="Arm although jitter or bus load exceed the budget of the bench")
-    ] = False,
-    seed: Annotated[int | None, typer.Option(min=0, help="Of the simulated sensors; left out: the bench's")] = None,
-    folder: Annotated[
-        Path | None, typer.Option("--out", help="Folder for the recording; left out: runs/NAME-TIME")
-    ] = None,
+    profile: Annotated[Path, typer.Argument(help="Profile file, such as profiles/reference.yaml.", show_default=False)],
+    bench: RunBench = "reference",
+    virtual: Virtual = False,
+    force: Force = False,
+    seed: Seed = None,
+    folder: Out = None,
 ) -> None:
-    """Run a profile on a bench and record it. ctrl-C stops the axis under control, a second one by the drive's ramp."""
+    """Run a profile on a bench and record it. ctrl-C: controlled stop; again: stop by the drive's ramp."""
     from hil.errors import HilError
     from hil.files.output import default_folder
     from hil.loop.run import run_profile
@@ -53,7 +48,7 @@ def run(
 
 @contextmanager
 def named(bench: str, profile: Path) -> Iterator[None]:
-    """An error at a field of the bench or the profile names its file and line."""
+    """Name file and line in an error at a field of the bench or the profile."""
     from hil.bench.bench_file import bench_path
     from hil.errors import FieldError
     from hil.files.yaml_model import located
@@ -66,7 +61,7 @@ def named(bench: str, profile: Path) -> Iterator[None]:
 
 
 def say(result: RunResult, virtual: bool) -> None:
-    """What came of a run."""
+    """Print notes, lateness and file of a run."""
     for note in (*result.notes, *result.doubts):
         err.print(f"note: {note}", markup=False)
     if not virtual:

@@ -1,7 +1,5 @@
 """hil validate."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 
@@ -11,7 +9,7 @@ from hil.report.console import out
 
 
 def validate(
-    files: Annotated[list[Path], typer.Argument(help="Bench, profile or map files (YAML)", show_default=False)],
+    files: Annotated[list[Path], typer.Argument(help="Bench, profile or map files (YAML).", show_default=False)],
 ) -> None:
     """Check bench, profile and map files: types, units, keys, limits. Every error names file, line and field."""
     from hil.errors import InputError
@@ -27,7 +25,7 @@ def validate(
 
 
 def _checked(path: Path) -> str:
-    """What a file is; by its keys a profile, a map, or else a bench. Raises InputError."""
+    """Describe a file: by its keys a profile, a map, else a bench. Raises InputError."""
     from pydantic import BaseModel, ConfigDict
 
     from hil.errors import FieldError

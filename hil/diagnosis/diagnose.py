@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Container, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -22,11 +23,14 @@ from hil.diagnosis.verdict.findings import corrections, diagnosed_bench, finding
 from hil.diagnosis.verdict.fit_table import channel_names, fit_table
 from hil.diagnosis.verdict.judge import judge
 from hil.diagnosis.verdict.observability import not_testable
-from hil.diagnosis.wording import number, said, title
+from hil.diagnosis.wording import title, where_in_short
 from hil.errors import InputError
 from hil.identification.dataset import Measured
+from hil.quantities import digits, quantity
 from hil.recording.recording import Recording
-from hil.twin.mechanism import Dimension
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 Progress = Callable[[str], None]
 
@@ -51,6 +55,24 @@ class Diagnosis:
     proof: Proof
     final: Fit
     experiment: Experiment | None = None  # what to run next; None where nothing is open
+
+    def plot(self, what: Literal["residuals", "location", "finding"] = "residuals", number: int = 1) -> Figure:
+        """Draw the residuals before and after, the location of the mismatch, or the evidence for finding `number`.
+
+        Residuals are those of the first held-out recording. Raises InputError if there is no such finding.
+        """
+        from hil.diagnosis.pictures import findings, location
+        from hil.figures.drawing import over_time
+
+        if what == "location":
+            return location.location_figure(self)
+        if what == "finding":
+            if not 1 <= number <= len(self.result.missing):
+                raise InputError(f"number: given {number}, allowed 1 to {len(self.result.missing)} findings")
+            return findings.finding_figure(self, findings.term_of(self, number - 1)).figure
+        run = (self.held_out or self.train)[0]
+        title = f"{run.name}: measured - twin, noise floor in grey"
+        return over_time(title, run.time_s, location.residual_panels(self, run))
 
 
 def diagnose(
@@ -135,7 +157,7 @@ def statement(result: Result) -> str:
         )
         found = entry.validate_ or entry.train
         before, after, noise = (
-            said(value, Dimension(entry.unit)) for value in (found.before_rms, found.after_rms, found.noise_floor_rms)
+            quantity(value, entry.unit) for value in (found.before_rms, found.after_rms, found.noise_floor_rms)
         )
         return (
             f"Missing physics: {named} With it the twin leaves {after} rms of {name} on "
@@ -208,27 +230,10 @@ def _unexplained(
     above = {name: float(np.sqrt(ratio)) for name, ratio in worst.items() if ratio > FLOOR}
     if not above:
         return Unexplained(share=share, description="Every channel is down to its noise.")
-    text = ", ".join(f"{name} at {number(above[name])} × its noise" for name in sorted(above, key=lambda n: -above[n]))
+    text = ", ".join(f"{name} at {digits(above[name])} × its noise" for name in sorted(above, key=lambda n: -above[n]))
     if verdict is Verdict.UNEXPLAINED and location is not None:
-        text += f"; {shape(location)}"
+        text += f"; {where_in_short(location)}"
     return Unexplained(share=share, description=f"Left above the noise, block by block: {text}.")
-
-
-def shape(location: Location) -> str:
-    """Where a residual without a name shows, in words."""
-    parts = [f"block {title(location.block)}"]
-    parts += [f"{100.0 * phase.share:.0f} % in {title(phase.kind)}" for phase in location.phases[:2]]
-    if location.position_m:
-        parts.append(f"at {location.position_m[0]:.3f} to {location.position_m[1]:.3f} m")
-    if location.speed_m_s:
-        parts.append(f"at speeds of {location.speed_m_s[0]:.3g} to {location.speed_m_s[1]:.3g} m/s")
-    if location.frequency_hz:
-        parts.append(f"repeating at {location.frequency_hz:.3g} Hz")
-    elif location.order_per_rev:
-        parts.append(f"repeating {location.order_per_rev:.3g} times per revolution")
-    elif location.period_m:
-        parts.append(f"repeating every {1e3 * location.period_m:.3g} mm")
-    return ", ".join(parts)
 
 
 def _notes(

@@ -25,10 +25,11 @@ from hil.diagnosis.estimation.terms import SAME, ambiguous, compatible
 from hil.diagnosis.search.forward_selection import ALIKE, TIED, Explanation
 from hil.diagnosis.verdict.findings import rivals_of
 from hil.diagnosis.verdict.observability import not_testable
-from hil.diagnosis.wording import number, title
+from hil.diagnosis.wording import title
 from hil.identification.dataset import Measured
 from hil.motion.profile import Profile
 from hil.motion.trajectory import Trajectory, plan
+from hil.quantities import digits
 from hil.twin.axis import Start
 from hil.twin.library import BY_ID
 
@@ -106,7 +107,7 @@ def separating(
         best.profile,
         best.effects,
         f"{best.what} is expected to tell {_pairs(best.answered)}, with "
-        f"evidence of {number(best.worth)} or more, where {TIED:g} is very strong.",
+        f"evidence of {digits(best.worth)} or more, where {TIED:g} is very strong.",
     )
 
 

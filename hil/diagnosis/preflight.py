@@ -17,9 +17,9 @@ from scipy.signal import savgol_filter
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
 from hil.channels import AXIS_CHANNELS
-from hil.diagnosis.wording import number
 from hil.errors import InputError
 from hil.identification.dataset import Measured, take
+from hil.quantities import digits, misread_factors
 from hil.recording.recording import Recording
 
 SHORTEST_S = 2.0  # there, back, and time to settle
@@ -33,25 +33,10 @@ _AWAY, _AWAY_M = 0.01, 1e-3  # of the travel, and at least: a loop that rests so
 SATURATED = 0.5  # share of the moving rows at the limit
 _SMOOTH_S = 0.021  # window of the derivatives of the motor position
 
-_POSITION_UNITS = {
-    1e3: "mm",
-    1e6: "µm",
-    1e9: "nm",
-    180.0 / math.pi: "degrees",
-    0.5 / math.pi: "revolutions",
-    1e-3: "km",
-    39.37: "inches",
-}
-_TORQUE_UNITS = {
-    1e3: "mN m",
-    1e6: "µN m",
-    1e2: "N cm",
-    1e-3: "kN m",
-    1.0 / 9.81: "kgf m",
+_POSITION_UNITS = misread_factors("mm", "um", "nm", "deg", "rev", "km", "in")
+_VELOCITY_UNITS = misread_factors("m/min", "mm/s", "mm/min", "um/s")
+_TORQUE_UNITS = misread_factors("mN m", "uN m", "N cm", "kN m", "kgf m", "kgf cm", "ozf in", "lbf ft") | {
     9.81: "N m times 9.81",
-    10.2: "kgf cm",
-    141.6: "ozf in",
-    0.7376: "lbf ft",
     2.0 * math.pi: "N m times 2 pi",
     1.0 / (2.0 * math.pi): "N m per 2 pi",
 }
@@ -159,9 +144,8 @@ def _position_problems(run: Measured, ratio: float, motor: str, table: str) -> I
 
 def _set_point_problems(run: Measured, name: str) -> Iterator[str]:
     slope = _slope(np.gradient(run.position_command_m, run.period_s), run.velocity_command_m_s)
-    units = {60.0: "m/min", 1e3: "mm/s", 6e4: "mm/min", 1e6: "µm/s"}
     if abs(slope - 1.0) > SLOPE_TOLERANCE:
-        yield f"{name}: {_factor(slope, units, 'the derivative of the position set-points')}"
+        yield f"{name}: {_factor(slope, _VELOCITY_UNITS, 'the derivative of the position set-points')}"
 
 
 def _torque_problems(run: Measured, bench: Bench) -> Iterator[str]:
@@ -268,6 +252,6 @@ def _factor(factor: float, units: dict[float, str], against: str) -> str:
     near = min(units, key=lambda unit: abs(math.log(max(size, 1e-300) / unit)))
     looks = f": it looks like {units[near]}" if abs(math.log(max(size, 1e-300) / near)) < math.log(1.6) else ""
     return (
-        f"{sign}is {number(size)} × what {against} ask for{looks}; correct its unit in the import map, "
+        f"{sign}is {digits(size)} × what {against} ask for{looks}; correct its unit in the import map, "
         "or the bench file"
     )

@@ -1,85 +1,73 @@
-"""Numbers and sentences as an engineer says them, and the units of parameters."""
+"""Mechanisms, terms and locations in words."""
 
-from __future__ import annotations
-
-import math
+from collections.abc import Iterable
 
 from hil.bench.bench_file import Bench
 from hil.diagnosis.estimation.terms import Term
+from hil.diagnosis.result import Location
+from hil.quantities import digits, quantity
 from hil.twin.library import BY_ID
-from hil.twin.mechanism import Dimension, Role
-
-# Dimension -> (from this magnitude on, factor, unit), largest first
-_SAID: dict[Dimension, tuple[tuple[float, float, str], ...]] = {
-    Dimension.LENGTH: ((1.0, 1.0, "m"), (1e-3, 1e3, "mm"), (0.0, 1e6, "µm")),
-    Dimension.TIME: ((1.0, 1.0, "s"), (1e-3, 1e3, "ms"), (0.0, 1e6, "µs")),
-    Dimension.ANGLE: ((1e-2, 1.0, "rad"), (0.0, 1e6, "µrad")),
-    Dimension.RATIO: ((0.0, 100.0, "%"),),
-    Dimension.COUNT: ((0.0, 1.0, ""),),  # sentences say what is counted
-}
-
-# Units of the nominal parameters, which their names hold in short
-NOMINAL_UNITS = {
-    "motor_mass_kg": "kg",
-    "table_mass_kg": "kg",
-    "mass_kg": "kg",
-    "motor_inertia_kg_m2": "kg m^2",
-    "stiffness_n_m": "N/m",
-    "nut_support_stiffness_n_m": "N/m",
-    "nut_stiffness_n_m": "N/m",
-    "coupling_stiffness_n_m_rad": "N m/rad",
-    "damping_ratio": "1",
-    "inertia_scale": "1",
-    "stiffness_scale": "1",
-    "coulomb_torque_n_m": "N m",
-    "viscous_torque_n_m_s_rad": "N m s/rad",
-    "coulomb_force_n": "N",
-    "viscous_force_n_s_m": "N s/m",
-}
+from hil.twin.mechanism import Role
 
 
-def number(value: float) -> str:
-    """Three significant digits, without exponent where that is readable."""
-    if value == 0.0:
-        return "0"
-    if 1e-3 <= abs(value) < 1e6:
-        return f"{value:.{max(2 - math.floor(math.log10(abs(value))), 0)}f}"
-    return f"{value:.2e}"
+def title(effect: str) -> str:
+    """Words of an id: "constant_load" -> "constant load"."""
+    return effect.replace("_", " ")
 
 
-def said(value: float, dimension: Dimension, linear: bool = False) -> str:
-    """A parameter's value with its unit, such as "24.7 µm"."""
-    unit = dimension.unit(linear)
-    for start, factor, text in _SAID.get(dimension, ((0.0, 1.0, unit),)):
-        if abs(value) >= start:
-            return f"{number(value * factor)} {text}".rstrip()
-    raise AssertionError(dimension)
-
-
-def sentence(term: Term, bench: Bench) -> str:
-    """The mechanism's sentence with its values, and the variant that it takes."""
-    mechanism, linear = BY_ID[term.effect], bench.axis.linear
-    values = {
-        parameter.name: said(value, parameter.dimension, linear)
-        for parameter, value in zip(mechanism.parameters, term.values, strict=True)
-    }
-    values["viscous_speed"] = said(bench.axis.physics().viscous_speed, Dimension.MOTOR_SPEED, linear)
-    variant = mechanism.variants[term.variant]
-    text = (variant.sentence or mechanism.sentence).format(**values)
-    return f"{text.removesuffix('.')} ({variant.name})." if variant.name else text
+def titles(effects: Iterable[str]) -> str:
+    """Words of several ids, separated by commas."""
+    return ", ".join(map(title, effects))
 
 
 def label(term: Term) -> str:
-    """An effect's id as words, with the period or order where it may act more than once."""
+    """Words of a term's effect, with its period or order if the effect may act more than once."""
     mechanism = BY_ID[term.effect]
     if mechanism.most == 1:
         return title(term.effect)
     period_m, order = (mechanism.named(role, term.values) for role in (Role.PERIOD, Role.ORDER))
     if period_m is not None:
-        return f"{title(term.effect)}, every {said(period_m, Dimension.LENGTH)}"
-    return title(term.effect) if order is None else f"{title(term.effect)}, {number(order)} times per revolution"
+        return f"{title(term.effect)}, every {quantity(period_m, 'm')}"
+    return title(term.effect) if order is None else f"{title(term.effect)}, {digits(order)} times per revolution"
 
 
-def title(effect: str) -> str:
-    """An effect's id as words."""
-    return effect.replace("_", " ")
+def sentence(term: Term, bench: Bench) -> str:
+    """Sentence of a term's mechanism with the values of the term, and its variant in brackets."""
+    mechanism, linear = BY_ID[term.effect], bench.axis.linear
+    values = {
+        parameter.name: quantity(value, parameter.dimension.unit(linear))
+        for parameter, value in zip(mechanism.parameters, term.values, strict=True)
+    }
+    values["viscous_speed"] = quantity(bench.axis.physics().viscous_speed, "m/s" if linear else "rad/s")
+    variant = mechanism.variants[term.variant]
+    text = (variant.sentence or mechanism.sentence).format(**values)
+    return f"{text.removesuffix('.')} ({variant.name})." if variant.name else text
+
+
+def where(location: Location) -> dict[str, str]:
+    """A location in words: what is located (block, element, channels, phases, ...) -> where."""
+    phases = [f"{title(phase.kind)} {100.0 * phase.share:.0f} %" for phase in location.phases if phase.share >= 0.005]
+    found = {
+        "block": title(location.block),
+        "element": location.element,
+        "channels": ", ".join(location.channels),
+        "phases of motion": ", ".join(phases),
+        "windows of the first recording": ", ".join(f"{a:.2f} to {b:.2f} s" for a, b in location.windows_s),
+    }
+    if location.position_m:
+        found["position"] = "{:.1f} to {:.1f} mm".format(*(1e3 * value for value in location.position_m))
+    if location.speed_m_s:
+        found["speed"] = "{:.3g} to {:.3g} m/min".format(*(60.0 * value for value in location.speed_m_s))
+    if location.order_per_rev:
+        found["repetition"] = f"{digits(location.order_per_rev)} times per revolution of the screw"
+    elif location.period_m:
+        found["repetition"] = f"every {quantity(location.period_m, 'm')} of travel"
+    elif location.frequency_hz:
+        found["repetition"] = f"{digits(location.frequency_hz)} Hz"
+    return {what: text for what, text in found.items() if text}
+
+
+def where_in_short(location: Location) -> str:
+    """Block, phases, ranges and repetition of a location in one clause."""
+    wanted = ("block", "phases of motion", "position", "speed", "repetition")
+    return ", ".join(f"{what} {text}" for what, text in where(location).items() if what in wanted)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.signal import butter, filtfilt
@@ -24,6 +24,9 @@ from hil.identification.inverse_dynamics import InverseDynamics, fit_inverse_dyn
 from hil.identification.nominal_fit import MOST_STEPS, TABLE_ACCURACY_M, FitResult, fit_nominal
 from hil.identification.residuals import datum_m
 from hil.recording.recording import Recording
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 SCHEMA_VERSION = 1
 LOW_PASS_HZ, LOW_PASS_ORDER = 100.0, 4
@@ -103,6 +106,19 @@ class Comparison:
     def explained(self) -> bool:
         """Whether the twin explains the recording: torque, and table against motor, within 1.3 x their noise."""
         return max(self.torque_over_noise, self.table_over_noise) <= EXPLAINED
+
+    def plot(self, blocks: bool = False, fastest_move: bool = False) -> Figure:
+        """Draw measured, simulated and their deviation over time: the whole axis in closed loop or block by block.
+
+        With `fastest_move` only the move with the greatest speed is drawn.
+        """
+        from hil.figures.drawing import over_time
+        from hil.identification import figures
+
+        what = "fastest move" if fastest_move else "block by block" if blocks else "whole recording"
+        panels = figures.block_panels(self) if blocks else figures.motion_panels(self)
+        rows = figures.fastest_move(self) if fastest_move else slice(None)
+        return over_time(f"{self.recording.name}: {what}", self.measured.time_s, panels, rows)
 
     def as_json(self) -> dict[str, Any]:
         """The numbers, SI units in the names or beside them."""

@@ -12,6 +12,7 @@ A linear axis is the same in N, N s/m and m/s.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -21,11 +22,29 @@ from hil.errors import InputError
 from hil.identification.least_squares import solve
 from hil.recording.recording import Recording
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 FEED_TOLERANCE = 1e-3  # of the feed: what counts as constant
 FEED_RESOLUTION_M_S = 2e-6  # two of the last digits that recordings are usually printed with
 SETTLING_S = 0.15  # transient after the feed is reached; several time constants of a position loop
 ENDING_S = 0.01  # before the feed changes again
 AVERAGED_MIN_S = 0.1  # a shorter mean holds more of the last transient than of friction
+
+
+class FrictionUnits(NamedTuple):
+    """Name of the motor's effort, and units of Coulomb friction, viscous friction and speed."""
+
+    quantity: str
+    coulomb: str
+    viscous: str
+    speed: str
+
+
+_UNITS = {
+    AxisKind.ROTARY: FrictionUnits("torque", "N m", "N m s/rad", "rad/s"),
+    AxisKind.LINEAR: FrictionUnits("force", "N", "N s/m", "m/s"),
+}
 
 
 @dataclass(frozen=True)
@@ -55,6 +74,17 @@ class FrictionResult:
     viscous_std_error: float
     offset_std_error: float
     residual_rms: float  # of the points about the line [N m] or [N]
+
+    @property
+    def units(self) -> FrictionUnits:
+        """Units on this kind of axis."""
+        return _UNITS[self.kind]
+
+    def plot(self) -> Figure:
+        """Draw torque over speed with the regression line, and the residuals."""
+        from hil.identification.figures import friction_figure
+
+        return friction_figure(self)
 
     def torque(self, speed: FloatArray) -> FloatArray:
         """Friction of the line [N m] or [N] over speed [rad/s] or [m/s]."""

@@ -13,12 +13,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hil.errors import FieldError, InputError, field_name
+from hil.figures.panels import COMMAND, Line, Panel
 from hil.motion.pieces import MAX_DURATION_S, Array, Cubic, Motion, MotionLimits, Move, Phase
 from hil.motion.time_optimal import State, point_to_point, stop, time_optimal_duration_s
 
@@ -72,6 +73,21 @@ class Trajectory:
     @property
     def duration_s(self) -> float:
         return float(self.time_s[-1])
+
+    def plot(self) -> Any:
+        """Draw position, velocity, acceleration and jerk over time; returns a matplotlib Figure."""
+        from hil.figures.drawing import over_time
+
+        panels = [
+            Panel(label, unit, (Line("set-points", values, COMMAND),))
+            for label, unit, values in (
+                ("position", "m", self.position_m),
+                ("velocity", "m/s", self.velocity_m_s),
+                ("acceleration", "m/s^2", self.acceleration_m_s2),
+                ("jerk", "m/s^3", self.jerk_m_s3),
+            )
+        ]
+        return over_time(f"Set-points, {self.duration_s:.1f} s", self.time_s, panels)
 
 
 def plan(profile: Profile, period_s: float, start_m: float | None = None) -> Trajectory:

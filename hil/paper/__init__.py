@@ -1,11 +1,8 @@
-"""Reproduction of the source paper: what it prints, what comes out, why they differ, and its figures.
+"""Reproduction of the source paper: printed and computed values, reasons for differences, and its figures.
 
-`run_paper` computes and writes; how the result looks on a page is `hil.report`'s matter.
+`run_paper` computes and writes numbers and pictures; `hil.report.paper_report` writes the page.
 """
 
-from __future__ import annotations
-
-import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -13,11 +10,12 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from hil.arrays import FloatArray
+from hil.files.output import write_json
 from hil.paper import figures, source, tables
-from hil.paper.tables import Row, Verdict
+from hil.paper.row import Reproduction, Row
 from hil.twin.structure.modal import modal
 
-__all__ = ["PaperResult", "Picture", "Row", "Verdict", "run_paper"]
+__all__ = ["PaperResult", "Picture", "Reproduction", "Row", "run_paper"]
 
 SCHEMA_VERSION = 1
 
@@ -45,7 +43,7 @@ class PaperResult:
     modal_matrix: FloatArray
 
     def as_json(self) -> dict[str, Any]:
-        """What paper.json holds."""
+        """Content of paper.json."""
         return {
             "schema_version": SCHEMA_VERSION,
             "rows": [asdict(row) | {"verdict": row.verdict.value} for row in self.rows],
@@ -72,7 +70,7 @@ def run_paper(out: Path) -> PaperResult:
         frequencies_hz=tables.frequencies_hz("7-dof"),
         modal_matrix=modal(chain).shape,
     )
-    (out / "paper.json").write_text(json.dumps(result.as_json(), indent=1) + "\n", encoding="utf-8")
+    write_json(out / "paper.json", result.as_json())
     return result
 
 

@@ -1,7 +1,5 @@
 """Pictures of the reproduction: modes, frequency responses, moves. Each returns a matplotlib figure."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import pi
 from typing import Any
@@ -109,7 +107,7 @@ def _bode(
     phase.plot(frequency_hz, degrees, **style)
 
 
-def move_over_time(runs: Sequence[tuple[str, source.Run]]) -> Figure:
+def move_over_time(runs: Sequence[tuple[str, source.SimulatedMove]]) -> Figure:
     """Position, following error, velocity, acceleration, jerk and torque of one move (Fig. 7, 8, 10)."""
     figure = Figure(figsize=(9.0, 12.0), layout="constrained")
     axes = figure.subplots(6, 1, sharex=True)

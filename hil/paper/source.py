@@ -1,6 +1,4 @@
-"""The axis of the source paper: what it states, what had to be assumed, and its moves simulated."""
-
-from __future__ import annotations
+"""Axis of the source paper: stated and assumed parameters, and its simulated moves."""
 
 from dataclasses import dataclass
 from math import pi
@@ -62,7 +60,7 @@ def gains(velocity_feedforward: float, position_from_table: bool = False) -> Gai
 
 
 @dataclass(frozen=True)
-class Run:
+class SimulatedMove:
     """One simulated move: set-points and response (n,) at the control period."""
 
     feed_m_min: float
@@ -84,7 +82,7 @@ class Run:
         return self.command.position_m - self.response.table_position_m
 
 
-def simulate(chain: Chain, feed_m_min: float, velocity_feedforward: float = 1.0) -> Run:
+def simulate(chain: Chain, feed_m_min: float, velocity_feedforward: float = 1.0) -> SimulatedMove:
     """A 100 mm move of an axis with friction by Eq. 24, from rest, in closed loop."""
     law = gains(velocity_feedforward)
     profile = Profile.model_validate(
@@ -100,4 +98,4 @@ def simulate(chain: Chain, feed_m_min: float, velocity_feedforward: float = 1.0)
     )
     command = plan(profile, law.period_s)
     twin = Twin(Physics(chain, COULOMB_N_M, VISCOUS_N_M_S_RAD), law)
-    return Run(feed_m_min, command, twin.simulate(command.position_m, command.velocity_m_s))
+    return SimulatedMove(feed_m_min, command, twin.simulate(command.position_m, command.velocity_m_s))

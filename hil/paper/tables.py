@@ -1,16 +1,14 @@
-"""The table of the reproduction: what the source prints, what comes out, and why they differ."""
-
-from __future__ import annotations
+"""Table of the reproduction: printed value, computed value, and the reason for a difference."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from enum import StrEnum
 from math import pi
 
 import numpy as np
+from scipy.optimize import brentq
 
 from hil.arrays import FloatArray
-from hil.paper import printed, source
+from hil.paper import formulas, source
+from hil.paper.row import Row
 from hil.twin.structure import frequency
 from hil.twin.structure.ballscrew import equivalent_two_mass
 from hil.twin.structure.chain import RECONSTRUCTED_TABLE_1, seven_dof, two_mass
@@ -21,43 +19,13 @@ CIRCULAR = (
     "Table 1 is lost; its rounded reconstruction was solved from Eq. 20, 22 and 23, so that this checks the "
     "model, not the authors' numbers"
 )
-BAND_HZ = np.geomspace(1.0, 4000.0, 3000)  # rigid body to above the highest mode
-
-
-class Verdict(StrEnum):
-    """Outcome of one comparison."""
-
-    REPRODUCED = "reproduced"
-    DIFFERS = "differs"
-    NOT_COMPARABLE = "not comparable"  # no number printed, or none that can be computed
-
-
-@dataclass(frozen=True)
-class Row:
-    """One comparison. `tolerance` is relative (of the printed value; absolute where that is 0)."""
-
-    where: str
-    quantity: str
-    unit: str
-    printed: float | None
-    computed: float | None
-    tolerance: float
-    why: str
-
-    @property
-    def verdict(self) -> Verdict:
-        """Whether the computed value lies within the tolerance of the printed one."""
-        if self.printed is None or self.computed is None:
-            return Verdict.NOT_COMPARABLE
-        allowed = self.tolerance * (abs(self.printed) or 1.0)
-        return Verdict.REPRODUCED if abs(self.computed - self.printed) <= allowed else Verdict.DIFFERS
 
 
 def rows() -> tuple[Row, ...]:
     """All comparisons, in the order of the source."""
     groups = (
-        _two_dof_formulas,
-        _transfer_functions,
+        formulas.two_dof_formulas,
+        formulas.transfer_functions,
         _modes,
         _equivalent_model,
         _friction,
@@ -67,99 +35,6 @@ def rows() -> tuple[Row, ...]:
         _experiments,
     )
     return tuple(row for group in groups for row in group())
-
-
-def _two_dof_formulas() -> Iterator[Row]:
-    m1, m2 = source.MOTOR_MASS_KG, source.TABLE_MASS_KG
-    mass = np.diag([m1, m2])
-    modes = modal(source.chains()["2-dof"])
-    shape = modes.shape * source.RATIO_M_RAD  # from angles to metres
-    w, xi = float(modes.frequency_rad_s[1]), float(modes.damping_ratio[1])
-    yield Row(
-        "Eq. 1, 7, 8",
-        "decay rate of the elastic mode (printed: of the formula as it stands)",
-        "1/s",
-        abs(printed.pole_eq_8(w, xi).real),
-        xi * w,
-        0.01,
-        "printed, the damping multiplies the position and damps nothing; it multiplies the velocity",
-    )
-    wrong = printed.modal_matrix_eq_5(m1, m2)
-    yield Row(
-        "Eq. 5",
-        "phi_1^T [M] phi_2, rigid and elastic mode (printed: of the matrix as it stands)",
-        "1",
-        float(wrong[:, 0] @ mass @ wrong[:, 1]),
-        float(shape[:, 0] @ mass @ shape[:, 1]),
-        0.01,
-        "the (1, 2) entry is + sqrt(m2/(m1 mt)), as Eq. 10 uses; with the printed sign the modes are not orthogonal",
-    )
-    yield Row(
-        "Eq. 6",
-        "rigid-body acceleration per newton (printed: of the formula as it stands)",
-        "m/s^2/N",
-        printed.rigid_acceleration_eq_6(shape),
-        1.0 / (m1 + m2),
-        0.01,
-        "the modal force is {g} = [phi]^T {f} with mass-normalised modes, not {f} = [phi]{g}",
-    )
-
-
-def _transfer_functions() -> Iterator[Row]:
-    chain = source.chains()["7-dof"]
-    modes = modal(chain)
-    natural = frequency.natural_transfer(chain, frequency.modal_damping(chain, modes), BAND_HZ)
-    worst = _largest_deviation(natural, frequency.modal_transfer(modes, BAND_HZ))
-    yield Row(
-        "Eq. 16, 17",
-        "largest relative deviation of TF1 and TF2, natural against modal, 1-4000 Hz",
-        "1",
-        0.0,
-        worst,
-        1e-9,
-        "the two forms are the same function; what is left is rounding",
-    )
-    inertia, stiffness = RECONSTRUCTED_TABLE_1.reduced()
-    beta_s = 2e-5  # dampers in proportion to the springs, c = beta k
-    natural = frequency.natural_transfer(chain, beta_s * chain.stiffness_n_m_rad, BAND_HZ)
-    recursive = frequency.recursive_transfer(inertia, stiffness, beta_s * stiffness, BAND_HZ)
-    yield Row(
-        "Appendix",
-        "largest relative deviation of TF1 and TF2, corrected recursion against matrices",
-        "1",
-        0.0,
-        _largest_deviation(natural, recursive),
-        1e-9,
-        "TF_5-6 and TF_6-7 hold as printed; TF_3-4 and TF_4-5 after the corrections of the next rows",
-    )
-    _, plus = printed.recursion(inertia, stiffness, beta_s * stiffness, BAND_HZ, screw_damper=1.0)
-    yield Row(
-        "Appendix, TF_4-5",
-        "|TF2| at 1 Hz (printed: with the sign as it stands)",
-        "1",
-        float(abs(plus[0])),
-        float(abs(recursive[1][0])),
-        0.01,
-        "a minus sign is missing: the nut spring acts on theta4 + theta5 - theta6. At 1 Hz the table "
-        "must follow the motor",
-    )
-    tf1, _ = printed.recursion(inertia, stiffness, beta_s * stiffness, BAND_HZ, nut_sign=-1.0)
-    yield Row(
-        "Appendix, TF_3-4",
-        "largest change of |TF1| by the damper c_t3 left out of the denominator",
-        "dB",
-        0.0,
-        float(np.max(np.abs(20.0 * np.log10(np.abs(tf1 / recursive[0]))))),
-        0.1,
-        "the denominator holds (c_t3 + c_t5) s, where c_t5 s is printed; with c = 20 us x k",
-    )
-
-
-Transfer = tuple[frequency.ComplexArray, frequency.ComplexArray]
-
-
-def _largest_deviation(expected: Transfer, found: Transfer) -> float:
-    return max(float(np.max(np.abs(b / a - 1.0))) for a, b in zip(expected, found, strict=True))
 
 
 def _modes() -> Iterator[Row]:
@@ -275,15 +150,15 @@ def _control() -> Iterator[Row]:
 
 
 def _position_gain_for(wanted_hz: float) -> float:
-    """Kv [1/s] that gives the 2-dof loop without feed-forward a bandwidth, by bisection."""
+    """Kv [1/s] that gives the 2-dof loop without feed-forward the bandwidth `wanted_hz`."""
     grid_hz = np.geomspace(0.1, 400.0, 4000)
     modes, law = modal(source.chains()["2-dof"]), source.gains(0.0)
-    low, high = 1.0, source.POSITION_GAIN_1_S
-    while high - low > 1e-3:
-        middle = 0.5 * (low + high)
-        response = frequency.closed_loop(modes, law._replace(position_gain_1_s=middle), grid_hz)
-        low, high = (middle, high) if frequency.bandwidth_hz(grid_hz, response) < wanted_hz else (low, middle)
-    return low
+
+    def excess_hz(gain_1_s: float) -> float:
+        response = frequency.closed_loop(modes, law._replace(position_gain_1_s=gain_1_s), grid_hz)
+        return frequency.bandwidth_hz(grid_hz, response) - wanted_hz
+
+    return float(brentq(excess_hz, 1.0, source.POSITION_GAIN_1_S, xtol=1e-3))
 
 
 def _two_against_seven() -> Iterator[Row]:

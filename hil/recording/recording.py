@@ -11,7 +11,7 @@ import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
@@ -21,6 +21,9 @@ from hil.arrays import FloatArray
 from hil.channels import AXIS_CHANNELS, CHANNELS, AxisChannels, AxisKind
 from hil.errors import InputError
 from hil.files import csv_columns
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 METADATA_KEY = b"hil"  # of the schema: the metadata as JSON
 CLOCK_TOLERANCE = 0.01  # of the period: what a step of a regular clock may deviate
@@ -58,6 +61,22 @@ class Recording:
     def axis(self) -> AxisChannels:
         """Names of the channels of this kind of axis."""
         return AXIS_CHANNELS[self.kind]
+
+    def plot(self, *channels: str) -> Figure:
+        """Draw channels over time, a panel each; without names: set-points, positions, torque and its command.
+
+        Raises InputError for a channel that is not recorded.
+        """
+        from hil.figures.drawing import over_time
+        from hil.figures.panels import MEASURED, Line, Panel
+
+        names = self.axis
+        usual = (names.position_command, names.velocity_command, *names.predicted)
+        panels = [
+            Panel(name.replace("_", " "), CHANNELS[name].unit, (Line("recorded", self[name], MEASURED),))
+            for name in channels or [name for name in usual if name in self.columns]
+        ]
+        return over_time(self.name, self["time_s"], panels)
 
 
 def read_recording(path: str | Path) -> Recording:

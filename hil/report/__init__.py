@@ -1,1 +1,1 @@
-"""One look for every result: a page that works offline, pictures, and the numbers as JSON."""
+"""Pages of results: HTML that opens without a network, pictures, and the numbers as JSON."""

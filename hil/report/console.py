@@ -1,9 +1,8 @@
-"""What commands say on the terminal: results on stdout, progress on stderr."""
+"""Output of commands on the terminal: results on stdout, progress on stderr."""
 
-from __future__ import annotations
-
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from typing import Protocol
 
 from rich.console import Console
 from rich.table import Table
@@ -11,16 +10,20 @@ from rich.table import Table
 out = Console(highlight=False, soft_wrap=True)
 err = Console(stderr=True, highlight=False, soft_wrap=True)
 
-Progress = Callable[[str, float | None], None]  # what is going on, and the share that is done if that is known
+
+class Progress(Protocol):
+    """Receiver of progress: the task at work, and the share of it that is done if that is known."""
+
+    def __call__(self, task: str, share: float | None = None) -> None: ...
 
 
 @contextmanager
 def progress() -> Iterator[Progress]:
-    """Progress bars of tasks by name; without a terminal one line per task."""
+    """Show a progress bar per task; without a terminal print one line per task."""
     if not err.is_terminal:
         seen: set[str] = set()
 
-        def line(task: str, share: float | None) -> None:
+        def line(task: str, share: float | None = None) -> None:
             if task not in seen:
                 seen.add(task)
                 err.print(f"{task} ...")
@@ -33,7 +36,7 @@ def progress() -> Iterator[Progress]:
     with Bars(TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), console=err, transient=True) as bars:
         tasks: dict[str, TaskID] = {}
 
-        def update(task: str, share: float | None) -> None:
+        def update(task: str, share: float | None = None) -> None:
             if task not in tasks:
                 for other in tasks.values():
                     bars.update(other, total=1.0, completed=1.0)
@@ -44,7 +47,7 @@ def progress() -> Iterator[Progress]:
 
 
 def table(headers: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Print a table; all columns but the first are set to the right."""
+    """Print a table; all columns but the first are aligned to the right."""
     view = Table(box=None, pad_edge=False, header_style="bold")
     for index, header in enumerate(headers):
         view.add_column(header, justify="right" if index else "left")

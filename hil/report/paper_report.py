@@ -1,12 +1,10 @@
-"""The report of `hil paper`: the table printed / computed / why they differ, and the figures."""
-
-from __future__ import annotations
+"""Report of `hil paper`: printed and computed values, reasons for differences, and the figures."""
 
 from pathlib import Path
 
-from hil.paper import PaperResult, Verdict
+from hil.paper import PaperResult, Reproduction
+from hil.quantities import digits
 from hil.report.page import Number, Page
-from hil.report.style import digits
 
 
 def write_paper(result: PaperResult, folder: Path) -> None:
@@ -15,7 +13,7 @@ def write_paper(result: PaperResult, folder: Path) -> None:
         "The source paper, reproduced",
         f"{len(result.rows)} figures of the paper recomputed",
         verdict(result),
-        not _count(result, Verdict.DIFFERS),
+        not _count(result, Reproduction.DIFFERS),
     )
     page.heading("Printed and computed")
     page.table(
@@ -52,14 +50,15 @@ def write_paper(result: PaperResult, folder: Path) -> None:
 
 
 def verdict(result: PaperResult) -> str:
-    """How many of the printed figures come out, and how many do not."""
+    """Count the printed figures that are reproduced, differ, or cannot be compared."""
+    reproduced, differ, incomparable = (_count(result, outcome) for outcome in Reproduction)
     return (
-        f"{_count(result, Verdict.REPRODUCED)} of the printed figures come out, {_count(result, Verdict.DIFFERS)} "
-        f"differ, {_count(result, Verdict.NOT_COMPARABLE)} cannot be compared; the table says why."
+        f"{reproduced} of the printed figures are reproduced, {differ} differ, {incomparable} cannot be compared; "
+        "the table gives the reasons."
     )
 
 
-def _count(result: PaperResult, wanted: Verdict) -> int:
+def _count(result: PaperResult, wanted: Reproduction) -> int:
     return sum(row.verdict is wanted for row in result.rows)
 
 

@@ -1,6 +1,4 @@
-"""Interactive plots (Bokeh) of the same panels as the pictures: linked in time, zoomed with the wheel."""
-
-from __future__ import annotations
+"""Interactive plots (Bokeh) of the panels of the pictures, with a common time axis and zoom."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -11,17 +9,15 @@ from bokeh.models import BoxAnnotation, ColumnDataSource, CrosshairTool, HoverTo
 from bokeh.plotting import figure
 
 from hil.arrays import FloatArray
-from hil.report import style
-from hil.report.figures import Panel
-from hil.report.style import thin
+from hil.figures.panels import NOISE, Panel, thin
 
-DRAWN_ROWS = 12_000  # of each panel: above it, least and greatest of each stretch
+DRAWN_ROWS = 12_000  # of a panel: keeps a page of 16 panels below 8 MB
 
 
 def over_time(time_s: FloatArray, panels: Sequence[Panel], heights: Sequence[int] = ()) -> Any:
-    """Panels one above the other with one time axis, a common toolbar and a crosshair through all of them."""
+    """Plot panels one above the other with a common time axis (n,) [s], toolbar and crosshair."""
     shared = Range1d(float(time_s[0]), float(time_s[-1]), bounds=(float(time_s[0]), float(time_s[-1])))
-    line = Span(dimension="height", line_color=style.NOISE, line_dash="dotted")
+    line = Span(dimension="height", line_color=NOISE, line_dash="dotted")
     cursor = CrosshairTool(overlay=line, dimensions="height")
     plots = []
     for index, panel in enumerate(panels):
@@ -30,7 +26,7 @@ def over_time(time_s: FloatArray, panels: Sequence[Panel], heights: Sequence[int
         plots.append(_panel(time_s, panel, shared, cursor, height + 40 * last + 26 * (index == 0), last))
     legend = plots[0].legend[0]
     legend.orientation, legend.padding, legend.border_line_alpha = "horizontal", 2, 0.0
-    plots[0].add_layout(legend, "above")  # inside, it would hide a line sooner or later
+    plots[0].add_layout(legend, "above")  # inside, it would hide lines
     for plot in plots[1:]:
         plot.legend.visible = False
     return gridplot(
@@ -43,25 +39,25 @@ def over_time(time_s: FloatArray, panels: Sequence[Panel], heights: Sequence[int
 
 
 def _panel(time_s: FloatArray, panel: Panel, shared: Range1d, cursor: CrosshairTool, height: int, last: bool) -> Any:
-    unit = panel.shown
+    factor, unit = panel.shown()
     chosen = thin(tuple(line.values for line in panel.lines), DRAWN_ROWS)
     data = {"time_s": time_s[chosen].astype(np.float32)}
-    data |= {f"y{i}": (line.values[chosen] * unit.factor).astype(np.float32) for i, line in enumerate(panel.lines)}
+    data |= {f"y{i}": (line.values[chosen] * factor).astype(np.float32) for i, line in enumerate(panel.lines)}
     source = ColumnDataSource(data)
     plot = figure(
         height=height,
         x_range=shared,
         tools="xpan,xwheel_zoom,box_zoom,reset,save",
         active_scroll="xwheel_zoom",
-        y_axis_label=f"{panel.label} [{unit.unit}]",
+        y_axis_label=f"{panel.label} [{unit}]",
         x_axis_label="time [s]" if last else None,
     )
     if panel.band > 0.0:
         plot.add_layout(
             BoxAnnotation(
-                bottom=-panel.band * unit.factor,
-                top=panel.band * unit.factor,
-                fill_color=style.NOISE,
+                bottom=-panel.band * factor,
+                top=panel.band * factor,
+                fill_color=NOISE,
                 fill_alpha=0.35,
                 level="underlay",
             )
@@ -71,7 +67,7 @@ def _panel(time_s: FloatArray, panel: Panel, shared: Range1d, cursor: CrosshairT
         look = {"line_width": 3.2, "line_alpha": 0.5} if line.broad else {"line_width": 1.1}
         drawn.append(plot.line("time_s", f"y{i}", source=source, color=line.colour, legend_label=line.label, **look))
     tips = [("time", "@time_s{0.0000} s")]
-    tips += [(line.label, f"@y{i}{{0.0000}} {unit.unit}") for i, line in enumerate(panel.lines)]
+    tips += [(line.label, f"@y{i}{{0.0000}} {unit}") for i, line in enumerate(panel.lines)]
     plot.add_tools(cursor, HoverTool(renderers=drawn[:1], tooltips=tips, mode="vline"))
     plot.xaxis.major_label_text_font_size = "12px" if last else "0px"
     plot.yaxis.axis_label_text_font_style = "normal"

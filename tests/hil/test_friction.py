@@ -16,7 +16,6 @@ from hil.errors import InputError
 from hil.identification.friction import constant_feed_stretches, identify_friction
 from hil.recording.importing import import_recording
 from hil.recording.recording import Recording, read_recording
-from hil.report.friction_figure import friction_figure
 
 SHARED = Path(__file__).parents[2].parent / "shared" / "recordings"
 PERIOD_S = 1e-3
@@ -129,7 +128,7 @@ def test_stretches_are_constant_maximal_and_hold_every_plateau(plateaus: list[tu
 
 def test_the_figure_shows_points_line_and_values() -> None:
     result = identify_friction(sweep(FEEDS, noise=0.01))
-    figure = friction_figure(result)
+    figure = result.plot()
     top, bottom = figure.axes
     assert top.lines[0].get_xdata() == pytest.approx([point.speed for point in result.points])
     assert top.get_ylabel() == "mean torque [N m]"
@@ -155,4 +154,4 @@ def test_emps_at_constant_feed_agrees_with_its_inverse_dynamics() -> None:
     assert abs(result.coulomb - 20.394) < 3 * result.coulomb_std_error
     assert abs(result.viscous - 203.50) < 3 * result.viscous_std_error
     assert abs(result.offset + 3.165) < 3 * result.offset_std_error
-    assert friction_figure(result).axes[0].get_ylabel() == "mean force [N]"
+    assert result.plot().axes[0].get_ylabel() == "mean force [N]"

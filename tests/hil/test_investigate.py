@@ -92,7 +92,7 @@ def test_a_designed_motion_that_is_not_confirmed_is_not_run(tmp_path: Path) -> N
         return False
 
     found = investigate_bench(
-        {"one_way": ONE_WAY}, {}, bench, tmp_path, run, allowed, lambda: nullcontext(lambda text, share: None)
+        {"one_way": ONE_WAY}, {}, bench, tmp_path, run, allowed, lambda: nullcontext(lambda text, share=None: None)
     )
     assert found.ended == "next_experiment.yaml was not run: it was not confirmed."
     assert found.rounds[0].motions == ("one_way",)
@@ -122,7 +122,7 @@ def test_a_run_that_stops_ends_it_and_keeps_the_recording(tmp_path: Path) -> Non
             tmp_path,
             run,
             lambda profile: True,
-            lambda: nullcontext(lambda text, share: None),
+            lambda: nullcontext(lambda text, share=None: None),
         )
     assert (tmp_path / "round_1" / "one_way.parquet").is_file()
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from hil.motion.pieces import Phase
-from hil.paper import PaperResult, Verdict, run_paper, source
-from hil.paper.tables import Row
+from hil.paper import PaperResult, Reproduction, run_paper, source
+from hil.paper.row import Row
 from hil.twin.structure.chain import RECONSTRUCTED_TABLE_1, one_mass
 
 NOTES = Path(__file__).parents[2] / "../shared/paper/paper-notes.md"
@@ -28,7 +28,7 @@ def row(result: PaperResult, where: str, quantity: str = "") -> Row:
 def test_eq_20_and_22_are_reproduced(result: PaperResult) -> None:
     rows = [r for r in result.rows if r.where in ("Eq. 20", "Eq. 22")]
     assert len(rows) == 8
-    assert {r.verdict for r in rows} == {Verdict.REPRODUCED}
+    assert {r.verdict for r in rows} == {Reproduction.REPRODUCED}
 
 
 @pytest.mark.parametrize(
@@ -47,7 +47,7 @@ def test_what_does_not_hold_as_printed_is_said_with_both_values_and_a_reason(
     result: PaperResult, where: str, quantity: str, printed: float, computed: float
 ) -> None:
     found = row(result, where, quantity)
-    assert found.verdict is Verdict.DIFFERS
+    assert found.verdict is Reproduction.DIFFERS
     assert found.printed == pytest.approx(printed, rel=0.005, abs=1e-9)
     assert found.computed == pytest.approx(computed, rel=0.005, abs=1e-9)
     assert found.why
@@ -61,17 +61,17 @@ def test_the_misprints_of_the_appendix_matter(result: PaperResult) -> None:
 
 
 def test_both_forms_of_eq_23_and_of_the_friction_torque_stand_in_the_table(result: PaperResult) -> None:
-    assert row(result, "Eq. 23", "parallel").verdict is Verdict.REPRODUCED
-    assert row(result, "Sec. 3.3.1, Eq. 24", "7 m/min").verdict is Verdict.REPRODUCED
+    assert row(result, "Eq. 23", "parallel").verdict is Reproduction.REPRODUCED
+    assert row(result, "Sec. 3.3.1, Eq. 24", "7 m/min").verdict is Reproduction.REPRODUCED
     assert row(result, "Eq. 16, 17").computed < 1e-9
     assert row(result, "Appendix").computed < 1e-9
 
 
 def test_every_difference_has_a_reason_and_what_has_no_number_claims_none(result: PaperResult) -> None:
     for r in result.rows:
-        if r.verdict is Verdict.DIFFERS:
+        if r.verdict is Reproduction.DIFFERS:
             assert r.why, r.quantity
-        if r.verdict is Verdict.NOT_COMPARABLE:
+        if r.verdict is Reproduction.NOT_COMPARABLE:
             assert r.printed is None or r.computed is None
 
 
@@ -79,8 +79,8 @@ def test_every_difference_has_a_reason_and_what_has_no_number_claims_none(result
 def test_the_verdict_follows_the_tolerance(printed: float) -> None:
     allowed = 0.01 * (abs(printed) or 1.0)
     inside, outside = (Row("", "", "", printed, printed + share * allowed, 0.01, "") for share in (0.99, 1.01))
-    assert inside.verdict is Verdict.REPRODUCED
-    assert outside.verdict is Verdict.DIFFERS
+    assert inside.verdict is Reproduction.REPRODUCED
+    assert outside.verdict is Reproduction.DIFFERS
 
 
 def test_the_folder_holds_the_pictures_and_the_numbers(result: PaperResult) -> None:
@@ -99,7 +99,7 @@ def test_the_folder_holds_the_pictures_and_the_numbers(result: PaperResult) -> N
         assert min(pixels.shape[:2]) > 500
         assert pixels[..., :3].std() > 0.05  # not an empty page
     assert len(written["rows"]) == len(result.rows)
-    assert {r["verdict"] for r in written["rows"]} == {verdict.value for verdict in Verdict}
+    assert {r["verdict"] for r in written["rows"]} == {verdict.value for verdict in Reproduction}
     assert any("reconstruction" in text for text in written["assumptions"])
     np.testing.assert_allclose(written["seven_dof"]["modal_matrix"], result.modal_matrix)
     inertias, _ = RECONSTRUCTED_TABLE_1.reduced()

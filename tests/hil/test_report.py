@@ -18,12 +18,13 @@ from matplotlib.image import imread
 
 from hil.bench.bench_file import Bench, load_bench
 from hil.errors import InputError
+from hil.figures.panels import MEASURED, SIMULATED, Line, Panel, thin
 from hil.files.output import new_folder, write_json
 from hil.identification.compare import compare
 from hil.identification.dataset import bench_of
-from hil.report import style
-from hil.report.compare_report import fastest_move, verdict, write_bench, write_comparison
-from hil.report.figures import Line, Panel
+from hil.identification.figures import fastest_move
+from hil.quantities import quantity
+from hil.report.compare_report import verdict, write_bench, write_comparison
 from hil.report.page import Number, Page
 from hil.report.plots import over_time
 
@@ -96,7 +97,7 @@ def test_the_page_works_without_a_network(report: Path, tmp_path: Path) -> None:
     document = rendered(report / "compare.html", tmp_path)
     assert document.count('class="bk-Canvas"') + document.count("bk-GridPlot") >= 2
     body = re.sub(r"<script.*?</script>", "", document, flags=re.DOTALL)
-    assert body.index("The twin explains this recording") < body.index("Measured over simulated")
+    assert body.index("The twin explains this recording") < body.index("Measured and simulated")
     assert "following error" in body
 
 
@@ -129,7 +130,7 @@ def test_a_written_bench_reads_the_same(name: str, tmp_path: Path) -> None:
 def test_thinning_keeps_the_extremes(values: list[float], limit: int, count: int) -> None:
     column = np.array(values)
     columns = tuple(np.roll(column, shift) for shift in range(count))
-    rows = style.thin(columns, limit)
+    rows = thin(columns, limit)
     assert np.all(np.diff(rows) > 0)
     assert rows[0] == 0
     assert rows[-1] == column.size - 1
@@ -155,13 +156,13 @@ def test_thinning_keeps_the_extremes(values: list[float], limit: int, count: int
     ],
 )
 def test_quantities_are_readable(value: float, unit: str, text: str) -> None:
-    assert style.quantity(value, unit) == text
+    assert quantity(value, unit) == text
 
 
 def test_long_recordings_stay_light(tmp_path: Path) -> None:
     time_s = np.arange(600_000) * 1e-3
     noise = np.random.default_rng(1).normal(size=(2, time_s.size))
-    lines = (Line("measured", noise[0], style.MEASURED, broad=True), Line("simulated", noise[1], style.SIMULATED))
+    lines = (Line("measured", noise[0], MEASURED, broad=True), Line("simulated", noise[1], SIMULATED))
     page = Page("long", "", "verdict", True)
     page.plot(over_time(time_s, [Panel("position", "m", lines)] * 16))
     page.write(tmp_path / "page.html")

@@ -18,8 +18,9 @@ from hil.diagnosis.search.forward_selection import TIED, Explanation, Rival
 from hil.diagnosis.search.validity import claimable
 from hil.diagnosis.verdict.confidence import confidence
 from hil.diagnosis.verdict.cross_validation import Ablation
-from hil.diagnosis.wording import NOMINAL_UNITS, number, sentence, title
+from hil.diagnosis.wording import sentence, title
 from hil.identification.dataset import Measured
+from hil.quantities import digits, unit_of
 from hil.twin.library import BY_ID
 from hil.twin.mechanism import Dimension, Role
 
@@ -99,7 +100,7 @@ def corrections(owner: Bench, found: Fit) -> dict[str, Correction]:
     """The nominal parameters of the owner and as fitted."""
     deviations = standard_errors(found)
     return {
-        name: Correction(nominal=float(getattr(owner.axis, name)), value=value, std=std, unit=NOMINAL_UNITS[name])
+        name: Correction(nominal=float(getattr(owner.axis, name)), value=value, std=std, unit=unit_of(name))
         for name, value, std in zip(owner.axis.NOMINAL, found.model.values(found.x), deviations, strict=False)
     }
 
@@ -191,7 +192,7 @@ def _text(rival: Rival, term: Term, train: Sequence[Measured]) -> str:
     if rival.tied:
         return (
             f"cannot be told apart from {title(term.effect)} by this motion: evidence against it is "
-            f"{number(rival.evidence)}, and next to the noise it leaves as much"
+            f"{digits(rival.evidence)}, and next to the noise it leaves as much"
         )
     size = math.sqrt(rival.fit.reduced)
     parameters = BY_ID[rival.fit.model.terms[-1].effect].parameters
@@ -203,13 +204,13 @@ def _text(rival: Rival, term: Term, train: Sequence[Measured]) -> str:
     ]
     bound = f", with {', '.join(stuck)} at the end of what is possible" if stuck else ""
     return (
-        f"leaves {number(size)} × the noise in rms{bound}; evidence against it "
-        f"{number(rival.evidence)}, where {TIED:g} is very strong"
+        f"leaves {digits(size)} × the noise in rms{bound}; evidence against it "
+        f"{digits(rival.evidence)}, where {TIED:g} is very strong"
     )
 
 
 def _needed(ablation: Ablation) -> str:
-    text = f"without it the residual energy is {number(ablation.train)} × as large on the training recordings"
+    text = f"without it the residual energy is {digits(ablation.train)} × as large on the training recordings"
     if ablation.held_out is None:
         return text + "; there are no held-out recordings"
-    return f"{text}, {number(ablation.held_out)} × on the held-out ones"
+    return f"{text}, {digits(ablation.held_out)} × on the held-out ones"

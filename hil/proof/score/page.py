@@ -7,6 +7,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
+from hil.figures.drawing import save
 from hil.files.output import write_json, write_text
 from hil.proof.score import pictures
 from hil.proof.score.confusion import by_effect, confusion, power, verdicts
@@ -24,9 +25,8 @@ from hil.proof.score.tables import (
     worst_tables,
 )
 from hil.proof.seal import read_seal
-from hil.report.figures import save
+from hil.quantities import digits
 from hil.report.page import Number, Page
-from hil.report.style import digits
 
 SCORES, REPORT, MARKDOWN = "scores.json", "report.html", "proof.md"
 _PICTURES = (

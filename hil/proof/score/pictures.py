@@ -10,11 +10,11 @@ from matplotlib.figure import Figure
 
 from hil.arrays import FloatArray
 from hil.diagnosis.wording import title
+from hil.figures import panels as style
+from hil.figures.drawing import style_axis
 from hil.proof.score.confusion import Counts, confusion, power
 from hil.proof.score.scores import Scores
 from hil.proof.score.statistics import Rate, rate
-from hil.report import style
-from hil.report.figures import style_axis
 
 _ERRORS = (0.03, 0.10)  # goals of the median and of the 90th percentile
 _LEAST_ERROR = 1e-5  # drawn: what is better is drawn there

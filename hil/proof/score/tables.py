@@ -13,8 +13,8 @@ from hil.proof.score.grading import Marked
 from hil.proof.score.scores import Goal, Scores
 from hil.proof.score.statistics import Rate
 from hil.proof.seal import CASES
+from hil.quantities import digits
 from hil.report.page import Number
-from hil.report.style import digits
 
 HEADERS = ("", "goal", "measured", "95 %", "of", "reached")
 _WORST = 5

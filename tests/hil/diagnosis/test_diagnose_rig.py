@@ -16,7 +16,7 @@ from hil.diagnosis.diagnose import Diagnosis, diagnose
 from hil.diagnosis.result import schema
 from hil.identification.dataset import take
 from hil.recording.recording import read_recording
-from hil.report.diagnosis.report import write_diagnosis
+from hil.report.diagnosis_report import write_diagnosis
 from hil.twin.library import BY_ID
 
 # As the README of the recordings has it

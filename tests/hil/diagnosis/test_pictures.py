@@ -11,14 +11,13 @@ from hil.diagnosis.diagnose import Diagnosis
 from hil.diagnosis.estimation.fit import evaluate
 from hil.diagnosis.estimation.hypothesis import Model
 from hil.diagnosis.estimation.terms import Term
+from hil.diagnosis.pictures.findings import finding_figure
 from hil.diagnosis.result import Result, Unexplained, Verdict
 from hil.diagnosis.search.forward_selection import Explanation
 from hil.diagnosis.search.initial_values import axis_facts
 from hil.diagnosis.verdict.cross_validation import Proof
+from hil.figures.drawing import save
 from hil.identification.dataset import take
-from hil.report.diagnosis.figures import convincing
-from hil.report.diagnosis.location import location_figure
-from hil.report.figures import save
 from hil.twin.library import BY_ID
 
 OWNER = bench()
@@ -55,7 +54,7 @@ def diagnosis_of(effect: str, times: float = 3.0) -> Diagnosis:
 @pytest.mark.parametrize("effect", BY_ID)
 def test_every_mechanism_has_its_picture(effect: str, tmp_path: Path) -> None:
     diagnosis = diagnosis_of(effect)
-    shown = convincing(diagnosis, diagnosis.final.model.terms[0])
+    shown = finding_figure(diagnosis, diagnosis.final.model.terms[0])
     assert save(shown.figure, tmp_path / f"{effect}.png").stat().st_size > 10_000
     assert shown.caption.endswith("Recordings: run.")
     axes = shown.figure.axes
@@ -64,5 +63,5 @@ def test_every_mechanism_has_its_picture(effect: str, tmp_path: Path) -> None:
 
 
 def test_the_location_has_its_picture(tmp_path: Path) -> None:
-    figure = location_figure(diagnosis_of("stribeck_friction"))
+    figure = diagnosis_of("stribeck_friction").plot("location")
     assert save(figure, tmp_path / "location.png").stat().st_size > 10_000

@@ -1,0 +1,18 @@
+"""Options and arguments that several commands share."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+RunBench = Annotated[str, typer.Option(help="Bench file or name of a shipped bench.")]
+RecordedBench = Annotated[
+    str | None,
+    typer.Option(help="Bench file or name of a shipped bench. Default: the bench stored in the recording."),
+]
+Virtual = Annotated[
+    bool, typer.Option("--virtual/--wall", help="Simulated bench: run as fast as possible or in wall-clock time.")
+]
+Force = Annotated[bool, typer.Option("--force", help="Run although jitter or bus load exceed the bench's limits.")]
+Seed = Annotated[int | None, typer.Option(min=0, help="Seed of the simulated sensors. Default: the bench's seed.")]
+Out = Annotated[Path | None, typer.Option("--out", help="Folder for the results. Default: a new one in runs/.")]

@@ -1,0 +1,1 @@
+"""Pictures of a diagnosis, as matplotlib figures."""

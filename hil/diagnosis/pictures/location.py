@@ -1,0 +1,106 @@
+"""Pictures of the location of a mismatch, and of the residuals before and after."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from hil.arrays import FloatArray
+from hil.channels import CHANNELS
+from hil.diagnosis.estimation.fit import Fit
+from hil.diagnosis.location.locate import BLOCKS, block_shares, phase_shares
+from hil.diagnosis.location.residual_energy import energies, without_terms
+from hil.diagnosis.result import Mode, Verdict
+from hil.diagnosis.verdict.fit_table import channel_names, residuals
+from hil.diagnosis.wording import title
+from hil.figures.drawing import style_axis
+from hil.figures.panels import COMMAND, DEVIATION, MEASURED, SIMULATED, Line, Panel
+from hil.identification.dataset import Measured
+
+if TYPE_CHECKING:
+    from hil.diagnosis.diagnose import Diagnosis
+
+BINS = 40
+TIME_BIN_S = 0.05
+ENERGY = "residual² / noise²"
+
+
+def location_figure(diagnosis: Diagnosis) -> Figure:
+    """Draw shares of the residual energy by block and phase, and its mean over position, speed and time."""
+    before, final = reference_fit(diagnosis), diagnosis.final
+    seen = (
+        energies(without_terms(final), diagnosis.train, final)
+        if final.model.terms
+        else energies(before, diagnosis.train)
+    )
+    figure = Figure(figsize=(10.0, 8.2), layout="constrained")
+    axes = figure.subplot_mosaic([["block", "phase"], ["position", "speed"], ["time", "time"]])
+    blocks = {title(BLOCKS[name][0]): share for name, share in block_shares(before, diagnosis.train).items()}
+    _shares(axes["block"], blocks, "Block in whose output it shows")
+    _shares(axes["phase"], {title(phase.kind): phase.share for phase in phase_shares(seen)}, "Phase of motion")
+    excess = np.concatenate([energy.rows for energy in seen])
+    position = np.concatenate([1e3 * energy.run.position_command_m for energy in seen])
+    speed = np.concatenate([60.0 * np.abs(energy.run.velocity_command_m_s) for energy in seen])
+    _density(axes["position"], position, excess)
+    style_axis(axes["position"], ENERGY, "position of the table [mm]", "Mean over the travel")
+    _density(axes["speed"], speed, excess)
+    style_axis(axes["speed"], ENERGY, "speed of the table [m/min]", "Mean over the speed")
+    run, rows = seen[0].run, seen[0].rows
+    size = max(round(TIME_BIN_S / run.period_s), 1)
+    starts = np.arange(0, rows.size, size)
+    power = np.maximum(np.add.reduceat(rows, starts), 0.0) / size
+    axes["time"].fill_between(run.time_s[starts], power, color=DEVIATION, alpha=0.45, linewidth=0.0, step="post")
+    style_axis(axes["time"], ENERGY, "time [s]", f"Over time: {run.name}; grey: speed set-point")
+    set_point = axes["time"].twinx()
+    set_point.plot(run.time_s, 60.0 * run.velocity_command_m_s, color=COMMAND, linewidth=0.7)
+    set_point.set_ylabel("speed set-point [m/min]")
+    return figure
+
+
+def reference_fit(diagnosis: Diagnosis) -> Fit:
+    """The hypothesis whose mismatch is located: the bench file if only its parameters are wrong, else refitted."""
+    if diagnosis.result.verdict in (Verdict.PARAMETER_ERROR, Verdict.NO_MISMATCH):
+        return diagnosis.explanation.owner
+    return diagnosis.explanation.nominal
+
+
+def residual_panels(diagnosis: Diagnosis, run: Measured) -> list[Panel]:
+    """Residual of each channel of a run before and after, with the noise floor as a band."""
+    held_out = any(run is other for other in diagnosis.held_out)
+    before, after = residuals(reference_fit(diagnosis), run), residuals(diagnosis.final, run)
+    panels = []
+    for channel, recorded in channel_names(diagnosis.owner, run).items():
+        if recorded not in diagnosis.result.fit:
+            continue
+        entry = diagnosis.result.fit[recorded]
+        closed = entry.mode is Mode.CLOSED_LOOP
+        floor = (entry.validate_ if held_out and entry.validate_ else entry.train).noise_floor_rms
+        first, second = (
+            _judged((found.closed_loop if closed else found.blocks)[channel], run) for found in (before, after)
+        )
+        lines = Line("before", first, COMMAND, broad=True), Line("after", second, SIMULATED)
+        label = recorded.removesuffix("_rad").removesuffix("_n_m").removesuffix("_m").removesuffix("_n")
+        panels.append(Panel(f"{label.replace('_', ' ')}\n{title(entry.mode)}", CHANNELS[recorded].unit, lines, floor))
+    return panels
+
+
+def _judged(values: FloatArray, run: Measured) -> FloatArray:
+    return np.where(np.arange(values.size) < run.judged.start, 0.0, values)
+
+
+def _shares(axis: Axes, shares: dict[str, float], heading: str) -> None:
+    axis.barh(list(shares), [100.0 * share for share in shares.values()], color=MEASURED)
+    axis.invert_yaxis()
+    axis.set_xlabel("share of the energy above the noise [%]")
+    axis.set_title(heading, loc="left")
+
+
+def _density(axis: Axes, x: FloatArray, excess: FloatArray) -> None:
+    """Draw the mean of the energy above the noise (n,) per row in each bin of x (n,)."""
+    edges = np.linspace(float(x.min()), float(x.max()) + 1e-12, BINS + 1)
+    total, _ = np.histogram(x, edges, weights=excess)
+    rows, _ = np.histogram(x, edges)
+    axis.stairs(np.maximum(total, 0.0) / np.maximum(rows, 1), edges, color=MEASURED, fill=True)

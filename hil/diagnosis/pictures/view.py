@@ -1,0 +1,137 @@
+"""Data of the picture of a finding: residuals without the finding's term, and the part that the term models."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from hil.arrays import FloatArray
+from hil.diagnosis.estimation.fit import Fit
+from hil.diagnosis.estimation.terms import Term
+from hil.diagnosis.location.residual_energy import without_terms
+from hil.diagnosis.search.disturbance import Disturbance, disturbance
+from hil.figures.panels import COMMAND, MEASURED, SIMULATED
+from hil.identification.dataset import Measured
+
+if TYPE_CHECKING:
+    from hil.diagnosis.diagnose import Diagnosis
+
+BIN_SAMPLES_MIN = 8  # of a bin that is drawn: quartiles of fewer samples scatter too much
+CHANNEL_LABELS = {
+    "motor": "torque on the motor",
+    "table": "table - motor position",
+    "torque": "torque",
+    "command": "command",
+}
+
+
+class Captioned(NamedTuple):
+    """A figure and its caption."""
+
+    figure: Figure
+    caption: str
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """One run beside the final twin with one term switched off."""
+
+    term: Term
+    run: Measured
+    measured: dict[str, FloatArray]  # residuals (n,) of the twin without the term, by channel
+    modelled: dict[str, FloatArray]  # part of them (n,) that the term models
+    torque: Disturbance  # the motor's residual as a torque on the motor
+    torque_modelled: Disturbance
+
+    def residual(self, channel: str, modelled: bool) -> FloatArray:
+        """Residual (n,) or its modelled part; that of the motor as the torque that causes it."""
+        if channel == "motor":
+            return (self.torque_modelled if modelled else self.torque).torque
+        return (self.modelled if modelled else self.measured)[channel]
+
+
+Drawer = Callable[["Diagnosis", Sequence[View]], Captioned]
+
+
+class Curve(NamedTuple):
+    """A signal (n,) of one run as measured or as a twin has it, with its look."""
+
+    label: str
+    values: FloatArray
+    colour: str
+
+
+def view_of(final: Fit, run: Measured, term: Term) -> View:
+    """Simulate a run without a term and with it."""
+    off = without_terms(final, term)
+    measured, left = off.model.blocks(off.x, run), final.model.blocks(final.x, run)
+    modelled = {name: measured[name] - left[name] for name in measured}
+    torque, torque_modelled = (
+        disturbance(run, values["motor"], inertia(final), final.model.observer_s) for values in (measured, modelled)
+    )
+    return View(term, run, measured, modelled, torque, torque_modelled)
+
+
+def three_curves(diagnosis: Diagnosis, run: Measured, channel: str, measured: FloatArray) -> list[Curve]:
+    """A signal (n,) as measured, as the refitted nominal twin has it, and as the final twin has it."""
+    nominal, final = (
+        measured - fit.model.blocks(fit.x, run)[channel] for fit in (diagnosis.explanation.nominal, diagnosis.final)
+    )
+    return [
+        Curve("nominal twin, refitted", nominal, COMMAND),
+        Curve("measured", measured, MEASURED),
+        Curve("twin with the findings", final, SIMULATED),
+    ]
+
+
+def longest(views: Sequence[View]) -> View:
+    """The view of the longest run."""
+    return max(views, key=lambda view: view.run.motor.size)
+
+
+def inertia(final: Fit) -> float:
+    """Inertia of the whole axis in motor units [kg m^2], linear axis [kg]."""
+    modes = final.model.resolved(final.x)[0].twin().modal
+    return float(modes.shape[modes.motor, 0] ** -2)
+
+
+def unit_of_channel(diagnosis: Diagnosis, channel: str) -> str:
+    """SI unit of a residual."""
+    return "m" if channel == "table" else "N" if diagnosis.owner.axis.linear else "N m"
+
+
+def noise(run: Measured, channel: str) -> float:
+    """White noise (1 sigma) of a residual."""
+    return {"motor": run.noise.motor, "table": run.noise.table_m}.get(channel, run.noise.torque)
+
+
+def binned(x: FloatArray, y: FloatArray, edges: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Centres (m,), medians (m,) and distances to the quartiles (2, m) of y in bins of x; NaN with too few samples."""
+    index = np.digitize(x, edges) - 1
+    quartiles = np.full((edges.size - 1, 3), np.nan)
+    for i in range(edges.size - 1):
+        if np.count_nonzero(index == i) >= BIN_SAMPLES_MIN:
+            quartiles[i] = np.percentile(y[index == i], [25.0, 50.0, 75.0])
+    low, middle, high = quartiles.T
+    return 0.5 * (edges[:-1] + edges[1:]), middle, np.stack([middle - low, high - middle])
+
+
+def angle(diagnosis: Diagnosis, view: View) -> FloatArray:
+    """Angle of the motor within its revolution [deg]."""
+    turned = view.run.motor * diagnosis.owner.axis.physics().angle_per_unit
+    return np.asarray(np.degrees(np.mod(turned, 2.0 * np.pi)))
+
+
+def position(diagnosis: Diagnosis, view: View) -> FloatArray:
+    """Position by the motor encoder [mm]."""
+    return np.asarray(1e3 * diagnosis.owner.axis.ratio_m_rad * view.run.motor)
+
+
+def around(row: int, run: Measured, half_s: float) -> slice:
+    """Rows within +- `half_s` of a row."""
+    half = round(half_s / run.period_s)
+    return slice(max(row - half, 0), min(row + half, run.motor.size))

@@ -1,0 +1,1 @@
+"""Pictures: panels over time as data, and matplotlib figures drawn from them."""

@@ -1,0 +1,74 @@
+"""Matplotlib figures in the style of every report. Matplotlib is loaded when this module is."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from hil.arrays import FloatArray
+from hil.figures.panels import NOISE, Panel, thin
+
+DRAWN_ROWS = 6000  # of a line: several per column of pixels
+
+
+def over_time(title: str, time_s: FloatArray, panels: Sequence[Panel], rows: slice = slice(None)) -> Figure:
+    """Draw panels one above the other over a common time axis (n,) [s], restricted to `rows`."""
+    figure = Figure(figsize=(10.0, 0.8 + 1.75 * len(panels)), layout="constrained")
+    axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
+    time_s = time_s[rows]
+    for axis, panel in zip(axes, panels, strict=True):
+        lines = [line.values[rows] for line in panel.lines]
+        chosen = thin(lines, DRAWN_ROWS)
+        factor, unit = panel.shown(rows)
+        if panel.band > 0.0:
+            band = panel.band * factor
+            axis.axhspan(-band, band, color=NOISE, alpha=0.35, label="noise, ±1 σ")
+        for line, values in zip(panel.lines, lines, strict=True):
+            width, alpha = (2.6, 0.5) if line.broad else (0.9, 1.0)
+            axis.plot(
+                time_s[chosen],
+                values[chosen] * factor,
+                color=line.colour,
+                label=line.label,
+                linewidth=width,
+                alpha=alpha,
+            )
+        style_axis(axis, f"{panel.label}\n[{unit}]")
+    axes[0].set_title(title, loc="left")
+    labelled = [axis.get_legend_handles_labels() for axis in axes]
+    known = {label: handle for handles, labels in labelled for handle, label in zip(handles, labels, strict=True)}
+    legend_above(axes[0], list(known.values()))
+    axes[-1].set_xlabel("time [s]")
+    axes[-1].set_xlim(time_s[0], time_s[-1])
+    figure.align_ylabels(axes)
+    return figure
+
+
+def style_axis(axis: Axes, label: str, x_label: str | None = None, title: str | None = None) -> None:
+    """Set labels, title and grid of an axis."""
+    axis.set_ylabel(label)
+    if x_label is not None:
+        axis.set_xlabel(x_label)
+    if title is not None:
+        axis.set_title(title, loc="left")
+    axis.grid(alpha=0.3)
+    axis.margins(y=0.12)
+
+
+def legend_above(axis: Axes, handles: Sequence[object] | None = None) -> None:
+    """Put the legend above an axis, where it hides no line."""
+    axis.legend(
+        handles=axis.get_legend_handles_labels()[0] if handles is None else handles,
+        loc="lower right",
+        bbox_to_anchor=(1.0, 1.0),
+        ncols=3,
+        frameon=False,
+        borderaxespad=0.2,
+    )
+
+
+def save(figure: Figure, path: Path) -> Path:
+    """Write a figure as PNG and return the path."""
+    figure.savefig(path, dpi=110)
+    return path

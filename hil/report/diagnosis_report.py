@@ -1,0 +1,181 @@
+"""Report of `hil diagnose`: page, pictures, numbers, and the bench with the corrected parameters and the findings."""
+
+from pathlib import Path
+
+from hil.diagnosis.diagnose import NEXT_EXPERIMENT, Diagnosis
+from hil.diagnosis.pictures.findings import finding_figure, term_of
+from hil.diagnosis.pictures.location import residual_panels
+from hil.diagnosis.result import FitFigures, Result, Value, Verdict
+from hil.diagnosis.wording import label, title, titles, where
+from hil.figures.drawing import save
+from hil.files.output import write_json
+from hil.motion.profile import write_profile
+from hil.quantities import change, digits, percent, quantity, reading_unit
+from hil.report import plots
+from hil.report.compare_report import write_bench
+from hil.report.page import Number, Page
+from hil.twin.library import BY_ID
+
+_FIT_HEADERS = (
+    "channel",
+    "how",
+    "recordings",
+    "bench file",
+    "before: parameters refitted",
+    "after",
+    "noise floor",
+    "after / floor",
+)
+
+
+def write_diagnosis(diagnosis: Diagnosis, folder: Path) -> None:
+    """Write diagnosis.json, report.html with its PNGs, bench.diagnosed.yaml and, if one helps, next_experiment.yaml."""
+    result = diagnosis.result
+    names = ", ".join(run.name for run in diagnosis.train)
+    good = result.verdict is not Verdict.UNEXPLAINED
+    page = Page(f"Diagnosis of {names}", _lead(diagnosis), result.statement, good)
+    for index in range(len(result.missing)):
+        _finding(page, diagnosis, index, folder)
+    if result.location is not None:
+        page.heading("Where it is")
+        page.items([f"{what.capitalize()}: {text}." for what, text in where(result.location).items()])
+        page.picture(
+            save(diagnosis.plot("location"), folder / "location.png"),
+            "Energy of the mismatch above the noise. The input of each block is the measured one, so that a mismatch "
+            "shows only in the block that causes it; energy over position and speed is the mean per sample.",
+        )
+    _fit(page, diagnosis, folder)
+    _corrections(page, result)
+    page.heading("What remains unexplained")
+    page.text(result.unexplained.description)
+    if result.unexplained.share > 0.0:
+        page.text(f"Unexplained: {percent(result.unexplained.share)} of the energy above the noise.")
+    page.heading("What this motion cannot show")
+    page.text(
+        titles(result.not_testable)
+        or "Every mechanism of the library would show in these recordings at a strength that matters."
+    )
+    _next_experiment(page, diagnosis, folder)
+    page.heading("How it was judged")
+    repeated = diagnosis.experiment.note if diagnosis.experiment else ""
+    page.items(
+        [
+            *(note for note in result.notes if note != repeated),
+            f"The diagnosis took {digits(result.runtime_s)} s.",
+            "bench.diagnosed.yaml is the bench with these parameters and findings, for every other command.",
+        ]
+    )
+    write_json(folder / "diagnosis.json", result.as_json())
+    write_bench(diagnosis.bench, folder / "bench.diagnosed.yaml")
+    page.write(folder / "report.html")
+
+
+def _lead(diagnosis: Diagnosis) -> str:
+    seconds = sum(run.motor.size * run.period_s for run in diagnosis.train)
+    held_out = ", ".join(run.name for run in diagnosis.held_out) or "nothing"
+    bench = f"bench {diagnosis.owner.name} ({diagnosis.owner.axis.model})"
+    return f"{seconds:.1f} s of training, held out: {held_out} · {bench}"
+
+
+def _finding(page: Page, diagnosis: Diagnosis, index: int, folder: Path) -> None:
+    finding, term = diagnosis.result.missing[index], term_of(diagnosis, index)
+    mechanism = BY_ID[finding.effect]
+    page.heading(f"{index + 1}. {title(finding.effect).capitalize()}: {mechanism.element}")
+    figure, caption = finding_figure(diagnosis, term)
+    again = f"_{term.slot + 1}" if term.slot else ""
+    page.picture(save(figure, folder / f"{term.effect}{again}.png"), caption)
+    sure = f"{100.0 * finding.confidence:.0f} %" if finding.confidence < 0.99 else "above 99 %"
+    page.text(f"{finding.sentence} Confidence {sure}: {finding.needed}.")
+    page.text(f"{mechanism.equation} ({mechanism.source})")
+    if finding.form:
+        page.text(f"Reported as part of this curve, because it corrects the curve's form only slightly: {finding.form}")
+    page.table(
+        ("parameter", "value", "standard error", "unit"),
+        [(name, *_value(entry)) for name, entry in finding.parameters.items()],
+    )
+    if finding.equivalents:
+        page.text(f"This motion cannot distinguish it from: {titles(finding.equivalents)}.")
+    if finding.rivals:
+        page.table(
+            ("rejected alternative", "reason"), [(title(rival.effect), rival.evidence) for rival in finding.rivals]
+        )
+
+
+def _fit(page: Page, diagnosis: Diagnosis, folder: Path) -> None:
+    result = diagnosis.result
+    page.heading("Does modelling it help?")
+    page.table(
+        _FIT_HEADERS,
+        [
+            (name, title(entry.mode), what, *_figures(found, entry.unit))
+            for name, entry in result.fit.items()
+            for what, found in (("training", entry.train), ("held out", entry.validate_))
+            if found is not None
+        ],
+    )
+    run = (diagnosis.held_out or diagnosis.train)[0]
+    save(diagnosis.plot("residuals"), folder / "residuals.png")
+    page.text(f"Measured - twin on {run.name}, before and after; the band is the noise floor (residuals.png).")
+    page.plot(plots.over_time(run.time_s, residual_panels(diagnosis, run)))
+    kept, dropped = diagnosis.proof.ablations, diagnosis.proof.dropped
+    if not dropped and not (result.missing and len(kept) > 1):
+        return
+    page.text("Growth of the residual energy if one term is left out and everything else is refitted.")
+    page.table(
+        ("without", "training", "held out", "kept"),
+        [
+            (
+                label(ablation.term),
+                Number(f"{digits(ablation.train)} ×"),
+                Number(f"{digits(ablation.held_out)} ×" if ablation.held_out is not None else "–"),
+                answer,
+            )
+            for answer, found in (("yes", kept), ("no", dropped))
+            for ablation in found
+        ],
+        mark=3,
+    )
+
+
+def _corrections(page: Page, result: Result) -> None:
+    if not result.parameter_corrections:
+        return
+    page.heading("Parameters of the bench")
+    page.table(
+        ("parameter", "unit", "bench file", "fitted", "standard error", "change"),
+        [
+            (
+                name,
+                entry.unit,
+                Number(digits(entry.nominal, 4)),
+                Number(digits(entry.value, 5)),
+                Number(digits(entry.std, 2)),
+                Number(change(entry.value, entry.nominal)),
+            )
+            for name, entry in result.parameter_corrections.items()
+        ],
+    )
+
+
+def _next_experiment(page: Page, diagnosis: Diagnosis, folder: Path) -> None:
+    experiment = diagnosis.experiment
+    page.heading("Next experiment")
+    page.text(experiment.note if experiment else "No question is open that another motion could answer.")
+    if experiment and experiment.profile:
+        page.text(
+            f"{NEXT_EXPERIMENT} is its profile: run it and diagnose all recordings together; hil investigate does both."
+        )
+        write_profile(folder / NEXT_EXPERIMENT, experiment.profile)
+
+
+def _value(entry: Value) -> tuple[str, ...]:
+    """Cells of a value, its standard error, and the unit in which both are shown."""
+    factor, unit = reading_unit(entry.unit, entry.value)
+    return Number(digits(entry.value * factor, 4)), Number(digits(entry.std * factor, 2)), unit
+
+
+def _figures(found: FitFigures, unit: str) -> list[Number]:
+    """Cells of a channel's rms values, and the last over the noise floor."""
+    values = (found.owner_rms, found.before_rms, found.after_rms, found.noise_floor_rms)
+    over_floor = digits(found.after_rms / found.noise_floor_rms) if found.noise_floor_rms > 0.0 else "–"
+    return [*(Number(quantity(value, unit)) for value in values), Number(over_floor)]

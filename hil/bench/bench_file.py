@@ -226,6 +226,11 @@ class Bench(_Model):
         """Constants of the control law."""
         return self.control.gains(self.axis.ratio_m_rad)
 
+    @property
+    def period_s(self) -> float:
+        """Period of the velocity loop [s]: one row of a recording, one set-point of a trajectory."""
+        return self.control.velocity_period_s
+
     def twin(self) -> Twin:
         """The twin of this bench, with its mechanisms."""
         return Twin(self.axis.physics(), self.gains, tuple(entry.active() for entry in self.mechanisms))

@@ -52,6 +52,22 @@ class Diagnosis:
     final: Fit
     experiment: Experiment | None = None  # what to run next; None where nothing is open
 
+    def __repr__(self) -> str:
+        lines = [f"Diagnosis: {self.result.verdict}", f"  {self.result.statement}"]
+        for finding in self.result.missing:
+            lines.append(f"  {title(finding.effect)}, confidence {finding.confidence:.2f}")
+            lines += [
+                f"    {name} = {number(entry.value)} ± {number(entry.std)} {entry.unit}"
+                for name, entry in finding.parameters.items()
+            ]
+            if finding.equivalents:
+                lines.append(f"    not told from {', '.join(map(title, finding.equivalents))} by this motion")
+        lines += [
+            f"  {name} = {number(entry.value)} ± {number(entry.std)} {entry.unit} (bench file {number(entry.nominal)})"
+            for name, entry in self.result.parameter_corrections.items()
+        ]
+        return "\n".join(lines)
+
 
 def diagnose(
     train: Sequence[Recording], validate: Sequence[Recording], bench: Bench, progress: Progress = lambda text: None

@@ -69,6 +69,17 @@ class Trajectory:
     def __len__(self) -> int:
         return len(self.time_s)
 
+    def __repr__(self) -> str:
+        peaks = (self.velocity_m_s, self.acceleration_m_s2, self.jerk_m_s3)
+        velocity, acceleration, jerk = (float(np.max(np.abs(values))) for values in peaks)
+        lines = [
+            f"Trajectory: {len(self)} set-points at {1e3 * self.period_s:g} ms = {self.duration_s:.3f} s, "
+            f"{len(self.runs)} segments",
+            f"  position {1e3 * self.position_m.min():.3f} to {1e3 * self.position_m.max():.3f} mm; largest velocity "
+            f"{velocity:.4g} m/s, acceleration {acceleration:.4g} m/s^2, jerk {jerk:.4g} m/s^3",
+        ]
+        return "\n".join([*lines, *(f"  note: {note}" for note in self.notes)])
+
     @property
     def duration_s(self) -> float:
         return float(self.time_s[-1])

@@ -43,6 +43,13 @@ class Recording:
     def __len__(self) -> int:
         return len(next(iter(self.columns.values())))
 
+    def __repr__(self) -> str:
+        channels = ", ".join(name for name in self.columns if name != "time_s")
+        return (
+            f"Recording {self.name}: {self.kind} axis, {len(self)} rows at {1e3 * self.period_s:g} ms = "
+            f"{len(self) * self.period_s:.3f} s\n  {channels}"
+        )
+
     def __getitem__(self, channel: str) -> FloatArray:
         """The column of a channel; raises InputError, with the channels there are, if it was not recorded."""
         if channel not in self.columns:

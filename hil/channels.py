@@ -5,8 +5,6 @@ motor side is in rad and N m; a linear axis (one mass, newtons and metres) has `
 `force_n` and `force_command_n` in their place. One line here is all that a new channel needs.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from enum import StrEnum
 

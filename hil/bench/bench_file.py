@@ -4,12 +4,10 @@ An axis file (the keys of `axis` at the top level, and `control`) is a bench too
 `load_bench` refuses what it does not understand with file, line and field.
 """
 
-from __future__ import annotations
-
 import math
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -50,7 +48,7 @@ class Control(_Model):
     velocity_filter_time_constant_s: NotNegative = 0.0
 
     @model_validator(mode="after")
-    def _one_gain(self) -> Control:
+    def _one_gain(self) -> Self:
         given = [self.velocity_gain_n_m_s_rad, self.velocity_gain_n_s_m, self.velocity_gain_ma_rpm]
         if sum(value is not None for value in given) != 1:
             raise FieldError(
@@ -105,7 +103,7 @@ class MechanismEntry(_Model):
     parameters: dict[str, float]
 
     @model_validator(mode="after")
-    def _known(self) -> MechanismEntry:
+    def _known(self) -> Self:
         if self.effect not in BY_ID:
             raise FieldError(("effect",), f"given {self.effect!r}, allowed one of {', '.join(BY_ID)}")
         mechanism = BY_ID[self.effect]
@@ -202,7 +200,7 @@ class Bench(_Model):
         return _tuples(data)
 
     @model_validator(mode="after")
-    def _room_for_mechanisms(self) -> Bench:
+    def _room_for_mechanisms(self) -> Self:
         effects = [entry.effect for entry in self.mechanisms]
         for effect in effects:
             given, most = effects.count(effect), BY_ID[effect].most
@@ -213,7 +211,7 @@ class Bench(_Model):
         return self
 
     @model_validator(mode="after")
-    def _feedback_is_measured(self) -> Bench:
+    def _feedback_is_measured(self) -> Self:
         if self.control.position_feedback == "table" and not self.has_table_encoder:
             raise FieldError(
                 ("control", "position_feedback"),

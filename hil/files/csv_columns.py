@@ -4,8 +4,6 @@ The fast reader knows that something is wrong but not always where; then a slow 
 finds the first bad field, so that an error always names line and column.
 """
 
-from __future__ import annotations
-
 import csv
 import math
 from collections.abc import Collection, Iterator

@@ -1,7 +1,5 @@
 """Folders and files of results: whole or not at all, and never mixed with older ones."""
 
-from __future__ import annotations
-
 import json
 import math
 import os

@@ -1,7 +1,5 @@
 """Pieces of motion in closed form, and a move made of them."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from enum import IntEnum

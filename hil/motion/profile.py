@@ -3,15 +3,13 @@
 `python -m hil.motion.profile` prints the JSON Schema that editors complete by (hil/profile.schema.json).
 """
 
-from __future__ import annotations
-
 import json
 import math
 from collections import Counter
 from collections.abc import Iterator
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -123,7 +121,7 @@ class Profile(Part):
             self.check_position(field, min(ends), max(ends))
 
     @model_validator(mode="after")
-    def _can_be_run(self) -> Profile:
+    def _can_be_run(self) -> Self:
         self.check_position(("start_m",), self.start_m, self.start_m)
         _ = self.runs
         return self

@@ -10,8 +10,6 @@ Over a step dv in the time Tr the peaks are a = pi dv/(2 Tr) in the middle and j
 both ends.
 """
 
-from __future__ import annotations
-
 import math
 
 from hil.errors import FieldError

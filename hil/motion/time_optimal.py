@@ -8,8 +8,6 @@ A starting velocity or acceleration beyond its limit is allowed: it is brought b
 shortest time, and both limits hold from then on. The jerk limit always holds.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

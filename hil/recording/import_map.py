@@ -5,8 +5,6 @@
 A map is a YAML file, such as the shipped `hil/maps/emps.yaml`.
 """
 
-from __future__ import annotations
-
 from math import pi
 from typing import Literal, Self
 

@@ -4,8 +4,6 @@ Parquet is the stored form (units in the schema), an Arrow stream (`.arrows`) th
 on, CSV with the canonical names the form of exchange. A foreign file goes through `hil.recording.importing`.
 """
 
-from __future__ import annotations
-
 import json
 import os
 from collections.abc import Callable, Mapping
@@ -88,11 +86,8 @@ def read_recording(path: str | Path) -> Recording:
     return readers[path.suffix.lower()](path)
 
 
-def check_columns(columns: Mapping[str, FloatArray], place: Callable[[int], str]) -> float:
-    """Period [s] of sound columns: finite, of a clock that is regular within 1 % of its period.
-
-    `place` tells where row i (from 0) stands, such as "file:line". Raises InputError.
-    """
+def check_finite(columns: Mapping[str, FloatArray], place: Callable[[int], str]) -> None:
+    """Raise InputError at the first NaN or infinity; `place` gives the place of row i (from 0), such as "file:line"."""
     for name, values in columns.items():
         bad = np.flatnonzero(~np.isfinite(values))
         if bad.size:
@@ -101,6 +96,14 @@ def check_columns(columns: Mapping[str, FloatArray], place: Callable[[int], str]
                 f"{place(row)}: {name}: given {values[row]}, allowed a finite number; "
                 "correct the value or cut the recording before it"
             )
+
+
+def check_columns(columns: Mapping[str, FloatArray], place: Callable[[int], str]) -> float:
+    """Return the period [s] of columns that are finite and whose clock is regular within 1 %.
+
+    `place` as in `check_finite`. Raises InputError.
+    """
+    check_finite(columns, place)
     time_s = columns["time_s"]
     if time_s.size < 3:
         raise InputError(f"{place(0)}: time_s: given {time_s.size} rows, allowed 3 or more; give a longer recording")

@@ -10,7 +10,7 @@ from enum import StrEnum
 
 
 class AxisKind(StrEnum):
-    """How the motor side of an axis is measured: rad and N m, or m and N."""
+    """Units of the motor side: rad and N m (rotary), or m and N (linear)."""
 
     ROTARY = "rotary"
     LINEAR = "linear"

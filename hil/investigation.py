@@ -22,7 +22,7 @@ Progress = Callable[[], AbstractContextManager[Callable[[str, float | None], Non
 
 @dataclass(frozen=True, eq=False)
 class Round:
-    """What was run, and what all recordings up to here say."""
+    """Motions of a round, and the diagnosis of all recordings up to it."""
 
     motions: tuple[str, ...]
     diagnosis: Diagnosis
@@ -43,7 +43,7 @@ class Investigation:
 
     @property
     def diagnosis(self) -> Diagnosis:
-        """What all recordings say."""
+        """Diagnosis of all recordings."""
         return self.rounds[-1].diagnosis
 
 

@@ -1,7 +1,7 @@
-"""Bench files: the axis as its owner believes it, its control, drive, encoders, and what was learnt since.
+"""Bench files: the axis as its owner describes it, control, encoders, drive, and mechanisms found by a diagnosis.
 
 An axis file (the keys of `axis` at the top level, and `control`) is a bench too: the rest has defaults.
-`load_bench` refuses what it does not understand with file, line and field.
+`load_bench` raises errors with file, line and field.
 """
 
 import math
@@ -72,7 +72,7 @@ class Control(_Model):
         return self
 
     def gains(self, ratio_m_rad: float) -> law.Gains:
-        """The constants of the control law for an axis of this ratio [m/rad]."""
+        """Return the constants of the control law for an axis with this ratio [m/rad]."""
         if self.velocity_gain_ma_rpm is not None and self.torque_constant_n_m_a is not None:
             gain = self.velocity_gain_ma_rpm * _MA_PER_RPM * self.torque_constant_n_m_a
         else:
@@ -235,13 +235,13 @@ class Bench(_Model):
 
     @property
     def motor_count(self) -> float:
-        """Count of the motor encoder [rad, or m of a linear axis]; 0 where it is not known."""
+        """Resolution of the motor encoder [rad, linear axis m]; 0 if unknown."""
         motor = self.encoders.motor
         return (motor.resolution_m or 0.0) if self.axis.linear else 2.0 * math.pi / motor.counts_per_rev
 
     @property
     def has_table_encoder(self) -> bool:
-        """Whether a linear encoder is there; never on a linear axis of one mass."""
+        """True with a linear encoder; a linear axis of one mass has none."""
         return self.encoders.table is not None and not isinstance(self.axis, OneMass)
 
 
@@ -258,7 +258,7 @@ def shipped_benches() -> dict[str, Path]:
 
 
 def bench_path(source: str | Path) -> Path:
-    """The file of a bench: a path, or the name of a shipped one. Raises InputError for a name not shipped."""
+    """Return the file of a bench from a path or a shipped name. Raises InputError for an unknown name."""
     path = Path(source)
     if path.suffix in (".yaml", ".yml"):
         return path
@@ -269,7 +269,7 @@ def bench_path(source: str | Path) -> Path:
 
 
 def load_bench(source: str | Path) -> Bench:
-    """The bench of a file, or a shipped bench by its name.
+    """Load a bench file, or a shipped bench by its name.
 
     Raises InputError with file, line, field, what was given and what is allowed.
     """

@@ -1,4 +1,4 @@
-"""Trajectory profile files: limits, travel, and the segments that run one after the other.
+"""Profile files: limits, travel, and segments in the order of their execution.
 
 `python -m hil.motion.profile` prints the JSON Schema that editors complete by (hil/profile.schema.json).
 """
@@ -25,7 +25,7 @@ MAX_MOVES = 100_000
 
 
 class Limits(Part):
-    """What no set-point of the profile passes."""
+    """Largest magnitudes of the set-points of a profile."""
 
     velocity_m_s: Positive = Field(description="largest velocity [m/s]")
     acceleration_m_s2: Positive = Field(description="largest acceleration [m/s^2]")

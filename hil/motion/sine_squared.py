@@ -1,4 +1,4 @@
-"""Moves whose velocity ramps are the square of a sine, as the path generator of the source makes them.
+"""Moves with sine-squared velocity ramps, as the path generator of the source makes them.
 
     v(t) = V sin^2(pi t / (2 Tr)),  0 <= t <= Tr        ("square sine shape", Sec. 3.3 of the source)
 

@@ -27,9 +27,9 @@ MAPS = Path(__file__).parents[1] / "maps"
 def import_recording(source: str | Path, map_path: str | Path) -> Recording:
     """Read `source` (.csv, .mat, .parquet) by the map file `map_path`, or by a shipped map's name (emps).
 
-    What the recording lacks and can be had from what it holds is derived: velocity_command_m_s by central
-    differences of the position command; torque from torque command or the other way round (on a linear axis force).
-    The metadata say so (`derived`), and what came from where (`channels`).
+    Missing channels are derived: velocity_command_m_s by central differences of the position command; torque from
+    torque command or vice versa (on a linear axis force). The metadata list them (`derived`) and the source of each channel
+    (`channels`).
     Raises InputError with file, row and column: wrong format, a missing column, text, NaN or infinity, columns of
     different length, an irregular clock.
     """
@@ -80,7 +80,7 @@ def _time_s(the_map: RecordingMap, raw: dict[str, FloatArray]) -> FloatArray:
 
 
 def _derive(columns: dict[str, FloatArray], axis: AxisChannels, period_s: float) -> dict[str, str]:
-    """Add the channels that follow from others; says how."""
+    """Add the channels that follow from others; return how each was derived."""
     derived = {}
     if axis.velocity_command not in columns:
         columns[axis.velocity_command] = np.gradient(columns[axis.position_command], period_s)
@@ -93,7 +93,7 @@ def _derive(columns: dict[str, FloatArray], axis: AxisChannels, period_s: float)
 
 
 def _describe_clock(time_s: FloatArray, period_s: float) -> str:
-    """How far the stamps are from start + tick x period, so that one may judge to take them as equidistant."""
+    """Describe the largest deviation of the time stamps from start + tick x period."""
     deviation_s = np.abs(time_s - time_s[0] - np.arange(time_s.size) * period_s).max()
     return f"period {period_s:.9g} s; stamps within {deviation_s:.2g} s of start + tick x period"
 
@@ -105,7 +105,7 @@ def _sha256(path: Path) -> str:
 
 @dataclass(frozen=True)
 class _Foreign:
-    """Finite columns of equal length, by name; `place` tells where row i (from 0) stands."""
+    """Finite columns of equal length, by name; `place` gives the place of row i (from 0) in the file."""
 
     columns: dict[str, FloatArray]
     scalars: dict[str, float]

@@ -1,7 +1,7 @@
 """Recordings: columns of the channel table at one period, read from and written to files.
 
-Parquet is the stored form (units in the schema), an Arrow stream (`.arrows`) the form while a run is going
-on, CSV with the canonical names the form of exchange. A foreign file goes through `hil.recording.importing`.
+Parquet (units in the schema) for finished runs, an Arrow stream (`.arrows`) during a run, CSV with the names of the
+channel table for exchange. Other files are read by `hil.recording.importing`.
 """
 
 import json
@@ -30,7 +30,7 @@ _FORMATS = ".parquet, .arrows (a run that was not closed) or .csv"
 class Recording:
     """A run: columns of equal length (names and units of `hil.channels`), one row per period.
 
-    `metadata` holds what JSON can: bench, profile, versions, seed, and what was noticed while reading.
+    `metadata` holds what JSON can: bench, profile, versions, seed, and remarks of the reader.
     """
 
     name: str

@@ -28,8 +28,8 @@ def import_recording(source: str | Path, map_path: str | Path) -> Recording:
     """Read `source` (.csv, .mat, .parquet) by the map file `map_path`, or by a shipped map's name (emps).
 
     Missing channels are derived: velocity_command_m_s by central differences of the position command; torque from
-    torque command or vice versa (on a linear axis force). The metadata list them (`derived`) and the source of each channel
-    (`channels`).
+    torque command or vice versa (on a linear axis force). The metadata list them (`derived`) and the source of each
+    channel (`channels`).
     Raises InputError with file, row and column: wrong format, a missing column, text, NaN or infinity, columns of
     different length, an irregular clock.
     """

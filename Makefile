@@ -1,11 +1,16 @@
 # make          set everything up and run the demo on the simulated bus
 # make test     set everything up and run every check
+# make format   format the code and apply the fixes that ruff makes by itself
+# make net      diagnose the fixed cases of tests/net again and print what changed (up to 40 min);
+#               continues a stopped run of this commit; NET=FOLDER for changes without a commit
 # make test-long, make peers, make clean
 PYTHON ?= python3.11
 BIN := .venv/bin
 INSTALLED := .venv/.installed
+# one folder holds the answers of one state of the code
+NET ?= runs/net-$(shell git rev-parse --short HEAD 2>/dev/null)
 
-.PHONY: all setup test test-long peers clean
+.PHONY: all setup test test-long format net peers clean
 
 all: setup
 	$(BIN)/hil demo
@@ -21,12 +26,20 @@ $(INSTALLED): requirements.lock pyproject.toml
 
 test: setup
 	$(BIN)/ruff check
+	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/pytest -n 2 -m "not long"
+	$(BIN)/pytest -n 2 --dist loadfile -m "not long"
 
 test-long: setup
-	$(BIN)/pytest -n 2
+	$(BIN)/pytest -n 2 --dist loadfile
+
+format: setup
+	$(BIN)/ruff check --fix
+	$(BIN)/ruff format
+
+net: setup
+	$(BIN)/python tests/net/net.py $(NET)
 
 # what hil bench and hil prove measure the project against; not needed to run it
 peers: setup

@@ -1,1 +1,124 @@
-"""Real-time hardware-in-the-loop servo control, digital twin and diagnosis of a ball-screw axis."""
+"""Real-time servo control, digital twin and diagnosis of missing physics for ball-screw and linear axes.
+
+The names of `__all__` are the public API; every other name may change without notice. A name is imported on first
+use (PEP 562), so that `import hil` itself loads neither numpy nor scipy:
+
+    import hil
+
+    bench = hil.load_bench("reference")
+    trajectory = hil.plan(hil.load_profile("profiles/reference.yaml"), bench.period_s)
+    recording = hil.simulate(bench, trajectory)
+    print(hil.compare(recording, bench))
+    print(hil.diagnose(recording, bench))
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from drivers.base import DriverError
+    from hil.api import (
+        design_experiment,
+        diagnose,
+        fit_nominal,
+        investigate,
+        run,
+        simulate,
+    )
+    from hil.bench.bench_file import Bench, load_bench
+    from hil.diagnosis.diagnose import Diagnosis
+    from hil.diagnosis.result import Verdict
+    from hil.errors import FieldError, HilError, InputError
+    from hil.identification.compare import Comparison, compare
+    from hil.identification.friction import identify_friction
+    from hil.motion.profile import Profile, load_profile
+    from hil.motion.trajectory import Trajectory, plan
+    from hil.recording.importing import import_recording
+    from hil.recording.recording import Recording, read_recording
+    from hil.twin.axis import Twin
+    from hil.twin.library import LIBRARY
+    from hil.twin.mechanism import Mechanism
+
+__version__ = "0.1.0"
+
+_MODULE_OF = {
+    # verbs
+    "load_bench": "hil.bench.bench_file",
+    "load_profile": "hil.motion.profile",
+    "plan": "hil.motion.trajectory",
+    "simulate": "hil.api",
+    "run": "hil.api",
+    "read_recording": "hil.recording.recording",
+    "import_recording": "hil.recording.importing",
+    "compare": "hil.identification.compare",
+    "fit_nominal": "hil.api",
+    "identify_friction": "hil.identification.friction",
+    "diagnose": "hil.api",
+    "design_experiment": "hil.api",
+    "investigate": "hil.api",
+    # nouns
+    "Bench": "hil.bench.bench_file",
+    "Profile": "hil.motion.profile",
+    "Trajectory": "hil.motion.trajectory",
+    "Recording": "hil.recording.recording",
+    "Twin": "hil.twin.axis",
+    "Mechanism": "hil.twin.mechanism",
+    "LIBRARY": "hil.twin.library",
+    "Comparison": "hil.identification.compare",
+    "Diagnosis": "hil.diagnosis.diagnose",
+    "Verdict": "hil.diagnosis.result",
+    # errors
+    "HilError": "hil.errors",
+    "InputError": "hil.errors",
+    "FieldError": "hil.errors",
+    "DriverError": "drivers.base",
+}
+
+__all__ = [  # noqa: RUF022  (in the order of use, as in the documentation)
+    "load_bench",
+    "load_profile",
+    "plan",
+    "simulate",
+    "run",
+    "read_recording",
+    "import_recording",
+    "compare",
+    "fit_nominal",
+    "identify_friction",
+    "diagnose",
+    "design_experiment",
+    "investigate",
+    "Bench",
+    "Profile",
+    "Trajectory",
+    "Recording",
+    "Twin",
+    "Mechanism",
+    "LIBRARY",
+    "Comparison",
+    "Diagnosis",
+    "Verdict",
+    "HilError",
+    "InputError",
+    "FieldError",
+    "DriverError",
+    "__version__",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name on first use. Raises AttributeError for a name that is not public."""
+    if name not in _MODULE_OF:
+        raise AttributeError(f"module 'hil' has no attribute {name!r}")
+    from hil.compiled.kernel_cache import provide_kernel_cache
+
+    provide_kernel_cache()  # before numba is imported
+    value = getattr(import_module(_MODULE_OF[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

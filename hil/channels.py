@@ -5,14 +5,12 @@ motor side is in rad and N m; a linear axis (one mass, newtons and metres) has `
 `force_n` and `force_command_n` in their place. One line here is all that a new channel needs.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from enum import StrEnum
 
 
 class AxisKind(StrEnum):
-    """How the motor side of an axis is measured: rad and N m, or m and N."""
+    """Units of the motor side: rad and N m (rotary), or m and N (linear)."""
 
     ROTARY = "rotary"
     LINEAR = "linear"

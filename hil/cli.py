@@ -1,7 +1,7 @@
 """The program `hil`.
 
 Exit codes: 0 done, 1 something went wrong that the user can act on, 2 a file or an argument is wrong, 130 stopped by
-ctrl-C. An error is one message on stderr, never a trace; a trace is a defect of the program.
+ctrl-C. An expected error is one message on stderr; a Python traceback means a defect of the program.
 """
 
 from __future__ import annotations
@@ -9,10 +9,11 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable
-from typing import Any
+from typing import Annotated, Any
 
 import typer
 
+from hil import __version__
 from hil.commands.bench import bench
 from hil.commands.compare import compare
 from hil.commands.demo import demo
@@ -33,6 +34,22 @@ app = typer.Typer(
     add_completion=False,
     help="Servo bench: real-time control, digital twin, comparison and diagnosis of recordings.",
 )
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        print(f"hil-servo {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", help="Print the version and exit", callback=_print_version, is_eager=True)
+    ] = False,
+) -> None:
+    """Options of the program itself."""
+
 
 # In the order of --help. A command's file imports nothing heavy at its top.
 COMMANDS: tuple[tuple[str, Callable[..., Any]], ...] = (
@@ -55,7 +72,7 @@ for _name, _command in COMMANDS:
 def main() -> None:
     """Entry point: runs the command line, turns errors into a message and an exit code."""
     try:
-        # commands spread their work over the cores themselves; threads of the linear algebra get into their way
+        # commands spread their work over the cores themselves; threads of the linear algebra would slow them down
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
         provide_kernel_cache()
         app()

@@ -1,4 +1,4 @@
-"""What `hil demo` moves and what it conceals in the simulated axis.
+"""Motions of `hil demo`, and the effects it conceals in the simulated axis.
 
 Moves: creep through reversals, two feeds of figures 7 and 8 of the source both ways, the faster one repeated so that
 the noise floor can be measured; and other feeds and strokes to prove the diagnosis on.

@@ -5,7 +5,7 @@ HilError          1   something went wrong that the user can act on
     └── FieldError    the same, at one field of a model whose file is known to the caller only
 """
 
-from __future__ import annotations
+from typing import Self
 
 FieldPath = tuple[str | int, ...]
 
@@ -34,9 +34,9 @@ class FieldError(InputError, ValueError):
         self.field = field
         self.message = message
 
-    def inside(self, *outer: str | int) -> FieldError:
+    def inside(self, *outer: str | int) -> Self:
         """The same error seen from the model that contains this one."""
-        return FieldError((*outer, *self.field), self.message)
+        return type(self)((*outer, *self.field), self.message)
 
 
 def field_name(field: FieldPath) -> str:

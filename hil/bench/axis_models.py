@@ -1,14 +1,12 @@
-"""What the owner of an axis believes about it: one pydantic model per kind of axis.
+"""Axis section of a bench file: one pydantic model per kind of axis.
 
-Each gives the twin's physics (`physics`) and names the parameters that may be wrong (`NOMINAL`), which the
-diagnosis refits before it looks for missing physics. Of them `MASSES` move, `SPRINGS` lie between motor and table.
+Each gives the twin's physics (`physics`) and names the parameters that the diagnosis refits before it looks for missing
+physics (`NOMINAL`): moving masses (`MASSES`), the springs between motor and table (`SPRINGS`), friction.
 """
-
-from __future__ import annotations
 
 from dataclasses import replace
 from math import pi
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
@@ -35,6 +33,9 @@ class _Model(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
+_FRICTION = ("coulomb_torque_n_m", "viscous_torque_n_m_s_rad")
+
+
 class _Rotary(_Model):
     """An axis driven by a motor and a screw; friction is given at the motor."""
 
@@ -49,7 +50,7 @@ class _Rotary(_Model):
 
     @property
     def linear(self) -> bool:
-        """Whether the motor side is in m and N."""
+        """True if the motor side is in m and N."""
         return False
 
     def chain(self) -> Chain:
@@ -64,16 +65,9 @@ class _Rotary(_Model):
 class TwoMass(_Rotary):
     """Motor and table with a spring between them, seen at the table (Eq. 1)."""
 
-    NOMINAL: ClassVar[tuple[str, ...]] = (
-        "motor_mass_kg",
-        "table_mass_kg",
-        "stiffness_n_m",
-        "damping_ratio",
-        "coulomb_torque_n_m",
-        "viscous_torque_n_m_s_rad",
-    )
     MASSES: ClassVar[tuple[str, ...]] = ("motor_mass_kg", "table_mass_kg")
     SPRINGS: ClassVar[tuple[str, ...]] = ("stiffness_n_m", "damping_ratio")
+    NOMINAL: ClassVar[tuple[str, ...]] = (*MASSES, *SPRINGS, *_FRICTION)
     model: Literal["two_mass"] = "two_mass"
     motor_mass_kg: Positive = Field(description="motor inertia as translation at the table [kg]")
     table_mass_kg: Positive = Field(description="table and screw at the table [kg]")
@@ -88,9 +82,9 @@ class TwoMass(_Rotary):
 class Rigid(_Rotary):
     """A motor and a screw stiff enough to be one mass with the table."""
 
-    NOMINAL: ClassVar[tuple[str, ...]] = ("mass_kg", "coulomb_torque_n_m", "viscous_torque_n_m_s_rad")
     MASSES: ClassVar[tuple[str, ...]] = ("mass_kg",)
     SPRINGS: ClassVar[tuple[str, ...]] = ()
+    NOMINAL: ClassVar[tuple[str, ...]] = (*MASSES, *SPRINGS, *_FRICTION)
     model: Literal["rigid"] = "rigid"
     mass_kg: Positive = Field(description="all moving mass and inertia at the table [kg]")
 
@@ -102,17 +96,9 @@ class Rigid(_Rotary):
 class SevenDofAxis(_Rotary):
     """The 7-dof drive of the source; defaults are the reconstruction of its lost Table 1."""
 
-    NOMINAL: ClassVar[tuple[str, ...]] = (
-        "motor_inertia_kg_m2",
-        "table_mass_kg",
-        "nut_support_stiffness_n_m",
-        "coupling_stiffness_n_m_rad",
-        "damping_ratio",
-        "coulomb_torque_n_m",
-        "viscous_torque_n_m_s_rad",
-    )
     MASSES: ClassVar[tuple[str, ...]] = ("motor_inertia_kg_m2", "table_mass_kg")
     SPRINGS: ClassVar[tuple[str, ...]] = ("nut_support_stiffness_n_m", "coupling_stiffness_n_m_rad", "damping_ratio")
+    NOMINAL: ClassVar[tuple[str, ...]] = (*MASSES, *SPRINGS, *_FRICTION)
     model: Literal["seven_dof"] = "seven_dof"
     lead_m: Lead = RECONSTRUCTED_TABLE_1.lead_m
     motor_inertia_kg_m2: Positive = RECONSTRUCTED_TABLE_1.motor_inertia_kg_m2
@@ -125,30 +111,17 @@ class SevenDofAxis(_Rotary):
 
     def chain(self) -> Chain:
         """The 7-dof chain with the nut at its position."""
-        parameters = replace(
-            RECONSTRUCTED_TABLE_1,
-            lead_m=self.lead_m,
-            motor_inertia_kg_m2=self.motor_inertia_kg_m2,
-            table_mass_kg=self.table_mass_kg,
-            coupling_stiffness_n_m_rad=self.coupling_stiffness_n_m_rad,
-            nut_stiffness_n_m=self.nut_stiffness_n_m,
-            nut_support_stiffness_n_m=self.nut_support_stiffness_n_m,
-        )
+        given = self.model_dump(include=set(vars(RECONSTRUCTED_TABLE_1)))
+        parameters = replace(RECONSTRUCTED_TABLE_1, **given)
         return seven_dof(parameters, self.damping_ratio, self.nut_position_m)
 
 
 class SerialChain(_Rotary):
     """Any number of inertias in a row, reduced to the motor shaft; the last spring is the nut."""
 
-    NOMINAL: ClassVar[tuple[str, ...]] = (
-        "inertia_scale",
-        "stiffness_scale",
-        "damping_ratio",
-        "coulomb_torque_n_m",
-        "viscous_torque_n_m_s_rad",
-    )
     MASSES: ClassVar[tuple[str, ...]] = ("inertia_scale",)
     SPRINGS: ClassVar[tuple[str, ...]] = ("stiffness_scale", "damping_ratio")
+    NOMINAL: ClassVar[tuple[str, ...]] = (*MASSES, *SPRINGS, *_FRICTION)
     model: Literal["serial_chain"] = "serial_chain"
     inertias_kg_m2: tuple[Positive, ...] = Field(min_length=2, description="from motor to table [kg m^2]")
     stiffnesses_n_m_rad: tuple[Positive, ...] = Field(min_length=1, description="one fewer than inertias [N m/rad]")
@@ -157,7 +130,7 @@ class SerialChain(_Rotary):
     damping_ratio: Damping = 0.03
 
     @model_validator(mode="after")
-    def _one_spring_fewer(self) -> SerialChain:
+    def _one_spring_fewer(self) -> Self:
         springs, allowed = len(self.stiffnesses_n_m_rad), len(self.inertias_kg_m2) - 1
         if springs != allowed:
             raise FieldError(
@@ -178,9 +151,9 @@ class SerialChain(_Rotary):
 class OneMass(_Model):
     """A linear axis: one mass, one encoder, newtons and metres."""
 
-    NOMINAL: ClassVar[tuple[str, ...]] = ("mass_kg", "coulomb_force_n", "viscous_force_n_s_m")
     MASSES: ClassVar[tuple[str, ...]] = ("mass_kg",)
     SPRINGS: ClassVar[tuple[str, ...]] = ()
+    NOMINAL: ClassVar[tuple[str, ...]] = (*MASSES, *SPRINGS, "coulomb_force_n", "viscous_force_n_s_m")
     model: Literal["one_mass"] = "one_mass"
     mass_kg: Positive = Field(description="moving mass [kg]")
     coulomb_force_n: NotNegative = Field(description="Coulomb friction [N]")
@@ -189,12 +162,12 @@ class OneMass(_Model):
 
     @property
     def ratio_m_rad(self) -> float:
-        """1: motor and table share metres."""
+        """1: motor and table are both in metres."""
         return 1.0
 
     @property
     def linear(self) -> bool:
-        """Whether the motor side is in m and N."""
+        """True if the motor side is in m and N."""
         return True
 
     def physics(self) -> Physics:
@@ -213,7 +186,7 @@ Axis = Annotated[TwoMass | SevenDofAxis | SerialChain | Rigid | OneMass, Field(d
 
 
 def model_of(keys: set[str]) -> str:
-    """Which kind of axis a file without the key `model` describes, by the keys it has."""
+    """Return the kind of axis that a file without the key `model` describes, from its keys."""
     if keys & {"coulomb_force_n", "viscous_force_n_s_m"}:
         return "one_mass"
     if "inertias_kg_m2" in keys:

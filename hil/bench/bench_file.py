@@ -1,15 +1,13 @@
-"""Bench files: the axis as its owner believes it, its control, drive, encoders, and what was learnt since.
+"""Bench files: the axis as its owner describes it, control, encoders, drive, and mechanisms found by a diagnosis.
 
 An axis file (the keys of `axis` at the top level, and `control`) is a bench too: the rest has defaults.
-`load_bench` refuses what it does not understand with file, line and field.
+`load_bench` raises errors with file, line and field.
 """
-
-from __future__ import annotations
 
 import math
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -50,7 +48,7 @@ class Control(_Model):
     velocity_filter_time_constant_s: NotNegative = 0.0
 
     @model_validator(mode="after")
-    def _one_gain(self) -> Control:
+    def _one_gain(self) -> Self:
         given = [self.velocity_gain_n_m_s_rad, self.velocity_gain_n_s_m, self.velocity_gain_ma_rpm]
         if sum(value is not None for value in given) != 1:
             raise FieldError(
@@ -74,7 +72,7 @@ class Control(_Model):
         return self
 
     def gains(self, ratio_m_rad: float) -> law.Gains:
-        """The constants of the control law for an axis of this ratio [m/rad]."""
+        """Return the constants of the control law for an axis with this ratio [m/rad]."""
         if self.velocity_gain_ma_rpm is not None and self.torque_constant_n_m_a is not None:
             gain = self.velocity_gain_ma_rpm * _MA_PER_RPM * self.torque_constant_n_m_a
         else:
@@ -105,7 +103,7 @@ class MechanismEntry(_Model):
     parameters: dict[str, float]
 
     @model_validator(mode="after")
-    def _known(self) -> MechanismEntry:
+    def _known(self) -> Self:
         if self.effect not in BY_ID:
             raise FieldError(("effect",), f"given {self.effect!r}, allowed one of {', '.join(BY_ID)}")
         mechanism = BY_ID[self.effect]
@@ -202,7 +200,7 @@ class Bench(_Model):
         return _tuples(data)
 
     @model_validator(mode="after")
-    def _room_for_mechanisms(self) -> Bench:
+    def _room_for_mechanisms(self) -> Self:
         effects = [entry.effect for entry in self.mechanisms]
         for effect in effects:
             given, most = effects.count(effect), BY_ID[effect].most
@@ -213,7 +211,7 @@ class Bench(_Model):
         return self
 
     @model_validator(mode="after")
-    def _feedback_is_measured(self) -> Bench:
+    def _feedback_is_measured(self) -> Self:
         if self.control.position_feedback == "table" and not self.has_table_encoder:
             raise FieldError(
                 ("control", "position_feedback"),
@@ -226,19 +224,24 @@ class Bench(_Model):
         """Constants of the control law."""
         return self.control.gains(self.axis.ratio_m_rad)
 
+    @property
+    def period_s(self) -> float:
+        """Period of the velocity loop [s]: one row of a recording, one set-point of a trajectory."""
+        return self.control.velocity_period_s
+
     def twin(self) -> Twin:
         """The twin of this bench, with its mechanisms."""
         return Twin(self.axis.physics(), self.gains, tuple(entry.active() for entry in self.mechanisms))
 
     @property
     def motor_count(self) -> float:
-        """Count of the motor encoder [rad, or m of a linear axis]; 0 where it is not known."""
+        """Resolution of the motor encoder [rad, linear axis m]; 0 if unknown."""
         motor = self.encoders.motor
         return (motor.resolution_m or 0.0) if self.axis.linear else 2.0 * math.pi / motor.counts_per_rev
 
     @property
     def has_table_encoder(self) -> bool:
-        """Whether a linear encoder is there; never on a linear axis of one mass."""
+        """True with a linear encoder; a linear axis of one mass has none."""
         return self.encoders.table is not None and not isinstance(self.axis, OneMass)
 
 
@@ -255,7 +258,7 @@ def shipped_benches() -> dict[str, Path]:
 
 
 def bench_path(source: str | Path) -> Path:
-    """The file of a bench: a path, or the name of a shipped one. Raises InputError for a name not shipped."""
+    """Return the file of a bench from a path or a shipped name. Raises InputError for an unknown name."""
     path = Path(source)
     if path.suffix in (".yaml", ".yml"):
         return path
@@ -266,7 +269,7 @@ def bench_path(source: str | Path) -> Path:
 
 
 def load_bench(source: str | Path) -> Bench:
-    """The bench of a file, or a shipped bench by its name.
+    """Load a bench file, or a shipped bench by its name.
 
     Raises InputError with file, line, field, what was given and what is allowed.
     """

@@ -49,7 +49,7 @@ def investigate(
     from hil.diagnosis.wording import title, titles
     from hil.errors import InputError
     from hil.files.output import default_folder, refuse_used
-    from hil.investigate import investigate as investigate_bench
+    from hil.investigation import investigate as investigate_bench
     from hil.loop.run import run_profile
     from hil.loop.simulated_bench import load_simulated
     from hil.loop.supervision import Ending

@@ -74,6 +74,22 @@ class Diagnosis:
         title = f"{run.name}: measured - twin, noise floor in grey"
         return over_time(title, run.time_s, location.residual_panels(self, run))
 
+    def __repr__(self) -> str:
+        lines = [f"Diagnosis: {self.result.verdict}", f"  {self.result.statement}"]
+        for finding in self.result.missing:
+            lines.append(f"  {title(finding.effect)}, confidence {finding.confidence:.2f}")
+            lines += [
+                f"    {name} = {digits(entry.value)} ± {digits(entry.std)} {entry.unit}"
+                for name, entry in finding.parameters.items()
+            ]
+            if finding.equivalents:
+                lines.append(f"    not told from {', '.join(map(title, finding.equivalents))} by this motion")
+        lines += [
+            f"  {name} = {digits(entry.value)} ± {digits(entry.std)} {entry.unit} (bench file {digits(entry.nominal)})"
+            for name, entry in self.result.parameter_corrections.items()
+        ]
+        return "\n".join(lines)
+
 
 def diagnose(
     train: Sequence[Recording], validate: Sequence[Recording], bench: Bench, progress: Progress = lambda text: None

@@ -1,10 +1,8 @@
-"""Read number columns of a CSV file fast (pyarrow), and say exactly which field is wrong when one is.
+"""Read number columns of a CSV file with pyarrow; every error names line and column.
 
-The fast reader knows that something is wrong but not always where; then a slow second pass over the text
-finds the first bad field, so that an error always names line and column.
+pyarrow does not always report where a file is wrong. In that case a slow second pass over the text finds the first bad
+field.
 """
-
-from __future__ import annotations
 
 import csv
 import math
@@ -24,7 +22,7 @@ from hil.errors import InputError
 
 @dataclass(frozen=True)
 class CsvFormat:
-    """How a CSV file is written: `skip_lines` stand above the header, `skip_rows` between it and the data."""
+    """Format of a CSV file: `skip_lines` above the header, `skip_rows` between header and data."""
 
     delimiter: str = ","
     decimal_point: str = "."

@@ -1,6 +1,4 @@
-"""Folders and files of results: whole or not at all, and never mixed with older ones."""
-
-from __future__ import annotations
+"""Folders and files of results, written completely or not at all, and never into a folder in use."""
 
 import json
 import math
@@ -52,7 +50,7 @@ def new_folder(folder: Path) -> Iterator[Path]:
     except BaseException:
         shutil.rmtree(part, ignore_errors=True)
         for parent in made:
-            with suppress(OSError):  # somebody else's results may stand there by now
+            with suppress(OSError):  # another process may have written there
                 parent.rmdir()
         raise
 
@@ -74,7 +72,7 @@ def write_text(path: Path, text: str) -> None:
 def write_json(path: Path, data: Any) -> None:
     """Write numbers, text, lists and mappings as JSON.
 
-    Raises ValueError at NaN or infinity, naming the place: a result that is none must not look like one.
+    Raises ValueError at NaN or infinity, naming the place: such a value is no result.
     """
     write_text(path, json.dumps(_plain(data, "$"), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
 

@@ -7,8 +7,6 @@ YAML 1.1 says otherwise), a key may stand once, and there are no anchors. Types 
 quotes is no number.
 """
 
-from __future__ import annotations
-
 import difflib
 import json
 import re

@@ -80,6 +80,20 @@ class Comparison:
     inverse_dynamics: InverseDynamics | None
     notes: tuple[str, ...]
 
+    def __repr__(self) -> str:
+        width = max(len(channel.name) for channel in self.channels)
+        lines = [
+            f"Comparison of {self.recording.name} with the twin of {self.bench.name}: "
+            f"{'explained' if self.explained else 'not explained'} (allowed {EXPLAINED:g} x noise: torque "
+            f"{self.torque_over_noise:.2f}, table against motor {self.table_over_noise:.2f})",
+            f"  {'measured less simulated':{width}}  {'rms':>10}  {'largest':>10}  relative",
+        ]
+        lines += [
+            f"  {channel.name:{width}}  {channel.rms:10.3g}  {channel.peak:10.3g}  {100.0 * channel.relative:7.3f} %"
+            for channel in self.channels
+        ]
+        return "\n".join(lines)
+
     def channel(self, name: str) -> Deviation:
         """The deviation of a channel by its name."""
         return next(channel for channel in self.channels if channel.name == name)

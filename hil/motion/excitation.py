@@ -5,13 +5,10 @@ polynomial with three continuous derivatives (the jerk starts and ends at zero).
 feed, which keeps friction sliding.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 
@@ -26,7 +23,7 @@ MISSED_PEAK = 1.0025
 
 
 class Spectrum(StrEnum):
-    """What stays equal over the band; the position amplitude falls with f to the power 0, 1, 2."""
+    """Quantity of constant amplitude over the band; the position amplitude falls with f to the power 0, 1, 2."""
 
     CONSTANT_DISPLACEMENT = "constant_displacement"
     CONSTANT_VELOCITY = "constant_velocity"
@@ -35,14 +32,6 @@ class Spectrum(StrEnum):
     @property
     def exponent(self) -> int:
         return list(Spectrum).index(self)
-
-
-class Signal(Protocol):
-    @property
-    def highest_frequency_hz(self) -> float: ...
-
-    def derivatives(self, time_s: Array) -> list[Array]:
-        """x, x', x'', x''' of the signal in its own unit."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +48,7 @@ class Chirp:
         return max(self.start_hz, self.end_hz)
 
     def derivatives(self, time_s: Array) -> list[Array]:
+        """Return the signal and its first three derivatives at times (n,), in its own unit."""
         k = math.log(self.end_hz / self.start_hz) / self.duration_s
         low = min(self.start_hz, self.end_hz)  # amplitude 1 at the lowest frequency of the sweep
         omega = 2 * math.pi * self.start_hz * np.exp(k * time_s)
@@ -102,6 +92,9 @@ class Multisine:
             for order in range(4):
                 result[order] += np.imag((1j * omega) ** order * z)
         return result
+
+
+Signal = Chirp | Multisine
 
 
 @dataclass(frozen=True)

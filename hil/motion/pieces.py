@@ -1,7 +1,5 @@
 """Pieces of motion in closed form, and a move made of them."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from enum import IntEnum
@@ -17,7 +15,7 @@ MAX_DURATION_S = 3600.0  # of a trajectory, which is held in memory
 
 
 class Phase(IntEnum):
-    """What the set-point does; small numbers, since a trajectory holds one per sample."""
+    """Kind of motion at a set-point; stored as one byte per sample of a trajectory."""
 
     STANDSTILL = 0
     ACCELERATION = 1

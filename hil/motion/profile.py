@@ -1,9 +1,7 @@
-"""Trajectory profile files: limits, travel, and the segments that run one after the other.
+"""Profile files: limits, travel, and segments in the order of their execution.
 
 `python -m hil.motion.profile` prints the JSON Schema that editors complete by (hil/profile.schema.json).
 """
-
-from __future__ import annotations
 
 import json
 import math
@@ -11,7 +9,7 @@ from collections import Counter
 from collections.abc import Iterator
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -27,7 +25,7 @@ MAX_MOVES = 100_000
 
 
 class Limits(Part):
-    """What no set-point of the profile passes."""
+    """Largest magnitudes of the set-points of a profile."""
 
     velocity_m_s: Positive = Field(description="largest velocity [m/s]")
     acceleration_m_s2: Positive = Field(description="largest acceleration [m/s^2]")
@@ -123,7 +121,7 @@ class Profile(Part):
             self.check_position(field, min(ends), max(ends))
 
     @model_validator(mode="after")
-    def _can_be_run(self) -> Profile:
+    def _can_be_run(self) -> Self:
         self.check_position(("start_m",), self.start_m, self.start_m)
         _ = self.runs
         return self

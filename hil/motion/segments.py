@@ -7,7 +7,7 @@ the segment when it cannot be made within the limits.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
@@ -55,7 +55,7 @@ class _Travel(_Limited):
     feed_m_s: Feed
 
     @model_validator(mode="after")
-    def _one_target(self) -> _Travel:
+    def _one_target(self) -> Self:
         if (self.to_m is None) == (self.stroke_m is None):
             given = "neither of" if self.to_m is None else "both"
             raise FieldError(("stroke_m",), f"given {given} to_m and stroke_m, allowed one; choose")

@@ -1,4 +1,4 @@
-"""Moves whose velocity ramps are the square of a sine, as the path generator of the source makes them.
+"""Moves with sine-squared velocity ramps, as the path generator of the source makes them.
 
     v(t) = V sin^2(pi t / (2 Tr)),  0 <= t <= Tr        ("square sine shape", Sec. 3.3 of the source)
 
@@ -9,8 +9,6 @@ rectangular velocity V of the length Tr + Tc convolved with the half sine pi/(2 
 Over a step dv in the time Tr the peaks are a = pi dv/(2 Tr) in the middle and j = pi^2 dv/(2 Tr^2) at
 both ends.
 """
-
-from __future__ import annotations
 
 import math
 

@@ -1,4 +1,4 @@
-"""What ruckig is for here: the time-optimal bound, approach, jog, and stops and new targets from any state.
+"""Time-optimal motion by ruckig: duration bound, approach, jog, stops and new targets from any state.
 
 Its trajectories have the jerk -J, 0 or +J; each section becomes one Cubic piece, so that set-points are
 evaluated in closed form like those of every other move. (Berscheid, Kroeger: Jerk-limited real-time
@@ -7,8 +7,6 @@ trajectory generation with arbitrary target states, RSS 2021.)
 A starting velocity or acceleration beyond its limit is allowed: it is brought back within the limit in the
 shortest time, and both limits hold from then on. The jerk limit always holds.
 """
-
-from __future__ import annotations
 
 import math
 from typing import NamedTuple
@@ -26,7 +24,7 @@ class _Unsolved(HilError):
 
 
 class State(NamedTuple):
-    """Where a motion starts."""
+    """State in which a motion starts."""
 
     position_m: float
     velocity_m_s: float = 0.0

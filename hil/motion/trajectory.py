@@ -1,11 +1,8 @@
-"""Set-points over time: what the controller is given at every tick, computed before the motion starts.
+"""Trajectories: the set-points of every tick, computed before the motion starts.
 
-Moves come from two sources. Those of a profile have sine-squared velocity ramps, v = V sin^2(pi t/(2 Tr)), the
-shape the source's path generator makes. ruckig cannot make it, since its jerk is -J, 0 or +J and the jerk of
-this ramp is a cosine; a rectangular velocity convolved with a half sine of the length Tr is exactly it
-(hil.motion.sine_squared). ruckig gives the time-optimal bound, approach and jog, and the trajectories that start from
-any state: stop_from and replan (hil.motion.time_optimal). All are evaluated in closed form; nothing is differentiated
-numerically.
+Moves of a profile have sine-squared velocity ramps, as the path generator of the source (`hil.motion.sine_squared`).
+Approach, jog, stops and new targets are time-optimal (`hil.motion.time_optimal`). Both are evaluated in closed form;
+no derivative is numerical.
 """
 
 from __future__ import annotations
@@ -70,6 +67,17 @@ class Trajectory:
     def __len__(self) -> int:
         return len(self.time_s)
 
+    def __repr__(self) -> str:
+        peaks = (self.velocity_m_s, self.acceleration_m_s2, self.jerk_m_s3)
+        velocity, acceleration, jerk = (float(np.max(np.abs(values))) for values in peaks)
+        lines = [
+            f"Trajectory: {len(self)} set-points at {1e3 * self.period_s:g} ms = {self.duration_s:.3f} s, "
+            f"{len(self.runs)} segments",
+            f"  position {1e3 * self.position_m.min():.3f} to {1e3 * self.position_m.max():.3f} mm; largest velocity "
+            f"{velocity:.4g} m/s, acceleration {acceleration:.4g} m/s^2, jerk {jerk:.4g} m/s^3",
+        ]
+        return "\n".join([*lines, *(f"  note: {note}" for note in self.notes)])
+
     @property
     def duration_s(self) -> float:
         return float(self.time_s[-1])
@@ -91,9 +99,9 @@ class Trajectory:
 
 
 def plan(profile: Profile, period_s: float, start_m: float | None = None) -> Trajectory:
-    """Set-points of a profile.
+    """Compute the set-points of a profile, one per period_s [s] (`bench.period_s`).
 
-    start_m: where the axis stands [m]; when it is not profile.start_m, a time-optimal approach comes first.
+    start_m: present position of the axis [m]; if it is not profile.start_m, a time-optimal approach comes first.
     Each segment begins at a multiple of profile.grid_s after the approach.
 
     Raises FieldError (an InputError): a period that is not positive, a start outside the travel, an excitation

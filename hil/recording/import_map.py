@@ -1,11 +1,9 @@
-"""The map file that says how a foreign recording becomes channels; `hil.recording.importing` applies it.
+"""Map file: which column of a foreign recording is which channel; `hil.recording.importing` applies it.
 
     value [SI] = sign x scale x factor(unit) x column + offset
 
 A map is a YAML file, such as the shipped `hil/maps/emps.yaml`.
 """
-
-from __future__ import annotations
 
 from math import pi
 from typing import Literal, Self
@@ -32,7 +30,7 @@ class _Strict(BaseModel):
 
 
 class CsvOptions(_Strict):
-    """How a CSV file is written."""
+    """Format of a CSV file."""
 
     delimiter: str = Field(default=",", min_length=1, max_length=1, description="between the fields")
     decimal_point: Literal[".", ","] = Field(default=".", description="of the numbers")
@@ -53,7 +51,7 @@ class TimeColumn(_Strict):
 
 
 class ChannelSource(_Strict):
-    """Where a channel comes from. NAME[i] is column i (from 0) of the matrix NAME in a .mat file."""
+    """Source of a channel. NAME[i] is column i (from 0) of the matrix NAME in a .mat file."""
 
     column: str = Field(description="name in the file")
     unit: str = Field(description="of the column, such as mm, deg, rpm, counts, A, V")

@@ -1,10 +1,8 @@
 """Recordings: columns of the channel table at one period, read from and written to files.
 
-Parquet is the stored form (units in the schema), an Arrow stream (`.arrows`) the form while a run is going
-on, CSV with the canonical names the form of exchange. A foreign file goes through `hil.recording.importing`.
+Parquet (units in the schema) for finished runs, an Arrow stream (`.arrows`) during a run, CSV with the names of the
+channel table for exchange. Other files are read by `hil.recording.importing`.
 """
-
-from __future__ import annotations
 
 import json
 import os
@@ -35,7 +33,7 @@ _FORMATS = ".parquet, .arrows (a run that was not closed) or .csv"
 class Recording:
     """A run: columns of equal length (names and units of `hil.channels`), one row per period.
 
-    `metadata` holds what JSON can: bench, profile, versions, seed, and what was noticed while reading.
+    `metadata` holds what JSON can: bench, profile, versions, seed, and remarks of the reader.
     """
 
     name: str
@@ -45,6 +43,13 @@ class Recording:
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values())))
+
+    def __repr__(self) -> str:
+        channels = ", ".join(name for name in self.columns if name != "time_s")
+        return (
+            f"Recording {self.name}: {self.kind} axis, {len(self)} rows at {1e3 * self.period_s:g} ms = "
+            f"{len(self) * self.period_s:.3f} s\n  {channels}"
+        )
 
     def __getitem__(self, channel: str) -> FloatArray:
         """The column of a channel; raises InputError, with the channels there are, if it was not recorded."""
@@ -100,11 +105,8 @@ def read_recording(path: str | Path) -> Recording:
     return readers[path.suffix.lower()](path)
 
 
-def check_columns(columns: Mapping[str, FloatArray], place: Callable[[int], str]) -> float:
-    """Period [s] of sound columns: finite, of a clock that is regular within 1 % of its period.
-
-    `place` tells where row i (from 0) stands, such as "file:line". Raises InputError.
-    """
+def check_finite(columns: Mapping[str, FloatArray], place: Callable[[int], str]) -> None:
+    """Raise InputError at the first NaN or infinity; `place` gives the place of row i (from 0), such as "file:line"."""
     for name, values in columns.items():
         bad = np.flatnonzero(~np.isfinite(values))
         if bad.size:
@@ -113,6 +115,14 @@ def check_columns(columns: Mapping[str, FloatArray], place: Callable[[int], str]
                 f"{place(row)}: {name}: given {values[row]}, allowed a finite number; "
                 "correct the value or cut the recording before it"
             )
+
+
+def check_columns(columns: Mapping[str, FloatArray], place: Callable[[int], str]) -> float:
+    """Return the period [s] of columns that are finite and whose clock is regular within 1 %.
+
+    `place` as in `check_finite`. Raises InputError.
+    """
+    check_finite(columns, place)
     time_s = columns["time_s"]
     if time_s.size < 3:
         raise InputError(f"{place(0)}: time_s: given {time_s.size} rows, allowed 3 or more; give a longer recording")

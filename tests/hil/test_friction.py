@@ -138,7 +138,7 @@ def test_the_figure_shows_points_line_and_values() -> None:
     figure.canvas.draw()
 
 
-@pytest.mark.skipif(not SHARED.is_dir(), reason="the shared recordings are not beside the project")
+@pytest.mark.skipif(not SHARED.is_dir(), reason="needs ../shared/recordings, which is not part of the repository")
 def test_the_rig_with_a_stribeck_fall_gives_its_coulomb_torque_above_it() -> None:
     recording = read_recording(SHARED / "rig" / "stribeck" / "train_1.csv")
     # Coulomb 1.007 N m is in the data; below some 6 rad/s the Stribeck fall (3.085 rad/s) lifts the points
@@ -146,7 +146,7 @@ def test_the_rig_with_a_stribeck_fall_gives_its_coulomb_torque_above_it() -> Non
     assert identify_friction(recording).coulomb > 1.1
 
 
-@pytest.mark.skipif(not SHARED.is_dir(), reason="the shared recordings are not beside the project")
+@pytest.mark.skipif(not SHARED.is_dir(), reason="needs ../shared/recordings, which is not part of the repository")
 def test_emps_at_constant_feed_agrees_with_its_inverse_dynamics() -> None:
     result = identify_friction(import_recording(SHARED / "emps" / "DATA_EMPS.mat", "emps"))
     assert result.kind is AxisKind.LINEAR

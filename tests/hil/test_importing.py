@@ -280,7 +280,7 @@ def test_a_gain_by_name_needs_a_mat_file(tmp_path: Path) -> None:
         import_recording(write_csv(tmp_path), write_map(tmp_path, content))
 
 
-@pytest.mark.skipif(not EMPS.is_file(), reason="the EMPS recording is not beside the project")
+@pytest.mark.skipif(not EMPS.is_file(), reason="needs ../shared/recordings/emps, not part of the repository")
 def test_the_shipped_map_imports_emps() -> None:
     recording = import_recording(EMPS, "emps")
     assert recording.kind is AxisKind.LINEAR

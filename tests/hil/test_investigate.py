@@ -15,7 +15,7 @@ from hil.commands.investigate import _confirmed, investigate
 from hil.diagnosis.candidate_motions import reach
 from hil.errors import HilError, InputError
 from hil.identification.dataset import take
-from hil.investigate import investigate as investigate_bench
+from hil.investigation import investigate as investigate_bench
 from hil.loop.run import RunResult, run_profile
 from hil.motion.profile import Profile, load_profile
 from hil.motion.trajectory import plan

@@ -205,7 +205,7 @@ def test_a_closed_stream_is_not_called_recovered(tmp_path: Path) -> None:
     assert read_recording(tmp_path / "run.arrows").metadata == small().metadata
 
 
-@pytest.mark.skipif(not RIG.is_dir(), reason="the shared rig recordings are not beside the project")
+@pytest.mark.skipif(not RIG.is_dir(), reason="needs ../shared/recordings/rig, which is not part of the repository")
 def test_the_rig_recordings_are_read() -> None:
     recording = read_recording(RIG / "null" / "train_1.csv")
     assert len(recording) == 20529

@@ -1,71 +1,66 @@
-"""An answer held against the truth: what is right in it, and how far its numbers are off."""
+"""Grade an answer against the truth: names, block, parameters and place."""
 
-from __future__ import annotations
-
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from math import inf, pi, remainder
 
 from hil.diagnosis.wording import title
-from hil.proof.answer.answers import ABSENT, FAILED, Named, Reply
-from hil.proof.draw.expected import same_law
+from hil.proof.answer.answers import ABSENT, FAILED, Answer, Named
+from hil.proof.draw.expected import Role, amplitude_of, role, same_law
 from hil.proof.draw.generator import Concealed, Truth
-from hil.proof.score.distances import difference, overlap, relative_error
 
 NORMAL_90 = 1.645  # standard errors to either side of a 90 % interval
-ABOVE_FLOOR = 1.0  # size, in units of noise, from which on an effect is above the noise floor
-# Parameters that say where an effect is: scored as its place, not once more as its parameters.
-_PLACES = ("cycles_per_rev", "period_m", "start_s", "end_s", "frequency_hz")
-_PERIODS = ("period_m", "cycles_per_rev")
+ABOVE_FLOOR = 1.0  # smallest size, in units of noise, of an effect above the noise floor
 
 
 @dataclass(frozen=True)
-class Marked:
-    """A case with its answer, and the answer after the motion that the diagnosis asked for was run too."""
+class GradedCase:
+    """A case with its answer, and the answer after the proposed motion was recorded too."""
 
     truth: Truth
-    reply: Reply
-    later: Reply | None = None
+    answer: Answer
+    later: Answer | None = None
 
     @property
     def concealed(self) -> Concealed | None:
-        """What the case is about; None where nothing is concealed."""
+        """The effect to be found; None if nothing is concealed."""
         return self.truth.effects[0] if self.truth.effects else None
 
     @property
     def first(self) -> Named | None:
-        """What was named first."""
-        return self.reply.named[0] if self.reply.named else None
+        """The first finding."""
+        return self.answer.named[0] if self.answer.named else None
 
     @property
     def size(self) -> float:
-        """Of the largest concealed effect, in units of noise."""
+        """Size of the largest concealed effect, in units of noise."""
         return max((effect.size for effect in self.truth.effects), default=0.0)
 
     @property
     def above_floor(self) -> bool:
-        """Whether an effect is concealed that these motions show above the noise."""
+        """Whether these motions show a concealed effect above the noise."""
         return self.size >= ABOVE_FLOOR and self.truth.tier != "insufficient"
 
     @property
     def detected(self) -> bool:
-        """Whether something is said to be missing, with a name or without."""
-        return self.reply.verdict in ("missing_physics", "unexplained")
+        """Whether the answer says that something is missing, with a name or without."""
+        return self.answer.verdict in ("missing_physics", "unexplained")
 
     @property
     def top(self) -> bool:
-        """Whether what the case is about was named first."""
+        """Whether the first finding is the effect to be found."""
         return self.first is not None and self.first.effect in self._laws(0)
 
     @property
     def in_set(self) -> bool:
-        """Whether it is what was named first or what that is said not to be told from."""
+        """Whether the effect to be found is the first finding or one of its equivalents."""
         return self.first is not None and bool(self.first.reported & self._laws(0))
 
     @cached_property
     def matched(self) -> tuple[Named | None, ...]:
-        """For each concealed effect the finding that names it, none of them twice."""
-        left, found = list(self.reply.named), []
+        """The finding for each concealed effect; each finding is used once."""
+        left, found = list(self.answer.named), []
         for index in range(len(self.truth.effects)):
             match = next((named for named in left if named.effect in self._laws(index)), None)
             found.append(match)
@@ -75,37 +70,37 @@ class Marked:
 
     @property
     def spurious(self) -> tuple[Named, ...]:
-        """Findings that name nothing that is there, and whose set holds nothing that is there and unnamed."""
+        """Findings that name no concealed effect and have no unnamed concealed effect among their equivalents."""
         open_laws = frozenset[str]().union(
             *(self._laws(index) for index, found in enumerate(self.matched) if found is None)
         )
         taken = [id(found) for found in self.matched]
-        return tuple(named for named in self.reply.named if id(named) not in taken and not named.reported & open_laws)
+        return tuple(named for named in self.answer.named if id(named) not in taken and not named.reported & open_laws)
 
     @property
     def unanswered(self) -> bool:
-        """Whether there is no answer."""
-        return self.reply.verdict in (FAILED, ABSENT)
+        """Whether the diagnosis failed or is missing."""
+        return self.answer.verdict in (FAILED, ABSENT)
 
     @property
     def names_something(self) -> bool:
-        """Whether something is named, rightly or not; an answer that is wanting is as wrong."""
-        return bool(self.reply.named) or self.unanswered
+        """Whether something is named, right or wrong; a missing answer counts too."""
+        return bool(self.answer.named) or self.unanswered
 
     @property
     def names_too_much(self) -> bool:
-        """Whether something is named that is not there; an answer that is wanting is as wrong."""
+        """Whether there is a spurious finding; a missing answer counts too."""
         return bool(self.spurious) or self.unanswered
 
     @property
     def blurred(self) -> bool:
-        """Whether the set named first holds more than what is concealed and what this motion cannot tell from it."""
+        """Whether the first set has more than the concealed effect and what this motion cannot separate from it."""
         return self.first is not None and bool(self.first.reported - self._laws(0))
 
     @property
     def block_right(self) -> bool:
-        """Whether the mismatch is placed in the block of a concealed effect."""
-        return self.reply.location.get("block") in {effect.block for effect in self.truth.effects}
+        """Whether the located block is that of a concealed effect."""
+        return self.answer.location.block in {effect.block for effect in self.truth.effects}
 
     @property
     def set_reported(self) -> bool:
@@ -118,7 +113,7 @@ class Marked:
 
     @property
     def resolved(self) -> bool:
-        """Whether the motion that was asked for left the concealed effect alone, without its rivals."""
+        """Whether the proposed motion separated the concealed effect from its rivals."""
         if self.later is None or not self.later.named:
             return False
         first = self.later.named[0]
@@ -126,31 +121,31 @@ class Marked:
 
     @property
     def called_untestable(self) -> bool:
-        """Whether what the motion cannot show is called not testable, and not named."""
+        """Whether the invisible effect is reported as not testable, and not named."""
         hidden = set(self.truth.not_testable)
-        return bool(hidden & set(self.reply.not_testable)) and not any(
-            named.effect in hidden for named in self.reply.named
+        return bool(hidden & set(self.answer.not_testable)) and not any(
+            named.effect in hidden for named in self.answer.named
         )
 
     @property
     def right(self) -> bool:
-        """Whether the answer as a whole is the right one: everything that is there named, and nothing else. Below the
-        noise it is right to name nothing, too."""
+        """Whether the whole answer is right: all concealed effects named and nothing else; below the noise floor also
+        nothing named."""
         if self.unanswered:
             return False
         if self.truth.tier == "ambiguous":
             return self.set_reported and not self.spurious
         if self.truth.tier == "insufficient":
-            return self.called_untestable and not self.reply.named
+            return self.called_untestable and not self.answer.named
         if not self.truth.effects or self.truth.tier == "novel":
-            return self.reply.verdict == self.truth.verdict and not self.reply.named
-        if not self.above_floor and not self.reply.named:
+            return self.answer.verdict == self.truth.verdict and not self.answer.named
+        if not self.above_floor and not self.answer.named:
             return True
         return all(self.matched) and not self.spurious
 
     @property
     def wrong(self) -> str:
-        """What is wrong with the answer, in words; empty where it is right."""
+        """The error of the answer in words; empty if it is right."""
         if self.right:
             return ""
         if self.unanswered:
@@ -164,70 +159,58 @@ class Marked:
         unnamed = [effect.effect for effect, found in zip(self.truth.effects, self.matched, strict=True) if not found]
         if self.truth.tier != "novel" and unnamed:
             return f"It does not name {_listed(unnamed)}."
-        return f"The verdict is {title(self.reply.verdict)} instead of {title(self.truth.verdict)}."
+        return f"The verdict is {title(self.answer.verdict)} instead of {title(self.truth.verdict)}."
 
     def named_right(self, named: Named) -> bool:
-        """Whether what a finding names is there."""
+        """Return whether a finding names a concealed effect."""
         return any(named is found for found in self.matched)
 
     def parameter_errors(self) -> dict[str, float]:
-        """Relative errors of the parameters of what was named first and rightly."""
+        """Return relative errors of the parameters of a right first finding."""
         return {
             name: relative_error(name, value, self._known())
             for name, (value, _) in self._estimated().items()
-            if name not in _PLACES
+            if not role(name).locates
         }
 
     def covered(self) -> dict[str, bool]:
-        """Whether the 90 % interval of each parameter of what was named first and rightly holds the true value."""
+        """Return whether the 90 % interval of each parameter of a right first finding covers the true value."""
         known = self._known()
         return {
             name: difference(name, value, known[name]) <= NORMAL_90 * deviation
             for name, (value, deviation) in self._estimated().items()
-            if name != "cycles_per_rev"
+            if role(name) is not Role.ORDER
         }
 
     def nominal_errors(self) -> dict[str, float]:
-        """Relative errors of the corrected parameters of the bench."""
+        """Return relative errors of the corrected parameters of the bench."""
         true = self.truth.true_parameters
-        return {name: abs(value / true[name] - 1.0) for name, (value, _) in self.reply.nominal.items() if true[name]}
+        return {name: abs(value / true[name] - 1.0) for name, (value, _) in self.answer.nominal.items() if true[name]}
 
     def period_error(self) -> float | None:
-        """Relative error of the spatial period, infinite where none is given; None for what has no free period."""
-        if self.concealed is None or not set(_PERIODS) & set(self.concealed.parameters):
+        """Return the relative error of the spatial period, infinite if none is given; None without a free period."""
+        if self.concealed is None or (true := self.concealed.free_period_m) is None:
             return None
-        lead_m = self.truth.true_parameters.get("lead_m") or self.truth.true_parameters["screw_lead_m"]
-        true = float(self.concealed.place["period_m"])  # type: ignore[arg-type]
-        period_m, order = self._said("period_m"), self._said("cycles_per_rev", "order_per_rev")
-        found = lead_m / order if order else period_m
-        return abs(found / true - 1.0) if found else float("inf")
+        place = self.answer.location
+        order = self._said(Role.ORDER) or place.order_per_rev
+        return _relative(self.truth.lead_m / order if order else self._said(Role.PERIOD) or place.period_m, true)
 
     def frequency_error(self) -> float | None:
-        """Relative error of the frequency of a mode, infinite where none is given; None for other effects."""
-        if self.concealed is None or self.concealed.effect != "structural_mode":
+        """Return the relative error of the frequency of a mode, infinite if none is given; None for other effects."""
+        if self.concealed is None or (true := self.concealed.mode_hz) is None:
             return None
-        found = self._said("frequency_hz")
-        true = float(self.concealed.place["frequency_hz"])  # type: ignore[arg-type]
-        return abs(found / true - 1.0) if found else float("inf")
+        return _relative(self._said(Role.FREQUENCY) or self.answer.location.frequency_hz, true)
 
     def window_overlap(self) -> float | None:
-        """Intersection over union of the windows said and the true one; None for what has no window."""
-        if self.concealed is None or "window_s" not in self.concealed.place:
+        """Return intersection over union of the given windows and the true one; None for permanent effects."""
+        if self.concealed is None or (true := self.concealed.window_s) is None:
             return None
-        named = self.first.parameters if self.first else {}
-        windows = (
-            [(named["start_s"][0], named["end_s"][0])]
-            if "start_s" in named
-            else self.reply.location.get("windows_s", [])
-        )
-        return overlap(windows, *self.concealed.place["window_s"])  # type: ignore[misc]
+        start_s, end_s = self._said(Role.START), self._said(Role.END)
+        known = start_s is not None and end_s is not None
+        return overlap([(start_s, end_s)] if known else self.answer.location.windows_s, *true)  # type: ignore[list-item]
 
-    def _said(self, name: str, in_location: str | None = None) -> float | None:
-        """A number that the first finding has, or else the location."""
-        if self.first and name in self.first.parameters:
-            return self.first.parameters[name][0]
-        found: float | None = self.reply.location.get(in_location or name)
-        return found
+    def _said(self, wanted: Role) -> float | None:
+        return self.first.value(wanted) if self.first else None
 
     def _estimated(self) -> dict[str, tuple[float, float]]:
         if not self.top or self.first is None:
@@ -238,13 +221,47 @@ class Marked:
         return self.concealed.compared if self.concealed else {}
 
     def _law(self, index: int) -> frozenset[str]:
-        """Ids that say what a concealed effect is."""
+        """Return the ids for the law of a concealed effect."""
         return frozenset(self.truth.effects[index].same_law) if index < len(self.truth.effects) else frozenset()
 
     def _laws(self, index: int) -> frozenset[str]:
-        """The same, with those that this motion cannot tell from the first one."""
+        """Return the same, with the rivals of the first effect."""
         laws = self._law(index)
         return laws.union(*(({rival, *same_law(rival)}) for rival in self.truth.rivals)) if index == 0 else laws
+
+
+def difference(name: str, value: float, true: float) -> float:
+    """Return the absolute error of a parameter; phases [rad] modulo 2 pi."""
+    return abs(remainder(value - true, 2.0 * pi)) if role(name) is Role.PHASE else abs(value - true)
+
+
+def relative_error(name: str, value: float, known: Mapping[str, float]) -> float:
+    """Return the relative error of a parameter with the true values `known`.
+
+    Amplitudes of harmonics are relative to the first one; the error of a phase [rad] is weighted with its amplitude.
+    """
+    off = difference(name, value, known[name])
+    first = next((size for other, size in known.items() if role(other) is Role.AMPLITUDE), 0.0)
+    if role(name) is Role.PHASE:
+        return off * (known.get(amplitude_of(name), first) / first if first else 1.0)
+    scale = first if role(name) is Role.AMPLITUDE else abs(known[name])
+    return off / scale if scale else float(off > 0.0)
+
+
+def overlap(windows: Iterable[Sequence[float]], begin: float, end: float) -> float:
+    """Return intersection over union of windows (begin, end), which may overlap, and the window `begin` to `end`."""
+    merged: list[tuple[float, float]] = []
+    for a, b in sorted((a, b) for a, b in windows):
+        if merged and a <= merged[-1][1]:
+            merged[-1] = merged[-1][0], max(merged[-1][1], b)
+        else:
+            merged.append((a, b))
+    common = sum(max(min(b, end) - max(a, begin), 0.0) for a, b in merged)
+    return common / (end - begin + sum(b - a for a, b in merged) - common)
+
+
+def _relative(found: float | None, true: float) -> float:
+    return abs(found / true - 1.0) if found else inf
 
 
 def _listed(names: Iterable[str], last: str = "and") -> str:

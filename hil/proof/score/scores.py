@@ -1,49 +1,47 @@
-"""The score of a proof: rates over the marked cases, beside the goals."""
-
-from __future__ import annotations
+"""Score a proof: rates over the graded cases, beside the goals."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
 
-from hil.proof.answer.answers import ABSENT, Reply
+from hil.proof.answer.answers import ABSENT, Answer
 from hil.proof.draw.generator import Truth
-from hil.proof.score.confusion import by_effect
-from hil.proof.score.grading import Marked
+from hil.proof.score.grading import GradedCase
 from hil.proof.score.statistics import (
     ConfidenceBin,
     Rate,
+    by_effect,
     confidence_bins,
     expected_calibration_error,
     quantile,
     rate,
 )
 
-FLOORED = 1.15  # times the noise floor, up to which a held-out residual is down to it
-SURE = 0.9  # confidence that may be relied on
-NO_REPLY = Reply(ABSENT, statement="No answer was given.")
+FLOORED = 1.15  # largest ratio to the noise floor of a held-out residual that counts as explained
+SURE = 0.9  # confidence of a reliable finding
+NO_ANSWER = Answer(ABSENT, statement="No answer was given.")
 
 
 @dataclass(frozen=True)
 class Goal:
-    """A figure beside its goal: a rate, or a number of so many cases. `low` and `high` are what is wanted."""
+    """A rate, or a number over `of` cases, beside its goal from `low` to `high`."""
 
     name: str
     measured: Rate | float | None
     low: float = 0.0
     high: float = inf
-    of: int = 0  # cases behind a number; a rate has its own
-    percent: bool = True  # how it is read
+    of: int = 0  # cases of a number; a rate has its own
+    percent: bool = True  # printed in percent
     detail: str = ""
 
     @property
     def value(self) -> float | None:
-        """The figure; None where no case tells it."""
+        """The figure; None without cases."""
         return self.measured.value if isinstance(self.measured, Rate) else self.measured
 
     @property
     def met(self) -> bool | None:
-        """Whether the goal is met; None where no case tells it or there is none."""
+        """Whether the goal is met; None without a goal or without cases."""
         if self.value is None or (self.low, self.high) == (0.0, inf):
             return None
         return bool(self.low <= self.value <= self.high)
@@ -51,22 +49,24 @@ class Goal:
 
 @dataclass(frozen=True)
 class Scores:
-    """All that is scored of the answers of one method."""
+    """Scores of the answers of one method."""
 
-    cases: tuple[Marked, ...]
+    cases: tuple[GradedCase, ...]
     goals: tuple[Goal, ...]
     calibration: tuple[ConfidenceBin, ...]
 
-    def of_tier(self, *tiers: str) -> list[Marked]:
-        """Cases of some tiers."""
+    def of_tier(self, *tiers: str) -> list[GradedCase]:
+        """Return the cases of some tiers."""
         return [case for case in self.cases if case.truth.tier in tiers]
 
 
 def score(
-    truths: Mapping[str, Truth], replies: Mapping[str, Reply], later: Mapping[str, Reply] | None = None
+    truths: Mapping[str, Truth], answers: Mapping[str, Answer], later: Mapping[str, Answer] | None = None
 ) -> Scores:
-    """Score answers by case; one that is wanting counts as wrong. `later` are those after the motion asked for."""
-    cases = tuple(Marked(truth, replies.get(name, NO_REPLY), (later or {}).get(name)) for name, truth in truths.items())
+    """Score answers by case; a missing one counts as wrong. `later`: answers after the proposed motion."""
+    cases = tuple(
+        GradedCase(truth, answers.get(name, NO_ANSWER), (later or {}).get(name)) for name, truth in truths.items()
+    )
     bins = calibration(cases)
     return Scores(
         cases,
@@ -76,8 +76,7 @@ def score(
 
 
 def lead(scores: Scores, others: Mapping[str, Scores]) -> Goal:
-    """Points of the rate of singles named first by which a method is ahead of the best of the others, of those that
-    answered all singles."""
+    """Return the lead in singles named first over the best other method that answered all singles."""
     singles = scores.of_tier("single")
     hits = {
         name: sum(case.top for case in other.of_tier("single"))
@@ -89,13 +88,13 @@ def lead(scores: Scores, others: Mapping[str, Scores]) -> Goal:
     return Goal("ahead of the best other method", ahead, low=0.20, of=len(singles), detail=best)
 
 
-def calibration(cases: Iterable[Marked]) -> list[ConfidenceBin]:
-    """Confidence of every finding against whether it is there."""
+def calibration(cases: Iterable[GradedCase]) -> list[ConfidenceBin]:
+    """Return the calibration of the confidence of all findings."""
     found = _confidences(cases)
     return confidence_bins([confidence for confidence, _ in found], [right for _, right in found])
 
 
-def _named(cases: Sequence[Marked]) -> list[Goal]:
+def _named(cases: Sequence[GradedCase]) -> list[Goal]:
     singles, pairs = _tier(cases, "single"), _tier(cases, "pair")
     above = [case for case in cases if case.above_floor]
     effects = by_effect(singles, lambda case: case.top)
@@ -119,7 +118,7 @@ def _named(cases: Sequence[Marked]) -> list[Goal]:
     ]
 
 
-def _located(cases: Sequence[Marked]) -> list[Goal]:
+def _located(cases: Sequence[GradedCase]) -> list[Goal]:
     singles = _tier(cases, "single")
     return [
         Goal("block right", rate(case.block_right for case in singles), low=0.95),
@@ -129,11 +128,11 @@ def _located(cases: Sequence[Marked]) -> list[Goal]:
     ]
 
 
-def _modelled(cases: Sequence[Marked]) -> list[Goal]:
+def _modelled(cases: Sequence[GradedCase]) -> list[Goal]:
     named = [case for case in _tier(cases, "single") if case.top]
     errors = [error for case in named for error in case.parameter_errors().values()]
     covered = rate(held for case in named for held in case.covered().values())
-    ratios = [case.reply.over_floor for case in named if case.reply.over_floor is not None]
+    ratios = [case.answer.over_floor for case in named if case.answer.over_floor is not None]
     nominal = [error for case in _tier(cases, "parameters_only") for error in case.nominal_errors().values()]
     return [
         _median("parameters, median error", errors, high=0.03),
@@ -144,7 +143,7 @@ def _modelled(cases: Sequence[Marked]) -> list[Goal]:
     ]
 
 
-def _sure(cases: Sequence[Marked], bins: Sequence[ConfidenceBin]) -> list[Goal]:
+def _sure(cases: Sequence[GradedCase], bins: Sequence[ConfidenceBin]) -> list[Goal]:
     found = _confidences(cases)
     return [
         Goal(
@@ -154,10 +153,10 @@ def _sure(cases: Sequence[Marked], bins: Sequence[ConfidenceBin]) -> list[Goal]:
     ]
 
 
-def _abstained(cases: Sequence[Marked]) -> list[Goal]:
+def _abstained(cases: Sequence[GradedCase]) -> list[Goal]:
     novel, poor = _tier(cases, "novel"), _tier(cases, "insufficient")
     return [
-        Goal("novel: unexplained", rate(case.reply.verdict == "unexplained" for case in novel), low=0.90),
+        Goal("novel: unexplained", rate(case.answer.verdict == "unexplained" for case in novel), low=0.90),
         Goal("novel: something named", rate(case.names_something for case in novel), high=0.05),
         Goal("novel: block right", rate(case.block_right for case in novel)),
         Goal("ambiguous: reported as a set", rate(case.set_reported for case in _tier(cases, "ambiguous")), low=0.95),
@@ -168,16 +167,16 @@ def _abstained(cases: Sequence[Marked]) -> list[Goal]:
     ]
 
 
-def _confidences(cases: Iterable[Marked]) -> list[tuple[float, bool]]:
+def _confidences(cases: Iterable[GradedCase]) -> list[tuple[float, bool]]:
     return [
         (named.confidence, case.named_right(named))
         for case in cases
-        for named in case.reply.named
+        for named in case.answer.named
         if named.confidence is not None
     ]
 
 
-def _tier(cases: Iterable[Marked], tier: str) -> list[Marked]:
+def _tier(cases: Iterable[GradedCase], tier: str) -> list[GradedCase]:
     return [case for case in cases if case.truth.tier == tier]
 
 

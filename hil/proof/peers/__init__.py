@@ -8,11 +8,16 @@ diagnosis before its search (`case`), with its refit, periods and windows, and e
 which is an idea of the diagnosis; users of these methods write equations for the plant.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from pathlib import Path
+from time import monotonic
 from typing import Any
 
-from hil.proof.peers.case import PeerCase
+from hil.errors import HilError, InputError
+from hil.files.output import write_json
+from hil.proof.answer.blind import DIAGNOSIS, ERROR, answered
+from hil.proof.peers.case import PeerCase, read_case
 from hil.proof.peers.fit_everything import fit_everything
 from hil.proof.peers.regressors import BLOCKS
 from hil.proof.peers.residual_tests import residual_tests
@@ -27,3 +32,33 @@ METHODS: Mapping[str, Callable[[PeerCase], dict[str, Any]]] = {
     "residual_tests": residual_tests,
 }
 SLOW = ("fit_everything",)  # minutes per case
+
+
+def answer_case(case: Path, out: Path, methods: Sequence[str]) -> None:
+    """Answer a case with the methods that lack an answer; preparing it once counts as time of each."""
+    begin = monotonic()
+    todo = [out / name / case.name for name in methods if not answered(out / name / case.name)]
+    for answer in todo:
+        answer.mkdir(parents=True, exist_ok=True)
+    try:
+        prepared = read_case(case)
+    except Exception as error:
+        for answer in todo:
+            _fail(answer, error)
+        return
+    prepared_s = monotonic() - begin
+    for answer in todo:
+        begin = monotonic()
+        try:
+            found = METHODS[answer.parent.name](prepared)
+        except Exception as error:
+            _fail(answer, error)
+        else:
+            write_json(answer / DIAGNOSIS, found | {"runtime_s": prepared_s + monotonic() - begin})
+
+
+def _fail(answer: Path, error: Exception) -> None:
+    """Write a failure as a wrong answer; raise it if the method is not installed."""
+    if isinstance(error, HilError) and not isinstance(error, InputError):
+        raise error
+    write_json(answer / ERROR, {"kind": type(error).__name__, "error": str(error)})

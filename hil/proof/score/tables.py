@@ -1,11 +1,14 @@
 """Tables of a proof for the page and for Markdown: goals, other methods, verdicts, effects, power, worst cases."""
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import inf, isfinite
+from pathlib import Path
 from typing import Any
 
 from hil.diagnosis.wording import title
+from hil.errors import InputError
 from hil.proof.score.grading import GradedCase
 from hil.proof.score.scores import Goal, Scores
 from hil.proof.score.statistics import Rate, by_effect, power, verdicts
@@ -13,6 +16,7 @@ from hil.proof.seal import CASES
 from hil.report.page import Number
 from hil.report.style import digits
 
+PUBLISHED = Path(__file__).parents[1] / "results"  # results of sealed runs, one JSON file per run
 HEADERS = ("", "goal", "measured", "95 %", "of", "reached")
 _WORST = 5
 
@@ -151,6 +155,19 @@ def checking(seal: Mapping[str, Any]) -> list[str]:
         f"Drawn and diagnosed by {seal['command']}, commit {seal['git_commit'] or 'unknown'}"
         f"{' with changes' if seal['git_changed'] else ''}, {libraries}.",
     ]
+
+
+def published(name: str) -> str:
+    """Return the published results of a sealed run in Markdown. Raises InputError for an unknown name."""
+    path = PUBLISHED / f"{name}.json"
+    if not path.is_file():
+        names = ", ".join(sorted(path.stem for path in PUBLISHED.glob("*.json")))
+        raise InputError(f"--show: given {name}, allowed {names}")
+    data: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    tables = [ProofTable(table["heading"], table["headers"], table["rows"], table["text"]) for table in data["tables"]]
+    notes = "\n".join(f"- {note}" for note in data["notes"])
+    parts = [f"# {data['title']}", data["about"], *map(markdown, tables), notes]
+    return "\n\n".join(part for part in parts if part)
 
 
 def markdown(table: ProofTable) -> str:

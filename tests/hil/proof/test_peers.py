@@ -14,12 +14,12 @@ import pytest
 from hil.errors import HilError
 from hil.proof.answer.answers import parse_answer
 from hil.proof.draw.generator import DrawnCase, draw, write
-from hil.proof.peers import METHODS, SLOW, signals
-from hil.proof.peers.__main__ import answer_case
+from hil.proof.peers import METHODS, SLOW, answer_case, signals
 from hil.proof.peers.case import PeerCase, read_case
 from hil.proof.peers.fit_everything import fit_everything
 from hil.proof.peers.regressors import Equation, named
 from hil.proof.peers.sparse_regression import pysindy, select_forward
+from hil.proof.peers.terms import TRACES
 from hil.twin.library import BY_ID
 
 QUICK = [name for name in METHODS if name not in SLOW]
@@ -53,6 +53,10 @@ def test_a_large_effect_is_named_first_in_the_form_of_the_interface(
     assert reply.verdict == "missing_physics"
     assert reply.named[0].effect == "external_force"
     assert all(found.effect in BY_ID for found in reply.named)
+
+
+def test_every_mechanism_of_the_library_has_a_term_and_every_term_is_one_of_it() -> None:
+    assert {effect for effects in TRACES.values() for effect in effects} == set(BY_ID)
 
 
 @pytest.mark.long

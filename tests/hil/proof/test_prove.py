@@ -24,6 +24,7 @@ from hil.proof.draw.plan import Planned, plan
 from hil.proof.run import ANSWERS, diagnose_blind, prove, score_others
 from hil.proof.score.page import write_proof
 from hil.proof.score.scores import Scores, score
+from hil.proof.score.tables import PUBLISHED, published
 from hil.proof.seal import CASES, SEAL, SEALED, code_sha256, draw_cases, read_seal, seal, sha256, unseal
 from hil.twin.library import BY_ID
 
@@ -196,6 +197,26 @@ def test_all_and_some_at_once_is_refused(tmp_path: Path) -> None:
     assert not (tmp_path / "new").exists()
 
 
+def test_without_a_folder_the_message_says_what_to_give() -> None:
+    ran = CliRunner().invoke(app, ["prove", "--cases", "3"])
+    assert isinstance(ran.exception, InputError)
+    assert str(ran.exception).startswith("--out: not given, allowed a folder")
+
+
+def test_published_results_are_printed_and_an_unknown_name_lists_them() -> None:
+    names = sorted(path.stem for path in PUBLISHED.glob("*.json"))
+    assert "20261206" in names
+    for name in names:
+        text = published(name)
+        assert text.startswith("# ")
+        assert text.count("| --- |") >= 1
+    ran = CliRunner().invoke(app, ["prove", "--show", "20261206"])
+    assert ran.exit_code == 0
+    assert "| singles: named first | ≥ 92.0 % | 98.3 % | 91.0–99.7 % | 59 | yes |" in ran.output
+    with pytest.raises(InputError, match=r"--show: given x, allowed 20261204, .*20261206"):
+        published("x")
+
+
 def test_the_blind_process_imports_nothing_that_knows(tmp_path: Path) -> None:
     """All that a diagnosis of a case loads, by what it would load: a case without recordings."""
     (tmp_path / "cases" / "empty").mkdir(parents=True)
@@ -208,6 +229,7 @@ def test_the_blind_process_imports_nothing_that_knows(tmp_path: Path) -> None:
     loaded = set(ran.stdout.split())
     assert "hil.diagnosis.diagnose" in loaded
     assert {name for name in loaded if name.startswith("hil.proof.")} == {
+        "hil.proof.answer",
         "hil.proof.answer.blind",
         "hil.proof.answer.worker_pool",
     }

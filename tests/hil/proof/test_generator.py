@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from pathlib import Path
 from typing import Any
@@ -54,6 +55,27 @@ def test_same_numbers_same_case_other_numbers_another(cases: dict[str, DrawnCase
     for first, second in zip(case.recordings, again.recordings, strict=True):
         assert all(np.array_equal(first[channel], second[channel]) for channel in first.columns)
     assert other.truth.true_parameters != case.truth.true_parameters
+
+
+@pytest.mark.parametrize(("arguments", "digest"), [
+    (("single", 1, 7, None, "two_mass"), "f3ec482c9b59"), (("null", 1, 7, None, "serial_chain"), "fd9b21643722"),
+    (("ladder", 2, 7, None, "two_mass"), "8bb08f2447a9"),
+    (("parameters_only", 1, 7, None, "seven_dof"), "957791f8679c"), (("insufficient", 5, 7, None, "one_mass"), "98e8909af127"),
+    (("novel", 1, 7, None, "two_mass"), "266a9120ee86"),
+])  # fmt: skip
+def test_a_tier_number_and_seed_give_the_case_that_they_always_gave(arguments: Any, digest: str) -> None:
+    """Effect and recordings to six digits, since another machine's linear algebra may change the last ones."""
+    case = draw(*arguments)
+    effects = [
+        f"{one.effect} {one.form} {[f'{name} {value:.6g}' for name, value in sorted(one.parameters.items())]}"
+        for one in case.truth.effects
+    ]
+    rms = [
+        f"{name} {np.sqrt(np.mean(np.square(values))):.6g}"
+        for recording in case.recordings
+        for name, values in sorted(recording.columns.items())
+    ]
+    assert hashlib.sha256(";".join([*effects, *rms]).encode()).hexdigest()[:12] == digest
 
 
 def test_consecutive_numbers_take_all_effects_equally_often() -> None:

@@ -30,8 +30,7 @@ from hil.identification.dataset import Measured
 from hil.motion.profile import Profile
 from hil.motion.trajectory import Trajectory, plan
 from hil.twin.axis import Start
-
-ONCE = "external_force"  # belongs to its moment: nobody expects it again on another motion
+from hil.twin.library import BY_ID
 
 _SURE = 2.0  # times as visible as needed must be what a motion shows that nobody has made yet
 
@@ -208,10 +207,10 @@ def _hypothesis(effect: str, found: Fit) -> _Hypothesis:
     stays = np.concatenate(
         [
             np.ones(found.model.nominal_count, dtype=bool),
-            *(np.full(len(term.values), term.effect != ONCE) for term in terms),
+            *(np.full(len(term.values), not BY_ID[term.effect].transient) for term in terms),
         ]
     )
-    model = replace(found.model, terms=tuple(term for term in terms if term.effect != ONCE))
+    model = replace(found.model, terms=tuple(term for term in terms if not BY_ID[term.effect].transient))
     return _Hypothesis(effect, model, found.x[stays], _triangle(found.jacobian[:, stays]))
 
 

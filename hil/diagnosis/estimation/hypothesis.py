@@ -22,7 +22,7 @@ from hil.identification.dataset import Measured
 from hil.identification.residuals import differences
 from hil.twin.axis import Response, Twin
 from hil.twin.library import BY_ID
-from hil.twin.mechanism import Parameter
+from hil.twin.mechanism import Parameter, Role
 from hil.twin.physics import Active
 
 # Torque that the motor channel is trusted to tell, over the noise of the torque channel. A fine encoder tells much
@@ -55,6 +55,7 @@ class Coordinate:
     low: float
     high: float
     step: float
+    role: Role | None = None  # of a mechanism's parameter
 
     def value(self, x: float) -> float:
         """Physical value of x."""
@@ -103,18 +104,18 @@ class Model:
 
     def _coordinate(self, name: str, parameter: Parameter, start: float) -> Coordinate:
         step = CHATTER_STEP if self._chatters else 1e-4
-        if parameter.name == "period_m":
+        if parameter.role is Role.PERIOD:
             step = 0.01 * start / (2.0 * np.pi * max(self.travel_m, start))
-        elif parameter.name in ("start_s", "end_s"):
+        elif parameter.role is Role.EDGE:
             # an edge is seen only where it lies: a wide difference sees it coming
             step = self.edge_step_s / max(abs(start), EDGE_STEP_S)
-        elif parameter.name == "cycles_per_rev":
+        elif parameter.role is Role.ORDER:
             angle_rad = self.travel_m / self.bench.axis.ratio_m_rad * self.bench.axis.physics().angle_per_unit
             step = 0.01 / (start * max(angle_rad, 1.0))
         if parameter.low > 0.0:
-            return Coordinate(name, start, True, parameter.low, parameter.high, step)
+            return Coordinate(name, start, True, parameter.low, parameter.high, step, parameter.role)
         scale = abs(start) or 1.0
-        linear_step = step if parameter.name in ("start_s", "end_s") else max(step, 1e-3)
+        linear_step = step if parameter.role is Role.EDGE else max(step, 1e-3)
         return Coordinate(
             name,
             scale,
@@ -122,14 +123,16 @@ class Model:
             parameter.low,
             parameter.high,
             min(linear_step, 0.1 * (parameter.high - parameter.low) / scale),
+            parameter.role,
         )
 
     @property
     def _chatters(self) -> bool:
         """Whether there is play, in which a nut may chatter."""
         return any(
-            BY_ID[effect].play
+            variant.play
             for effect in (*(term.effect for term in self.terms), *(entry.effect for entry in self.bench.mechanisms))
+            for variant in BY_ID[effect].variants
         )
 
     @property

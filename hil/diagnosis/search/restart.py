@@ -25,11 +25,9 @@ from hil.diagnosis.search.initial_values import stretches
 from hil.diagnosis.search.successive_halving import LONG, SOFT, believed, leads, race
 from hil.diagnosis.search.validity import claimable
 from hil.identification.dataset import Measured
+from hil.twin.library import LIBRARY
 
-_EFFECT = "preload_loss"
-# Gap, in units of the largest stretch to one side, and the stiffness in it: a nut that has lost its preload keeps a
-# tenth to a half.
-_STARTS = ((1.0, 0.15), (1.0, 0.4), (0.5, 0.15))
+_EFFECT, _STARTS = next((mechanism.id, mechanism.hidden_starts) for mechanism in LIBRARY if mechanism.hidden_starts)
 _FIRST = 20  # evaluations of a first fit: far from the base, it has farther to go than a race's
 _NARROWEST_M = 1e-6  # gap to begin with where motor and table do not part at all
 
@@ -49,7 +47,7 @@ def may_hide(base: Fit, runs: Sequence[Measured]) -> bool:
     return (
         len(bench.axis.physics().chain.names) > 2
         and bool(runs[0].table_m.size)
-        and compatible((*terms, Term(_EFFECT, 0, (0.0, 1.0)), *known))
+        and compatible((*terms, Term(_EFFECT, 0, _STARTS[0]), *known))
     )
 
 
@@ -58,8 +56,8 @@ def unbent(base: Fit, runs: Sequence[Measured]) -> Fit:
     widest_m = max(stretches(runs, base.model.bench.axis.ratio_m_rad)[1], _NARROWEST_M)
     x = believed(base)[-1]
 
-    def begun(start: tuple[float, float]) -> Fit:
-        term = Term(_EFFECT, 0, (start[0] * widest_m, start[1]))
+    def begun(start: tuple[float, ...]) -> Fit:
+        term = Term(_EFFECT, 0, (start[0] * widest_m, *start[1:]))
         model = replace(base.model, terms=(*base.model.terms, term), torque_accuracy=SEARCH_ACCURACY)
         return fit(model, runs, np.concatenate([x, model.initial()[x.size :]]), soft=SOFT, evaluations=_FIRST)
 

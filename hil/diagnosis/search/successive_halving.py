@@ -30,6 +30,7 @@ from hil.diagnosis.search.initial_values import Start
 from hil.diagnosis.search.score_test import Lead, screen
 from hil.identification.dataset import Measured
 from hil.twin.library import BY_ID
+from hil.twin.mechanism import Role
 
 _RACERS = 8  # leads that are fitted
 _SPRINTERS = 4  # of which are fitted on
@@ -147,7 +148,7 @@ def race(base: Fit, found: Sequence[Lead], runs: Sequence[Measured]) -> list[Fit
         return finish(again) if gained(again) > 0.0 else again
 
     def finish(found: Fit) -> Fit:
-        if any(coordinate.name.endswith("end_s") for coordinate in found.model.coordinates):
+        if any(coordinate.role is Role.EDGE for coordinate in found.model.coordinates):
             found = fit(found.model, runs, found.x, evaluations=LONG, slopes=found.jacobian)
             found = _edges_moved(found, runs)
         found = fit(
@@ -271,7 +272,7 @@ def _edges_moved(found: Fit, runs: Sequence[Measured]) -> Fit:
     """A fit with each edge of a window where it leaves least: their valleys are narrow, a step leads past them."""
     x, low, high = found.x.copy(), *found.model.bounds()
     for index, coordinate in enumerate(found.model.coordinates):
-        if not coordinate.name.endswith(("start_s", "end_s")):
+        if coordinate.role is not Role.EDGE:
             continue
         edges = np.tile(x, (_EDGE_SHIFTS_S.size, 1))
         edges[:, index] = [coordinate.x(coordinate.value(x[index]) + shift_s) for shift_s in _EDGE_SHIFTS_S]

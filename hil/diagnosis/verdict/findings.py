@@ -21,7 +21,7 @@ from hil.diagnosis.verdict.cross_validation import Ablation
 from hil.diagnosis.wording import NOMINAL_UNITS, number, sentence, title
 from hil.identification.dataset import Measured
 from hil.twin.library import BY_ID
-from hil.twin.mechanism import Dimension
+from hil.twin.mechanism import Dimension, Role
 
 # On development cases (seeds 931 and 941 of the proof's generator, 67 parameters) nine in ten errors are below 3.5
 # standard errors of the noise alone, 2.1 times 1.645: two honest simulations of one axis differ by that.
@@ -76,7 +76,7 @@ def findings(
                 ablation.train,
                 Finding(
                     effect=term.effect,
-                    variant=BY_ID[term.effect].variants[term.variant],
+                    variant=BY_ID[term.effect].forms[term.variant],
                     confidence=confidence(left, _factor(ablation), margin),
                     equivalents=tuple(dict.fromkeys(tied)),
                     rivals=tuple(
@@ -140,7 +140,7 @@ def diagnosed_bench(owner: Bench, found: Fit) -> Bench:
     entries = tuple(
         MechanismEntry(
             effect=term.effect,
-            variant=BY_ID[term.effect].variants[term.variant],
+            variant=BY_ID[term.effect].forms[term.variant],
             parameters=dict(zip(BY_ID[term.effect].names, _normal(term).values, strict=True)),
         )
         for term in terms
@@ -151,7 +151,7 @@ def diagnosed_bench(owner: Bench, found: Fit) -> Bench:
 def _normal(term: Term) -> Term:
     """Phases within one turn."""
     values = tuple(
-        math.remainder(value, 2.0 * math.pi) if parameter.name.startswith("phase") else value
+        math.remainder(value, 2.0 * math.pi) if parameter.role is Role.PHASE else value
         for value, parameter in zip(term.values, BY_ID[term.effect].parameters, strict=True)
     )
     return replace(term, values=values)

@@ -11,7 +11,8 @@ from typing import Any
 
 from hil.errors import HilError
 from hil.proof.answer.blind import DIAGNOSIS, ERROR, answered
-from hil.proof.draw.expected import Role, role
+from hil.twin.library import names_of
+from hil.twin.mechanism import Role
 
 FAILED, ABSENT = "error", "no_answer"  # verdicts beside those of a diagnosis
 
@@ -30,9 +31,9 @@ class Named:
         """The set of reported ids: the name and its equivalents."""
         return frozenset({self.effect, *self.equivalents})
 
-    def value(self, wanted: Role) -> float | None:
-        """Return the value of the parameter with a role; None if there is none."""
-        return next((value for name, (value, _) in self.parameters.items() if role(name) is wanted), None)
+    def values(self, role: Role) -> list[float]:
+        """Return the values of the parameters with a role."""
+        return [self.parameters[name][0] for name in names_of(role) if name in self.parameters]
 
 
 @dataclass(frozen=True)

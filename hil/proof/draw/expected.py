@@ -5,7 +5,6 @@ keeps the name of its mechanism; only parameters with the same meaning in both l
 """
 
 from collections.abc import Mapping
-from enum import StrEnum
 from math import sqrt
 
 from drivers.sim.axis import AxisTruth
@@ -16,44 +15,6 @@ from hil.twin.library import BY_ID
 
 # Two names for one law: friction that differs by direction shifts its band as a weight does, also at standstill.
 SAME_LAW = (frozenset({"asymmetric_friction", "constant_load"}),)
-
-
-class Role(StrEnum):
-    """Roles of parameters that are scored in a way of their own."""
-
-    AMPLITUDE = "amplitude"  # of a harmonic
-    PHASE = "phase"  # of a harmonic [rad], modulo 2 pi
-    PERIOD = "period"  # [m]
-    ORDER = "order"  # periods per revolution
-    START = "start"  # of a window [s]
-    END = "end"
-    FREQUENCY = "frequency"  # [Hz]
-    OTHER = ""
-
-    @property
-    def locates(self) -> bool:
-        """Whether the parameter locates the effect: it is scored as its place, not among its parameters."""
-        return self in (Role.PERIOD, Role.ORDER, Role.START, Role.END, Role.FREQUENCY)
-
-
-_ROLES = {
-    "period_m": Role.PERIOD,
-    "cycles_per_rev": Role.ORDER,
-    "start_s": Role.START,
-    "end_s": Role.END,
-    "frequency_hz": Role.FREQUENCY,
-}
-
-
-def role(parameter: str) -> Role:
-    """Return the role of a parameter by its name; names of harmonics are numbered, as in amplitude_2_m."""
-    kind = next((kind for kind in (Role.AMPLITUDE, Role.PHASE) if parameter.startswith(kind)), Role.OTHER)
-    return _ROLES.get(parameter, kind)
-
-
-def amplitude_of(phase: str) -> str:
-    """Return the name of the amplitude [m] of the harmonic of a phase."""
-    return phase.replace(Role.PHASE, Role.AMPLITUDE).replace("_rad", "_m")
 
 
 def same_law(effect: str) -> tuple[str, ...]:

@@ -25,6 +25,8 @@ from hil.proof.draw.effects import LIBRARY
 from hil.proof.draw.tiers import RECIPES
 from hil.proof.draw.unknown_effects import NOVEL
 from hil.recording.recording import Recording, write_parquet
+from hil.twin.library import names_of
+from hil.twin.mechanism import Role
 
 TIERS = tuple(RECIPES)
 BALANCED = {"single": LIBRARY, "ladder": LIBRARY, "pair": LIBRARY, "masked": LIBRARY, "novel": NOVEL}
@@ -50,7 +52,7 @@ class Concealed:
     @property
     def free_period_m(self) -> float | None:
         """Spatial period [m] if it is a parameter of the effect."""
-        free = {expected.role(name) for name in self.parameters} & {expected.Role.PERIOD, expected.Role.ORDER}
+        free = set(names_of(Role.PERIOD, Role.ORDER)) & set(self.parameters)
         return cast(float, self.place["period_m"]) if free else None
 
     @property

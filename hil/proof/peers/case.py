@@ -14,10 +14,11 @@ from hil.diagnosis.estimation.fit import Fit, evaluate
 from hil.diagnosis.preflight import prepare
 from hil.diagnosis.result import Verdict
 from hil.diagnosis.search import successive_halving
-from hil.diagnosis.search.initial_values import Scene, scene
+from hil.diagnosis.search.initial_values import scene
 from hil.diagnosis.verdict.judge import refit_matters
 from hil.identification.dataset import Measured
 from hil.recording.recording import read_recording
+from hil.twin.mechanism import Scene
 
 _TRAIN, _HELD_OUT = ("train_1", "train_2"), ("holdout",)
 

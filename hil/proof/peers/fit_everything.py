@@ -22,8 +22,6 @@ from hil.diagnosis.search.forward_selection import MATERIAL
 from hil.diagnosis.search.initial_values import Start, starts
 from hil.diagnosis.search.score_test import Lead
 from hil.identification.dataset import Measured
-from hil.proof.draw.effects import STRENGTH
-from hil.proof.draw.expected import Role, role
 from hil.proof.peers.case import PeerCase
 from hil.twin.library import BY_ID
 
@@ -63,22 +61,14 @@ def _weak(lead: Lead, start: Start) -> Term:
 def _strength_over_error(found: Fit, index: int) -> float:
     """Return the strength of a term in standard errors; the standard error of a logarithm is the relative error.
 
-    Infinite for mechanisms without a strength, such as a torque limit: they are without effect only at infinity or at
-    the value of another parameter, and are judged by the growth of the residual alone.
+    Infinite for mechanisms that are not neutral at zero, such as a torque limit: they are judged by the growth of the
+    residual alone.
     """
-    effect = found.model.terms[index].effect
-    strength = next(
-        (
-            at
-            for at, name in enumerate(BY_ID[effect].names)
-            if name == STRENGTH.get(effect) or role(name) is Role.AMPLITUDE
-        ),
-        None,
-    )
-    if strength is None:
+    mechanism = BY_ID[found.model.terms[index].effect]
+    if not mechanism.neutral_at_zero:
         return inf
     first = found.model.nominal_count + sum(len(other.values) for other in found.model.terms[:index])
-    at = first + strength
+    at = first + mechanism.strength
     error = _standard_errors(found)[at]
     value = 1.0 if found.model.coordinates[at].logarithmic else abs(found.x[at])
     return float(value / max(error, 1e-300))

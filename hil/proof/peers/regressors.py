@@ -70,8 +70,10 @@ def equations(
 
 
 def forward(equation: Equation, among: Sequence[int]) -> Iterator[tuple[int, float]]:
-    """Yield terms by orthogonal forward regression: the one that explains most of the remaining energy, and its share of
-    that energy. Ends when the other terms are redundant."""
+    """Yield terms by orthogonal forward regression, each with its share of the energy that remained before it.
+
+    The term that explains most of the remaining energy is next. Ends when the other terms are redundant.
+    """
     left, w = equation.target.copy(), equation.terms[:, list(among)]
     size = np.sum(w**2, axis=0)
     for _ in among:

@@ -5,9 +5,9 @@ with the inputs.
 
 It uses the diagnosis's own twin with fitted nominal parameters, motor side and transmission separately, so that each
 prediction error belongs to one block; controller and drive, which have no fitted parameters; and as inputs the terms
-of `hil.proof.peers.regressors`. Correlations within the joint 99 % bounds of a case, or below the materiality limit of the
-diagnosis, are no mismatch. Otherwise the term that explains most energy of a residual names the effect. Whiteness is not
-tested, since quantisation noise is not white.
+of `hil.proof.peers.regressors`. Correlations within the joint 99 % bounds of a case, or below the materiality limit of
+the diagnosis, are no mismatch. Otherwise the term that explains most energy of a residual names the effect. Whiteness
+is not tested, since quantisation noise is not white.
 """
 
 from typing import Any

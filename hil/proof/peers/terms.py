@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
-from hil.diagnosis.search.initial_values import Scene
 from hil.identification.dataset import Measured
 from hil.proof.peers import signals
+from hil.twin.mechanism import Scene
 
 Effects = tuple[str, ...]
 TRACES: Mapping[str, list[str]] = json.loads(Path(__file__).with_name("traces.json").read_text(encoding="utf-8"))

@@ -7,11 +7,15 @@ from math import inf, pi, remainder
 
 from hil.diagnosis.wording import title
 from hil.proof.answer.answers import ABSENT, FAILED, Answer, Named
-from hil.proof.draw.expected import Role, amplitude_of, role, same_law
+from hil.proof.draw.expected import same_law
 from hil.proof.draw.generator import Concealed, Truth
+from hil.twin.library import names_of
+from hil.twin.mechanism import Role
 
 NORMAL_90 = 1.645  # standard errors to either side of a 90 % interval
 ABOVE_FLOOR = 1.0  # smallest size, in units of noise, of an effect above the noise floor
+# Parameters that locate an effect: they are scored as its place, not among its parameters.
+_PLACES = names_of(Role.ORDER, Role.PERIOD, Role.EDGE, Role.FREQUENCY)
 
 
 @dataclass(frozen=True)
@@ -170,7 +174,7 @@ class GradedCase:
         return {
             name: relative_error(name, value, self._known())
             for name, (value, _) in self._estimated().items()
-            if not role(name).locates
+            if name not in _PLACES
         }
 
     def covered(self) -> dict[str, bool]:
@@ -179,7 +183,7 @@ class GradedCase:
         return {
             name: difference(name, value, known[name]) <= NORMAL_90 * deviation
             for name, (value, deviation) in self._estimated().items()
-            if role(name) is not Role.ORDER
+            if name not in names_of(Role.ORDER)
         }
 
     def nominal_errors(self) -> dict[str, float]:
@@ -205,12 +209,11 @@ class GradedCase:
         """Return intersection over union of the given windows and the true one; None for permanent effects."""
         if self.concealed is None or (true := self.concealed.window_s) is None:
             return None
-        start_s, end_s = self._said(Role.START), self._said(Role.END)
-        known = start_s is not None and end_s is not None
-        return overlap([(start_s, end_s)] if known else self.answer.location.windows_s, *true)  # type: ignore[list-item]
+        edges = self.first.values(Role.EDGE) if self.first else []
+        return overlap([edges] if edges else self.answer.location.windows_s, *true)
 
-    def _said(self, wanted: Role) -> float | None:
-        return self.first.value(wanted) if self.first else None
+    def _said(self, role: Role) -> float | None:
+        return next(iter(self.first.values(role)), None) if self.first else None
 
     def _estimated(self) -> dict[str, tuple[float, float]]:
         if not self.top or self.first is None:
@@ -232,7 +235,7 @@ class GradedCase:
 
 def difference(name: str, value: float, true: float) -> float:
     """Return the absolute error of a parameter; phases [rad] modulo 2 pi."""
-    return abs(remainder(value - true, 2.0 * pi)) if role(name) is Role.PHASE else abs(value - true)
+    return abs(remainder(value - true, 2.0 * pi)) if name in names_of(Role.PHASE) else abs(value - true)
 
 
 def relative_error(name: str, value: float, known: Mapping[str, float]) -> float:
@@ -241,10 +244,11 @@ def relative_error(name: str, value: float, known: Mapping[str, float]) -> float
     Amplitudes of harmonics are relative to the first one; the error of a phase [rad] is weighted with its amplitude.
     """
     off = difference(name, value, known[name])
-    first = next((size for other, size in known.items() if role(other) is Role.AMPLITUDE), 0.0)
-    if role(name) is Role.PHASE:
-        return off * (known.get(amplitude_of(name), first) / first if first else 1.0)
-    scale = first if role(name) is Role.AMPLITUDE else abs(known[name])
+    phases, strengths = ([other for other in known if other in names_of(role)] for role in (Role.PHASE, Role.STRENGTH))
+    first = known[strengths[0]] if phases and strengths else 0.0
+    if name in phases:
+        return off * (known[strengths[phases.index(name)]] / first if first else 1.0)
+    scale = first if name in strengths and phases else abs(known[name])
     return off / scale if scale else float(off > 0.0)
 
 

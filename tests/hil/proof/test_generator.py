@@ -60,7 +60,8 @@ def test_same_numbers_same_case_other_numbers_another(cases: dict[str, DrawnCase
 @pytest.mark.parametrize(("arguments", "digest"), [
     (("single", 1, 7, None, "two_mass"), "f3ec482c9b59"), (("null", 1, 7, None, "serial_chain"), "fd9b21643722"),
     (("ladder", 2, 7, None, "two_mass"), "8bb08f2447a9"),
-    (("parameters_only", 1, 7, None, "seven_dof"), "957791f8679c"), (("insufficient", 5, 7, None, "one_mass"), "98e8909af127"),
+    (("parameters_only", 1, 7, None, "seven_dof"), "957791f8679c"),
+    (("insufficient", 5, 7, None, "one_mass"), "98e8909af127"),
     (("novel", 1, 7, None, "two_mass"), "266a9120ee86"),
 ])  # fmt: skip
 def test_a_tier_number_and_seed_give_the_case_that_they_always_gave(arguments: Any, digest: str) -> None:

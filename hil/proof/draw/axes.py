@@ -70,7 +70,7 @@ class DrawnAxis:
 
     @property
     def has_table(self) -> bool:
-        """Whether there is a linear encoder."""
+        """True if there is a linear encoder."""
         return not self.truth.linear
 
     @property

@@ -11,47 +11,12 @@ from math import sqrt
 from drivers.sim.effects import CATALOGUE, Effect
 from hil.proof.draw.axes import DrawnAxis
 from hil.proof.draw.axis_kinds import Rng, any_phase, any_sign, log_uniform
+from hil.twin.library import BY_ID
+from hil.twin.mechanism import Role
 
 FormAndParameters = tuple[str, dict[str, float]]
 LIBRARY: tuple[str, ...] = tuple(CATALOGUE)
-NEED_TABLE = frozenset(
-    {
-        "backlash",
-        "preload_loss",
-        "position_dependent_stiffness",
-        "periodic_lead_error",
-        "cumulative_lead_error",
-        "thermal_growth",
-        "scale_interpolation_error",
-        "structural_mode",
-        "table_side_friction",
-    }
-)
-# The parameter to which the size of an effect is about proportional. Without an entry: all its amplitudes, or, for the
-# three effects that `scaled` lists, the distance of a parameter from a value without effect.
-STRENGTH: Mapping[str, str] = {
-    "asymmetric_friction": "offset_torque_n_m",
-    "constant_load": "load_torque_n_m",
-    "position_dependent_friction": "fraction",
-    "nonlinear_viscous_friction": "quadratic_n_m_s2_rad2",
-    "friction_drift": "fraction",
-    "table_side_friction": "share",
-    "backlash": "gap_m",
-    "preload_loss": "zone_m",
-    "position_dependent_stiffness": "relative_slope",
-    "cumulative_lead_error": "slope_m_m",
-    "thermal_growth": "relative_growth",
-    "structural_mode": "mass_ratio",
-    "torque_ripple": "fraction",
-    "torque_constant_saturation": "coefficient_1_n2_m2",
-    "torque_dead_zone": "half_width_n_m",
-    "current_loop_lag": "time_constant_s",
-    "transport_delay": "delay_s",
-    "velocity_filter_lag": "time_constant_s",
-    "channel_time_skew": "delay_s",
-    "external_force": "force_n",
-    "spring_load": "stiffness_n_m",
-}
+NEED_TABLE = frozenset(name for name in LIBRARY if BY_ID[name].needs_table)
 _SOFTEST = 0.8  # share of the stiffness that may be lost over the travel: the spring stays positive
 
 
@@ -81,7 +46,7 @@ def applicable(axis: DrawnAxis) -> tuple[str, ...]:
 
 def draw_effect(name: str, scale: DrawScale, rng: Rng) -> Effect:
     """Draw an effect of the library with random form and parameters for this axis."""
-    form, parameters = _DRAWS[name](scale, rng)
+    form, parameters = _WITH_FORM[name](scale, rng) if name in _WITH_FORM else ("", _PLAIN[name](scale, rng))
     return Effect(name, {key: float(value) for key, value in parameters.items()}, form)
 
 
@@ -96,8 +61,8 @@ def scaled(effect: Effect, factor: float, scale: DrawScale) -> Effect | None:
     elif effect.id == "torque_saturation":
         parameters["limit_n_m"] = scale.peak_torque - factor * (scale.peak_torque - parameters["limit_n_m"])
     else:
-        for name in [name for name in parameters if name.startswith("amplitude")] or [STRENGTH[effect.id]]:
-            parameters[name] *= factor
+        for index in BY_ID[effect.id].indices(Role.STRENGTH):
+            parameters[BY_ID[effect.id].names[index]] *= factor
     if parameters.get("relative_slope", 0.0) * scale.axis.travel_m < -_SOFTEST:
         return None
     try:
@@ -125,19 +90,19 @@ def _structural_mode(s: DrawScale, rng: Rng) -> FormAndParameters:
     }
 
 
-def _external_force(s: DrawScale, rng: Rng) -> FormAndParameters:
+def _external_force(s: DrawScale, rng: Rng) -> dict[str, float]:
     start_s = s.duration_s * rng.uniform(0.15, 0.6)
-    return "", {
+    return {
         "force_n": any_sign(rng) * s.coulomb / s.ratio * log_uniform(rng, 0.1, 1.0),
         "start_s": start_s,
         "end_s": start_s + s.duration_s * rng.uniform(0.05, 0.3),
     }
 
 
-def _periodic_lead_error(s: DrawScale, rng: Rng) -> FormAndParameters:
+def _periodic_lead_error(s: DrawScale, rng: Rng) -> dict[str, float]:
     """Draw harmonics as measured on screws: the first dominates, the others are a few tenths of it."""
     amplitude_m = log_uniform(rng, 1e-6, 15e-6)
-    return "", {
+    return {
         "amplitude_m": amplitude_m,
         "phase_rad": any_phase(rng),
         "amplitude_2_m": amplitude_m * rng.uniform(0.0, 0.3),
@@ -154,12 +119,65 @@ def _channel_time_skew(s: DrawScale, rng: Rng) -> FormAndParameters:
     return form, {"delay_s": log_uniform(rng, 0.1e-3 if form == "torque" else 10e-6, 2e-3)}
 
 
-_DRAWS: Mapping[str, Callable[[DrawScale, Rng], FormAndParameters]] = {
-    "asymmetric_friction": lambda s, rng: (
-        "",
-        {"offset_torque_n_m": any_sign(rng) * s.coulomb * log_uniform(rng, 0.03, 0.4)},
-    ),
-    "constant_load": lambda s, rng: ("", {"load_torque_n_m": any_sign(rng) * s.coulomb * log_uniform(rng, 0.03, 1.0)}),
+_PLAIN: Mapping[str, Callable[[DrawScale, Rng], dict[str, float]]] = {
+    "asymmetric_friction": lambda s, rng: {
+        "offset_torque_n_m": any_sign(rng) * s.coulomb * log_uniform(rng, 0.03, 0.4)
+    },
+    "constant_load": lambda s, rng: {"load_torque_n_m": any_sign(rng) * s.coulomb * log_uniform(rng, 0.03, 1.0)},
+    "position_dependent_friction": lambda s, rng: {
+        "fraction": log_uniform(rng, 0.05, 0.5),
+        "phase_rad": any_phase(rng),
+        "period_m": log_uniform(rng, 0.02, 0.8 * s.axis.travel_m),
+    },
+    "nonlinear_viscous_friction": lambda s, rng: {
+        "quadratic_n_m_s2_rad2": s.coulomb * log_uniform(rng, 0.1, 1.5) / (s.axis.feed_m_s / s.ratio) ** 2
+    },
+    "friction_drift": lambda s, rng: {
+        "fraction": any_sign(rng) * log_uniform(rng, 0.08, 0.6),
+        "time_constant_s": log_uniform(rng, 2.0, 20.0),
+    },
+    "cogging_torque": lambda s, rng: {
+        "amplitude_n_m": s.coulomb * log_uniform(rng, 0.02, 0.3),
+        "phase_rad": any_phase(rng),
+        "cycles_per_rev": rng.choice((4, 6, 8, 12, 18, 24, 36)),
+    },
+    "table_side_friction": lambda s, rng: {"share": rng.uniform(0.15, 0.9)},
+    "external_force": _external_force,
+    "spring_load": lambda s, rng: {
+        "stiffness_n_m": s.coulomb / s.ratio * log_uniform(rng, 0.1, 2.0) / s.axis.travel_m,
+        "rest_position_m": s.axis.travel_m * rng.uniform(-0.5, 1.5),
+    },
+    "backlash": lambda s, rng: {"gap_m": log_uniform(rng, 2e-6, 60e-6)},
+    "preload_loss": lambda s, rng: {"zone_m": log_uniform(rng, 2e-6, 40e-6), "stiffness_ratio": rng.uniform(0.1, 0.7)},
+    "position_dependent_stiffness": lambda s, rng: {
+        "relative_slope": rng.uniform(0.4, 3.0) if rng.random() < 0.5 else -rng.uniform(0.3, 0.7) / s.axis.travel_m
+    },
+    "periodic_lead_error": _periodic_lead_error,
+    "cumulative_lead_error": lambda s, rng: {"slope_m_m": any_sign(rng) * log_uniform(rng, 5e-6, 200e-6)},
+    "thermal_growth": lambda s, rng: {
+        "relative_growth": log_uniform(rng, 10e-6, 200e-6),
+        "time_constant_s": log_uniform(rng, 2.0, 30.0),
+    },
+    "torque_ripple": lambda s, rng: {
+        "fraction": log_uniform(rng, 0.01, 0.12),
+        "cycles_per_rev": rng.choice((2, 4, 6, 8, 12, 24)),
+        "phase_rad": any_phase(rng),
+    },
+    "torque_constant_saturation": lambda s, rng: {
+        "coefficient_1_n2_m2": log_uniform(rng, 0.03, 0.25) / s.peak_torque**2
+    },
+    "velocity_filter_lag": lambda s, rng: {"time_constant_s": log_uniform(rng, 0.3e-3, 2e-3)},
+    "encoder_eccentricity": lambda s, rng: {
+        "amplitude_rad": log_uniform(rng, 0.3e-6, 6e-6) / s.ratio,
+        "phase_rad": any_phase(rng),
+    },
+    "scale_interpolation_error": lambda s, rng: {
+        "amplitude_m": log_uniform(rng, 0.1e-6, 2e-6),
+        "phase_rad": any_phase(rng),
+        "period_m": rng.choice((4e-6, 10e-6, 20e-6, 40e-6, 100e-6, 200e-6)),
+    },
+}
+_WITH_FORM: Mapping[str, Callable[[DrawScale, Rng], FormAndParameters]] = {
     "stribeck_friction": lambda s, rng: (
         str(rng.choice(("gaussian", "exponential", "atan"), p=(0.4, 0.3, 0.3))),
         {
@@ -171,67 +189,7 @@ _DRAWS: Mapping[str, Callable[[DrawScale, Rng], FormAndParameters]] = {
         str(rng.choice(("gms", "dahl", "lugre"), p=(0.4, 0.4, 0.2))),
         {"stiffness_n_m_rad": s.coulomb * s.ratio / log_uniform(rng, 0.5e-6, 20e-6)},
     ),
-    "position_dependent_friction": lambda s, rng: (
-        "",
-        {
-            "fraction": log_uniform(rng, 0.05, 0.5),
-            "phase_rad": any_phase(rng),
-            "period_m": log_uniform(rng, 0.02, 0.8 * s.axis.travel_m),
-        },
-    ),
-    "nonlinear_viscous_friction": lambda s, rng: (
-        "",
-        {"quadratic_n_m_s2_rad2": s.coulomb * log_uniform(rng, 0.1, 1.5) / (s.axis.feed_m_s / s.ratio) ** 2},
-    ),
-    "friction_drift": lambda s, rng: (
-        "",
-        {"fraction": any_sign(rng) * log_uniform(rng, 0.08, 0.6), "time_constant_s": log_uniform(rng, 2.0, 20.0)},
-    ),
-    "cogging_torque": lambda s, rng: (
-        "",
-        {
-            "amplitude_n_m": s.coulomb * log_uniform(rng, 0.02, 0.3),
-            "phase_rad": any_phase(rng),
-            "cycles_per_rev": rng.choice((4, 6, 8, 12, 18, 24, 36)),
-        },
-    ),
-    "table_side_friction": lambda s, rng: ("", {"share": rng.uniform(0.15, 0.9)}),
     "structural_mode": _structural_mode,
-    "external_force": _external_force,
-    "spring_load": lambda s, rng: (
-        "",
-        {
-            "stiffness_n_m": s.coulomb / s.ratio * log_uniform(rng, 0.1, 2.0) / s.axis.travel_m,
-            "rest_position_m": s.axis.travel_m * rng.uniform(-0.5, 1.5),
-        },
-    ),
-    "backlash": lambda s, rng: ("", {"gap_m": log_uniform(rng, 2e-6, 60e-6)}),
-    "preload_loss": lambda s, rng: (
-        "",
-        {"zone_m": log_uniform(rng, 2e-6, 40e-6), "stiffness_ratio": rng.uniform(0.1, 0.7)},
-    ),
-    "position_dependent_stiffness": lambda s, rng: (
-        "",
-        {"relative_slope": rng.uniform(0.4, 3.0) if rng.random() < 0.5 else -rng.uniform(0.3, 0.7) / s.axis.travel_m},
-    ),
-    "periodic_lead_error": _periodic_lead_error,
-    "cumulative_lead_error": lambda s, rng: ("", {"slope_m_m": any_sign(rng) * log_uniform(rng, 5e-6, 200e-6)}),
-    "thermal_growth": lambda s, rng: (
-        "",
-        {"relative_growth": log_uniform(rng, 10e-6, 200e-6), "time_constant_s": log_uniform(rng, 2.0, 30.0)},
-    ),
-    "torque_ripple": lambda s, rng: (
-        "",
-        {
-            "fraction": log_uniform(rng, 0.01, 0.12),
-            "cycles_per_rev": rng.choice((2, 4, 6, 8, 12, 24)),
-            "phase_rad": any_phase(rng),
-        },
-    ),
-    "torque_constant_saturation": lambda s, rng: (
-        "",
-        {"coefficient_1_n2_m2": log_uniform(rng, 0.03, 0.25) / s.peak_torque**2},
-    ),
     "torque_saturation": lambda s, rng: (_drive_form(rng), {"limit_n_m": s.peak_torque * rng.uniform(0.6, 0.95)}),
     "torque_dead_zone": lambda s, rng: (
         _drive_form(rng),
@@ -239,18 +197,5 @@ _DRAWS: Mapping[str, Callable[[DrawScale, Rng], FormAndParameters]] = {
     ),
     "current_loop_lag": lambda s, rng: (_drive_form(rng), {"time_constant_s": log_uniform(rng, 0.2e-3, 2e-3)}),
     "transport_delay": lambda s, rng: (_drive_form(rng), {"delay_s": log_uniform(rng, 0.3e-3, 2e-3)}),
-    "velocity_filter_lag": lambda s, rng: ("", {"time_constant_s": log_uniform(rng, 0.3e-3, 2e-3)}),
     "channel_time_skew": _channel_time_skew,
-    "encoder_eccentricity": lambda s, rng: (
-        "",
-        {"amplitude_rad": log_uniform(rng, 0.3e-6, 6e-6) / s.ratio, "phase_rad": any_phase(rng)},
-    ),
-    "scale_interpolation_error": lambda s, rng: (
-        "",
-        {
-            "amplitude_m": log_uniform(rng, 0.1e-6, 2e-6),
-            "phase_rad": any_phase(rng),
-            "period_m": rng.choice((4e-6, 10e-6, 20e-6, 40e-6, 100e-6, 200e-6)),
-        },
-    ),
 }

@@ -49,64 +49,54 @@ EFFECTS = (
 def xml(axis: DrawnAxis, effect: Effect | None, step_s: float = STEP_S) -> str:
     """Return the model with those effects that MuJoCo has."""
     stiff = f'"{2.0 * step_s} 1"'  # solref: the least time constant that is stable
-    own = _Own(effect)
+    name = effect.id if effect is not None else None
     true, ratio = axis.true, axis.truth.screw_ratio_m_rad
     motor, table = true["motor_mass_kg"] * ratio**2, true["table_mass_kg"]
     reduced = 1.0 / (1.0 / true["motor_mass_kg"] + 1.0 / table)
     damping = 2.0 * true["damping_ratio"] * (true["stiffness_n_m"] * reduced) ** 0.5
-    share = own.value("table_side_friction", "share")
+    share = _own(effect, "table_side_friction", "share")
     coulomb, viscous = true["coulomb_torque_n_m"], true["viscous_torque_n_m_s_rad"]
     nut = mode = nut_end = ""
-    if own.is_a("backlash"):
-        half, table = 0.5 * own.value("backlash", "gap_m"), (1.0 - _NUT) * table
+    if name == "backlash":
+        half, table = 0.5 * _own(effect, "backlash", "gap_m"), (1.0 - _NUT) * table
         nut = (
             f'<body><joint name="nut" type="slide" axis="1 0 0" limited="true" range="{-half} {half}" '
             f'solreflimit={stiff} solimplimit="{_HARD} {_HARD} 1e-6"/>{_inertial(_NUT / (1 - _NUT) * table)}'
             "</body>"
         )
         nut_end = '<joint joint="nut" coef="-1"/>'
-    if own.is_a("structural_mode"):
-        mass = own.value("structural_mode", "mass_ratio") * true["table_mass_kg"]
-        omega = 2.0 * pi * own.value("structural_mode", "frequency_hz")
+    if name == "structural_mode":
+        mass = _own(effect, "structural_mode", "mass_ratio") * true["table_mass_kg"]
+        omega = 2.0 * pi * _own(effect, "structural_mode", "frequency_hz")
         mode = (
             f'<body><joint name="mode" type="slide" axis="1 0 0" stiffness="{mass * omega**2}" '
-            f'damping="{2.0 * own.value("structural_mode", "damping_ratio") * mass * omega}"/>{_inertial(mass)}'
+            f'damping="{2.0 * _own(effect, "structural_mode", "damping_ratio") * mass * omega}"/>{_inertial(mass)}'
             "</body>"
         )
-    weight = own.value("constant_load", "load_torque_n_m") / ratio / table
+    weight = _own(effect, "constant_load", "load_torque_n_m") / ratio / table
     friction = f'solreffriction={stiff} solimpfriction="{_HARD} {_HARD} 1"'
     return f"""<mujoco><option timestep="{step_s}" gravity="{-weight} 0 0" integrator="implicitfast" solver="Newton"
     iterations="50" tolerance="1e-12"><flag autoreset="disable"/></option><compiler autolimits="false"/><worldbody>
   <body><joint name="motor" type="hinge" axis="1 0 0" damping="{(1.0 - share) * viscous}"
     frictionloss="{(1.0 - share) * coulomb}" {friction}/>{_inertial(1e-3, motor)}</body>
   <body name="table"><joint name="table" type="slide" axis="1 0 0" damping="{share * viscous / ratio**2}"
-    frictionloss="{share * coulomb / ratio}" {friction} stiffness="{own.value("spring_load", "stiffness_n_m")}"
-    springref="{own.value("spring_load", "rest_position_m")}"/>{_inertial(table)}{nut}{mode}</body></worldbody>
+    frictionloss="{share * coulomb / ratio}" {friction} stiffness="{_own(effect, "spring_load", "stiffness_n_m")}"
+    springref="{_own(effect, "spring_load", "rest_position_m")}"/>{_inertial(table)}{nut}{mode}</body></worldbody>
   <tendon><fixed name="screw" stiffness="{true["stiffness_n_m"]}" damping="{damping}" springlength="0">
-    <joint joint="motor" coef="{ratio * (1.0 + own.value("cumulative_lead_error", "slope_m_m"))}"/>
+    <joint joint="motor" coef="{ratio * (1.0 + _own(effect, "cumulative_lead_error", "slope_m_m"))}"/>
     <joint joint="table" coef="-1"/>{nut_end}</fixed></tendon>
   <actuator><motor joint="motor"/></actuator></mujoco>"""
 
 
 def sag_m(axis: DrawnAxis, effect: Effect | None) -> float:
     """Return the stretch [m] of the screw by a weight before the encoders are set to zero."""
-    load = _Own(effect).value("constant_load", "load_torque_n_m")
+    load = _own(effect, "constant_load", "load_torque_n_m")
     return load / axis.truth.screw_ratio_m_rad / float(axis.true["stiffness_n_m"])
 
 
-class _Own:
-    """Parameters of the concealed effect; zero for all other effects."""
-
-    def __init__(self, effect: Effect | None) -> None:
-        self._effect = effect
-
-    def is_a(self, name: str) -> bool:
-        """Return whether this effect is concealed."""
-        return self._effect is not None and self._effect.id == name
-
-    def value(self, name: str, parameter: str) -> float:
-        """Return a parameter of an effect."""
-        return self._effect.parameters[parameter] if self._effect is not None and self.is_a(name) else 0.0
+def _own(effect: Effect | None, name: str, parameter: str) -> float:
+    """Return a parameter of the concealed effect; zero for all other effects."""
+    return effect.parameters[parameter] if effect is not None and effect.id == name else 0.0
 
 
 def _inertial(mass_kg: float, inertia_kg_m2: float = 1.0) -> str:

@@ -43,22 +43,22 @@ class GradedCase:
 
     @property
     def above_floor(self) -> bool:
-        """Whether these motions show a concealed effect above the noise."""
+        """True if these motions show a concealed effect above the noise."""
         return self.size >= ABOVE_FLOOR and self.truth.tier != "insufficient"
 
     @property
     def detected(self) -> bool:
-        """Whether the answer says that something is missing, with a name or without."""
+        """True if the answer says that something is missing, with a name or without."""
         return self.answer.verdict in ("missing_physics", "unexplained")
 
     @property
     def top(self) -> bool:
-        """Whether the first finding is the effect to be found."""
+        """True if the first finding is the effect to be found."""
         return self.first is not None and self.first.effect in self._laws(0)
 
     @property
     def in_set(self) -> bool:
-        """Whether the effect to be found is the first finding or one of its equivalents."""
+        """True if the effect to be found is the first finding or one of its equivalents."""
         return self.first is not None and bool(self.first.reported & self._laws(0))
 
     @cached_property
@@ -83,32 +83,32 @@ class GradedCase:
 
     @property
     def unanswered(self) -> bool:
-        """Whether the diagnosis failed or is missing."""
+        """True if the diagnosis failed or is missing."""
         return self.answer.verdict in (FAILED, ABSENT)
 
     @property
     def names_something(self) -> bool:
-        """Whether something is named, right or wrong; a missing answer counts too."""
+        """True if something is named, right or wrong; a missing answer counts too."""
         return bool(self.answer.named) or self.unanswered
 
     @property
     def names_too_much(self) -> bool:
-        """Whether there is a spurious finding; a missing answer counts too."""
+        """True if there is a spurious finding; a missing answer counts too."""
         return bool(self.spurious) or self.unanswered
 
     @property
     def blurred(self) -> bool:
-        """Whether the first set has more than the concealed effect and what this motion cannot separate from it."""
+        """True if the first set has more than the concealed effect and what this motion cannot separate from it."""
         return self.first is not None and bool(self.first.reported - self._laws(0))
 
     @property
     def block_right(self) -> bool:
-        """Whether the located block is that of a concealed effect."""
+        """True if the located block is that of a concealed effect."""
         return self.answer.location.block in {effect.block for effect in self.truth.effects}
 
     @property
     def set_reported(self) -> bool:
-        """Whether the effect and all its rivals are reported as one set."""
+        """True if the effect and all its rivals are reported as one set."""
         return (
             self.first is not None
             and bool(self.first.reported & self._law(0))
@@ -117,7 +117,7 @@ class GradedCase:
 
     @property
     def resolved(self) -> bool:
-        """Whether the proposed motion separated the concealed effect from its rivals."""
+        """True if the proposed motion separated the concealed effect from its rivals."""
         if self.later is None or not self.later.named:
             return False
         first = self.later.named[0]
@@ -125,7 +125,7 @@ class GradedCase:
 
     @property
     def called_untestable(self) -> bool:
-        """Whether the invisible effect is reported as not testable, and not named."""
+        """True if the invisible effect is reported as not testable, and not named."""
         hidden = set(self.truth.not_testable)
         return bool(hidden & set(self.answer.not_testable)) and not any(
             named.effect in hidden for named in self.answer.named
@@ -133,7 +133,7 @@ class GradedCase:
 
     @property
     def right(self) -> bool:
-        """Whether the whole answer is right: all concealed effects named and nothing else; below the noise floor also
+        """True if the whole answer is right: all concealed effects named and nothing else; below the noise floor also
         nothing named."""
         if self.unanswered:
             return False

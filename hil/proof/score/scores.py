@@ -41,7 +41,7 @@ class Goal:
 
     @property
     def met(self) -> bool | None:
-        """Whether the goal is met; None without a goal or without cases."""
+        """True if the goal is met; None without a goal or without cases."""
         if self.value is None or (self.low, self.high) == (0.0, inf):
             return None
         return bool(self.low <= self.value <= self.high)

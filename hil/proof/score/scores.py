@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from math import inf
 
 from hil.proof.answer.answers import ABSENT, Answer
-from hil.proof.draw.generator import Truth
+from hil.proof.draw.generator import TIERS, Truth
 from hil.proof.score.grading import GradedCase
 from hil.proof.score.statistics import (
     ConfidenceBin,
@@ -67,12 +67,14 @@ def score(
     cases = tuple(
         GradedCase(truth, answers.get(name, NO_ANSWER), (later or {}).get(name)) for name, truth in truths.items()
     )
-    bins = calibration(cases)
-    return Scores(
-        cases,
-        (*_named(cases), *_located(cases), *_modelled(cases), *_sure(cases, bins), *_abstained(cases)),
-        tuple(bins),
-    )
+    found = [
+        (named.confidence, case.named_right(named))
+        for case in cases
+        for named in case.answer.named
+        if named.confidence is not None
+    ]
+    bins = confidence_bins([confidence for confidence, _ in found], [right for _, right in found])
+    return Scores(cases, tuple(_goals(cases, found, bins)), tuple(bins))
 
 
 def lead(scores: Scores, others: Mapping[str, Scores]) -> Goal:
@@ -88,24 +90,26 @@ def lead(scores: Scores, others: Mapping[str, Scores]) -> Goal:
     return Goal("ahead of the best other method", ahead, low=0.20, of=len(singles), detail=best)
 
 
-def calibration(cases: Iterable[GradedCase]) -> list[ConfidenceBin]:
-    """Return the calibration of the confidence of all findings."""
-    found = _confidences(cases)
-    return confidence_bins([confidence for confidence, _ in found], [right for _, right in found])
-
-
-def _named(cases: Sequence[GradedCase]) -> list[Goal]:
-    singles, pairs = _tier(cases, "single"), _tier(cases, "pair")
-    above = [case for case in cases if case.above_floor]
+def _goals(
+    cases: Sequence[GradedCase], found: Sequence[tuple[float, bool]], bins: Sequence[ConfidenceBin]
+) -> list[Goal]:
+    """Return all goals with their figures; `found`: confidence of each finding and whether it is right."""
+    tier = {name: [case for case in cases if case.truth.tier == name] for name in TIERS}
+    nulls, wrong, singles, pairs = tier["null"], tier["parameters_only"], tier["single"], tier["pair"]
+    novel, ambiguous, poor = tier["novel"], tier["ambiguous"], tier["insufficient"]
     effects = by_effect(singles, lambda case: case.top)
     worst = min(effects, key=lambda effect: effects[effect].value or 0.0, default="")
-    nulls, wrong = _tier(cases, "null"), _tier(cases, "parameters_only")
+    right = [case for case in singles if case.top]
+    errors = [error for case in right for error in case.parameter_errors().values()]
+    ratios = [case.answer.over_floor for case in right if case.answer.over_floor is not None]
+    nominal = [error for case in wrong for error in case.nominal_errors().values()]
+    calibration_error = expected_calibration_error(bins)
     return [
         Goal("nulls: something named", rate(case.names_something for case in nulls), high=0.01),
         Goal("nulls: right verdict", rate(case.right for case in nulls)),
         Goal("wrong parameters: something named", rate(case.names_something for case in wrong), high=0.02),
         Goal("wrong parameters: right verdict", rate(case.right for case in wrong)),
-        Goal("detected where above the floor", rate(case.detected for case in above), low=0.95),
+        Goal("detected where above the floor", rate(case.detected for case in cases if case.above_floor), low=0.95),
         Goal("singles: named first", rate(case.top for case in singles), low=0.92),
         Goal("singles: in the set named first", rate(case.in_set for case in singles), low=0.99),
         Goal("singles: more in that set", rate(case.blurred for case in singles)),
@@ -114,70 +118,32 @@ def _named(cases: Sequence[GradedCase]) -> list[Goal]:
         Goal("pairs: both named", rate(all(case.matched) for case in pairs), low=0.80),
         Goal("pairs: at least one named", rate(any(case.matched) for case in pairs), low=0.98),
         Goal("pairs: a spurious third", rate(case.names_too_much for case in pairs), high=0.05),
-        Goal("masked: what hides is named", rate(bool(case.matched[0]) for case in _tier(cases, "masked"))),
-    ]
-
-
-def _located(cases: Sequence[GradedCase]) -> list[Goal]:
-    singles = _tier(cases, "single")
-    return [
+        Goal("masked: what hides is named", rate(bool(case.matched[0]) for case in tier["masked"])),
         Goal("block right", rate(case.block_right for case in singles), low=0.95),
         _median("window overlap, median IoU", [case.window_overlap() for case in singles], low=0.8, percent=False),
         _median("spatial period, median error", [case.period_error() for case in singles], high=0.002),
         _median("mode frequency, median error", [case.frequency_error() for case in singles], high=0.01),
-    ]
-
-
-def _modelled(cases: Sequence[GradedCase]) -> list[Goal]:
-    named = [case for case in _tier(cases, "single") if case.top]
-    errors = [error for case in named for error in case.parameter_errors().values()]
-    covered = rate(held for case in named for held in case.covered().values())
-    ratios = [case.answer.over_floor for case in named if case.answer.over_floor is not None]
-    nominal = [error for case in _tier(cases, "parameters_only") for error in case.nominal_errors().values()]
-    return [
         _median("parameters, median error", errors, high=0.03),
         Goal("parameters, 90th percentile", quantile(errors, 0.9), high=0.10, of=len(errors)),
-        Goal("parameters, 90 % intervals cover", covered, low=0.86, high=0.94),
+        Goal(
+            "parameters, 90 % intervals cover",
+            rate(held for case in right for held in case.covered().values()),
+            low=0.86,
+            high=0.94,
+        ),
         Goal(f"held out ≤ {FLOORED} × floor if right", rate(ratio <= FLOORED for ratio in ratios), low=0.90),
         _median("parameters of the bench, median", nominal),
-    ]
-
-
-def _sure(cases: Sequence[GradedCase], bins: Sequence[ConfidenceBin]) -> list[Goal]:
-    found = _confidences(cases)
-    return [
-        Goal(
-            "confidence: calibration error", expected_calibration_error(bins), high=0.05, of=len(found), percent=False
-        ),
-        Goal(f"right where confidence ≥ {SURE}", rate(right for sure, right in found if sure >= SURE), low=0.95),
-    ]
-
-
-def _abstained(cases: Sequence[GradedCase]) -> list[Goal]:
-    novel, poor = _tier(cases, "novel"), _tier(cases, "insufficient")
-    return [
+        Goal("confidence: calibration error", calibration_error, high=0.05, of=len(found), percent=False),
+        Goal(f"right where confidence ≥ {SURE}", rate(good for sure, good in found if sure >= SURE), low=0.95),
         Goal("novel: unexplained", rate(case.answer.verdict == "unexplained" for case in novel), low=0.90),
         Goal("novel: something named", rate(case.names_something for case in novel), high=0.05),
         Goal("novel: block right", rate(case.block_right for case in novel)),
-        Goal("ambiguous: reported as a set", rate(case.set_reported for case in _tier(cases, "ambiguous")), low=0.95),
-        Goal("ambiguous: more in that set", rate(case.blurred for case in _tier(cases, "ambiguous"))),
-        Goal("ambiguous: resolved by motion", rate(case.resolved for case in _tier(cases, "ambiguous")), low=0.90),
+        Goal("ambiguous: reported as a set", rate(case.set_reported for case in ambiguous), low=0.95),
+        Goal("ambiguous: more in that set", rate(case.blurred for case in ambiguous)),
+        Goal("ambiguous: resolved by motion", rate(case.resolved for case in ambiguous), low=0.90),
         Goal("insufficient: called not testable", rate(case.called_untestable for case in poor)),
         Goal("insufficient: something named", rate(case.names_something for case in poor)),
     ]
-
-
-def _confidences(cases: Iterable[GradedCase]) -> list[tuple[float, bool]]:
-    return [
-        (named.confidence, case.named_right(named))
-        for case in cases
-        for named in case.answer.named
-        if named.confidence is not None
-    ]
-
-
-def _tier(cases: Iterable[GradedCase], tier: str) -> list[GradedCase]:
-    return [case for case in cases if case.truth.tier == tier]
 
 
 def _median(

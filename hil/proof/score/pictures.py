@@ -27,7 +27,7 @@ def power_figure(scores: Scores) -> Figure | None:
     axes = figure.subplots()
     size = np.array([rung.size for rung in rungs])
     for label, rates, colour, shift in (
-        ("said to be missing", [rung.detected for rung in rungs], style.MEASURED, 0.985),
+        ("detected", [rung.detected for rung in rungs], style.MEASURED, 0.985),
         ("named first", [rung.named for rung in rungs], style.SIMULATED, 1.015),
     ):
         _rates(axes, size * shift, rates, colour, label)

@@ -64,8 +64,8 @@ def others_table(scores: Scores, others: Mapping[str, Scores]) -> ProofTable:
             if isinstance(goal.measured, Rate) and any(row[goal.name].value is not None for row in rows)
         ],
         "Same recordings, same score. What a method does not report counts as wrong; the number of cases that it was "
-        "given is in the heading. forward_selection and fit_everything use this project's search limits, refit, "
-        "periods and windows; the others use its refit and its terms.",
+        "given is in the heading. All other methods use this project's refit of the nominal parameters, its periods, "
+        "orders and windows, and its materiality limit; fit_everything also uses the starts and the fit of its search.",
     )
 
 
@@ -114,7 +114,7 @@ def power_table(scores: Scores) -> ProofTable:
     """Return the table of detection and naming over the size of the effect."""
     return ProofTable(
         "Power over the size of the effect",
-        ("size over noise", "cases", "said to be missing", "95 %", "named first", "95 %"),
+        ("size over noise", "cases", "detected", "95 %", "named first", "95 %"),
         [
             (
                 Number(f"{rung.size:g}"),

@@ -157,9 +157,9 @@ class GradedCase:
         if self.spurious:
             return f"It names {_listed(named.effect for named in self.spurious)}, which is not there."
         if self.truth.tier == "ambiguous" and self.top:
-            return f"It does not say that {_listed(self.truth.rivals)} cannot be told from what it names."
+            return f"It does not report {_listed(self.truth.rivals)} as indistinguishable from what it names."
         if self.truth.tier == "insufficient":
-            return f"It does not say that this motion cannot show {_listed(self.truth.not_testable, 'or')}."
+            return f"It does not report {_listed(self.truth.not_testable, 'or')} as not testable."
         unnamed = [effect.effect for effect, found in zip(self.truth.effects, self.matched, strict=True) if not found]
         if self.truth.tier != "novel" and unnamed:
             return f"It does not name {_listed(unnamed)}."

@@ -45,7 +45,7 @@ def test_an_ambiguous_case_wants_the_set_and_then_one_of_it() -> None:
     assert marked(of, finding("asymmetric_friction", "spring_load", "backlash")).blurred
     alone = marked(of, finding("spring_load"))
     assert (alone.top, alone.set_reported, alone.resolved) == (True, False, False)
-    assert alone.wrong == "It does not say that constant load cannot be told from what it names."
+    assert alone.wrong == "It does not report constant load as indistinguishable from what it names."
     for later, resolved in (
         (finding("spring_load"), True),
         (finding("spring_load", "constant_load"), False),

@@ -13,11 +13,11 @@ from typing import Annotated
 
 import typer
 
-from hil.demo import LEARN, PROVE, conceal
 from hil.loop.run import run_profile
 from hil.loop.simulated_bench import load_simulated
 from hil.motion.profile import Profile
 from hil.motion.trajectory import plan
+from hil.proof.draw.demo import LEARN, PROVE, conceal
 from hil.report.console import table
 from hil.twin.mechanisms import cogging_torque
 

@@ -17,14 +17,14 @@ if TYPE_CHECKING:
 
 
 def demo(
-    effect: Annotated[str | None, typer.Option(help="What to conceal, such as backlash; left out: drawn")] = None,
+    effect: Annotated[str | None, typer.Option(help="Effect to conceal, such as backlash; default: drawn")] = None,
     seed: Annotated[
         int | None,
-        typer.Option(min=0, help="Of what is drawn and of the simulated sensors; left out: another one every time"),
+        typer.Option(min=0, help="Seed of the draw and of the simulated sensors; default: another one every time"),
     ] = None,
     virtual: Annotated[bool, typer.Option("--virtual", help="In virtual time")] = False,
     folder: Annotated[
-        Path | None, typer.Option("--out", help="New folder for recordings and reports; left out: runs/demo-TIME")
+        Path | None, typer.Option("--out", help="New folder for recordings and reports; default: runs/demo-TIME")
     ] = None,
 ) -> None:
     """Conceal an effect in the simulated axis, move it over CANopen, compare it with its twin, and find the effect."""
@@ -38,8 +38,8 @@ def demo(
     seed = secrets.randbelow(10_000) if seed is None else seed
     believed = load_simulated("reference")
     bench, truth = concealed.conceal(believed, seed, effect)
-    err.print("A simulated ball-screw axis conceals something that neither its twin nor the diagnosis knows.")
-    # only now what takes seconds to import
+    err.print("A simulated ball-screw axis conceals an effect that neither its twin nor the diagnosis knows.")
+    # imported late: these take seconds
     from hil.diagnosis.diagnose import diagnose
     from hil.identification.compare import compare
     from hil.report.compare_report import rows_of, verdict, write_comparison
@@ -69,16 +69,16 @@ def demo(
 
 
 def _record(bench: Bench, folder: Path, virtual: bool) -> list[Recording]:
-    """The two runs of the demo, recorded."""
-    from hil.demo import LEARN, PROVE
+    """Record the two runs of the demo."""
     from hil.errors import HilError
     from hil.loop.run import run_profile
     from hil.loop.supervision import Ending
+    from hil.proof.draw.demo import LEARN, PROVE
     from hil.recording.recording import read_recording
 
     recordings = []
     for name, profile in (("learn", LEARN), ("prove", PROVE)):
-        # on a simulated bench nothing can be harmed by a late tick: a busy machine is reported, not refused
+        # a late tick harms nothing on a simulated bench: a busy machine is reported, not refused
         result = run_profile(
             bench,
             profile,
@@ -103,7 +103,7 @@ def _record(bench: Bench, folder: Path, virtual: bool) -> list[Recording]:
 
 
 def _say(result: Result, truth: SimulationSection, believed: Bench) -> None:
-    """What was concealed beside what was found."""
+    """Print the concealed effect beside the finding."""
     import math
 
     from hil.diagnosis.wording import title

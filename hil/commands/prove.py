@@ -1,7 +1,5 @@
 """hil prove."""
 
-from __future__ import annotations
-
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -11,8 +9,8 @@ import typer
 from hil.report.console import out, progress, table
 
 
-class Plant(StrEnum):
-    """What moves the axes of a proof."""
+class PlantChoice(StrEnum):
+    """Plants of a proof."""
 
     SIMULATED = "simulated"
     MUJOCO = "mujoco"
@@ -20,36 +18,34 @@ class Plant(StrEnum):
 
 def prove(
     folder: Annotated[
-        Path,
-        typer.Option(
-            "--out", help="Folder for cases, answers and scores; one that was interrupted goes on", show_default=False
-        ),
-    ],
-    cases: Annotated[int | None, typer.Option("--cases", help="How many cases; left out: 40")] = None,
-    full: Annotated[bool, typer.Option("--full", help="The whole proof, some 1200 cases: takes many hours")] = False,
-    seed: Annotated[int, typer.Option(min=0, help="Of the draw")] = 1,
+        Path | None,
+        typer.Option("--out", help="Folder for cases, answers and scores; continues an interrupted proof"),
+    ] = None,
+    cases: Annotated[int | None, typer.Option("--cases", help="Number of cases; default: 40")] = None,
+    full: Annotated[bool, typer.Option("--full", help="The whole proof, about 1200 cases: takes many hours")] = False,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the draw")] = 1,
     plant: Annotated[
-        Plant,
-        typer.Option(
-            "--plant", help="What moves the axes: our simulation, or MuJoCo, which must be installed (make peers)"
-        ),
-    ] = Plant.SIMULATED,
+        PlantChoice,
+        typer.Option("--plant", help="Our simulation, or MuJoCo, which must be installed (make peers)"),
+    ] = PlantChoice.SIMULATED,
     only: Annotated[
         list[str] | None,
-        typer.Option("--only", help="A tier to draw from, as single or pair; may be repeated; left out: all"),
+        typer.Option("--only", help="A tier to draw from, as single or pair; may be repeated; default: all"),
     ] = None,
     hours: Annotated[
         float | None,
         typer.Option(
             min=0.0,
-            help="Of diagnosing, after which no case is begun; the "
-            "first that are answered are scored, the same again goes on; left "
-            "out: no end",
+            help="No diagnosis begins after this time; the first cases with an answer are scored, and the same "
+            "command continues; default: no limit",
         ),
     ] = None,
-    jobs: Annotated[int | None, typer.Option(min=1, help="Cases diagnosed at once; left out: one per core")] = None,
+    jobs: Annotated[int | None, typer.Option(min=1, help="Cases diagnosed at once; default: one per core")] = None,
+    show: Annotated[
+        str | None, typer.Option("--show", help="Print the published tables of a run, as 20261206, and exit")
+    ] = None,
 ) -> None:
-    """Conceal effects in simulated axes, seal what they are, diagnose the recordings blind, unseal and score."""
+    """Conceal effects in simulated axes, seal the truth, diagnose the recordings blind, unseal and score."""
     import os
     import signal
     from math import inf
@@ -59,8 +55,13 @@ def prove(
     from hil.proof.run import prove as run
     from hil.proof.run import score_others
     from hil.proof.score.page import write_proof
-    from hil.proof.score.tables import HEADERS, goal_row
+    from hil.proof.score.tables import HEADERS, goal_row, published
 
+    if show is not None:
+        out.print(published(show), markup=False)
+        return
+    if folder is None:
+        raise InputError("--out: not given, allowed a folder for cases, answers and scores; or --show NAME")
     if full and cases is not None:
         raise InputError(f"--full: given with --cases {cases}, allowed one of them")
     whole = sum(share for tier, share in PLANTS[plant].items() if not only or tier in only)
@@ -71,17 +72,8 @@ def prove(
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         with progress() as tell:
-            scores = run(
-                folder,
-                planned,
-                seed,
-                jobs or os.cpu_count() or 1,
-                out.print,
-                tell,
-                plant,
-                tiers,
-                inf if hours is None else hours,
-            )
+            limit = inf if hours is None else hours
+            scores = run(folder, planned, seed, jobs or os.cpu_count() or 1, out.print, tell, plant, tiers, limit)
             tell("writing the report", None)
             write_proof(scores, score_others(folder, scores), folder)
     finally:

@@ -1,13 +1,11 @@
-"""The seal: what is concealed is written and fixed by its SHA-256 before any diagnosis starts.
+"""Seal the truth: it is written and fixed by its SHA-256 before any diagnosis starts.
 
-    DIR/cases/NAME/          recordings and bench: all that a diagnosis gets
-    DIR/sealed/truths.json   what each conceals, and the SHA-256 of each of its files
-    DIR/seal.json            SHA-256 of truths.json, with the command, the seed and the code that were used
+    DIR/cases/NAME/          recordings and bench: the input of the diagnosis
+    DIR/sealed/truths.json   concealed effects of each case, and the SHA-256 of each of its files
+    DIR/seal.json            SHA-256 of truths.json, with command, seed and code
 
-Files are sealed, not seeds: another machine's linear algebra may draw a case with other digits.
+Files are sealed, not seeds: the linear algebra of another machine may change the last digits of a case.
 """
-
-from __future__ import annotations
 
 import hashlib
 import json
@@ -19,33 +17,35 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import replace
 from datetime import UTC, datetime
+from functools import partial
 from importlib.metadata import version
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from hil.errors import HilError, InputError
 from hil.files.output import write_json
-from hil.proof.draw.generator import Concealed, Truth, draw, write
+from hil.proof.draw.generator import Truth, draw, write
 from hil.proof.draw.mujoco_plant import draw_mujoco
 from hil.proof.draw.plan import Planned
+from hil.report.console import Progress
 
 CASES, SEALED, SEAL = "cases", "sealed", "seal.json"
 _TRUTHS = f"{SEALED}/truths.json"
 _PACKAGE = Path(__file__).parents[1]
-# What a diagnosis runs, beside the modules at the root.
+# Packages that a diagnosis uses, beside the modules at the root.
 _ANSWERING = ("bench", "compiled", "control", "diagnosis", "files", "identification", "motion", "recording", "twin")
 _LIBRARIES = ("hil-servo", "numpy", "scipy", "numba")
 
-Told = Callable[[float], None]  # the share that is done
+_Argument = TypeVar("_Argument")
 
 
 def draw_cases(
-    folder: Path, planned: Sequence[Planned], seed: int, jobs: int, told: Told, plant: str = "simulated"
+    folder: Path, planned: Sequence[Planned], seed: int, jobs: int, progress: Progress, plant: str = "simulated"
 ) -> None:
-    """Draw and write cases of a plant, several at once; those that stand there already are left alone.
+    """Draw and write cases of a plant, several at once; those that exist are kept.
 
-    Raises InputError where `folder` holds cases of another plan.
+    Raises InputError if `folder` holds cases of another plan.
     """
     todo = []
     for case in planned:
@@ -61,20 +61,33 @@ def draw_cases(
                 f"{part}: given a case of another plan, allowed one of --seed {seed} and as many --cases; "
                 "give another --out"
             )
+    before = len(planned) - len(todo)
+    in_processes(
+        partial(_draw, folder, seed, plant),
+        todo,
+        jobs,
+        lambda done: progress("drawing cases", (before + done) / len(planned)),
+    )
+
+
+def in_processes(
+    work: Callable[[_Argument], None], todo: Sequence[_Argument], jobs: int, done: Callable[[int], None]
+) -> None:
+    """Call `work` for each argument in `jobs` processes; `done` gets the count so far."""
     with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
-        drawn = [pool.submit(_draw, folder, case, seed, plant) for case in todo]
+        running = [pool.submit(work, argument) for argument in todo]
         try:
-            for done, case_drawn in enumerate(as_completed(drawn), 1):
-                case_drawn.result()
-                told((len(planned) - len(todo) + done) / len(planned))
+            for count, result in enumerate(as_completed(running), 1):
+                result.result()
+                done(count)
         except BaseException:
-            for case_drawn in drawn:
-                case_drawn.cancel()
+            for result in running:
+                result.cancel()
             raise
 
 
 def seal(folder: Path, planned: Sequence[Planned], command: str, seed: int) -> dict[str, Any]:
-    """Put the truths together and seal them; returns what seal.json says."""
+    """Write the truths into one file and seal it; returns the content of seal.json."""
     parts = [_part(folder, case.name) for case in planned]
     write_json(folder / _TRUTHS, {path.stem: json.loads(path.read_text()) for path in parts})
     about = {
@@ -94,7 +107,7 @@ def seal(folder: Path, planned: Sequence[Planned], command: str, seed: int) -> d
 
 
 def read_seal(folder: Path) -> dict[str, Any] | None:
-    """What seal.json says; None where nothing is sealed yet. Raises HilError where it cannot be read."""
+    """Read seal.json; None if nothing is sealed yet. Raises HilError if it cannot be read."""
     if not (folder / SEAL).exists():
         return None
     try:
@@ -105,7 +118,7 @@ def read_seal(folder: Path) -> dict[str, Any] | None:
 
 
 def unseal(folder: Path) -> dict[str, Truth]:
-    """The truths by case. Raises HilError when they, a recording or a bench are not what was sealed."""
+    """Read the truths by case. Raises HilError if they, a recording or a bench have changed since the seal."""
     about, path = read_seal(folder), folder / _TRUTHS
     if about is None:
         raise HilError(f"{folder}: nothing is sealed here; give the --out of hil prove")
@@ -121,37 +134,28 @@ def unseal(folder: Path) -> dict[str, Truth]:
             raise HilError(
                 f"{place}: recordings or bench are not what was sealed; nothing can be scored: give another --out"
             )
-        truths[name] = truth_of(entry["truth"])
+        truths[name] = Truth.from_json(entry["truth"])
     return truths
 
 
-def truth_of(data: dict[str, Any]) -> Truth:
-    """The truth of a case from plain data."""
-    effects = tuple(Concealed(**{**effect, "same_law": tuple(effect["same_law"])}) for effect in data["effects"])
-    return Truth(
-        **{**data, "effects": effects, "rivals": tuple(data["rivals"]), "not_testable": tuple(data["not_testable"])}
-    )
-
-
 def sha256(path: Path) -> str:
-    """SHA-256 of a file."""
+    """Return the SHA-256 of a file."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def code_sha256() -> str:
-    """SHA-256 of the code that a diagnosis runs: twin, diagnosis and what they stand on."""
+    """Return the SHA-256 of the code that a diagnosis uses."""
     digest = hashlib.sha256()
-    for path in sorted(
-        [*_PACKAGE.glob("*.py"), *(path for part in _ANSWERING for path in (_PACKAGE / part).rglob("*.py"))]
-    ):
+    packages = (path for part in _ANSWERING for path in (_PACKAGE / part).rglob("*.py"))
+    for path in sorted([*_PACKAGE.glob("*.py"), *packages]):
         digest.update(path.relative_to(_PACKAGE).as_posix().encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()
 
 
-def _draw(folder: Path, case: Planned, seed: int, plant: str) -> None:
+def _draw(folder: Path, seed: int, plant: str, case: Planned) -> None:
     drawn = (draw_mujoco if plant == "mujoco" else draw)(case.tier, case.number, seed)
-    # the number within the tier would tell the tier
+    # the number within the tier would reveal the tier
     drawn = replace(drawn, name=case.name, truth=replace(drawn.truth, name=case.name))
     shutil.rmtree(folder / CASES / case.name, ignore_errors=True)
     place = write(drawn, folder / CASES)
@@ -169,17 +173,12 @@ def _part(folder: Path, name: str) -> Path:
 
 
 def _commit() -> dict[str, Any]:
-    """The commit of the code and whether it was changed since; nothing where there is none."""
+    """Return the commit of the code and whether it was changed since; None without a repository."""
 
     def git(*arguments: str) -> str | None:
         try:
-            ran = subprocess.run(
-                ["git", "-C", str(_PACKAGE), *arguments],
-                capture_output=True,
-                text=True,
-                check=True,
-                env={**os.environ, "GIT_OPTIONAL_LOCKS": "0"},
-            )
+            command, quick = ["git", "-C", str(_PACKAGE), *arguments], os.environ | {"GIT_OPTIONAL_LOCKS": "0"}
+            ran = subprocess.run(command, capture_output=True, text=True, check=True, env=quick)
         except (OSError, subprocess.CalledProcessError):
             return None
         return ran.stdout.strip()

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from command_line import hil, refused
 
-from hil.demo import CONCEALED
+from hil.proof.draw.demo import CONCEALED
 from hil.recording.recording import read_recording
 
 

@@ -1,10 +1,15 @@
 """Regression net of the diagnosis: fixed cases, diagnosed again and compared with the stored answers.
 
-    python tests/net/net.py OUT [--jobs N] [--only PART] [--store]
+    make net                                                             into runs/net
+    python tests/net/net.py OUT [--jobs N] [--only PART] [--store]       from the root of the repository
 
-draws the cases of cases.yaml into OUT/cases, diagnoses those without an answer into OUT/answers, and prints every
-change against answers.json: verdict, names, parameters beyond a standard error, held-out figures, seconds. A stopped
-run continues with the same command. `--store` writes the answers of this run as the new reference.
+Run it after every change of twin, identification or diagnosis, on idle cores: two cores need about 30 minutes. It draws
+the cases of cases.yaml into OUT/cases, diagnoses those without an answer into OUT/answers, and prints every change
+against answers.json: verdict, names, parameters beyond a standard error, held-out figures, seconds. It returns 1 if a
+right answer became wrong. A stopped run continues with the same command; a new commit needs a new OUT, where OUT/cases
+may be copied from an old one to save the drawing. `--only` selects cases by a part of their name; `--store` writes the
+answers of this run as the new reference, after every change has been explained. Cases of recordings outside of the
+repository are skipped if these are not there.
 """
 
 from __future__ import annotations

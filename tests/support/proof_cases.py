@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from hil.proof.answer.answers import reply_of
+from hil.proof.answer.answers import parse_answer
 from hil.proof.draw.expected import block, same_law
 from hil.proof.draw.generator import Concealed, Truth
-from hil.proof.score.grading import Marked
+from hil.proof.score.grading import GradedCase
 from hil.proof.score.scores import Goal, Scores, score
 
 VERDICTS = {"null": "no_mismatch", "parameters_only": "parameter_error", "insufficient": "parameter_error",
@@ -53,16 +53,16 @@ def finding(
     }
 
 
-def marked(of: Truth, *missing: dict[str, Any], verdict: str = "", **more: Any) -> Marked:
+def marked(of: Truth, *missing: dict[str, Any], verdict: str = "", **more: Any) -> GradedCase:
     said = verdict or ("missing_physics" if missing else "unexplained")
-    return Marked(of, reply_of({"verdict": said, "missing": missing, **more}))
+    return GradedCase(of, parse_answer({"verdict": said, "missing": missing, **more}))
 
 
 def scores(*cases: tuple[Truth, dict[str, Any] | None]) -> Scores:
     """Of truths with their answers."""
     return score(
         {str(at): of for at, (of, _) in enumerate(cases)},
-        {str(at): reply_of(answer) for at, (_, answer) in enumerate(cases) if answer is not None},
+        {str(at): parse_answer(answer) for at, (_, answer) in enumerate(cases) if answer is not None},
     )
 
 

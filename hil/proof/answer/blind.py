@@ -1,14 +1,11 @@
-"""The blind diagnosis of cases: a process of its own that is given the folder of recordings and nothing else.
+"""Diagnose cases blind: a separate process that only gets the folder of recordings.
 
     python -m hil.proof.answer.blind CASES ANSWERS [--jobs N] [--hours H]
 
 reads CASES/NAME/{train_*.parquet, holdout.parquet, bench.yaml} and writes ANSWERS/NAME/diagnosis.json, with the next
-experiment as a profile where one is proposed, or error.json where the diagnosis failed. Cases with an answer are
-left out, so that an interrupted run goes on. Nothing that draws or knows what is concealed is imported here; an
-import contract holds that.
+experiment as a profile if one is proposed, or error.json if the diagnosis failed. Cases with an answer are skipped, so
+an interrupted run continues. An import contract keeps everything that draws or knows the truth out of this process.
 """
-
-from __future__ import annotations
 
 import sys
 from functools import partial
@@ -39,7 +36,7 @@ def diagnose_cases(
 
 
 def answered(answer: Path) -> bool:
-    """Whether a case has an answer."""
+    """Return whether a case has an answer."""
     return (answer / DIAGNOSIS).exists() or (answer / ERROR).exists()
 
 
@@ -57,7 +54,7 @@ def diagnose_case(case: Path, answers: Path) -> None:
             [read_recording(case / "holdout.parquet")],
             load_bench(case / "bench.yaml"),
         )
-    except Exception as error:  # whatever it is: an answer is owed, and this is a wrong one
+    except Exception as error:  # any failure counts as a wrong answer
         write_json(answer / ERROR, {"kind": type(error).__name__, "error": str(error)})
         return
     if found.experiment and found.experiment.profile:

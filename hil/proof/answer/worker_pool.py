@@ -1,6 +1,4 @@
-"""Cases done side by side by processes, each of which keeps to its share of the cores."""
-
-from __future__ import annotations
+"""Process cases in parallel; each process keeps to its share of the cores."""
 
 import os
 import signal
@@ -22,12 +20,12 @@ if TYPE_CHECKING:
 
 
 def side_by_side(work: Callable[[Path], None], todo: Sequence[Path], jobs: int, hours: float = inf) -> Iterator[str]:
-    """Have the work done for each folder, `jobs` at once, none begun after `hours`; gives the name of each when done.
+    """Call `work` for each folder, `jobs` at once, none begun after `hours`; yields each name when it is done.
 
-    Raises HilError where a process was ended from outside.
+    Raises HilError if a process was ended from outside.
     """
     end_s = monotonic() + 3600.0 * hours
-    # each process spreads its work over its cores itself; threads of the linear algebra get into its way
+    # each process distributes its own work; threads of the linear algebra would compete with it
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     context = get_context("spawn")
     shares: Queue[set[int]] = context.Queue()
@@ -45,7 +43,7 @@ def side_by_side(work: Callable[[Path], None], todo: Sequence[Path], jobs: int, 
                     for done in wait(running, return_when=FIRST_COMPLETED).done:
                         done.result()
                         yield running.pop(done)
-            except BaseException:  # stopped, or nobody listens any more: no case is begun
+            except BaseException:  # stopped, or the generator is closed: no further case begins
                 for case in running:
                     case.cancel()
                 raise
@@ -56,9 +54,9 @@ def side_by_side(work: Callable[[Path], None], todo: Sequence[Path], jobs: int, 
 
 
 def cases_in(folder: Path, answers: Path) -> list[Path]:
-    """The cases of a folder in order of their names; makes the folder of their answers.
+    """Return the cases of a folder in order of their names; makes the folder of their answers.
 
-    Raises InputError where there is none, or where the other cannot be made.
+    Raises InputError if there are none, or if the folder cannot be made.
     """
     if not any(folder.glob("*/bench.yaml")):
         raise InputError(f"{folder}: holds no cases, allowed the folder of cases of a proof, DIR/cases")
@@ -70,20 +68,20 @@ def cases_in(folder: Path, answers: Path) -> list[Path]:
 
 
 def _shares(jobs: int) -> list[set[int]]:
-    """Cores of each process."""
+    """Return the cores of each process."""
     cores = sorted(os.sched_getaffinity(0))
     return [set(cores[job % len(cores) :: jobs]) for job in range(jobs)]
 
 
-def _keep_to(shares: Queue[set[int]]) -> None:
-    """Keep this process to its share of the cores; let it end by ctrl-C, or with the process that it works for."""
+def _keep_to(shares: "Queue[set[int]]") -> None:
+    """Bind this process to its share of the cores; end it on ctrl-C and with its parent."""
     signal.signal(signal.SIGINT, lambda signum, frame: os._exit(130))
     Thread(target=_end_together, daemon=True).start()
     os.sched_setaffinity(0, shares.get())
 
 
 def _end_together() -> None:
-    """End this process when the one that it works for has ended, however it did: what is half done is done again."""
+    """End this process when its parent has ended in any way; an unfinished case is done again."""
     if (parent := parent_process()) is not None:
         parent.join()
     os._exit(1)

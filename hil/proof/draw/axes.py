@@ -1,10 +1,8 @@
-"""Axes drawn at random: what each really is, its loop and sensors, and what its owner believes about it.
+"""Draw axes: true parameters, control loop, sensors, and the parameters in the owner's bench file.
 
 Bandwidths follow the reference axis (velocity loop at about a quarter of the first resonance, position loop at about a
 quarter of the velocity loop); an axis whose loop rings without friction is drawn again.
 """
-
-from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -19,8 +17,7 @@ from drivers.sim.reality import record
 from drivers.sim.sensors import Sensors
 from drivers.sim.servo import Servo, VelocityEstimate
 from hil.bench.bench_file import Bench
-from hil.proof.draw.axis_kinds import KINDS, PARAMETERS, TRUTH, Kind, rigid_inertia
-from hil.proof.draw.random_draws import Rng, log_uniform
+from hil.proof.draw.axis_kinds import KINDS, PARAMETERS, TRUTH, Kind, Rng, log_uniform, rigid_inertia
 
 Belief = Literal["exact", "wrong"]
 
@@ -30,12 +27,12 @@ STEP_S = 2e-5  # internal step: 1 to 4 % of a loop period, and below half a radi
 _TABLE_COUNTS_M = (0.1e-6, 0.2e-6, 0.5e-6, 1e-6)
 _COARSE_COUNTS_M = (1e-6, 2e-6, 5e-6)
 _SPARE_M = 0.01  # travel beyond the strokes
-_RINGING = 0.01  # of the largest torque, that an axis without friction may still need at rest
+_RINGING = 0.01  # of the largest torque: limit at rest for an axis without friction
 
 
 @dataclass(frozen=True, eq=False)
 class DrawnAxis:
-    """One axis with its loop. `true` and `believed` hold the keys of a bench's section `axis`."""
+    """An axis with its loop. `true` and `believed` have the keys of the section `axis` of a bench file."""
 
     kind: Kind
     true: Mapping[str, Any]
@@ -49,21 +46,21 @@ class DrawnAxis:
 
     @cached_property
     def truth(self) -> AxisTruth:
-        """What the axis really is."""
+        """The true axis."""
         return self.with_parameters({})
 
     def with_parameters(self, changes: Mapping[str, float]) -> AxisTruth:
-        """The axis with other true parameters."""
+        """Return the axis with other true parameters."""
         return TRUTH[self.kind](dict(self.true) | dict(changes))
 
     @cached_property
     def bench(self) -> Bench:
-        """What the owner believes."""
+        """The bench as in the owner's file."""
         return self._bench(self.believed)
 
     @property
     def true_bench(self) -> Bench:
-        """What the owner should believe."""
+        """The bench with the true parameters."""
         return self._bench(self.true)
 
     @property
@@ -73,7 +70,7 @@ class DrawnAxis:
 
     @property
     def has_table(self) -> bool:
-        """Whether there is a linear encoder."""
+        """True if there is a linear encoder."""
         return not self.truth.linear
 
     @property
@@ -111,7 +108,7 @@ class DrawnAxis:
                 "axis": {"model": self.kind, **axis},
                 "control": control,
                 "encoders": {"motor": motor, "table": table},
-                # what the axis may do is no secret of its owner, however little of it a recording shows
+                # the owner knows the limits of the axis even if a recording does not reach them
                 "drive": {
                     "travel_m": [-_SPARE_M, self.travel_m + _SPARE_M],
                     "limits": {
@@ -125,7 +122,7 @@ class DrawnAxis:
 
 
 def draw_axis(rng: Rng, kind: Kind | None = None, belief: Belief = "wrong", hard: bool = False) -> DrawnAxis:
-    """An axis whose loop is stable. `hard`: more noise, coarser encoders, jitter."""
+    """Draw an axis with a stable loop. `hard`: more noise, coarser encoders, jitter."""
     if kind is None:
         kind = cast(Kind, str(rng.choice(list(KINDS), p=list(KINDS.values()))))
     while True:
@@ -160,7 +157,7 @@ def _drawn(rng: Rng, kind: Kind, belief: Belief, hard: bool) -> DrawnAxis:
 def _servo(
     rng: Rng, truth: AxisTruth, feed_m_s: float, acceleration_m_s2: float, period_s: float, position_every: int
 ) -> Servo:
-    """Gains by bandwidth: of the whole inertia below the first resonance, of the motor alone below the delay."""
+    """Draw gains by bandwidth: whole inertia below the first resonance, motor alone below the limit of the delay."""
     ratio = truth.drive_ratio_m_rad
     inertia = rigid_inertia(truth)
     elastic = truth.frequencies_hz()[1:]
@@ -186,7 +183,7 @@ def _servo(
 
 
 def _settles(axis: DrawnAxis) -> bool:
-    """Whether the loop comes to rest when no friction damps it."""
+    """Check that the loop comes to rest without friction."""
     names = ("coulomb_torque_n_m", "viscous_torque_n_m_s_rad", "coulomb_force_n", "viscous_force_n_s_m")
     free = axis.with_parameters({name: 0.0 for name in names if name in axis.true})
     count = round(1.0 / axis.period_s)
@@ -201,5 +198,5 @@ def _settles(axis: DrawnAxis) -> bool:
 
 
 def _rounded(value: float, digits: int = 4) -> float:
-    """To so many significant digits, as gains are entered in a drive."""
+    """Round to significant digits, as gains are entered in a drive."""
     return float(f"{value:.{digits}g}")

@@ -1,17 +1,32 @@
-"""Kinds of axes: true parameters drawn at random, by the names of a bench file, and the simulated axis of them."""
-
-from __future__ import annotations
+"""Draw the true parameters of each kind of axis, by the names of a bench file, and build the simulated axis."""
 
 from collections.abc import Callable, Mapping
-from math import pi
+from math import exp, log, pi
 from typing import Any, Literal
 
-from drivers.sim.axis import AxisTruth, one_mass, serial_chain, seven_dof, two_mass
-from hil.proof.draw.random_draws import Rng, log_uniform
+import numpy as np
 
+from drivers.sim.axis import AxisTruth, one_mass, serial_chain, seven_dof, two_mass
+
+Rng = np.random.Generator
 Kind = Literal["two_mass", "seven_dof", "serial_chain", "one_mass"]
 KINDS: dict[Kind, float] = {"two_mass": 0.5, "seven_dof": 0.2, "serial_chain": 0.1, "one_mass": 0.2}  # shares
 LEADS_M = (0.005, 0.010, 0.016, 0.020)
+
+
+def log_uniform(rng: Rng, low: float, high: float) -> float:
+    """Draw a number whose logarithm is uniform between two limits."""
+    return exp(rng.uniform(log(low), log(high)))
+
+
+def any_phase(rng: Rng) -> float:
+    """Draw an angle [rad]."""
+    return float(rng.uniform(-pi, pi))
+
+
+def any_sign(rng: Rng) -> float:
+    """Draw 1 or -1."""
+    return float(rng.choice((-1.0, 1.0)))
 
 
 def _two_mass(rng: Rng) -> dict[str, Any]:
@@ -73,7 +88,7 @@ def _one_mass(rng: Rng) -> dict[str, Any]:
 
 
 def _friction(rng: Rng, inertia_kg_m2: float, lead_m: float) -> dict[str, float]:
-    """Coulomb as a share of the accelerating torque; viscous equal to it at some quarter of a metre per second."""
+    """Draw Coulomb friction as a share of the accelerating torque, and viscous friction equal to it near 0.25 m/s."""
     coulomb = inertia_kg_m2 / (lead_m / (2 * pi)) * log_uniform(rng, 0.5, 1.8)
     return {
         "coulomb_torque_n_m": coulomb,
@@ -82,17 +97,13 @@ def _friction(rng: Rng, inertia_kg_m2: float, lead_m: float) -> dict[str, float]
 
 
 def rigid_inertia(truth: AxisTruth) -> float:
-    """Inertia at the motor [kg m^2, kg] of an axis that moves as one body; a screw does not move along itself."""
+    """Return the inertia at the motor [kg m^2, kg] of the rigid axis, without the axial mass of the screw."""
     still = truth.mass_kg[truth.nut.axial] if truth.nut is not None and truth.nut.axial >= 0 else 0.0
     return float((sum(truth.mass_kg) - still) * truth.drive_ratio_m_rad**2)
 
 
-def _two_mass_truth(p: Mapping[str, Any]) -> AxisTruth:
-    return two_mass(**p)
-
-
 def _seven_dof_truth(p: Mapping[str, Any]) -> AxisTruth:
-    # what a bench file does not name is as in the reconstruction of the source's Table 1
+    # parameters that a bench file does not name: reconstruction of the source's Table 1
     return seven_dof(
         lead_m=p["lead_m"], inertia_kg_m2=(p["motor_inertia_kg_m2"], 1.04e-4, 4.89e-5, 6.62e-4),
         axial_mass_kg=(5.25, 3.49, p["table_mass_kg"]),
@@ -110,10 +121,6 @@ def _serial_truth(p: Mapping[str, Any]) -> AxisTruth:
         viscous_torque_n_m_s_rad=p["viscous_torque_n_m_s_rad"])  # fmt: skip
 
 
-def _one_mass_truth(p: Mapping[str, Any]) -> AxisTruth:
-    return one_mass(p["mass_kg"], p["coulomb_force_n"], p["viscous_force_n_s_m"], p["screw_lead_m"])
-
-
 PARAMETERS: dict[Kind, Callable[[Rng], dict[str, Any]]] = {
     "two_mass": _two_mass,
     "seven_dof": _seven_dof,
@@ -121,8 +128,8 @@ PARAMETERS: dict[Kind, Callable[[Rng], dict[str, Any]]] = {
     "one_mass": _one_mass,
 }
 TRUTH: dict[Kind, Callable[[Mapping[str, Any]], AxisTruth]] = {
-    "two_mass": _two_mass_truth,
+    "two_mass": lambda p: two_mass(**p),
     "seven_dof": _seven_dof_truth,
     "serial_chain": _serial_truth,
-    "one_mass": _one_mass_truth,
+    "one_mass": lambda p: one_mass(p["mass_kg"], p["coulomb_force_n"], p["viscous_force_n_s_m"], p["screw_lead_m"]),
 }

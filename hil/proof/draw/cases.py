@@ -1,6 +1,4 @@
-"""Drafts of cases: an axis over its motions, with effects of wanted sizes."""
-
-from __future__ import annotations
+"""Draft cases: an axis over its motions, with effects of wanted sizes."""
 
 from dataclasses import dataclass
 
@@ -8,24 +6,23 @@ from drivers.sim.effects import Effect
 from hil.motion.trajectory import Trajectory
 from hil.proof.draw import motions
 from hil.proof.draw.axes import Belief, DrawnAxis, draw_axis
-from hil.proof.draw.axis_kinds import Kind
-from hil.proof.draw.effect_size import Visibility
-from hil.proof.draw.effects import LIBRARY, Scene, applicable, draw_effect, scaled
-from hil.proof.draw.random_draws import Rng, log_uniform
+from hil.proof.draw.axis_kinds import Kind, Rng, log_uniform
+from hil.proof.draw.effect_size import EffectSizes
+from hil.proof.draw.effects import LIBRARY, DrawScale, applicable, draw_effect, scaled
 from hil.proof.draw.unknown_effects import EncoderFault
 
 Runs = tuple[Trajectory, Trajectory, Trajectory]
 Sizes = tuple[float, float]
 Sized = tuple[Effect, float]
-TRIES = 8  # draws on one axis
-_PAIRS = 3  # draws of two, each of which takes new sensitivities
-_ON_RUNG = 0.05  # relative, of a size wanted
-_STEPS = 8  # towards it
+TRIES = 8  # draws on one axis before it is scaled or given up
+_PAIRS = 3  # draws of two effects; each costs new sensitivities
+_ON_RUNG = 0.05  # relative tolerance of a wanted size
+_STEPS = 8  # of scaling
 
 
 @dataclass(frozen=True, eq=False)
-class Draft:
-    """What is to be recorded, and the answer: effects with their sizes, first the one that the case is about."""
+class CaseDraft:
+    """A case before it is recorded, with its right answer: effects and their sizes, the one to be found first."""
 
     axis: DrawnAxis
     runs: Runs
@@ -36,28 +33,28 @@ class Draft:
 
 
 @dataclass(frozen=True, eq=False)
-class Stage:
-    """An axis over good motions, before anything is concealed."""
+class AxisOnMotions:
+    """An axis over good motions, without effects."""
 
     axis: DrawnAxis
     runs: Runs
-    visibility: Visibility
-    scene: Scene
+    sizes: EffectSizes
+    scale: DrawScale
 
 
-def stage(rng: Rng, kind: Kind | None, belief: Belief = "wrong", hard: bool = False) -> Stage:
-    """An axis and its motions at random."""
+def stage(rng: Rng, kind: Kind | None, belief: Belief = "wrong", hard: bool = False) -> AxisOnMotions:
+    """Draw an axis and its motions."""
     axis = draw_axis(rng, kind, belief, hard)
     train = motions.training(rng, axis)
-    visibility = Visibility(axis, train)
-    scene = Scene(axis, visibility.peak_torque(), min(motion.duration_s for motion in train))
-    return Stage(axis, (*train, motions.holdout(rng, axis)), visibility, scene)
+    sizes = EffectSizes(axis, train)
+    scale = DrawScale(axis, sizes.peak_torque(), min(motion.duration_s for motion in train))
+    return AxisOnMotions(axis, (*train, motions.holdout(rng, axis)), sizes, scale)
 
 
 def name_on(axis: DrawnAxis, effect: str | None, forced: bool, rng: Rng) -> str | None:
-    """The effect asked for, or any; None where another kind of axis must be drawn for it.
+    """Return the wanted effect, or any; None if it needs another kind of axis.
 
-    Raises ValueError for an effect that no axis has, or not the kind that is `forced`.
+    Raises ValueError for an effect that no axis has, or that the `forced` kind lacks.
     """
     names = applicable(axis)
     if effect is None:
@@ -69,48 +66,50 @@ def name_on(axis: DrawnAxis, effect: str | None, forced: bool, rng: Rng) -> str 
     return None
 
 
-def one(rng: Rng, on: Stage, name: str, sizes: Sizes) -> Draft | None:
-    """One effect of a size between two."""
+def one(rng: Rng, on: AxisOnMotions, name: str, sizes: Sizes) -> CaseDraft | None:
+    """Draft a case with one effect of a size between two limits."""
     found = sized(rng, on, name, sizes)
-    return Draft(on.axis, on.runs, "missing_physics", (found,)) if found else None
+    return CaseDraft(on.axis, on.runs, "missing_physics", (found,)) if found else None
 
 
-def two(rng: Rng, on: Stage, names: tuple[str, str], sizes: Sizes, second: Sizes, ratio: Sizes) -> Draft | None:
-    """Two effects, each of a size between two beside the other; `ratio`: of the second to the first."""
+def two(
+    rng: Rng, on: AxisOnMotions, names: tuple[str, str], sizes: Sizes, second: Sizes, ratio: Sizes
+) -> CaseDraft | None:
+    """Draft a case with two effects, each within limits of its size beside the other; `ratio`: second to first."""
     for _ in range(_PAIRS):
         one, another = sized(rng, on, names[0], sizes), sized(rng, on, names[1], second)
         if one is None or another is None:
             return None
         first, other = one[0], another[0]
-        size = on.visibility.size([first], [other])
+        size = on.sizes.size([first], [other])
         if not sizes[0] <= size <= sizes[1]:
             continue
-        beside = on.visibility.size([other], [first])
+        beside = on.sizes.size([other], [first])
         if second[0] <= beside <= second[1] and ratio[0] <= beside / size <= ratio[1]:
-            return Draft(on.axis, on.runs, "missing_physics", ((first, size), (other, beside)))
+            return CaseDraft(on.axis, on.runs, "missing_physics", ((first, size), (other, beside)))
     return None
 
 
-def sized(rng: Rng, on: Stage, name: str, sizes: Sizes) -> Sized | None:
-    """An effect of a size between two: as drawn, or turned up or down where no draw comes to lie there."""
+def sized(rng: Rng, on: AxisOnMotions, name: str, sizes: Sizes) -> Sized | None:
+    """Draw an effect of a size between two limits; scale it if no draw falls between them."""
     for _ in range(TRIES):
-        effect = draw_effect(name, on.scene, rng)
-        size = on.visibility.size([effect])
+        effect = draw_effect(name, on.scale, rng)
+        size = on.sizes.size([effect])
         if sizes[0] <= size <= sizes[1]:
             return effect, size
     found = at_size(effect, log_uniform(rng, *sizes), on)
     return found if found and sizes[0] <= found[1] <= sizes[1] else None
 
 
-def at_size(effect: Effect, wanted: float, on: Stage) -> Sized | None:
-    """The effect turned up or down until its size is the wanted one; None where it cannot be."""
+def at_size(effect: Effect, wanted: float, on: AxisOnMotions) -> Sized | None:
+    """Scale the effect until its size is the wanted one; None if that fails."""
     found: Effect | None = effect
     for _ in range(_STEPS):
         if found is None:
             return None
-        size = on.visibility.size([found])
+        size = on.sizes.size([found])
         if abs(size / wanted - 1.0) < _ON_RUNG:
             return found, size
-        # sizes grow about as the strength does; what has a threshold is led there in smaller steps
-        found = scaled(found, min(max(wanted / max(size, 1e-6), 0.2), 3.0), on.scene)
+        # sizes are about proportional to the strength; limited steps for effects with a threshold
+        found = scaled(found, min(max(wanted / max(size, 1e-6), 0.2), 3.0), on.scale)
     return None

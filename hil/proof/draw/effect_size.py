@@ -1,16 +1,14 @@
-"""How visible an effect is: what it changes in the recordings that no nominal parameter could, in units of noise.
+"""Size of an effect: its change of the recordings that no nominal parameter can imitate, in units of the noise.
 
     size = max over channels of rms( (1 - P) (r_with - r_without) ),   P = Q Q^T of the parameters' sensitivities
 
-What large changes of the parameters explain beyond that, as a nut that is soft all over, is no size either: r_without
-is taken again where P leads, a few times (a chord method).
+Large changes of the parameters are taken into account by a few chord steps: r_without is simulated again at the
+parameters to which P leads.
 
 Runs of the closed loop without sensor noise. Channels: torque over the torque's noise; drive (torque less command) and
 controller (command less the law fed with the recorded positions) over the same; table less r x motor over the noise of
-counting. This is the generator's own yardstick; nothing of the twin or of the diagnosis is in it.
+counting. Independent of twin and diagnosis.
 """
-
-from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from math import inf
@@ -29,14 +27,14 @@ from hil.proof.draw.axes import STEP_S, DrawnAxis
 
 _PERFECT = Sensors(motor_counts_per_rev=0, table_resolution_m=0, torque_noise_n_m=0)
 _DIFFERENCE = 0.01  # relative, of a parameter in its finite difference
-_FACTORS = (0.2, 5.0)  # of the true value, between which parameters are fitted
-_CHORDS = 3  # steps of that fit with the derivatives of the true values
-# Parameters that a recording shows by themselves, and of which a percent more is another effect.
+_FACTORS = (0.2, 5.0)  # bounds of fitted parameters, relative to the true value
+_CHORDS = 3  # steps of the fit with the derivatives at the true values
+# Parameters that a recording shows directly; a change by one percent makes another effect.
 _READ_OFF = ("cycles_per_rev", "period_m", "start_s", "end_s")
 
 
-class Visibility:
-    """Sizes of effects on one axis over some motions. Runs are kept, since many draws share them."""
+class EffectSizes:
+    """Sizes of effects on one axis over some motions. Simulated runs are kept, since many draws share them."""
 
     def __init__(self, axis: DrawnAxis, motions: Sequence[Trajectory]) -> None:
         self.axis, self.motions = axis, tuple(motions)
@@ -44,11 +42,11 @@ class Visibility:
         self._bases: dict[object, tuple[FloatArray, FloatArray]] = {}
 
     def size(self, effects: Sequence[Effect], beside: Sequence[Effect] = ()) -> float:
-        """Size of effects beside others, whose parameters could be fitted too."""
+        """Return the size of effects beside others, whose parameters can be fitted too."""
         return max(self.sizes(effects, beside).values())
 
     def sizes(self, effects: Sequence[Effect], beside: Sequence[Effect] = ()) -> dict[str, float]:
-        """The same for each channel."""
+        """Return the size in each channel."""
         seen = self._channels([*beside, *effects])
         if not np.all(np.isfinite(seen)):
             return dict.fromkeys(self._names, inf)
@@ -58,13 +56,13 @@ class Visibility:
         return dict(zip(self._names, np.sqrt(np.mean(left**2, axis=1)).tolist(), strict=True))
 
     def _left(self, seen: FloatArray, without: FloatArray, beside: tuple[Effect, ...] = ()) -> FloatArray:
-        """What of channels (channels, n) the parameters cannot explain from where they are."""
+        """Return the part of the change of channels (channels, n) that is orthogonal to the sensitivities."""
         basis, _ = self._basis(beside)
         flat = (seen - without).ravel()
         return np.asarray((flat - basis @ (basis.T @ flat)).reshape(seen.shape), dtype=np.float64)
 
     def _refitted(self, seen: FloatArray, best: FloatArray) -> FloatArray:
-        """The least that is left of channels (channels, n) on the way of the nominal parameters to them."""
+        """Return the smallest remainder (channels, n) while the nominal parameters are fitted to the channels."""
         _, slopes = self._basis(())
         factors, at = np.ones(len(self.axis.nominal)), self._channels(())
         for _ in range(_CHORDS):
@@ -81,13 +79,15 @@ class Visibility:
         return best
 
     def evidence(self, effects: Sequence[Effect]) -> float:
-        """Sum of squares of what the sizes are the rms of: what a test on white noise would see."""
+        """Return the sum of squares over all rows, the statistic of a test on white noise."""
         rows = sum(len(motion) for motion in self.motions)
         return rows * sum(size**2 for size in self.sizes(effects).values())
 
     def separation(self, effect: Effect, rival: Effect, enough: float) -> float:
-        """Evidence by which these motions tell an effect from a rival whose parameters, like the nominal ones, are
-        fitted to what the effect does. Where the rival is `enough` alike as it stands, it is not fitted."""
+        """Return the sum of squares between an effect and a rival that is fitted to it, with the nominal parameters.
+
+        The rival is not fitted if the sum is below `enough` as it stands.
+        """
         seen = self._channels([effect])
         at = self._channels([rival]) - seen
         if float(np.sum(at**2)) < enough:
@@ -106,7 +106,7 @@ class Visibility:
         return 2.0 * float(least_squares(left, start, bounds=_FACTORS, diff_step=1e-3, max_nfev=6).cost)
 
     def peak_torque(self) -> float:
-        """Largest torque that the motions take without effects."""
+        """Return the largest torque of the motions without effects."""
         return max(
             float(np.max(np.abs(rows["force_n" if self.axis.truth.linear else "torque_n_m"])))
             for rows in (self._record(self.axis.truth, (), motion) for motion in self.motions)
@@ -118,8 +118,8 @@ class Visibility:
         return names if self.axis.has_table else names[:3]
 
     def _basis(self, beside: tuple[Effect, ...]) -> tuple[FloatArray, FloatArray]:
-        """Orthonormal directions (n, p) that nominal parameters and those of the other effects span, and the changes
-        (n, p) that span them."""
+        """Return an orthonormal basis (n, p) of the sensitivities of the nominal parameters and those of other effects,
+        and the sensitivities (n, p)."""
         key = _key(beside)
         if key not in self._bases:
             at = self._channels(beside).ravel()
@@ -136,7 +136,7 @@ class Visibility:
         return self._bases[key]
 
     def _channels(self, effects: Sequence[Effect], truth: AxisTruth | None = None) -> FloatArray:
-        """Channels over their noise (channels, n), the motions one after the other."""
+        """Return the channels over their noise (channels, n), the motions one after the other."""
         key = (_key(effects), truth)
         if key not in self._runs:
             self._runs[key] = self._seen_all(effects, truth or self.axis.truth)
@@ -179,7 +179,7 @@ class Visibility:
 
 
 def _neighbours(effect: Effect) -> list[Effect]:
-    """The effect with each of its parameters changed a little."""
+    """Return the effect with each of its parameters changed a little."""
     found = []
     for name, value in effect.parameters.items():
         change = _DIFFERENCE if "phase" in name else _DIFFERENCE * value

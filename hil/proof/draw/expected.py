@@ -1,10 +1,8 @@
-"""What is right to answer about a concealed effect: its block, where it shows, and the parameters that can be compared.
+"""The right answer about a concealed effect: its ids, its block, its place, and the parameters that can be compared.
 
-A form that the library has not (damped bristles, an atan Stribeck curve), or not quite (GMS with other knees), keeps
-its name; compared are those parameters only that mean the same in both laws. An exponential Stribeck curve is left out.
+A form that the library lacks (damped bristles, an atan Stribeck curve) or has with other details (GMS with other knees)
+keeps the name of its mechanism; only parameters with the same meaning in both laws are compared.
 """
-
-from __future__ import annotations
 
 from collections.abc import Mapping
 from math import sqrt
@@ -12,46 +10,35 @@ from math import sqrt
 from drivers.sim.axis import AxisTruth
 from drivers.sim.effects import Effect
 from hil.proof.draw.axes import DrawnAxis
-from hil.proof.draw.unknown_effects import EncoderFault
+from hil.proof.draw.unknown_effects import BLOCKS, EncoderFault
 from hil.twin.library import BY_ID
 
 # Two names for one law: friction that differs by direction shifts its band as a weight does, also at standstill.
 SAME_LAW = (frozenset({"asymmetric_friction", "constant_load"}),)
-_NOVEL_BLOCKS = {
-    "novel_friction_bump": "motor_side",
-    "novel_friction_wander": "motor_side",
-    "novel_pitch_bump": "transmission",
-    "novel_mass_change": "table",
-    "novel_vibration": "table",
-    "novel_hammering": "table",
-    "novel_torque_fade": "drive",
-    "novel_lost_counts": "sensor",
-    "novel_noise_bursts": "sensor",
-}
 
 
 def same_law(effect: str) -> tuple[str, ...]:
-    """Ids of the library that say what this one says, itself included; none for physics that it has not."""
+    """Return the ids of the library for the same law, with its own; empty for physics that the library lacks."""
     if effect not in BY_ID:
         return ()
     return tuple(sorted(next((law for law in SAME_LAW if effect in law), {effect})))
 
 
 def inseparable(effect: str) -> frozenset[str]:
-    """Ids of the library that no motion tells apart from this one or beside it: what says the same, and a constant
-    torque beside a spring, whose rest it moves."""
+    """Return the ids of the library that no motion separates from this effect: the same law, and spring and constant
+    torque, which shifts the rest position of the spring."""
     own = frozenset(same_law(effect))
     constant = next(law for law in SAME_LAW if "constant_load" in law)
     return own | constant if effect == "spring_load" else own | {"spring_load"} if own & constant else own
 
 
 def block(effect: str) -> str:
-    """Block of the chain in which an effect lives."""
-    return str(BY_ID[effect].block) if effect in BY_ID else _NOVEL_BLOCKS[effect]
+    """Return the block of the chain to which an effect belongs."""
+    return str(BY_ID[effect].block) if effect in BY_ID else BLOCKS[effect]
 
 
 def compared(effect: Effect | EncoderFault, axis: DrawnAxis) -> dict[str, float]:
-    """True values of those parameters of the library's law that the recordings have."""
+    """Return the true values of the parameters of the library's law that can be compared."""
     values = effect.parameters
     if effect.id == "structural_mode":
         return _mode(values, effect.form, axis.truth)
@@ -64,7 +51,7 @@ def compared(effect: Effect | EncoderFault, axis: DrawnAxis) -> dict[str, float]
 
 
 def place(effect: Effect | EncoderFault, axis: DrawnAxis) -> dict[str, float | tuple[float, float]]:
-    """Where an effect shows: window_s, period_m, frequency_hz, position_m, as far as it keeps to one."""
+    """Return the place of an effect (window_s, period_m, frequency_hz or position_m); empty if it has none."""
     lead_m, values = axis.truth.lead_m, effect.parameters
     if "cycles_per_rev" in values:
         return {"period_m": lead_m / values["cycles_per_rev"]}
@@ -88,7 +75,7 @@ def place(effect: Effect | EncoderFault, axis: DrawnAxis) -> dict[str, float | t
 
 
 def _mode(values: Mapping[str, float], form: str, truth: AxisTruth) -> dict[str, float]:
-    """Frequency and mass ratio of the mass on the table that acts on the drive as this mode does.
+    """Return frequency and mass ratio of the mass on the table that is equivalent to this mode for the drive.
 
     A base m_b on a spring k_b under an axis that moves m_t against it: between their relative motion x and the force,
 

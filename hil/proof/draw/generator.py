@@ -1,15 +1,13 @@
-"""The case generator: an axis, what is concealed in it, recordings of it - and the truth, kept apart.
+"""Draw cases: an axis with concealed effects, its recordings, and the truth, which is kept apart.
 
-A case folder holds train_1, train_2 and holdout as Parquet and bench.yaml as the owner has it. The truth is returned to
-whoever seals it and never written beside them.
+A case folder holds train_1, train_2 and holdout as Parquet and the owner's bench.yaml. The truth is returned to the
+caller and never written beside them.
 """
-
-from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import yaml
@@ -22,41 +20,58 @@ from hil.motion.trajectory import Trajectory
 from hil.proof.draw import expected
 from hil.proof.draw.axes import DrawnAxis
 from hil.proof.draw.axis_kinds import Kind
-from hil.proof.draw.cases import Draft
+from hil.proof.draw.cases import CaseDraft
 from hil.proof.draw.effects import LIBRARY
 from hil.proof.draw.tiers import RECIPES
 from hil.proof.draw.unknown_effects import NOVEL
 from hil.recording.recording import Recording, write_parquet
+from hil.twin.library import names_of
+from hil.twin.mechanism import Role
 
 TIERS = tuple(RECIPES)
 BALANCED = {"single": LIBRARY, "ladder": LIBRARY, "pair": LIBRARY, "masked": LIBRARY, "novel": NOVEL}
 RECORDINGS = ("train_1", "train_2", "holdout")
-_AXES = 300  # drawn before it is clear that the tier cannot have what was asked for
-_STOPPED_M = 3e-3  # following error, beyond that of the law, and share of torque at its limit at which an
-_LIMITED = 0.05  # engineer would have stopped the axis
+_AXES = 300  # draws before a request counts as impossible
+# An engineer would stop an axis with more than this following error beyond that of the law, or share of limited torque.
+_STOPPED_M, _LIMITED = 3e-3, 0.05
 
 
 @dataclass(frozen=True)
 class Concealed:
-    """One concealed effect: as drawn, its size in units of noise, and what is right to answer about it."""
+    """A concealed effect as drawn, its size in units of noise, and the right answer about it."""
 
     effect: str
     form: str
     parameters: Mapping[str, float]
     size: float
-    same_law: tuple[str, ...]  # ids of the library that say the same; none: the library has it not
+    same_law: tuple[str, ...]  # ids of the library for the same law; empty if the library lacks it
     block: str
     place: Mapping[str, float | tuple[float, float]]
-    compared: Mapping[str, float]  # parameters of the library's law that the recordings have
+    compared: Mapping[str, float]  # true values of the parameters of the library's law
+
+    @property
+    def free_period_m(self) -> float | None:
+        """Spatial period [m] if it is a parameter of the effect."""
+        free = set(names_of(Role.PERIOD, Role.ORDER)) & set(self.parameters)
+        return cast(float, self.place["period_m"]) if free else None
+
+    @property
+    def mode_hz(self) -> float | None:
+        """Frequency [Hz] if it is a parameter of the library's law."""
+        return self.compared.get("frequency_hz") and cast(float, self.place["frequency_hz"])
+
+    @property
+    def window_s(self) -> tuple[float, float] | None:
+        """Begin and end [s] of the effect if it is transient."""
+        return cast("tuple[float, float] | None", self.place.get("window_s"))
 
 
 @dataclass(frozen=True)
 class Truth:
-    """What a case conceals and what is right to answer.
+    """The concealed effects of a case and the right answer.
 
-    `effects`: the concealed ones, that which the tier is about first. `rivals`: ids that these motions cannot tell from
-    it. `not_testable`: ids that must be reported so. `noise`: standard deviations of the channels; `table_m` is that of
-    table less r x motor.
+    `effects`: the one to be found first. `rivals`: ids that these motions cannot separate from it. `not_testable`: ids
+    that must be reported as such. `noise`: standard deviations of the channels; `table_m`: table less r x motor.
     """
 
     name: str
@@ -72,28 +87,40 @@ class Truth:
     believed_parameters: Mapping[str, Any]
     noise: Mapping[str, float]
 
+    @property
+    def lead_m(self) -> float:
+        """Lead of the screw [m], also of that behind a one-mass axis."""
+        return float(self.true_parameters.get("lead_m") or self.true_parameters["screw_lead_m"])
+
     def as_json(self) -> dict[str, Any]:
-        """Plain data."""
+        """Return plain data."""
         return asdict(self)
+
+    @classmethod
+    def from_json(cls, data: dict[str, Any]) -> "Truth":
+        """Return the truth from plain data."""
+        effects = tuple(Concealed(**{**effect, "same_law": tuple(effect["same_law"])}) for effect in data["effects"])
+        return cls(
+            **{**data, "effects": effects, "rivals": tuple(data["rivals"]), "not_testable": tuple(data["not_testable"])}
+        )
 
 
 @dataclass(frozen=True, eq=False)
-class Case:
-    """A case: what the diagnosis gets, the truth, and the axis itself for another run."""
+class DrawnCase:
+    """A case: recordings and bench for the diagnosis, the truth, and the draft for further runs."""
 
     name: str
     recordings: tuple[Recording, ...]
     bench: Bench
     truth: Truth
-    draft: Draft
+    draft: CaseDraft
 
 
-def draw(tier: str, number: int, seed: int, effect: str | None = None, axis: Kind | None = None) -> Case:
-    """The case of a tier, number and seed; always the same one.
+def draw(tier: str, number: int, seed: int, effect: str | None = None, axis: Kind | None = None) -> DrawnCase:
+    """Draw the case of a tier, number and seed; the same arguments give the same case.
 
-    `effect` and `axis` force what is drawn, where the tier has a choice. Without them, consecutive numbers of a tier
-    take all its effects equally often. Raises ValueError for an unknown tier, and
-    for an effect that the tier or this kind of axis cannot show.
+    `effect` and `axis` fix what the tier would choose. Without them, consecutive numbers of a tier take all its effects
+    equally often. Raises ValueError for an unknown tier, and for an effect that the tier or kind of axis lacks.
     """
     if tier not in RECIPES:
         raise ValueError(f"tier: must be one of {', '.join(TIERS)}, got {tier!r}")
@@ -109,27 +136,21 @@ def draw(tier: str, number: int, seed: int, effect: str | None = None, axis: Kin
         ]
         if all(_sound(recording, draft.axis) for recording in recordings):
             name = f"case_{number:04d}"
-            return Case(name, tuple(recordings), draft.axis.bench, truth_of(name, tier, number, seed, draft), draft)
+            return DrawnCase(
+                name, tuple(recordings), draft.axis.bench, truth_of(name, tier, number, seed, draft), draft
+            )
     raise ValueError(
-        f"tier {tier}: given {effect} on {axis or 'any axis'}, which came to no case on {_AXES} axes; "
+        f"tier {tier}: given {effect} on {axis or 'any axis'}, which gave no case on {_AXES} axes; "
         "leave the effect or the axis out"
     )
 
 
-def rerun(draft: Draft, run: Trajectory, seed: int, name: str = "run") -> Recording:
-    """A recording of the axis with what it conceals over any motion: those of the case, or one asked for later."""
+def rerun(draft: CaseDraft, run: Trajectory, seed: int, name: str = "run") -> Recording:
+    """Record the axis with its concealed effects over a motion of the case or a proposed one."""
     axis = draft.axis
     effects = [effect for effect, _ in draft.effects if isinstance(effect, Effect)]
-    columns = record(
-        axis.truth,
-        axis.sensors,
-        effects,
-        axis.servo,
-        np.array(run.position_m),
-        np.array(run.velocity_m_s),
-        axis.period_s,
-        seed,
-    )
+    motion = np.array(run.position_m), np.array(run.velocity_m_s)
+    columns = record(axis.truth, axis.sensors, effects, axis.servo, *motion, axis.period_s, seed)
     faults = np.random.default_rng(seed)
     for fault, _ in draft.effects:
         if not isinstance(fault, Effect):
@@ -138,8 +159,8 @@ def rerun(draft: Draft, run: Trajectory, seed: int, name: str = "run") -> Record
     return Recording(name, columns, axis.period_s)
 
 
-def write(case: Case, folder: str | Path) -> Path:
-    """Write recordings and bench into folder/NAME; returns that folder. Raises InputError if a file exists."""
+def write(case: DrawnCase, folder: str | Path) -> Path:
+    """Write recordings and bench into folder/NAME and return that folder. Raises InputError if a file exists."""
     place = Path(folder) / case.name
     place.mkdir(parents=True, exist_ok=True)
     for recording in case.recordings:
@@ -149,8 +170,8 @@ def write(case: Case, folder: str | Path) -> Path:
     return place
 
 
-def truth_of(name: str, tier: str, number: int, seed: int, draft: Draft) -> Truth:
-    """What a draft conceals and what is right to answer about it."""
+def truth_of(name: str, tier: str, number: int, seed: int, draft: CaseDraft) -> Truth:
+    """Return the truth of a draft."""
     axis = draft.axis
     noise = {"torque": axis.sensors.torque_noise_n_m} | ({"table_m": axis.table_noise_m} if axis.has_table else {})
     concealed = tuple(
@@ -166,24 +187,12 @@ def truth_of(name: str, tier: str, number: int, seed: int, draft: Draft) -> Trut
         )
         for effect, size in draft.effects
     )
-    return Truth(
-        name,
-        tier,
-        number,
-        seed,
-        axis.kind,
-        draft.verdict,
-        concealed,
-        draft.rivals,
-        draft.not_testable,
-        dict(axis.true),
-        dict(axis.believed),
-        noise,
-    )
+    answer = (draft.verdict, concealed, draft.rivals, draft.not_testable)
+    return Truth(name, tier, number, seed, axis.kind, *answer, dict(axis.true), dict(axis.believed), noise)
 
 
 def _turn(names: tuple[str, ...], number: int, seed: int) -> str:
-    """Every name once in each round of numbers, in another order each time."""
+    """Return every name once in each round of numbers, in another order each round."""
     turn, at = divmod(number, len(names))
     return names[int(np.random.default_rng([seed, turn]).permutation(len(names))[at])]
 

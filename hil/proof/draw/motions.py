@@ -1,10 +1,8 @@
-"""Motions drawn at random: for training, a different one to hold out, and a poor one that shows little.
+"""Draw motions: for training, another one to hold out, and poor ones with little excitation.
 
 A good motion has the full travel, several feeds both ways, creep through reversals, standstill, short strokes and
 accelerations. All are made of sine-squared moves (`hil.motion.profile`), from rest to rest.
 """
-
-from __future__ import annotations
 
 from dataclasses import replace
 from typing import Any, Literal, get_args
@@ -14,7 +12,7 @@ import numpy as np
 from hil.motion.profile import Profile
 from hil.motion.trajectory import Trajectory, plan
 from hil.proof.draw.axes import JERK_M_S3, DrawnAxis
-from hil.proof.draw.random_draws import Rng, log_uniform
+from hil.proof.draw.axis_kinds import Rng, log_uniform
 
 Poor = Literal["one_way", "local", "slow"]
 POOR: tuple[Poor, ...] = get_args(Poor)
@@ -24,18 +22,18 @@ _TRIES = 5  # draws that do not fit into the time before a motion counts as full
 
 
 def training(rng: Rng, axis: DrawnAxis) -> tuple[Trajectory, Trajectory]:
-    """Two motions, a long and a short one."""
+    """Draw two motions, a long and a short one."""
     return _good(rng, axis, TRAINING_S), _good(rng, axis, SHORT_S)
 
 
 def holdout(rng: Rng, axis: DrawnAxis) -> Trajectory:
-    """Another motion: other feeds, strokes, positions."""
+    """Draw a motion with other feeds, strokes and positions."""
     return _good(rng, axis, HOLDOUT_S)
 
 
 def poor(rng: Rng, axis: DrawnAxis, kind: Poor) -> Trajectory:
-    """A motion that shows little: one stroke in one direction, recorded until shortly before its end; strokes of a
-    millimetre in one place; or one low feed back and forth with gentle accelerations."""
+    """Draw a motion with little excitation: one stroke in one direction, recorded until shortly before its end; strokes
+    of about 1 mm in one place; or one low feed back and forth with low acceleration."""
     if kind == "one_way":
         feed = axis.travel_m / rng.uniform(4.0, 8.0)
         return _cut(_planned(axis, [_rest(0.2), _to(axis.travel_m, feed)]), 0.95)
@@ -76,7 +74,7 @@ def _good(rng: Rng, axis: DrawnAxis, seconds: float) -> Trajectory:
 
 
 def _creep(rng: Rng, low_m_s: float, high_m_s: float) -> list[dict[str, Any]]:
-    """Through reversals at some mm/s: turning without a rest, or from rest to rest."""
+    """Draw reversals at some mm/s, with or without a rest."""
     feed = log_uniform(rng, low_m_s, high_m_s)
     stroke = feed * rng.uniform(0.4, 0.8)
     if rng.random() < 0.5:
@@ -85,7 +83,7 @@ def _creep(rng: Rng, low_m_s: float, high_m_s: float) -> list[dict[str, Any]]:
 
 
 def _short_strokes(rng: Rng, axis: DrawnAxis) -> list[dict[str, Any]]:
-    """Strokes that are all acceleration, there and back, at two lengths."""
+    """Draw strokes of two lengths there and back, without constant feed."""
     strokes = [log_uniform(rng, 1e-3, 30e-3) for _ in range(2)]
     return [_stroke(sign * stroke, axis.feed_m_s) for stroke in strokes for sign in (1, -1)]
 
@@ -121,7 +119,7 @@ def _planned(axis: DrawnAxis, segments: list[dict[str, Any]], gentle: float = 1.
 
 
 def _cut(trajectory: Trajectory, share: float) -> Trajectory:
-    """The first part of a trajectory."""
+    """Return the first part of a trajectory."""
     rows = slice(0, round(share * len(trajectory)))
     arrays: dict[str, Any] = {
         name: value[rows] for name, value in vars(trajectory).items() if isinstance(value, np.ndarray)

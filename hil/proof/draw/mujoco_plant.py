@@ -1,10 +1,8 @@
-"""A third party's physics as the plant: recordings of a two-mass axis that MuJoCo moves (`make peers`).
+"""Draw cases with MuJoCo as the plant: recordings of a two-mass axis by an independent simulator (`make peers`).
 
-Controller and set-points are those of the other cases; encoders and current are read here, in numpy. Of the simulated
-axis of `drivers.sim` nothing is in these recordings: it only helps to draw effects of a size that shows.
+Controller and set-points are those of the other cases; encoders and current are modelled here, in numpy. The simulated
+axis of `drivers.sim` is not used in these recordings, only for the size of the drawn effects.
 """
-
-from __future__ import annotations
 
 from math import pi
 
@@ -16,23 +14,23 @@ from hil.control import cascade
 from hil.errors import HilError
 from hil.motion.trajectory import Trajectory
 from hil.proof.draw.axes import DrawnAxis
-from hil.proof.draw.cases import Draft, one, stage
-from hil.proof.draw.generator import RECORDINGS, Case, truth_of
+from hil.proof.draw.axis_kinds import Rng
+from hil.proof.draw.cases import CaseDraft, one, stage
+from hil.proof.draw.generator import RECORDINGS, DrawnCase, truth_of
 from hil.proof.draw.mujoco_model import EFFECTS, STEP_S, acting, sag_m, xml
 from hil.proof.draw.plan import MUJOCO
-from hil.proof.draw.random_draws import Rng
 from hil.proof.draw.tiers import VISIBLE
 from hil.recording.recording import Recording
 
-_STREAM = 1000  # of random numbers, apart from those of the other tiers
-_LOST_M = 0.1  # following error beyond which no loop holds the axis
+_STREAM = 1000  # offset of the random stream from those of the other tiers
+_LOST_M = 0.1  # following error beyond which the simulation has diverged
 
 
-def draw_mujoco(tier: str, number: int, seed: int) -> Case:
-    """The case of a tier, number and seed: one effect, each in turn, or none and the owner's parameters wrong.
+def draw_mujoco(tier: str, number: int, seed: int) -> DrawnCase:
+    """Draw the case of a tier, number and seed: one effect, each in turn, or only wrong parameters.
 
-    Effects are drawn and sized as in the tier `single`. Raises HilError where MuJoCo is not installed, ValueError for
-    another tier than `single` and `parameters_only`.
+    Effects are drawn and sized as in the tier `single`. Raises HilError if MuJoCo is not installed, ValueError for
+    other tiers than `single` and `parameters_only`.
     """
     if tier not in MUJOCO:
         raise ValueError(f"tier: must be one of {', '.join(MUJOCO)}, got {tier!r}")
@@ -44,16 +42,16 @@ def draw_mujoco(tier: str, number: int, seed: int) -> Case:
         for name, run in zip(RECORDINGS, draft.runs, strict=True)
     )
     name = f"case_{number:04d}"
-    return Case(name, recordings, draft.axis.bench, truth_of(name, tier, number, seed, draft), draft)
+    return DrawnCase(name, recordings, draft.axis.bench, truth_of(name, tier, number, seed, draft), draft)
 
 
-def _draft(name: str | None, rng: Rng) -> Draft:
+def _draft(name: str | None, rng: Rng) -> CaseDraft:
     while True:
         on = stage(rng, "two_mass")
         if name is None:
-            return Draft(on.axis, on.runs, "parameter_error")
+            return CaseDraft(on.axis, on.runs, "parameter_error")
         draft = one(rng, on, name, VISIBLE)
-        # a base that yields would move the encoders with it: here a mass sways on the table
+        # the model has an attached mass only: a yielding base would move the encoders
         if draft is not None and draft.effects[0][0].form != "base":
             return draft
 
@@ -61,9 +59,9 @@ def _draft(name: str | None, rng: Rng) -> Draft:
 def record_mujoco(
     axis: DrawnAxis, effect: Effect | None, run: Trajectory, seed: int, name: str = "run", step_s: float = STEP_S
 ) -> Recording:
-    """A recording of a two-mass axis with at most one effect over set-points, from rest at the first one.
+    """Record a two-mass axis with at most one effect over set-points, from rest at the first one.
 
-    Raises HilError where MuJoCo is not installed or loses the axis, ValueError for another axis or effect.
+    Raises HilError if MuJoCo is not installed or the axis leaves its path, ValueError for another axis or effect.
     """
     if axis.kind != "two_mass" or (effect is not None and effect.id not in EFFECTS):
         raise ValueError(
@@ -115,7 +113,7 @@ def record_mujoco(
 
 
 def _torque_noise(axis: DrawnAxis, count: int, seed: int) -> FloatArray:
-    """Noise of the current (count,): each value resembles the one before it."""
+    """Return noise of the current (count,), autoregressive of first order."""
     rho = axis.sensors.torque_noise_correlation
     noise = np.random.default_rng(seed).standard_normal(count)
     for k in range(1, count):

@@ -1,6 +1,4 @@
-"""Which cases a proof consists of: how many of each tier, in mixed order."""
-
-from __future__ import annotations
+"""Plan the cases of a proof: how many of each tier, in mixed order."""
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
@@ -24,16 +22,16 @@ FULL: Mapping[str, int] = MappingProxyType(
         "insufficient": 60,
     }
 )
-# MuJoCo moves two-mass axes; three of each effect that can be had there.
+# MuJoCo moves two-mass axes: three of each effect that its model has.
 MUJOCO: Mapping[str, int] = MappingProxyType({"single": 45, "parameters_only": 15})
 PLANTS: Mapping[str, Mapping[str, int]] = MappingProxyType({"simulated": FULL, "mujoco": MUJOCO})
 MOST = 10_000  # case folders have four digits
-_NUMBERS = 1_000_000  # that the first case of a tier may have
+_NUMBERS = 1_000_000  # upper limit of the number of the first case of a tier
 
 
 @dataclass(frozen=True)
 class Planned:
-    """A case to be drawn: its folder, which says nothing, and its tier and number within that."""
+    """A case to be drawn: its neutral folder name, its tier and its number within the tier."""
 
     name: str
     tier: str
@@ -41,10 +39,10 @@ class Planned:
 
 
 def plan(cases: int, seed: int, plant: str = "simulated", only: Collection[str] = ()) -> tuple[Planned, ...]:
-    """So many cases, of each tier its share of the full proof on a plant, shuffled by the seed; `only` of some tiers.
+    """Plan `cases` cases with each tier's share of the full proof on a plant, shuffled by the seed; `only`: some tiers.
 
-    Within a tier numbers are consecutive, so that its effects are drawn equally often. Raises InputError for a
-    number of cases that makes no sense and for a tier that the plant has not.
+    Numbers within a tier are consecutive, so that its effects are drawn equally often. Raises InputError for a number
+    of cases out of range and for a tier that the plant lacks.
     """
     known = PLANTS[plant]
     for tier in only:
@@ -54,7 +52,7 @@ def plan(cases: int, seed: int, plant: str = "simulated", only: Collection[str] 
         raise InputError(f"--cases: given {cases}, allowed 1 to {MOST}")
     shares = {tier: share for tier, share in known.items() if not only or tier in only}
     random = np.random.default_rng([seed, cases])
-    # from another number in each tier: the same number of two tiers is the same effect
+    # each tier starts at a number of its own, since equal numbers of two tiers conceal the same effect
     order = [
         (tier, first + number)
         for tier, count in counts(cases, shares).items()
@@ -67,7 +65,7 @@ def plan(cases: int, seed: int, plant: str = "simulated", only: Collection[str] 
 
 
 def counts(cases: int, full: Mapping[str, int] = FULL) -> dict[str, int]:
-    """Cases of each tier in a proof of so many, by largest remainders."""
+    """Return the cases of each tier in a proof of `cases`, by largest remainders."""
     whole = sum(full.values())
     found = {tier: cases * count // whole for tier, count in full.items()}
     missing = cases - sum(found.values())

@@ -2,25 +2,28 @@
 
     python -m hil.proof.peers CASES OUT [--method NAME]...
 
-Answers have the form of diagnosis.json as far as a method can tell: the verdict, and the ids of what is missing. All
-get what the diagnosis has before it searches (`case`) and every mechanism of the library as a term (`regressors`): what
-is compared is the search. `..._on_blocks` also get the controller and the drive as equations of their own; others write
-equations for the plant, to cut the chain there is an idea of the diagnosis.
+Answers are a part of diagnosis.json: the verdict and the ids of the missing effects. All methods get the state of the
+diagnosis before its search (`case`), with its refit, periods and windows, and every mechanism of the library as a term
+(`regressors`): the comparison is between searches. `..._on_blocks` also get controller and drive as separate equations,
+which is an idea of the diagnosis; users of these methods write equations for the plant.
 """
 
-from __future__ import annotations
-
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from pathlib import Path
+from time import monotonic
+from typing import Any
 
-from hil.proof.peers.case import Answer, Case
+from hil.errors import HilError, InputError
+from hil.files.output import write_json
+from hil.proof.answer.blind import DIAGNOSIS, ERROR, answered
+from hil.proof.peers.case import PeerCase, read_case
 from hil.proof.peers.fit_everything import fit_everything
-from hil.proof.peers.forward_selection import forward_selection
-from hil.proof.peers.pysindy_peer import pysindy
 from hil.proof.peers.regressors import BLOCKS
 from hil.proof.peers.residual_tests import residual_tests
+from hil.proof.peers.sparse_regression import forward_selection, pysindy
 
-METHODS: Mapping[str, Callable[[Case], Answer]] = {
+METHODS: Mapping[str, Callable[[PeerCase], dict[str, Any]]] = {
     "pysindy": pysindy,
     "pysindy_on_blocks": partial(pysindy, blocks=BLOCKS),
     "forward_selection": forward_selection,
@@ -28,4 +31,34 @@ METHODS: Mapping[str, Callable[[Case], Answer]] = {
     "fit_everything": fit_everything,
     "residual_tests": residual_tests,
 }
-SLOW = ("fit_everything",)  # minutes a case
+SLOW = ("fit_everything",)  # minutes per case
+
+
+def answer_case(case: Path, out: Path, methods: Sequence[str]) -> None:
+    """Answer a case with the methods that lack an answer; preparing it once counts as time of each."""
+    begin = monotonic()
+    todo = [out / name / case.name for name in methods if not answered(out / name / case.name)]
+    for answer in todo:
+        answer.mkdir(parents=True, exist_ok=True)
+    try:
+        prepared = read_case(case)
+    except Exception as error:
+        for answer in todo:
+            _fail(answer, error)
+        return
+    prepared_s = monotonic() - begin
+    for answer in todo:
+        begin = monotonic()
+        try:
+            found = METHODS[answer.parent.name](prepared)
+        except Exception as error:
+            _fail(answer, error)
+        else:
+            write_json(answer / DIAGNOSIS, found | {"runtime_s": prepared_s + monotonic() - begin})
+
+
+def _fail(answer: Path, error: Exception) -> None:
+    """Write a failure as a wrong answer; raise it if the method is not installed."""
+    if isinstance(error, HilError) and not isinstance(error, InputError):
+        raise error
+    write_json(answer / ERROR, {"kind": type(error).__name__, "error": str(error)})

@@ -1,10 +1,8 @@
 """python -m hil.proof.peers CASES OUT [--method NAME]... [--jobs N] [--first N]
 
 reads CASES/CASE/{train_1, train_2, holdout}.parquet and bench.yaml, writes OUT/NAME/CASE/diagnosis.json, or error.json
-where the method failed. Cases with an answer are left out. What lies in DIR/peers is scored by `hil prove --out DIR`.
+if the method failed. Cases with an answer are skipped. `hil prove --out DIR` scores the answers in DIR/peers.
 """
-
-from __future__ import annotations
 
 import sys
 from enum import StrEnum
@@ -17,8 +15,7 @@ import typer
 from hil.errors import HilError
 from hil.proof.answer.blind import answered
 from hil.proof.answer.worker_pool import cases_in, side_by_side
-from hil.proof.peers import METHODS, SLOW
-from hil.proof.peers.answer import answer_case
+from hil.proof.peers import METHODS, SLOW, answer_case
 
 Name = StrEnum("Name", {name: name for name in METHODS})  # type: ignore[misc]   # choices of the command line
 _QUICK = [Name(name) for name in METHODS if name not in SLOW]
@@ -27,11 +24,11 @@ _QUICK = [Name(name) for name in METHODS if name not in SLOW]
 def answer_cases(
     cases: Annotated[Path, typer.Argument(help="Folder with a folder for each case")],
     out: Annotated[Path, typer.Argument(help="Folder for the answers, a folder for each method")],
-    method: Annotated[list[Name], typer.Option(help="Who answers")] = _QUICK,
+    method: Annotated[list[Name], typer.Option(help="Method; may be repeated")] = _QUICK,
     jobs: Annotated[int, typer.Option(min=1, help="Cases at once, each on its share of the cores")] = 1,
-    first: Annotated[int | None, typer.Option(min=1, help="Only so many cases, which lie in mixed order")] = None,
+    first: Annotated[int | None, typer.Option(min=1, help="Only the first cases, which lie in mixed order")] = None,
 ) -> None:
-    """Have other methods answer every case that they have not answered yet; prints the name of each that is done."""
+    """Run other methods on every case without an answer; prints the name of each case that is done."""
     names = [str(name) for name in method]
     todo = [
         place for place in cases_in(cases, out)[:first] if not all(answered(out / name / place.name) for name in names)

@@ -1,10 +1,8 @@
-"""What every other method is given of a case, and the form of its answer.
+"""Input of the other methods for a case, and the form of their answers.
 
-All get what the diagnosis has before it searches: recordings on one clock with their noise, the nominal parameters
-refitted in the twin, and the orders, periods, window and levels that stand out of what the refit leaves.
+All methods get the state of the diagnosis before its search: recordings on one clock with their noise, the nominal
+parameters refitted in the twin, and orders, periods, window and levels estimated from the residuals of that refit.
 """
-
-from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,14 +20,13 @@ from hil.identification.dataset import Measured
 from hil.recording.recording import read_recording
 from hil.twin.scene import Scene
 
-Answer = dict[str, Any]
 _TRAIN, _HELD_OUT = ("train_1", "train_2"), ("holdout",)
 
 
 @dataclass(frozen=True, eq=False)
-class Case:
-    """A case folder ready for a method: `owner` and `nominal` are the twin as believed and refitted, `scene` holds
-    what stands out of the latter's residuals."""
+class PeerCase:
+    """A prepared case: `owner` and `nominal` are the twin with the parameters of the bench file and with refitted ones,
+    `scene` holds the estimates from the residuals of the latter."""
 
     bench: Bench
     train: tuple[Measured, ...]
@@ -43,10 +40,10 @@ class Case:
         """The bench with the refitted nominal parameters."""
         return self.nominal.model.resolved(self.nominal.x)[0]
 
-    def answer(self, effects: Sequence[str]) -> Answer:
-        """diagnosis.json as far as a method can tell: the effects it names, the most important one first.
+    def answer(self, effects: Sequence[str]) -> dict[str, Any]:
+        """Return the verdict and the named effects, the most important one first, in the form of diagnosis.json.
 
-        Without any, whether the parameters of the bench are wrong is judged as the diagnosis does.
+        Without effects, the verdict on the parameters of the bench is that of the diagnosis.
         """
         if effects:
             verdict = Verdict.MISSING_PHYSICS
@@ -56,7 +53,7 @@ class Case:
         return {"verdict": str(verdict), "missing": [{"effect": effect} for effect in effects]}
 
 
-def read_case(folder: Path) -> Case:
+def read_case(folder: Path) -> PeerCase:
     """Read a case folder and refit the nominal parameters. Raises InputError as the diagnosis does."""
     bench = load_bench(folder / "bench.yaml")
     names = (*_TRAIN, *_HELD_OUT)
@@ -65,7 +62,7 @@ def read_case(folder: Path) -> Case:
     nominal = successive_halving.nominal(bench, train)
     fitted, _ = nominal.model.resolved(nominal.x)
     blocks = [nominal.model.blocks(nominal.x, run) for run in train]
-    return Case(
+    return PeerCase(
         bench,
         train,
         held_out,

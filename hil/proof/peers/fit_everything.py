@@ -1,16 +1,16 @@
-"""Everything at once: all mechanisms of the library fitted together in the twin, those that differ from nothing named.
+"""Fit all mechanisms of the library together in the twin; name the significant ones.
 
     z = strength / standard error,  named where z > 2
 
-It is given the diagnosis's own twin, blocks and fit, and for each mechanism the start that the diagnosis's screen likes
-best, weakened to the share of the residual that it explains; what it lacks is the search. The mechanism without which
-the residual grows most comes first; one that changes nothing to speak of is not named.
+It uses the diagnosis's own twin, blocks, fit and periods, and for each mechanism the start with the best score of its
+screen, reduced to the share of the residual that it explains. The mechanism without which the residual grows most comes
+first; those below the materiality limit are not named.
 """
-
-from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from math import inf
+from typing import Any
 
 import numpy as np
 
@@ -22,15 +22,15 @@ from hil.diagnosis.search.forward_selection import MATERIAL
 from hil.diagnosis.search.initial_values import Start, starts
 from hil.diagnosis.search.score_test import Lead
 from hil.identification.dataset import Measured
-from hil.proof.peers.case import Answer, Case
+from hil.proof.peers.case import PeerCase
 from hil.twin.library import BY_ID
 
 EVALUATIONS = 12  # a minute on two cores for half a minute of recordings
 SIGNIFICANT = 2.0  # standard errors
 
 
-def fit_everything(case: Case, evaluations: int = EVALUATIONS) -> Answer:
-    """The answer of one fit of everything about a case."""
+def fit_everything(case: PeerCase, evaluations: int = EVALUATIONS) -> dict[str, Any]:
+    """Return the answer of one fit of everything to a case."""
     begun = {start.effect: start for start in starts(case.scene, case.bench)}
     terms = tuple(_weak(lead, begun[lead.term.effect]) for lead in successive_halving.leads(case.nominal, case.train))
     model = replace(case.nominal.model, terms=terms)
@@ -40,11 +40,7 @@ def fit_everything(case: Case, evaluations: int = EVALUATIONS) -> Answer:
         np.concatenate([case.nominal.x, model.initial()[case.nominal.x.size :]]),
         evaluations=evaluations,
     )
-    significant = [
-        index
-        for index, term in enumerate(terms)
-        if not BY_ID[term.effect].neutral_at_zero or _strength_over_error(found, index) > SIGNIFICANT
-    ]
+    significant = [index for index in range(len(terms)) if _strength_over_error(found, index) > SIGNIFICANT]
     grown = dict(zip(significant, POOL.map(lambda index: _without(found, index, case.train), significant), strict=True))
     named = sorted(
         (index for index in significant if grown[index] > MATERIAL * found.residuals.size),
@@ -54,7 +50,7 @@ def fit_everything(case: Case, evaluations: int = EVALUATIONS) -> Answer:
 
 
 def _weak(lead: Lead, start: Start) -> Term:
-    """A lead's term at a strength as small as what it explains."""
+    """Return a lead's term with its strength reduced to the share that it explains."""
     values = list(lead.term.values)
     if start.strength >= 0:
         for n in range(start.harmonics):
@@ -63,18 +59,23 @@ def _weak(lead: Lead, start: Start) -> Term:
 
 
 def _strength_over_error(found: Fit, index: int) -> float:
-    """Strength of a term in standard errors; the logarithm of a value has its relative error."""
-    term = found.model.terms[index]
+    """Return the strength of a term in standard errors; the standard error of a logarithm is the relative error.
+
+    Infinite for mechanisms that are not neutral at zero, such as a torque limit: they are judged by the growth of the
+    residual alone.
+    """
+    mechanism = BY_ID[found.model.terms[index].effect]
+    if not mechanism.neutral_at_zero:
+        return inf
     first = found.model.nominal_count + sum(len(other.values) for other in found.model.terms[:index])
-    strength = BY_ID[term.effect].strength
-    at = first + strength
+    at = first + mechanism.strength
     error = _standard_errors(found)[at]
     value = 1.0 if found.model.coordinates[at].logarithmic else abs(found.x[at])
     return float(value / max(error, 1e-300))
 
 
 def _standard_errors(found: Fit) -> FloatArray:
-    """Of each coordinate, as if all rows were independent: infinite where nothing depends on it."""
+    """Return the standard error of each coordinate for independent rows; infinite if nothing depends on it."""
     normal = found.jacobian.T @ found.jacobian
     size = np.sqrt(np.maximum(np.diag(normal), 1e-300))
     variance = np.diag(np.linalg.pinv(normal / np.outer(size, size), hermitian=True)) * found.reduced
@@ -82,7 +83,7 @@ def _standard_errors(found: Fit) -> FloatArray:
 
 
 def _without(found: Fit, index: int, runs: Sequence[Measured]) -> float:
-    """By how much the sum of squares grows where a term is taken out of the fit as it stands."""
+    """Return the growth of the sum of squares when a term is removed without a new fit."""
     nominal = found.model.nominal_count
     resolved = found.model.resolved(found.x)[1]
     rest = replace(found.model, terms=tuple(term for k, term in enumerate(resolved) if k != index))

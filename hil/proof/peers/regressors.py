@@ -1,15 +1,13 @@
-"""Equations of the axis that are linear in unknown coefficients, and which mechanism each of their terms speaks for.
+"""Equations of the axis that are linear in unknown coefficients, and the mechanisms behind their terms.
 
     controller    command - law(recorded positions)  = sum of terms
     drive         torque - command                   = sum of terms
-    motor         torque = J a + J_t a_t + J_s a_t'' + D v + Fc sign(v) + sum of terms    rows where the axis slides
+    motor         torque = J a + J_t a_t + J_s a_t'' + D v + Fc sign(v) + sum of terms    rows of sliding motion
     transmission  table - r motor = x_0 + c_0 a_t + c_1 a_t' + c_2 a_t'' + sum of terms
 
-Every mechanism of the library has its terms. A term may be the trace of several mechanisms: the one that most of what
-was found speaks for is named.
+Every mechanism of the library has its terms. A term may belong to several mechanisms: the one that explains most of the
+selected terms is named.
 """
-
-from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -19,12 +17,12 @@ import numpy as np
 from hil.arrays import FloatArray
 from hil.diagnosis.search.forward_selection import MATERIAL
 from hil.identification.dataset import Measured
-from hil.proof.peers.case import Case
+from hil.proof.peers.case import PeerCase
 from hil.proof.peers.terms import MAKERS, Effects
 
 BLOCKS = tuple(MAKERS)
-PLANT = ("motor", "transmission")  # what others write equations for
-_DEPENDENT = 1e-6  # share of a term that is left of it, below which the others say the same
+PLANT = ("motor", "transmission")  # blocks of usual identification methods
+_DEPENDENT = 1e-6  # share of a term outside the span of the others below which it is redundant
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,13 +40,12 @@ class Equation:
 
 
 def equations(
-    case: Case,
+    case: PeerCase,
     runs: Sequence[Measured],
     blocks: Sequence[str] = BLOCKS,
     residuals: Callable[[Measured], Mapping[str, FloatArray]] | None = None,
 ) -> list[Equation]:
-    """The equations of some blocks of a case over runs, one after the other; the grids are those of the training
-    recordings. Without a linear encoder there is no transmission.
+    """Return the equations of some blocks of a case over runs; without a linear encoder there is no transmission.
 
     `residuals` gives other targets (n,) of a run, by block, in units of noise, for some blocks.
     """
@@ -73,8 +70,10 @@ def equations(
 
 
 def forward(equation: Equation, among: Sequence[int]) -> Iterator[tuple[int, float]]:
-    """Terms by orthogonal forward regression: of those left, the one that takes most of the target's energy, and the
-    share of what was left that it takes. Ends where those left say nothing new."""
+    """Yield terms by orthogonal forward regression, each with its share of the energy that remained before it.
+
+    The term that explains most of the remaining energy is next. Ends when the other terms are redundant.
+    """
     left, w = equation.target.copy(), equation.terms[:, list(among)]
     size = np.sum(w**2, axis=0)
     for _ in among:
@@ -91,9 +90,9 @@ def forward(equation: Equation, among: Sequence[int]) -> Iterator[tuple[int, flo
 
 
 def named(found: Sequence[tuple[Equation, Sequence[int]]]) -> list[str]:
-    """Mechanisms behind equations and their selected terms.
+    """Return the mechanisms behind the selected terms of equations.
 
-    The one whose terms take most energy away, in units of noise, comes first; its terms are then spoken for.
+    The one whose terms explain most energy, in units of noise, comes first; its terms are then removed.
     """
     terms = list[tuple[Effects, float]]()
     for equation, chosen in found:

@@ -1,34 +1,35 @@
-"""Residual tests of a grey-box fit, as `resid` of MATLAB's System Identification Toolbox has them: is what the fit
-leaves correlated with what goes into the system?
+"""Residual tests of a grey-box fit, as `resid` of MATLAB's System Identification Toolbox: correlation of the residuals
+with the inputs.
 
     corr(e, z_j) = sum e z_j / (|e| |z_j|),   variance  1/n sum over lags l of  r_e(l) r_z(l)          (Bartlett 1946)
 
-It is given the diagnosis's own twin with its nominal parameters fitted, motor side and transmission each by themselves,
-so that a prediction error speaks of one block alone; controller and drive, which have no parameters to fit; and as
-inputs the terms of `hil.proof.peers.regressors`. Within the bounds of 99 %, for all tests of a case together, there is
-no mismatch, nor does what the diagnosis would not call material count. Else the term that takes most energy of a
-residual away names the effect. Whiteness is not asked for: encoders count, which is not white.
+It uses the diagnosis's own twin with fitted nominal parameters, motor side and transmission separately, so that each
+prediction error belongs to one block; controller and drive, which have no fitted parameters; and as inputs the terms
+of `hil.proof.peers.regressors`. Correlations within the joint 99 % bounds of a case, or below the materiality limit of
+the diagnosis, are no mismatch. Otherwise the term that explains most energy of a residual names the effect. Whiteness
+is not tested, since quantisation noise is not white.
 """
 
-from __future__ import annotations
+from typing import Any
 
 import numpy as np
+from scipy.signal import correlate
 from scipy.stats import norm
 
 from hil.arrays import FloatArray
 from hil.diagnosis.estimation.hypothesis import scales
 from hil.diagnosis.search.forward_selection import MATERIAL
 from hil.identification.dataset import Measured
-from hil.proof.peers.case import Answer, Case
+from hil.proof.peers.case import PeerCase
 from hil.proof.peers.regressors import Equation, equations
 
 _LEVEL = 0.99  # of all tests of a case
-_LAGS = 200  # rows, up to which a signal remembers
+_LAGS = 200  # rows, longest correlation
 _CHANNELS = {"motor": "motor", "transmission": "table"}
 
 
-def residual_tests(case: Case) -> Answer:
-    """The answer of the residual tests about a case."""
+def residual_tests(case: PeerCase) -> dict[str, Any]:
+    """Return the answer of the residual tests to a case."""
     found = equations(case, case.train, residuals=lambda run: _prediction_errors(case, run))
     count = sum(equation.terms.shape[1] for equation in found)
     bound = float(norm.ppf(1.0 - 0.5 * (1.0 - _LEVEL) / count))
@@ -36,8 +37,8 @@ def residual_tests(case: Case) -> Answer:
     return case.answer([best[1]] if best else [])
 
 
-def _prediction_errors(case: Case, run: Measured) -> dict[str, FloatArray]:
-    """Of the refitted twin's motor and transmission, in units of noise. A motor that is behind lacks torque."""
+def _prediction_errors(case: PeerCase, run: Measured) -> dict[str, FloatArray]:
+    """Return the errors of the refitted twin's motor and transmission in units of noise, with the sign of a torque."""
     model = case.nominal.model
     noise = scales(run, model.bench, model.observer_s)
     errors = model.blocks(case.nominal.x, run)
@@ -46,7 +47,7 @@ def _prediction_errors(case: Case, run: Measured) -> dict[str, FloatArray]:
 
 
 def _outside(equation: Equation, bound: float) -> list[tuple[float, str]]:
-    """Energy and effect of each term whose correlation is beyond its bound, given in standard deviations."""
+    """Return energy and effect of each term with a correlation beyond its bound, given in standard deviations."""
     error = equation.target
     memory = _autocorrelation(error)
     found = []
@@ -65,7 +66,6 @@ def _outside(equation: Equation, bound: float) -> list[tuple[float, str]]:
 
 
 def _autocorrelation(values: FloatArray) -> FloatArray:
-    """Of lags 0 to _LAGS."""
-    size = 1 << (2 * values.size - 1).bit_length()
-    products = np.fft.irfft(np.abs(np.fft.rfft(values, size)) ** 2, size)[: _LAGS + 1]
+    """Return the autocorrelation of lags 0 to _LAGS, 1 at lag 0."""
+    products = correlate(values, values, method="fft")[values.size - 1 :][: _LAGS + 1]
     return np.asarray(products / max(products[0], 1e-300), dtype=np.float64)

@@ -1,10 +1,8 @@
-"""Signals of a recording that regressors are made of: derivatives, directions, and what a late or limited torque is.
+"""Signals for regressors: derivatives, directions, delayed and lagging torques.
 
-All signals of an equation pass the same Gaussian, derivatives pass its derivative: what was equal stays equal. (A local
-polynomial passes less of an acceleration than of a position, which a stiff axis would show as a flexible mode.)
+All signals of an equation pass the same Gaussian, derivatives its derivative, so that equalities are kept. (A local
+polynomial damps accelerations more than positions, which would look like a flexible mode.)
 """
-
-from __future__ import annotations
 
 import math
 from collections.abc import Callable
@@ -19,30 +17,30 @@ from hil.bench.bench_file import Bench
 from hil.control import cascade
 from hil.identification.dataset import Measured
 
-SMOOTH_S = 0.002  # standard deviation of the Gaussian: passes some 66 Hz
+SMOOTH_S = 0.002  # standard deviation of the Gaussian: cut-off at 66 Hz
 _TRUNCATE = 8.0  # standard deviations: derivatives of a constant are zero to rounding
-_REACH = 4.0  # up to which it sees anything to speak of
+_REACH = 4.0  # standard deviations with noticeable weight
 SLIDING_M_S = 1e-4  # at the table: what is slower counts as rest
 
 
 def smooth(values: FloatArray, period_s: float, order: int = 0) -> FloatArray:
-    """A signal (n,) through the Gaussian, or its derivative of an order."""
+    """Filter a signal (n,) by the Gaussian, or return its derivative of an order."""
     filtered = gaussian_filter1d(values, SMOOTH_S / period_s, order=order, mode="nearest", truncate=_TRUNCATE)
     return np.asarray(filtered / period_s**order, dtype=np.float64)
 
 
 def curvature(values: FloatArray, period_s: float) -> FloatArray:
-    """Second difference (n,), for a signal that is still to be smoothed."""
+    """Return the second difference (n,), for a signal that is smoothed later."""
     return np.asarray(np.pad(np.diff(values, 2), 1) / period_s**2, dtype=np.float64)
 
 
 def at_rows(torque: FloatArray) -> FloatArray:
-    """Torque (n,) at the instants of the rows: a row holds its mean over the period that follows."""
+    """Return the torque (n,) at the instants of the rows; a row holds the mean over the following period."""
     return np.asarray(0.5 * (torque + np.concatenate([torque[:1], torque[:-1]])), dtype=np.float64)
 
 
 def direction(velocity_m_s: FloatArray) -> FloatArray:
-    """Sign of the last motion (n,): kept while the axis rests."""
+    """Return the sign of the last motion (n,), held at rest."""
     moving = np.flatnonzero(np.abs(velocity_m_s) > SLIDING_M_S)
     if not moving.size:
         return np.zeros(velocity_m_s.size)
@@ -51,14 +49,14 @@ def direction(velocity_m_s: FloatArray) -> FloatArray:
 
 
 def sliding(velocity_m_s: FloatArray, period_s: float) -> NDArray[np.bool_]:
-    """Rows (n,) at which all that the Gaussian sees slides one way."""
+    """Return the rows (n,) with sliding in one direction within the reach of the Gaussian."""
     window = 2 * round(_REACH * SMOOTH_S / period_s) + 1
     moving = np.where(np.abs(velocity_m_s) > SLIDING_M_S, np.sign(velocity_m_s), 0.0)
     return np.asarray(np.abs(np.convolve(moving, np.ones(window), "same")) > window - 0.5, dtype=np.bool_)
 
 
 def since_reversal(position: FloatArray, way: FloatArray) -> FloatArray:
-    """Distance (n,) from where the direction changed last."""
+    """Return the distance (n,) from the last reversal."""
     turns = np.flatnonzero(np.diff(way, prepend=way[0]) != 0.0)
     turns = np.concatenate([[0], turns])
     last = turns[np.searchsorted(turns, np.arange(way.size), side="right") - 1]
@@ -66,7 +64,7 @@ def since_reversal(position: FloatArray, way: FloatArray) -> FloatArray:
 
 
 def delayed(torque: FloatArray, delay_s: float, period_s: float) -> FloatArray:
-    """A held torque (n,) as its means over each period when it acts late."""
+    """Return the means over each period of a held torque (n,) after a delay."""
     whole = math.floor(delay_s / period_s)
     f = delay_s / period_s - whole
     rows = np.arange(torque.size) - whole
@@ -74,7 +72,7 @@ def delayed(torque: FloatArray, delay_s: float, period_s: float) -> FloatArray:
 
 
 def lagged(torque: FloatArray, time_constant_s: float, period_s: float) -> FloatArray:
-    """A held torque (n,) behind a first-order lag, as its means over each period."""
+    """Return the means over each period of a held torque (n,) after a first-order lag."""
     pole = math.exp(-period_s / time_constant_s)
     ends = lfilter([1.0 - pole], [1.0, -pole], torque)
     begins = np.concatenate([[0.0], ends[:-1]])
@@ -82,15 +80,15 @@ def lagged(torque: FloatArray, time_constant_s: float, period_s: float) -> Float
 
 
 def swayed(acceleration: FloatArray, frequency_hz: float, period_s: float, damping: float = 0.03) -> FloatArray:
-    """Acceleration (n,) of a mass on a spring on what accelerates."""
+    """Return the acceleration (n,) of a mass on a spring on an accelerated base."""
     omega = 2.0 * math.pi * frequency_hz
     b, a = bilinear([omega**2], [1.0, 2.0 * damping * omega, omega**2], 1.0 / period_s)
     return np.asarray(lfilter(b, a, acceleration), dtype=np.float64)
 
 
 def law(run: Measured, bench: Bench) -> Callable[[FloatArray, float], FloatArray]:
-    """The control law of the bench over a run: motor position (n,) and a velocity filter's time constant [s] ->
-    torque command (n,)."""
+    """Return the control law over a run as a function of motor position (n,) and velocity filter time constant [s],
+    with the torque command (n,) as its value."""
     feedback = run.table_m if run.table_m.size else run.motor
 
     def command(motor: FloatArray, filter_s: float = 0.0) -> FloatArray:

@@ -1,8 +1,7 @@
 """Pictures of a proof: power over size, confusion matrix, calibration, parameter errors, times."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,16 +11,15 @@ from hil.arrays import FloatArray
 from hil.diagnosis.wording import title
 from hil.figures import panels as style
 from hil.figures.drawing import style_axis
-from hil.proof.score.confusion import Counts, confusion, power
 from hil.proof.score.scores import Scores
-from hil.proof.score.statistics import Rate, rate
+from hil.proof.score.statistics import Counts, Rate, confusion, power, rate
 
 _ERRORS = (0.03, 0.10)  # goals of the median and of the 90th percentile
-_LEAST_ERROR = 1e-5  # drawn: what is better is drawn there
+_LEAST_ERROR = 1e-5  # smallest error drawn; smaller ones are drawn here
 
 
 def power_figure(scores: Scores) -> Figure | None:
-    """Detection and naming over the size of an effect; None without a ladder."""
+    """Draw detection and naming over the size of an effect; None without a ladder."""
     rungs = power(scores.cases)
     if not rungs:
         return None
@@ -29,14 +27,14 @@ def power_figure(scores: Scores) -> Figure | None:
     axes = figure.subplots()
     size = np.array([rung.size for rung in rungs])
     for label, rates, colour, shift in (
-        ("said to be missing", [rung.detected for rung in rungs], style.MEASURED, 0.985),
+        ("detected", [rung.detected for rung in rungs], style.MEASURED, 0.985),
         ("named first", [rung.named for rung in rungs], style.SIMULATED, 1.015),
     ):
         _rates(axes, size * shift, rates, colour, label)
     axes.axvline(1.0, color=style.NOISE, linestyle="dashed", label="noise floor")
     alarms = rate(case.detected for case in scores.of_tier("null", "parameters_only")).value
     if alarms is not None:
-        axes.axhline(alarms, color=style.NOISE, linestyle="dotted", label="the same where nothing is concealed")
+        axes.axhline(alarms, color=style.NOISE, linestyle="dotted", label="false alarms without an effect")
     axes.set_xscale("log")
     axes.set_xticks(size, [f"{value:g}" for value in size])
     axes.minorticks_off()
@@ -49,7 +47,7 @@ def power_figure(scores: Scores) -> Figure | None:
 
 
 def confusion_figure(scores: Scores) -> Figure | None:
-    """What was taken for what; None where nothing was decided."""
+    """Draw the confusion matrix; None without cases."""
     counts = confusion(scores.cases)
     if not counts:
         return None
@@ -67,48 +65,29 @@ def confusion_figure(scores: Scores) -> Figure | None:
     for y, row in enumerate(counts):
         for x, column in enumerate(columns):
             if number := counts[row].get(column, 0):
-                axes.text(
-                    x,
-                    y,
-                    str(number),
-                    ha="center",
-                    va="center",
-                    fontsize=8,
-                    color="white" if shares[y, x] > 0.6 else "black",
-                )
-    axes.set_xticks(
-        range(len(columns)),
-        [title(name) for name in columns],
-        rotation=60,
-        ha="right",
-        rotation_mode="anchor",
-        fontsize=8,
-    )
+                colour = "white" if shares[y, x] > 0.6 else "black"
+                axes.text(x, y, str(number), ha="center", va="center", fontsize=8, color=colour)
+    slanted: dict[str, Any] = {"rotation": 60, "ha": "right", "rotation_mode": "anchor", "fontsize": 8}
+    axes.set_xticks(range(len(columns)), [title(name) for name in columns], **slanted)
     axes.set_yticks(range(len(counts)), [title(name) for name in counts], fontsize=8)
     axes.set_xlabel("named first, or the verdict without a name")
     axes.set_ylabel("concealed")
-    axes.set_title("What was taken for what (cases)", loc="left")
+    axes.set_title("Confusion of names (cases)", loc="left")
     return figure
 
 
 def calibration_figure(scores: Scores) -> Figure | None:
-    """Accuracy over confidence; None without findings."""
+    """Draw accuracy over confidence; None without findings."""
     if not scores.calibration:
         return None
     figure = Figure(figsize=(5.6, 5.2), layout="constrained")
     axes = figure.subplots()
-    axes.plot([0.0, 1.0], [0.0, 1.0], color=style.NOISE, linestyle="dashed", label="as promised")
+    axes.plot([0.0, 1.0], [0.0, 1.0], color=style.NOISE, linestyle="dashed", label="calibrated")
     confidence = np.array([found.confidence for found in scores.calibration])
     _rates(axes, confidence, [found.right for found in scores.calibration], style.MEASURED, "findings")
     for found in scores.calibration:
-        axes.annotate(
-            str(found.right.of),
-            (found.confidence, found.right.value or 0.0),
-            xytext=(6, -9),
-            textcoords="offset points",
-            fontsize=8,
-            color=style.COMMAND,
-        )
+        at = found.confidence, found.right.value or 0.0
+        axes.annotate(str(found.right.of), at, (6, -9), textcoords="offset points", fontsize=8, color=style.COMMAND)
     axes.set_xlabel("confidence")
     axes.set_title("Calibration: findings that are right (number: of so many)", loc="left", fontsize=10)
     style_axis(axes, "share that is right")
@@ -119,7 +98,7 @@ def calibration_figure(scores: Scores) -> Figure | None:
 
 
 def errors_figure(scores: Scores) -> Figure | None:
-    """Errors of the parameters of single effects that were rightly named, by effect; None without any."""
+    """Draw errors of the parameters of rightly named single effects; None without any."""
     errors: dict[str, list[float]] = {}
     for case in scores.of_tier("single"):
         if case.concealed and case.parameter_errors():
@@ -146,8 +125,8 @@ def errors_figure(scores: Scores) -> Figure | None:
 
 
 def times_figure(scores: Scores) -> Figure | None:
-    """Histogram of the times of a diagnosis; None without any."""
-    times = [case.reply.runtime_s for case in scores.cases if case.reply.runtime_s is not None]
+    """Draw a histogram of the times of a diagnosis; None without any."""
+    times = [case.answer.runtime_s for case in scores.cases if case.answer.runtime_s is not None]
     if not times:
         return None
     figure = Figure(figsize=(9.0, 3.4), layout="constrained")
@@ -164,29 +143,19 @@ def times_figure(scores: Scores) -> Figure | None:
 
 
 def _rates(axes: Axes, at: FloatArray, rates: Sequence[Rate], colour: str, label: str) -> None:
-    """Rates with their 95 % intervals."""
+    """Draw rates with their 95 % intervals."""
     values = np.array([found.value or 0.0 for found in rates])
     low, high = np.array([found.interval for found in rates]).T
-    axes.errorbar(
-        at,
-        values,
-        yerr=(values - low, high - values),
-        fmt="o-",
-        color=colour,
-        capsize=3,
-        linewidth=1.2,
-        elinewidth=0.8,
-        markersize=5,
-        label=label,
-    )
+    line: dict[str, Any] = {"capsize": 3, "linewidth": 1.2, "elinewidth": 0.8, "markersize": 5}
+    axes.errorbar(at, values, (values - low, high - values), fmt="o-", color=colour, label=label, **line)
 
 
 def _columns(counts: Counts) -> list[str]:
-    """Answers in the order of the rows, others after them."""
+    """Return the answers in the order of the rows, then the others."""
     said = {column for row in counts.values() for column in row}
     return [row for row in counts if row in said] + sorted(said - set(counts))
 
 
 def _legend_above(axes: Axes) -> None:
-    """A legend beside the title: inside, it would hide points sooner or later."""
+    """Place the legend beside the title, where it hides no points."""
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, frameon=False, fontsize=8, borderaxespad=0.2)

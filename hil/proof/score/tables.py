@@ -1,28 +1,29 @@
-"""The tables of a proof, for the page and for Markdown: goals, other methods, verdicts, effects, power, worst cases."""
+"""Tables of a proof for the page and for Markdown: goals, other methods, verdicts, effects, power, worst cases."""
 
-from __future__ import annotations
-
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import inf, isfinite
+from pathlib import Path
 from typing import Any
 
 from hil.diagnosis.wording import title
-from hil.proof.score.confusion import by_effect, power, verdicts
-from hil.proof.score.grading import Marked
+from hil.errors import InputError
+from hil.proof.score.grading import GradedCase
 from hil.proof.score.scores import Goal, Scores
-from hil.proof.score.statistics import Rate
+from hil.proof.score.statistics import Rate, by_effect, power, verdicts
 from hil.proof.seal import CASES
 from hil.quantities import digits
 from hil.report.page import Number
 
+PUBLISHED = Path(__file__).parents[1] / "results"  # results of sealed runs, one JSON file per run
 HEADERS = ("", "goal", "measured", "95 %", "of", "reached")
 _WORST = 5
 
 
 @dataclass(frozen=True)
-class Table:
-    """A table with its heading and what is to be said before it; `mark` is a column of yes and no."""
+class ProofTable:
+    """A table with its heading and introduction; `mark`: index of a column of yes and no."""
 
     heading: str
     headers: Sequence[str]
@@ -31,13 +32,13 @@ class Table:
     mark: int | None = None
 
 
-def goals_table(goals: Sequence[Goal]) -> Table:
-    """Goals beside what was measured."""
-    return Table("Goals", HEADERS, [goal_row(goal) for goal in goals], mark=5)
+def goals_table(goals: Sequence[Goal]) -> ProofTable:
+    """Return the table of goals and measured figures."""
+    return ProofTable("Goals", HEADERS, [goal_row(goal) for goal in goals], mark=5)
 
 
 def goal_row(goal: Goal) -> tuple[str, ...]:
-    """A row of the table of goals."""
+    """Return a row of the table of goals."""
     name = f"{goal.name} ({title(goal.detail)})" if goal.detail else goal.name
     interval = _interval(goal.measured) if isinstance(goal.measured, Rate) else ""
     return (
@@ -50,11 +51,11 @@ def goal_row(goal: Goal) -> tuple[str, ...]:
     )
 
 
-def others_table(scores: Scores, others: Mapping[str, Scores]) -> Table:
-    """Rates of other methods by the same score, of so many of the cases."""
+def others_table(scores: Scores, others: Mapping[str, Scores]) -> ProofTable:
+    """Return the table of the rates of other methods."""
     rows = [{goal.name: goal for goal in other.goals} for other in others.values()]
     headers = [f"{name} ({len(found.cases)} cases)" for name, found in {"this diagnosis": scores, **others}.items()]
-    return Table(
+    return ProofTable(
         "Beside other methods",
         ("", *headers),
         [
@@ -62,16 +63,17 @@ def others_table(scores: Scores, others: Mapping[str, Scores]) -> Table:
             for goal in scores.goals
             if isinstance(goal.measured, Rate) and any(row[goal.name].value is not None for row in rows)
         ],
-        "The same recordings, the same score. What a method does not say counts as wrong; where it was not given all "
-        "cases, its rates are of those that it was given.",
+        "Same recordings, same score. What a method does not report counts as wrong; the number of cases that it was "
+        "given is in the heading. All other methods use this project's refit of the nominal parameters, its periods, "
+        "orders and windows, and its materiality limit; fit_everything also uses the starts and the fit of its search.",
     )
 
 
-def verdicts_table(scores: Scores) -> Table:
-    """How often each verdict was given, by tier."""
+def verdicts_table(scores: Scores) -> ProofTable:
+    """Return the table of verdicts by tier."""
     found = verdicts(scores.cases)
     columns = sorted({verdict for counts in found.values() for verdict in counts})
-    return Table(
+    return ProofTable(
         "Verdicts",
         ("tier", *map(title, columns), "wholly right"),
         [
@@ -85,8 +87,8 @@ def verdicts_table(scores: Scores) -> Table:
     )
 
 
-def effects_table(scores: Scores) -> Table:
-    """Singles, effect by effect."""
+def effects_table(scores: Scores) -> ProofTable:
+    """Return the table of singles by effect."""
     singles = scores.of_tier("single")
     columns = [
         by_effect(singles, lambda case: case.top),
@@ -94,7 +96,7 @@ def effects_table(scores: Scores) -> Table:
         by_effect(singles, lambda case: not case.names_too_much),
         by_effect(singles, lambda case: case.block_right),
     ]
-    return Table(
+    return ProofTable(
         "Singles, effect by effect",
         ("effect", "cases", "named first", "in the set", "nothing else named", "block right"),
         [
@@ -108,11 +110,11 @@ def effects_table(scores: Scores) -> Table:
     )
 
 
-def power_table(scores: Scores) -> Table:
-    """Detection and naming over the size of the effect."""
-    return Table(
+def power_table(scores: Scores) -> ProofTable:
+    """Return the table of detection and naming over the size of the effect."""
+    return ProofTable(
         "Power over the size of the effect",
-        ("size over noise", "cases", "said to be missing", "95 %", "named first", "95 %"),
+        ("size over noise", "cases", "detected", "95 %", "named first", "95 %"),
         [
             (
                 Number(f"{rung.size:g}"),
@@ -128,8 +130,8 @@ def power_table(scores: Scores) -> Table:
     )
 
 
-def worst_tables(scores: Scores) -> list[Table]:
-    """The cases that are wrong in the surest way: by the confidence of what is not there, then by size."""
+def worst_tables(scores: Scores) -> list[ProofTable]:
+    """Return a table for each of the worst cases, ordered by the confidence of spurious findings, then by size."""
     wrong = sorted(
         (case for case in scores.cases if not case.right),
         reverse=True,
@@ -137,26 +139,53 @@ def worst_tables(scores: Scores) -> list[Table]:
     )
     heading = f"The worst of {len(wrong)} cases that are not wholly right"
     return [
-        Table(heading if not at else "", (case.truth.name, case.wrong), _rows(case))
+        ProofTable(heading if not at else "", (case.truth.name, case.wrong), _rows(case))
         for at, case in enumerate(wrong[:_WORST])
     ]
 
 
 def checking(seal: Mapping[str, Any]) -> list[str]:
-    """How the proof can be checked and done again."""
+    """Return how to check and repeat the proof."""
     libraries = ", ".join(f"{name} {version}" for name, version in seal["versions"].items())
     return [
-        f"What is concealed was written to sealed/truths.json before any diagnosis; its SHA-256 is "
-        f"{seal['truths_sha256']}. It holds the SHA-256 of every recording and bench.",
-        "The diagnosis ran in a process of its own that is given the folder of recordings: python -m "
+        f"The truth was written to sealed/truths.json before any diagnosis; its SHA-256 is {seal['truths_sha256']}. It "
+        "contains the SHA-256 of every recording and bench.",
+        "The diagnosis ran in a separate process that only gets the folder of recordings: python -m "
         "hil.proof.answer.blind cases answers gives the same answers without sealed/ on the machine.",
         f"Drawn and diagnosed by {seal['command']}, commit {seal['git_commit'] or 'unknown'}"
         f"{' with changes' if seal['git_changed'] else ''}, {libraries}.",
     ]
 
 
-def _rows(case: Marked) -> list[tuple[str, str]]:
-    truth, reply = case.truth, case.reply
+def published(name: str) -> str:
+    """Return the published results of a sealed run in Markdown. Raises InputError for an unknown name."""
+    path = PUBLISHED / f"{name}.json"
+    if not path.is_file():
+        names = ", ".join(sorted(path.stem for path in PUBLISHED.glob("*.json")))
+        raise InputError(f"--show: given {name}, allowed {names}")
+    data: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    tables = [ProofTable(table["heading"], table["headers"], table["rows"], table["text"]) for table in data["tables"]]
+    notes = "\n".join(f"- {note}" for note in data["notes"])
+    parts = [f"# {data['title']}", data["about"], *map(markdown, tables), notes]
+    return "\n\n".join(part for part in parts if part)
+
+
+def markdown(table: ProofTable) -> str:
+    """Return a table in Markdown with its heading; empty if it has no rows."""
+    if not table.rows:
+        return ""
+    right = [all(isinstance(row[at], Number) for row in table.rows) for at in range(len(table.headers))]
+    lines = [table.headers, ["---:" if number else "---" for number in right], *table.rows]
+    parts = [
+        f"## {table.heading}" if table.heading else "",
+        table.text,
+        "\n".join("| " + " | ".join(cell.replace("|", "/") for cell in line) + " |" for line in lines),
+    ]
+    return "\n\n".join(part for part in parts if part)
+
+
+def _rows(case: GradedCase) -> list[tuple[str, str]]:
+    truth, answer = case.truth, case.answer
     hidden = [
         f"{title(effect.effect)}{f' ({title(effect.form)})' if effect.form else ''}, {digits(effect.size)} × the "
         "noise: " + ", ".join(f"{name} {digits(value, 4)}" for name, value in effect.parameters.items())
@@ -166,9 +195,9 @@ def _rows(case: Marked) -> list[tuple[str, str]]:
     return [
         ("tier and axis", f"{title(truth.tier)}, {title(truth.axis)}"),
         ("concealed", "; ".join(hidden) or "nothing"),
-        ("verdict", title(reply.verdict)),
-        ("named", "; ".join(_finding(case, index) for index in range(len(reply.named))) or "nothing"),
-        ("in its words", reply.statement),
+        ("verdict", title(answer.verdict)),
+        ("named", "; ".join(_finding(case, index) for index in range(len(answer.named))) or "nothing"),
+        ("in its words", answer.statement),
         (
             "to see it",
             f"hil diagnose {place}/train_*.parquet --validate {place}/holdout.parquet --bench {place}/bench.yaml",
@@ -176,8 +205,8 @@ def _rows(case: Marked) -> list[tuple[str, str]]:
     ]
 
 
-def _finding(case: Marked, index: int) -> str:
-    named = case.reply.named[index]
+def _finding(case: GradedCase, index: int) -> str:
+    named = case.answer.named[index]
     parts = [title(named.effect)]
     parts += [f"or {', '.join(map(title, named.equivalents))}"] if named.equivalents else []
     parts += [f"confidence {100.0 * named.confidence:.0f} %"] if named.confidence is not None else []

@@ -12,59 +12,61 @@ import numpy as np
 import pytest
 
 from hil.errors import HilError
-from hil.proof.answer.answers import reply_of
-from hil.proof.draw.generator import Case, draw, write
-from hil.proof.peers import METHODS, SLOW, signals
-from hil.proof.peers.answer import answer_case
-from hil.proof.peers.case import Case as Prepared
-from hil.proof.peers.case import read_case
+from hil.proof.answer.answers import parse_answer
+from hil.proof.draw.generator import DrawnCase, draw, write
+from hil.proof.peers import METHODS, SLOW, answer_case, signals
+from hil.proof.peers.case import PeerCase, read_case
 from hil.proof.peers.fit_everything import fit_everything
-from hil.proof.peers.forward_selection import select
-from hil.proof.peers.pysindy_peer import pysindy
 from hil.proof.peers.regressors import Equation, named
+from hil.proof.peers.sparse_regression import pysindy, select_forward
+from hil.proof.peers.terms import TRACES
 from hil.twin.library import BY_ID
 
 QUICK = [name for name in METHODS if name not in SLOW]
 
 
 @pytest.fixture(scope="module")
-def concealed() -> Case:
+def concealed() -> DrawnCase:
     """A push against one mass, some ten times its noise."""
     return draw("single", 1, 3, effect="external_force", axis="one_mass")
 
 
 @pytest.fixture(scope="module")
-def folder(concealed: Case, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(concealed: DrawnCase, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write(concealed, tmp_path_factory.mktemp("cases"))
 
 
 @pytest.fixture(scope="module")
-def case(folder: Path) -> Prepared:
+def case(folder: Path) -> PeerCase:
     return read_case(folder)
 
 
 @pytest.mark.parametrize("method", QUICK)
 def test_a_large_effect_is_named_first_in_the_form_of_the_interface(
-    method: str, case: Prepared, concealed: Case
+    method: str, case: PeerCase, concealed: DrawnCase
 ) -> None:
     if method.startswith("pysindy"):
         pytest.importorskip("pysindy", reason="not installed: make peers")
     assert concealed.truth.effects[0].size > 5.0
     answer = METHODS[method](case)
-    reply = reply_of(json.loads(json.dumps(answer)))
+    reply = parse_answer(json.loads(json.dumps(answer)))
     assert reply.verdict == "missing_physics"
     assert reply.named[0].effect == "external_force"
     assert all(found.effect in BY_ID for found in reply.named)
 
 
+def test_every_mechanism_of_the_library_has_a_term_and_every_term_is_one_of_it() -> None:
+    assert {effect for effects in TRACES.values() for effect in effects} == set(BY_ID)
+
+
 @pytest.mark.long
-def test_one_fit_of_everything_names_it_too(case: Prepared) -> None:
+def test_one_fit_of_everything_names_it_too(case: PeerCase) -> None:
     assert "external_force" in [found["effect"] for found in fit_everything(case)["missing"]]
 
 
-def test_one_fit_of_everything_answers_in_the_form_of_the_interface(case: Prepared) -> None:
+def test_one_fit_of_everything_answers_in_the_form_of_the_interface(case: PeerCase) -> None:
     """After two steps, which take it nowhere yet."""
-    reply = reply_of(fit_everything(case, evaluations=2))
+    reply = parse_answer(fit_everything(case, evaluations=2))
     assert all(found.effect in BY_ID for found in reply.named)
 
 
@@ -74,7 +76,7 @@ def test_with_nothing_to_name_the_parameters_are_judged(tier: str, verdict: str,
     assert answer == {"verdict": verdict, "missing": []}
 
 
-def test_without_pysindy_the_message_says_what_to_do(case: Prepared, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_pysindy_the_message_says_what_to_do(case: PeerCase, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pysindy", None)
     with pytest.raises(HilError, match=r"pysindy is not installed, allowed .*make peers") as raised:
         pysindy(case)
@@ -125,7 +127,7 @@ def test_forward_selection_finds_the_terms_of_a_sum_and_stops_at_noise() -> None
     terms = rng.standard_normal((2000, 30))
     terms[:, 4] = 0.9 * terms[:, 3] + 0.1 * terms[:, 4]  # resembles one that is there
     target = 2.0 * terms[:, 3] - terms[:, 11] + 0.1 * terms[:, 20] + rng.standard_normal(2000)
-    found = select(Equation("motor", target, terms, [(("",), ("",))] * 30, 1.0))
+    found = select_forward(Equation("motor", target, terms, [(("",), ("",))] * 30, 1.0))
     assert found[:2] == [3, 11]
     assert set(found) <= {3, 11, 20}
 

@@ -24,6 +24,7 @@ from hil.proof.draw.plan import Planned, plan
 from hil.proof.run import ANSWERS, diagnose_blind, prove, score_others
 from hil.proof.score.page import write_proof
 from hil.proof.score.scores import Scores, score
+from hil.proof.score.tables import PUBLISHED, published
 from hil.proof.seal import CASES, SEAL, SEALED, code_sha256, draw_cases, read_seal, seal, sha256, unseal
 from hil.twin.library import BY_ID
 
@@ -127,8 +128,8 @@ def test_drawing_goes_on_where_it_was_interrupted(copy: Path, sealed: Path) -> N
     before = (copy / CASES / "case_0000" / "train_1.parquet").stat().st_mtime_ns
     with pytest.raises(InputError, match=r"case_0000.json: given a case of another plan, allowed one of --seed 8"):
         draw_cases(copy, QUICK, 8, 1, quiet)
-    shares: list[float] = []
-    draw_cases(copy, QUICK, 7, 1, shares.append)
+    shares: list[float | None] = []
+    draw_cases(copy, QUICK, 7, 1, lambda task, share: shares.append(share))
     about = seal(copy, QUICK, "hil prove --cases 2 --seed 7 --out DIR", 7)
     assert shares == [1.0]
     assert (copy / CASES / "case_0000" / "train_1.parquet").stat().st_mtime_ns == before
@@ -161,7 +162,7 @@ def test_when_time_is_up_what_is_answered_is_scored(copy: Path) -> None:
     told: list[str] = []
     found = prove(copy, QUICK, 7, 1, told.append, quiet, hours=0.0)
     assert [(case.truth.name, case.right) for case in found.cases] == [("case_0000", False)]
-    assert told[-1] == "the first 1 of 2 cases have an answer and are scored; the same again goes on"
+    assert told[-1] == "the first 1 of 2 cases have an answer and are scored; the same command continues"
     write_proof(found, {}, copy)
     assert (copy / "proof.md").read_text().count("The first 1 of 2 cases, seed 7, sealed ") == 1
     assert not (copy / ANSWERS / "case_0001").exists()
@@ -196,6 +197,26 @@ def test_all_and_some_at_once_is_refused(tmp_path: Path) -> None:
     assert not (tmp_path / "new").exists()
 
 
+def test_without_a_folder_the_message_says_what_to_give() -> None:
+    ran = CliRunner().invoke(app, ["prove", "--cases", "3"])
+    assert isinstance(ran.exception, InputError)
+    assert str(ran.exception).startswith("--out: not given, allowed a folder")
+
+
+def test_published_results_are_printed_and_an_unknown_name_lists_them() -> None:
+    names = sorted(path.stem for path in PUBLISHED.glob("*.json"))
+    assert "20261206" in names
+    for name in names:
+        text = published(name)
+        assert text.startswith("# ")
+        assert text.count("| --- |") >= 1
+    ran = CliRunner().invoke(app, ["prove", "--show", "20261206"])
+    assert ran.exit_code == 0
+    assert "| singles: named first | ≥ 92.0 % | 98.3 % | 91.0–99.7 % | 59 | yes |" in ran.output
+    with pytest.raises(InputError, match=r"--show: given x, allowed 20261204, .*20261206"):
+        published("x")
+
+
 def test_the_blind_process_imports_nothing_that_knows(tmp_path: Path) -> None:
     """All that a diagnosis of a case loads, by what it would load: a case without recordings."""
     (tmp_path / "cases" / "empty").mkdir(parents=True)
@@ -208,6 +229,7 @@ def test_the_blind_process_imports_nothing_that_knows(tmp_path: Path) -> None:
     loaded = set(ran.stdout.split())
     assert "hil.diagnosis.diagnose" in loaded
     assert {name for name in loaded if name.startswith("hil.proof.")} == {
+        "hil.proof.answer",
         "hil.proof.answer.blind",
         "hil.proof.answer.worker_pool",
     }
@@ -224,9 +246,12 @@ def test_a_case_that_fails_is_an_answer_and_not_tried_again(tmp_path: Path) -> N
         (tmp_path / CASES / name).mkdir(parents=True)
         (tmp_path / CASES / name / "bench.yaml").touch()
     answer(tmp_path, "two")
-    shares: list[float] = []
+    shares: list[float | None] = []
+    names = ["one", "two"]
     for _ in range(2):
-        diagnose_blind(tmp_path / CASES, tmp_path / ANSWERS, ["one", "two"], code_sha256(), 2, shares.append)
+        diagnose_blind(
+            tmp_path / CASES, tmp_path / ANSWERS, names, code_sha256(), 2, lambda task, share: shares.append(share)
+        )
     assert shares == [0.5, 1.0]
     assert "holdout" in data(tmp_path / ANSWERS / "one" / ERROR)["error"]
     assert not (tmp_path / ANSWERS / "two" / ERROR).exists()
@@ -285,4 +310,4 @@ def test_forty_cases(tmp_path: Path) -> None:
     assert {name: measured[name] for name, value in most.items() if (measured[name] or 0.0) > value} == {}
     effects = [case.concealed.effect for case in found.of_tier("single") if case.concealed]
     assert len(set(effects)) == len(effects) <= len(LIBRARY)
-    assert np.all([case.reply.verdict != "error" for case in found.cases])
+    assert np.all([case.answer.verdict != "error" for case in found.cases])

@@ -11,12 +11,20 @@ from proof_cases import concealed, finding, goals, scores, truth
 
 from hil.errors import HilError
 from hil.files.output import write_json
-from hil.proof.answer.answers import Reply, read_replies, reply_of
+from hil.proof.answer.answers import Answer, parse_answer, read_answers
 from hil.proof.answer.blind import DIAGNOSIS, ERROR
-from hil.proof.score.confusion import confusion, power, verdicts
 from hil.proof.score.page import write_proof
 from hil.proof.score.scores import Goal, lead, score
-from hil.proof.score.statistics import Rate, confidence_bins, expected_calibration_error, quantile, rate
+from hil.proof.score.statistics import (
+    Rate,
+    confidence_bins,
+    confusion,
+    expected_calibration_error,
+    power,
+    quantile,
+    rate,
+    verdicts,
+)
 from hil.proof.score.tables import goal_row
 from hil.proof.seal import SEAL
 
@@ -159,9 +167,9 @@ def test_no_answer_at_all_reaches_no_goal() -> None:
         ("null", []), ("parameters_only", []), ("novel", [concealed("novel_hammering")]),
         ("ambiguous", [concealed("spring_load")]), ("insufficient", [concealed("backlash", size=0.1)]))]  # fmt: skip
     truths = {str(at): of for at, of in enumerate(cases)}
-    failed = dict.fromkeys(truths, Reply("error"))
-    for replies in ({}, failed):
-        assert not [goal.name for goal in score(truths, replies).goals if goal.met]
+    failed = dict.fromkeys(truths, Answer("error"))
+    for answers in ({}, failed):
+        assert not [goal.name for goal in score(truths, answers).goals if goal.met]
 
 
 def test_tallies_by_hand() -> None:
@@ -192,16 +200,16 @@ def test_another_method_is_scored_by_its_names_alone(tmp_path: Path) -> None:
     (tmp_path / "c").mkdir()
     write_json(tmp_path / "c" / ERROR, {"kind": "ValueError", "error": "singular"})
     truths = {name: truth("single", concealed("backlash"), name=name) for name in "abcd"}
-    replies = read_replies(tmp_path, truths)
-    assert set(replies) == {"a", "b", "c"}
-    assert (replies["c"].verdict, replies["c"].statement) == ("error", "ValueError: singular")
-    other = score(truths, replies)
+    answers = read_answers(tmp_path, truths)
+    assert set(answers) == {"a", "b", "c"}
+    assert (answers["c"].verdict, answers["c"].statement) == ("error", "ValueError: singular")
+    other = score(truths, answers)
     assert goals(other)["singles: named first"].measured == Rate(1, 4)
-    own = score(truths, {name: reply_of({"verdict": "missing_physics", "missing": [finding("backlash")]})
+    own = score(truths, {name: parse_answer({"verdict": "missing_physics", "missing": [finding("backlash")]})
                          for name in truths})  # fmt: skip
     ahead = lead(own, {"other": other, "blank": score(truths, {})})
     assert (ahead.value, ahead.detail, ahead.met) == (0.75, "other", True)
-    begun = score({"a": truths["a"]}, replies)
+    begun = score({"a": truths["a"]}, answers)
     assert lead(own, {"other": other, "begun": begun}) == ahead  # which answered one case, rightly
     assert lead(own, {"begun": begun}).met is None
 
@@ -210,13 +218,13 @@ def test_an_answer_that_cannot_be_read_says_what_to_do(tmp_path: Path) -> None:
     (tmp_path / "a").mkdir()
     (tmp_path / "a" / DIAGNOSIS).write_text('{"verdict": "no_mismatch"}')
     with pytest.raises(HilError, match=r"a/diagnosis.json: cannot be read as an answer .*missing.*; remove the folder"):
-        read_replies(tmp_path, ["a"])
+        read_answers(tmp_path, ["a"])
 
 
 def test_a_confidence_that_is_none_is_no_answer() -> None:
     for given in (float("nan"), 1.01, -0.1):
         with pytest.raises(ValueError, match=r"confidence: given .* allowed 0 to 1"):
-            reply_of({"verdict": "missing_physics", "missing": [finding("backlash", confidence=given)]})
+            parse_answer({"verdict": "missing_physics", "missing": [finding("backlash", confidence=given)]})
 
 
 def test_goals_as_text() -> None:

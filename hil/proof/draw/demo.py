@@ -1,10 +1,8 @@
-"""Motions of `hil demo`, and the effects it conceals in the simulated axis.
+"""Motions and concealed effects of `hil demo`.
 
-Moves: creep through reversals, two feeds of figures 7 and 8 of the source both ways, the faster one repeated so that
-the noise floor can be measured; and other feeds and strokes to prove the diagnosis on.
+Motions: creep through reversals, two feeds of figures 7 and 8 of the source both ways, the faster one repeated to
+measure the noise floor; and other feeds and strokes to validate the diagnosis.
 """
-
-from __future__ import annotations
 
 from typing import Any
 
@@ -50,8 +48,8 @@ PROVE = _profile(
     "another creep, 80 mm at 12 m/min there and back", [*_reversal(0.004, 0.008), *_there_and_back(0.08, 0.2)]
 )
 
-# What may be concealed: parameters by name with the range that they are drawn from. All of it is what an axis in
-# service has, and well above the noise of these moves.
+# Effects to conceal: parameters by name with the range of the draw. Usual values of axes in service, well above the
+# noise of these motions.
 _PHASE = (0.0, 6.28)
 CONCEALED: dict[str, dict[str, tuple[float, float]]] = {
     "periodic_lead_error": {"amplitude_m": (3e-6, 8e-6), "phase_rad": _PHASE},
@@ -61,13 +59,15 @@ CONCEALED: dict[str, dict[str, tuple[float, float]]] = {
     "structural_mode": {"frequency_hz": (25.0, 40.0), "damping_ratio": (0.02, 0.05), "mass_ratio": (0.1, 0.2)},
     "encoder_eccentricity": {"amplitude_rad": (2e-3, 6e-3), "phase_rad": _PHASE},
 }
-# Nominal values that the owner has a little wrong as well: factors.
+# Nominal values that are wrong in the bench file as well: factors.
 WRONG = {"table_mass_kg": (0.9, 1.1), "coulomb_torque_n_m": (0.9, 1.1)}
 
 
 def conceal(believed: Bench, seed: int, effect: str | None = None) -> tuple[Bench, SimulationSection]:
-    """The bench as it really is, and what is concealed in it: one effect, drawn by `seed` unless given, and wrong
-    nominal values. Raises InputError for an effect that is not among CONCEALED."""
+    """Return the true bench and its concealed section: one effect, drawn by `seed` unless given, and wrong parameters.
+
+    Raises InputError for an effect that is not among CONCEALED.
+    """
     if effect is not None and effect not in CONCEALED:
         raise InputError(f"--effect: given {effect}, allowed {', '.join(CONCEALED)}")
     draw = np.random.default_rng(seed)

@@ -7,8 +7,8 @@ from math import inf, pi
 import pytest
 from proof_cases import concealed, finding, marked, truth
 
-from hil.proof.answer.answers import reply_of
-from hil.proof.score.grading import Marked
+from hil.proof.answer.answers import parse_answer
+from hil.proof.score.grading import GradedCase
 
 
 def test_one_law_of_two_names_is_right_by_either() -> None:
@@ -25,7 +25,7 @@ def test_a_name_beside_the_right_one_is_spurious_and_so_is_the_same_name_twice()
     assert (beside.top, beside.in_set, beside.right) == (False, False, False)
     assert [named.effect for named in beside.spurious] == ["backlash"]
     twice = marked(ripple, finding("torque_ripple"), finding("torque_ripple"))
-    assert [twice.named_right(named) for named in twice.reply.named] == [True, False]
+    assert [twice.named_right(named) for named in twice.answer.named] == [True, False]
     assert twice.wrong == "It names torque ripple, which is not there."
 
 
@@ -45,14 +45,14 @@ def test_an_ambiguous_case_wants_the_set_and_then_one_of_it() -> None:
     assert marked(of, finding("asymmetric_friction", "spring_load", "backlash")).blurred
     alone = marked(of, finding("spring_load"))
     assert (alone.top, alone.set_reported, alone.resolved) == (True, False, False)
-    assert alone.wrong == "It does not say that constant load cannot be told from what it names."
+    assert alone.wrong == "It does not report constant load as indistinguishable from what it names."
     for later, resolved in (
         (finding("spring_load"), True),
         (finding("spring_load", "constant_load"), False),
         (finding("asymmetric_friction"), False),
     ):
-        answer = reply_of({"verdict": "missing_physics", "missing": [later]})
-        assert Marked(of, alone.reply, answer).resolved is resolved
+        answer = parse_answer({"verdict": "missing_physics", "missing": [later]})
+        assert GradedCase(of, alone.answer, answer).resolved is resolved
 
 
 def test_what_a_motion_cannot_show_must_be_listed_and_nothing_named() -> None:

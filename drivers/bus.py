@@ -16,7 +16,7 @@ from typing import Any, Final, Protocol
 
 import can
 
-from drivers.base import BusError
+from drivers.port import BusError
 
 Listener = Callable[[int, bytes, float], None]  # COB-ID, data, time_s
 """Called once per frame; canopen's own callbacks have the same form."""

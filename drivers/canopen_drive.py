@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from drivers.base import Condition, DriveFault, DriveGoal, DriveSample
 from drivers.bus import BusState
 from drivers.canopen_master import CanopenMaster
 from drivers.cia402 import ENABLE_OPERATION, STATE_BY_STATUS, DriveState, Mode, next_controlword
@@ -26,6 +25,7 @@ from drivers.cia402_setup import (
 )
 from drivers.emcy import Emergency, decode_emergency
 from drivers.pdo import layout, saturate
+from drivers.port import Condition, Drive, DriveFault, DriveGoal, DriveSample
 
 __all__ = ["TRIPPING", "CanopenDrive", "DriveInfo", "DriveSettings", "HomingSettings"]
 
@@ -37,11 +37,12 @@ TRIPPING: Final = (
 _OPERATIONAL: Final = 5
 # Bound once: looking a member up in its enumeration costs the loop.
 _OK, _ENABLED_STATE, _ENABLED = Condition.OK, DriveState.OPERATION_ENABLED, DriveGoal.ENABLED
+_POWERED: Final = (_ENABLED_STATE, DriveState.QUICK_STOP_ACTIVE, DriveState.FAULT_REACTION_ACTIVE)
 _new = tuple.__new__  # makes a named tuple without its Python-level constructor
 
 
-class CanopenDrive:
-    """One drive on a master's bus; implements `drivers.base.Drive`."""
+class CanopenDrive(Drive):
+    """One CiA 402 drive on a master's bus."""
 
     def __init__(self, master: CanopenMaster, settings: DriveSettings) -> None:
         self._master, self.settings = master, settings
@@ -140,7 +141,8 @@ class CanopenDrive:
             condition = _OK
             self._was_enabled = True
         return _new(DriveSample, (self._sample_time_s, age, state, self._counts * self._rad_per_count,
-                                  self._torque * self._n_m_per_mille, statusword, condition, enabled))  # fmt: skip
+                                  self._torque * self._n_m_per_mille, statusword, condition, enabled,
+                                  enabled or state in _POWERED))  # fmt: skip
 
     def _diagnose(self, age: int, state: DriveState, now_s: float) -> Condition:
         condition = Condition(self._latched)
@@ -201,6 +203,16 @@ class CanopenDrive:
         self._latched, self.tripped = 0, Condition.OK
         self._reset_requested = True
         self._was_enabled = False
+
+    @property
+    def error_code(self) -> int:
+        """CiA 301 code of the last EMCY, 0 without one."""
+        return self.emergencies[-1].code if self.emergencies else 0
+
+    @property
+    def status(self) -> str:
+        """CiA 402 state and statusword."""
+        return f"{STATE_BY_STATUS[self._statusword & 0x7F].name}, statusword 0x{self._statusword:04X}"
 
     def check(self) -> None:
         """Raise DriveFault if something tripped the drive since the last `reset_fault`."""

@@ -8,12 +8,12 @@ from pathlib import Path
 from struct import Struct
 from typing import Final
 
-from drivers.base import Condition, ConfigurationError, EncoderError, EncoderSample
 from drivers.bus import BusState
 from drivers.canopen_master import NMT_PRE_OPERATIONAL, CanopenMaster
 from drivers.counting import Unwrapper
 from drivers.emcy import Emergency, decode_emergency
 from drivers.pdo import EVERY_SYNC
+from drivers.port import Condition, ConfigurationError, Encoder, EncoderError, EncoderSample
 from drivers.sdo_setup import EDS_FOLDER, DeviceSetup
 
 _POSITION: Final = Struct("<i")
@@ -36,8 +36,8 @@ class EncoderSettings:
     missed_answers_allowed: int = 3
 
 
-class CanopenEncoder:
-    """One encoder on a master's bus; implements `drivers.base.Encoder`."""
+class CanopenEncoder(Encoder):
+    """One encoder on a master's bus; implements `drivers.port.Encoder`."""
 
     def __init__(self, master: CanopenMaster, settings: EncoderSettings) -> None:
         self._master, self.settings = master, settings
@@ -140,3 +140,6 @@ class CanopenEncoder:
             names = " | ".join(str(flag.name) for flag in Condition if flag in condition)
             raise EncoderError(names, where=self._name, given=active[-1] if active else self._health.last_error,
                                advice="Check the encoder, its supply and its wiring.")  # fmt: skip
+
+    def close(self) -> None:
+        """Nothing to release: the bus belongs to the master."""

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from drivers.base import DriveSample
 from drivers.canopen_drive import CanopenDrive
 from drivers.cia402 import Controlword, HomingPhase, next_homing_phase
+from drivers.port import DriveSample
 
 
 class HomingRun:

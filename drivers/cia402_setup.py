@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from drivers.base import ConfigurationError
 from drivers.canopen_master import NMT_PRE_OPERATIONAL, CanopenMaster
 from drivers.cia402 import Mode
 from drivers.pdo import EVENT_DRIVEN, EVERY_SYNC, Entry
+from drivers.port import ConfigurationError
 from drivers.sdo_setup import EDS_FOLDER, DeviceSetup
 
 TARGET: Final = {

@@ -15,9 +15,9 @@ import canopen
 from canopen.objectdictionary import ODVariable, datatypes
 from canopen.sdo import SdoAbortedError, SdoClient, SdoCommunicationError
 
-from drivers.base import ConfigurationError, IdentityError, ResponseTimeout
 from drivers.bus import CanPort
 from drivers.pdo import PDO_INVALID, PDO_NO_RTR, Entry, layout
+from drivers.port import ConfigurationError, IdentityError, ResponseTimeout
 
 EDS_FOLDER: Final = Path(__file__).parent / "eds"
 RESPONSE_TIMEOUT_S: Final = 0.5

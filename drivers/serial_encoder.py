@@ -9,8 +9,8 @@ from enum import StrEnum
 
 import serial
 
-from drivers.base import Condition, EncoderError, EncoderSample
 from drivers.counting import Unwrapper
+from drivers.port import Condition, Encoder, EncoderError, EncoderSample
 from drivers.serial_frames import AsciiParser, BinaryParser, Parser, Reading
 
 
@@ -35,8 +35,8 @@ class SerialSettings:
     missed_reads_allowed: int = 10  # reads in a row without a new position before it counts as stale
 
 
-class SerialEncoder:
-    """Implements `drivers.base.Encoder`. EncoderError if the device cannot be opened."""
+class SerialEncoder(Encoder):
+    """Implements `drivers.port.Encoder`. EncoderError if the device cannot be opened."""
 
     def __init__(self, settings: SerialSettings) -> None:
         self.settings = settings
@@ -63,6 +63,9 @@ class SerialEncoder:
     def checksum_errors(self) -> int:
         """Frames or lines thrown away since the line was opened."""
         return self._parser.errors
+
+    def set_up(self) -> None:
+        """Nothing to configure: the line is open and the device sends by itself."""
 
     def read(self, now_s: float) -> EncoderSample:
         """Take in what has arrived; the newest position, and what is wrong. Never raises, never waits."""

@@ -18,7 +18,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from drivers.base import DriverError
+    from drivers.port import DriverError
     from hil.api import (
         design_experiment,
         diagnose,
@@ -73,7 +73,7 @@ _MODULE_OF = {
     "HilError": "hil.errors",
     "InputError": "hil.errors",
     "FieldError": "hil.errors",
-    "DriverError": "drivers.base",
+    "DriverError": "drivers.port",
 }
 
 __all__ = [  # noqa: RUF022  (in the order of use, as in the documentation)

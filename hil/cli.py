@@ -92,7 +92,7 @@ def _exit_code(error: Exception) -> int | None:
     """Exit code of an error raised on purpose; None for a defect."""
     if isinstance(error, HilError):
         return error.exit_code
-    from drivers.base import DriverError  # only here: the drivers are not light
+    from drivers.port import DriverError  # only here: the drivers are not light
 
     return 1 if isinstance(error, DriverError) else None
 

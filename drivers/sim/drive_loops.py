@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from drivers.base import PlantLike, ServoLike, ServoTarget
+from drivers.port import PlantLike, ServoLike, ServoTarget
 
 _LOOP_PERIOD_S = 0.001  # of the servo, where the SYNC is slower
 _AT_REST_RAD_S = 0.5  # a stop ramp has ended

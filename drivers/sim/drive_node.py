@@ -10,9 +10,9 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from drivers.base import PlantLike, ServoLike, ServoTarget
 from drivers.bus import CanPort
 from drivers.cia402 import Controlword, DriveState, Mode, Statusword
+from drivers.port import PlantLike, ServoLike, ServoTarget
 from drivers.sim.can_node import EDS_FOLDER, SimulatedDevice
 from drivers.sim.cia402_device import REMOTE, STATUS, next_state
 from drivers.sim.drive_loops import DriveLoops

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from drivers.base import PlantLike
 from drivers.bus import CanPort
+from drivers.port import PlantLike
 from drivers.sim.can_node import EDS_FOLDER, SimulatedDevice
 from drivers.sim.object_dictionary import key_of
 

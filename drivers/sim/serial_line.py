@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import tty
 
-from drivers.base import PlantLike
+from drivers.port import PlantLike
 from drivers.serial_encoder import SerialFormat
 from drivers.serial_frames import encode_frame, encode_line
 

@@ -21,7 +21,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from drivers.base import ServoTarget
+from drivers.port import ServoTarget
 
 
 class VelocityEstimate(StrEnum):

@@ -10,9 +10,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Protocol, Self
 
-from drivers.base import ConfigurationError, DriverError, PlantLike
 from drivers.bus import BusConfig, CanPort, PumpedPort, PythonCanPort, open_bus
 from drivers.canopen_drive import CanopenDrive, DriveSettings
 from drivers.canopen_encoder import CanopenEncoder, EncoderSettings
@@ -20,6 +19,7 @@ from drivers.canopen_master import CanopenMaster
 from drivers.cia402 import Mode
 from drivers.inprocess import InProcessBus
 from drivers.modelled_bus import frame_bits
+from drivers.port import ConfigurationError, Drive, DriverError, Encoder, Master, PlantLike
 from drivers.sdo_setup import EDS_FOLDER
 from drivers.serial_encoder import SerialEncoder, SerialFormat, SerialSettings
 from hil.bench.bench_file import Bench
@@ -33,6 +33,22 @@ MODES = {
     DriveMode.CSP: Mode.CYCLIC_SYNC_POSITION,
 }
 _TARGET_BYTES = {DriveMode.CST: 2, DriveMode.CSV: 4, DriveMode.CSP: 4}
+
+
+class Devices(Protocol):
+    """What a session needs: the bench, its devices behind the port, and nothing of their protocol."""
+
+    bench: Bench
+    section: DriveSection
+
+    @property
+    def master(self) -> Master: ...
+
+    @property
+    def drive(self) -> Drive: ...
+
+    @property
+    def encoder(self) -> Encoder | None: ...
 
 
 class Rig:
@@ -77,7 +93,7 @@ class Rig:
                     allowed=f"{rated} N m",
                     advice="Correct drive.rated_torque_n_m in the bench file, or the drive.",
                 )
-            if isinstance(self.encoder, CanopenEncoder):
+            if self.encoder is not None:
                 self.encoder.set_up()
         except DriverError as error:
             raise HilError(str(error)) from error
@@ -91,7 +107,7 @@ class Rig:
 
     def close(self) -> None:
         """Close encoder line and bus."""
-        if isinstance(self.encoder, SerialEncoder):
+        if self.encoder is not None:
             self.encoder.close()
         for port in self.ports:
             port.close()

@@ -24,14 +24,13 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import Protocol
 
-from drivers.base import Condition, DriveGoal, DriverError, DriveSample, EncoderSample
-from drivers.cia402 import DriveState
+from drivers.port import Condition, DriveGoal, DriverError, DriveSample, EncoderSample
 from hil.bench.hardware import DriveMode
 from hil.channels import AxisKind
 from hil.errors import HilError
 from hil.loop.clock import Clock
 from hil.loop.cycle import Cycle, Setpoint, Watch
-from hil.loop.devices import Rig
+from hil.loop.devices import Devices
 from hil.loop.supervision import Ending, find
 from hil.motion.pieces import MotionLimits
 from hil.motion.trajectory import Trajectory, stop_from
@@ -42,7 +41,6 @@ QUICK_STOP_LIMIT_S = 2.0  # the longest a quick stop is waited for
 AFTERMATH_S = 0.1  # recorded after the power stage is off
 DISARM_TIMEOUT_S = 0.2
 STOP_SEGMENT = -1  # in the recording: set-points of a stop
-_POWERED = (DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE, DriveState.FAULT_REACTION_ACTIVE)
 _NO_ENCODER = EncoderSample(0.0, 0, 0.0, 0, Condition.OK)
 _SETPOINTS = {DriveMode.CST: Setpoint.TORQUE, DriveMode.CSV: Setpoint.VELOCITY, DriveMode.CSP: Setpoint.POSITION}
 
@@ -78,7 +76,7 @@ class Session:
     """
 
     def __init__(
-        self, rig: Rig, cycle: Cycle, trajectory: Trajectory, limits: MotionLimits, clock: Clock, recorder: Rows
+        self, rig: Devices, cycle: Cycle, trajectory: Trajectory, limits: MotionLimits, clock: Clock, recorder: Rows
     ) -> None:
         self._rig, self._cycle, self._clock, self._recorder = rig, cycle, clock, recorder
         self._trajectory, self._limits = trajectory, limits
@@ -149,8 +147,8 @@ class Session:
             if self._stops_asked:
                 raise HilError("interrupted while the drive was armed; nothing moved")
         raise HilError(
-            f"the drive did not enable within {ARM_TIMEOUT_S:.0f} s: it is {sample.state.name}, statusword "
-            f"0x{sample.statusword:04X}; check its enable input and safe torque off"
+            f"the drive did not enable within {ARM_TIMEOUT_S:.0f} s: it is {self._drive.status}; check its enable "
+            "input and safe torque off"
         )
 
     def _check_start(self, sample: DriveSample, seen: EncoderSample) -> None:
@@ -191,7 +189,7 @@ class Session:
             late = lateness[-1] > overrun_s
             if sample.condition or seen.condition or passed or late or self._stops_asked or self._phase:
                 stop = self._supervise(tick, index, sample, seen, passed)
-                error_code = drive.emergencies[-1].code if drive.emergencies else 0
+                error_code = drive.error_code
                 if stop is not None:
                     cycle.follow(stop, STOP_SEGMENT)
                     index, last_index = 0, len(stop) - 1
@@ -213,7 +211,7 @@ class Session:
     ) -> Trajectory | None:
         """Change the phase if need be; the stop that begins now, if one does."""
         if self._phase is Phase.QUICK_STOP:
-            if sample.state not in _POWERED:
+            if not sample.powered:
                 self._last_tick = min(self._last_tick, tick + self._ticks(AFTERMATH_S))
             return None
         stopping = self._phase is Phase.STOP
@@ -252,7 +250,7 @@ class Session:
         for _ in range(self._ticks(DISARM_TIMEOUT_S)):
             sample, _ = self._exchange()
             self._drive.command(self._now_s, 0.0)
-            if sample.state not in _POWERED:
+            if not sample.powered:
                 return
 
     def _abandon(self) -> None:
@@ -268,7 +266,7 @@ class Session:
         return round(duration_s / self._period_s)
 
 
-def make_cycle(rig: Rig, motor_position: float) -> Cycle:
+def make_cycle(rig: Devices, motor_position: float) -> Cycle:
     """Controller and twin of a bench, for an axis at rest at this motor position [rad, m]."""
     bench, section = rig.bench, rig.section
     travel = section.travel_m or (float("-inf"), float("inf"))

@@ -12,8 +12,8 @@ from typing import Any
 
 from pydantic import ValidationError, model_validator
 
-from drivers.base import PlantLike
 from drivers.bus import CanPort
+from drivers.port import PlantLike
 from drivers.serial_encoder import SerialFormat
 from drivers.sim import axis as truth
 from drivers.sim.axis import AxisTruth

@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterator
 from enum import StrEnum
 from typing import NamedTuple
 
-from drivers.base import Condition, DriverError, EncoderSample
+from drivers.port import Condition, DriverError, EncoderSample
 from hil.loop.cycle import Limit
-from hil.loop.devices import Rig
+from hil.loop.devices import Devices
 
 # What makes a linear encoder useless; a late sample or a broken frame does not.
 _ENCODER_LOST = (Condition.STALE | Condition.HEARTBEAT_LOST | Condition.BUS_OFF | Condition.NOT_OPERATIONAL
@@ -36,7 +36,7 @@ class Finding(NamedTuple):
 
 
 def find(
-    rig: Rig, seen: EncoderSample, passed: int, lateness_s: float, stops_asked: int, *, stopping: bool
+    rig: Devices, seen: EncoderSample, passed: int, lateness_s: float, stops_asked: int, *, stopping: bool
 ) -> Iterator[Finding]:
     """What is wrong, the gravest first. passed: the `Limit`s; lateness_s of the tick; stopping: under control."""
     section, gains = rig.section, rig.bench.gains

@@ -13,14 +13,15 @@ from typing import Any, Protocol
 import numpy as np
 from numba import njit
 
-from drivers.base import DriveSample, EncoderSample
 from drivers.canopen_encoder import CanopenEncoder
+from drivers.port import DriveSample, EncoderSample
 from drivers.sim import kernel
 from drivers.sim.plant import Plant
 from hil.arrays import FloatArray
 from hil.bench.hardware import DriveMode
 from hil.compiled.source_digest import source_digest
 from hil.loop import cycle as compiled
+from hil.loop.devices import Rig
 from hil.loop.session import Rows, Session
 
 SNAPSHOT_TICKS = 2000
@@ -138,6 +139,8 @@ class VirtualSession(Session):
     def _can_be_compiled(self) -> bool:
         """Torque control of a simulated axis on an ideal bus; the rest goes over the bus."""
         rig, section = self._rig, self._rig.section
+        if not isinstance(rig, Rig):  # other devices have no compiled counterpart
+            return False
         encoder_is_ideal = rig.encoder is None or isinstance(rig.encoder, CanopenEncoder)
         return (
             section.mode is DriveMode.CST
@@ -150,6 +153,7 @@ class VirtualSession(Session):
 
     def _run_compiled(self, sample: DriveSample, seen: EncoderSample) -> tuple[int, DriveSample, EncoderSample]:
         """The tick to go on with over the bus, and its samples."""
+        assert isinstance(self._rig, Rig)
         nodes = self._rig.nodes
         assert nodes is not None
         plant = nodes.plant
@@ -190,6 +194,7 @@ class VirtualSession(Session):
     def _scales(self) -> FloatArray:
         """As the simulated drive and the real driver convert, in the same order of operations."""
         rig = self._rig
+        assert isinstance(rig, Rig)
         assert rig.nodes is not None
         number = rig.nodes.drive.dictionary.number
         scales = np.ones(SCALES)

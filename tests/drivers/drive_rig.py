@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from drivers.base import DriveGoal, DriveSample, ServoLike
 from drivers.bus import CanPort
 from drivers.canopen_drive import CanopenDrive, DriveSettings
 from drivers.canopen_encoder import CanopenEncoder, EncoderSettings
 from drivers.canopen_master import CanopenMaster
 from drivers.inprocess import InProcessBus
+from drivers.port import DriveGoal, DriveSample, ServoLike
 from drivers.sim.drive_node import SimulatedDrive
 from drivers.sim.encoder_node import SimulatedEncoder
 

@@ -8,10 +8,10 @@ from itertools import pairwise
 import can
 import pytest
 
-from drivers.base import BusError
 from drivers.bus import BusConfig, BusState, CanPort, PumpedPort, PythonCanPort, open_bus
 from drivers.inprocess import AsBusABC, InProcessBus
 from drivers.modelled_bus import Fault, FaultKind, ModelledBus, frame_bits
+from drivers.port import BusError
 
 Seen = list[tuple[int, bytes, float]]
 

@@ -11,12 +11,12 @@ from drive_rig import Mass, Rig, in_process
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.base import Condition, ConfigurationError, DriveGoal
 from drivers.canopen_drive import CanopenDrive, DriveSettings, HomingSettings
 from drivers.canopen_homing import HomingRun
 from drivers.canopen_master import CanopenMaster
 from drivers.cia402 import DriveState, HomingPhase, Mode
 from drivers.inprocess import InProcessBus
+from drivers.port import Condition, ConfigurationError, DriveGoal
 from drivers.sim.drive_node import SimulatedDrive
 from drivers.sim.servo import DriveServo, Servo
 

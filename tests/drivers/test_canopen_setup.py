@@ -9,10 +9,10 @@ import canopen
 import pytest
 from drive_rig import Rig, in_process
 
-from drivers.base import ConfigurationError, IdentityError, ResponseTimeout
 from drivers.bus import BusConfig, PythonCanPort, open_bus
 from drivers.canopen_drive import DriveSettings
 from drivers.cia402 import DriveState, Mode
+from drivers.port import ConfigurationError, IdentityError, ResponseTimeout
 from drivers.sdo_setup import EDS_FOLDER, DeviceSetup, SetupNetwork
 
 

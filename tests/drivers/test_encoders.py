@@ -11,11 +11,11 @@ from drive_rig import Mass
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.base import Condition, ConfigurationError
 from drivers.canopen_encoder import CanopenEncoder, EncoderSettings
 from drivers.canopen_master import CanopenMaster
 from drivers.counting import Unwrapper
 from drivers.inprocess import InProcessBus
+from drivers.port import Condition, ConfigurationError
 from drivers.sim.encoder_node import SimulatedEncoder
 
 STEP_M = 0.5e-6

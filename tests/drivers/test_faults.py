@@ -8,12 +8,12 @@ from typing import Any
 import pytest
 from drive_rig import Rig
 
-from drivers.base import Condition, DriveFault, DriveGoal, EncoderError
 from drivers.bus import BusState
 from drivers.canopen_drive import DriveSettings
 from drivers.cia402 import DriveState, Mode
 from drivers.emcy import decode_emergency
 from drivers.modelled_bus import Fault, FaultKind, ModelledBus
+from drivers.port import Condition, DriveFault, DriveGoal, EncoderError
 from drivers.sim.servo import DriveServo, Servo
 
 TPDO, RPDO, ENCODER_TPDO, HEARTBEAT, SYNC = 0x185, 0x205, 0x186, 0x705, 0x080

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from drive_rig import Rig
 
-from drivers.base import ServoTarget
 from drivers.inprocess import InProcessBus
+from drivers.port import ServoTarget
 from drivers.sim.axis import two_mass
 from drivers.sim.plant import Plant
 from drivers.sim.servo import DriveServo, Servo

@@ -12,11 +12,11 @@ from pathlib import Path
 
 import pytest
 
-from drivers.base import Condition, DriveGoal
 from drivers.bus import BusConfig, PythonCanPort, open_bus
 from drivers.canopen_drive import CanopenDrive, DriveSettings
 from drivers.canopen_encoder import CanopenEncoder, EncoderSettings
 from drivers.canopen_master import CanopenMaster
+from drivers.port import Condition, DriveGoal
 
 GROUP = "239.74.163.77"
 ROOT = Path(__file__).parents[2]

@@ -12,7 +12,7 @@ from drive_rig import Mass
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.base import Condition, EncoderError, EncoderSample
+from drivers.port import Condition, EncoderError, EncoderSample
 from drivers.serial_encoder import SerialEncoder, SerialFormat, SerialSettings
 from drivers.serial_frames import AsciiParser, BinaryParser, Parser, Reading, crc16, encode_frame, encode_line
 from drivers.sim.serial_line import SimulatedSerialEncoder

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from sim_tools import PERFECT, motion
 
-from drivers.base import ServoTarget
+from drivers.port import ServoTarget
 from drivers.sim.axis import AxisTruth, one_mass, seven_dof, two_mass
 from drivers.sim.effects import Effect
 from drivers.sim.plant import Plant

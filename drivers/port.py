@@ -1,4 +1,4 @@
-"""What a drive, an encoder and a bus look like to the loop above them, and the tree of driver errors.
+"""Port between the loop and its devices: abstract drive, encoder and master, their samples and errors.
 
 One tick of a loop at `now_s` (time = tick x period; nothing here reads a clock, and nothing here blocks):
 
@@ -24,11 +24,11 @@ same as an error with the text a person needs.
 
 from __future__ import annotations
 
+from abc import abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum, IntFlag
 from typing import NamedTuple, Protocol
-
-from drivers.cia402 import DriveState
 
 __all__ = [
     "BusError",
@@ -43,6 +43,7 @@ __all__ = [
     "EncoderError",
     "EncoderSample",
     "IdentityError",
+    "Master",
     "PlantLike",
     "ResponseTimeout",
     "ServoLike",
@@ -113,17 +114,19 @@ class DriveSample(NamedTuple):
     """One answer of the drive to one SYNC. A named tuple: made in a third of a frozen dataclass's time.
 
     motor_position_rad and torque_n_m (linear drives: m and N) were latched at the SYNC sent at `time_s`; torque is the
-    mean since the SYNC before. `age_cycles` = 0 means: belongs to the latest SYNC.
+    mean since the SYNC before. `age_cycles` = 0 means: belongs to the latest SYNC. `state` is the CiA 402 state number
+    (0 to 7), which is recorded; the loop decides by `enabled` (follows set-points) and `powered` (may produce torque).
     """
 
     time_s: float
     age_cycles: int
-    state: DriveState
+    state: int
     motor_position_rad: float
     torque_n_m: float
     statusword: int
     condition: Condition
     enabled: bool
+    powered: bool
 
 
 class EncoderSample(NamedTuple):
@@ -137,26 +140,77 @@ class EncoderSample(NamedTuple):
     condition: Condition
 
 
+class Master(Protocol):
+    """Timing of the devices: starts their cyclic operation and asks all of them for one sample a tick."""
+
+    @abstractmethod
+    def start(self, now_s: float) -> None:
+        """Begin cyclic operation; call `sync` every period from here on."""
+
+    @abstractmethod
+    def sync(self, now_s: float) -> None:
+        """Request the samples of this tick. Does not wait."""
+
+    @property
+    @abstractmethod
+    def poll(self) -> Callable[..., None]:
+        """Function (now_s, timeout_s = 0) that takes in what has arrived. A property: a bus may bind its own."""
+
+
 class Drive(Protocol):
-    """One axis behind a drive. `command` takes N m (CST), rad/s (CSV) or rad (CSP), linear axes N, m/s, m."""
+    """One axis behind a drive. `command` takes N m (CST), rad/s (CSV) or rad (CSP), linear axes N, m/s, m.
+
+    Implementations name this class as their base, so that mypy and the interpreter refuse an incomplete one.
+    """
 
     goal: DriveGoal
+    tripped: Condition  # conditions that tripped the drive since its last reset
 
-    def read(self, now_s: float) -> DriveSample: ...
+    @abstractmethod
+    def set_up(self) -> None:
+        """Check and configure the device; blocking, power stage off. Raises DriverError."""
 
-    def command(self, now_s: float, setpoint: float) -> None: ...
+    @abstractmethod
+    def read(self, now_s: float) -> DriveSample:
+        """Return the latest sample. Never raises, never waits."""
 
+    @abstractmethod
+    def command(self, now_s: float, setpoint: float) -> None:
+        """Send goal and set-point; the target is zero, or the position held, until the drive is enabled."""
+
+    @abstractmethod
     def check(self) -> None:
-        """Raise `DriveFault` if the drive tripped; the text says why."""
+        """Raise `DriveFault` with the reason if the drive tripped."""
+
+    @property
+    @abstractmethod
+    def error_code(self) -> int:
+        """Last error code of the device, 0 without one."""
+
+    @property
+    @abstractmethod
+    def status(self) -> str:
+        """State of the device in words, for messages."""
 
 
 class Encoder(Protocol):
-    """One linear encoder."""
+    """One linear encoder. Implementations name this class as their base, as for `Drive`."""
 
-    def read(self, now_s: float) -> EncoderSample: ...
+    @abstractmethod
+    def set_up(self) -> None:
+        """Check and configure the device; blocking. Raises DriverError."""
 
+    @abstractmethod
+    def read(self, now_s: float) -> EncoderSample:
+        """Return the latest sample. Never raises, never waits."""
+
+    @abstractmethod
     def check(self) -> None:
-        """Raise `EncoderError` if the sample read last cannot be trusted; the text says why."""
+        """Raise `EncoderError` with the reason if the sample read last cannot be trusted."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Release the connection of this device."""
 
 
 class PlantLike(Protocol):

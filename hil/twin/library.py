@@ -3,8 +3,6 @@
 The order of the list is the order in which the contributions of one stage are composed.
 """
 
-from __future__ import annotations
-
 import inspect
 import sys
 from pathlib import Path

@@ -3,15 +3,13 @@
 A positive load pulls the axis in the negative direction: it takes a positive motor torque to hold it.
 """
 
-from collections.abc import MutableSequence, Sequence
-
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Stage, Variant
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Row, Stage, Variant
 
 
 @njit
-def _load(value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]) -> float:
+def _load(value: float, at: Moment, parameters: Row, memory: Row) -> float:
     return value - parameters[0]
 
 

@@ -1,15 +1,14 @@
 """Current loop lag: the current follows its command late."""
 
 import math
-from collections.abc import MutableSequence, Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Stage, Variant
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Row, Stage, Variant
 
 
 @njit
-def _lagging_current(value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]) -> float:
+def _lagging_current(value: float, at: Moment, parameters: Row, memory: Row) -> float:
     # memory: the torque at the end of the last step, and whether there was one
     if memory[1] == 0.0:
         memory[0] = value

@@ -1,15 +1,15 @@
 """Spring load: a force on the table proportional to its position."""
 
-from collections.abc import MutableSequence, Sequence
+from collections.abc import Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Stage, Variant
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Row, Stage, Variant
 from hil.twin.scene import AxisFacts, Scene
 
 
 @njit
-def _pull_to_rest(value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]) -> float:
+def _pull_to_rest(value: float, at: Moment, parameters: Row, memory: Row) -> float:
     return value - parameters[0] * (at.table_position_m - parameters[1])
 
 

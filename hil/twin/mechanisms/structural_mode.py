@@ -1,7 +1,7 @@
 """Structural mode: a flexible mode that the chain has not, such as machine base, column or screw torsion."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -16,13 +16,25 @@ from hil.twin.structure.modal import modal
 _MOST = 0.99  # a modal damping ratio stays below 1
 
 
-def _with_structure(chain: Chain, parameters: Sequence[float], variant: int = 0) -> Chain:
-    """The chain with one more mass on a spring; a mass ratio of 0 leaves it as it is."""
-    frequency_hz, damping_ratio, mass_ratio = parameters[:3]
+def _with_mass_on_table(chain: Chain, parameters: Sequence[float]) -> Chain:
+    """Add a mass that sways on the table."""
+    return _with_structure(chain, parameters, _on_the_table)
+
+
+def _with_yielding_base(chain: Chain, parameters: Sequence[float]) -> Chain:
+    """Add a machine base that yields."""
+    return _with_structure(chain, parameters, _under_the_axis)
+
+
+def _with_structure(
+    chain: Chain, parameters: Sequence[float], added: Callable[[Chain, float, float], tuple[Chain, FloatArray]]
+) -> Chain:
+    """Add one more mass on a spring; a mass ratio of 0 leaves the chain unchanged."""
+    frequency_hz, damping_ratio, mass_ratio = parameters
     if mass_ratio <= 0.0:
         return chain
     omega = 2.0 * math.pi * frequency_hz
-    extended, spring = (_on_the_table, _under_the_axis)[variant](chain, omega**2, mass_ratio)
+    extended, spring = added(chain, omega**2, mass_ratio)
     stiffness = extended.stiffness_n_m_rad[-1, -1]
     modes = modal(extended)
     elastic = np.where(modes.frequency_rad_s > 0.0, modes.frequency_rad_s, np.inf)
@@ -100,10 +112,10 @@ MECHANISM = Mechanism(
         Parameter("mass_ratio", Dimension.RATIO, 1e-3, 10.0, role=Role.STRENGTH),
     ),
     variants=(
-        Variant(Stage.CHAIN, _with_structure, "mass on the table"),
+        Variant(Stage.CHAIN, _with_mass_on_table, "mass on the table"),
         Variant(
             Stage.CHAIN,
-            _with_structure,
+            _with_yielding_base,
             "yielding base",
             sentence=(
                 "The machine base yields: it sways with the table at {frequency_hz}, damped by {damping_ratio}; "

@@ -22,7 +22,7 @@ SCHEMA_VERSION = 1
 
 @dataclass(frozen=True)
 class Picture:
-    """A picture: the figure of the source it stands for, its file beside paper.json, its caption."""
+    """Picture: figure of the source, file beside paper.json, caption."""
 
     figure: str
     file: str
@@ -31,8 +31,8 @@ class Picture:
 
 @dataclass(frozen=True)
 class PaperResult:
-    """The reproduction as written to `folder`. `modal_matrix` (7, 7) stands for Eq. 21, whose entries are
-    lost: mass-normalised columns [1/sqrt(kg m^2)], rows named by `coordinates`."""
+    """Reproduction as written to `folder`. `modal_matrix` (7, 7) replaces Eq. 21, whose entries are lost: mass-normalised
+    columns [1/sqrt(kg m^2)], rows named by `coordinates`."""
 
     folder: Path
     rows: tuple[Row, ...]
@@ -115,7 +115,7 @@ def _pictures() -> list[tuple[str, str, str, Figure]]:
         (
             "Sec. 3.3.3",
             "nut_travel.png",
-            "What the position of the nut changes: the source suspects it of the delays it cannot explain.",
+            "Screw stiffness and frequencies over the nut's travel: the source suspects them of the delays it cannot explain.",
             figures.nut_travel(),
         ),
     ]

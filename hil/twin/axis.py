@@ -1,4 +1,4 @@
-"""The twin of an axis in the time domain: its physics, its active mechanisms, its simulation.
+"""Twin of an axis in the time domain: physics, active mechanisms, simulation.
 
 The same packed arrays and kernel serve offline simulation in closed loop and the live twin in the control loop.
 """
@@ -34,7 +34,7 @@ _ANSWER = "torque"  # the recorded channel that is an answer of the axis only, a
 
 
 class Response(NamedTuple):
-    """What the twin answers with, each (n,): SI values in the units of the axis."""
+    """Channels of the twin, each (n,): SI values in the units of the axis."""
 
     motor_position: FloatArray
     table_position_m: FloatArray
@@ -43,7 +43,7 @@ class Response(NamedTuple):
 
 
 class Start(NamedTuple):
-    """Where a simulation starts: table position, velocity, and the torque of the integrator."""
+    """Start of a simulation: table position, velocity, torque of the integrator, control tick."""
 
     position_m: float = 0.0
     velocity_m_s: float = 0.0
@@ -56,7 +56,7 @@ _AT_REST = Start()
 
 @dataclass(frozen=True)
 class Twin:
-    """An axis with its control law and its active mechanisms.
+    """Axis with its control law and its active mechanisms.
 
     `modes` keeps only the lowest modes of the chain (None: all). `fine_step_s` and `coarse_step_s` are the longest
     internal steps, of which a whole number makes a control tick; equal values give a fixed step.
@@ -72,7 +72,7 @@ class Twin:
 
     @cached_property
     def chain(self) -> Chain:
-        """The chain of the axis, with those mechanisms that change it."""
+        """Chain of the axis, with the mechanisms that change it."""
         chain = self.physics.chain
         for active in self.active:
             if active.form.stage is Stage.CHAIN:
@@ -95,7 +95,7 @@ class Twin:
 
     @cached_property
     def loop_gains(self) -> cascade.Gains:
-        """The gains, with the velocity filter of an active mechanism."""
+        """Gains, with the velocity filter of an active mechanism."""
         gains = self.gains
         for active in self.active:
             if active.form.stage is Stage.VELOCITY_FILTER:
@@ -123,10 +123,10 @@ class Twin:
         measured_table_m: FloatArray = _NOTHING,
         misread: FloatArray = _RIGHT,
     ) -> Response:
-        """The axis in closed loop over set-points (n,), one per control tick, from `start`.
+        """Simulate the axis in closed loop over set-points (n,), one per control tick, from `start`.
 
         `measured_table_m` (n,) holds a table that floats in a gap, see `hil.twin.stepping.loops`. `misread` (2, n):
-        what the motor encoder [motor units] and the table encoder [m] tell the controller too much.
+        error of the motor encoder [motor units] and of the table encoder [m] that the controller sees.
         """
         setpoints = loops.Setpoints(position_command_m, velocity_command_m_s)
         channels = loops.closed_loop(
@@ -135,7 +135,7 @@ class Twin:
         return self._recorded(Response(*channels))
 
     def drive(self, torque_command: FloatArray, start: Start = _AT_REST) -> Response:
-        """The axis without its controller under a given torque command (n,), from `start`."""
+        """Simulate the axis without its controller under a given torque command (n,), from `start`."""
         motor, table, torque = loops.open_loop(torque_command, self._axis(start))
         return self._recorded(Response(motor, table, torque_command, torque))
 
@@ -146,7 +146,7 @@ class Twin:
         measured: Response,
         start: Start = _AT_REST,
     ) -> Response:
-        """The axis block by block, each fed with measured inputs; see `hil.twin.stepping.loops`.
+        """Simulate the axis block by block, each on measured inputs; see `hil.twin.stepping.loops`.
 
         `measured.table_position_m` is empty without a linear encoder. Recorded lateness of a channel must
         have been undone, see `undelayed`.
@@ -159,7 +159,7 @@ class Twin:
         return self._recorded(Response(*channels), lambda variant: variant.name == _ANSWER)
 
     def undelayed(self, measured: Response) -> Response:
-        """Measured inputs with the lateness that active mechanisms give them taken back."""
+        """Undo the lateness that active mechanisms give to measured inputs."""
 
         def present(variant: Variant) -> bool:
             return variant.name != _ANSWER and bool(not variant.needs_table or measured.table_position_m.size)
@@ -178,7 +178,7 @@ class Twin:
     def _recorded(
         self, response: Response, which: Callable[[Variant], bool] = lambda _: True, times: float = 1.0
     ) -> Response:
-        """The channels with the changes by active mechanisms of the recording, their parameters multiplied."""
+        """Apply active mechanisms of the recording to the channels, with their parameters multiplied."""
         for active in self.active:
             if active.form.stage is Stage.CHANNEL and which(active.form):
                 values = tuple(times * value for value in active.values)

@@ -1,4 +1,4 @@
-"""The library of mechanisms: one import and one line of the list each.
+"""Library of mechanisms: one import and one line of the list each.
 
 The order of the list is the order in which the contributions of one stage are composed.
 """

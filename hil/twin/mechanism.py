@@ -88,7 +88,7 @@ class Dimension(StrEnum):
     COUNT = "1/rev"
 
     def unit(self, linear: bool) -> str:
-        """The SI unit on a rotary or on a linear axis."""
+        """SI unit on a rotary or on a linear axis."""
         return _LINEAR_UNITS.get(self, self.value) if linear else self.value
 
 
@@ -136,7 +136,7 @@ Points = Sequence[tuple[float, ...]]
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter of a mechanism: name with unit, dimension, physical bounds, default (None: required) and role."""
+    """Parameter of a mechanism: name with unit, dimension, physical bounds, default (None: required) and role."""
 
     name: str
     dimension: Dimension
@@ -148,7 +148,7 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Variant:
-    """One form of a mechanism, searched separately.
+    """Form of a mechanism, searched separately.
 
     `contribution` is compiled (`numba.njit`) for stages in the stepping kernel; for Stage.CHAIN it is
     `(chain, parameters) -> chain`, for Stage.CHANNEL `(channels, parameters, period_s) -> channels`, both plain Python.

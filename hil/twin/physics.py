@@ -9,7 +9,7 @@ from hil.twin.structure.chain import Chain
 
 @dataclass(frozen=True)
 class Active:
-    """A mechanism that is on: its id, its parameters in the library's order, its variant."""
+    """Active mechanism: its id, its parameters in the library's order, its variant."""
 
     effect: str
     values: tuple[float, ...]
@@ -17,7 +17,7 @@ class Active:
 
     @property
     def form(self) -> Variant:
-        """The variant itself."""
+        """Its entry in the library."""
         return BY_ID[self.effect].variants[self.variant]
 
 

@@ -1,6 +1,6 @@
 """Periodic lead error: the table runs ahead and behind with the angle of the screw.
 
-A ground screw hardly ever errs by a pure sine: three harmonics are one cause.
+The error of a ground screw is rarely a pure sine: three harmonics count as one cause.
 """
 
 import math

@@ -18,7 +18,7 @@ _NEAR = 0.9  # of the reach: a rest position beyond is a constant load
 
 
 def _starts(s: Scene) -> list[tuple[float, ...]]:
-    """At rest where the axis starts, or so far away that the force hardly changes over a short motion."""
+    """Rest positions at the start of the axis, and 20 travels away, where the force is nearly constant."""
     return [(0.02 * s.coulomb / s.ratio / s.travel_m, f * s.travel_m) for f in (0.0, -20.0, 20.0)]
 
 

@@ -13,7 +13,7 @@ _rigid, _elastic, _slipping = contact.rigid, contact.elastic, contact.slipping
 
 @njit(**COMPILE)
 def _at_speed(at, speed):  # type: ignore[no-untyped-def]
-    """The moment at another speed."""
+    """Change the speed of a moment."""
     return Moment(
         at.time_s,
         at.within_s,

@@ -1,4 +1,4 @@
-"""The compiled step of the twin: modal states, friction, active mechanisms; and the readings of its encoders.
+"""Compiled step of the twin: modal states, friction, active mechanisms; and the readings of its encoders.
 
 Each internal step h moves every modal oscillator exactly under the torques held over the step (Eq. 8 of the source),
 then applies contact friction as an impulse. Position-dependent torques are taken at the predicted middle of the step,
@@ -11,7 +11,8 @@ from numba import njit
 
 from hil.compiled.source_digest import source_digest
 from hil.twin.stepping import stages
-from hil.twin.stepping.contact import COMPILE
+from hil.twin.stepping.contact import COMPILE, Resistance
+from hil.twin.stepping.contact import rigid as _rigid
 from hil.twin.stepping.friction import friction as _friction
 from hil.twin.stepping.records import coupling_of, shapes_of, step_of
 from hil.twin.stepping.transmission import Motion, along, moment
@@ -100,31 +101,34 @@ def _build_advance(digest: str) -> Any:
         fine = c.always_fine > 0 or (reversing and abs(speed) > RESTING)
         own.last_speed = speed
         step, internal = step_of(modes, fine), c.fine if fine else c.coarse
-        h = c.period / internal.number
+        steps, gain = internal.number, internal.motor_gain
+        h = c.period / steps
+        resistance = Resistance(c.coulomb, c.viscous, 0.0, 0.0)
         measured = 0.0
-        for j in range(internal.number):
-            middle = motion.position + 0.5 * h * motion.speed
-            table_m = (motion.table + 0.5 * h * motion.table_speed) * c.ratio
-            at = moment(c, own.clock + j * h, j * h, h, middle, motion.speed, table_m)
-            made = _current(command, at, effects)
-            measured += made
-            drive = _motor_torque(_torque(made, at, effects), at, effects)
-            free = table_free = 0.0
+        for j in range(steps):
+            made, guide = command, 0.0
             if any_active:
+                middle = motion.position + 0.5 * h * motion.speed
+                table_m = (motion.table + 0.5 * h * motion.table_speed) * c.ratio
+                at = moment(c, own.clock + j * h, j * h, h, middle, motion.speed, table_m)
+                made = _current(command, at, effects)
+                drive = _motor_torque(_torque(made, at, effects), at, effects)
                 push = _table_force(0.0, at, effects) * c.ratio
                 force = _transmit(c, own, shapes, motion, at, effects, delta)
                 free, table_free = _move(shapes, step, c.coupled, coupling, drive, push, force, delta)
+                motor, guide = _friction(c, own, internal, motion, at, effects, free, table_free)
             else:
-                free = _move_driven(shapes, step, drive, delta)
-            motor, guide = _friction(c, own, internal, motion, at, effects, free, table_free)
+                free = _move_driven(shapes, step, command, delta)
+                motor = _rigid(free, gain, resistance)
+            measured += made
             for i in range(delta.shape[1]):
                 g = shapes.motor[i] * motor + shapes.table[i] * guide
                 delta[0, i] -= step.b1[i] * g
                 delta[1, i] -= step.b2[i] * g
-            if any_active and j + 1 < internal.number:
+            if any_active and j + 1 < steps:
                 motion = _look(shapes, delta)
         own.clock += c.period
-        return measured / internal.number
+        return measured / steps
 
     return advance
 

@@ -1,4 +1,4 @@
-"""The compiled loops over the ticks of a recording: closed, block by block from measured inputs, and open."""
+"""Compiled loops over the ticks of a recording: closed, block by block from measured inputs, and open."""
 
 from typing import Any, NamedTuple
 

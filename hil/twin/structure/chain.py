@@ -7,8 +7,6 @@ Every coordinate is an angle of the motor shaft or its equivalent, which keeps t
 A linear axis is the same chain with r = 1: its angles are metres and its torques newtons.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import pi
@@ -16,20 +14,8 @@ from math import pi
 import numpy as np
 
 from hil.arrays import FloatArray
-from hil.twin.structure.ballscrew import RECONSTRUCTED_TABLE_1, SevenDof
-from hil.twin.structure.elasticity import in_series
-
-__all__ = [
-    "LINEAR_LEAD_M",
-    "RECONSTRUCTED_TABLE_1",
-    "Chain",
-    "FloatArray",
-    "SevenDof",
-    "one_mass",
-    "serial_chain",
-    "seven_dof",
-    "two_mass",
-]
+from hil.twin.structure.ballscrew import RECONSTRUCTED_TABLE_1 as RECONSTRUCTED_TABLE_1
+from hil.twin.structure.ballscrew import SevenDof, in_series
 
 LINEAR_LEAD_M = 2.0 * pi
 """Lead of an axis without a screw: r = 1, so that motor and table share metres and newtons."""
@@ -37,7 +23,7 @@ LINEAR_LEAD_M = 2.0 * pi
 
 @dataclass(frozen=True)
 class Chain:
-    """A chain of n lumped inertias, free to move as a rigid body.
+    """Chain of n lumped inertias, free to move as a rigid body.
 
     `damping_ratio` holds one modal damping ratio per mode, in ascending frequency, 0 for the rigid
     body. `transmission @ q` is the deflection of the transmission spring, motor side minus table
@@ -70,7 +56,7 @@ class Chain:
 
 
 def one_mass(mass_kg: float, lead_m: float = LINEAR_LEAD_M) -> Chain:
-    """A rigid axis: motor and table are one mass [kg], seen at the table."""
+    """Build a rigid axis: motor and table are one mass [kg], seen at the table."""
     r = lead_m / (2.0 * pi)
     zero = np.zeros(1)
     return Chain(np.array([[mass_kg * r**2]]), np.zeros((1, 1)), lead_m, zero, ("axis",), 0, 0, zero, 0.0, zero, 0.0)
@@ -79,7 +65,7 @@ def one_mass(mass_kg: float, lead_m: float = LINEAR_LEAD_M) -> Chain:
 def two_mass(
     motor_mass_kg: float, table_mass_kg: float, stiffness_n_m: float, damping_ratio: float, lead_m: float
 ) -> Chain:
-    """The 2-dof model of Eq. 1: motor and table mass [kg] and a spring [N/m], all seen at the table."""
+    """Build the 2-dof model of Eq. 1: motor and table mass [kg] and a spring [N/m], all seen at the table."""
     r2 = (lead_m / (2.0 * pi)) ** 2
     k = stiffness_n_m * r2
     return Chain(
@@ -106,7 +92,7 @@ def serial_chain(
     names: Sequence[str] = (),
     transmission: int = -1,
 ) -> Chain:
-    """n inertias in a row with n - 1 springs between them, all reduced to the motor shaft (Eq. 13).
+    """Build n inertias in a row with n - 1 springs between them, all reduced to the motor shaft (Eq. 13).
 
     The first inertia carries the motor encoder, the last the linear encoder. `damping_ratio` is one
     number for all n - 1 elastic modes or one for each. `transmission` is the index of the spring that
@@ -148,7 +134,7 @@ def _elastic_damping(damping_ratio: float | Sequence[float], n: int) -> FloatArr
 
 
 def seven_dof(parameters: SevenDof, damping_ratio: float, nut_position_m: float | None = None) -> Chain:
-    """The 7-dof chain of Fig. 4 and Eq. 14 with the nut anywhere between the bearings.
+    """Build the 7-dof chain of Fig. 4 and Eq. 14 with the nut anywhere between the bearings.
 
     Potential energy, with axial stiffnesses reduced by Eq. 13 (theta5 is the axial motion of the screw):
         k_t1 (t1 - t2)^2 + k_t2 (t2 - t3)^2 + k_t3 (t3 - t4)^2 + k_t4 t5^2

@@ -115,8 +115,7 @@ def init(
     period_s: float = 0.001,
     tick: int = 0,
 ) -> State:
-    """Start a controller on an axis that moves at `motor_velocity_rad_s`, with its integrator at `torque_n_m`, without a
-    jump of the motor."""
+    """Start a controller without a jump: motor at `motor_velocity_rad_s`, integrator at `torque_n_m`."""
     step_rad = motor_velocity_rad_s * period_s
     return State(
         tick,

@@ -31,8 +31,11 @@ class Picture:
 
 @dataclass(frozen=True)
 class PaperResult:
-    """Reproduction as written to `folder`. `modal_matrix` (7, 7) replaces Eq. 21, whose entries are lost: mass-normalised
-    columns [1/sqrt(kg m^2)], rows named by `coordinates`."""
+    """Reproduction as written to `folder`.
+
+    `modal_matrix` (7, 7) replaces Eq. 21, whose entries are lost: mass-normalised columns [1/sqrt(kg m^2)], rows named
+    by `coordinates`.
+    """
 
     folder: Path
     rows: tuple[Row, ...]
@@ -115,7 +118,7 @@ def _pictures() -> list[tuple[str, str, str, Figure]]:
         (
             "Sec. 3.3.3",
             "nut_travel.png",
-            "Screw stiffness and frequencies over the nut's travel: the source suspects them of the delays it cannot explain.",
+            "Screw stiffness and frequencies over the nut's travel, which the source suspects of unexplained delays.",
             figures.nut_travel(),
         ),
     ]

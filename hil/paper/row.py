@@ -20,7 +20,10 @@ class Reproduction(StrEnum):
 
 @dataclass(frozen=True)
 class Row:
-    """Comparison of a printed value with the computed one. `tolerance` is relative (of the printed value; absolute where that is 0)."""
+    """Comparison of a printed value with the computed one.
+
+    `tolerance` is relative (of the printed value; absolute where that is 0).
+    """
 
     where: str
     quantity: str

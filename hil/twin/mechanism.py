@@ -282,7 +282,6 @@ class _Scales(NamedTuple):
 
     def of(self, dimension: Dimension) -> float:
         """Scale of a dimension."""
-        force_n = self.torque / self.ratio_m
         return {
             Dimension.TORQUE: self.torque,
             Dimension.MOTOR_SPEED: self.speed,
@@ -292,8 +291,8 @@ class _Scales(NamedTuple):
             Dimension.ANGLE: 1e-4,
             Dimension.LENGTH: self.length_m,
             Dimension.TIME: 0.02 * self.duration_s,
-            Dimension.FORCE: force_n,
-            Dimension.STIFFNESS: force_n / self.travel_m,
+            Dimension.FORCE: self.torque / self.ratio_m,
+            Dimension.STIFFNESS: self.torque / self.ratio_m / self.travel_m,
             Dimension.FREQUENCY: 40.0,
             Dimension.RATIO: 0.05,
             Dimension.PER_LENGTH: 0.1 / self.travel_m,

@@ -1,4 +1,4 @@
-"""Structural mode: a flexible mode that the chain has not, such as machine base, column or screw torsion."""
+"""Structural mode: a flexible mode that is not in the chain, such as machine base, column or screw torsion."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -40,19 +40,19 @@ def _with_structure(
     elastic = np.where(modes.frequency_rad_s > 0.0, modes.frequency_rad_s, np.inf)
 
     def shared(damping: FloatArray) -> FloatArray:
-        # each mode is damped by what its shape takes of the dampers (modal strain energy, Johnson and Kienholz 1982)
+        # damping of each mode by its share in the dampers (modal strain energy, Johnson and Kienholz 1982)
         taken = np.einsum("im,ij,jm->m", modes.shape, damping, modes.shape)
         return np.asarray(np.maximum(taken, 0.0) / (2.0 * elastic))
 
     damping = np.pad(modal_damping(chain, modal(chain)), (0, 1))
     damping += 2.0 * damping_ratio / omega * stiffness * np.outer(spring, spring)
-    # dampers that no longer let a mode swing are weakened until they do
+    # keep all modes below critical damping
     damping *= min(_MOST / max(float(shared(damping).max()), _MOST), 1.0)
     return replace(extended, damping_ratio=shared(damping), damping_n_m_s_rad=damping)
 
 
 def _on_the_table(chain: Chain, square: float, mass_ratio: float) -> tuple[Chain, FloatArray]:
-    """A mass that sways on the table."""
+    """Extend the chain by a mass on a spring on the table."""
     n, table = len(chain.names), chain.table
     inertia = mass_ratio * chain.inertia_kg_m2[table, table]
     extended = _longer(chain)
@@ -64,8 +64,8 @@ def _on_the_table(chain: Chain, square: float, mass_ratio: float) -> tuple[Chain
 
 
 def _under_the_axis(chain: Chain, square: float, mass_ratio: float) -> tuple[Chain, FloatArray]:
-    """A machine base that yields, with the linear encoder on it: all that travels with the nut is seen from it, and
-    has its motion as well."""
+    """Extend the chain by a machine base on a spring, with the linear encoder on it: coordinates that travel with the
+    nut are relative to the base, and move with it as well."""
     n = len(chain.names)
     travelling = chain.inertia_kg_m2 @ (1.0 - chain.side(chain.motor))
     table = chain.inertia_kg_m2[chain.table, chain.table]
@@ -77,7 +77,7 @@ def _under_the_axis(chain: Chain, square: float, mass_ratio: float) -> tuple[Cha
 
 
 def _longer(chain: Chain) -> Chain:
-    """The chain with one more coordinate that nothing holds yet."""
+    """Extend the chain by a free coordinate."""
     return replace(
         chain,
         inertia_kg_m2=np.pad(chain.inertia_kg_m2, (0, 1)),

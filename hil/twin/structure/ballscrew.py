@@ -1,7 +1,7 @@
 """Ball-screw drive: stiffness of its parts, parameters of the 7-dof model, equivalent 2-dof model.
 
-By the theory of elasticity (paper, appendix and Eq. 18-19):
-    K_torsional = G J / L        K_axial = E A / L        K_flexure = 3 E I / L^3
+By the theory of elasticity (paper, appendix and Eq. 18):
+    K_torsional = G J / L        K_axial = E A / L
 """
 
 from dataclasses import dataclass
@@ -12,7 +12,6 @@ import numpy as np
 from hil.arrays import FloatArray
 
 STEEL_YOUNG_PA = 2.06e11
-STEEL_SHEAR_PA = 7.93e10
 
 
 def torsional_stiffness(rigidity_n_m2: float, length_m: float) -> float:
@@ -25,24 +24,9 @@ def axial_stiffness(rigidity_n: float, length_m: float) -> float:
     return rigidity_n / length_m
 
 
-def flexural_stiffness(rigidity_n_m2: float, length_m: float) -> float:
-    """K = 3 E I / L^3 [N/m] of a cantilever with rigidity E I, loaded at its end."""
-    return 3.0 * rigidity_n_m2 / length_m**3
-
-
 def round_area(diameter_m: float) -> float:
     """A = pi d^2 / 4 [m^2] of a solid round section."""
     return pi * diameter_m**2 / 4.0
-
-
-def round_axial_moment(diameter_m: float) -> float:
-    """I = pi d^4 / 64 [m^4] of a solid round section about its diameter."""
-    return pi * diameter_m**4 / 64.0
-
-
-def round_polar_moment(diameter_m: float) -> float:
-    """J = pi d^4 / 32 [m^4] of a solid round section."""
-    return pi * diameter_m**4 / 32.0
 
 
 def in_series(*stiffnesses: float) -> float:
@@ -58,14 +42,6 @@ def supported_screw_stiffness(
     Each bearing is in series with its side of the screw; the two sides act in parallel.
     """
     return in_series(front_bearing_n_m, front_screw_n_m) + in_series(back_bearing_n_m, back_screw_n_m)
-
-
-def nut_support_stiffness(nut_n_m: float, support_n_m: float, fixing_screw_n_m: float, screws: int = 4) -> float:
-    """Axial stiffness k_a6 [N/m] from the nut to the table (Eq. 19).
-
-    Nut, nut support, and the bending of the fixing screws (in parallel to each other) are in series.
-    """
-    return in_series(nut_n_m, support_n_m, screws * fixing_screw_n_m)
 
 
 @dataclass(frozen=True)

@@ -57,9 +57,7 @@ class Chain:
 
 def one_mass(mass_kg: float, lead_m: float = LINEAR_LEAD_M) -> Chain:
     """Build a rigid axis: motor and table are one mass [kg], seen at the table."""
-    r = lead_m / (2.0 * pi)
-    zero = np.zeros(1)
-    return Chain(np.array([[mass_kg * r**2]]), np.zeros((1, 1)), lead_m, zero, ("axis",), 0, 0, zero, 0.0, zero, 0.0)
+    return serial_chain([mass_kg * (lead_m / (2.0 * pi)) ** 2], [], 0.0, lead_m, names=("axis",))
 
 
 def two_mass(
@@ -67,20 +65,8 @@ def two_mass(
 ) -> Chain:
     """Build the 2-dof model of Eq. 1: motor and table mass [kg] and a spring [N/m], all seen at the table."""
     r2 = (lead_m / (2.0 * pi)) ** 2
-    k = stiffness_n_m * r2
-    return Chain(
-        inertia_kg_m2=np.array([[motor_mass_kg * r2, 0.0], [0.0, table_mass_kg * r2]]),
-        stiffness_n_m_rad=np.array([[k, -k], [-k, k]]),
-        lead_m=lead_m,
-        damping_ratio=np.array([0.0, damping_ratio]),
-        names=("motor", "table"),
-        motor=0,
-        table=1,
-        transmission=np.array([1.0, -1.0]),
-        transmission_stiffness_n_m_rad=k,
-        screw=np.array([1.0, -1.0]),
-        screw_stiffness_n_m_rad=k,
-    )
+    masses = (motor_mass_kg * r2, table_mass_kg * r2)
+    return serial_chain(masses, [stiffness_n_m * r2], damping_ratio, lead_m, names=("motor", "table"))
 
 
 def serial_chain(

@@ -32,7 +32,6 @@ class Modal:
     damping_ratio: FloatArray
     motor: int
     table: int
-    lead_m: float
     transmission: FloatArray
     screw: FloatArray
 
@@ -65,7 +64,6 @@ def modal(chain: Chain) -> Modal:
         damping_ratio=chain.damping_ratio,
         motor=chain.motor,
         table=chain.table,
-        lead_m=chain.lead_m,
         transmission=chain.transmission @ shape,
         screw=chain.screw @ shape,
     )

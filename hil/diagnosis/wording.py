@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from hil.bench.bench_file import Bench
-from hil.diagnosis.estimation.terms import Term
+from hil.identification.terms import Term
 from hil.twin.library import BY_ID
 from hil.twin.mechanism import Dimension
 

@@ -14,9 +14,8 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
-from hil.diagnosis.estimation.hypothesis import inertia
 from hil.diagnosis.search import disturbance as estimate
-from hil.identification.dataset import Measured
+from hil.identification.dataset import Measured, inertia
 from hil.twin.library import BY_ID, LIBRARY
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hil.bench.bench_file import Bench
-from hil.diagnosis.estimation.terms import FRICTION, Term, ambiguous
+from hil.identification.terms import FRICTION, Term, ambiguous
 from hil.twin.library import BY_ID
 
 _NEAR = 0.9  # of what is possible: not at its end, nor on the way there

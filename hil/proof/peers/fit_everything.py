@@ -9,19 +9,18 @@ the residual grows most comes first; one that changes nothing to speak of is not
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
+from functools import reduce
 
 import numpy as np
 
 from hil.arrays import FloatArray
-from hil.diagnosis.estimation.fit import POOL, Fit, evaluate, fit
-from hil.diagnosis.estimation.terms import Term
-from hil.diagnosis.search import successive_halving
 from hil.diagnosis.search.forward_selection import MATERIAL
 from hil.diagnosis.search.initial_values import Start, starts
-from hil.diagnosis.search.score_test import Lead
-from hil.identification.dataset import Measured
+from hil.diagnosis.search.score_test import Candidate, screen_library
+from hil.identification.estimator import POOL, Fit
+from hil.identification.hypothesis import Hypothesis
+from hil.identification.terms import Term
 from hil.proof.peers.case import Answer, Case
 
 EVALUATIONS = 12  # a minute on two cores for half a minute of recordings
@@ -35,44 +34,38 @@ _NEVER_ZERO = ("stribeck_friction", "presliding_hysteresis", "torque_saturation"
 def fit_everything(case: Case, evaluations: int = EVALUATIONS) -> Answer:
     """The answer of one fit of everything about a case."""
     begun = {start.effect: start for start in starts(case.scene, case.bench)}
-    terms = tuple(_weak(lead, begun[lead.term.effect]) for lead in successive_halving.leads(case.nominal, case.train))
-    model = replace(case.nominal.model, terms=terms)
-    found = fit(
-        model,
-        case.train,
-        np.concatenate([case.nominal.x, model.initial()[case.nominal.x.size :]]),
-        evaluations=evaluations,
-    )
+    terms = tuple(_weak(one, begun[one.term.effect]) for one in screen_library(case.nominal))
+    hypothesis: Hypothesis = reduce(Hypothesis.with_term, terms, case.nominal.hypothesis)
+    found = case.nominal.estimator.fit(hypothesis, evaluations=evaluations)
     significant = [
         index
         for index, term in enumerate(terms)
         if term.effect in _NEVER_ZERO or _strength_over_error(found, index, begun) > SIGNIFICANT
     ]
-    grown = dict(zip(significant, POOL.map(lambda index: _without(found, index, case.train), significant), strict=True))
+    grown = dict(zip(significant, POOL.map(lambda index: _without(found, index), significant), strict=True))
     named = sorted(
-        (index for index in significant if grown[index] > MATERIAL * found.residuals.size),
+        (index for index in significant if grown[index] > MATERIAL * found.rows),
         key=lambda index: -grown[index],
     )
     return case.answer([terms[index].effect for index in named])
 
 
-def _weak(lead: Lead, start: Start) -> Term:
-    """A lead's term at a strength as small as what it explains."""
-    values = list(lead.term.values)
+def _weak(candidate: Candidate, start: Start) -> Term:
+    """A candidate's term at a strength as small as what it explains."""
+    values = list(candidate.term.values)
     if start.strength >= 0:
         for n in range(start.harmonics):
-            values[start.strength + 2 * n] *= max(lead.share, 0.01)
-    return replace(lead.term, values=tuple(values))
+            values[start.strength + 2 * n] *= max(candidate.share, 0.01)
+    return replace(candidate.term, values=tuple(values))
 
 
 def _strength_over_error(found: Fit, index: int, begun: dict[str, Start]) -> float:
     """Strength of a term in standard errors; the logarithm of a value has its relative error."""
-    term = found.model.terms[index]
-    first = found.model.nominal_count + sum(len(other.values) for other in found.model.terms[:index])
+    term, hypothesis = found.terms[index], found.hypothesis
     strength = max(begun[term.effect].strength, 0) if term.effect not in _STRENGTH else _STRENGTH[term.effect]
-    at = first + strength
+    at = hypothesis.columns(index).start + strength
     error = _standard_errors(found)[at]
-    value = 1.0 if found.model.coordinates[at].logarithmic else abs(found.x[at])
+    value = 1.0 if hypothesis.coordinates[at].logarithmic else abs(hypothesis.x[at])
     return float(value / max(error, 1e-300))
 
 
@@ -84,10 +77,6 @@ def _standard_errors(found: Fit) -> FloatArray:
     return np.asarray(np.where(np.diag(normal) > 0.0, np.sqrt(np.maximum(variance, 0.0)) / size, np.inf))
 
 
-def _without(found: Fit, index: int, runs: Sequence[Measured]) -> float:
+def _without(found: Fit, index: int) -> float:
     """By how much the sum of squares grows where a term is taken out of the fit as it stands."""
-    nominal = found.model.nominal_count
-    resolved = found.model.resolved(found.x)[1]
-    rest = replace(found.model, terms=tuple(term for k, term in enumerate(resolved) if k != index))
-    x = np.concatenate([found.x[:nominal], rest.initial()[nominal:]])
-    return evaluate(rest, runs, x).cost - found.cost
+    return found.estimator.evaluate(found.hypothesis.rebased.without(index)).cost - found.cost

@@ -16,7 +16,6 @@ import numpy as np
 from scipy.stats import norm
 
 from hil.arrays import FloatArray
-from hil.diagnosis.estimation.hypothesis import scales
 from hil.diagnosis.search.forward_selection import MATERIAL
 from hil.identification.dataset import Measured
 from hil.proof.peers.case import Answer, Case
@@ -38,11 +37,9 @@ def residual_tests(case: Case) -> Answer:
 
 def _prediction_errors(case: Case, run: Measured) -> dict[str, FloatArray]:
     """Of the refitted twin's motor and transmission, in units of noise. A motor that is behind lacks torque."""
-    model = case.nominal.model
-    noise = scales(run, model.bench, model.observer_s)
-    errors = model.blocks(case.nominal.x, run)
+    errors = case.nominal.residuals.over_noise(case.nominal.data.runs.index(run))
     errors["motor"] *= -1.0
-    return {block: errors[channel] / noise[channel] for block, channel in _CHANNELS.items() if channel in errors}
+    return {block: errors[channel] for block, channel in _CHANNELS.items() if channel in errors}
 
 
 def _outside(equation: Equation, bound: float) -> list[tuple[float, str]]:

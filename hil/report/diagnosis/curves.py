@@ -10,10 +10,10 @@ from scipy.signal import savgol_filter
 
 from hil.arrays import FloatArray
 from hil.diagnosis.diagnose import Diagnosis
-from hil.diagnosis.estimation.fit import Fit
-from hil.identification.dataset import Measured
+from hil.identification.dataset import Measured, inertia
+from hil.identification.estimator import Fit
 from hil.report import style
-from hil.report.diagnosis.view import AFTER, Shown, View, around, binned, inertia, longest
+from hil.report.diagnosis.view import AFTER, Shown, View, around, binned, longest
 from hil.report.figures import style_axis
 from hil.report.style import shown
 
@@ -27,7 +27,7 @@ def friction(diagnosis: Diagnosis, views: Sequence[View]) -> Shown:
     figure = Figure(figsize=(10.0, 5.6), layout="constrained")
     axis = figure.subplots()
     measured = [_friction_of(final, view.run, view.run.motor, view.run.torque) for view in views]
-    answers = [final.model.respond(final.x, view.run) for view in views]
+    answers = [final.hypothesis.respond(view.run) for view in views]
     simulated = [
         _friction_of(final, view.run, answer.motor_position, answer.torque)
         for view, answer in zip(views, answers, strict=True)
@@ -58,7 +58,7 @@ def friction(diagnosis: Diagnosis, views: Sequence[View]) -> Shown:
         ("bench file", diagnosis.explanation.owner, ":"),
         ("nominal twin, refitted", diagnosis.explanation.nominal, "-."),
     ):
-        physics = fit.model.resolved(fit.x)[0].axis.physics()
+        physics = fit.bench.axis.physics()
         axis.plot(
             edges * ratio * 60.0,
             physics.coulomb_n_m + physics.viscous_n_m_s_rad * edges,
@@ -83,9 +83,9 @@ def _friction_of(final: Fit, run: Measured, motor: FloatArray, torque: FloatArra
     """Speed and friction (m,) of the rows at which the axis moves and hardly accelerates."""
     window = max(round(0.021 / run.period_s) | 1, 5)
     velocity = savgol_filter(motor, window, 2, deriv=1, delta=run.period_s)
-    inertial = inertia(final) * savgol_filter(motor, window, 2, deriv=2, delta=run.period_s)
+    inertial = inertia(final.bench) * savgol_filter(motor, window, 2, deriv=2, delta=run.period_s)
     friction = savgol_filter(torque, window, 2) - inertial
-    physics = final.model.resolved(final.x)[0].axis.physics()
+    physics = final.bench.axis.physics()
     # the slip of a stick-slip cycle is too short for the differences; at speed, J a is known well
     share = np.where(np.abs(velocity) > 0.05 * np.abs(velocity).max(), 1.0, 0.1)
     rows = (np.abs(inertial) < share * physics.coulomb_n_m) & (np.abs(velocity) > 0.0)
@@ -109,8 +109,8 @@ def lost_motion(diagnosis: Diagnosis, views: Sequence[View]) -> Shown:
     nominal, final = diagnosis.explanation.nominal, diagnosis.final
     lines = (
         ("measured", stretch, style.MEASURED),
-        ("nominal twin, refitted", stretch - nominal.model.blocks(nominal.x, run)["table"], style.COMMAND),
-        ("twin with the terms found", stretch - final.model.blocks(final.x, run)["table"], AFTER),
+        ("nominal twin, refitted", stretch - diagnosis.residuals(nominal, run)["table"], style.COMMAND),
+        ("twin with the terms found", stretch - diagnosis.residuals(final, run)["table"], AFTER),
     )
     figure = Figure(figsize=(10.0, 5.2), layout="constrained")
     left, right = figure.subplots(1, 2)
@@ -166,9 +166,9 @@ def drive(diagnosis: Diagnosis, views: Sequence[View]) -> Shown:
     unit = "N" if diagnosis.owner.axis.linear else "N m"
     window = _steepest(run.torque_command, run)
     for label, values, colour in (
-        ("nominal twin, refitted", run.torque - nominal.model.blocks(nominal.x, run)["torque"], style.COMMAND),
+        ("nominal twin, refitted", run.torque - diagnosis.residuals(nominal, run)["torque"], style.COMMAND),
         ("measured", run.torque, style.MEASURED),
-        ("twin with the terms found", run.torque - final.model.blocks(final.x, run)["torque"], AFTER),
+        ("twin with the terms found", run.torque - diagnosis.residuals(final, run)["torque"], AFTER),
     ):
         broad = label == "measured"
         left.plot(

@@ -10,7 +10,7 @@ from scipy.signal import welch
 
 from hil.arrays import FloatArray
 from hil.diagnosis.diagnose import Diagnosis
-from hil.diagnosis.estimation.terms import Term
+from hil.identification.terms import Term
 from hil.report import style
 from hil.report.diagnosis.curves import drive, friction, lost_motion
 from hil.report.diagnosis.view import (
@@ -41,8 +41,9 @@ def convincing(diagnosis: Diagnosis, term: Term) -> Shown:
     """The picture that shows an engineer a mechanism that was found in the recordings."""
     picture = _PICTURES.get(term.effect, _over_time)
     # a friction curve needs every feed there is; all else is shown where it was not fitted
-    runs = (*diagnosis.train, *diagnosis.held_out) if picture is friction else diagnosis.held_out or diagnosis.train
-    shown = picture(diagnosis, [view_of(diagnosis.final, run, term) for run in runs])
+    train, held_out = diagnosis.train.runs, diagnosis.held_out.runs
+    runs = (*train, *held_out) if picture is friction else held_out or train
+    shown = picture(diagnosis, [view_of(diagnosis, run, term) for run in runs])
     return Shown(shown.figure, f"{shown.caption} Recordings: {', '.join(run.name for run in runs)}.")
 
 
@@ -127,7 +128,7 @@ def _spectrum(diagnosis: Diagnosis, views: Sequence[View]) -> Shown:
         power = []
         for view in views:
             frequency, density = welch(
-                fit.model.blocks(fit.x, view.run)[channel],
+                diagnosis.residuals(fit, view.run)[channel],
                 1.0 / view.run.period_s,
                 nperseg=min(4096, view.run.motor.size),
             )

@@ -10,13 +10,13 @@ from matplotlib.figure import Figure
 from hil.arrays import FloatArray
 from hil.channels import CHANNELS
 from hil.diagnosis.diagnose import Diagnosis
-from hil.diagnosis.estimation.fit import Fit
-from hil.diagnosis.location.locate import BLOCKS, block_shares, phase_shares
-from hil.diagnosis.location.residual_energy import Energy, energies, without_terms
+from hil.diagnosis.location.locate import BLOCKS, block_shares, mismatch_energies, phase_shares
+from hil.diagnosis.location.residual_energy import Energy
 from hil.diagnosis.result import Mode, Verdict
-from hil.diagnosis.verdict.fit_table import channel_names, residuals
+from hil.diagnosis.verdict.fit_table import channel_names
 from hil.diagnosis.wording import title
 from hil.identification.dataset import Measured
+from hil.identification.estimator import Fit
 from hil.report import style
 from hil.report.figures import Line, Panel, style_axis
 
@@ -26,15 +26,10 @@ _BINS = 40
 def location_figure(diagnosis: Diagnosis) -> Figure:
     """Shares of blocks and phases; energy over time, position and speed, per second spent there."""
     before = first_hypothesis(diagnosis)
-    final = diagnosis.final
-    seen = (
-        energies(without_terms(final), diagnosis.train, final)
-        if final.model.terms
-        else energies(before, diagnosis.train)
-    )
+    seen = mismatch_energies(before, diagnosis.final)
     figure = Figure(figsize=(10.0, 8.2), layout="constrained")
     axes = figure.subplot_mosaic([["block", "phase"], ["position", "speed"], ["time", "time"]])
-    shares = block_shares(before, diagnosis.train)
+    shares = block_shares(before)
     names = [f"{title(BLOCKS[name][0])}" for name in shares]
     axes["block"].barh(names, [100.0 * value for value in shares.values()], color=style.MEASURED)
     axes["block"].set_title("Block whose output it shows in", loc="left")
@@ -76,24 +71,19 @@ def first_hypothesis(diagnosis: Diagnosis) -> Fit:
 def residual_panels(diagnosis: Diagnosis, run: Measured) -> list[Panel]:
     """What is left of each channel before and after, with the noise floor as a band."""
     figures = diagnosis.result.fit
-    held_out = any(run is other for other in diagnosis.held_out)
-    before = residuals(first_hypothesis(diagnosis), run)
-    after = residuals(diagnosis.final, run)
+    held_out = any(run is other for other in diagnosis.held_out.runs)
+    fits = (("before", first_hypothesis(diagnosis), style.COMMAND), ("after", diagnosis.final, style.SIMULATED))
     panels = []
     for channel, recorded in channel_names(diagnosis.owner, run).items():
         if recorded not in figures:
             continue
         entry = figures[recorded]
-        closed = entry.mode is Mode.CLOSED_LOOP
         floor = (entry.validate_ if held_out and entry.validate_ else entry.train).noise_floor_rms
         lines = tuple(
-            Line(label, _judged((found.closed_loop if closed else found.blocks)[channel], run), colour, broad)
-            for label, found, colour, broad in (
-                ("before", before, style.COMMAND, True),
-                ("after", after, style.SIMULATED, False),
-            )
+            Line(label, _judged(diagnosis.residuals(fit, run, entry.mode)[channel], run), colour, label == "before")
+            for label, fit, colour in fits
         )
-        what = "closed loop" if closed else "block by block"
+        what = "closed loop" if entry.mode is Mode.CLOSED_LOOP else "block by block"
         panels.append(Panel(f"{recorded}\n{what}", CHANNELS[recorded].unit, lines, floor))
     return panels
 

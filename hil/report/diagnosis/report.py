@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from hil.diagnosis.diagnose import NEXT_EXPERIMENT, Diagnosis
-from hil.diagnosis.estimation.terms import Term
 from hil.diagnosis.result import FitFigures, Location, Verdict
 from hil.diagnosis.wording import label, number, title
 from hil.files.output import write_json
+from hil.identification.terms import Term
 from hil.motion.profile import write_profile
 from hil.report import figures, plots
 from hil.report.compare_report import write_bench
@@ -23,7 +23,7 @@ def write_diagnosis(diagnosis: Diagnosis, folder: Path) -> None:
     """Write diagnosis.json, report.html with its PNGs, bench.diagnosed.yaml and, if one helps, next_experiment.yaml."""
     result = diagnosis.result
     good = result.verdict is not Verdict.UNEXPLAINED
-    names = ", ".join(run.name for run in diagnosis.train)
+    names = ", ".join(run.name for run in diagnosis.train.runs)
     page = Page(f"Diagnosis of {names}", _lead(diagnosis), result.statement, good)
     for index, term in enumerate(_terms(diagnosis)):
         _finding(page, diagnosis, index, term, folder / f"{term.effect}{f'_{term.slot + 1}' if term.slot else ''}.png")
@@ -85,8 +85,8 @@ def write_diagnosis(diagnosis: Diagnosis, folder: Path) -> None:
 
 
 def _lead(diagnosis: Diagnosis) -> str:
-    seconds = sum(run.motor.size * run.period_s for run in diagnosis.train)
-    held_out = ", ".join(run.name for run in diagnosis.held_out) or "nothing"
+    seconds = sum(run.motor.size * run.period_s for run in diagnosis.train.runs)
+    held_out = ", ".join(run.name for run in diagnosis.held_out.runs) or "nothing"
     return (
         f"{seconds:.1f} s of training, held out: {held_out} · bench {diagnosis.owner.name} "
         f"({diagnosis.owner.axis.model})"
@@ -95,11 +95,10 @@ def _lead(diagnosis: Diagnosis) -> str:
 
 def _terms(diagnosis: Diagnosis) -> list[Term]:
     """The term of each finding."""
-    terms = diagnosis.final.model.resolved(diagnosis.final.x)[1]
     return [
         next(
             term
-            for term in terms
+            for term in diagnosis.final.terms
             if term.effect == finding.effect and term.values[0] == next(iter(finding.parameters.values())).value
         )
         for finding in diagnosis.result.missing
@@ -178,7 +177,7 @@ def _fit(page: Page, diagnosis: Diagnosis, folder: Path) -> None:
         ),
         rows,
     )
-    run = (diagnosis.held_out or diagnosis.train)[0]
+    run = (*diagnosis.held_out.runs, *diagnosis.train.runs)[0]
     panels = residual_panels(diagnosis, run)
     figure = figures.over_time(f"{run.name}: measured less twin, noise floor in grey", run.time_s, panels)
     figures.save(figure, folder / "residuals.png")

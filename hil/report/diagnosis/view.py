@@ -10,11 +10,10 @@ from matplotlib.figure import Figure
 
 from hil.arrays import FloatArray
 from hil.diagnosis.diagnose import Diagnosis
-from hil.diagnosis.estimation.fit import Fit
-from hil.diagnosis.estimation.terms import Term
 from hil.diagnosis.location.residual_energy import without_terms
 from hil.diagnosis.search.disturbance import Disturbance, disturbance
-from hil.identification.dataset import Measured
+from hil.identification.dataset import Measured, inertia
+from hil.identification.terms import Term
 from hil.report import style
 
 AFTER = style.SIMULATED
@@ -45,11 +44,12 @@ Picture = Callable[[Diagnosis, Sequence[View]], Shown]
 NAMES = {"motor": "torque on the motor", "table": "table against motor", "torque": "torque", "command": "command"}
 
 
-def view_of(final: Fit, run: Measured, term: Term) -> View:
-    off = without_terms(final, term)
-    measured, left = off.model.blocks(off.x, run), final.model.blocks(final.x, run)
+def view_of(diagnosis: Diagnosis, run: Measured, term: Term) -> View:
+    final, data = diagnosis.final, diagnosis.train
+    measured = without_terms(final.hypothesis, term).blocks(run, data.observer_s)
+    left = diagnosis.residuals(final, run)
     modelled = {name: measured[name] - left[name] for name in measured}
-    whole, observer_s = inertia(final), final.model.observer_s
+    whole, observer_s = inertia(final.bench), data.observer_s
     return View(
         term,
         run,
@@ -63,12 +63,6 @@ def view_of(final: Fit, run: Measured, term: Term) -> View:
 def longest(views: Sequence[View]) -> View:
     """The view of the longest run."""
     return max(views, key=lambda found: found.run.motor.size)
-
-
-def inertia(final: Fit) -> float:
-    """Inertia of the whole axis in motor units."""
-    modes = final.model.resolved(final.x)[0].twin().modal
-    return float(modes.shape[modes.motor, 0] ** -2)
 
 
 def residual(view: View, channel: str, modelled: bool) -> FloatArray:

@@ -177,6 +177,11 @@ class Effect:
         object.__setattr__(self, "parameters", {**defaults, **self.parameters})  # a dict can be pickled
 
     @property
+    def delays_feedback(self) -> bool:
+        """Whether the motor encoder is late, which a loop on the bus would see as well."""
+        return self.id == "channel_time_skew" and self.form == "motor_position"
+
+    @property
     def form_index(self) -> int:
         """Index of the form within the catalogue's forms; 0 is the default."""
         return EFFECTS[self.id].forms.index(self.form) if self.form else 0

@@ -115,8 +115,8 @@ class MechanismEntry(_Model):
                 ("parameters",),
                 f"given {', '.join(self.parameters) or 'nothing'}, allowed exactly {', '.join(mechanism.names)}",
             )
-        if self.variant and self.variant not in mechanism.variants:
-            allowed = ", ".join(variant or "none" for variant in mechanism.variants)
+        if self.variant and self.variant not in mechanism.forms:
+            allowed = ", ".join(variant or "none" for variant in mechanism.forms)
             raise FieldError(("variant",), f"given {self.variant!r}, allowed one of {allowed}")
         for parameter in mechanism.parameters:
             value = self.parameters.get(parameter.name, parameter.default)
@@ -131,7 +131,7 @@ class MechanismEntry(_Model):
     def active(self) -> Active:
         """The entry as the twin takes it."""
         mechanism = BY_ID[self.effect]
-        variant = mechanism.variants.index(self.variant) if self.variant else 0
+        variant = mechanism.forms.index(self.variant) if self.variant else 0
         return Active(
             self.effect,
             tuple(self.parameters.get(parameter.name, parameter.default or 0.0) for parameter in mechanism.parameters),

@@ -21,12 +21,13 @@ from hil.loop.simulated_bench import load_simulated
 from hil.motion.profile import Profile
 from hil.motion.trajectory import plan
 from hil.report.console import table
+from hil.twin.mechanisms import cogging_torque
 
 LENGTHS_S = (25.0, 50.0, 100.0, 200.0)
 _HIL = (sys.executable, "-c", "from hil.cli import main; main()")
 
 
-def measure(effect: Annotated[str, typer.Option(help="What is concealed")] = "cogging_torque") -> None:
+def measure(effect: Annotated[str, typer.Option(help="What is concealed")] = cogging_torque.MECHANISM.id) -> None:
     """Print the time of a diagnosis, cold, for each length."""
     bench, _ = conceal(load_simulated("reference"), 1, effect)
     rows: list[tuple[str, ...]] = []

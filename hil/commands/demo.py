@@ -120,20 +120,24 @@ def _say(result: Result, truth: SimulationSection, believed: Bench) -> None:
 
     from hil.diagnosis.wording import NOMINAL_UNITS, number, said, title
     from hil.twin.library import BY_ID
+    from hil.twin.mechanism import Role
 
     (hidden,) = truth.effects
     found = next((finding for finding in result.missing if finding.effect == hidden.effect), None)
     rows = []
-    dimensions = {parameter.name: parameter.dimension for parameter in BY_ID[hidden.effect].parameters}
+    parameters = {parameter.name: parameter for parameter in BY_ID[hidden.effect].parameters}
     for name, value in hidden.parameters.items():
-        dimension, seen = dimensions[name], found.parameters[name] if found else None
+        parameter, seen = parameters[name], found.parameters[name] if found else None
         rows.append(
             (
                 name,
                 "–",
-                said(math.remainder(value, 2.0 * math.pi) if name == "phase_rad" else value, dimension),
-                said(seen.value, dimension) if seen else "–",
-                said(seen.std, dimension) if seen else "–",
+                said(
+                    math.remainder(value, 2.0 * math.pi) if parameter.role is Role.PHASE else value,
+                    parameter.dimension,
+                ),
+                said(seen.value, parameter.dimension) if seen else "–",
+                said(seen.std, parameter.dimension) if seen else "–",
             )
         )
     for name, value in truth.axis.items():

@@ -29,8 +29,7 @@ from hil.identification.terms import SAME, ambiguous, compatible
 from hil.motion.profile import Profile
 from hil.motion.trajectory import Trajectory, plan
 from hil.twin.axis import Start
-
-ONCE = "external_force"  # belongs to its moment: nobody expects it again on another motion
+from hil.twin.library import BY_ID
 
 _SURE = 2.0  # times as visible as needed must be what a motion shows that nobody has made yet
 
@@ -199,7 +198,7 @@ def _group(explanation: Explanation, final: Fit, index: int) -> list[_Alternativ
 def _alternative(effect: str, found: Fit) -> _Alternative:
     """Prediction of a fit for another motion."""
     hypothesis = found.hypothesis
-    once = [index for index, term in enumerate(hypothesis.terms) if term.effect == ONCE]
+    once = [index for index, term in enumerate(hypothesis.terms) if BY_ID[term.effect].transient]
     gone = [column for index in once for column in range(hypothesis.x.size)[hypothesis.columns(index)]]
     known = _triangle(np.delete(found.jacobian, gone, axis=1))
     return _Alternative(effect, hypothesis.without(*once), known, found.estimator)

@@ -7,7 +7,7 @@ import math
 from hil.bench.bench_file import Bench
 from hil.identification.terms import Term
 from hil.twin.library import BY_ID
-from hil.twin.mechanism import Dimension
+from hil.twin.mechanism import Dimension, Role
 
 # Dimension -> (from this magnitude on, factor, unit), largest first
 _SAID: dict[Dimension, tuple[tuple[float, float, str], ...]] = {
@@ -65,22 +65,19 @@ def sentence(term: Term, bench: Bench) -> str:
     }
     values["viscous_speed"] = said(bench.axis.physics().viscous_speed, Dimension.MOTOR_SPEED, linear)
     variant = mechanism.variants[term.variant]
-    text = (mechanism.second_sentence if term.variant == 1 else "") or mechanism.sentence
-    text = text.format(**values)
-    return f"{text.removesuffix('.')} ({variant})." if variant else text
+    text = (variant.sentence or mechanism.sentence).format(**values)
+    return f"{text.removesuffix('.')} ({variant.name})." if variant.name else text
 
 
 def label(term: Term) -> str:
     """An effect's id as words, with the period or order where it may act more than once."""
-    values = dict(zip(BY_ID[term.effect].names, term.values, strict=True))
-    if BY_ID[term.effect].most == 1:
+    mechanism = BY_ID[term.effect]
+    if mechanism.most == 1:
         return title(term.effect)
-    where = (
-        f"every {said(values['period_m'], Dimension.LENGTH)}"
-        if "period_m" in values
-        else f"{number(values['cycles_per_rev'])} times per revolution"
-    )
-    return f"{title(term.effect)}, {where}"
+    period_m, order = (mechanism.named(role, term.values) for role in (Role.PERIOD, Role.ORDER))
+    if period_m is not None:
+        return f"{title(term.effect)}, every {said(period_m, Dimension.LENGTH)}"
+    return title(term.effect) if order is None else f"{title(term.effect)}, {number(order)} times per revolution"
 
 
 def title(effect: str) -> str:

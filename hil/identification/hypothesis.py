@@ -20,7 +20,7 @@ from hil.identification.residuals import Residuals, differences
 from hil.identification.terms import Term, repeats
 from hil.twin.axis import Response, Twin
 from hil.twin.library import BY_ID
-from hil.twin.mechanism import Parameter
+from hil.twin.mechanism import Parameter, Role
 from hil.twin.physics import Active
 
 # Differences by which the edges of a window are moved: first wide, then by a tick.
@@ -32,7 +32,6 @@ CHATTER_STEP = 0.03
 # The owner's masses and stiffnesses are trusted to this factor: beyond it lie minima in which a wrong structure is
 # compensated by implausible parameters.
 TRUST = 3.0
-_EDGES = ("start_s", "end_s")
 
 
 @dataclass(frozen=True)
@@ -60,9 +59,14 @@ class Coordinate:
         return self.x(self.low), self.x(self.high)
 
     @property
+    def role(self) -> Role | None:
+        """Role of a mechanism's parameter."""
+        return self.parameter.role if self.parameter else None
+
+    @property
     def edge(self) -> bool:
         """Whether it is an instant at which a window begins or ends."""
-        return self.parameter is not None and self.parameter.name in _EDGES
+        return self.role is Role.EDGE
 
 
 class Resolved(NamedTuple):
@@ -181,12 +185,12 @@ class Hypothesis:
         starts = [value for term in self.terms for value in term.values]
         found = [max(step, 1e-3) if name == "damping_ratio" else step for name in self.bench.axis.NOMINAL]
         for coordinate, start in zip(self.coordinates[self.nominal_count :], starts, strict=True):
-            name, own = coordinate.name.split(".")[1], step
-            if name == "period_m":
+            own = step
+            if coordinate.role is Role.PERIOD:
                 own = 0.01 * start / (2.0 * np.pi * max(travel_m, start))
             elif coordinate.edge:  # an edge shows only where it lies: a wide difference reaches it
                 own = edge_step_s / max(abs(start), EDGE_STEP_S)
-            elif name == "cycles_per_rev":
+            elif coordinate.role is Role.ORDER:
                 own = 0.01 / (start * max(angle_rad, 1.0))
             if not coordinate.logarithmic:
                 own = own if coordinate.edge else max(own, 1e-3)
@@ -198,7 +202,7 @@ class Hypothesis:
     def _chatters(self) -> bool:
         """Whether there is play, in which a nut may chatter."""
         effects = (*(term.effect for term in self.terms), *(entry.effect for entry in self.bench.mechanisms))
-        return any(BY_ID[effect].play for effect in effects)
+        return any(variant.play for effect in effects for variant in BY_ID[effect].variants)
 
     @cached_property
     def values(self) -> list[float]:

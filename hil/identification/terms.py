@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations, count
 
-from hil.twin.library import BY_ID
+from hil.twin.library import BY_ID, LIBRARY
+from hil.twin.mechanism import Role
 from hil.twin.physics import Active
 
 Key = tuple[str, int, int]
@@ -14,7 +15,7 @@ Key = tuple[str, int, int]
 # Periods, or orders, further apart than this factor are two causes.
 _APART = 1.1
 # One set: Coulomb friction that differs by direction, alike at every speed, is its band shifted by a constant torque.
-SAME = FRICTION, LOAD = "asymmetric_friction", "constant_load"
+SAME = FRICTION, LOAD = next((mechanism.id, mechanism.same_as) for mechanism in LIBRARY if mechanism.same_as)
 
 
 @dataclass(frozen=True)
@@ -45,8 +46,8 @@ def repeats(one: Term | Active, other: Term | Active) -> bool:
     the other of two that no motion tells apart."""
     if one.effect != other.effect:
         return ambiguous(one) and ambiguous(other)
-    for name, value, other_value in zip(BY_ID[one.effect].names, one.values, other.values, strict=True):
-        if name in ("period_m", "cycles_per_rev"):
+    for parameter, value, other_value in zip(BY_ID[one.effect].parameters, one.values, other.values, strict=True):
+        if parameter.role in (Role.PERIOD, Role.ORDER):
             return max(value, other_value) < _APART * min(value, other_value)
     return True
 

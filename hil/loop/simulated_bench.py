@@ -61,7 +61,7 @@ def make_plant(bench: Bench, seed: int | None = None) -> Plant:
             effects.append(Effect(entry.effect, entry.parameters, entry.form))
         except ValueError as error:
             raise FieldError(at, f"given {entry.effect}: {error}") from None
-        if entry.effect == "channel_time_skew" and entry.form == "motor_position":
+        if effects[-1].delays_feedback:
             raise FieldError(
                 (*at, "form"),
                 "given motor_position, allowed table_position or torque: on the bus the "

@@ -16,6 +16,7 @@ from hil.report import figures, plots, style
 from hil.report.figures import Line, Panel
 from hil.report.page import Number, Page
 from hil.report.style import digits, percent, quantity
+from hil.twin.library import BY_ID
 
 MOVE_MARGIN_S = 0.1
 
@@ -199,11 +200,7 @@ def _inverse_dynamics(page: Page, result: Comparison) -> None:
         f"{percent(fit.relative_error)}."
     )
     offset = next(
-        (
-            entry.parameters["offset_torque_n_m"]
-            for entry in result.bench.mechanisms
-            if entry.effect == "asymmetric_friction"
-        ),
+        (entry.active().values[0] for entry in result.bench.mechanisms if BY_ID[entry.effect].same_as),
         0.0,
     )
     assert isinstance(axis, OneMass)

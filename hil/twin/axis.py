@@ -77,9 +77,9 @@ class Twin:
         """The chain of the axis, with those mechanisms that change it."""
         chain = self.physics.chain
         for active in self.active:
-            mechanism = BY_ID[active.effect]
-            if mechanism.stage is Stage.CHAIN:
-                chain = mechanism.contribution(chain, active.values, active.variant)
+            variant = BY_ID[active.effect].variants[active.variant]
+            if variant.stage is Stage.CHAIN:
+                chain = variant.contribution(chain, active.values, active.variant)
         return chain
 
     @cached_property
@@ -105,7 +105,7 @@ class Twin:
         """The gains, with the velocity filter of an active mechanism."""
         gains = self.gains
         for active in self.active:
-            if BY_ID[active.effect].stage is Stage.VELOCITY_FILTER:
+            if BY_ID[active.effect].variants[active.variant].stage is Stage.VELOCITY_FILTER:
                 gains = gains._replace(filter_coefficient=1.0 - math.exp(-gains.period_s / max(active.values[0], 1e-9)))
         return gains
 
@@ -184,22 +184,21 @@ class Twin:
         )
         response = Response(*channels)
         for active in self.active:  # lateness of an input is taken back, that of the answer is simulated
-            mechanism = BY_ID[active.effect]
-            if mechanism.stage is Stage.CHANNEL and mechanism.variants[active.variant] == _ANSWER:
+            variant = BY_ID[active.effect].variants[active.variant]
+            if variant.stage is Stage.CHANNEL and variant.name == _ANSWER:
                 response = Response(
-                    *mechanism.contribution(tuple(response), active.values, active.variant, self.gains.period_s)
+                    *variant.contribution(tuple(response), active.values, active.variant, self.gains.period_s)
                 )
         return response
 
     def undelayed(self, measured: Response) -> Response:
         """Measured inputs with the lateness that active mechanisms give them taken back."""
         for active in self.active:
-            mechanism = BY_ID[active.effect]
-            variant = mechanism.variants[active.variant]
-            present = variant != "table_position" or measured.table_position_m.size
-            if mechanism.stage is Stage.CHANNEL and variant != _ANSWER and present:
+            variant = BY_ID[active.effect].variants[active.variant]
+            present = not variant.needs_table or measured.table_position_m.size
+            if variant.stage is Stage.CHANNEL and variant.name != _ANSWER and present:
                 back = tuple(-value for value in active.values)
-                measured = Response(*mechanism.contribution(tuple(measured), back, active.variant, self.gains.period_s))
+                measured = Response(*variant.contribution(tuple(measured), back, active.variant, self.gains.period_s))
         return measured
 
     def _controller(self, start: Start) -> cascade.State:
@@ -210,9 +209,9 @@ class Twin:
 
     def _channels(self, response: Response) -> Response:
         for active in self.active:
-            mechanism = BY_ID[active.effect]
-            if mechanism.stage is Stage.CHANNEL:
+            variant = BY_ID[active.effect].variants[active.variant]
+            if variant.stage is Stage.CHANNEL:
                 response = Response(
-                    *mechanism.contribution(tuple(response), active.values, active.variant, self.gains.period_s)
+                    *variant.contribution(tuple(response), active.values, active.variant, self.gains.period_s)
                 )
         return response

@@ -5,7 +5,7 @@ The order of the list is the order in which the contributions of one stage are c
 
 from __future__ import annotations
 
-from hil.twin.mechanism import Mechanism
+from hil.twin.mechanism import Mechanism, Role
 from hil.twin.mechanisms import (
     asymmetric_friction,
     backlash,
@@ -72,3 +72,9 @@ BY_ID: dict[str, Mechanism] = {mechanism.id: mechanism for mechanism in LIBRARY}
 
 # Places in the twin: a mechanism that may act twice at once has two.
 SLOTS: tuple[Mechanism, ...] = tuple(mechanism for mechanism in LIBRARY for _ in range(mechanism.most))
+
+
+def names_of(*roles: Role) -> tuple[str, ...]:
+    """Names of all parameters in the library that have one of the roles."""
+    found = (p.name for mechanism in LIBRARY for p in mechanism.parameters if p.role in roles)
+    return tuple(dict.fromkeys(found))

@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from itertools import product
 from typing import Any, NamedTuple
 
 PARAMETERS = 8  # the most parameters a mechanism may have; the last place tells its variant
@@ -101,45 +102,163 @@ _LINEAR_UNITS = {
 }
 
 
+class Role(StrEnum):
+    """Role of a parameter in a search."""
+
+    STRENGTH = "strength"  # size of the effect
+    PHASE = "phase"  # angle at which the effect begins
+    PERIOD = "period"  # along the travel
+    ORDER = "order"  # cycles per revolution of the motor
+    FREQUENCY = "frequency"  # over time
+    EDGE = "edge"  # start or end of a window of time
+    SHAPE = "shape"  # any other
+
+
+class Picture(StrEnum):
+    """Figure of the report that shows a mechanism."""
+
+    TIME = "time"
+    FRICTION = "friction"  # over speed
+    FRICTION_ALONG_TRAVEL = "friction along travel"
+    POSITION = "position"  # torque over position
+    POSITION_TABLE = "position, table"  # table reading over position
+    MOTOR_ANGLE = "motor angle"
+    MOTOR_ANGLE_PER_TORQUE = "motor angle, per torque"
+    MOTOR_ANGLE_TABLE = "motor angle, table"
+    SCREW_ANGLE = "screw angle"
+    SIGNAL_PERIOD = "signal period"
+    LOST_MOTION = "lost motion"
+    DRIVE_LAW = "drive law"
+    SPECTRUM = "spectrum"
+
+
+@dataclass(frozen=True)
+class AxisFacts:
+    """Facts of an axis that typical values and limits of validity are scaled by; motor units."""
+
+    coulomb: float  # friction [N m]
+    ratio: float  # [m/rad]
+    angle_per_unit: float  # motor angle per motor unit
+    rated_torque: float  # [N m]
+    table_count_m: float | None  # resolution of the linear encoder; None without one
+    duration_s: float  # of the longest recording
+
+    @property
+    def friction(self) -> float:
+        """Coulomb friction, above zero [N m]."""
+        return max(self.coulomb, 1e-6)
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Measured sizes that starting values are scaled by; motor units."""
+
+    coulomb: float  # friction, above zero [N m]
+    peak_torque: float  # [N m]
+    peak_speed: float  # [rad/s]
+    viscous_speed: float  # [rad/s] at which viscous friction equals Coulomb friction
+    travel_m: float
+    duration_s: float
+    ratio: float  # [m/rad]
+    lead_m: float  # of the screw
+    orders: list[float]  # of the disturbance torque, per revolution
+    ripple_orders: list[float]  # of the disturbance torque over the torque
+    friction_periods: list[float]  # [m]
+    scale_periods: list[float]  # of the table residual [m]
+    window: tuple[float, float, float]  # start, end, level [N m]
+    stretch: float  # table against motor [m], typical
+    most_stretch: float  # and largest
+
+
+Points = Sequence[tuple[float, ...]]
+
+
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter of a mechanism: its name with unit, what it measures, its physical bounds, and what it is where
-    nobody gives it (None: it must be given)."""
+    """A parameter of a mechanism: name with unit, dimension, physical bounds, default (None: required) and role."""
 
     name: str
     dimension: Dimension
     low: float
     high: float
     default: float | None = None
+    role: Role = Role.SHAPE
+
+
+@dataclass(frozen=True)
+class Variant:
+    """One form of a mechanism, searched separately.
+
+    `contribution` is compiled (`numba.njit`) for stages in the stepping kernel; for Stage.CHAIN it is
+    `(chain, parameters, variant) -> chain`, for Stage.CHANNEL `(channels, parameters, variant, period_s) -> channels`,
+    both plain Python.
+    """
+
+    stage: Stage
+    contribution: Callable[..., Any]
+    name: str = ""
+    sentence: str = ""  # if it differs from the mechanism's
+    starts: Callable[[Scene], Points] | None = None  # if they differ from the mechanism's
+    proportional: bool = True  # the change is proportional to the strength
+    needs_table: bool = False  # not observable without a linear encoder
+    form_of: str = ""  # id of a friction law whose form a small contribution corrects
+    play: bool = False  # the flanks of the transmission push only: contacts open and close
+    slips: bool = False  # the contact is of Maxwell slip elements
 
 
 @dataclass(frozen=True)
 class Mechanism:
-    """One piece of physics. `contribution` is compiled (`numba.njit`) for stages in the stepping
-    kernel; for Stage.CHAIN it is `(chain, parameters, variant) -> chain`, for Stage.CHANNEL
-    `(channels, parameters, variant, period_s) -> channels`, both plain Python."""
+    """One piece of physics, and all that the search, the screen, the report and the scoring know of it.
+
+    Required are physics, text and bounds. All other fields have defaults: `starts` and `typical` follow from the
+    dimensions and roles of the parameters.
+    """
 
     id: str
     block: Block
     element: str  # the part of the axis an engineer would point at
-    sentence: str  # what an engineer would say; may name parameters in braces
+    sentence: str  # what an engineer would say; may name parameters and viscous_speed in braces
     equation: str
     source: str
     parameters: tuple[Parameter, ...]
-    stage: Stage
-    contribution: Callable[..., Any]
-    variants: tuple[str, ...] = ("",)  # ways it may show: each is weighed in its own right
-    softens: bool = False  # whether it changes the stiffness of a spring of the chain
-    play: bool = False  # in the second variant the flanks of the transmission push only
-    slips: bool = False  # in the second variant the contact is of Maxwell slip elements
-    second_stage: Stage | None = None  # where the second variant enters, if elsewhere
-    most: int = 1  # times that it may act at once, with periods or orders of their own
-    second_sentence: str = ""  # of the second variant, if it says something else; may name viscous_speed too
+    variants: tuple[Variant, ...]
+    starts: Callable[[Scene], Points] | None = None  # parameter values at which a search begins
+    typical: Callable[[AxisFacts], tuple[float, ...]] | None = None  # values that an engineer calls a defect
+    valid: Callable[[Sequence[float], int, AxisFacts], bool] | None = None  # (values, variant, axis): name applies
+    proportional: bool = True  # the change is proportional to the strength
+    neutral_at_zero: bool = True  # without effect where the strength is zero
+    needs_table: bool = False  # not observable without a linear encoder
+    transient: bool = False  # belongs to one recording: not expected on another motion
+    softens: bool = False  # changes the stiffness of a spring of the chain
+    most: int = 1  # number that may act at once, with periods or orders of their own
+    screw_locked: bool = False  # at one slow speed, a share of Coulomb friction that repeats with the screw
+    same_as: str = ""  # id of a less common cause whose first variant is the same torque as this one's
+    hidden_starts: tuple[tuple[float, ...], ...] = ()  # starts where refitted springs hide it; the first value is in
+    # units of the largest stretch of the transmission
+    picture: Picture = Picture.TIME
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names of its parameters, in order."""
         return tuple(parameter.name for parameter in self.parameters)
+
+    @property
+    def forms(self) -> tuple[str, ...]:
+        """Names of its variants, in order."""
+        return tuple(variant.name for variant in self.variants)
+
+    def indices(self, role: Role) -> list[int]:
+        """Indices of the parameters of a role."""
+        return [index for index, parameter in enumerate(self.parameters) if parameter.role is role]
+
+    def named(self, role: Role, values: Sequence[float]) -> float | None:
+        """Value of the first parameter of a role; None if there is none."""
+        return next((values[index] for index in self.indices(role)), None)
+
+    @property
+    def strength(self) -> int:
+        """Index of the parameter that is the size of the effect."""
+        return next(iter(self.indices(Role.STRENGTH)), 0)
 
     def complete(self, values: Sequence[float]) -> tuple[float, ...]:
         """Values of the first parameters, and the defaults of the others; raises ValueError if one has none."""
@@ -147,3 +266,67 @@ class Mechanism:
         if any(value is None for value in rest):
             raise ValueError(f"{self.id}: given {len(values)} values, allowed {', '.join(self.names)}")
         return (*values, *(value for value in rest if value is not None))
+
+    def start_points(self, variant: int, scene: Scene) -> list[tuple[float, ...]]:
+        """Parameter values (points of `names`) at which a search for a variant begins, within bounds."""
+        given = self.variants[variant].starts or self.starts
+        points = given(scene) if given else product(*(_start_values(p, scene) for p in self.parameters))
+        return [self._inside(point) for point in points]
+
+    def typical_values(self, axis: AxisFacts) -> tuple[float, ...]:
+        """Values that an engineer would call a defect."""
+        return self.typical(axis) if self.typical else self._inside([_typical_value(p, axis) for p in self.parameters])
+
+    def is_valid(self, values: Sequence[float], variant: int, axis: AxisFacts) -> bool:
+        """Check that the name applies at these values, and that the sensors can show it."""
+        return self.valid is None or self.valid(values, variant, axis)
+
+    def _inside(self, values: Sequence[float]) -> tuple[float, ...]:
+        return tuple(min(max(value, p.low), p.high) for value, p in zip(values, self.parameters, strict=True))
+
+
+def _start_values(parameter: Parameter, scene: Scene) -> list[float]:
+    """Default starting values of a parameter: small but visible."""
+    by_role = {
+        Role.PHASE: [0.0],
+        Role.ORDER: scene.orders,
+        Role.PERIOD: scene.friction_periods,
+        Role.EDGE: [scene.window[0]],
+    }
+    if parameter.role in by_role:
+        return by_role[parameter.role]
+    torque, speed, length = 0.05 * scene.coulomb, 0.1 * scene.peak_speed, scene.stretch
+    return [_by_dimension(parameter, torque, speed, length, scene.ratio, scene.travel_m, 0.02 * scene.duration_s)]
+
+
+def _typical_value(parameter: Parameter, axis: AxisFacts) -> float:
+    """Default of a value that is a defect: a fifth of friction, some micrometres."""
+    by_role = {Role.PHASE: 0.0, Role.ORDER: 6.0, Role.PERIOD: 0.1, Role.EDGE: 0.5 * axis.duration_s}
+    if parameter.role in by_role:
+        return by_role[parameter.role]
+    return _by_dimension(
+        parameter, 0.2 * axis.friction, 0.1 / axis.ratio, 3e-6, axis.ratio, 0.1, 0.02 * axis.duration_s
+    )
+
+
+def _by_dimension(
+    parameter: Parameter, torque: float, speed: float, length_m: float, ratio_m: float, travel_m: float, time_s: float
+) -> float:
+    """Scale of a parameter from a torque, a speed, a small length, the travel and a time; motor units."""
+    scales = {
+        Dimension.TORQUE: torque,
+        Dimension.MOTOR_SPEED: speed,
+        Dimension.MOTOR_STIFFNESS: torque * ratio_m / length_m,
+        Dimension.MOTOR_DRAG: torque / speed**2,
+        Dimension.INVERSE_TORQUE_SQUARED: 1e-4 / torque**2,
+        Dimension.ANGLE: 1e-4,
+        Dimension.LENGTH: length_m,
+        Dimension.TIME: time_s,
+        Dimension.FORCE: torque / ratio_m,
+        Dimension.STIFFNESS: torque / ratio_m / travel_m,
+        Dimension.FREQUENCY: 40.0,
+        Dimension.RATIO: 0.05,
+        Dimension.PER_LENGTH: 0.1 / travel_m,
+        Dimension.COUNT: 6.0,
+    }
+    return scales[parameter.dimension]

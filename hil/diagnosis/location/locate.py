@@ -6,6 +6,7 @@ into blocks that are dealt out at random (a block-permutation null), hardly ever
 """
 
 from collections.abc import Sequence
+from dataclasses import asdict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -155,7 +156,7 @@ def _dealt(rows: FloatArray, size: int, random: np.random.Generator) -> FloatArr
 
 
 def _periods(locked: Lock) -> dict[str, float | None]:
-    return {"frequency_hz": locked.frequency_hz, "period_m": locked.period_m, "order_per_rev": locked.order_per_rev}
+    return asdict(locked)
 
 
 def phases(run: Measured) -> NDArray[np.str_]:

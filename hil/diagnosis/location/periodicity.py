@@ -18,6 +18,7 @@ from hil.bench.bench_file import Bench
 from hil.diagnosis.location.residual_energy import Energy
 from hil.identification.terms import Term
 from hil.twin.library import BY_ID
+from hil.twin.mechanism import Role
 
 CLAIMED = 0.25  # share of the energy that one harmonic must explain
 APART = 1.5  # times the next best domain
@@ -83,15 +84,13 @@ def lock(seen: Sequence[Energy], channel: str, bench: Bench, terms: Sequence[Ter
 
 
 def _named(term: Term, lead_m: float) -> Lock:
-    values = dict(zip(BY_ID[term.effect].names, term.values, strict=True))
-    order = values.get("cycles_per_rev")
-    if term.effect == "periodic_lead_error":  # of the strongest harmonic
-        order = 1.0 + float(np.argmax(term.values[::2]))
-    elif term.effect == "encoder_eccentricity":
-        order = 1.0
+    mechanism = BY_ID[term.effect]
+    order, period_m = (mechanism.named(role, term.values) for role in (Role.ORDER, Role.PERIOD))
+    if order is None and period_m is None and mechanism.indices(Role.PHASE):  # harmonics of the turn: the strongest
+        order = 1.0 + float(np.argmax([term.values[index] for index in mechanism.indices(Role.STRENGTH)]))
     if order is not None:
         return Lock(period_m=lead_m / order if lead_m else None, order_per_rev=order)
-    return Lock(frequency_hz=values.get("frequency_hz"), period_m=values.get("period_m"))
+    return Lock(frequency_hz=mechanism.named(Role.FREQUENCY, term.values), period_m=period_m)
 
 
 def _lead_m(bench: Bench) -> float:

@@ -1,13 +1,13 @@
 """Starting values of each mechanism for the recordings at hand: where a search for it begins.
 
 A start is a point of a mechanism's parameters at small but visible strength. The screen asks how much of
-the residual the twin's answer to it explains, scales the strength, and turns the phase. A variant without an
-entry of its own starts as its mechanism does, a mechanism without an entry from the middle of its bounds.
+the residual the twin's answer to it explains, scales the strength, and turns the phase. The points are
+data of the mechanisms.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +16,8 @@ from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
 from hil.diagnosis.search import disturbance as estimate
 from hil.identification.dataset import Measured, inertia
-from hil.twin.library import BY_ID, LIBRARY
+from hil.twin.library import LIBRARY
+from hil.twin.mechanism import AxisFacts, Role, Scene
 
 
 @dataclass(frozen=True)
@@ -37,24 +38,18 @@ class Start:
     instead: bool = False
 
 
-@dataclass(frozen=True, eq=False)
-class Scene:
-    """What the starting values are scaled by."""
-
-    coulomb: float  # [N m]
-    peak_torque: float  # [N m]
-    peak_speed: float  # [rad/s]
-    viscous_speed: float  # [rad/s] at which viscous friction equals Coulomb friction
-    travel_m: float
-    duration_s: float
-    ratio: float
-    orders: list[float]
-    ripple_orders: list[float]
-    friction_periods: list[float]
-    scale_periods: list[float]
-    window: tuple[float, float, float]  # start, end, level [N m]
-    stretch: float  # table against motor [m], typical
-    most_stretch: float  # and the most
+def axis_facts(bench: Bench, runs: Sequence[Measured] = ()) -> AxisFacts:
+    """Facts of the axis of a bench with the nominal parameters as fitted, and of its recordings."""
+    physics, table, limit = bench.axis.physics(), bench.encoders.table, bench.gains.torque_limit_n_m
+    peak = max((float(np.max(np.abs(run.torque))) for run in runs), default=0.0)
+    return AxisFacts(
+        coulomb=physics.coulomb_n_m,
+        ratio=bench.axis.ratio_m_rad,
+        angle_per_unit=physics.angle_per_unit,
+        rated_torque=limit / 3.0 if np.isfinite(limit) else peak,
+        table_count_m=table.resolution_m if table is not None else None,
+        duration_s=max((run.motor.size * run.period_s for run in runs), default=0.0),
+    )
 
 
 def scene(runs: Sequence[Measured], bench: Bench, blocks: Sequence[dict[str, FloatArray]], observer_s: float) -> Scene:
@@ -100,16 +95,12 @@ def scene(runs: Sequence[Measured], bench: Bench, blocks: Sequence[dict[str, Flo
         travel_m=travel,
         duration_s=max(run.motor.size * run.period_s for run in runs),
         ratio=ratio,
+        lead_m=lead,
         orders=orders,
         ripple_orders=estimate.orders(runs, found, physics.angle_per_unit, 2, ripple),
         friction_periods=[*periods, *turns],
         scale_periods=(
-            [
-                *estimate.scale_periods(runs, [block["table"] for block in blocks]),
-                *([lead] if lead < travel and round(lead, 9) <= _LONGEST_SCALE_M else []),
-            ]
-            if runs[0].table_m.size
-            else []
+            estimate.scale_periods(runs, [block["table"] for block in blocks]) if runs[0].table_m.size else []
         ),
         window=estimate.force_window(runs[longest], found[longest]),
         stretch=max(stretch, 0.5e-6),
@@ -127,101 +118,22 @@ def stretches(runs: Sequence[Measured], ratio_m_rad: float) -> tuple[float, floa
 
 
 _SHORTEST_M = 1e-3  # along the travel: below, friction is not looked for
-_LONGEST_SCALE_M = BY_ID["scale_interpolation_error"].parameters[1].high
 _WHOLE = 0.05  # of a turn, to which a period makes a whole order of the screw
-
-_Values = Sequence[tuple[float, ...]]
-_STARTS: dict[str, tuple[Callable[[Scene], _Values], int, int]] = {
-    "asymmetric_friction": (lambda s: [(0.05 * s.coulomb,)], 0, -1),
-    "constant_load": (lambda s: [(0.05 * s.coulomb,)], 0, -1),
-    "stribeck_friction": (lambda s: [(1.3 * s.coulomb, f * s.peak_speed) for f in (0.003, 0.01, 0.04)], -1, -1),
-    "presliding_hysteresis": (lambda s: [(s.coulomb * s.ratio / d,) for d in (0.3e-6, 1e-6, 4e-6, 16e-6)], -1, -1),
-    "position_dependent_friction": (lambda s: [(0.05, p, 0.0) for p in s.friction_periods], 0, 2),
-    "nonlinear_viscous_friction": (lambda s: [(0.05 * s.coulomb / s.peak_speed**2,)], 0, -1),
-    "nonlinear_viscous_friction.thinning lubricant": (
-        lambda s: [(f * s.coulomb / s.viscous_speed**2,) for f in (0.1, 1.0)],
-        -1,
-        -1,
-    ),
-    "friction_drift": (lambda s: [(0.05, f * s.duration_s) for f in (0.2, 1.0, 5.0)], 0, -1),
-    "table_side_friction": (lambda s: [(0.2,), (0.6,)], -1, -1),
-    "backlash": (lambda s: [(f * s.stretch,) for f in (0.5, 1.0, 2.0, 4.0)], -1, -1),
-    "preload_loss": (
-        lambda s: [
-            (zone, 0.4)
-            for zone in (
-                0.5 * s.stretch,
-                s.stretch,
-                2.0 * s.stretch,
-                0.5 * s.most_stretch,
-                s.most_stretch,
-                1.5 * s.most_stretch,
-            )
-        ],
-        -1,
-        -1,
-    ),
-    "position_dependent_stiffness": (lambda s: [(0.1 / s.travel_m,)], 0, -1),
-    "periodic_lead_error": (lambda s: [(0.5e-6, 0.0, 0.0, 0.0, 0.0, 0.0)], 0, 1),
-    "cumulative_lead_error": (lambda s: [(1e-6 / s.travel_m,)], 0, -1),
-    "thermal_growth": (lambda s: [(1e-6 / s.travel_m, f * s.duration_s) for f in (0.2, 1.0, 5.0)], 0, -1),
-    "structural_mode": (lambda s: [(f, 0.03, 0.15) for f in np.geomspace(12.0, 240.0, 13)], -1, -1),
-    "cogging_torque": (lambda s: [(0.01 * s.coulomb, o, 0.0) for o in s.orders], 0, 2),
-    "torque_ripple": (lambda s: [(0.01, o, 0.0) for o in dict.fromkeys((*s.ripple_orders, *s.orders))], 0, 2),
-    "torque_constant_saturation": (lambda s: [(0.02 / s.peak_torque**2,)], 0, -1),
-    "torque_saturation": (lambda s: [(f * s.peak_torque,) for f in (0.999, 0.95, 0.85, 0.7)], -1, -1),
-    "torque_dead_zone": (lambda s: [(f * s.coulomb,) for f in (0.03, 0.15)], -1, -1),
-    "current_loop_lag": (lambda s: [(2e-4,), (1e-3,)], -1, -1),
-    "transport_delay": (lambda s: [(1.5e-4,), (7e-4,)], -1, -1),
-    "velocity_filter_lag": (lambda s: [(2e-4,), (1e-3,)], -1, -1),
-    "channel_time_skew": (lambda s: [(2e-4,)], 0, -1),
-    "encoder_eccentricity": (lambda s: [(1e-4, 0.0)], 0, 1),
-    "scale_interpolation_error": (lambda s: [(1e-7, p, 0.0) for p in s.scale_periods], 0, 2),
-    "external_force": (lambda s: [(s.window[2] / s.ratio or 1.0, s.window[0], s.window[1])], 0, -1),
-    # at rest where the axis starts, or so far away that it pushes alike all over a short motion
-    "spring_load": (
-        lambda s: [(0.02 * s.coulomb / s.ratio / s.travel_m, f * s.travel_m) for f in (0.0, -20.0, 20.0)],
-        0,
-        -1,
-    ),
-}
-
-# Nothing tells them apart from parameters of the motor side where no linear encoder is.
-NEEDS_TABLE = frozenset(
-    {
-        "backlash",
-        "preload_loss",
-        "position_dependent_stiffness",
-        "periodic_lead_error",
-        "cumulative_lead_error",
-        "thermal_growth",
-        "scale_interpolation_error",
-        "structural_mode",
-        "table_side_friction",
-    }
-)
 
 
 def starts(scene: Scene, bench: Bench) -> list[Start]:
     """All starting points of the library for this scene, every variant."""
     found = []
     for mechanism in LIBRARY:
-        if mechanism.id in NEEDS_TABLE and not bench.has_table_encoder:
-            continue
-        for variant, name in enumerate(mechanism.variants):
-            if name == "table_position" and not bench.has_table_encoder:
+        phases = mechanism.indices(Role.PHASE)
+        for number, variant in enumerate(mechanism.variants):
+            if (mechanism.needs_table or variant.needs_table) and not bench.has_table_encoder:
                 continue
-            known = _STARTS.get(f"{mechanism.id}.{name}") or _STARTS.get(mechanism.id)
-            if known:
-                values, strength, phase = known
-                points = values(scene)
-            else:
-                points, strength, phase = [tuple(0.5 * (p.low + p.high) for p in mechanism.parameters)], 0, -1
-            for point in points:
-                inside = tuple(
-                    min(max(value, p.low), p.high)
-                    for value, p in zip(point, BY_ID[mechanism.id].parameters, strict=True)
-                )
-                harmonics = (len(inside) - strength) // 2 if phase == strength + 1 else 1
-                found.append(Start(mechanism.id, variant, inside, strength, phase, harmonics))
+            strength, phase = mechanism.strength, next(iter(phases), -1)
+            if not (mechanism.proportional and variant.proportional):
+                strength = phase = -1
+            found += [
+                Start(mechanism.id, number, point, strength, phase, max(len(phases), 1))
+                for point in mechanism.start_points(number, scene)
+            ]
     return found

@@ -21,11 +21,9 @@ from hil.identification.dataset import TORQUE_ACCURACY
 from hil.identification.estimator import Fit, in_parallel
 from hil.identification.hypothesis import LAST_EDGE_STEP_S
 from hil.identification.terms import Term, compatible
+from hil.twin.library import LIBRARY
 
-_EFFECT = "preload_loss"
-# Gap, in units of the largest stretch to one side, and the stiffness in it: a nut that has lost its preload keeps a
-# tenth to a half.
-_STARTS = ((1.0, 0.15), (1.0, 0.4), (0.5, 0.15))
+_EFFECT, _STARTS = next((mechanism.id, mechanism.hidden_starts) for mechanism in LIBRARY if mechanism.hidden_starts)
 _FIRST = 20  # evaluations of a first fit: it starts farther from its end than those of a race
 _NARROWEST_M = 1e-6  # first gap where motor and table never separate
 
@@ -44,7 +42,7 @@ def may_hide(base: Fit) -> bool:
     return (
         len(base.bench.axis.physics().chain.names) > 2
         and bool(base.data.runs[0].table_m.size)
-        and compatible((*base.terms, Term(_EFFECT, 0, (0.0, 1.0)), *known))
+        and compatible((*base.terms, Term(_EFFECT, 0, _STARTS[0]), *known))
     )
 
 
@@ -53,7 +51,7 @@ def unbent(base: Fit) -> Fit:
     widest_m = max(stretches(base.data.runs, base.bench.axis.ratio_m_rad)[1], _NARROWEST_M)
     owner = base.hypothesis.moved(owner_points(base)[-1])
     search = replace(base.estimator, torque_accuracy=SEARCH_ACCURACY)
-    starts = [owner.with_term(Term(_EFFECT, 0, (share * widest_m, stiffness))) for share, stiffness in _STARTS]
+    starts = [owner.with_term(Term(_EFFECT, 0, (share * widest_m, *rest))) for share, *rest in _STARTS]
     best = min(
         in_parallel([partial(search.fit, start, soft=SOFT, evaluations=_FIRST) for start in starts]),
         key=lambda found: found.cost,

@@ -12,8 +12,14 @@ from collections.abc import Sequence
 from hil.diagnosis.search.forward_selection import Explanation
 from hil.diagnosis.verdict.cross_validation import Ablation
 from hil.diagnosis.verdict.findings import rivals_of
+from hil.twin.library import LIBRARY
 
-_FALLING, _DRAG = "stribeck_friction", ("nonlinear_viscous_friction", 0)
+_FALLING, _DRAG = next(
+    (variant.form_of, (mechanism.id, index))
+    for mechanism in LIBRARY
+    for index, variant in enumerate(mechanism.variants)
+    if variant.form_of
+)
 # Of the energy that the Stribeck law takes away, what a drag takes for its form. Fitted to an arctangent, with Coulomb
 # and viscous friction free, over 5 to 150 Stribeck velocities, drag takes up to 1.3 % beside the best of the laws; five
 # such contacts among development cases asked for up to 1.0 %. The laws themselves may differ by `explain.FORM`.

@@ -18,7 +18,7 @@ from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.terms import FRICTION, LOAD, SAME, Key, Term, ambiguous
 from hil.twin.library import BY_ID
-from hil.twin.mechanism import Dimension
+from hil.twin.mechanism import Dimension, Role
 
 # On development cases (seeds 931 and 941 of the proof's generator, 67 parameters) nine in ten errors are below 3.5
 # standard errors of the noise alone, 2.1 times 1.645: two honest simulations of one axis differ by that.
@@ -72,7 +72,7 @@ def findings(
                 ablation.train,
                 Finding(
                     effect=term.effect,
-                    variant=BY_ID[term.effect].variants[term.variant],
+                    variant=BY_ID[term.effect].forms[term.variant],
                     confidence=confidence(left, _factor(ablation), margin),
                     equivalents=tuple(dict.fromkeys(tied)),
                     rivals=tuple(
@@ -129,7 +129,7 @@ def diagnosed_bench(owner: Bench, found: Fit) -> Bench:
     entries = tuple(
         MechanismEntry(
             effect=term.effect,
-            variant=BY_ID[term.effect].variants[term.variant],
+            variant=BY_ID[term.effect].forms[term.variant],
             parameters=dict(zip(BY_ID[term.effect].names, _normal(term).values, strict=True)),
         )
         for term in found.terms
@@ -142,7 +142,7 @@ def diagnosed_bench(owner: Bench, found: Fit) -> Bench:
 def _normal(term: Term) -> Term:
     """Phases within one turn."""
     values = tuple(
-        math.remainder(value, 2.0 * math.pi) if parameter.name.startswith("phase") else value
+        math.remainder(value, 2.0 * math.pi) if parameter.role is Role.PHASE else value
         for value, parameter in zip(term.values, BY_ID[term.effect].parameters, strict=True)
     )
     return replace(term, values=values)

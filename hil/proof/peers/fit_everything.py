@@ -22,13 +22,10 @@ from hil.identification.estimator import POOL, Fit
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.terms import Term
 from hil.proof.peers.case import Answer, Case
+from hil.twin.library import BY_ID
 
 EVALUATIONS = 12  # a minute on two cores for half a minute of recordings
 SIGNIFICANT = 2.0  # standard errors
-# The parameter that says how strong a mechanism is, where its start cannot be scaled and it is not the first.
-_STRENGTH = {"structural_mode": 2}
-# No value of these is without effect but infinity or that of another parameter: that they change nothing says the same.
-_NEVER_ZERO = ("stribeck_friction", "presliding_hysteresis", "torque_saturation")
 
 
 def fit_everything(case: Case, evaluations: int = EVALUATIONS) -> Answer:
@@ -40,7 +37,7 @@ def fit_everything(case: Case, evaluations: int = EVALUATIONS) -> Answer:
     significant = [
         index
         for index, term in enumerate(terms)
-        if term.effect in _NEVER_ZERO or _strength_over_error(found, index, begun) > SIGNIFICANT
+        if not BY_ID[term.effect].neutral_at_zero or _strength_over_error(found, index) > SIGNIFICANT
     ]
     grown = dict(zip(significant, POOL.map(lambda index: _without(found, index), significant), strict=True))
     named = sorted(
@@ -59,11 +56,10 @@ def _weak(candidate: Candidate, start: Start) -> Term:
     return replace(candidate.term, values=tuple(values))
 
 
-def _strength_over_error(found: Fit, index: int, begun: dict[str, Start]) -> float:
+def _strength_over_error(found: Fit, index: int) -> float:
     """Strength of a term in standard errors; the logarithm of a value has its relative error."""
     term, hypothesis = found.terms[index], found.hypothesis
-    strength = max(begun[term.effect].strength, 0) if term.effect not in _STRENGTH else _STRENGTH[term.effect]
-    at = hypothesis.columns(index).start + strength
+    at = hypothesis.columns(index).start + BY_ID[term.effect].strength
     error = _standard_errors(found)[at]
     value = 1.0 if hypothesis.coordinates[at].logarithmic else abs(hypothesis.x[at])
     return float(value / max(error, 1e-300))

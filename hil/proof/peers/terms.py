@@ -15,9 +15,39 @@ from numpy.typing import NDArray
 
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
-from hil.diagnosis.search.initial_values import Scene
 from hil.identification.dataset import Measured
 from hil.proof.peers import signals
+from hil.twin.mechanism import Scene
+from hil.twin.mechanisms import (
+    asymmetric_friction,
+    backlash,
+    channel_time_skew,
+    cogging_torque,
+    constant_load,
+    cumulative_lead_error,
+    current_loop_lag,
+    encoder_eccentricity,
+    external_force,
+    friction_drift,
+    nonlinear_viscous_friction,
+    periodic_lead_error,
+    position_dependent_friction,
+    position_dependent_stiffness,
+    preload_loss,
+    presliding_hysteresis,
+    scale_interpolation_error,
+    spring_load,
+    stribeck_friction,
+    structural_mode,
+    table_side_friction,
+    thermal_growth,
+    torque_constant_saturation,
+    torque_dead_zone,
+    torque_ripple,
+    torque_saturation,
+    transport_delay,
+    velocity_filter_lag,
+)
 
 Effects = tuple[str, ...]
 
@@ -71,14 +101,16 @@ def _controller(run: Measured, bench: Bench, scene: Scene) -> Draft:
     velocity = signals.smooth(run.motor, run.period_s, 1)
     draft = Draft(run.torque_command - nominal, run.noise.torque, [], _judged(run), smooth=False)
     for time_s in _DELAYS_S:
-        draft.add(law(run.motor, time_s) - nominal, "velocity_filter_lag")
-        draft.add(law(run.motor + time_s * velocity, 0.0) - nominal, "channel_time_skew")
+        draft.add(law(run.motor, time_s) - nominal, velocity_filter_lag.MECHANISM.id)
+        draft.add(law(run.motor + time_s * velocity, 0.0) - nominal, channel_time_skew.MECHANISM.id)
     return draft
 
 
 def _drive(run: Measured, bench: Bench, scene: Scene) -> Draft:
     draft = Draft(run.torque - run.torque_command, run.noise.torque, [], _judged(run), smooth=False)
-    _add_torque_path(draft, run, run.torque_command, scene, -1.0, "transport_delay", "channel_time_skew")
+    _add_torque_path(
+        draft, run, run.torque_command, scene, -1.0, transport_delay.MECHANISM.id, channel_time_skew.MECHANISM.id
+    )
     return draft
 
 
@@ -91,13 +123,17 @@ def _add_torque_path(
     """
     for time_s in _DELAYS_S:
         draft.add(sign * (torque - signals.delayed(torque, time_s, run.period_s)), *late, negative=negative)
-        draft.add(sign * (torque - signals.lagged(torque, time_s, run.period_s)), "current_loop_lag", negative=negative)
+        draft.add(
+            sign * (torque - signals.lagged(torque, time_s, run.period_s)),
+            current_loop_lag.MECHANISM.id,
+            negative=negative,
+        )
     for share in _LIMITS:
         limit = share * scene.peak_torque
-        draft.add(sign * (torque - np.clip(torque, -limit, limit)), "torque_saturation")
+        draft.add(sign * (torque - np.clip(torque, -limit, limit)), torque_saturation.MECHANISM.id)
     for share in _DEAD_ZONES:
         width = share * scene.coulomb
-        draft.add(sign * np.clip(torque, -width, width), "torque_dead_zone")
+        draft.add(sign * np.clip(torque, -width, width), torque_dead_zone.MECHANISM.id)
 
 
 def _motor(run: Measured, bench: Bench, scene: Scene) -> Draft:
@@ -116,32 +152,37 @@ def _motor(run: Measured, bench: Bench, scene: Scene) -> Draft:
         nominal,
         _judged(run) & signals.sliding(ratio * velocity, period_s),
     )
-    draft.add(np.ones(motor.size), "asymmetric_friction", "constant_load")
-    draft.add(speed, "asymmetric_friction")
-    draft.add(position, "spring_load")
-    draft.add(_window(time_s, scene), "external_force")
+    draft.add(np.ones(motor.size), asymmetric_friction.MECHANISM.id, constant_load.MECHANISM.id)
+    draft.add(speed, asymmetric_friction.MECHANISM.id)
+    draft.add(position, spring_load.MECHANISM.id)
+    draft.add(_window(time_s, scene), external_force.MECHANISM.id)
     for slow_m_s in _STRIBECK_M_S:
-        draft.add(way * np.exp(-((speed / slow_m_s) ** 2)), "stribeck_friction")
-        draft.add(way * np.exp(-speed / slow_m_s), "stribeck_friction")
+        draft.add(way * np.exp(-((speed / slow_m_s) ** 2)), stribeck_friction.MECHANISM.id)
+        draft.add(way * np.exp(-speed / slow_m_s), stribeck_friction.MECHANISM.id)
     distance = signals.since_reversal(position, way)
     for length_m in _BRISTLES_M:
-        draft.add(way * np.exp(-distance / length_m), "presliding_hysteresis")
-    draft.add(velocity * np.abs(velocity), "nonlinear_viscous_friction")
-    draft.add(way * np.sqrt(speed), "nonlinear_viscous_friction")
+        draft.add(way * np.exp(-distance / length_m), presliding_hysteresis.MECHANISM.id)
+    draft.add(velocity * np.abs(velocity), nonlinear_viscous_friction.MECHANISM.id)
+    draft.add(way * np.sqrt(speed), nonlinear_viscous_friction.MECHANISM.id)
     for tau_s in _WARMING_S:
-        draft.add(friction * (1.0 - np.exp(-time_s / tau_s)), "friction_drift")
+        draft.add(friction * (1.0 - np.exp(-time_s / tau_s)), friction_drift.MECHANISM.id)
     for period_m in scene.friction_periods:
-        draft.add_wave(2.0 * pi * position / period_m, way, "position_dependent_friction")
+        draft.add_wave(2.0 * pi * position / period_m, way, position_dependent_friction.MECHANISM.id)
     for order in scene.orders:
-        draft.add_wave(order * angle, 1.0, "cogging_torque")
+        draft.add_wave(order * angle, 1.0, cogging_torque.MECHANISM.id)
     for order in dict.fromkeys((*scene.ripple_orders, *scene.orders)):
-        draft.add_wave(order * angle, command, "torque_ripple")
-    draft.add(command**3, "torque_constant_saturation")
-    _add_torque_path(draft, run, command, scene, 1.0, "transport_delay", negative=("channel_time_skew",))
+        draft.add_wave(order * angle, command, torque_ripple.MECHANISM.id)
+    draft.add(command**3, torque_constant_saturation.MECHANISM.id)
+    _add_torque_path(
+        draft, run, command, scene, 1.0, transport_delay.MECHANISM.id, negative=(channel_time_skew.MECHANISM.id,)
+    )
     for wave in (np.sin(angle), np.cos(angle)):
-        draft.add(signals.curvature(wave, period_s), "encoder_eccentricity")
+        draft.add(signals.curvature(wave, period_s), encoder_eccentricity.MECHANISM.id)
     for frequency_hz in _MODES_HZ if run.table_m.size else ():
-        draft.add(signals.swayed(signals.curvature(run.table_m, period_s), frequency_hz, period_s), "structural_mode")
+        draft.add(
+            signals.swayed(signals.curvature(run.table_m, period_s), frequency_hz, period_s),
+            structural_mode.MECHANISM.id,
+        )
     return draft
 
 
@@ -151,23 +192,28 @@ def _transmission(run: Measured, bench: Bench, scene: Scene) -> Draft:
     velocity, acceleration, jerk = (signals.smooth(table, period_s, order) for order in (1, 2, 3))
     nominal = [np.ones(table.size), acceleration, jerk, signals.smooth(table, period_s, 4)]
     draft = Draft(table - scene.ratio * run.motor, run.noise.table_m, nominal, _judged(run))
-    draft.add(velocity, "channel_time_skew")
-    draft.add(table, "cumulative_lead_error", "spring_load")
+    draft.add(velocity, channel_time_skew.MECHANISM.id)
+    draft.add(table, cumulative_lead_error.MECHANISM.id, spring_load.MECHANISM.id)
     for tau_s in _WARMING_S:
-        draft.add(table * (1.0 - np.exp(-time_s / tau_s)), "thermal_growth")
-    draft.add_wave(angle, 1.0, "periodic_lead_error", "encoder_eccentricity")
+        draft.add(table * (1.0 - np.exp(-time_s / tau_s)), thermal_growth.MECHANISM.id)
+    draft.add_wave(angle, 1.0, periodic_lead_error.MECHANISM.id, encoder_eccentricity.MECHANISM.id)
     for harmonic in (2.0, 3.0):
-        draft.add_wave(harmonic * angle, 1.0, "periodic_lead_error")
+        draft.add_wave(harmonic * angle, 1.0, periodic_lead_error.MECHANISM.id)
     for period_m in scene.scale_periods:
-        draft.add_wave(2.0 * pi * table / period_m, 1.0, "scale_interpolation_error")
-    draft.add(table * acceleration, "position_dependent_stiffness")
-    draft.add(signals.direction(velocity), "table_side_friction")
-    draft.add(_window(time_s, scene), "external_force")
+        draft.add_wave(2.0 * pi * table / period_m, 1.0, scale_interpolation_error.MECHANISM.id)
+    draft.add(table * acceleration, position_dependent_stiffness.MECHANISM.id)
+    draft.add(signals.direction(velocity), table_side_friction.MECHANISM.id)
+    draft.add(_window(time_s, scene), external_force.MECHANISM.id)
     for share in _PLAY:
         width = share * float(np.max(np.abs(acceleration)))
-        draft.add(np.clip(acceleration, -width, width) / width, "preload_loss" if share == _PLAY[-1] else "backlash")
+        draft.add(
+            np.clip(acceleration, -width, width) / width,
+            preload_loss.MECHANISM.id if share == _PLAY[-1] else backlash.MECHANISM.id,
+        )
     for frequency_hz in _MODES_HZ:
-        draft.add(signals.swayed(signals.curvature(table, period_s), frequency_hz, period_s), "structural_mode")
+        draft.add(
+            signals.swayed(signals.curvature(table, period_s), frequency_hz, period_s), structural_mode.MECHANISM.id
+        )
     return draft
 
 

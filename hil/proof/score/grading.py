@@ -11,12 +11,18 @@ from hil.proof.answer.answers import ABSENT, FAILED, Named, Reply
 from hil.proof.draw.expected import same_law
 from hil.proof.draw.generator import Concealed, Truth
 from hil.proof.score.distances import difference, overlap, relative_error
+from hil.twin.library import BY_ID, names_of
+from hil.twin.mechanism import Role
 
 NORMAL_90 = 1.645  # standard errors to either side of a 90 % interval
 ABOVE_FLOOR = 1.0  # size, in units of noise, from which on an effect is above the noise floor
 # Parameters that say where an effect is: scored as its place, not once more as its parameters.
-_PLACES = ("cycles_per_rev", "period_m", "start_s", "end_s", "frequency_hz")
-_PERIODS = ("period_m", "cycles_per_rev")
+_PLACES = names_of(Role.ORDER, Role.PERIOD, Role.EDGE, Role.FREQUENCY)
+
+
+def _has_frequency(effect: str) -> bool:
+    """Check that an effect of the library is scored by its frequency."""
+    return effect in BY_ID and bool(BY_ID[effect].indices(Role.FREQUENCY))
 
 
 @dataclass(frozen=True)
@@ -184,7 +190,7 @@ class Marked:
         return {
             name: difference(name, value, known[name]) <= NORMAL_90 * deviation
             for name, (value, deviation) in self._estimated().items()
-            if name != "cycles_per_rev"
+            if name not in names_of(Role.ORDER)
         }
 
     def nominal_errors(self) -> dict[str, float]:
@@ -194,19 +200,19 @@ class Marked:
 
     def period_error(self) -> float | None:
         """Relative error of the spatial period, infinite where none is given; None for what has no free period."""
-        if self.concealed is None or not set(_PERIODS) & set(self.concealed.parameters):
+        if self.concealed is None or not {*names_of(Role.PERIOD, Role.ORDER)} & set(self.concealed.parameters):
             return None
         lead_m = self.truth.true_parameters.get("lead_m") or self.truth.true_parameters["screw_lead_m"]
         true = float(self.concealed.place["period_m"])  # type: ignore[arg-type]
-        period_m, order = self._said("period_m"), self._said("cycles_per_rev", "order_per_rev")
+        period_m, order = self._said(Role.PERIOD, "period_m"), self._said(Role.ORDER, "order_per_rev")
         found = lead_m / order if order else period_m
         return abs(found / true - 1.0) if found else float("inf")
 
     def frequency_error(self) -> float | None:
         """Relative error of the frequency of a mode, infinite where none is given; None for other effects."""
-        if self.concealed is None or self.concealed.effect != "structural_mode":
+        if self.concealed is None or not _has_frequency(self.concealed.effect):
             return None
-        found = self._said("frequency_hz")
+        found = self._said(Role.FREQUENCY, "frequency_hz")
         true = float(self.concealed.place["frequency_hz"])  # type: ignore[arg-type]
         return abs(found / true - 1.0) if found else float("inf")
 
@@ -215,19 +221,15 @@ class Marked:
         if self.concealed is None or "window_s" not in self.concealed.place:
             return None
         named = self.first.parameters if self.first else {}
-        windows = (
-            [(named["start_s"][0], named["end_s"][0])]
-            if "start_s" in named
-            else self.reply.location.get("windows_s", [])
-        )
+        edges = [named[name][0] for name in names_of(Role.EDGE) if name in named]
+        windows = [(edges[0], edges[1])] if edges else self.reply.location.get("windows_s", [])
         return overlap(windows, *self.concealed.place["window_s"])  # type: ignore[misc]
 
-    def _said(self, name: str, in_location: str | None = None) -> float | None:
-        """A number that the first finding has, or else the location."""
-        if self.first and name in self.first.parameters:
-            return self.first.parameters[name][0]
-        found: float | None = self.reply.location.get(in_location or name)
-        return found
+    def _said(self, role: Role, key: str) -> float | None:
+        """The parameter of a role in the first finding, or else the entry of the location."""
+        named = self.first.parameters if self.first else {}
+        found: float | None = next((named[name][0] for name in names_of(role) if name in named), None)
+        return self.reply.location.get(key) if found is None else found
 
     def _estimated(self) -> dict[str, tuple[float, float]]:
         if not self.top or self.first is None:

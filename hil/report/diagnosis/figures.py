@@ -16,7 +16,7 @@ from hil.report.diagnosis.curves import drive, friction, lost_motion
 from hil.report.diagnosis.view import (
     AFTER,
     NAMES,
-    Picture,
+    Draw,
     Shown,
     View,
     angle,
@@ -31,6 +31,8 @@ from hil.report.diagnosis.view import (
 )
 from hil.report.figures import style_axis
 from hil.report.style import shown
+from hil.twin.library import BY_ID
+from hil.twin.mechanism import Picture
 
 _BINS = 120
 _PER_BIN = 60  # samples on average, where a recording is short
@@ -39,7 +41,7 @@ _SHORT = 6  # periods in the travel, from which on they are laid over each other
 
 def convincing(diagnosis: Diagnosis, term: Term) -> Shown:
     """The picture that shows an engineer a mechanism that was found in the recordings."""
-    picture = _PICTURES.get(term.effect, _over_time)
+    picture = _PICTURES[BY_ID[term.effect].picture]
     # a friction curve needs every feed there is; all else is shown where it was not fitted
     train, held_out = diagnosis.train.runs, diagnosis.held_out.runs
     runs = (*train, *held_out) if picture is friction else held_out or train
@@ -55,7 +57,7 @@ def _over(
     bins: int = _BINS,
     against_motion: bool = False,
     per_torque: bool = False,
-) -> Picture:
+) -> Draw:
     """A picture of the residual over a quantity: measured as points, what the terms explain as a line."""
 
     def picture(diagnosis: Diagnosis, views: Sequence[View]) -> Shown:
@@ -194,22 +196,18 @@ def _friction_along_travel(diagnosis: Diagnosis, views: Sequence[View]) -> Shown
     return picture(diagnosis, views)
 
 
-_PICTURES: dict[str, Picture] = {
-    **dict.fromkeys(
-        ("asymmetric_friction", "constant_load", "stribeck_friction", "nonlinear_viscous_friction"), friction
-    ),
-    "position_dependent_friction": _friction_along_travel,
-    "spring_load": _over("position", position, "mm"),
-    "cogging_torque": _over("motor angle", angle, "deg", bins=240),
-    "torque_ripple": _over("motor angle", angle, "deg", bins=240, per_torque=True),
-    "encoder_eccentricity": _over("motor angle", angle, "deg", "table"),
-    "periodic_lead_error": _over("screw angle", angle, "deg", "table"),
-    "cumulative_lead_error": _over("position", position, "mm", "table"),
-    "scale_interpolation_error": _over("position within the signal period", _within_period, "µm", "table", bins=40),
-    **dict.fromkeys(("backlash", "preload_loss"), lost_motion),
-    **dict.fromkeys(
-        ("torque_constant_saturation", "torque_saturation", "torque_dead_zone", "current_loop_lag", "transport_delay"),
-        _drive_law,
-    ),
-    "structural_mode": _spectrum,
+_PICTURES: dict[Picture, Draw] = {
+    Picture.TIME: _over_time,
+    Picture.FRICTION: friction,
+    Picture.FRICTION_ALONG_TRAVEL: _friction_along_travel,
+    Picture.POSITION: _over("position", position, "mm"),
+    Picture.POSITION_TABLE: _over("position", position, "mm", "table"),
+    Picture.MOTOR_ANGLE: _over("motor angle", angle, "deg", bins=240),
+    Picture.MOTOR_ANGLE_PER_TORQUE: _over("motor angle", angle, "deg", bins=240, per_torque=True),
+    Picture.MOTOR_ANGLE_TABLE: _over("motor angle", angle, "deg", "table"),
+    Picture.SCREW_ANGLE: _over("screw angle", angle, "deg", "table"),
+    Picture.SIGNAL_PERIOD: _over("position within the signal period", _within_period, "µm", "table", bins=40),
+    Picture.LOST_MOTION: lost_motion,
+    Picture.DRIVE_LAW: _drive_law,
+    Picture.SPECTRUM: _spectrum,
 }

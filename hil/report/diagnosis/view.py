@@ -40,7 +40,7 @@ class View:
     torque_modelled: Disturbance
 
 
-Picture = Callable[[Diagnosis, Sequence[View]], Shown]
+Draw = Callable[[Diagnosis, Sequence[View]], Shown]
 NAMES = {"motor": "torque on the motor", "table": "table against motor", "torque": "torque", "command": "command"}
 
 

@@ -1,12 +1,22 @@
 """Asymmetric friction: friction differs by direction, alike at every speed or the more the faster."""
 
-from __future__ import annotations
-
 from collections.abc import MutableSequence, Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import PARAMETERS, Block, Dimension, Mechanism, Moment, Parameter, Stage
+from hil.twin.mechanism import (
+    PARAMETERS,
+    AxisFacts,
+    Block,
+    Dimension,
+    Mechanism,
+    Moment,
+    Parameter,
+    Picture,
+    Role,
+    Stage,
+    Variant,
+)
 
 
 @njit
@@ -19,19 +29,35 @@ def _offset(value: float, at: Moment, parameters: Sequence[float], memory: Mutab
     return value + offset * abs(at.velocity) / at.viscous_speed
 
 
+def _valid(values: Sequence[float], variant: int, axis: AxisFacts) -> bool:
+    """Check that an offset alike at every speed is below Coulomb friction: above, it would drive the axis."""
+    return variant != 0 or abs(values[0]) <= axis.coulomb
+
+
 MECHANISM = Mechanism(
     id="asymmetric_friction",
     block=Block.MOTOR_SIDE,
     element="ball nut, seals and guideways",
     sentence="Friction in positive direction is {offset_torque_n_m} above the mean of both directions.",
-    second_sentence="Friction differs by direction, the more the faster: at {viscous_speed}, where viscous friction "
-    "equals Coulomb friction, it is {offset_torque_n_m} above the mean of both in positive direction.",
     equation="T_f = Fc sign(v) + T_0; at rest T_0 - Fc <= T_f <= T_0 + Fc; with speed: T_0 |v| / v_r, v_r = Fc / c",
     source="Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30 (1994) 1083, direction dependence; its "
     "slope over speed differs by direction too: Armstrong-Hélouvry, Control of Machines with Friction (1991)",
-    parameters=(Parameter("offset_torque_n_m", Dimension.TORQUE, -1e3, 1e3),),
-    stage=Stage.BIAS,
-    contribution=_offset,
-    variants=("", "with speed"),
-    second_stage=Stage.DRAG,
+    parameters=(Parameter("offset_torque_n_m", Dimension.TORQUE, -1e3, 1e3, role=Role.STRENGTH),),
+    variants=(
+        Variant(Stage.BIAS, _offset),
+        Variant(
+            Stage.DRAG,
+            _offset,
+            "with speed",
+            sentence=(
+                "Friction differs by direction, the more the faster: at {viscous_speed}, where viscous friction "
+                "equals Coulomb friction, it is {offset_torque_n_m} above the mean of both in positive direction."
+            ),
+        ),
+    ),
+    starts=lambda s: [(0.05 * s.coulomb,)],
+    typical=lambda a: (0.1 * a.friction,),
+    valid=_valid,
+    picture=Picture.FRICTION,
+    same_as="constant_load",
 )

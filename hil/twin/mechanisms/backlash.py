@@ -3,13 +3,11 @@
 Oiled flanks are held by their damping when they part, dry flanks only push.
 """
 
-from __future__ import annotations
-
 from collections.abc import MutableSequence, Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Stage
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Stage, Variant
 
 
 @njit
@@ -29,10 +27,15 @@ MECHANISM = Mechanism(
     sentence="There are {gap_m} of lost motion between screw and table.",
     equation="T = k dz(q, gap/2): no torque while |q| < gap/2",
     source="Nordin and Gutman, Automatica 38 (2002) 1633, dead-zone model",
-    parameters=(Parameter("gap_m", Dimension.LENGTH, 0.0, 1e-3),),
-    stage=Stage.TRANSMISSION,
-    contribution=_free_play,
-    variants=("oiled flanks", "dry flanks"),
+    parameters=(Parameter("gap_m", Dimension.LENGTH, 0.0, 1e-3, role=Role.STRENGTH),),
+    variants=(
+        Variant(Stage.TRANSMISSION, _free_play, "oiled flanks"),
+        Variant(Stage.TRANSMISSION, _free_play, "dry flanks", play=True),
+    ),
+    starts=lambda s: [(f * s.stretch,) for f in (0.5, 1.0, 2.0, 4.0)],
+    typical=lambda a: (3e-6,),
+    proportional=False,
+    needs_table=True,
+    picture=Picture.LOST_MOTION,
     softens=True,
-    play=True,
 )

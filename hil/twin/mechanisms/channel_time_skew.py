@@ -1,14 +1,12 @@
 """Channel time skew: one recorded channel is late against the others."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 
 import numpy as np
 
 from hil.arrays import FloatArray
-from hil.twin.mechanism import Block, Dimension, Mechanism, Parameter, Stage
+from hil.twin.mechanism import Block, Dimension, Mechanism, Parameter, Role, Stage, Variant
 
 Channels = tuple[FloatArray, ...]  # motor position, table position, torque command, torque
 
@@ -61,8 +59,12 @@ MECHANISM = Mechanism(
     sentence="The channel is recorded {delay_s} late against the others.",
     equation="y_recorded(t) = y(t - delay)",
     source="Keys, IEEE Trans. Acoustics, Speech, and Signal Processing 29 (1981) 1153, cubic convolution",
-    parameters=(Parameter("delay_s", Dimension.TIME, -0.01, 0.01),),
-    stage=Stage.CHANNEL,
-    contribution=_skewed,
-    variants=tuple(_VARIANTS),
+    parameters=(Parameter("delay_s", Dimension.TIME, -0.01, 0.01, role=Role.STRENGTH),),
+    variants=(
+        Variant(Stage.CHANNEL, _skewed, "table_position", needs_table=True),
+        Variant(Stage.CHANNEL, _skewed, "torque"),
+        Variant(Stage.CHANNEL, _skewed, "motor_position"),
+    ),
+    starts=lambda s: [(2e-4,)],
+    typical=lambda a: (2e-4,),
 )

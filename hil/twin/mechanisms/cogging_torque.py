@@ -1,13 +1,11 @@
 """Cogging torque: the magnets pull towards the teeth, whatever the current."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import MutableSequence, Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Stage
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Stage, Variant
 
 
 @njit
@@ -23,11 +21,14 @@ MECHANISM = Mechanism(
     equation="T = u + A sin(n theta + phi)",
     source="Jahns and Soong, IEEE Trans. Industrial Electronics 43 (1996) 321, cogging torque",
     parameters=(
-        Parameter("amplitude_n_m", Dimension.TORQUE, 0.0, 1e3),
-        Parameter("cycles_per_rev", Dimension.COUNT, 1.0, 200.0),
-        Parameter("phase_rad", Dimension.ANGLE, -2.0 * math.pi, 2.0 * math.pi),
+        Parameter("amplitude_n_m", Dimension.TORQUE, 0.0, 1e3, role=Role.STRENGTH),
+        Parameter("cycles_per_rev", Dimension.COUNT, 1.0, 200.0, role=Role.ORDER),
+        Parameter("phase_rad", Dimension.ANGLE, -2.0 * math.pi, 2.0 * math.pi, role=Role.PHASE),
     ),
-    stage=Stage.MOTOR_TORQUE,
-    contribution=_cogging,
+    variants=(Variant(Stage.MOTOR_TORQUE, _cogging),),
+    starts=lambda s: [(0.01 * s.coulomb, order, 0.0) for order in s.orders],
+    typical=lambda a: (0.02 * a.rated_torque, 12.0, 0.0),
+    picture=Picture.MOTOR_ANGLE,
     most=2,
+    screw_locked=True,
 )

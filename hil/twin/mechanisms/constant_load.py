@@ -3,13 +3,11 @@
 A positive load pulls the axis in the negative direction: it takes a positive motor torque to hold it.
 """
 
-from __future__ import annotations
-
 from collections.abc import MutableSequence, Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Stage
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Stage, Variant
 
 
 @njit
@@ -24,7 +22,9 @@ MECHANISM = Mechanism(
     sentence="A constant load of {load_torque_n_m}, such as a weight, acts on the axis, also at standstill.",
     equation="T = u - T_load",
     source="Groß, Hamann and Wiegärtner, Electrical Feed Drives in Automation (2001), weight of an axis",
-    parameters=(Parameter("load_torque_n_m", Dimension.TORQUE, -1e4, 1e4),),
-    stage=Stage.MOTOR_TORQUE,
-    contribution=_load,
+    parameters=(Parameter("load_torque_n_m", Dimension.TORQUE, -1e4, 1e4, role=Role.STRENGTH),),
+    variants=(Variant(Stage.MOTOR_TORQUE, _load),),
+    starts=lambda s: [(0.05 * s.coulomb,)],
+    typical=lambda a: (0.1 * a.friction,),
+    picture=Picture.FRICTION,
 )

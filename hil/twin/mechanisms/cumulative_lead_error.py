@@ -1,12 +1,10 @@
 """Cumulative lead error: an error of the lead that grows along the travel."""
 
-from __future__ import annotations
-
 from collections.abc import MutableSequence, Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Stage
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Stage, Variant
 
 
 @njit
@@ -22,7 +20,10 @@ MECHANISM = Mechanism(
     sentence="The lead is wrong: the table goes {slope_m_m} too far for each metre of travel.",
     equation="x = (1 + s) r theta",
     source="ISO 3408-3:2006, mean travel deviation",
-    parameters=(Parameter("slope_m_m", Dimension.RATIO, -5e-3, 5e-3),),
-    stage=Stage.TRANSMISSION,
-    contribution=_longer_lead,
+    parameters=(Parameter("slope_m_m", Dimension.RATIO, -5e-3, 5e-3, role=Role.STRENGTH),),
+    variants=(Variant(Stage.TRANSMISSION, _longer_lead),),
+    starts=lambda s: [(1e-6 / s.travel_m,)],
+    typical=lambda a: (20e-6,),
+    needs_table=True,
+    picture=Picture.POSITION_TABLE,
 )

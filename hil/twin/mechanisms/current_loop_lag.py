@@ -1,13 +1,11 @@
 """Current loop lag: the current follows its command late."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import MutableSequence, Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Stage
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Stage, Variant
 
 
 @njit
@@ -34,9 +32,13 @@ MECHANISM = Mechanism(
     sentence="The motor current follows its command with a time constant of {time_constant_s}.",
     equation="tau dT/dt = u - T",
     source="Leonhard, Control of Electrical Drives, 3rd ed. (2001), current loop as an equivalent lag",
-    parameters=(Parameter("time_constant_s", Dimension.TIME, 1e-5, 0.05),),
-    stage=Stage.CURRENT,
-    contribution=_lagging_current,
-    variants=("measured", "hidden"),
-    second_stage=Stage.TORQUE,
+    parameters=(Parameter("time_constant_s", Dimension.TIME, 1e-5, 0.05, role=Role.STRENGTH),),
+    variants=(
+        Variant(Stage.CURRENT, _lagging_current, "measured"),
+        Variant(Stage.TORQUE, _lagging_current, "hidden"),
+    ),
+    starts=lambda s: [(2e-4,), (1e-3,)],
+    typical=lambda a: (5e-4,),
+    proportional=False,
+    picture=Picture.DRIVE_LAW,
 )

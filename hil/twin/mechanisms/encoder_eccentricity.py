@@ -3,14 +3,12 @@
 On a linear axis, which has its motor encoder read as metres, the amplitude is in metres too.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import MutableSequence, Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Stage
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Stage, Variant
 
 
 @njit
@@ -26,9 +24,11 @@ MECHANISM = Mechanism(
     equation="theta_read = theta + A sin(theta + phi), A = eccentricity / graduation radius",
     source="Heidenhain, Angle Encoders without Integral Bearing (catalogue), eccentricity of the graduation",
     parameters=(
-        Parameter("amplitude_rad", Dimension.ANGLE, 0.0, 0.1),
-        Parameter("phase_rad", Dimension.ANGLE, -2.0 * math.pi, 2.0 * math.pi),
+        Parameter("amplitude_rad", Dimension.ANGLE, 0.0, 0.1, role=Role.STRENGTH),
+        Parameter("phase_rad", Dimension.ANGLE, -2.0 * math.pi, 2.0 * math.pi, role=Role.PHASE),
     ),
-    stage=Stage.MOTOR_READING,
-    contribution=_eccentric_reading,
+    variants=(Variant(Stage.MOTOR_READING, _eccentric_reading),),
+    starts=lambda s: [(1e-4, 0.0)],
+    typical=lambda a: (2e-4 / a.angle_per_unit, 0.0),
+    picture=Picture.MOTOR_ANGLE_TABLE,
 )

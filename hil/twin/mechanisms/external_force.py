@@ -1,12 +1,10 @@
 """External force: something pushes the table during a window of time."""
 
-from __future__ import annotations
-
 from collections.abc import MutableSequence, Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Stage
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Role, Stage, Variant
 
 
 @njit
@@ -27,10 +25,12 @@ MECHANISM = Mechanism(
     equation="F_table = F for start <= t < end, else 0",
     source="Newton's second law; such as the pneumatic cylinder that loads the table of the source's test bench",
     parameters=(
-        Parameter("force_n", Dimension.FORCE, -1e5, 1e5),
-        Parameter("start_s", Dimension.TIME, 0.0, 1e5),
-        Parameter("end_s", Dimension.TIME, 0.0, 1e5),
+        Parameter("force_n", Dimension.FORCE, -1e5, 1e5, role=Role.STRENGTH),
+        Parameter("start_s", Dimension.TIME, 0.0, 1e5, role=Role.EDGE),
+        Parameter("end_s", Dimension.TIME, 0.0, 1e5, role=Role.EDGE),
     ),
-    stage=Stage.TABLE_FORCE,
-    contribution=_push,
+    variants=(Variant(Stage.TABLE_FORCE, _push),),
+    starts=lambda s: [(s.window[2] / s.ratio or 1.0, s.window[0], s.window[1])],
+    typical=lambda a: (0.2 * a.friction / a.ratio, 0.5 * a.duration_s, 0.5 * a.duration_s + 1.0),
+    transient=True,
 )

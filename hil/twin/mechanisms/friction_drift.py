@@ -1,13 +1,11 @@
 """Friction drift: friction changes as the axis warms up."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import MutableSequence, Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Stage
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Role, Stage, Variant
 
 
 @njit
@@ -26,9 +24,10 @@ MECHANISM = Mechanism(
     equation="F(t) = F (1 + a (1 - exp(-t/tau)))",
     source="Bittencourt and Gunnarsson, ASME J. Dynamic Systems, Measurement, and Control 134 (2012) 051013",
     parameters=(
-        Parameter("fraction", Dimension.RATIO, -0.95, 5.0),
+        Parameter("fraction", Dimension.RATIO, -0.95, 5.0, role=Role.STRENGTH),
         Parameter("time_constant_s", Dimension.TIME, 1.0, 1e4),
     ),
-    stage=Stage.FRICTION_SCALE,
-    contribution=_warming,
+    variants=(Variant(Stage.FRICTION_SCALE, _warming),),
+    starts=lambda s: [(0.05, f * s.duration_s) for f in (0.2, 1.0, 5.0)],
+    typical=lambda a: (0.2, 600.0),
 )

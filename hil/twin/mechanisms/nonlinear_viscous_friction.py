@@ -3,14 +3,12 @@
 It departs with the square of the speed or, as in grease and oils that thin when they are sheared, with its root.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import MutableSequence, Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import PARAMETERS, Block, Dimension, Mechanism, Moment, Parameter, Stage
+from hil.twin.mechanism import PARAMETERS, Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Stage, Variant
 
 
 @njit
@@ -31,14 +29,26 @@ MECHANISM = Mechanism(
     block=Block.MOTOR_SIDE,
     element="lubricant of nut and bearings",
     sentence="Drag departs from linear in speed by {quadratic_n_m_s2_rad2} times the square of the speed.",
-    second_sentence="Drag rises steeply from rest and then ever less, with the root of the speed: at {viscous_speed} "
-    "by {quadratic_n_m_s2_rad2} times the square of that speed.",
     equation="F = Fc sign(v) + c v + q v |v|; thinning: + q v_r^2 sqrt(|v| / v_r) sign(v), q >= 0, v_r = Fc / c, "
     "which for q v_r^2 = 2 Fc is the law of Casson, |F| = (sqrt(Fc) + sqrt(c |v|))^2",
     source="Olsson et al., Friction models and friction compensation, European J. Control 4 (1998) 176; thinning: "
     "Casson, in Mill (ed.), Rheology of Disperse Systems (1959) 84",
-    parameters=(Parameter("quadratic_n_m_s2_rad2", Dimension.MOTOR_DRAG, -1e5, 1e5),),
-    stage=Stage.DRAG,
-    contribution=_drag,
-    variants=("", "thinning lubricant"),
+    parameters=(Parameter("quadratic_n_m_s2_rad2", Dimension.MOTOR_DRAG, -1e5, 1e5, role=Role.STRENGTH),),
+    variants=(
+        Variant(Stage.DRAG, _drag, form_of="stribeck_friction"),
+        Variant(
+            Stage.DRAG,
+            _drag,
+            "thinning lubricant",
+            sentence=(
+                "Drag rises steeply from rest and then ever less, with the root of the speed: at {viscous_speed} "
+                "by {quadratic_n_m_s2_rad2} times the square of that speed."
+            ),
+            starts=lambda s: [(f * s.coulomb / s.viscous_speed**2,) for f in (0.1, 1.0)],
+            proportional=False,
+        ),
+    ),
+    starts=lambda s: [(0.05 * s.coulomb / s.peak_speed**2,)],
+    typical=lambda a: (0.2 * a.friction / (0.3 / a.ratio) ** 2,),
+    picture=Picture.FRICTION,
 )

@@ -3,14 +3,12 @@
 A ground screw hardly ever errs by a pure sine: three harmonics are one cause.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import MutableSequence, Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Stage
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Stage, Variant
 
 
 @njit
@@ -32,13 +30,16 @@ MECHANISM = Mechanism(
     equation="x = r theta + sum over n = 1, 2, 3 of A_n sin(n theta + phi_n)",
     source="ISO 3408-3:2006, travel variation within 2 pi rad; ISO 230-2, bidirectional positioning",
     parameters=(
-        Parameter("amplitude_m", Dimension.LENGTH, 0.0, 1e-3),
-        Parameter("phase_rad", Dimension.ANGLE, -2.0 * math.pi, 2.0 * math.pi),
-        Parameter("amplitude_2_m", Dimension.LENGTH, 0.0, 1e-3, 0.0),
-        Parameter("phase_2_rad", Dimension.ANGLE, -2.0 * math.pi, 2.0 * math.pi, 0.0),
-        Parameter("amplitude_3_m", Dimension.LENGTH, 0.0, 1e-3, 0.0),
-        Parameter("phase_3_rad", Dimension.ANGLE, -2.0 * math.pi, 2.0 * math.pi, 0.0),
+        Parameter("amplitude_m", Dimension.LENGTH, 0.0, 1e-3, role=Role.STRENGTH),
+        Parameter("phase_rad", Dimension.ANGLE, -2.0 * math.pi, 2.0 * math.pi, role=Role.PHASE),
+        Parameter("amplitude_2_m", Dimension.LENGTH, 0.0, 1e-3, 0.0, role=Role.STRENGTH),
+        Parameter("phase_2_rad", Dimension.ANGLE, -2.0 * math.pi, 2.0 * math.pi, 0.0, role=Role.PHASE),
+        Parameter("amplitude_3_m", Dimension.LENGTH, 0.0, 1e-3, 0.0, role=Role.STRENGTH),
+        Parameter("phase_3_rad", Dimension.ANGLE, -2.0 * math.pi, 2.0 * math.pi, 0.0, role=Role.PHASE),
     ),
-    stage=Stage.TRANSMISSION,
-    contribution=_wobble,
+    variants=(Variant(Stage.TRANSMISSION, _wobble),),
+    starts=lambda s: [(0.5e-6, 0.0, 0.0, 0.0, 0.0, 0.0)],
+    typical=lambda a: (2e-6, 0.0),
+    needs_table=True,
+    picture=Picture.SCREW_ANGLE,
 )

@@ -1,13 +1,11 @@
 """Position-dependent friction: friction varies along the travel."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import MutableSequence, Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Stage
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Stage, Variant
 
 
 @njit
@@ -26,11 +24,14 @@ MECHANISM = Mechanism(
     equation="F = Fc (1 + a sin(2 pi x / p + phi))",
     source="Armstrong-Hélouvry, Control of Machines with Friction (1991), position-dependent friction",
     parameters=(
-        Parameter("fraction", Dimension.RATIO, 0.0, 1.0),
-        Parameter("period_m", Dimension.LENGTH, 1e-4, 1.0),
-        Parameter("phase_rad", Dimension.ANGLE, -2.0 * math.pi, 2.0 * math.pi),
+        Parameter("fraction", Dimension.RATIO, 0.0, 1.0, role=Role.STRENGTH),
+        Parameter("period_m", Dimension.LENGTH, 1e-4, 1.0, role=Role.PERIOD),
+        Parameter("phase_rad", Dimension.ANGLE, -2.0 * math.pi, 2.0 * math.pi, role=Role.PHASE),
     ),
-    stage=Stage.COULOMB,
-    contribution=_level_along_travel,
+    variants=(Variant(Stage.COULOMB, _level_along_travel),),
+    starts=lambda s: [(0.05, p, 0.0) for p in s.friction_periods],
+    typical=lambda a: (0.1, 0.1, 0.0),
+    picture=Picture.FRICTION_ALONG_TRAVEL,
     most=2,
+    screw_locked=True,
 )

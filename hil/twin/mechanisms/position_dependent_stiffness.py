@@ -1,12 +1,10 @@
 """Position-dependent stiffness: the screw is stiffer or softer with the position of its nut."""
 
-from __future__ import annotations
-
 from collections.abc import MutableSequence, Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Stage
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Role, Stage, Variant
 
 
 @njit
@@ -23,8 +21,10 @@ MECHANISM = Mechanism(
     sentence="The stiffness of the screw changes by a share of {relative_slope} for each metre of travel.",
     equation="T = k max(1 + s x, 0) q,   k: torsion and axial give of the screw, one after the other",
     source="Zaeh, Oertli and Milberg, CIRP Annals 53 (2004) 289, screw stiffness over the position of its nut",
-    parameters=(Parameter("relative_slope", Dimension.PER_LENGTH, -10.0, 10.0),),
-    stage=Stage.SCREW,
-    contribution=_stiffness_along_travel,
+    parameters=(Parameter("relative_slope", Dimension.PER_LENGTH, -10.0, 10.0, role=Role.STRENGTH),),
+    variants=(Variant(Stage.SCREW, _stiffness_along_travel),),
+    starts=lambda s: [(0.1 / s.travel_m,)],
+    typical=lambda a: (0.5,),
+    needs_table=True,
     softens=True,
 )

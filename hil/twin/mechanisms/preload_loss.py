@@ -1,12 +1,10 @@
 """Preload loss: the transmission is soft around zero load."""
 
-from __future__ import annotations
-
 from collections.abc import MutableSequence, Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Stage
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Stage, Variant
 
 
 @njit
@@ -27,10 +25,18 @@ MECHANISM = Mechanism(
     equation="T = k e(q), de/dq = rho for |q| < zone/2, else 1",
     source="ISO 3408-4:2006, axial rigidity of preloaded nuts; Feng and Pan, Int. J. Machine Tools 52 (2012) 85",
     parameters=(
-        Parameter("zone_m", Dimension.LENGTH, 0.0, 1e-3),
+        Parameter("zone_m", Dimension.LENGTH, 0.0, 1e-3, role=Role.STRENGTH),
         Parameter("stiffness_ratio", Dimension.RATIO, 0.0, 1.0),
     ),
-    stage=Stage.TRANSMISSION,
-    contribution=_soft_zone,
+    variants=(Variant(Stage.TRANSMISSION, _soft_zone),),
+    starts=lambda s: (
+        [(f * s.stretch, 0.4) for f in (0.5, 1.0, 2.0)] + [(f * s.most_stretch, 0.4) for f in (0.5, 1.0, 1.5)]
+    ),
+    typical=lambda a: (3e-6, 0.5),
+    proportional=False,
+    needs_table=True,
+    picture=Picture.LOST_MOTION,
     softens=True,
+    # a nut that has lost its preload keeps a tenth to a half of its stiffness
+    hidden_starts=((1.0, 0.15), (1.0, 0.4), (0.5, 0.15)),
 )

@@ -1,12 +1,10 @@
 """Presliding hysteresis: elastic micro-motion of the contact before it slides."""
 
-from __future__ import annotations
-
 from collections.abc import MutableSequence, Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Stage
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Role, Stage, Variant
 
 
 @njit
@@ -19,15 +17,26 @@ MECHANISM = Mechanism(
     block=Block.MOTOR_SIDE,
     element="ball nut and guideways",
     sentence="Before it slides, the contact yields like a spring of {stiffness_n_m_rad}.",
-    second_sentence="Before it slides, the contact yields like a spring of {stiffness_n_m_rad}, and like it again from "
-    "wherever it turns.",
     equation="F = sigma z, dz/dt = v (1 - sigma z sign(v) / F(v)); Maxwell slip: F = sum of f_i, df_i/dt = k_i v while "
     "|f_i| < y_i",
     source="Dahl, A solid friction model (1968); Canudas de Wit et al., IEEE Trans. Automatic Control 40 (1995) 419; "
     "Al-Bender, Lampaert and Swevers, IEEE Trans. Automatic Control 50 (2005) 1883",
-    parameters=(Parameter("stiffness_n_m_rad", Dimension.MOTOR_STIFFNESS, 1.0, 1e10),),
-    stage=Stage.BRISTLE,
-    contribution=_contact_stiffness,
-    variants=("Dahl", "Maxwell slip"),
-    slips=True,
+    parameters=(Parameter("stiffness_n_m_rad", Dimension.MOTOR_STIFFNESS, 1.0, 1e10, role=Role.STRENGTH),),
+    variants=(
+        Variant(Stage.BRISTLE, _contact_stiffness, "Dahl"),
+        Variant(
+            Stage.BRISTLE,
+            _contact_stiffness,
+            "Maxwell slip",
+            sentence=(
+                "Before it slides, the contact yields like a spring of {stiffness_n_m_rad}, and like it again from "
+                "wherever it turns."
+            ),
+            slips=True,
+        ),
+    ),
+    starts=lambda s: [(s.coulomb * s.ratio / d,) for d in (0.3e-6, 1e-6, 4e-6, 16e-6)],
+    typical=lambda a: (a.friction * a.ratio / 5e-6,),
+    proportional=False,
+    neutral_at_zero=False,
 )

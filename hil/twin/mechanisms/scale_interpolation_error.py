@@ -1,13 +1,23 @@
 """Interpolation error of the scale: the linear encoder errs within its signal period."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import MutableSequence, Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Stage
+from hil.twin.mechanism import (
+    AxisFacts,
+    Block,
+    Dimension,
+    Mechanism,
+    Moment,
+    Parameter,
+    Picture,
+    Role,
+    Scene,
+    Stage,
+    Variant,
+)
 
 
 @njit
@@ -20,6 +30,25 @@ def _interpolated_reading(
     return value + amplitude_m * math.sin(2.0 * math.pi * at.table_position_m / period_m + phase_rad)
 
 
+_LONGEST_M = 1e-2  # signal period
+# Counting errs as a sawtooth, whose fundamental is 1/pi of a count: an amplitude up to a quarter more is counting,
+# which has no period longer than a millimetre.
+_COUNTING = 1.25 / math.pi
+_LONG_PERIOD_M = 1e-3
+
+
+def _starts(s: Scene) -> list[tuple[float, ...]]:
+    """At the periods of the residual, and at the lead of the screw."""
+    lead = [s.lead_m] if s.lead_m < s.travel_m and round(s.lead_m, 9) <= _LONGEST_M else []
+    return [(1e-7, period_m, 0.0) for period_m in (*s.scale_periods, *lead)]
+
+
+def _valid(values: Sequence[float], variant: int, axis: AxisFacts) -> bool:
+    """Check that the error is more than counting of the linear encoder makes."""
+    amplitude_m, period_m, _ = values
+    return not axis.table_count_m or period_m > _LONG_PERIOD_M or amplitude_m > _COUNTING * axis.table_count_m
+
+
 MECHANISM = Mechanism(
     id="scale_interpolation_error",
     block=Block.SENSOR,
@@ -28,10 +57,14 @@ MECHANISM = Mechanism(
     equation="x_read = x + A sin(2 pi x / p + phi)",
     source="Heydemann, Quadrature fringe measurement errors in interferometers, Applied Optics 20 (1981) 3382",
     parameters=(
-        Parameter("amplitude_m", Dimension.LENGTH, 0.0, 1e-4),
-        Parameter("period_m", Dimension.LENGTH, 1e-6, 1e-2),
-        Parameter("phase_rad", Dimension.ANGLE, -2.0 * math.pi, 2.0 * math.pi),
+        Parameter("amplitude_m", Dimension.LENGTH, 0.0, 1e-4, role=Role.STRENGTH),
+        Parameter("period_m", Dimension.LENGTH, 1e-6, _LONGEST_M, role=Role.PERIOD),
+        Parameter("phase_rad", Dimension.ANGLE, -2.0 * math.pi, 2.0 * math.pi, role=Role.PHASE),
     ),
-    stage=Stage.TABLE_READING,
-    contribution=_interpolated_reading,
+    variants=(Variant(Stage.TABLE_READING, _interpolated_reading),),
+    starts=_starts,
+    typical=lambda a: (max(0.5 * (a.table_count_m or 1e-7), 1e-7), 20e-6, 0.0),
+    valid=_valid,
+    needs_table=True,
+    picture=Picture.SIGNAL_PERIOD,
 )

@@ -1,17 +1,41 @@
 """Spring load: a force on the table proportional to its position."""
 
-from __future__ import annotations
-
 from collections.abc import MutableSequence, Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Stage
+from hil.twin.mechanism import (
+    AxisFacts,
+    Block,
+    Dimension,
+    Mechanism,
+    Moment,
+    Parameter,
+    Picture,
+    Role,
+    Scene,
+    Stage,
+    Variant,
+)
 
 
 @njit
 def _pull_to_rest(value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]) -> float:
     return value - parameters[0] * (at.table_position_m - parameters[1])
+
+
+_REACH_M = 10.0  # of the rest position to either side
+_NEAR = 0.9  # of the reach: a rest position beyond is a constant load
+
+
+def _starts(s: Scene) -> list[tuple[float, ...]]:
+    """At rest where the axis starts, or so far away that the force hardly changes over a short motion."""
+    return [(0.02 * s.coulomb / s.ratio / s.travel_m, f * s.travel_m) for f in (0.0, -20.0, 20.0)]
+
+
+def _valid(values: Sequence[float], variant: int, axis: AxisFacts) -> bool:
+    """Check that the rest position is not at its bounds."""
+    return abs(values[1]) < _NEAR * _REACH_M
 
 
 MECHANISM = Mechanism(
@@ -22,9 +46,12 @@ MECHANISM = Mechanism(
     equation="F_table = -k (x - x0)",
     source="Hooke's law; Groß, Hamann and Wiegärtner, Electrical Feed Drives in Automation (2001), load forces",
     parameters=(
-        Parameter("stiffness_n_m", Dimension.STIFFNESS, 0.0, 1e7),
-        Parameter("rest_position_m", Dimension.LENGTH, -10.0, 10.0),
+        Parameter("stiffness_n_m", Dimension.STIFFNESS, 0.0, 1e7, role=Role.STRENGTH),
+        Parameter("rest_position_m", Dimension.LENGTH, -_REACH_M, _REACH_M),
     ),
-    stage=Stage.TABLE_FORCE,
-    contribution=_pull_to_rest,
+    variants=(Variant(Stage.TABLE_FORCE, _pull_to_rest),),
+    starts=_starts,
+    typical=lambda a: (0.5 * a.friction / a.ratio, 0.0),
+    valid=_valid,
+    picture=Picture.POSITION,
 )

@@ -3,14 +3,24 @@
 How it falls differs from contact to contact: the variants are the laws in use.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import MutableSequence, Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import PARAMETERS, Block, Dimension, Mechanism, Moment, Parameter, Stage
+from hil.twin.mechanism import (
+    PARAMETERS,
+    AxisFacts,
+    Block,
+    Dimension,
+    Mechanism,
+    Moment,
+    Parameter,
+    Picture,
+    Role,
+    Stage,
+    Variant,
+)
 
 
 @njit
@@ -29,6 +39,11 @@ def _stribeck_level(value: float, at: Moment, parameters: Sequence[float], memor
     return value + (static - value) * share
 
 
+def _valid(values: Sequence[float], variant: int, axis: AxisFacts) -> bool:
+    """Check that static friction is above Coulomb friction."""
+    return values[0] > axis.coulomb
+
+
 MECHANISM = Mechanism(
     id="stribeck_friction",
     block=Block.MOTOR_SIDE,
@@ -38,10 +53,18 @@ MECHANISM = Mechanism(
     source="Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30 (1994) 1083: Gaussian; Tustin (1947): "
     "exponential; Hess and Soom (1990): Lorentzian",
     parameters=(
-        Parameter("static_torque_n_m", Dimension.TORQUE, 0.0, 1e4),
+        Parameter("static_torque_n_m", Dimension.TORQUE, 0.0, 1e4, role=Role.STRENGTH),
         Parameter("stribeck_velocity_rad_s", Dimension.MOTOR_SPEED, 1e-5, 1e3),
     ),
-    stage=Stage.COULOMB,
-    contribution=_stribeck_level,
-    variants=("Gaussian", "exponential", "Lorentzian"),
+    variants=(
+        Variant(Stage.COULOMB, _stribeck_level, "Gaussian"),
+        Variant(Stage.COULOMB, _stribeck_level, "exponential"),
+        Variant(Stage.COULOMB, _stribeck_level, "Lorentzian"),
+    ),
+    starts=lambda s: [(1.3 * s.coulomb, f * s.peak_speed) for f in (0.003, 0.01, 0.04)],
+    typical=lambda a: (1.5 * a.friction, 2e-3 / a.ratio),
+    valid=_valid,
+    proportional=False,
+    picture=Picture.FRICTION,
+    neutral_at_zero=False,
 )

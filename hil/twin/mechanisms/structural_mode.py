@@ -1,7 +1,5 @@
 """Structural mode: a flexible mode that the chain has not, such as machine base, column or screw torsion."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace
@@ -9,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from hil.arrays import FloatArray
-from hil.twin.mechanism import Block, Dimension, Mechanism, Parameter, Stage
+from hil.twin.mechanism import AxisFacts, Block, Dimension, Mechanism, Parameter, Picture, Role, Stage, Variant
 from hil.twin.structure.chain import Chain
 from hil.twin.structure.frequency import modal_damping
 from hil.twin.structure.modal import modal
@@ -78,22 +76,44 @@ def _longer(chain: Chain) -> Chain:
     )
 
 
+_HIGHEST_HZ = 2000.0
+_NEAR = 0.9  # of the highest frequency: beyond, the structure is a mass
+
+
+def _valid(values: Sequence[float], variant: int, axis: AxisFacts) -> bool:
+    """Check that the frequency is not at its upper bound."""
+    return values[0] < _NEAR * _HIGHEST_HZ
+
+
 MECHANISM = Mechanism(
     id="structural_mode",
     block=Block.TABLE,
     element="machine base, column or screw torsion",
     sentence="A structure of {mass_ratio} of the table's mass sways at {frequency_hz}, damped by {damping_ratio}.",
-    second_sentence="The machine base yields: it sways with the table at {frequency_hz}, damped by {damping_ratio}; "
-    "the table has {mass_ratio} of its mass.",
     equation="m_a x_a'' + k_a (x_a - x) = 0, k_a = m_a (2 pi f)^2, m_a = mu m_table, damped by xi where the table "
     "is held; or a base of m_table / mu under the axis, which sways with the table at f",
     source="Den Hartog, Mechanical Vibrations, 4th ed. (1956), auxiliary mass on a spring",
     parameters=(
-        Parameter("frequency_hz", Dimension.FREQUENCY, 1.0, 2000.0),
+        Parameter("frequency_hz", Dimension.FREQUENCY, 1.0, _HIGHEST_HZ, role=Role.FREQUENCY),
         Parameter("damping_ratio", Dimension.RATIO, 1e-4, 0.9),
-        Parameter("mass_ratio", Dimension.RATIO, 1e-3, 10.0),
+        Parameter("mass_ratio", Dimension.RATIO, 1e-3, 10.0, role=Role.STRENGTH),
     ),
-    stage=Stage.CHAIN,
-    contribution=_with_structure,
-    variants=("mass on the table", "yielding base"),
+    variants=(
+        Variant(Stage.CHAIN, _with_structure, "mass on the table"),
+        Variant(
+            Stage.CHAIN,
+            _with_structure,
+            "yielding base",
+            sentence=(
+                "The machine base yields: it sways with the table at {frequency_hz}, damped by {damping_ratio}; "
+                "the table has {mass_ratio} of its mass."
+            ),
+        ),
+    ),
+    starts=lambda s: [(f, 0.03, 0.15) for f in np.geomspace(12.0, 240.0, 13)],
+    typical=lambda a: (40.0, 0.03, 0.1),
+    valid=_valid,
+    proportional=False,
+    needs_table=True,
+    picture=Picture.SPECTRUM,
 )

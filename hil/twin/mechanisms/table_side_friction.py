@@ -1,12 +1,10 @@
 """Table-side friction: part of the friction acts on the guideway, behind the compliance."""
 
-from __future__ import annotations
-
 from collections.abc import MutableSequence, Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Stage
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Role, Stage, Variant
 
 
 @njit
@@ -21,7 +19,10 @@ MECHANISM = Mechanism(
     sentence="A share of {share} of the friction acts on the table, not on the motor.",
     equation="F_table = s F, F_motor = (1 - s) F",
     source="Altintas, Verl, Brecher, Uriarte and Pritschow, Machine tool feed drives, CIRP Annals 60 (2011) 779",
-    parameters=(Parameter("share", Dimension.RATIO, 0.0, 1.0),),
-    stage=Stage.TABLE_SHARE,
-    contribution=_share_on_table,
+    parameters=(Parameter("share", Dimension.RATIO, 0.0, 1.0, role=Role.STRENGTH),),
+    variants=(Variant(Stage.TABLE_SHARE, _share_on_table),),
+    starts=lambda s: [(0.2,), (0.6,)],
+    typical=lambda a: (0.3,),
+    proportional=False,
+    needs_table=True,
 )

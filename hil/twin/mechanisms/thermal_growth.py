@@ -1,13 +1,11 @@
 """Thermal growth: the screw grows while the axis runs."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import MutableSequence, Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Stage
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Role, Stage, Variant
 
 
 @njit
@@ -26,9 +24,11 @@ MECHANISM = Mechanism(
     equation="x = (1 + g (1 - exp(-t/tau))) r theta",
     source="ISO 230-3, thermal effects; Bryan, CIRP Annals 39 (1990) 645",
     parameters=(
-        Parameter("relative_growth", Dimension.RATIO, -5e-3, 5e-3),
+        Parameter("relative_growth", Dimension.RATIO, -5e-3, 5e-3, role=Role.STRENGTH),
         Parameter("time_constant_s", Dimension.TIME, 1.0, 1e4),
     ),
-    stage=Stage.TRANSMISSION,
-    contribution=_grown_lead,
+    variants=(Variant(Stage.TRANSMISSION, _grown_lead),),
+    starts=lambda s: [(1e-6 / s.travel_m, f * s.duration_s) for f in (0.2, 1.0, 5.0)],
+    typical=lambda a: (50e-6, 1800.0),
+    needs_table=True,
 )

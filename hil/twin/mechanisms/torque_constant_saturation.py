@@ -1,13 +1,11 @@
 """Saturation of the torque constant: torque per ampere falls with current."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import MutableSequence, Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Stage
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Stage, Variant
 
 
 @njit
@@ -29,7 +27,9 @@ MECHANISM = Mechanism(
     sentence="The torque constant falls with current: T = u (1 - c u^2), c = {coefficient_1_n2_m2}.",
     equation="T = u (1 - c u^2) up to where that is greatest, |u| = 1 / sqrt(3 c), and no more beyond",
     source="Krishnan, Permanent Magnet Synchronous and Brushless DC Motor Drives (2010), magnetic saturation",
-    parameters=(Parameter("coefficient_1_n2_m2", Dimension.INVERSE_TORQUE_SQUARED, 0.0, 1.0),),
-    stage=Stage.TORQUE,
-    contribution=_saturating_torque_constant,
+    parameters=(Parameter("coefficient_1_n2_m2", Dimension.INVERSE_TORQUE_SQUARED, 0.0, 1.0, role=Role.STRENGTH),),
+    variants=(Variant(Stage.TORQUE, _saturating_torque_constant),),
+    starts=lambda s: [(0.02 / s.peak_torque**2,)],
+    typical=lambda a: (0.1 / (3.0 * a.rated_torque) ** 2,),
+    picture=Picture.DRIVE_LAW,
 )

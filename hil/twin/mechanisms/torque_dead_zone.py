@@ -1,12 +1,10 @@
 """Torque dead zone: the drive answers small commands with no torque."""
 
-from __future__ import annotations
-
 from collections.abc import MutableSequence, Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import PARAMETERS, Block, Dimension, Mechanism, Moment, Parameter, Stage
+from hil.twin.mechanism import PARAMETERS, Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Stage, Variant
 
 _GATE = 2.0  # from this variant on, the torque outside the zone is unchanged
 
@@ -28,9 +26,15 @@ MECHANISM = Mechanism(
     sentence="The drive gives no torque for commands below {half_width_n_m}.",
     equation="T = 0 for |u| <= w, else u - w sign(u); as a gate: else u",
     source="Tao and Kokotović, Adaptive Control of Systems with Actuator and Sensor Nonlinearities (1996)",
-    parameters=(Parameter("half_width_n_m", Dimension.TORQUE, 0.0, 1e3),),
-    stage=Stage.CURRENT,
-    contribution=_dead_zone,
-    variants=("measured", "hidden", "measured gate", "hidden gate"),
-    second_stage=Stage.TORQUE,
+    parameters=(Parameter("half_width_n_m", Dimension.TORQUE, 0.0, 1e3, role=Role.STRENGTH),),
+    variants=(
+        Variant(Stage.CURRENT, _dead_zone, "measured"),
+        Variant(Stage.TORQUE, _dead_zone, "hidden"),
+        Variant(Stage.CURRENT, _dead_zone, "measured gate"),
+        Variant(Stage.TORQUE, _dead_zone, "hidden gate"),
+    ),
+    starts=lambda s: [(f * s.coulomb,) for f in (0.03, 0.15)],
+    typical=lambda a: (0.05 * a.friction,),
+    proportional=False,
+    picture=Picture.DRIVE_LAW,
 )

@@ -1,13 +1,11 @@
 """Torque ripple: the torque constant is periodic in the motor angle."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import MutableSequence, Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Stage
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Stage, Variant
 
 
 @njit
@@ -23,11 +21,14 @@ MECHANISM = Mechanism(
     equation="T = u (1 + a sin(n theta + phi))",
     source="Jahns and Soong, IEEE Trans. Industrial Electronics 43 (1996) 321, ripple torque",
     parameters=(
-        Parameter("fraction", Dimension.RATIO, 0.0, 0.5),
-        Parameter("cycles_per_rev", Dimension.COUNT, 1.0, 200.0),
-        Parameter("phase_rad", Dimension.ANGLE, -2.0 * math.pi, 2.0 * math.pi),
+        Parameter("fraction", Dimension.RATIO, 0.0, 0.5, role=Role.STRENGTH),
+        Parameter("cycles_per_rev", Dimension.COUNT, 1.0, 200.0, role=Role.ORDER),
+        Parameter("phase_rad", Dimension.ANGLE, -2.0 * math.pi, 2.0 * math.pi, role=Role.PHASE),
     ),
-    stage=Stage.TORQUE,
-    contribution=_rippling_torque,
+    variants=(Variant(Stage.TORQUE, _rippling_torque),),
+    starts=lambda s: [(0.01, order, 0.0) for order in dict.fromkeys((*s.ripple_orders, *s.orders))],
+    typical=lambda a: (0.02, 6.0, 0.0),
+    picture=Picture.MOTOR_ANGLE_PER_TORQUE,
     most=2,
+    screw_locked=True,
 )

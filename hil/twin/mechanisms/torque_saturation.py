@@ -1,12 +1,10 @@
 """Torque saturation: the drive gives less than commanded."""
 
-from __future__ import annotations
-
 from collections.abc import MutableSequence, Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Stage
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Stage, Variant
 
 
 @njit
@@ -21,9 +19,14 @@ MECHANISM = Mechanism(
     sentence="The drive gives at most {limit_n_m}, less than the controller may command.",
     equation="T = min(max(u, -limit), limit)",
     source="Åström and Rundqwist, Integrator windup and how to avoid it, American Control Conf. (1989) 1693",
-    parameters=(Parameter("limit_n_m", Dimension.TORQUE, 1e-3, 1e5),),
-    stage=Stage.CURRENT,
-    contribution=_limited_torque,
-    variants=("measured", "hidden"),
-    second_stage=Stage.TORQUE,
+    parameters=(Parameter("limit_n_m", Dimension.TORQUE, 1e-3, 1e5, role=Role.STRENGTH),),
+    variants=(
+        Variant(Stage.CURRENT, _limited_torque, "measured"),
+        Variant(Stage.TORQUE, _limited_torque, "hidden"),
+    ),
+    starts=lambda s: [(f * s.peak_torque,) for f in (0.999, 0.95, 0.85, 0.7)],
+    typical=lambda a: (2.5 * a.rated_torque,),
+    proportional=False,
+    picture=Picture.DRIVE_LAW,
+    neutral_at_zero=False,
 )

@@ -1,13 +1,11 @@
 """Transport delay: the torque command acts late."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import MutableSequence, Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Stage
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Stage, Variant
 
 _OLDEST = 14  # age in ticks of the oldest command kept: 12 ticks of delay, a fraction, and its step
 _STARTED = 15  # memory[_STARTED] is 0 until the first command has come
@@ -39,9 +37,13 @@ MECHANISM = Mechanism(
     sentence="The torque command acts {delay_s} later than the controller believes.",
     equation="T(t) = u(t - delay), u held over a control period",
     source="Åström and Wittenmark, Computer-Controlled Systems, 3rd ed. (1997), systems with time delay",
-    parameters=(Parameter("delay_s", Dimension.TIME, 0.0, 0.012),),
-    stage=Stage.CURRENT,
-    contribution=_delayed_command,
-    variants=("measured", "hidden"),
-    second_stage=Stage.TORQUE,
+    parameters=(Parameter("delay_s", Dimension.TIME, 0.0, 0.012, role=Role.STRENGTH),),
+    variants=(
+        Variant(Stage.CURRENT, _delayed_command, "measured"),
+        Variant(Stage.TORQUE, _delayed_command, "hidden"),
+    ),
+    starts=lambda s: [(1.5e-4,), (7e-4,)],
+    typical=lambda a: (5e-4,),
+    proportional=False,
+    picture=Picture.DRIVE_LAW,
 )

@@ -1,12 +1,10 @@
 """Velocity filter lag: the controller filters its velocity feedback."""
 
-from __future__ import annotations
-
 from collections.abc import MutableSequence, Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Stage
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Role, Stage, Variant
 
 
 @njit
@@ -21,7 +19,9 @@ MECHANISM = Mechanism(
     sentence="The controller filters its velocity feedback with a time constant of {time_constant_s}.",
     equation="tau dv_f/dt = v - v_f",
     source="Brown, Schneider and Mulligan, IEEE Trans. Industrial Electronics 39 (1992) 11, filtered differences",
-    parameters=(Parameter("time_constant_s", Dimension.TIME, 1e-5, 0.05),),
-    stage=Stage.VELOCITY_FILTER,
-    contribution=_time_constant,
+    parameters=(Parameter("time_constant_s", Dimension.TIME, 1e-5, 0.05, role=Role.STRENGTH),),
+    variants=(Variant(Stage.VELOCITY_FILTER, _time_constant),),
+    starts=lambda s: [(2e-4,), (1e-3,)],
+    typical=lambda a: (5e-4,),
+    proportional=False,
 )

@@ -76,9 +76,9 @@ def pack_constants(
     constants[layout.COARSE_STEPS], constants[layout.FINE_STEPS] = steps
     constants[layout.OBSERVER] = observer_s
     constants[layout.SLOW_VELOCITY] = SLOW_M_S if physics.linear else SLOW_RAD_S
-    second = [BY_ID[one.effect] for one in active if one.variant == 1]
-    constants[layout.PLAY] = float(any(mechanism.play for mechanism in second))
-    constants[layout.SLIPS] = float(any(mechanism.slips for mechanism in second))
+    variants = [BY_ID[one.effect].variants[one.variant] for one in active]
+    constants[layout.PLAY] = float(any(variant.play for variant in variants))
+    constants[layout.SLIPS] = float(any(variant.slips for variant in variants))
     motor, table = modes[layout.SHAPE_MOTOR], modes[layout.SHAPE_TABLE]
     for at, first in ((layout.COARSE_GAINS, layout.COARSE), (layout.FINE_GAINS, layout.FINE)):
         per_torque = modes[first + 5]

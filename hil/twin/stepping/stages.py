@@ -24,17 +24,14 @@ KERNEL_STAGES = (
 
 
 def stage_of(mechanism: Mechanism, variant: int) -> Stage:
-    """Where a variant enters: odd variants at the second stage, where there is one."""
-    if mechanism.second_stage is not None and variant % 2 == 1:
-        return mechanism.second_stage
-    return mechanism.stage
+    """Stage at which a variant enters."""
+    return mechanism.variants[variant].stage
 
 
 def _compose(entries: list[tuple[Any, int, int]]) -> Any:
     """A compiled `(value, at, values, codes, memory) -> value` that runs the entries in order.
 
-    An entry is (contribution, slot of the mechanism, parity of the variants that enter here, or -1
-    for all).
+    An entry is (contribution, slot of the mechanism, bit mask of the variants that enter here).
     """
     if not entries:
 
@@ -43,12 +40,12 @@ def _compose(entries: list[tuple[Any, int, int]]) -> Any:
             return value
 
         return nothing
-    (contribution, index, parity), rest = entries[0], _compose(entries[1:])
+    (contribution, index, mask), rest = entries[0], _compose(entries[1:])
 
     @njit(inline="always")
     def chained(value: float, at: Any, values: Any, codes: Any, memory: Any) -> Any:
         code = codes[index]
-        if code != 0 and (parity < 0 or (code - 1) % 2 == parity):
+        if code != 0 and (mask >> (code - 1)) & 1:
             value = contribution(value, at, values[index], memory[index])
         return rest(value, at, values, codes, memory)
 
@@ -58,11 +55,11 @@ def _compose(entries: list[tuple[Any, int, int]]) -> Any:
 def _stage(stage: Stage) -> Any:
     entries = []
     for index, mechanism in enumerate(SLOTS):
-        if mechanism.second_stage is None:
-            if mechanism.stage is stage:
-                entries.append((mechanism.contribution, index, -1))
-        elif stage in (mechanism.stage, mechanism.second_stage):
-            entries.append((mechanism.contribution, index, int(stage is mechanism.second_stage)))
+        masks: dict[Any, int] = {}
+        for number, variant in enumerate(mechanism.variants):
+            if variant.stage is stage:
+                masks[variant.contribution] = masks.get(variant.contribution, 0) | 1 << number
+        entries += [(contribution, index, mask) for contribution, mask in masks.items()]
     return _compose(entries)
 
 

@@ -90,7 +90,7 @@ def test_in_closed_loop_the_axis_moves_with_what_its_encoders_count() -> None:
     run = take(case.recordings[2], exact)
     limit = Term(
         "torque_saturation",
-        BY_ID["torque_saturation"].variants.index("hidden"),
+        BY_ID["torque_saturation"].forms.index("hidden"),
         (case.truth.effects[0].parameters["limit_n_m"],),
     )
     model = Model(exact, (limit,), 0.3, observer_time_s([run], exact))

@@ -13,8 +13,8 @@ from hil.diagnosis.estimation.hypothesis import Model
 from hil.diagnosis.estimation.terms import Term
 from hil.diagnosis.result import Result, Unexplained, Verdict
 from hil.diagnosis.search.forward_selection import Explanation
+from hil.diagnosis.search.initial_values import axis_facts
 from hil.diagnosis.verdict.cross_validation import Proof
-from hil.diagnosis.verdict.observability import _typical
 from hil.identification.dataset import take
 from hil.report.diagnosis.figures import convincing
 from hil.report.diagnosis.location import location_figure
@@ -27,7 +27,7 @@ OWNER = bench()
 def diagnosis_of(effect: str, times: float = 3.0) -> Diagnosis:
     """A right diagnosis of an effect of some times the strength that an engineer would call a defect."""
     run = take(recorded(OWNER), OWNER)
-    values = list(_typical(OWNER, [run])[effect])
+    values = list(BY_ID[effect].typical_values(axis_facts(OWNER, [run])))
     as_it_is = ("presliding_hysteresis", "structural_mode", "preload_loss", "stribeck_friction")
     values[0] *= 1.0 if effect in as_it_is else times
     if effect == "torque_saturation":

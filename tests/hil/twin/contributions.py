@@ -39,7 +39,7 @@ def call(effect, value, at=AT_REST, *, variant=0, **parameters):
     mechanism = BY_ID[effect]
     assert set(parameters) == set(mechanism.names)
     values = row([float(parameters[name]) for name in mechanism.names], variant)
-    return mechanism.contribution(float(value), at, values, np.zeros(WIDTH))
+    return mechanism.variants[variant].contribution(float(value), at, values, np.zeros(WIDTH))
 
 
 def per_tick(effect, commands, steps, parameters, variant=0):
@@ -50,5 +50,5 @@ def per_tick(effect, commands, steps, parameters, variant=0):
     for tick, command in enumerate(commands):
         for j in range(steps):
             at = AT_REST._replace(time_s=tick * PERIOD_S + j * step_s, within_s=j * step_s, step_s=step_s)
-            means[tick] += BY_ID[effect].contribution(float(command), at, values, memory) / steps
+            means[tick] += BY_ID[effect].variants[variant].contribution(float(command), at, values, memory) / steps
     return means

@@ -72,7 +72,7 @@ NEUTRAL = {
     "spring_load": {"stiffness_n_m": 0.0, "rest_position_m": 0.1},
 }
 
-STEPPED = [mechanism for mechanism in LIBRARY if mechanism.stage not in (Stage.CHAIN, Stage.CHANNEL)]
+STEPPED = [mechanism for mechanism in LIBRARY if mechanism.variants[0].stage not in (Stage.CHAIN, Stage.CHANNEL)]
 SUFFIX = {
     Dimension.TORQUE: "_n_m",
     Dimension.MOTOR_SPEED: "_rad_s",
@@ -118,9 +118,10 @@ def test_bounds_units_and_text(mechanism) -> None:
         assert parameter.name.endswith(SUFFIX.get(parameter.dimension, ""))
     assert fields(mechanism.sentence) <= set(mechanism.names)
     assert mechanism.sentence.endswith(".")
-    if mechanism.second_sentence:
-        assert fields(mechanism.second_sentence) <= {*mechanism.names, "viscous_speed"}
-        assert mechanism.second_sentence.endswith(".")
+    for variant in mechanism.variants:
+        if variant.sentence:
+            assert fields(variant.sentence) <= {*mechanism.names, "viscous_speed"}
+            assert variant.sentence.endswith(".")
         assert len(mechanism.variants) > 1
     assert mechanism.element
     assert mechanism.equation
@@ -128,18 +129,17 @@ def test_bounds_units_and_text(mechanism) -> None:
 
 
 @each
-def test_variants_with_a_second_stage_come_in_pairs(mechanism) -> None:
-    assert len(set(mechanism.variants)) == len(mechanism.variants)
-    if mechanism.second_stage is not None:
-        assert mechanism.second_stage is not mechanism.stage
-        assert len(mechanism.variants) % 2 == 0
+def test_variants_differ_by_name_and_act_in_the_kernel_or_outside(mechanism) -> None:
+    assert len(set(mechanism.forms)) == len(mechanism.variants) > 0
+    assert len({variant.stage in (Stage.CHAIN, Stage.CHANNEL) for variant in mechanism.variants}) == 1
 
 
 @each_stepped
 def test_compiles_to_the_one_signature(mechanism) -> None:
     moment = typeof(Moment(*[0.0] * len(Moment._fields)))
-    mechanism.contribution.compile((float64, moment, float64[::1], float64[::1]))
-    assert mechanism.contribution.nopython_signatures[0].return_type == float64
+    for variant in mechanism.variants:
+        variant.contribution.compile((float64, moment, float64[::1], float64[::1]))
+        assert variant.contribution.nopython_signatures[0].return_type == float64
 
 
 @each_stepped
@@ -150,16 +150,18 @@ def test_neutral_at_zero_strength(mechanism, at) -> None:
     for variant in range(len(mechanism.variants)):
         values = row([neutral[name] for name in mechanism.names], variant)
         first = at._replace(within_s=0.0)
-        assert mechanism.contribution(VALUE, first, values, np.zeros(WIDTH)) == pytest.approx(VALUE, rel=1e-12)
+        assert mechanism.variants[variant].contribution(VALUE, first, values, np.zeros(WIDTH)) == pytest.approx(
+            VALUE, rel=1e-12
+        )
 
 
 def test_neutral_structure_and_skew() -> None:
     chain = two_mass(335.0, 384.0, 5.64e7, 0.03, 0.01)
-    assert BY_ID["structural_mode"].contribution(chain, (30.0, 0.05, 0.0)) is chain
+    assert BY_ID["structural_mode"].variants[0].contribution(chain, (30.0, 0.05, 0.0)) is chain
     channels = tuple(np.random.default_rng(1).normal(size=(4, 50)))
     for variant in range(3):
         np.testing.assert_array_equal(
-            BY_ID["channel_time_skew"].contribution(channels, (0.0,), variant, PERIOD_S), channels
+            BY_ID["channel_time_skew"].variants[variant].contribution(channels, (0.0,), variant, PERIOD_S), channels
         )
 
 
@@ -168,9 +170,10 @@ def test_neutral_structure_and_skew() -> None:
 @PROPERTY
 def test_finite_within_bounds_and_at_zero(mechanism, data, at, value) -> None:
     strategies = [st.floats(p.low, p.high) | st.sampled_from([0.0, p.low, p.high]) for p in mechanism.parameters]
-    values = row(data.draw(st.tuples(*strategies)), data.draw(st.integers(0, len(mechanism.variants) - 1)))
+    variant = data.draw(st.integers(0, len(mechanism.variants) - 1))
+    values = row(data.draw(st.tuples(*strategies)), variant)
     memory = np.zeros(WIDTH)
     for within_s in (0.0, at.step_s, 0.0):
-        out = mechanism.contribution(value, at._replace(within_s=within_s), values, memory)
+        out = mechanism.variants[variant].contribution(value, at._replace(within_s=within_s), values, memory)
         assert np.isfinite(out)
     assert np.isfinite(memory).all()

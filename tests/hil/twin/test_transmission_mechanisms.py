@@ -111,7 +111,7 @@ def test_position_dependent_stiffness_is_nominal_at_zero_and_never_negative(slop
 
 
 def test_lead_errors_come_before_the_spring_that_they_bend() -> None:
-    order = [mechanism.id for mechanism in LIBRARY if mechanism.stage is Stage.TRANSMISSION]
+    order = [mechanism.id for mechanism in LIBRARY if mechanism.variants[0].stage is Stage.TRANSMISSION]
     assert set(order[:3]) == {"periodic_lead_error", "cumulative_lead_error", "thermal_growth"}
 
 
@@ -121,7 +121,7 @@ ratios = st.floats(1e-3, 3.0)
 
 
 def with_structure(chain, frequency_hz, damping_ratio, mass_ratio):
-    return BY_ID["structural_mode"].contribution(chain, (frequency_hz, damping_ratio, mass_ratio))
+    return BY_ID["structural_mode"].variants[0].contribution(chain, (frequency_hz, damping_ratio, mass_ratio))
 
 
 @given(chain=chains, frequency=frequencies, ratio=ratios)
@@ -167,8 +167,10 @@ def test_structural_mode_adds_one_mode_and_keeps_the_rest(chain, frequency, rati
 def test_a_yielding_base_has_the_modes_of_the_chain_seen_from_the_ground(frequency: float, ratio: float) -> None:
     """Motor, table and base in absolute coordinates: the nut pulls table and base together, a spring holds the base."""
     motor, table, stiffness = 335.0, 384.0, 5.64e7
-    longer = BY_ID["structural_mode"].contribution(
-        two_mass(motor, table, stiffness, 0.03, 2.0 * pi), (frequency, 0.01, ratio), 1
+    longer = (
+        BY_ID["structural_mode"]
+        .variants[0]
+        .contribution(two_mass(motor, table, stiffness, 0.03, 2.0 * pi), (frequency, 0.01, ratio), 1)
     )
     base = table / ratio
     nut = np.array([1.0, -1.0, 1.0])

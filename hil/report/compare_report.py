@@ -180,14 +180,14 @@ def _fit(page: Page, fit: FitResult) -> None:
                 Number(digits(parameter.nominal, 4)),
                 Number(digits(parameter.value, 5)),
                 Number(digits(parameter.standard_error, 2)),
-                Number(f"{100.0 * (parameter.value / parameter.nominal - 1.0):+.1f} %"),
+                Number(f"{100.0 * (parameter.value / parameter.nominal - 1.0):+.1f} %" if parameter.nominal else "–"),
             )
             for parameter in fit.parameters
         ],
     )
     page.text(
-        "Closed-loop output error over torque, motor position and table against motor; standard errors hold if "
-        "what is left is white noise. bench.fitted.yaml holds the bench with these values."
+        "Fitted block by block as in hil diagnose, within a factor of three of the bench file; standard errors are "
+        "robust against coloured residuals. bench.fitted.yaml holds the bench with these values."
     )
 
 

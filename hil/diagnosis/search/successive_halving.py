@@ -13,15 +13,15 @@ from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
 from hil.diagnosis.search.equivalents import likenesses
 from hil.diagnosis.search.score_test import Candidate, offered
-from hil.identification.dataset import TORQUE_ACCURACY, Dataset, inertia
+from hil.identification.dataset import TORQUE_ACCURACY, inertia
 from hil.identification.estimator import POOL, Estimator, Fit, in_parallel, soft_cost
-from hil.identification.hypothesis import LAST_EDGE_STEP_S, TRUST, Hypothesis
+from hil.identification.hypothesis import LAST_EDGE_STEP_S, TRUST
+from hil.identification.nominal_fit import SOFT
 from hil.identification.terms import compatible
 from hil.twin.library import BY_ID
 
 # Weight of the motor channel in a search: the full resolution of the encoder makes the valleys of stick-slip convex.
 SEARCH_ACCURACY = 0.2
-SOFT = 30.0  # residual from which the loss of a first fit is linear: far above noise, so that valleys stay convex
 LONG = 25  # evaluations of a last fit
 _STARTED = 8  # candidates that are fitted
 _CONTINUED = 4  # of which are fitted on
@@ -33,11 +33,6 @@ _LEVEL = 1.5  # except where it is level with the leader's second fit;
 _BEHIND = 0.5  # nor one whose gain is less than this share of the leader's
 _HOPELESS = 0.02  # share of the first candidate's: below, a candidate is not fitted
 _EDGE_SHIFTS_S = np.arange(-15, 16) * 0.005  # of an edge, where it may have been missed
-
-
-def fit_nominal_parameters(data: Dataset) -> Fit:
-    """Fit of the nominal parameters alone."""
-    return Estimator(data).fit(Hypothesis(data.bench), soft=SOFT, evaluations=8).refit(10)
 
 
 def race(base: Fit, candidates: Sequence[Candidate]) -> list[Fit]:

@@ -66,7 +66,6 @@ def test_no_motion_is_promised_that_gains_nothing() -> None:
     lag = Term("current_loop_lag", 0, (1e-4,))  # of a tenth of a tick, on a motion without jerk
     train = runs(SLOW, lag)
     found = designed(
-        train,
         fitted(Hypothesis(OWNER, (lag,)), train),
         fitted(Hypothesis(OWNER, (Term("transport_delay", 0, (1e-4,)),)), train),
     )
@@ -119,11 +118,11 @@ def test_candidates_keep_to_what_was_recorded(travel_m: tuple[float, float] | No
         ),
         believed=owner,
     )
-    reached = reach(train, owner)
+    reached = reach(train.runs, owner)
     short, long = candidates(reached)
     assert len(short) >= 5
     assert long
-    velocity = train[0].velocity_command_m_s
+    velocity = train.runs[0].velocity_command_m_s
     fastest, hardest = np.abs(velocity).max(), np.abs(np.diff(velocity)).max() / OWNER.gains.period_s
     low, high = (0.0, 0.06) if travel_m is None else (travel_m[0] + 0.003, travel_m[1] - 0.003)
     for profile in (*short, *long):

@@ -98,5 +98,5 @@ def test_a_mechanism_that_the_bench_has_gives_way_to_the_one_found() -> None:
 
     found = Hypothesis(known(SIX, FIFTEEN), (Term("cogging_torque", 0, (0.4, 6.1, 0.5)),))
     assert [entry.parameters["cycles_per_rev"] for entry in found.kept] == [15.0]
-    assert len(found.twin(found.initial()).active) == 2
+    assert len(found.twin().active) == 2
     assert len(Hypothesis(known(SIX), (FIFTEEN,)).kept) == 1

@@ -1,12 +1,16 @@
 """Digest of the sources that a compiled kernel inlines: numba's cache sees only the file that a kernel stands in."""
 
-from __future__ import annotations
-
 import hashlib
 from pathlib import Path
 
 _PACKAGE = Path(__file__).parents[1]
 _TWIN = ("compiled", "control", "twin")
+_added: list[Path] = []
+
+
+def add_source(path: Path) -> None:
+    """Count a file outside the package among the sources."""
+    _added.append(path)
 
 
 def source_digest(*more: str) -> str:
@@ -16,4 +20,6 @@ def source_digest(*more: str) -> str:
         place = _PACKAGE / name
         for path in sorted(place.rglob("*.py")) if place.is_dir() else (place,):
             digest.update(path.read_bytes())
+    for path in _added:
+        digest.update(path.read_bytes())
     return digest.hexdigest()

@@ -5,6 +5,11 @@ The order of the list is the order in which the contributions of one stage are c
 
 from __future__ import annotations
 
+import inspect
+import sys
+from pathlib import Path
+
+from hil.compiled.source_digest import add_source
 from hil.twin.mechanism import Mechanism, Role
 from hil.twin.mechanisms import (
     asymmetric_friction,
@@ -72,6 +77,24 @@ BY_ID: dict[str, Mechanism] = {mechanism.id: mechanism for mechanism in LIBRARY}
 
 # Places in the twin: a mechanism that may act twice at once has two.
 SLOTS: tuple[Mechanism, ...] = tuple(mechanism for mechanism in LIBRARY for _ in range(mechanism.most))
+
+
+def register(mechanism: Mechanism) -> None:
+    """Add a mechanism from outside the package at the end of the library.
+
+    Call it before any other module of hil is imported: kernels are composed and compiled from the library then. Raises
+    RuntimeError afterwards, ValueError if the id is taken.
+    """
+    global LIBRARY, SLOTS
+    if "hil.twin.stepping.stages" in sys.modules:
+        raise RuntimeError(f"{mechanism.id} must be registered before the kernels are built, got it afterwards")
+    if mechanism.id in BY_ID:
+        raise ValueError(f"id must be a new one, got {mechanism.id}")
+    LIBRARY = (*LIBRARY, mechanism)
+    SLOTS = (*SLOTS, *[mechanism] * mechanism.most)
+    BY_ID[mechanism.id] = mechanism
+    for contribution in {variant.contribution for variant in mechanism.variants}:
+        add_source(Path(inspect.getfile(inspect.unwrap(contribution))))
 
 
 def names_of(*roles: Role) -> tuple[str, ...]:

@@ -17,7 +17,8 @@ from hil.bench.bench_file import Bench
 from hil.diagnosis.search import disturbance as estimate
 from hil.identification.dataset import Measured, inertia
 from hil.twin.library import LIBRARY
-from hil.twin.mechanism import AxisFacts, Role, Scene
+from hil.twin.mechanism import Role
+from hil.twin.scene import AxisFacts, Scene
 
 
 @dataclass(frozen=True)

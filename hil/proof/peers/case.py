@@ -20,7 +20,7 @@ from hil.identification.dataset import Measured, prepare_dataset
 from hil.identification.estimator import Fit
 from hil.identification.nominal_fit import fit_nominal_parameters
 from hil.recording.recording import read_recording
-from hil.twin.mechanism import Scene
+from hil.twin.scene import Scene
 
 Answer = dict[str, Any]
 _TRAIN, _HELD_OUT = ("train_1", "train_2"), ("holdout",)

@@ -17,7 +17,6 @@ from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
 from hil.identification.dataset import Measured
 from hil.proof.peers import signals
-from hil.twin.mechanism import Scene
 from hil.twin.mechanisms import (
     asymmetric_friction,
     backlash,
@@ -48,6 +47,7 @@ from hil.twin.mechanisms import (
     transport_delay,
     velocity_filter_lag,
 )
+from hil.twin.scene import Scene
 
 Effects = tuple[str, ...]
 

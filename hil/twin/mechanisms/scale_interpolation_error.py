@@ -5,19 +5,8 @@ from collections.abc import MutableSequence, Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import (
-    AxisFacts,
-    Block,
-    Dimension,
-    Mechanism,
-    Moment,
-    Parameter,
-    Picture,
-    Role,
-    Scene,
-    Stage,
-    Variant,
-)
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Stage, Variant
+from hil.twin.scene import AxisFacts, Scene
 
 
 @njit

@@ -8,19 +8,8 @@ from collections.abc import MutableSequence, Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import (
-    PARAMETERS,
-    AxisFacts,
-    Block,
-    Dimension,
-    Mechanism,
-    Moment,
-    Parameter,
-    Picture,
-    Role,
-    Stage,
-    Variant,
-)
+from hil.twin.mechanism import PARAMETERS, Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Stage, Variant
+from hil.twin.scene import AxisFacts
 
 
 @njit

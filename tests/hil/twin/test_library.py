@@ -122,7 +122,7 @@ def test_bounds_units_and_text(mechanism) -> None:
         if variant.sentence:
             assert fields(variant.sentence) <= {*mechanism.names, "viscous_speed"}
             assert variant.sentence.endswith(".")
-        assert len(mechanism.variants) > 1
+            assert len(mechanism.variants) > 1
     assert mechanism.element
     assert mechanism.equation
     assert mechanism.source

@@ -1,0 +1,41 @@
+"""Facts of an axis and of its recordings that values of a mechanism are scaled by."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class AxisFacts:
+    """Facts of an axis that typical values and limits of validity are scaled by; motor units."""
+
+    coulomb: float  # friction [N m]
+    ratio: float  # [m/rad]
+    angle_per_unit: float  # motor angle per motor unit
+    rated_torque: float  # [N m]
+    table_count_m: float | None  # resolution of the linear encoder; None without one
+    duration_s: float  # of the longest recording
+
+    @property
+    def friction(self) -> float:
+        """Coulomb friction, above zero [N m]."""
+        return max(self.coulomb, 1e-6)
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Measured sizes that starting values are scaled by; motor units."""
+
+    coulomb: float  # friction, above zero [N m]
+    peak_torque: float  # [N m]
+    peak_speed: float  # [rad/s]
+    viscous_speed: float  # [rad/s] at which viscous friction equals Coulomb friction
+    travel_m: float
+    duration_s: float
+    ratio: float  # [m/rad]
+    lead_m: float  # of the screw
+    orders: list[float]  # of the disturbance torque, per revolution
+    ripple_orders: list[float]  # of the disturbance torque over the torque
+    friction_periods: list[float]  # [m]
+    scale_periods: list[float]  # of the table residual [m]
+    window: tuple[float, float, float]  # start, end, level [N m]
+    stretch: float  # table against motor [m], typical
+    most_stretch: float  # and largest

@@ -1,0 +1,83 @@
+"""A mechanism is one file and one line: one that the library does not know is added by a call, and diagnosed."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+SUPPORT = Path(__file__).parents[2] / "support"
+
+# The one file: physics, text and bounds, and nothing else.
+MECHANISM = """
+from numba import njit
+
+from hil.twin.mechanism import Block, Dimension, Mechanism, Parameter, Role, Stage, Variant
+
+
+@njit
+def _bowl(value, at, parameters, memory):
+    return value - parameters[0] * (at.table_position_m / 0.05) ** 2
+
+
+MECHANISM = Mechanism(
+    id="quadratic_load",
+    block=Block.MOTOR_SIDE,
+    element="bent guideway",
+    sentence="A load rises with the square of the position, to {bowl_n_m} at 50 mm.",
+    equation="T = u - T_50 (x / 50 mm)^2",
+    source="made up for this test",
+    parameters=(Parameter("bowl_n_m", Dimension.TORQUE, -10.0, 10.0, role=Role.STRENGTH),),
+    variants=(Variant(Stage.MOTOR_TORQUE, _bowl),),
+)
+"""
+
+# The one line is the first that follows the imports.
+PRELUDE = """
+from hil.twin import library
+import quadratic_load
+library.register(quadratic_load.MECHANISM)
+from diagnosis_runs import bench, recorded
+from hil.diagnosis.estimation.terms import Term
+owner, truth = bench(), Term("quadratic_load", 0, (0.4,))
+"""
+
+SCREEN = """
+from hil.diagnosis.estimation.fit import fit
+from hil.diagnosis.estimation.hypothesis import Model
+from hil.diagnosis.search.successive_halving import leads
+from hil.identification.dataset import take
+runs = [take(recorded(owner, truth), owner)]
+print(leads(fit(Model(owner), runs, evaluations=8), runs)[0].term.effect)
+"""
+
+DIAGNOSIS = """
+from hil.diagnosis.diagnose import diagnose
+found = diagnose([recorded(owner, truth)], [recorded(owner, truth, seed=2)], owner).result
+print(found.missing[0].effect, round(found.missing[0].parameters["bowl_n_m"].value, 2), found.missing[0].sentence)
+"""
+
+
+def printed(folder, script):
+    """The last line that a script prints in a process of its own, where cached kernels of the library must not do."""
+    (folder / "quadratic_load.py").write_text(MECHANISM)
+    path = os.pathsep.join([str(folder), str(SUPPORT), *sys.path])
+    environment = os.environ | {"PYTHONPATH": path}
+    command = [sys.executable, "-c", PRELUDE + script]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout.splitlines()[-1]
+
+
+@pytest.mark.long
+def test_the_screen_puts_it_first(tmp_path) -> None:
+    assert printed(tmp_path, SCREEN) == "quadratic_load"
+
+
+@pytest.mark.long
+def test_the_diagnosis_names_it_first_with_its_strength(tmp_path) -> None:
+    effect, strength, sentence = printed(tmp_path, DIAGNOSIS).split(" ", 2)
+    assert effect == "quadratic_load"
+    assert float(strength) == pytest.approx(0.4, rel=0.03)
+    assert sentence.startswith("A load rises with the square of the position, to 0.4")

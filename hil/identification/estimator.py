@@ -5,10 +5,9 @@
     step s:  min |J s + r|^2 + mu |diag(J) s|^2   with x + s inside the bounds;  mu after Nielsen (1999)
 
 The Jacobian J is taken by differences, one simulation per parameter, on all cores: the kernel releases the
-interpreter. While steps bring what they promise, J is not taken anew but corrected along the step (Broyden 1965; so
-Madsen, Nielsen and Tingleff 2004, sec. 3.5); a fit that converges ends with a new one. A recording has 1e5 rows and a
-hypothesis ten parameters, hence the step is found from J^T J: a decomposition of J, as scipy's solvers take it, costs
-more than the simulations.
+interpreter. While steps gain what is predicted, J is not taken anew but corrected along the step (Broyden 1965; Madsen,
+Nielsen and Tingleff 2004, sec. 3.5); a fit that converges ends with a new one. With 1e5 rows and ten parameters the
+step is found from J^T J: a decomposition of J, as in scipy's solvers, costs more than the simulations.
 """
 
 import os
@@ -31,7 +30,6 @@ from hil.identification.residuals import Residuals
 from hil.identification.terms import Term
 
 Output = TypeVar("Output")
-
 POOL = ThreadPoolExecutor(os.cpu_count() or 1)
 
 _FIRST_DAMPING = 1e-3
@@ -86,7 +84,7 @@ class Fit:
 
     @property
     def reduced(self) -> float:
-        """Mean squared weighted residual: 1 at the noise floor."""
+        """Mean squared weighted residual."""
         return self.cost / self.rows
 
     @cached_property
@@ -102,7 +100,7 @@ class Fit:
     @property
     def at_floor(self) -> bool:
         """Whether every channel of every run is down to its noise."""
-        return all(ratio <= FLOOR for ratios in self.noise_ratios for ratio in ratios.values())
+        return self.worst_ratio <= FLOOR
 
     @cached_property
     def excess(self) -> float:
@@ -124,14 +122,12 @@ class Fit:
     @property
     def status(self) -> FitStatus:
         """How the fit ended."""
-        if self.converged is None:
-            return FitStatus.NOT_FITTED
         if not self.converged:
-            return FitStatus.OUT_OF_STEPS
+            return FitStatus.NOT_FITTED if self.converged is None else FitStatus.OUT_OF_STEPS
         return FitStatus.PARAMETER_AT_BOUND if self.at_bound else FitStatus.CONVERGED
 
     def on(self, data: Dataset) -> "Fit":
-        """The hypothesis evaluated on another data set; this fit for its own."""
+        """The hypothesis evaluated on a data set; this fit itself on its own."""
         if data is self.data:
             return self
         if data not in self._elsewhere:
@@ -301,4 +297,4 @@ def _step(
 def in_parallel(jobs: Sequence[Callable[[], Output]]) -> list[Output]:
     """Results of jobs that run side by side, in order."""
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-        return [future.result() for future in [pool.submit(job) for job in jobs]]
+        return list(pool.map(lambda job: job(), jobs))

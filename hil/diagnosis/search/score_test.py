@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hil.arrays import FloatArray
-from hil.diagnosis.search.initial_values import Start, scene, starts
+from hil.diagnosis.search.initial_values import StartPoint, scene, starts
 from hil.identification.estimator import POOL, Fit
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.model_comparison import whitened, whitening
@@ -105,7 +105,7 @@ def offered(new: Term, hypothesis: Hypothesis, terms: Sequence[Term]) -> bool:
     return compatible((*terms, new, *(other for other in known if not repeats(new, other))))
 
 
-def _from_known(start: Start, hypothesis: Hypothesis) -> Start:
+def _from_known(start: StartPoint, hypothesis: Hypothesis) -> StartPoint:
     """The start, its strength counted from that of the mechanism of the bench that it replaces, if any."""
     new = Term(start.effect, start.variant, start.values)
     taken = [entry.active() for entry in hypothesis.kept if repeats(new, entry.active())]
@@ -116,7 +116,7 @@ def _from_known(start: Start, hypothesis: Hypothesis) -> Start:
     return replace(start, known=taken[0].values[start.strength])
 
 
-def screen(base: Fit, points: Sequence[Start]) -> list[Candidate]:
+def screen(base: Fit, points: Sequence[StartPoint]) -> list[Candidate]:
     """A candidate for each start, best first.
 
     Each is scored twice: on the residuals as they are, where the largest cause shows, and whitened, where a
@@ -124,16 +124,16 @@ def screen(base: Fit, points: Sequence[Start]) -> list[Candidate]:
     """
     views = [_view(base, False), _view(base, True)]
 
-    def direction(start: Start, values: tuple[float, ...]) -> FloatArray:
+    def direction(start: StartPoint, values: tuple[float, ...]) -> FloatArray:
         changed = base.hypothesis.with_term(Term(start.effect, start.variant, values))
         return base.estimator.residuals(changed).vector - base.residuals.vector
 
-    def candidate(start: Start) -> Candidate:
+    def candidate(start: StartPoint) -> Candidate:
         directions = [direction(start, values) for values in _directions(start)]
         gone = direction(start, _scaled(start, np.zeros(2 * start.harmonics))) if start.instead else np.zeros(base.rows)
         return max((scored(start, directions, gone, view) for view in views), key=lambda found: found.share)
 
-    def scored(start: Start, directions: list[FloatArray], gone: FloatArray, view: _View) -> Candidate:
+    def scored(start: StartPoint, directions: list[FloatArray], gone: FloatArray, view: _View) -> Candidate:
         energy = float(view.residual @ view.residual)
         without = view.residual + view.of(gone) if start.instead else view.residual
         span = np.stack([view.of(change - gone) for change in directions], axis=1)
@@ -156,12 +156,12 @@ def screen(base: Fit, points: Sequence[Start]) -> list[Candidate]:
     return sorted(POOL.map(candidate, points), key=lambda found: -found.share)
 
 
-def _pairs(start: Start) -> list[tuple[int, int]]:
+def _pairs(start: StartPoint) -> list[tuple[int, int]]:
     """Places of strength and phase of each harmonic."""
     return [(start.strength + 2 * n, start.phase + 2 * n) for n in range(start.harmonics)]
 
 
-def _directions(start: Start) -> list[tuple[float, ...]]:
+def _directions(start: StartPoint) -> list[tuple[float, ...]]:
     """Values that span the effect of the start: its strength, or sine and cosine of each harmonic."""
     if start.phase < 0:
         values = list(start.values)
@@ -178,7 +178,7 @@ def _directions(start: Start) -> list[tuple[float, ...]]:
     return found
 
 
-def _scaled(start: Start, coefficients: FloatArray) -> tuple[float, ...]:
+def _scaled(start: StartPoint, coefficients: FloatArray) -> tuple[float, ...]:
     """The start at the strengths (and phases) that the score test asks for, within bounds."""
     values = list(start.values)
     unit = start.values[start.strength]

@@ -16,7 +16,7 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.diagnosis.search.forward_selection import MATERIAL
-from hil.diagnosis.search.initial_values import Start, starts
+from hil.diagnosis.search.initial_values import StartPoint, starts
 from hil.diagnosis.search.score_test import Candidate, screen_library
 from hil.identification.estimator import POOL, Fit
 from hil.identification.hypothesis import Hypothesis
@@ -47,7 +47,7 @@ def fit_everything(case: Case, evaluations: int = EVALUATIONS) -> Answer:
     return case.answer([terms[index].effect for index in named])
 
 
-def _weak(candidate: Candidate, start: Start) -> Term:
+def _weak(candidate: Candidate, start: StartPoint) -> Term:
     """A candidate's term at a strength as small as what it explains."""
     values = list(candidate.term.values)
     if start.strength >= 0:

@@ -7,7 +7,7 @@ from scipy.optimize import least_squares
 from scipy.signal import lfilter
 
 from hil.arrays import FloatArray
-from hil.diagnosis.search.initial_values import Start
+from hil.diagnosis.search.initial_values import StartPoint
 from hil.diagnosis.search.score_test import screen
 from hil.identification.dataset import take
 from hil.identification.estimator import Estimator, Fit, FitStatus
@@ -76,7 +76,7 @@ def test_the_score_test_finds_a_known_direction_and_its_strength() -> None:
     load = Term("constant_load", 0, (0.05,))
     data = dataset([take(recorded(OWNER, load), OWNER)], OWNER)
     base = fitted(Hypothesis(OWNER), data, evaluations=1)  # its derivatives, no step
-    points = [Start("constant_load", 0, (0.02,)), Start("encoder_eccentricity", 0, (1e-4, 0.0), 0, 1)]
+    points = [StartPoint("constant_load", 0, (0.02,)), StartPoint("encoder_eccentricity", 0, (1e-4, 0.0), 0, 1)]
     first, second = screen(base, points)
     assert first.term.effect == "constant_load"
     assert first.term.values[0] == pytest.approx(0.05, rel=0.1)

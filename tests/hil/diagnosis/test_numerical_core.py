@@ -81,3 +81,15 @@ def test_the_score_test_finds_a_known_direction_and_its_strength() -> None:
     assert first.term.effect == "constant_load"
     assert first.term.values[0] == pytest.approx(0.05, rel=0.1)
     assert first.share > 10.0 * second.share
+
+
+def test_another_scale_of_the_coordinates_changes_no_residual() -> None:
+    """Terms are started at 0.05 N m and 200 us and moved away from there; then they are scaled by their values."""
+    data = dataset([take(recorded(OWNER, LOAD), OWNER)], OWNER)
+    terms = (Term("constant_load", 0, (0.05,)), Term("current_loop_lag", 0, (2e-4,)))
+    start = Hypothesis(OWNER, terms)
+    moved = start.moved(start.x + 0.3)
+    assert moved.rebased.values == pytest.approx(moved.values)
+    np.testing.assert_allclose(moved.rebased.residuals(data).vector, moved.residuals(data).vector, atol=1e-6)
+    assert moved.without(0).values == pytest.approx([*moved.values[: moved.nominal_count], moved.values[-1]])
+    assert moved.with_term(Term("backlash", 0, (3e-6,))).without(2).values == moved.values

@@ -122,16 +122,16 @@ def run(
 def fit_nominal(recordings: Recording | Sequence[Recording], bench: Bench) -> FitResult:
     """Fit the nominal parameters of a bench (masses, stiffness, friction) to recordings.
 
-    Closed-loop output error: torque, motor position, and table against motor position, each over its noise (Ljung,
-    System Identification, 1999, ch. 7). A parameter that is 0 in the bench file stays 0.
+    Prediction error block by block: each block of the loop is fed its measured inputs, each residual is weighted by its
+    noise (Ljung, System Identification, 1999, ch. 7). Parameters stay within a factor of three of the bench file.
 
     Returns the fitted bench, its parameters with standard errors, and whether the fit converged. Raises InputError if
     recording and bench do not belong together, HilError if no parameters give a finite response.
     """
-    from hil.identification.dataset import take
+    from hil.identification.dataset import prepare_dataset, take
     from hil.identification.nominal_fit import fit_nominal as fit
 
-    return fit(bench, [take(recording, bench) for recording in _sequence(recordings)])
+    return fit(prepare_dataset([take(recording, bench) for recording in _sequence(recordings)], bench))
 
 
 def diagnose(

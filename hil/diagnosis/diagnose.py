@@ -9,23 +9,24 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
-from hil.diagnosis.estimation.fit import FLOOR, Fit
-from hil.diagnosis.estimation.noise_ratios import noise_ratios
 from hil.diagnosis.experiment import Experiment, separating, showing
 from hil.diagnosis.location.locate import locate
 from hil.diagnosis.preflight import prepare
 from hil.diagnosis.result import ChannelFit, Location, Mode, NextExperiment, Result, Unexplained, Verdict
 from hil.diagnosis.search.forward_selection import Explanation, explain
-from hil.diagnosis.verdict.cross_validation import Proof, explained_share, prove
+from hil.diagnosis.verdict.cross_validation import CrossValidation, cross_validate, explained_share
 from hil.diagnosis.verdict.curve_forms import form_of
 from hil.diagnosis.verdict.findings import corrections, diagnosed_bench, findings, renamed
-from hil.diagnosis.verdict.fit_table import channel_names, fit_table
+from hil.diagnosis.verdict.fit_table import channel_names, channel_residuals, fit_table
 from hil.diagnosis.verdict.judge import judge
 from hil.diagnosis.verdict.observability import not_testable
 from hil.diagnosis.wording import title, where_in_short
 from hil.errors import InputError
-from hil.identification.dataset import Measured
+from hil.identification.dataset import Dataset, Measured, prepare_dataset
+from hil.identification.estimator import Fit, FitStatus
+from hil.identification.noise_floor import FLOOR
 from hil.quantities import digits, quantity
 from hil.recording.recording import Recording
 
@@ -49,10 +50,10 @@ class Diagnosis:
     result: Result
     bench: Bench  # with corrected parameters and the new terms
     owner: Bench
-    train: tuple[Measured, ...]
-    held_out: tuple[Measured, ...]
+    train: Dataset
+    held_out: Dataset  # without runs where nothing was held out
     explanation: Explanation
-    proof: Proof
+    proof: CrossValidation
     final: Fit
     experiment: Experiment | None = None  # what to run next; None where nothing is open
 
@@ -70,7 +71,7 @@ class Diagnosis:
             if not 1 <= number <= len(self.result.missing):
                 raise InputError(f"number: given {number}, allowed 1 to {len(self.result.missing)} findings")
             return findings.finding_figure(self, findings.term_of(self, number - 1)).figure
-        run = (self.held_out or self.train)[0]
+        run = (*self.held_out.runs, *self.train.runs)[0]
         title = f"{run.name}: measured - twin, noise floor in grey"
         return over_time(title, run.time_s, location.residual_panels(self, run))
 
@@ -89,6 +90,11 @@ class Diagnosis:
             for name, entry in self.result.parameter_corrections.items()
         ]
         return "\n".join(lines)
+
+    def residuals(self, fit: Fit, run: Measured, mode: Mode = Mode.BLOCKS) -> dict[str, FloatArray]:
+        """Residuals (n,) of a fit on one of the recordings, by channel."""
+        data = self.train if run in self.train.runs else self.held_out
+        return channel_residuals(fit.hypothesis, data, mode)[data.runs.index(run)]
 
 
 def diagnose(
@@ -112,36 +118,31 @@ def diagnose(
             "of another motion; leave it out of one of them"
         )
     prepared = prepare([*train, *validate], bench)
-    runs, held_out = tuple(prepared[: len(train)]), tuple(prepared[len(train) :])
+    data = prepare_dataset(prepared[: len(train)], bench)
+    held_out = data.over(prepared[len(train) :])
 
-    explanation = explain(bench, runs, progress)
-    progress("proving on held-out recordings")
-    proof = prove(explanation.nominal, renamed(explanation.final), runs, held_out)
-    verdict = judge(explanation.owner, explanation.nominal, proof.final, runs, held_out)
+    explanation = explain(data, progress)
+    owner, nominal = explanation.owner, explanation.nominal
+    progress("testing on held-out recordings")
+    proof = cross_validate(nominal, renamed(explanation.final), held_out)
+    verdict = judge(owner, nominal, proof.final, held_out)
     named = verdict is Verdict.MISSING_PHYSICS
-    final = {Verdict.MISSING_PHYSICS: proof.final, Verdict.NO_MISMATCH: explanation.owner}.get(
-        verdict, explanation.nominal
-    )
+    final = {Verdict.MISSING_PHYSICS: proof.final, Verdict.NO_MISMATCH: owner}.get(verdict, nominal)
+    # a parameter error is located and measured against the parameters of the bench file
+    before = owner if verdict is Verdict.PARAMETER_ERROR else nominal
 
     progress("locating")
-    location = None
-    if verdict is not Verdict.NO_MISMATCH:
-        found = explanation.owner if verdict is Verdict.PARAMETER_ERROR else explanation.nominal
-        location = locate(found, runs, final)
+    location = None if verdict is Verdict.NO_MISMATCH else locate(before, final)
     progress("judging the fit")
-    table = fit_table(explanation.owner, explanation.nominal, final, runs, held_out)
+    table = fit_table(owner, nominal, final, held_out)
     forms = form_of(explanation, proof.ablations)
-    missing = findings(explanation, proof.final, proof.ablations, forms, runs, held_out) if named else ()
+    missing = findings(explanation, proof.final, proof.ablations, forms, held_out) if named else ()
     progress("testing what this motion can show")
-    hidden = not_testable(final if named else explanation.nominal, runs)
+    hidden = not_testable(final if named else nominal)
     progress("looking for a motion that would tell more")
-    # a cause that is named has only its rivals open; without one, what this motion hides may be it
-    experiment = (
-        separating(explanation, proof.final, runs, held_out)
-        if named
-        else showing(explanation.nominal, hidden, runs, held_out)
-    )
-    notes += _notes(table, proof, forms, verdict, explanation)
+    # with findings only their rivals are open; without, what this motion hides may be the cause
+    experiment = separating(explanation, proof.final, held_out) if named else showing(nominal, hidden, held_out)
+    notes += [*_notes(table, proof, forms, verdict, explanation), *_ended(final)]
     notes += [experiment.note] if experiment else []
     result = Result(
         verdict=verdict,
@@ -151,7 +152,7 @@ def diagnose(
         parameter_corrections={} if verdict is Verdict.NO_MISMATCH else corrections(bench, final),
         fit=table,
         not_testable=hidden,
-        unexplained=_unexplained(explanation, final, runs, held_out, location, verdict),
+        unexplained=_unexplained(before, final, held_out, location, verdict),
         next_experiment=NextExperiment(profile=NEXT_EXPERIMENT, separates=experiment.separates)
         if experiment and experiment.profile
         else None,
@@ -160,7 +161,7 @@ def diagnose(
     )
     result = result.model_copy(update={"statement": statement(result)})
     after = bench if verdict is Verdict.NO_MISMATCH else diagnosed_bench(bench, final)
-    return Diagnosis(result, after, bench, runs, held_out, explanation, proof, final, experiment)
+    return Diagnosis(result, after, bench, data, held_out, explanation, proof, final, experiment)
 
 
 def statement(result: Result) -> str:
@@ -228,21 +229,17 @@ def _part(recording: Recording, rows: slice, what: str) -> Recording:
 
 
 def _unexplained(
-    explanation: Explanation,
-    final: Fit,
-    train: Sequence[Measured],
-    held_out: Sequence[Measured],
-    location: Location | None,
-    verdict: Verdict,
+    before: Fit, final: Fit, held_out: Dataset, location: Location | None, verdict: Verdict
 ) -> Unexplained:
-    """Share of the excess that is left, and its shape."""
-    before = explanation.owner if verdict is Verdict.PARAMETER_ERROR else explanation.nominal
-    share = 0.0 if verdict is Verdict.NO_MISMATCH else 1.0 - explained_share(before, final, held_out or train)
+    """Unexplained share of the energy above the floor, and the channels above their noise."""
+    evidence = held_out if held_out.runs else final.data
+    share = 0.0 if verdict is Verdict.NO_MISMATCH else 1.0 - explained_share(before.on(evidence), final.on(evidence))
     worst: dict[str, float] = {}
-    names = channel_names(final.model.bench, train[0])
-    for run in (*train, *held_out):
-        for name, ratio in noise_ratios(final, run).items():
-            worst[names[name]] = max(worst.get(names[name], 0.0), ratio)
+    names = channel_names(final.bench, final.data.runs[0])
+    for data in (final.data, held_out):
+        for ratios in final.on(data).noise_ratios:
+            for name, ratio in ratios.items():
+                worst[names[name]] = max(worst.get(names[name], 0.0), ratio)
     above = {name: float(np.sqrt(ratio)) for name, ratio in worst.items() if ratio > FLOOR}
     if not above:
         return Unexplained(share=share, description="Every channel is down to its noise.")
@@ -253,7 +250,11 @@ def _unexplained(
 
 
 def _notes(
-    table: dict[str, ChannelFit], proof: Proof, forms: Container[int], verdict: Verdict, explanation: Explanation
+    table: dict[str, ChannelFit],
+    proof: CrossValidation,
+    forms: Container[int],
+    verdict: Verdict,
+    explanation: Explanation,
 ) -> list[str]:
     notes = []
     if any(entry.floor_from == "repeated_laps" for entry in table.values()):
@@ -283,3 +284,13 @@ def _notes(
         tried = ", ".join(title(term.effect) for term in explanation.terms)
         notes.append(f"The nearest mechanisms ({tried}) leave too much of it, so that none is named.")
     return notes
+
+
+def _ended(final: Fit) -> list[str]:
+    """How the final fit ended, if it did not converge between the bounds of its parameters."""
+    if final.status is FitStatus.OUT_OF_STEPS:
+        return ["The final fit ended before it converged: its parameters are the best so far."]
+    names = ", ".join(name.split(".")[-1] for name in final.at_bound)
+    if final.status is FitStatus.PARAMETER_AT_BOUND:
+        return [f"In the final fit {names} ended at a bound of what is possible."]
+    return []

@@ -7,8 +7,6 @@ the residuals of the other on it, block by block in units of noise, J their deri
 that there are: what these have fixed is free no more. The evidence must be had whichever of the two is true.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -18,15 +16,16 @@ from typing import Any
 import numpy as np
 
 from hil.arrays import FloatArray
+from hil.bench.bench_file import Bench
 from hil.diagnosis.candidate_motions import candidates, reach
-from hil.diagnosis.estimation.fit import Fit, fit, in_parallel, jacobian, splits
-from hil.diagnosis.estimation.hypothesis import Model
-from hil.diagnosis.estimation.terms import SAME, ambiguous, compatible
 from hil.diagnosis.search.forward_selection import ALIKE, TIED, Explanation
 from hil.diagnosis.verdict.findings import rivals_of
 from hil.diagnosis.verdict.observability import not_testable
 from hil.diagnosis.wording import title
-from hil.identification.dataset import Measured
+from hil.identification.dataset import Dataset, Measured
+from hil.identification.estimator import Estimator, Fit, in_parallel
+from hil.identification.hypothesis import Hypothesis
+from hil.identification.terms import SAME, ambiguous, compatible
 from hil.motion.profile import Profile
 from hil.motion.trajectory import Trajectory, plan
 from hil.quantities import digits
@@ -52,33 +51,35 @@ class Experiment:
 
 
 @dataclass(frozen=True, eq=False)
-class _Hypothesis:
-    """An explanation of the recordings; `known` is what these say of its parameters: R of J_o = Q R."""
+class _Alternative:
+    """An explanation of the recordings; `known` is R of their Jacobian J_o = Q R."""
 
     effect: str
-    model: Model
-    x: FloatArray
+    hypothesis: Hypothesis
     known: FloatArray
+    estimator: Estimator
+
+    def on(self, run: Measured) -> Fit:
+        """The explanation evaluated on another run."""
+        data = self.estimator.data.over([run])
+        return replace(self.estimator, data=data).evaluate(self.hypothesis)
 
 
-def separating(
-    explanation: Explanation, final: Fit, train: Sequence[Measured], held_out: Sequence[Measured]
-) -> Experiment | None:
+def separating(explanation: Explanation, final: Fit, held_out: Dataset) -> Experiment | None:
     """The motion that tells the terms of `final` from the rivals that the recordings tie with them; None without any.
 
     Of the motions that separate most of them it is the one with the most evidence per second for the hardest.
     """
-    groups = [_group(explanation, final, index, train) for index in range(len(final.model.terms))]
-    pairs = [pair for group in groups for pair in permutations(group, 2)]
+    train = final.data
+    pairs = [pair for index in range(len(final.terms)) for pair in permutations(_group(explanation, final, index), 2)]
     if not pairs:
-        if not any(map(ambiguous, final.model.terms)):
+        if not any(map(ambiguous, final.terms)):
             return None
         return Experiment(None, (), f"No motion tells {_pairs([SAME])}: they are the same torque on every one.")
 
     asked: set[Question] = {tuple(sorted((truth.effect, other.effect))) for truth, other in pairs}
 
-    known = final.residuals.size
-    channels = known / sum(run.motor[run.judged].size for run in train)
+    known, channels = final.rows, final.rows / train.rows
 
     def enough(trajectory: Trajectory) -> float:
         # beside what is recorded, the difference must be one that tells (see `Rival.tied`)
@@ -89,13 +90,13 @@ def separating(
         for truth, other in pairs:
             question = tuple(sorted((truth.effect, other.effect)))
             if found[question] >= least:  # not already open the other way round
-                run = _imagined(truth, trajectory, train[0])
+                run = _imagined(truth, trajectory, train.runs[0])
                 found[question] = min(found[question], _left(other, run) - _own(truth, run))
         return found
 
     best = _best(
-        (*train, *held_out),
-        final.model,
+        (*train.runs, *held_out.runs),
+        final.hypothesis.bench,
         len(asked),
         answers,
         enough,
@@ -111,26 +112,21 @@ def separating(
     )
 
 
-def showing(
-    found: Fit, hidden: Sequence[str], train: Sequence[Measured], held_out: Sequence[Measured]
-) -> Experiment | None:
+def showing(found: Fit, hidden: Sequence[str], held_out: Dataset) -> Experiment | None:
     """The motion that shows most per second of the mechanisms that the recordings cannot show; None where all show."""
     if not hidden:
         return None
-    expected = _hypothesis("", found)
+    expected = _alternative("", found)
 
     def answers(trajectory: Trajectory) -> Answers:
-        run = _imagined(expected, trajectory, train[0])
-        residuals = expected.model.residuals(expected.x, [run])
-        slope = jacobian(expected.model, expected.x, residuals, [run])
-        still = not_testable(
-            Fit(expected.model, expected.x, residuals, slope, splits(expected.model, [run])), [run], hidden, _SURE
-        )
+        there = expected.on(_imagined(expected, trajectory, found.data.runs[0]))
+        there = replace(there, jacobian=there.estimator.jacobian(there.hypothesis))
+        still = not_testable(there, hidden, _SURE)
         return {(effect,): float(effect not in still) for effect in hidden}
 
     best = _best(
-        (*train, *held_out),
-        found.model,
+        (*found.data.runs, *held_out.runs),
+        found.hypothesis.bench,
         len(hidden),
         answers,
         lambda _: 1.0,
@@ -164,7 +160,7 @@ class _Tested:
 
 def _best(
     runs: Sequence[Measured],
-    model: Model,
+    bench: Bench,
     questions: int,
     answers: Callable[[Trajectory], Answers],
     enough: Callable[[Trajectory], float],
@@ -173,13 +169,13 @@ def _best(
     """The candidate of the highest rank. Long ones are tried only for what no shorter one answers."""
 
     def test(profile: Profile) -> _Tested:
-        trajectory = plan(profile, model.bench.gains.period_s)
+        trajectory = plan(profile, bench.gains.period_s)
         least = enough(trajectory)
         found = {question: worth for question, worth in answers(trajectory).items() if worth >= least}
         return _Tested(profile, trajectory.duration_s, tuple(found), min(found.values(), default=0.0))
 
     tested: list[_Tested] = []
-    for profiles in candidates(reach(runs, model.bench)):
+    for profiles in candidates(reach(runs, bench)):
         tested += in_parallel([partial(test, profile) for profile in profiles])
         if any(len(one.answered) == questions for one in tested):
             break
@@ -187,32 +183,26 @@ def _best(
     return best if best and best.answered else None
 
 
-def _group(explanation: Explanation, final: Fit, index: int, runs: Sequence[Measured]) -> list[_Hypothesis]:
-    """The final fit, and as many as there are rivals that tie with one of its terms."""
-    terms = final.model.resolved(final.x)[1]
-    group = [_hypothesis(terms[index].effect, final)]
-    for rival in rivals_of(explanation, terms[index]):
+def _group(explanation: Explanation, final: Fit, index: int) -> list[_Alternative]:
+    """The final fit, and fits with each of the rivals that tie with one of its terms."""
+    term, rebased = final.terms[index], final.hypothesis.rebased
+    group = [_alternative(term.effect, final)]
+    for rival in rivals_of(explanation, term):
         if rival.tied:
-            other = rival.fit.model.resolved(rival.fit.x)[1][-1]
-            model = replace(final.model, terms=(*terms[:index], other, *terms[index + 1 :]))
-            if not compatible(model.terms):
-                continue  # it was found later, as a cause of its own
-            x = np.concatenate([final.x[: model.nominal_count], model.initial()[model.nominal_count :]])
-            group.append(_hypothesis(other.effect, fit(model, runs, x, evaluations=12)))
+            other = rival.fit.terms[-1]
+            replaced = rebased.replaced(index, other)
+            if compatible(replaced.terms):  # else it was found later, as a cause of its own
+                group.append(_alternative(other.effect, final.estimator.fit(replaced, evaluations=12)))
     return group
 
 
-def _hypothesis(effect: str, found: Fit) -> _Hypothesis:
-    """What a fit expects of another motion."""
-    terms = found.model.terms
-    stays = np.concatenate(
-        [
-            np.ones(found.model.nominal_count, dtype=bool),
-            *(np.full(len(term.values), not BY_ID[term.effect].transient) for term in terms),
-        ]
-    )
-    model = replace(found.model, terms=tuple(term for term in terms if not BY_ID[term.effect].transient))
-    return _Hypothesis(effect, model, found.x[stays], _triangle(found.jacobian[:, stays]))
+def _alternative(effect: str, found: Fit) -> _Alternative:
+    """Prediction of a fit for another motion."""
+    hypothesis = found.hypothesis
+    once = [index for index, term in enumerate(hypothesis.terms) if BY_ID[term.effect].transient]
+    gone = [column for index in once for column in range(hypothesis.x.size)[hypothesis.columns(index)]]
+    known = _triangle(np.delete(found.jacobian, gone, axis=1))
+    return _Alternative(effect, hypothesis.without(*once), known, found.estimator)
 
 
 def _triangle(jacobian: FloatArray) -> FloatArray:
@@ -220,11 +210,11 @@ def _triangle(jacobian: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.qr(jacobian, mode="r"), dtype=np.float64)
 
 
-def _imagined(truth: _Hypothesis, trajectory: Trajectory, like: Measured) -> Measured:
-    """What would be recorded if the hypothesis were true, with the noise of a recording but none of it drawn."""
+def _imagined(truth: _Alternative, trajectory: Trajectory, like: Measured) -> Measured:
+    """Recording of a trajectory if the explanation were true: the noise level of a recording, none of it drawn."""
     position, velocity = np.array(trajectory.position_m), np.array(trajectory.velocity_m_s)
     start = Start(float(position[0]))
-    answer = truth.model.twin(truth.x).simulate(position, velocity, start)
+    answer = truth.hypothesis.twin().simulate(position, velocity, start)
     return replace(
         like,
         name="imagined",
@@ -239,17 +229,16 @@ def _imagined(truth: _Hypothesis, trajectory: Trajectory, like: Measured) -> Mea
     )
 
 
-def _own(truth: _Hypothesis, run: Measured) -> float:
-    """Energy that the truth leaves of its own run: rounding, and what an observer needs to settle."""
-    residuals = truth.model.residuals(truth.x, [run])
-    return float(residuals @ residuals)
+def _own(truth: _Alternative, run: Measured) -> float:
+    """Energy of the residuals of the truth on its own run: rounding, and the settling of the observer."""
+    return truth.on(run).cost
 
 
-def _left(found: _Hypothesis, run: Measured) -> float:
-    """Energy that a hypothesis leaves of a run, its parameters refitted to first order."""
-    residuals = found.model.residuals(found.x, [run])
-    slope = np.concatenate([found.known, jacobian(found.model, found.x, residuals, [run])])
-    target = np.concatenate([np.zeros(len(found.known)), residuals])
+def _left(other: _Alternative, run: Measured) -> float:
+    """Energy of the residuals of an explanation on a run, its parameters refitted to first order."""
+    there = other.on(run)
+    slope = np.concatenate([other.known, there.estimator.jacobian(there.hypothesis)])
+    target = np.concatenate([np.zeros(len(other.known)), there.residuals.vector])
     change, *_ = np.linalg.lstsq(slope, -target, rcond=None)
     left = target + slope @ change
     return float(left @ left)

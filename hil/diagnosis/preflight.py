@@ -25,7 +25,7 @@ from hil.recording.recording import Recording
 SHORTEST_S = 2.0  # there, back, and time to settle
 LEAST_TRAVEL_COUNTS = 50  # of the motor encoder: below this there is no motion to speak of
 LEAST_MOVING_S = 0.5
-# Nominal parameters may be wrong by a factor of three (`hil.diagnosis.estimation.hypothesis`), units by more.
+# Nominal parameters may be wrong by a factor of three (`hil.identification.hypothesis`), units by more.
 WRONG_BY = 4.0
 SLOPE_TOLERANCE = 0.2  # of positions against set-points; following errors are below 5 %
 _RELATED = 0.5  # of the variance of a channel, that the other must tell

@@ -3,8 +3,8 @@
 from collections.abc import Iterable
 
 from hil.bench.bench_file import Bench
-from hil.diagnosis.estimation.terms import Term
 from hil.diagnosis.result import Location
+from hil.identification.terms import Term
 from hil.quantities import digits, quantity
 from hil.twin.library import BY_ID
 from hil.twin.mechanism import Role

@@ -19,9 +19,11 @@ from hil.bench.bench_file import Bench
 from hil.bench.hardware import DriveMode
 from hil.errors import HilError, InputError
 from hil.identification.blocks import BlockDeviation, compare_blocks
-from hil.identification.dataset import SETTLE_S, Measured, take
+from hil.identification.dataset import SETTLE_S, Measured, prepare_dataset, take
+from hil.identification.hypothesis import Hypothesis
 from hil.identification.inverse_dynamics import InverseDynamics, fit_inverse_dynamics
-from hil.identification.nominal_fit import MOST_STEPS, TABLE_ACCURACY_M, FitResult, fit_nominal
+from hil.identification.noise_floor import FLOOR
+from hil.identification.nominal_fit import MOST_STEPS, FitResult, fit_nominal
 from hil.identification.residuals import datum_m
 from hil.recording.recording import Recording
 
@@ -30,7 +32,8 @@ if TYPE_CHECKING:
 
 SCHEMA_VERSION = 1
 LOW_PASS_HZ, LOW_PASS_ORDER = 100.0, 4
-EXPLAINED = 1.3  # times its noise: up to here the twin leaves nothing of a channel worth a search
+EXPLAINED: float = FLOOR**0.5  # rms over noise up to which a channel is explained, as in the diagnosis
+TABLE_ACCURACY_M = 0.15e-6  # of the twin in closed loop: its own step, and counts that beat with the motion
 
 Progress = Callable[[str, float | None], None]  # what is going on; the share that is done, None if not known
 
@@ -118,8 +121,8 @@ class Comparison:
 
     @property
     def explained(self) -> bool:
-        """Whether the twin explains the recording: torque, and table against motor, within 1.3 x their noise."""
-        return max(self.torque_over_noise, self.table_over_noise) <= EXPLAINED
+        """Whether the twin explains the recording: torque, and table less motor, within 1.25 x their noise."""
+        return bool(max(self.torque_over_noise, self.table_over_noise) <= EXPLAINED)
 
     def plot(self, blocks: bool = False, fastest_move: bool = False) -> Figure:
         """Draw measured, simulated and their deviation over time: the whole axis in closed loop or block by block.
@@ -172,10 +175,13 @@ def compare(
     do not belong together, HilError where the fit fails.
     """
     measured = take(recording, bench)
-    fitted = fit_nominal(bench, [measured], lambda _rms: progress("fitting", None)) if fit else None
-    if fitted is not None:
+    data, fitted = prepare_dataset([measured], bench), None
+    if fit:
+        progress("fitting", None)
+        fitted = fit_nominal(data)
         bench = fitted.bench
-    progress("simulating", 0.0)
+    progress("simulating", None)
+    hypothesis = Hypothesis(bench)
     response = bench.twin().simulate(
         measured.position_command_m, measured.velocity_command_m_s, measured.start, measured.table_m
     )
@@ -185,7 +191,7 @@ def compare(
     datum = datum_m(measured.response, response, ratio, measured.judged)
     # the encoder that the position loop goes by has that of the set-points
     of_table, of_motor = (0.0, -datum) if bench.gains.position_from_table else (datum, 0.0)
-    blocks = compare_blocks(measured, bench, lambda share: progress("block by block", share))
+    blocks = compare_blocks(hypothesis, data)
     table = measured.table_m.size > 0
     positions = (
         (measured.table_m - of_table, response.table_position_m)

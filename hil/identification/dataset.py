@@ -8,13 +8,13 @@ they were controlled with is not known.
 A drive in CSP gets positions only: the velocity that its loops feed forward is their difference from SYNC to SYNC.
 """
 
-from __future__ import annotations
-
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
@@ -22,6 +22,8 @@ from hil.bench.hardware import DriveMode
 from hil.channels import AxisKind
 from hil.control import cascade
 from hil.errors import InputError
+from hil.identification.laps import Laps, find_laps
+from hil.identification.sensor_noise import Noise, estimate_noise, moving
 from hil.recording.recording import Recording
 from hil.twin.axis import Response, Start
 
@@ -31,19 +33,13 @@ SETTLE_S = 0.05  # the start is only roughly known: this much of it is not judge
 _REPLAYED_ROWS = 200  # to find the phase of the position loop
 _FITTED_ROWS = 11  # of the motor position, for its velocity at the first row
 
-
-@dataclass(frozen=True)
-class Noise:
-    """Standard deviation of the white noise of a sensor: motor in rad (m), table in m, torque in N m (N).
-
-    `table_m` is that of table position less r x motor position, 0 without a linear encoder. `jitter_s` is that of the
-    instants at which positions are read: an error that grows with the speed, and is the same for both encoders.
-    """
-
-    motor: float
-    table_m: float
-    torque: float
-    jitter_s: float = 0.0
+# Torque that the motor channel is trusted to tell, over the noise of the torque channel. A fine encoder tells much
+# less, but details below the material size lie there too: friction at zero speed, the side force of a lead error.
+TORQUE_ACCURACY = 1.0
+# Time constants of the motor's observer. Fast: stick-slip is forgotten within a few ticks, so that even a poor start
+# leads to the right valley; faster than two ticks, the sampled observer is unstable on an elastic axis. Slow: a coarse
+# encoder still tells the torque.
+FASTEST_OBSERVER_TICKS, FASTEST_OBSERVER_S, SLOWEST_OBSERVER_S = 2.0, 0.002, 0.008
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +71,11 @@ class Measured:
         speed = np.gradient(self.motor) / self.period_s
         return np.asarray(np.hypot(self.noise.motor, self.noise.jitter_s * speed), dtype=np.float64)
 
+    @cached_property
+    def laps(self) -> Laps | None:
+        """Repeated motion; None where no motion is made twice."""
+        return find_laps(self.position_command_m, self.velocity_command_m_s, self.period_s)
+
     @property
     def response(self) -> Response:
         """The measured channels in the twin's order."""
@@ -91,12 +92,6 @@ class Measured:
         before is not known."""
         first = min(int(np.argmax(self.moving)), self.motor.size // 2)
         return slice(max(round(SETTLE_S / self.period_s), first), None)
-
-
-def moving(velocity: FloatArray) -> NDArray[np.bool_]:
-    """Where a set velocity (n,) is one: above a thousandth of the highest, below which lies noise."""
-    speed = np.abs(velocity)
-    return np.asarray(speed > 1e-3 * np.max(speed, initial=0.0))
 
 
 def take(recording: Recording, bench: Bench) -> Measured:
@@ -153,7 +148,7 @@ def take(recording: Recording, bench: Bench) -> Measured:
         torque,
         bool(np.array_equal(command, torque)),
         _start(gains, (position, velocity, motor, feedback), command),
-        _noise(bench, velocity, motor, table, command, torque, recording.period_s),
+        estimate_noise(bench, velocity, motor, table, command, torque, recording.period_s),
         first,
     )
 
@@ -212,64 +207,79 @@ def _start(gains: cascade.Gains, channels: Channels, command: FloatArray) -> Sta
     return Start(float(gains.ratio_m_rad * motor[0]), gains.ratio_m_rad * speed, state.integral_n_m)
 
 
-def _noise(
-    bench: Bench,
-    velocity: FloatArray,
-    motor: FloatArray,
-    table: FloatArray,
-    command: FloatArray,
-    torque: FloatArray,
-    period_s: float,
-) -> Noise:
-    motor_noise, table_noise = max(_white(motor), bench.motor_count / np.sqrt(12.0)), 0.0
-    if table.size and bench.encoders.table is not None:
-        ratio_m = bench.axis.ratio_m_rad
-        counting = np.hypot(bench.encoders.table.resolution_m, ratio_m * bench.motor_count) / np.sqrt(12.0)
-        table_noise = max(_white(table - ratio_m * motor), float(counting))
-    of_torque = _white(torque) if np.array_equal(command, torque) else _coloured(torque - command)
-    return Noise(motor_noise, table_noise, of_torque, _jitter_s(motor, velocity, motor_noise, period_s))
+@dataclass(frozen=True, eq=False)
+class Dataset:
+    """Recordings of one axis prepared for a fit, with everything that does not depend on the hypothesis.
 
-
-def _white(signal: FloatArray) -> float:
-    """White noise of a smooth signal: fourth differences, of variance 70 sigma^2, see nothing slower.
-
-    The median over blocks keeps events, such as reversals, out of it.
+    `observer_s` is the time constant of the motor's observer in the block residuals, `travel_m` the largest range of
+    the position set-points.
     """
-    return float(np.sqrt(np.median(_white_blocks(signal))))
+
+    runs: tuple[Measured, ...]
+    bench: Bench
+    observer_s: float = FASTEST_OBSERVER_S
+    travel_m: float = 0.1
+    _scales: dict[float, tuple[dict[str, FloatArray], ...]] = field(default_factory=dict, init=False, repr=False)
+
+    def over(self, runs: Sequence[Measured]) -> "Dataset":
+        """Other recordings of the same axis with the same observer and travel."""
+        return Dataset(tuple(runs), self.bench, self.observer_s, self.travel_m)
+
+    def scales(self, torque_accuracy: float = TORQUE_ACCURACY) -> tuple[dict[str, FloatArray], ...]:
+        """Size of one unit of weighted residual at each row, (n,) per channel, for each run."""
+        if torque_accuracy not in self._scales:
+            self._scales[torque_accuracy] = tuple(
+                scales(run, self.bench, self.observer_s, torque_accuracy) for run in self.runs
+            )
+        return self._scales[torque_accuracy]
+
+    @property
+    def rows(self) -> int:
+        """Rows of all runs that are judged."""
+        return sum(run.motor[run.judged].size for run in self.runs)
+
+    @property
+    def laps(self) -> list[tuple[int, Laps]]:
+        """Index and laps of the runs in which motion repeats."""
+        return [(index, run.laps) for index, run in enumerate(self.runs) if run.laps is not None]
 
 
-def _white_blocks(signal: FloatArray) -> FloatArray:
-    """Variance of the white noise in each block of 64 rows."""
-    differences = np.diff(signal, 4)
-    blocks = differences[: differences.size // 64 * 64].reshape(-1, 64)
-    return np.asarray(np.mean(blocks**2, axis=1) / 70.0, dtype=np.float64)
+def prepare_dataset(runs: Sequence[Measured], bench: Bench) -> Dataset:
+    """The data set of recordings, its observer chosen so that the encoder's counts resolve the torque noise.
 
-
-def _jitter_s(motor: FloatArray, velocity: FloatArray, noise: float, period_s: float) -> float:
-    """Jitter of the instants of reading: by how much noise at constant feed exceeds `noise`, over the speed.
-
-    Known from six blocks of 64 rows in which the set velocity is constant, from half of the fastest such feed on; with
-    less of them 0. Less than three times the noise is not told from counting, which at half a count per row makes 2.7.
+    The time constant is that at which the motor encoder's noise moves the observed torque as much as the noise of the
+    torque channel does.
     """
-    variance = _white_blocks(motor)
-    rows = 64 * variance.size
-    speed = np.abs(np.diff(motor)[:rows].reshape(-1, 64).mean(axis=1)) / period_s
-    steady = np.ptp(velocity[:rows].reshape(-1, 64), axis=1) <= 1e-6 * np.max(np.abs(velocity), initial=0.0)
-    steady &= moving(velocity)[:rows].reshape(-1, 64).all(axis=1)
-    fast = steady & (speed > 0.5 * np.max(speed[steady], initial=0.0))
-    if np.count_nonzero(fast) < 6:
-        return 0.0
-    more = (variance[fast] - noise**2) / speed[fast] ** 2
-    return float(np.sqrt(np.median(more))) if np.median(variance[fast]) > 3.0 * noise**2 else 0.0
+    wanted = max(np.sqrt(run.noise.motor * inertia(bench) / (TORQUE_ACCURACY * run.noise.torque)) for run in runs)
+    observer_s = float(np.clip(wanted, FASTEST_OBSERVER_TICKS * runs[0].period_s, SLOWEST_OBSERVER_S))
+    return Dataset(tuple(runs), bench, observer_s, max(float(np.ptp(run.position_command_m)) for run in runs))
 
 
-def _coloured(signal: FloatArray) -> float:
-    """Noise of a signal that is next to zero, of any colour: what varies about a straight line within 64 rows.
+def inertia(bench: Bench) -> float:
+    """Inertia of the whole axis in motor units."""
+    modes = bench.twin().modal
+    return float(modes.shape[modes.motor, 0] ** -2)
 
-    A current measurement is filtered: its noise is no longer white. The median again keeps events out of it.
+
+def scales(
+    run: Measured, bench: Bench, observer_s: float, torque_accuracy: float = TORQUE_ACCURACY
+) -> dict[str, FloatArray]:
+    """Size of one unit of weighted residual at each row (n,), per channel.
+
+    A torque d that the twin misses moves its motor by d tau^2 / J before the correction takes hold, with tau the
+    observer's time constant: the motor counts from the torque that the torque channel can still see. White noise e
+    of its encoder comes back through the observer as (1 - z^-1)^2 / (1 - a z^-1)^2 e, a = 1 - T / tau.
     """
-    rows = np.arange(64) - 31.5
-    blocks = signal[: signal.size // 64 * 64].reshape(-1, 64)
-    blocks = blocks - blocks.mean(axis=1, keepdims=True)
-    blocks = blocks - np.outer(blocks @ rows / (rows @ rows), rows)
-    return float(np.sqrt(np.median(np.sum(blocks**2, axis=1)) / 62.0))
+    seen = torque_accuracy * run.noise.torque * observer_s**2 / inertia(bench)
+    a = 1.0 - run.period_s / observer_s
+    impulse = np.zeros(round(20.0 * observer_s / run.period_s) + 3)
+    impulse[0] = 1.0
+    passed = lfilter([1.0, -2.0, 1.0], [1.0, -2.0 * a, a * a], impulse)
+    rows = run.motor.shape
+    table, torque = (np.broadcast_to(noise, rows) for noise in (run.noise.table_m, run.noise.torque))
+    return {
+        "motor": np.hypot(run.motor_noise * np.linalg.norm(passed), seen),
+        "table": table,
+        "torque": torque,
+        "command": torque,
+    }

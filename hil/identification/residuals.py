@@ -1,26 +1,93 @@
-"""Measured less simulated. Each encoder has a datum of its own: only that of the position loop is the set-points'."""
+"""Residuals, measured less simulated, by named channel and run.
 
-from __future__ import annotations
+Each encoder has its own datum; only that of the position loop is the datum of the set-points. A channel that is not
+recorded is absent.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
+from hil.identification.dataset import TORQUE_ACCURACY, Dataset
 from hil.twin.axis import Response
+
+_LOST = 1e6  # bound of weighted residuals: beyond, an unstable hypothesis is not resolved further
+
+
+@dataclass(frozen=True, eq=False)
+class Residuals:
+    """Residuals of one hypothesis on a data set.
+
+    `channels` holds, for each run, measured less simulated (n,) per channel: motor [rad or m], table less motor [m],
+    torque and, block by block, command [N m or N]. `torque_accuracy` sets the weight of the motor channel.
+    """
+
+    data: Dataset
+    channels: tuple[dict[str, FloatArray], ...]
+    torque_accuracy: float = TORQUE_ACCURACY
+
+    def weighted_by(self, torque_accuracy: float) -> "Residuals":
+        """The same residuals with another weight of the motor channel."""
+        if torque_accuracy == self.torque_accuracy:
+            return self
+        return Residuals(self.data, self.channels, torque_accuracy)
+
+    def over_noise(self, run: int) -> dict[str, FloatArray]:
+        """Residuals (n,) of all rows of a run in units of noise."""
+        scale = self.data.scales()[run]
+        return {name: values / scale[name] for name, values in self.channels[run].items()}
+
+    @cached_property
+    def vector(self) -> FloatArray:
+        """Weighted residuals (m,) of the judged rows, run after run and channel after channel."""
+        return np.concatenate([part for _, part in self._weighted()])
+
+    @cached_property
+    def parts(self) -> dict[tuple[int, str], FloatArray]:
+        """Weighted residuals of the judged rows by (index of the run, channel): size one or less at the noise floor."""
+        return dict(zip(self._keys(), np.split(self.vector, self.splits), strict=True))
+
+    @cached_property
+    def splits(self) -> tuple[int, ...]:
+        """Rows of `vector` at which the parts after the first begin."""
+        lengths = [self.data.runs[run].motor[self.data.runs[run].judged].size for run, _ in self._keys()]
+        return tuple(int(row) for row in np.cumsum(lengths)[:-1])
+
+    def split(self, values: FloatArray) -> list[FloatArray]:
+        """Values (m,) or (m, k) by part, in the order of `parts`."""
+        return np.split(values, self.splits)
+
+    def _keys(self) -> list[tuple[int, str]]:
+        return [(run, name) for run, channels in enumerate(self.channels) for name in channels]
+
+    def _weighted(self) -> Iterator[tuple[str, FloatArray]]:
+        scales = self.data.scales(self.torque_accuracy)
+        for run, scale, channels in zip(self.data.runs, scales, self.channels, strict=True):
+            rows = run.judged
+            for name, values in channels.items():
+                with np.errstate(over="ignore"):  # a hypothesis may be unstable
+                    weighted = np.nan_to_num(values[rows] / scale[name][rows], nan=_LOST)
+                yield name, np.clip(weighted, -_LOST, _LOST)
 
 
 def datum_m(measured: Response, simulated: Response, ratio_m: float, judged: slice) -> float:
-    """By how much the datum of the linear encoder differs from that of a simulation: the mean difference of table less
-    motor position over the rows judged. 0 without a linear encoder."""
+    """Datum of the linear encoder less that of a simulation [m]; 0 without a linear encoder.
+
+    It is the mean difference of table less motor position over the rows judged.
+    """
     if not measured.table_position_m.size:
         return 0.0
     return float(np.mean(_stretch(measured, simulated, ratio_m)[judged]))
 
 
 def differences(measured: Response, simulated: Response, bench: Bench, judged: slice) -> dict[str, FloatArray]:
-    """Differences (n,) of the motor [rad or m], table less motor [m], torque [N m or N], free of the data.
+    """Measured less simulated (n,): motor [rad or m], table less motor [m], torque [N m or N], free of the datums.
 
-    Not finite where the simulation is not.
+    Not finite where the simulation is not. Without a linear encoder there is no "table".
     """
     ratio_m = bench.axis.ratio_m_rad
     with np.errstate(invalid="ignore", over="ignore"):  # a hypothesis may be unstable

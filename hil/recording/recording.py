@@ -4,6 +4,8 @@ Parquet (units in the schema) for finished runs, an Arrow stream (`.arrows`) dur
 channel table for exchange. Other files are read by `hil.recording.importing`.
 """
 
+from __future__ import annotations
+
 import json
 import os
 from collections.abc import Callable, Mapping

@@ -130,8 +130,8 @@ def _fit(page: Page, fit: FitResult) -> None:
         ],
     )
     page.text(
-        "Closed-loop output error of torque, motor position and table against motor; the standard errors hold if "
-        "the remaining deviation is white noise. bench.fitted.yaml is the bench with these values."
+        "Fitted block by block as in hil diagnose, within a factor of three of the bench file; standard errors are "
+        "robust against coloured residuals. bench.fitted.yaml holds the bench with these values."
     )
 
 

@@ -31,7 +31,7 @@ _FIT_HEADERS = (
 def write_diagnosis(diagnosis: Diagnosis, folder: Path) -> None:
     """Write diagnosis.json, report.html with its PNGs, bench.diagnosed.yaml and, if one helps, next_experiment.yaml."""
     result = diagnosis.result
-    names = ", ".join(run.name for run in diagnosis.train)
+    names = ", ".join(run.name for run in diagnosis.train.runs)
     good = result.verdict is not Verdict.UNEXPLAINED
     page = Page(f"Diagnosis of {names}", _lead(diagnosis), result.statement, good)
     for index in range(len(result.missing)):
@@ -71,8 +71,8 @@ def write_diagnosis(diagnosis: Diagnosis, folder: Path) -> None:
 
 
 def _lead(diagnosis: Diagnosis) -> str:
-    seconds = sum(run.motor.size * run.period_s for run in diagnosis.train)
-    held_out = ", ".join(run.name for run in diagnosis.held_out) or "nothing"
+    seconds = sum(run.motor.size * run.period_s for run in diagnosis.train.runs)
+    held_out = ", ".join(run.name for run in diagnosis.held_out.runs) or "nothing"
     bench = f"bench {diagnosis.owner.name} ({diagnosis.owner.axis.model})"
     return f"{seconds:.1f} s of training, held out: {held_out} · {bench}"
 
@@ -113,7 +113,7 @@ def _fit(page: Page, diagnosis: Diagnosis, folder: Path) -> None:
             if found is not None
         ],
     )
-    run = (diagnosis.held_out or diagnosis.train)[0]
+    run = (*diagnosis.held_out.runs, *diagnosis.train.runs)[0]
     save(diagnosis.plot("residuals"), folder / "residuals.png")
     page.text(f"Measured - twin on {run.name}, before and after; the band is the noise floor (residuals.png).")
     page.plot(plots.over_time(run.time_s, residual_panels(diagnosis, run)))

@@ -14,7 +14,7 @@ from compare_runs import bench_with, record
 from hil.bench.bench_file import Bench, load_bench
 from hil.errors import HilError, InputError
 from hil.identification.compare import Comparison, compare, low_pass
-from hil.identification.dataset import bench_of, take
+from hil.identification.dataset import bench_of, prepare_dataset, take
 from hil.identification.nominal_fit import fit_nominal
 from hil.recording.importing import import_recording
 from hil.recording.recording import Recording, read_recording
@@ -189,7 +189,7 @@ def _rig(name: str) -> tuple[Bench, Recording]:
 def test_the_null_rig_is_explained_on_another_motion() -> None:
     bench, holdout = _rig("null/holdout.csv")
     trained = [take(_rig(f"null/{name}.csv")[1], bench) for name in ("train_1", "train_2")]
-    result = compare(holdout, fit_nominal(bench, trained).bench)
+    result = compare(holdout, fit_nominal(prepare_dataset(trained, bench)).bench)
     assert result.torque_over_noise <= 1.3
     assert result.channel("table_position_m").rms <= 1e-6
     assert result.explained

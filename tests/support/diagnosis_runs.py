@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,8 +11,10 @@ import numpy as np
 import pytest
 
 from hil.bench.bench_file import Bench, load_bench
-from hil.diagnosis.estimation.hypothesis import Model
-from hil.diagnosis.estimation.terms import Term
+from hil.identification.dataset import Dataset, Measured
+from hil.identification.estimator import Estimator, Fit
+from hil.identification.hypothesis import Hypothesis
+from hil.identification.terms import Term
 from hil.motion.profile import Profile
 from hil.motion.trajectory import plan
 from hil.recording.recording import Recording
@@ -59,8 +62,8 @@ def recorded(
 ) -> Recording:
     """What an axis that is `truth` with `terms` records over a profile, else over the segments, `times` times over."""
     trajectory = plan(profile or moves(SEGMENTS, times), truth.gains.period_s)
-    model = Model(truth, terms)
-    answer = model.twin(model.initial()).simulate(trajectory.position_m, trajectory.velocity_m_s, Start())
+    twin = Hypothesis(truth, terms).twin()
+    answer = twin.simulate(trajectory.position_m, trajectory.velocity_m_s, Start())
     noise = np.random.default_rng(seed)
     count = 2.0 * np.pi / truth.encoders.motor.counts_per_rev
     n = answer.torque.size
@@ -95,3 +98,20 @@ def rig(folder: str) -> Path:
     if not (RIG / folder).is_dir():
         pytest.skip(f"the rig recordings {folder} are not beside the repository")
     return RIG / folder
+
+
+def dataset(runs: Sequence[Measured], owner: Bench, **settings: float) -> Dataset:
+    """A data set with the default observer unless `settings` say otherwise."""
+    return Dataset(tuple(runs), owner, **settings)
+
+
+def evaluated(hypothesis: Hypothesis, runs: Sequence[Measured] | Dataset, **settings: float) -> Fit:
+    """A hypothesis evaluated on runs, not fitted."""
+    data = runs if isinstance(runs, Dataset) else dataset(runs, hypothesis.bench, **settings)
+    return Estimator(data).evaluate(hypothesis)
+
+
+def fitted(hypothesis: Hypothesis, runs: Sequence[Measured] | Dataset, evaluations: int = 30) -> Fit:
+    """A hypothesis fitted to runs."""
+    data = runs if isinstance(runs, Dataset) else dataset(runs, hypothesis.bench)
+    return Estimator(data).fit(hypothesis, evaluations=evaluations)

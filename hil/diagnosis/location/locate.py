@@ -5,23 +5,20 @@ it arises. A range is claimed only where it is narrow against what the motion co
 into blocks that are dealt out at random (a block-permutation null), hardly ever concentrates so much.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import asdict
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hil.arrays import FloatArray
-from hil.diagnosis.estimation.fit import Fit
-from hil.diagnosis.estimation.noise_ratios import noise_ratios
 from hil.diagnosis.location.periodicity import Lock, lock
-from hil.diagnosis.location.phases import phases
 from hil.diagnosis.location.reaction_torque import acting
 from hil.diagnosis.location.residual_energy import Energy, energies, without_terms
 from hil.diagnosis.result import Location, Phase, PhaseKind
 from hil.diagnosis.verdict.fit_table import channel_names
 from hil.identification.dataset import Measured
+from hil.identification.estimator import Fit
 from hil.twin.library import BY_ID
 
 # Channel of the twin -> block whose output it is, and the part of the axis an engineer would look at
@@ -35,27 +32,30 @@ BLOCKS = {
 CONCENTRATED = 0.8  # share of the energy that a window or a range holds
 NARROW = 0.5  # of what the motion covers: a range beyond is no range
 SURE = 0.01  # of the null may concentrate as much
+CREEP = 0.05  # of the top speed
+ACCELERATING = 0.02  # of the top acceleration
+AFTER_REVERSAL_S = 0.06  # the flanks and the friction have turned round by then
 _SHUFFLES = 199
 _BLOCK_S = 0.1  # of time: longer than residuals remember
 _BINS = 40
 _WINDOWS = 5
 
 
-def block_shares(found: Fit, runs: Sequence[Measured]) -> dict[str, float]:
-    """Share of each channel of the twin in the energy above the floor, whatever its name."""
-    total = dict.fromkeys(noise_ratios(found, runs[0]), 0.0)
-    for run in runs:
-        for name, ratio in noise_ratios(found, run).items():
+def block_shares(found: Fit) -> dict[str, float]:
+    """Share of each channel of the twin in the energy above the floor."""
+    total = dict.fromkeys(found.noise_ratios[0], 0.0)
+    for run, ratios in zip(found.data.runs, found.noise_ratios, strict=True):
+        for name, ratio in ratios.items():
             total[name] += run.motor.size * max(ratio - 1.0, 0.0)
     whole = sum(total.values())
     return {name: value / whole if whole > 0.0 else 0.0 for name, value in total.items()}
 
 
-def locate(found: Fit, runs: Sequence[Measured], final: Fit) -> Location:
-    """Where `found` misses the recordings; `final` is the hypothesis with the terms that explain it, if any do."""
-    bench, terms = final.model.bench, final.model.resolved(final.x)[1]
-    shares = block_shares(found, runs)
-    names = channel_names(bench, runs[0])
+def locate(found: Fit, final: Fit) -> Location:
+    """Where `found` deviates from its recordings; `final` is the fit with the terms that explain it, if any do."""
+    bench, terms, data = final.hypothesis.bench, final.terms, found.data
+    shares = block_shares(found)
+    names = channel_names(bench, data.runs[0])
     strongest = sorted((name for name in shares if shares[name] > 0.05), key=lambda name: -shares[name])
     strongest = strongest or [max(shares, key=lambda name: shares[name])]
     block, element = BLOCKS[strongest[0]]
@@ -63,9 +63,9 @@ def locate(found: Fit, runs: Sequence[Measured], final: Fit) -> Location:
         mechanism = BY_ID[terms[0].effect]
         block, element = mechanism.block.value, mechanism.element
     elif found is final and strongest[0] in ("motor", "table"):  # no refit moves it either
-        block, element = acting(found, runs) or (block, element)
-    # with names, what the named physics does to the axis is known without noise
-    seen = energies(without_terms(final), runs, final) if terms else energies(found, runs)
+        block, element = acting(found) or (block, element)
+    # the effect of a finding is known without noise
+    seen = mismatch_energies(found, final)
     locked = lock(seen, max(strongest, key=lambda name: shares[name]), bench, terms)
     return Location(
         block=block,
@@ -77,6 +77,13 @@ def locate(found: Fit, runs: Sequence[Measured], final: Fit) -> Location:
         speed_m_s=_range([np.abs(run.run.velocity_command_m_s) for run in seen], seen),
         **_periods(locked),
     )
+
+
+def mismatch_energies(found: Fit, final: Fit) -> list[Energy]:
+    """Energy of the effect of the terms of `final` by row, else that of the residuals of `found`."""
+    if final.terms:
+        return energies(without_terms(final.hypothesis), found.data, final.hypothesis)
+    return energies(found.hypothesis, found.data)
 
 
 def phase_shares(seen: Sequence[Energy]) -> tuple[Phase, ...]:
@@ -150,3 +157,20 @@ def _dealt(rows: FloatArray, size: int, random: np.random.Generator) -> FloatArr
 
 def _periods(locked: Lock) -> dict[str, float | None]:
     return asdict(locked)
+
+
+def phases(run: Measured) -> NDArray[np.str_]:
+    """The phase (n,) of each row, by its set-points; a reversal lasts until the axis has turned round."""
+    speed = run.velocity_command_m_s
+    top = float(np.max(np.abs(speed))) or 1.0
+    acceleration = np.gradient(speed, run.period_s)
+    moving = np.abs(speed) > 1e-3 * top
+    kinds = np.full(speed.size, PhaseKind.CONSTANT_FEED.value, dtype="<U16")
+    kinds[np.abs(acceleration) > ACCELERATING * float(np.max(np.abs(acceleration)))] = PhaseKind.ACCELERATION.value
+    kinds[np.abs(speed) < CREEP * top] = PhaseKind.CREEP.value
+    kinds[~moving] = PhaseKind.STANDSTILL.value
+    rows = np.flatnonzero(moving)
+    turns = rows[1:][np.diff(np.sign(speed[rows])) != 0.0]
+    for turn in turns:
+        kinds[turn : turn + round(AFTER_REVERSAL_S / run.period_s)] = PhaseKind.REVERSAL.value
+    return kinds

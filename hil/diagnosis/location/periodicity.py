@@ -15,8 +15,8 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
-from hil.diagnosis.estimation.terms import Term
 from hil.diagnosis.location.residual_energy import Energy
+from hil.identification.terms import Term
 from hil.twin.library import BY_ID
 from hil.twin.mechanism import Role
 

@@ -1,35 +1,30 @@
-"""On which side of the transmission acts what has no name: told by what the motor feels while the table is off.
+"""Isolate an unnamed fault to table or linear encoder from the motor's reaction torque.
 
-Where the table is off by e, reduced to the motor, the motor feels
+A deviation e of the table, reduced to the motor, causes the torque on the motor
 
-    k e        of a force on the table, which the transmission passes on
-    -J e''     of an error of the transmission, which moves the table against its inertia
-    0          of an error of the linear encoder, which moves nothing
+    k e        if a force acts on the table
+    -J e''     if the transmission has an error, which moves the table against its inertia
+    0          if the linear encoder has an error
 
-with the stiffness k between motor and table and the inertia J of the table. What it feels is the disturbance torque d
-of `hil.diagnosis.search.disturbance`; the share b of a reaction x that is there is <d, x> / <x, x>.
+with the stiffness k between motor and table and the inertia J of the table. The torque on the motor is the disturbance
+torque d of `hil.diagnosis.search.disturbance`; the share of a reaction x in it is <d, x> / <x, x>.
 """
-
-from __future__ import annotations
-
-from collections.abc import Sequence
 
 import numpy as np
 from scipy.signal import lfilter
 
 from hil.arrays import FloatArray
-from hil.diagnosis.estimation.fit import Fit
-from hil.diagnosis.estimation.hypothesis import inertia
 from hil.diagnosis.search.disturbance import disturbance, smooth
-from hil.identification.dataset import Measured
+from hil.identification.dataset import Measured, inertia
+from hil.identification.estimator import Fit
 from hil.twin.mechanism import Block
 from hil.twin.structure.chain import Chain
 
 TABLE = (Block.TABLE.value, "table, its guides, and what acts on them")
 ENCODER = (Block.SENSOR.value, "linear encoder")
 
-# A force shows at both ends: the motor feels more than half of k e, which refitted springs may bend, and hardly
-# anything else. On development axes forces had 0.9 to 5, errors of the transmission 0.6 at most, of encoders 0.1.
+# A force acts on both ends: the share of k e in the torque is above a half, refitted springs included, and little else
+# is in it. On development axes forces had 0.9 to 5, errors of the transmission 0.6 at most, of encoders 0.1.
 _PASSED, _ALONE = 0.7, 0.5
 # Inertia that would stand so far out of what the motor feels anyway, and of which it feels less than this, is not
 # there: errors of the linear encoder had 0.02 at most, those of the transmission 0.5 and more. Fewer rows than pass in
@@ -38,16 +33,15 @@ _STANDS_OUT, _MISSING, _FEW_S = 5.0, 0.25, 0.05
 _DEVIATION = 1.4826  # standard deviation of Gaussian noise over the median of its size
 
 
-def acting(found: Fit, runs: Sequence[Measured]) -> tuple[str, str] | None:
-    """Block and element, where the motor tells that it is the table or the linear encoder; else None."""
-    fitted, _ = found.model.resolved(found.x)
+def acting(found: Fit) -> tuple[str, str] | None:
+    """Block and element, where the reaction torque isolates the table or the linear encoder; else None."""
+    fitted, runs = found.bench, found.data.runs
     chain = fitted.axis.physics().chain
     if len(chain.names) < 2 or not all(run.table_m.size for run in runs):
         return None
     stiffness, table_inertia = stiffness_between(chain), float(chain.inertia_kg_m2[chain.table, chain.table])
-    observer_s, felt, off, moved = found.model.observer_s, list[FloatArray](), list[FloatArray](), list[FloatArray]()
-    for run in runs:
-        blocks = found.model.blocks(found.x, run)
+    observer_s, felt, off, moved = found.data.observer_s, list[FloatArray](), list[FloatArray](), list[FloatArray]()
+    for run, blocks in zip(runs, found.residuals.channels, strict=True):
         seen = disturbance(run, blocks["motor"], inertia(fitted), observer_s)
         table = smooth(_observed(blocks["table"] / fitted.axis.ratio_m_rad, run, observer_s), run.period_s)
         table = smooth(table, run.period_s)  # like the torque, which is smooth already, and once more below

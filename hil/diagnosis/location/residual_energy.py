@@ -1,19 +1,15 @@
-"""Residual energy row by row: what a hypothesis leaves of a recording, block by block, in units of noise."""
+"""Residual energy of a hypothesis row by row, block by block, in units of noise."""
 
-from __future__ import annotations
-
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from hil.arrays import FloatArray
-from hil.diagnosis.estimation.fit import Fit
-from hil.diagnosis.estimation.hypothesis import scales
-from hil.diagnosis.estimation.terms import Term
-from hil.identification.dataset import Measured
+from hil.identification.dataset import Dataset, Measured
+from hil.identification.hypothesis import Hypothesis
+from hil.identification.terms import Term
 
-_MEMORY_S = 0.03  # an error of the table counts as new for so long
+_MEMORY_S = 0.03  # for so long, a change of the table's error counts as new
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,15 +21,14 @@ class Energy:
     parts: dict[str, FloatArray]
 
 
-def energies(found: Fit, runs: Sequence[Measured], reference: Fit | None = None) -> list[Energy]:
-    """Energy of the rows of each run that a hypothesis leaves; with `reference`, that of the difference of both."""
+def energies(hypothesis: Hypothesis, data: Dataset, reference: Hypothesis | None = None) -> list[Energy]:
+    """Energy of the rows of each run under a hypothesis; with `reference`, that of the difference of both."""
     result = []
-    for run in runs:
-        scale = scales(run, found.model.bench, found.model.observer_s)
-        parts = {name: values / scale[name] for name, values in found.model.blocks(found.x, run).items()}
+    for index, run in enumerate(data.runs):
+        parts = hypothesis.residuals(data).over_noise(index)
         if reference is not None:
-            other = reference.model.blocks(reference.x, run)
-            parts = {name: values - other[name] / scale[name] for name, values in parts.items()}
+            other = reference.residuals(data).over_noise(index)
+            parts = {name: values - other[name] for name, values in parts.items()}
         rows = np.sum([_arising(name, values, run) ** 2 for name, values in parts.items()], axis=0)
         if reference is None:
             rows = rows - len(parts)
@@ -42,18 +37,16 @@ def energies(found: Fit, runs: Sequence[Measured], reference: Fit | None = None)
     return result
 
 
-def without_terms(found: Fit, off: Term | None = None) -> Fit:
-    """The hypothesis with its terms, or one of them, switched off and all else as it is."""
-    kept = tuple(term for term in found.model.resolved(found.x)[1] if off is not None and term.key != off.key)
-    model = replace(found.model, terms=kept)
-    x = np.concatenate([found.x[: model.nominal_count], model.initial()[model.nominal_count :]])
-    return replace(found, model=model, x=x)
+def without_terms(hypothesis: Hypothesis, off: Term | None = None) -> Hypothesis:
+    """The hypothesis with its terms, or one of them, switched off and the rest as it is."""
+    keys = [term.key for term in hypothesis.terms]
+    return hypothesis.without(*(index for index, key in enumerate(keys) if off is None or key == off.key))
 
 
 def _arising(channel: str, values: FloatArray, run: Measured) -> FloatArray:
     """The part of a residual (n,) that arises at each row.
 
-    The table keeps an error once it has it, at standstill too: what counts is by how much it changes.
+    The table keeps an error, at standstill too: its change counts.
     """
     if channel != "table":
         return values

@@ -10,7 +10,6 @@ from matplotlib.figure import Figure
 from scipy.signal import welch
 
 from hil.arrays import FloatArray
-from hil.diagnosis.estimation.terms import Term
 from hil.diagnosis.pictures.laws import friction_over_speed, lost_motion, torque_over_command
 from hil.diagnosis.pictures.view import (
     CHANNEL_LABELS,
@@ -28,6 +27,7 @@ from hil.diagnosis.pictures.view import (
 )
 from hil.figures.drawing import legend_above, style_axis
 from hil.figures.panels import COMMAND, MEASURED, SIMULATED, thin
+from hil.identification.terms import Term
 from hil.quantities import reading_unit
 from hil.twin.library import BY_ID
 from hil.twin.mechanism import Picture
@@ -47,8 +47,9 @@ def finding_figure(diagnosis: Diagnosis, term: Term) -> Captioned:
     picture = PICTURES[BY_ID[term.effect].picture]
     # a friction curve needs every feed of every recording
     every = picture is friction_over_speed
-    runs = (*diagnosis.train, *diagnosis.held_out) if every else diagnosis.held_out or diagnosis.train
-    figure, caption = picture(diagnosis, [view_of(diagnosis.final, run, term) for run in runs])
+    train, held_out = diagnosis.train.runs, diagnosis.held_out.runs
+    runs = (*train, *held_out) if every else held_out or train
+    figure, caption = picture(diagnosis, [view_of(diagnosis, run, term) for run in runs])
     return Captioned(figure, f"{caption} Recordings: {', '.join(run.name for run in runs)}.")
 
 
@@ -56,7 +57,7 @@ def term_of(diagnosis: Diagnosis, index: int) -> Term:
     """The term of the final hypothesis that the finding `index` reports."""
     finding = diagnosis.result.missing[index]
     strength = next(iter(finding.parameters.values())).value
-    terms = diagnosis.final.model.resolved(diagnosis.final.x)[1]
+    terms = diagnosis.final.terms
     return next(term for term in terms if term.effect == finding.effect and term.values[0] == strength)
 
 
@@ -153,7 +154,7 @@ def _spectrum(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:
     ):
         spectra = [
             welch(
-                fit.model.blocks(fit.x, view.run)[channel],
+                diagnosis.residuals(fit, view.run)[channel],
                 1.0 / view.run.period_s,
                 nperseg=min(4096, view.run.motor.size),
             )

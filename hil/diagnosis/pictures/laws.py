@@ -11,11 +11,11 @@ from matplotlib.figure import Figure
 from scipy.signal import savgol_filter
 
 from hil.arrays import FloatArray
-from hil.diagnosis.estimation.fit import Fit
-from hil.diagnosis.pictures.view import Captioned, Curve, View, around, binned, inertia, longest, three_curves
+from hil.diagnosis.pictures.view import Captioned, Curve, View, around, binned, longest, three_curves
 from hil.figures.drawing import style_axis
 from hil.figures.panels import COMMAND, DEVIATION, MEASURED, SIMULATED
-from hil.identification.dataset import Measured
+from hil.identification.dataset import Measured, inertia
+from hil.identification.estimator import Fit
 from hil.quantities import reading_unit
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ def friction_over_speed(diagnosis: Diagnosis, views: Sequence[View]) -> Captione
     figure = Figure(figsize=(10.0, 5.6), layout="constrained")
     axis = figure.subplots()
     measured = [_friction_of(final, view.run, view.run.motor, view.run.torque) for view in views]
-    responses = [final.model.respond(final.x, view.run) for view in views]
+    responses = [final.hypothesis.respond(view.run) for view in views]
     simulated = [
         _friction_of(final, view.run, response.motor_position, response.torque)
         for view, response in zip(views, responses, strict=True)
@@ -55,7 +55,7 @@ def friction_over_speed(diagnosis: Diagnosis, views: Sequence[View]) -> Captione
         ("bench file", diagnosis.explanation.owner, ":"),
         ("nominal twin, refitted", diagnosis.explanation.nominal, "-."),
     ):
-        physics = fit.model.resolved(fit.x)[0].axis.physics()
+        physics = fit.bench.axis.physics()
         law = physics.coulomb_n_m + physics.viscous_n_m_s_rad * edges
         axis.plot(edges * to_m_min, law, color=COMMAND, linestyle=dash, label=name)
     axis.set_xscale("log")
@@ -73,9 +73,9 @@ def _friction_of(final: Fit, run: Measured, motor: FloatArray, torque: FloatArra
     """Speed and friction (m,) of the rows in which the axis moves with little acceleration."""
     window = max(round(0.021 / run.period_s) | 1, 5)
     velocity = savgol_filter(motor, window, 2, deriv=1, delta=run.period_s)
-    inertial = inertia(final) * savgol_filter(motor, window, 2, deriv=2, delta=run.period_s)
+    inertial = inertia(final.bench) * savgol_filter(motor, window, 2, deriv=2, delta=run.period_s)
     friction = savgol_filter(torque, window, 2) - inertial
-    coulomb = final.model.resolved(final.x)[0].axis.physics().coulomb_n_m
+    coulomb = final.bench.axis.physics().coulomb_n_m
     # the slip of a stick-slip cycle is shorter than the filter window; at higher speed J a is known well
     share = np.where(np.abs(velocity) > 0.05 * np.abs(velocity).max(), 1.0, 0.1)
     rows = (np.abs(inertial) < share * coulomb) & (np.abs(velocity) > 0.0)

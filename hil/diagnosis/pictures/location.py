@@ -10,15 +10,14 @@ from matplotlib.figure import Figure
 
 from hil.arrays import FloatArray
 from hil.channels import CHANNELS
-from hil.diagnosis.estimation.fit import Fit
-from hil.diagnosis.location.locate import BLOCKS, block_shares, phase_shares
-from hil.diagnosis.location.residual_energy import energies, without_terms
-from hil.diagnosis.result import Mode, Verdict
-from hil.diagnosis.verdict.fit_table import channel_names, residuals
+from hil.diagnosis.location.locate import BLOCKS, block_shares, mismatch_energies, phase_shares
+from hil.diagnosis.result import Verdict
+from hil.diagnosis.verdict.fit_table import channel_names
 from hil.diagnosis.wording import title
 from hil.figures.drawing import style_axis
 from hil.figures.panels import COMMAND, DEVIATION, MEASURED, SIMULATED, Line, Panel
 from hil.identification.dataset import Measured
+from hil.identification.estimator import Fit
 
 if TYPE_CHECKING:
     from hil.diagnosis.diagnose import Diagnosis
@@ -30,15 +29,11 @@ ENERGY = "residual² / noise²"
 
 def location_figure(diagnosis: Diagnosis) -> Figure:
     """Draw shares of the residual energy by block and phase, and its mean over position, speed and time."""
-    before, final = reference_fit(diagnosis), diagnosis.final
-    seen = (
-        energies(without_terms(final), diagnosis.train, final)
-        if final.model.terms
-        else energies(before, diagnosis.train)
-    )
+    before = reference_fit(diagnosis)
+    seen = mismatch_energies(before, diagnosis.final)
     figure = Figure(figsize=(10.0, 8.2), layout="constrained")
     axes = figure.subplot_mosaic([["block", "phase"], ["position", "speed"], ["time", "time"]])
-    blocks = {title(BLOCKS[name][0]): share for name, share in block_shares(before, diagnosis.train).items()}
+    blocks = {title(BLOCKS[name][0]): share for name, share in block_shares(before).items()}
     _shares(axes["block"], blocks, "Block in whose output it shows")
     _shares(axes["phase"], {title(phase.kind): phase.share for phase in phase_shares(seen)}, "Phase of motion")
     excess = np.concatenate([energy.rows for energy in seen])
@@ -69,17 +64,16 @@ def reference_fit(diagnosis: Diagnosis) -> Fit:
 
 def residual_panels(diagnosis: Diagnosis, run: Measured) -> list[Panel]:
     """Residual of each channel of a run before and after, with the noise floor as a band."""
-    held_out = any(run is other for other in diagnosis.held_out)
-    before, after = residuals(reference_fit(diagnosis), run), residuals(diagnosis.final, run)
+    held_out = any(run is other for other in diagnosis.held_out.runs)
     panels = []
     for channel, recorded in channel_names(diagnosis.owner, run).items():
         if recorded not in diagnosis.result.fit:
             continue
         entry = diagnosis.result.fit[recorded]
-        closed = entry.mode is Mode.CLOSED_LOOP
         floor = (entry.validate_ if held_out and entry.validate_ else entry.train).noise_floor_rms
         first, second = (
-            _judged((found.closed_loop if closed else found.blocks)[channel], run) for found in (before, after)
+            _judged(diagnosis.residuals(fit, run, entry.mode)[channel], run)
+            for fit in (reference_fit(diagnosis), diagnosis.final)
         )
         lines = Line("before", first, COMMAND, broad=True), Line("after", second, SIMULATED)
         label = recorded.removesuffix("_rad").removesuffix("_n_m").removesuffix("_m").removesuffix("_n")

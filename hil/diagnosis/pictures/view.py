@@ -10,12 +10,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from hil.arrays import FloatArray
-from hil.diagnosis.estimation.fit import Fit
-from hil.diagnosis.estimation.terms import Term
 from hil.diagnosis.location.residual_energy import without_terms
 from hil.diagnosis.search.disturbance import Disturbance, disturbance
 from hil.figures.panels import COMMAND, MEASURED, SIMULATED
-from hil.identification.dataset import Measured
+from hil.identification.dataset import Measured, inertia
+from hil.identification.terms import Term
 
 if TYPE_CHECKING:
     from hil.diagnosis.diagnose import Diagnosis
@@ -65,13 +64,14 @@ class Curve(NamedTuple):
     colour: str
 
 
-def view_of(final: Fit, run: Measured, term: Term) -> View:
-    """Simulate a run without a term and with it."""
-    off = without_terms(final, term)
-    measured, left = off.model.blocks(off.x, run), final.model.blocks(final.x, run)
+def view_of(diagnosis: Diagnosis, run: Measured, term: Term) -> View:
+    """Simulate a run without a term of the final hypothesis."""
+    final, observer_s = diagnosis.final, diagnosis.train.observer_s
+    measured = without_terms(final.hypothesis, term).blocks(run, observer_s)
+    left = diagnosis.residuals(final, run)
     modelled = {name: measured[name] - left[name] for name in measured}
     torque, torque_modelled = (
-        disturbance(run, values["motor"], inertia(final), final.model.observer_s) for values in (measured, modelled)
+        disturbance(run, values["motor"], inertia(final.bench), observer_s) for values in (measured, modelled)
     )
     return View(term, run, measured, modelled, torque, torque_modelled)
 
@@ -79,7 +79,7 @@ def view_of(final: Fit, run: Measured, term: Term) -> View:
 def three_curves(diagnosis: Diagnosis, run: Measured, channel: str, measured: FloatArray) -> list[Curve]:
     """A signal (n,) as measured, as the refitted nominal twin has it, and as the final twin has it."""
     nominal, final = (
-        measured - fit.model.blocks(fit.x, run)[channel] for fit in (diagnosis.explanation.nominal, diagnosis.final)
+        measured - diagnosis.residuals(fit, run)[channel] for fit in (diagnosis.explanation.nominal, diagnosis.final)
     )
     return [
         Curve("nominal twin, refitted", nominal, COMMAND),
@@ -91,12 +91,6 @@ def three_curves(diagnosis: Diagnosis, run: Measured, channel: str, measured: Fl
 def longest(views: Sequence[View]) -> View:
     """The view of the longest run."""
     return max(views, key=lambda view: view.run.motor.size)
-
-
-def inertia(final: Fit) -> float:
-    """Inertia of the whole axis in motor units [kg m^2], linear axis [kg]."""
-    modes = final.model.resolved(final.x)[0].twin().modal
-    return float(modes.shape[modes.motor, 0] ** -2)
 
 
 def unit_of_channel(diagnosis: Diagnosis, channel: str) -> str:

@@ -2,7 +2,7 @@
 
     d = e J / tau^2
 
-with the motor's innovation e (see `hil.diagnosis.estimation.hypothesis`), the inertia J of the whole axis and the time
+with the motor's innovation e (see `hil.identification.hypothesis`), the inertia J of the whole axis and the time
 constant tau of the observer: the torque whose effect the correction of the motor just holds.
 
 These are starting values only: every verdict comes from the closed-loop fit.

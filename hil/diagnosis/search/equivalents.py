@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from hil.bench.bench_file import Bench
-from hil.diagnosis.estimation.terms import Term, free_slot
+from hil.identification.terms import Term, free_slot
 from hil.twin.library import BY_ID, LIBRARY
 from hil.twin.mechanism import Dimension, Mechanism, Role
 

@@ -1,11 +1,9 @@
-"""From recordings to an explanation: how many mechanisms, which, their rivals, and what stays unexplained.
+"""Forward selection: how many mechanisms, which, and their rivals.
 
-Terms are added one at a time while the evidence asks for them, each against the whole library. After every
-addition the terms that are no longer needed are dropped, so that a first guess that only imitated two
-causes goes once both are there.
+Terms are added one at a time while the evidence asks for them, each against the whole library. After every addition
+the terms that are no longer needed are removed, so that a first term which only imitated two causes goes once both
+are there.
 """
-
-from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -13,17 +11,17 @@ from functools import partial
 
 import numpy as np
 
-from hil.bench.bench_file import Bench
-from hil.diagnosis.estimation.fit import Fit, evaluate, fit, in_parallel
-from hil.diagnosis.estimation.hypothesis import LAST_EDGE_STEP_S
-from hil.diagnosis.estimation.model_comparison import against, whitening
-from hil.diagnosis.estimation.noise_floor import REPEATS, Laps, all_laps, unrepeated
-from hil.diagnosis.estimation.terms import FRICTION, Key, Term
-from hil.diagnosis.search import successive_halving
 from hil.diagnosis.search.restart import from_owner, may_hide, unbent
-from hil.diagnosis.search.score_test import Lead
+from hil.diagnosis.search.score_test import Candidate, screen_library
+from hil.diagnosis.search.successive_halving import race
 from hil.diagnosis.search.validity import claimable
-from hil.identification.dataset import Measured
+from hil.identification.dataset import Dataset
+from hil.identification.estimator import Fit, in_parallel
+from hil.identification.hypothesis import LAST_EDGE_STEP_S, effects
+from hil.identification.model_comparison import against, whitening
+from hil.identification.noise_floor import REPEATS, unrepeated
+from hil.identification.nominal_fit import fit_nominal_parameters
+from hil.identification.terms import FRICTION, Key, Term
 
 Progress = Callable[[str], None]
 
@@ -32,32 +30,34 @@ MOST_TERMS = 8  # at once; more than an engineer could act on, and the search st
 # 90 starts, which costs 2 log 90 = 9 more.
 NEEDED = 20.0
 TIED = 10.0  # a rival closer than this is not refuted
-# A fit without a term that leaves so much more than the one with it, 1 / 0.7, is not carried to its end: more steps
-# would change the number, not the answer. Nearer ones are. What takes less away may be the rest of something hidden.
+# Ablation fits stop early when the cost without the term is > 1.43 x (1 / 0.7) the cost with it; others are iterated to
+# convergence. A term that removes less may be the remainder of a hidden effect, which restarts look for.
 _CLEAR = 0.7
-# A term must also matter: take so much energy away, in units of the noise's: 14 % of the noise in rms.
-# Below lie the details in which two honest simulations of one axis differ.
+# A term must also matter: remove so much energy, in units of the noise's: 14 % of the noise in rms.
+# Two honest simulations of one axis differ by details below that.
 MATERIAL = 0.02
-# And so much of what is left above the noise: one mechanism after the other that each explain next to nothing are a
-# series expansion of something else.
+# And so much of the energy above the noise: many mechanisms that each explain next to nothing are a series expansion
+# of something else.
 WORTH = 0.02
-# Terms that together leave more than this of what is above the floor are a fit, not an explanation: more of the
-# mismatch is not understood than is. After so many of them the search ends.
+# Terms that together leave more than this share of the energy above the floor are a fit, not an explanation. After so
+# many of them the search ends.
 MOST, _IN_VAIN = 0.5, 3
 _ENDED = 40  # evaluations, within which a fit that began near its end gets there
-# The same law may be written in another form. What a term leaves below this share of the energy that it took from a
-# channel, a twentieth in rms, may be its own form, and no second mechanism.
+# The same law may be written in another form. A residual below this share of the energy that a term removed from a
+# channel, a twentieth in rms, may be due to its form, and no second mechanism.
 FORM = 0.0025
 
-# A rival that leaves no more than this beside the best is not refuted either, whatever the evidence: a quarter of what
-# is material, 7 % of the noise in rms. A simulation of the axis by someone else differs by as much.
+# A rival whose energy per row exceeds the best's by no more than this is not refuted either, whatever the evidence: a
+# quarter of what is material, 7 % of the noise in rms. Two simulations of the same axis differ by as much.
 ALIKE = 0.25 * MATERIAL
 
 
 @dataclass(frozen=True, eq=False)
-class Rival:
-    """Another explanation of the same residual, the evidence against it (BIC difference), and the energy that it
-    leaves beyond, per row in units of the noise's."""
+class RivalFit:
+    """Another explanation of the same residual and the evidence against it (BIC difference).
+
+    `more` is its energy per row, in units of noise, less that of the explanation chosen.
+    """
 
     fit: Fit
     evidence: float
@@ -71,178 +71,146 @@ class Rival:
 
 @dataclass(frozen=True, eq=False)
 class Explanation:
-    """What was found: the owner's values, the nominal refit, the final fit and the rivals of each term."""
+    """Result of the search: the fit at the bench's parameters, the nominal refit, the final fit and its rivals."""
 
     owner: Fit
     nominal: Fit
     final: Fit
-    rivals: dict[Key, list[Rival]] = field(default_factory=dict)
+    rivals: dict[Key, list[RivalFit]] = field(default_factory=dict)
     needed: dict[Key, float] = field(default_factory=dict)  # evidence that each term is needed
-    leads: tuple[Lead, ...] = ()  # of the first screen
+    candidates: tuple[Candidate, ...] = ()  # of the first score test
 
     @property
     def terms(self) -> tuple[Term, ...]:
         """The mechanisms found, with their fitted values."""
-        return self.final.model.resolved(self.final.x)[1]
+        return self.final.terms
 
 
-def explain(bench: Bench, runs: Sequence[Measured], progress: Progress = lambda text: None) -> Explanation:
-    """Search for the physics that the twin of `bench` lacks on these recordings."""
+def explain(data: Dataset, progress: Progress = lambda text: None) -> Explanation:
+    """Search for the physics that the twin of a bench lacks on the recordings of a data set."""
     progress("refitting the nominal parameters")
-    base = successive_halving.nominal(bench, runs)
-    owner = evaluate(base.model, runs)
-    nominal, rivals, needed, first_leads = base, dict[Key, list[Rival]](), dict[Key, float](), list[Lead]()
-    repeated = all_laps(runs)
-    tried = [_kinds(base)]
-    while len(base.model.terms) < MOST_TERMS:
-        progress(f"screening the library beside {len(base.model.terms)} terms")
-        leads = [
-            lead
-            for lead in successive_halving.leads(base, runs)
-            if claimable(lead.term, base.model.resolved(base.x)[0])
-        ]
-        first_leads = first_leads or leads
-        rows = base.residuals.size
-        promising = [lead for lead in leads if lead.share > _bits(rows) and lead.share * base.cost > MATERIAL * rows]
-        found: list[Fit] = []
-        if promising:
-            progress("fitting " + ", ".join(lead.term.effect for lead in promising[:3]))
-            found = [
-                other
-                for other in successive_halving.race(base, promising, runs)
-                if claimable(_last(other), other.model.resolved(other.x)[0])
-            ]
-        best = _worthwhile(found, base, nominal, repeated)
-        if (best is None or best.cost > _CLEAR * base.cost) and not owner.at_floor and may_hide(base, runs):
-            progress("fitting what bent springs may hide")
-            found = sorted([*found, unbent(base, runs)], key=lambda other: other.cost)
-            best = _worthwhile(found, base, nominal, repeated)
-        if best is None and not base.at_floor and excess(base) > MOST * excess(nominal):
-            progress("searching again beside the owner's values")
-            found = [
-                other for other in from_owner(base, runs) if claimable(_last(other), other.model.resolved(other.x)[0])
-            ]
-            best = _worthwhile(found, base, nominal, repeated)
+    base = fit_nominal_parameters(data)
+    owner, nominal = base.estimator.evaluate(base.hypothesis.owner), base
+    rivals, needed, first = dict[Key, list[RivalFit]](), dict[Key, float](), list[Candidate]()
+    tried = [effects(())]
+    while len(base.terms) < MOST_TERMS:
+        progress(f"screening the library beside {len(base.terms)} terms")
+        candidates = [one for one in screen_library(base) if claimable(one.term, base.bench)]
+        first = first or candidates
+        found, best = _next_term(base, owner, nominal, candidates, progress)
         if best is None:
             break
         best = _simplest([best, *(other for other in found if other is not best and against(best, other) < TIED)])
         found = [other for other in found if other is not best]
-        if not best.jacobian.size:  # a rival that was not fitted to its end, before another was refused
-            best = fit(replace(best.model, edge_step_s=LAST_EDGE_STEP_S), runs, best.x)
+        if not best.jacobian.size:  # evaluated, not fitted, while another that was fitted was refused
+            best = replace(best.estimator, edge_step_s=LAST_EDGE_STEP_S).fit(best.hypothesis)
         filters = whitening(best)
-        rivals[best.model.terms[-1].key] = sorted(
-            (Rival(other, against(best, other, filters), (other.cost - best.cost) / rows) for other in found),
+        rivals[best.terms[-1].key] = sorted(
+            (RivalFit(other, against(best, other, filters), (other.cost - best.cost) / base.rows) for other in found),
             key=lambda rival: rival.evidence,
         )
-        best, needed = _pruned(best, nominal, runs)
-        # to its end: what a fit that is on its way leaves looks like something else
-        base = claimed(fit(best.model, runs, best.x, evaluations=_ENDED, slopes=best.jacobian), runs)
-        if _kinds(base) in tried:
-            break  # what was added went again
-        tried.append(_kinds(base))
-        if len(base.model.terms) >= _IN_VAIN and excess(base) > MOST * excess(nominal):
+        best, needed = _pruned(best, nominal)
+        # converged: the residual of an unfinished fit resembles other mechanisms
+        base = claimed(best.refit(_ENDED, slopes=best.jacobian))
+        if effects(base.terms) in tried:
+            break  # the term that was added has been removed again
+        tried.append(effects(base.terms))
+        if len(base.terms) >= _IN_VAIN and base.excess > MOST * nominal.excess:
             break
-    final = fit(base.model, runs, base.x, evaluations=_ENDED)
-    kept = {term.key for term in final.model.terms}
-    return Explanation(
-        owner, nominal, final, {key: value for key, value in rivals.items() if key in kept}, needed, tuple(first_leads)
-    )
+    final = base.refit(_ENDED)
+    kept = {term.key for term in final.terms}
+    rivals = {key: value for key, value in rivals.items() if key in kept}
+    return Explanation(owner, nominal, final, rivals, needed, tuple(first))
 
 
-def _worthwhile(found: Sequence[Fit], base: Fit, nominal: Fit, repeated: Sequence[tuple[Measured, Laps]]) -> Fit | None:
-    """The first that explains so much more than the base that its last term is asked for, and repeats as well."""
-    enough = max(MATERIAL * base.residuals.size, WORTH * excess(base))
-    differs = unrepeated(base, repeated)
+def _next_term(
+    base: Fit, owner: Fit, nominal: Fit, candidates: Sequence[Candidate], progress: Progress
+) -> tuple[list[Fit], Fit | None]:
+    """Fits of the base with one more term, and the first of them that is worth it, if any."""
+    bits = 1.0 - float(np.exp(-NEEDED / base.rows))  # share of white residuals that evidence of NEEDED removes
+    promising = [one for one in candidates if one.share > bits and one.share * base.cost > MATERIAL * base.rows]
+    found: list[Fit] = []
+    if promising:
+        progress("fitting " + ", ".join(one.term.effect for one in promising[:3]))
+        found = _claimable(race(base, promising))
+    best = _worthwhile(found, base, nominal)
+    if (best is None or best.cost > _CLEAR * base.cost) and not owner.at_floor and may_hide(base):
+        progress("fitting a lost preload from the springs of the bench file")
+        found = sorted([*found, unbent(base)], key=lambda other: other.cost)
+        best = _worthwhile(found, base, nominal)
+    if best is None and not base.at_floor and base.excess > MOST * nominal.excess:
+        progress("searching again beside the parameters of the bench file")
+        found = _claimable(from_owner(base))
+        best = _worthwhile(found, base, nominal)
+    return found, best
+
+
+def _claimable(found: Sequence[Fit]) -> list[Fit]:
+    return [other for other in found if claimable(other.terms[-1], other.bench)]
+
+
+def _worthwhile(found: Sequence[Fit], base: Fit, nominal: Fit) -> Fit | None:
+    """The first whose last term the evidence supports, that is material, and that repeats from lap to lap."""
+    enough = max(MATERIAL * base.rows, WORTH * base.excess)
+    differs = unrepeated(base.hypothesis, base.data)
     return next(
         (
             other
             for other in found
             if against(other, base) >= NEEDED
             and gain(base, other, nominal) >= enough
-            and REPEATS * unrepeated(other, repeated) <= differs
+            and REPEATS * unrepeated(other.hypothesis, other.data) <= differs
         ),
         None,
     )
 
 
 def gain(without: Fit, found: Fit, nominal: Fit) -> float:
-    """Energy that a term takes away, channel by channel beyond what may be the form of the terms before it."""
+    """Energy that a term removes, channel by channel beyond what may be due to the form of the terms before it."""
+    parts = (fit.residuals.parts.values() for fit in (without, found, nominal))
     return sum(
-        max(float(a @ a - b @ b) - FORM * max(float(n @ n - a @ a), 0.0), 0.0)
-        for a, b, n in zip(without.parts, found.parts, nominal.parts, strict=True)
+        max(float(a @ a - b @ b) - FORM * max(float(n @ n - a @ a), 0.0), 0.0) for a, b, n in zip(*parts, strict=True)
     )
-
-
-def excess(found: Fit) -> float:
-    """Energy above that of the noise."""
-    return sum(max(float(part @ part) - part.size, 0.0) for part in found.parts)
-
-
-def _bits(rows: int) -> float:
-    """Share of white residuals that evidence of NEEDED takes away."""
-    return 1.0 - float(np.exp(-NEEDED / rows))
-
-
-def _kinds(found: Fit) -> list[tuple[str, int]]:
-    """Effect and variant of each term, whatever their order."""
-    return sorted((term.effect, term.variant) for term in found.model.terms)
 
 
 def _simplest(tied: list[Fit]) -> Fit:
-    """Of explanations that the evidence does not tell apart, the one with the fewest parameters. A constant torque
-    and friction that differs by direction, alike at every speed, are the same on every motion: the second is named,
-    most axes lie flat."""
-    return min(tied, key=lambda found: (found.x.size, _last(found).key[:2] != (FRICTION, 0)))
+    """Of explanations that the evidence does not separate, the one with the fewest parameters.
+
+    A constant torque and friction that differs by direction, alike at every speed, are the same on every motion: the
+    second is named, since most axes are horizontal.
+    """
+    return min(tied, key=lambda found: (found.hypothesis.x.size, found.terms[-1].key[:2] != (FRICTION, 0)))
 
 
-def _last(found: Fit) -> Term:
-    return found.model.resolved(found.x)[1][-1]
-
-
-def _ablated(found: Fit, runs: Sequence[Measured]) -> dict[Key, tuple[float, Fit]]:
-    """For each term: the evidence for it, and the fit without it, to the end where that may decide."""
-    filters = whitening(found)
-
-    def without(index: int) -> tuple[float, Fit]:
-        other = _without(found, index, runs)
-        if found.cost > _CLEAR * other.cost:
-            other = fit(other.model, runs, other.x, evaluations=12, slopes=other.jacobian)
-        return against(found, other, filters), other
-
-    fits = in_parallel([partial(without, index) for index in range(len(found.model.terms))])
-    return {term.key: result for term, result in zip(found.model.terms, fits, strict=True)}
-
-
-def _without(found: Fit, index: int, runs: Sequence[Measured]) -> Fit:
+def _without(found: Fit, index: int) -> Fit:
     """A first fit without one of the terms."""
-    terms = found.model.terms
-    first = found.model.nominal_count + sum(len(term.values) for term in terms[:index])
-    columns = slice(first, first + len(terms[index].values))
-    return fit(
-        replace(found.model, terms=terms[:index] + terms[index + 1 :]),
-        runs,
-        np.delete(found.x, columns),
-        evaluations=6,
-        slopes=np.delete(found.jacobian, columns, axis=1),
-    )
+    slopes = np.delete(found.jacobian, found.hypothesis.columns(index), axis=1)
+    return found.estimator.fit(found.hypothesis.without(index), evaluations=6, slopes=slopes)
 
 
-def claimed(found: Fit, runs: Sequence[Measured]) -> Fit:
-    """The fit without the terms whose values beside the others are no longer what their names say."""
+def claimed(found: Fit) -> Fit:
+    """The fit without the terms whose values are no longer valid for their mechanism."""
     while True:
-        bench, terms = found.model.resolved(found.x)
-        lost = next((index for index, term in enumerate(terms) if not claimable(term, bench)), None)
+        lost = next((index for index, term in enumerate(found.terms) if not claimable(term, found.bench)), None)
         if lost is None:
             return found
-        rest = _without(found, lost, runs)
-        found = fit(rest.model, runs, rest.x, evaluations=_ENDED, slopes=rest.jacobian)
+        rest = _without(found, lost)
+        found = rest.refit(_ENDED, slopes=rest.jacobian)
 
 
-def _pruned(found: Fit, nominal: Fit, runs: Sequence[Measured]) -> tuple[Fit, dict[Key, float]]:
+def _pruned(found: Fit, nominal: Fit) -> tuple[Fit, dict[Key, float]]:
     """Remove the terms that the evidence does not support, weakest first; the fit and the evidence for the others."""
+
+    def ablated(index: int) -> tuple[float, Fit]:
+        other = _without(found, index)
+        if found.cost > _CLEAR * other.cost:
+            other = other.refit(12, slopes=other.jacobian)
+        return against(found, other, filters), other
+
     while True:
-        ablated = _ablated(found, runs)
-        evidence, rest = min(ablated.values(), key=lambda pair: pair[0])
-        if len(ablated) == 1 or (evidence >= NEEDED and gain(rest, found, nominal) >= MATERIAL * found.residuals.size):
-            return found, {key: value for key, (value, _) in ablated.items()}
+        filters = whitening(found)
+        pairs = in_parallel([partial(ablated, index) for index in range(len(found.terms))])
+        evidence, rest = min(pairs, key=lambda pair: pair[0])
+        if len(pairs) == 1 or (evidence >= NEEDED and gain(rest, found, nominal) >= MATERIAL * found.rows):
+            return found, {term.key: value for term, (value, _) in zip(found.terms, pairs, strict=True)}
         found = rest

@@ -14,16 +14,15 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
-from hil.diagnosis.estimation.hypothesis import inertia
 from hil.diagnosis.search import disturbance as estimate
-from hil.identification.dataset import Measured
+from hil.identification.dataset import Measured, inertia
 from hil.twin.library import LIBRARY
 from hil.twin.mechanism import Role
 from hil.twin.scene import AxisFacts, Scene
 
 
 @dataclass(frozen=True)
-class Start:
+class StartPoint:
     """Parameter values of one variant, and which of them are strength and phase (-1: no phase).
 
     Further pairs of strength and phase follow the first for so many `harmonics`. Without a phase, the strength counts
@@ -123,7 +122,7 @@ _SHORTEST_M = 1e-3  # along the travel: below, friction is not looked for
 _WHOLE = 0.05  # of a turn, to which a period makes a whole order of the screw
 
 
-def starts(scene: Scene, bench: Bench) -> list[Start]:
+def starts(scene: Scene, bench: Bench) -> list[StartPoint]:
     """All starting points of the library for this scene, every variant."""
     found = []
     for mechanism in LIBRARY:
@@ -135,7 +134,7 @@ def starts(scene: Scene, bench: Bench) -> list[Start]:
             if not (mechanism.proportional and variant.proportional):
                 strength = phase = -1
             found += [
-                Start(mechanism.id, number, point, strength, phase, max(len(phases), 1))
+                StartPoint(mechanism.id, number, point, strength, phase, max(len(phases), 1))
                 for point in mechanism.start_points(number, scene)
             ]
     return found

@@ -1,4 +1,4 @@
-"""Score tests: how much of what a hypothesis leaves over would each mechanism of the library explain?
+"""Score tests: the share of a residual that each mechanism of the library would explain.
 
     minimise over a, c:  | W (r + J a + D c) |^2
 
@@ -8,30 +8,30 @@ no parameter can explain counts (Rao's score test with nuisance parameters). Whe
 the bench knows, and can be scaled, r and D are those without that one.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from hil.arrays import FloatArray
-from hil.diagnosis.estimation.fit import POOL, Fit
-from hil.diagnosis.estimation.model_comparison import whitened, whitening
-from hil.diagnosis.estimation.terms import Term
-from hil.diagnosis.search.initial_values import Start
-from hil.identification.dataset import Measured
+from hil.diagnosis.search.initial_values import StartPoint, scene, starts
+from hil.identification.estimator import POOL, Fit
+from hil.identification.hypothesis import Hypothesis
+from hil.identification.model_comparison import whitened, whitening
+from hil.identification.terms import Term, compatible, free_slot, repeats
 from hil.twin.library import BY_ID
 
 _SOFT = 3.0  # residuals beyond so many typical ones lose weight
-_WEAKER = (0.3, 0.1)  # of the strength that a straight line promises: half an order of magnitude apart
+_WEAKER = (0.3, 0.1)  # of the strength from the linear score test: half an order of magnitude apart
+_OTHERS = 6  # starts of one mechanism that are kept
 
 
 @dataclass(frozen=True)
-class Lead:
+class Candidate:
     """A mechanism worth fitting: its start, scaled, and the share of the residual it would explain.
 
-    `others` are the same at less strength or from elsewhere: what a small change promises, a large one need not keep.
+    `others` are starts of the same mechanism at less strength or other values: the response to a large change is not
+    linear.
     """
 
     term: Term
@@ -41,8 +41,7 @@ class Lead:
 
 @dataclass(frozen=True, eq=False)
 class _View:
-    """Residuals behind weights and filters, with what the parameters can explain taken out: those that the base has
-    derivatives by."""
+    """Weighted and filtered residuals, orthogonal to the derivatives by the parameters of the base."""
 
     weights: FloatArray
     nuisance: FloatArray
@@ -58,15 +57,15 @@ class _View:
 
 
 def _view(base: Fit, white: bool) -> _View:
+    residuals, slopes = base.residuals, base.jacobian
     filters = whitening(base) if white else None
-    seen = base.residuals if filters is None else whitened(base.residuals, base.splits, filters)
-    slopes = base.jacobian
+    seen = residuals.vector if filters is None else whitened(residuals.vector, residuals.splits, filters)
     if filters is not None and slopes.size:
-        slopes = whitened(slopes, base.splits, filters)
-    weights = np.concatenate([_weights(part) for part in np.split(seen, base.splits)])
+        slopes = whitened(slopes, residuals.splits, filters)
+    weights = np.concatenate([_weights(part) for part in residuals.split(seen)])
     nuisance, _ = np.linalg.qr(weights[:, None] * slopes)
     residual = weights * seen
-    return _View(weights, nuisance, residual - nuisance @ (nuisance.T @ residual), base.splits, filters)
+    return _View(weights, nuisance, residual - nuisance @ (nuisance.T @ residual), residuals.splits, filters)
 
 
 def _weights(part: FloatArray) -> FloatArray:
@@ -75,30 +74,66 @@ def _weights(part: FloatArray) -> FloatArray:
     return np.asarray(1.0 / np.sqrt(np.sqrt(1.0 + (part / (_SOFT * typical)) ** 2)), dtype=np.float64)
 
 
-def screen(base: Fit, runs: Sequence[Measured], starts: Sequence[Start]) -> list[Lead]:
-    """A lead for each start, best first.
+def screen_library(base: Fit) -> list[Candidate]:
+    """One candidate for each mechanism that fits beside the terms of the base, best first."""
+    hypothesis, terms = base.hypothesis, base.terms
+    residuals = hypothesis.residuals(base.data)
+    known = scene(base.data.runs, base.bench, residuals.channels, base.data.observer_s)
+    points = [
+        _from_known(start, hypothesis)
+        for start in starts(known, hypothesis.bench)
+        if offered(Term(start.effect, start.variant, start.values), hypothesis, terms)
+    ]
+    best: dict[str, list[Candidate]] = {}
+    for candidate in screen(base, points):
+        best.setdefault(candidate.term.effect, []).append(candidate)
+
+    def gathered(effect: str, same: Sequence[Candidate]) -> Candidate:
+        slot = free_slot(effect, terms)
+        first, *rest = (
+            replace(term, slot=slot)
+            for term in (same[0].term, *same[0].others, *(other.term for other in same[1:_OTHERS]))
+        )
+        return Candidate(first, same[0].share, tuple(rest))
+
+    return [gathered(effect, same) for effect, same in best.items()]
+
+
+def offered(new: Term, hypothesis: Hypothesis, terms: Sequence[Term]) -> bool:
+    """Whether a mechanism can act beside the terms. Mechanisms of the bench that it repeats are replaced by it."""
+    known = [entry.active() for entry in hypothesis.kept]
+    return compatible((*terms, new, *(other for other in known if not repeats(new, other))))
+
+
+def _from_known(start: StartPoint, hypothesis: Hypothesis) -> StartPoint:
+    """The start, its strength counted from that of the mechanism of the bench that it replaces, if any."""
+    new = Term(start.effect, start.variant, start.values)
+    taken = [entry.active() for entry in hypothesis.kept if repeats(new, entry.active())]
+    if start.strength < 0 or not taken:
+        return start
+    if start.phase >= 0 or taken[0].variant != start.variant:
+        return replace(start, instead=True)
+    return replace(start, known=taken[0].values[start.strength])
+
+
+def screen(base: Fit, points: Sequence[StartPoint]) -> list[Candidate]:
+    """A candidate for each start, best first.
 
     Each is scored twice: on the residuals as they are, where the largest cause shows, and whitened, where a
     faint one shows beside a large one. The better share counts.
     """
     views = [_view(base, False), _view(base, True)]
 
-    def direction(start: Start, values: tuple[float, ...]) -> FloatArray:
-        term = Term(start.effect, start.variant, values)
-        model = replace(base.model, terms=(*base.model.terms, term))
-        x = np.concatenate([base.x, model.initial()[base.x.size :]])
-        return model.residuals(x, runs) - base.residuals
+    def direction(start: StartPoint, values: tuple[float, ...]) -> FloatArray:
+        changed = base.hypothesis.with_term(Term(start.effect, start.variant, values))
+        return base.estimator.residuals(changed).vector - base.residuals.vector
 
-    def lead(start: Start) -> Lead:
+    def candidate(start: StartPoint) -> Candidate:
         directions = [direction(start, values) for values in _directions(start)]
-        gone = (
-            direction(start, _scaled(start, np.zeros(2 * start.harmonics)))
-            if start.instead
-            else np.zeros(base.residuals.size)
-        )
+        gone = direction(start, _scaled(start, np.zeros(2 * start.harmonics))) if start.instead else np.zeros(base.rows)
         return max((scored(start, directions, gone, view) for view in views), key=lambda found: found.share)
 
-    def scored(start: Start, directions: list[FloatArray], gone: FloatArray, view: _View) -> Lead:
+    def scored(start: StartPoint, directions: list[FloatArray], gone: FloatArray, view: _View) -> Candidate:
         energy = float(view.residual @ view.residual)
         without = view.residual + view.of(gone) if start.instead else view.residual
         span = np.stack([view.of(change - gone) for change in directions], axis=1)
@@ -109,26 +144,25 @@ def screen(base: Fit, runs: Sequence[Measured], starts: Sequence[Start]) -> list
         if start.strength < 0:
             # a start that cannot be scaled also counts as it stands
             whole = float(2.0 * target[0] - products[0, 0]) / energy
-            return Lead(
+            return Candidate(
                 Term(start.effect, start.variant, start.values), max(share if coefficients[0] > 0.0 else 0.0, whole)
             )
-        return Lead(
+        return Candidate(
             Term(start.effect, start.variant, _scaled(start, coefficients)),
             share,
             tuple(Term(start.effect, start.variant, _scaled(start, factor * coefficients)) for factor in _WEAKER),
         )
 
-    leads = list(POOL.map(lead, starts))
-    return sorted(leads, key=lambda found: -found.share)
+    return sorted(POOL.map(candidate, points), key=lambda found: -found.share)
 
 
-def _pairs(start: Start) -> list[tuple[int, int]]:
+def _pairs(start: StartPoint) -> list[tuple[int, int]]:
     """Places of strength and phase of each harmonic."""
     return [(start.strength + 2 * n, start.phase + 2 * n) for n in range(start.harmonics)]
 
 
-def _directions(start: Start) -> list[tuple[float, ...]]:
-    """Values that span what the start may become: its strength, or sine and cosine of each harmonic."""
+def _directions(start: StartPoint) -> list[tuple[float, ...]]:
+    """Values that span the effect of the start: its strength, or sine and cosine of each harmonic."""
     if start.phase < 0:
         values = list(start.values)
         values[start.strength] += start.known
@@ -144,7 +178,7 @@ def _directions(start: Start) -> list[tuple[float, ...]]:
     return found
 
 
-def _scaled(start: Start, coefficients: FloatArray) -> tuple[float, ...]:
+def _scaled(start: StartPoint, coefficients: FloatArray) -> tuple[float, ...]:
     """The start at the strengths (and phases) that the score test asks for, within bounds."""
     values = list(start.values)
     unit = start.values[start.strength]

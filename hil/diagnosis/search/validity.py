@@ -1,8 +1,8 @@
 """Check that the fitted values of a term still are what its name says."""
 
 from hil.bench.bench_file import Bench
-from hil.diagnosis.estimation.terms import Term
 from hil.diagnosis.search.initial_values import axis_facts
+from hil.identification.terms import Term
 from hil.twin.library import BY_ID
 
 

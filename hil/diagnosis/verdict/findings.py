@@ -1,48 +1,39 @@
 """From fitted terms to findings: values with standard errors, equivalents, rivals, confidence, sentence."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from hil.bench.bench_file import Bench, MechanismEntry
-from hil.diagnosis.estimation.fit import Fit
-from hil.diagnosis.estimation.noise_ratios import noise_ratios
-from hil.diagnosis.estimation.terms import FRICTION, LOAD, SAME, Key, Term, ambiguous
-from hil.diagnosis.result import Correction, Finding, Value
-from hil.diagnosis.result import Rival as RivalText
-from hil.diagnosis.search.forward_selection import TIED, Explanation, Rival
+from hil.diagnosis.result import Correction, Finding, Rival, Value
+from hil.diagnosis.search.forward_selection import TIED, Explanation, RivalFit
 from hil.diagnosis.search.validity import claimable
 from hil.diagnosis.verdict.confidence import confidence
 from hil.diagnosis.verdict.cross_validation import Ablation
 from hil.diagnosis.wording import sentence, title
-from hil.identification.dataset import Measured
+from hil.identification.dataset import Dataset
+from hil.identification.estimator import Fit
+from hil.identification.terms import FRICTION, LOAD, SAME, Key, Term, ambiguous
+from hil.identification.uncertainty import standard_errors
 from hil.quantities import digits, unit_of
 from hil.twin.library import BY_ID
 from hil.twin.mechanism import Dimension, Role
 
-# On development cases (seeds 931 and 941 of the proof's generator, 67 parameters) nine in ten errors are below 3.5
-# standard errors of the noise alone, 2.1 times 1.645: two honest simulations of one axis differ by that.
-_WIDENED = 2.1
-_LEAST = 0.01  # of the step of a difference
-_BLOCK_ROWS = 200  # longer than residuals remember: 0.2 s at 1 kHz
-
 
 def renamed(found: Fit) -> Fit:
-    """The fit with a constant load called asymmetric friction, where it may be that and the bench knows of no load: the
-    same torque, and the commoner cause."""
-    bench, resolved = found.model.resolved(found.x)
-    if any(one.effect == FRICTION for one in resolved) or any(entry.effect == LOAD for entry in bench.mechanisms):
+    """The fit with a constant load renamed to asymmetric friction, where that is valid and the bench has no load.
+
+    Both make the same torque, and friction is the commoner cause.
+    """
+    hypothesis = found.hypothesis
+    if any(one.effect == FRICTION for one in found.terms) or any(e.effect == LOAD for e in hypothesis.bench.mechanisms):
         return found
 
     def called(term: Term, fitted: Term) -> Term:
-        rather = term.effect == LOAD and claimable(replace(fitted, effect=FRICTION), bench)
+        rather = term.effect == LOAD and claimable(replace(fitted, effect=FRICTION), found.bench)
         return replace(term, effect=FRICTION) if rather else term
 
-    return replace(found, model=replace(found.model, terms=tuple(map(called, found.model.terms, resolved))))
+    return replace(found, hypothesis=replace(hypothesis, terms=tuple(map(called, hypothesis.terms, found.terms))))
 
 
 def findings(
@@ -50,26 +41,23 @@ def findings(
     final: Fit,
     ablations: Sequence[Ablation],
     forms: Mapping[int, int],
-    train: Sequence[Measured],
-    held_out: Sequence[Measured],
+    held_out: Dataset,
 ) -> tuple[Finding, ...]:
     """A finding for each term that is not the form of another (`forms`), the one that matters most first."""
     deviations = standard_errors(final)
-    left = math.sqrt(max(ratio for run in (*train, *held_out) for ratio in noise_ratios(final, run).values()))
-    bench, terms = final.model.resolved(final.x)
-    row = final.model.nominal_count
+    left = math.sqrt(max(final.on(data).worst_ratio for data in (final.data, held_out) if data.runs))
+    bench, terms = final.bench, final.terms
     result = []
     for index, (term, ablation) in enumerate(zip(terms, ablations, strict=True)):
-        errors = deviations[row : row + len(term.values)]
-        row += len(term.values)
         if index in forms:
             continue
+        errors = deviations[final.hypothesis.columns(index)]
         rivals = rivals_of(explanation, term)
-        tied = [rival.fit.model.terms[-1].effect for rival in rivals if rival.tied]
+        tied = [rival.fit.terms[-1].effect for rival in rivals if rival.tied]
         if ambiguous(term):
             tied += [name for name in SAME if name != term.effect and claimable(replace(term, effect=name), bench)]
         margin = min(
-            (rival.evidence for rival in rivals if rival.fit.model.terms[-1].effect not in tied),
+            (rival.evidence for rival in rivals if rival.fit.terms[-1].effect not in tied),
             default=explanation.needed.get(_key(explanation, term), math.inf),
         )
         result.append(
@@ -81,8 +69,7 @@ def findings(
                     confidence=confidence(left, _factor(ablation), margin),
                     equivalents=tuple(dict.fromkeys(tied)),
                     rivals=tuple(
-                        RivalText(effect=rival.fit.model.terms[-1].effect, evidence=_text(rival, term, train))
-                        for rival in rivals
+                        Rival(effect=rival.fit.terms[-1].effect, evidence=_text(rival, term)) for rival in rivals
                     ),
                     parameters=_values(term, errors, bench),
                     sentence=sentence(_normal(term), bench),
@@ -101,52 +88,23 @@ def corrections(owner: Bench, found: Fit) -> dict[str, Correction]:
     deviations = standard_errors(found)
     return {
         name: Correction(nominal=float(getattr(owner.axis, name)), value=value, std=std, unit=unit_of(name))
-        for name, value, std in zip(owner.axis.NOMINAL, found.model.values(found.x), deviations, strict=False)
+        for name, value, std in zip(owner.axis.NOMINAL, found.hypothesis.values, deviations, strict=False)
     }
-
-
-def standard_errors(found: Fit) -> list[float]:
-    """Standard error of each physical parameter, robust against residuals that are no white noise:
-
-        A^-1 (sum over blocks of g g^T) A^-1,   A = J^T J,   g = J^T r of a block      (Liang and Zeger 1986)
-
-    and widened for what a model differs by from the axis beside noise. A controller that is replayed to the bit leaves
-    no noise at all: nothing is known better than a hundredth of the differences that its derivative was taken with.
-    """
-    scale = np.linalg.norm(found.jacobian, axis=0)
-    scale[scale == 0.0] = 1.0
-    slope = found.jacobian / scale
-    inverse = np.linalg.pinv(slope.T @ slope, hermitian=True)
-    starts = np.concatenate(
-        [
-            np.arange(begin, end, _BLOCK_ROWS)
-            for begin, end in zip((0, *found.splits), (*found.splits, found.residuals.size), strict=True)
-        ]
-    )
-    score = np.add.reduceat(slope * found.residuals[:, None], starts, axis=0)
-    covariance = inverse @ (score.T @ score) @ inverse
-    errors = np.sqrt(np.maximum(np.diag(covariance), 0.0)) / scale
-    return [
-        float(
-            max(_WIDENED * error, _LEAST * coordinate.step)
-            * (abs(value) if coordinate.logarithmic else abs(coordinate.scale))
-        )
-        for error, value, coordinate in zip(errors, found.model.values(found.x), found.model.coordinates, strict=True)
-    ]
 
 
 def diagnosed_bench(owner: Bench, found: Fit) -> Bench:
     """The owner's bench with the parameters and the terms of a fit: what every other command accepts."""
-    bench, terms = found.model.resolved(found.x)
     entries = tuple(
         MechanismEntry(
             effect=term.effect,
             variant=BY_ID[term.effect].forms[term.variant],
             parameters=dict(zip(BY_ID[term.effect].names, _normal(term).values, strict=True)),
         )
-        for term in terms
+        for term in found.terms
     )
-    return bench.model_copy(update={"name": f"{owner.name}_diagnosed", "mechanisms": found.model.kept + entries})
+    return found.bench.model_copy(
+        update={"name": f"{owner.name}_diagnosed", "mechanisms": found.hypothesis.kept + entries}
+    )
 
 
 def _normal(term: Term) -> Term:
@@ -166,37 +124,37 @@ def _values(term: Term, errors: Sequence[float], bench: Bench) -> dict[str, Valu
 
 
 def _factor(ablation: Ablation) -> float:
-    """By which factor more energy is left without a term; on held-out recordings too, where these show it at all."""
+    """Factor by which the energy grows without a term: the lower of training and, where they show it, held-out."""
     if ablation.held_out is None or not ablation.shown:
         return ablation.train
     return min(ablation.train, ablation.held_out)
 
 
 def _key(explanation: Explanation, term: Term) -> Key:
-    """The key under which the search knows a term that was renamed."""
+    """Key of a term in the search, before it was renamed."""
     known = set(explanation.rivals) | set(explanation.needed)
     return term.key if term.key in known or term.effect not in SAME else replace(term, effect=LOAD).key
 
 
-def rivals_of(explanation: Explanation, term: Term) -> list[Rival]:
+def rivals_of(explanation: Explanation, term: Term) -> list[RivalFit]:
     """Other mechanisms than the term's own, each in its best variant, the strongest first."""
-    best: dict[str, Rival] = {}
+    best: dict[str, RivalFit] = {}
     for rival in sorted(explanation.rivals.get(_key(explanation, term), []), key=lambda found: found.evidence):
-        other = rival.fit.model.terms[-1]
+        other = rival.fit.terms[-1]
         if other.effect != term.effect and not (ambiguous(other) and ambiguous(term)):
             best.setdefault(other.effect, rival)
     return list(best.values())
 
 
-def _text(rival: Rival, term: Term, train: Sequence[Measured]) -> str:
+def _text(rival: RivalFit, term: Term) -> str:
     if rival.tied:
         return (
             f"cannot be told apart from {title(term.effect)} by this motion: evidence against it is "
             f"{digits(rival.evidence)}, and next to the noise it leaves as much"
         )
     size = math.sqrt(rival.fit.reduced)
-    parameters = BY_ID[rival.fit.model.terms[-1].effect].parameters
-    at = rival.fit.model.resolved(rival.fit.x)[1][-1].values
+    parameters = BY_ID[rival.fit.terms[-1].effect].parameters
+    at = rival.fit.terms[-1].values
     stuck = [
         parameter.name
         for parameter, value in zip(parameters, at, strict=True)

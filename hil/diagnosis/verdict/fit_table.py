@@ -1,15 +1,12 @@
 """Fit before and after, channel by channel, on training and on held-out recordings, against the noise floor.
 
-In closed loop, from the set-points alone, unless that is chaotic: where stick-slip or play let two recordings of the
-same axis part, a twin that leaves nothing but noise in every block still strays from the recording in closed
-loop. Then the figures are those of the block, which is fed measured inputs. The same holds for the position of the
-motor: its encoder resolves far less than what the noise of the torque moves it by.
+Figures are of the closed loop unless that is chaotic: where stick-slip or play let two recordings of the same axis
+diverge, a twin at the noise floor in every block still deviates from the recording in closed loop. Then the figures
+are those of the block, which is fed measured inputs. The same holds for the position of the motor: its encoder
+resolves far less than the motion caused by the torque noise.
 """
 
-from __future__ import annotations
-
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,21 +14,13 @@ import numpy as np
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
 from hil.channels import AXIS_CHANNELS, CHANNELS
-from hil.diagnosis.estimation.fit import Fit
-from hil.diagnosis.estimation.hypothesis import scales
-from hil.diagnosis.estimation.noise_floor import Floor, Laps, floor, laps, rms, sensor_noise, shaken
 from hil.diagnosis.result import ChannelFit, FitFigures, Mode
-from hil.identification.dataset import Measured
+from hil.identification.dataset import Dataset, Measured
+from hil.identification.estimator import Fit
+from hil.identification.hypothesis import Hypothesis
+from hil.identification.noise_floor import floor, noise_response, rms, sensor_noise
 
-STRAYS = 1.15  # times its floor: beyond, though its block is at the floor, a closed loop strays
-
-
-@dataclass(frozen=True, eq=False)
-class Residuals:
-    """Residuals (n,) of one hypothesis over one run, per channel of the recording, in its unit."""
-
-    closed_loop: dict[str, FloatArray]
-    blocks: dict[str, FloatArray]
+STRAYS = 1.15  # times its floor: a closed loop above, though its block is at the floor, counts as chaotic
 
 
 def channel_names(bench: Bench, run: Measured) -> dict[str, str]:
@@ -43,113 +32,99 @@ def channel_names(bench: Bench, run: Measured) -> dict[str, str]:
     return found
 
 
-def residuals(found: Fit, run: Measured) -> Residuals:
-    """Measured less twin. In closed loop the table is compared as it is, block by block against the motor."""
-    model = found.model
-    closed = model.closed_loop(found.x, run)
-    if "table" in closed:
-        closed["table"] = closed["table"] + model.bench.axis.ratio_m_rad * closed["motor"]
-    if run.torque_is_command:
-        closed.pop("command", None)
-    return Residuals(closed, model.blocks(found.x, run))
+def channel_residuals(hypothesis: Hypothesis, data: Dataset, mode: Mode) -> tuple[dict[str, FloatArray], ...]:
+    """Residuals (n,) of each run by channel, in its unit.
+
+    In closed loop the table is compared as it is, block by block less the motor.
+    """
+    if mode is Mode.BLOCKS:
+        return hypothesis.residuals(data).channels
+    ratio = hypothesis.bench.axis.ratio_m_rad
+    return tuple(
+        {**found, "table": found["table"] + ratio * found["motor"]} if "table" in found else found
+        for found in hypothesis.residuals(data, closed=True).channels
+    )
 
 
 @dataclass(frozen=True, eq=False)
-class _Set:
-    """Recordings of one kind, training or held out, with the residuals of each hypothesis and their laps."""
+class _ChannelTable:
+    """Figures of one channel in one mode for the three hypotheses."""
 
-    runs: Sequence[Measured]
-    owner: list[Residuals]
-    nominal: list[Residuals]
-    final: list[Residuals]
-    shaken: list[dict[str, float]]  # rms by which the noise of the encoders moves the axis in closed loop
-    laps: list[Laps | None]
+    owner: Hypothesis
+    nominal: Hypothesis
+    final: Hypothesis
+    noise: dict[Measured, dict[str, float]]  # closed-loop response of the axis to the noise of its encoders
+    channel: str
+    mode: Mode
 
-    def rms(self, found: list[Residuals], channel: str, mode: Mode) -> float:
-        """Root mean square of a channel over all recordings."""
-        values = [_of(entry, mode)[channel][run.judged] for entry, run in zip(found, self.runs, strict=True)]
-        return float(np.sqrt(np.mean(np.concatenate(values) ** 2)))
-
-    def floors(self, channel: str, mode: Mode, final: Fit) -> list[Floor]:
-        """Floor of a channel in each recording.
-
-        What one hypothesis does differently from lap to lap is its own, and no noise: the lowest is the floor.
-        """
-        return [
-            min(
-                (
-                    floor(_of(entry, mode)[channel], _white(run, final, channel, mode, moved), repeated)
-                    for entry in pair
-                ),
-                key=lambda found: found.rms,
-            )
-            for *pair, run, moved, repeated in zip(
-                self.nominal, self.final, self.runs, self.shaken, self.laps, strict=True
-            )
+    def figures(self, data: Dataset, other: Dataset) -> FitFigures:
+        """Figures on a data set; the laps of the `other` give the floor where it has none itself."""
+        own = self._floors(data)
+        lapped = [rms for rms, repeated in own if repeated] or [
+            rms for rms, repeated in self._floors(other) if repeated
         ]
-
-
-def fit_table(
-    owner: Fit, nominal: Fit, final: Fit, train: Sequence[Measured], held_out: Sequence[Measured]
-) -> dict[str, ChannelFit]:
-    """The table, by recorded channel."""
-
-    def gathered(runs: Sequence[Measured]) -> _Set:
-        of = [[residuals(found, run) for run in runs] for found in (owner, nominal, final)]
-        return _Set(runs, of[0], of[1], of[2], [shaken(final, run) for run in runs], [laps(run) for run in runs])
-
-    trained, validated = gathered(train), gathered(held_out)
-
-    def figures(of: _Set, channel: str, mode: Mode) -> FitFigures:
-        # the axis and its sensors are the same: laps of the one set tell the floor of the other
-        other = trained if of is validated else validated
-        own, others = of.floors(channel, mode, final), other.floors(channel, mode, final)
-        repeated = next(
-            (
-                known
-                for known in (
-                    [value.rms for value in values if value.source == "repeated_laps"] for values in (own, others)
-                )
-                if known
-            ),
-            [value.rms for value in own],
-        )
         return FitFigures(
-            before_rms=of.rms(of.nominal, channel, mode),
-            after_rms=of.rms(of.final, channel, mode),
-            noise_floor_rms=float(np.sqrt(np.mean(np.square(repeated)))),
-            owner_rms=of.rms(of.owner, channel, mode),
+            before_rms=self._rms(self.nominal, data),
+            after_rms=self._rms(self.final, data),
+            noise_floor_rms=float(np.sqrt(np.mean(np.square(lapped or [rms for rms, _ in own])))),
+            owner_rms=self._rms(self.owner, data),
         )
 
+    def _of(self, hypothesis: Hypothesis, data: Dataset) -> list[FloatArray]:
+        return [found[self.channel] for found in channel_residuals(hypothesis, data, self.mode)]
+
+    def _rms(self, hypothesis: Hypothesis, data: Dataset) -> float:
+        pairs = zip(self._of(hypothesis, data), data.runs, strict=True)
+        return rms(np.concatenate([values[run.judged] for values, run in pairs]))
+
+    def _floors(self, data: Dataset) -> list[tuple[float, bool]]:
+        """Floor of each run, and whether it is from repeated laps.
+
+        The lower one of two hypotheses: a difference from lap to lap that only one of them has is its own error.
+        """
+        found = []
+        runs = zip(data.runs, self._of(self.nominal, data), self._of(self.final, data), strict=True)
+        for index, (run, *pair) in enumerate(runs):
+            white = self._white(data, index)
+            best = min((floor(values, white, run.laps) for values in pair), key=lambda one: one.rms)
+            found.append((best.rms, best.source == "repeated_laps"))
+        return found
+
+    def _white(self, data: Dataset, index: int) -> float:
+        """White noise of the channel in a run.
+
+        Block by block that of its scale: the motor counts from the torque that the torque channel resolves. In closed
+        loop the response of the axis to the noise of its encoders adds to that of the sensor.
+        """
+        run = data.runs[index]
+        if self.mode is Mode.BLOCKS:
+            return rms(data.scales()[index][self.channel][run.judged])
+        return math.hypot(sensor_noise(run)[self.channel], self.noise[run][self.channel])
+
+
+def fit_table(owner: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> dict[str, ChannelFit]:
+    """The table, by recorded channel."""
+    train = final.data
+    sets = [data for data in (train, held_out) if data.runs]
+    laps = any(data.laps for data in sets)
+    noise = {run: noise_response(final.hypothesis, run) for data in sets for run in data.runs}
     result = {}
-    any_laps = any(found is not None for found in (*trained.laps, *validated.laps))
-    for channel, recorded in channel_names(final.model.bench, train[0]).items():
+    for channel, recorded in channel_names(final.bench, train.runs[0]).items():
         if channel == "command":
             continue
-        sets = [trained, validated] if held_out else [trained]
-        closed, block = (
-            max(found.after_rms / found.noise_floor_rms for found in (figures(of, channel, mode) for of in sets))
+        figures = {
+            mode: [table.figures(data, held_out if data is train else train) for data in sets]
             for mode in (Mode.CLOSED_LOOP, Mode.BLOCKS)
-        )
-        chaotic = closed > STRAYS >= block and not train[0].torque_is_command
+            for table in [_ChannelTable(owner.hypothesis, nominal.hypothesis, final.hypothesis, noise, channel, mode)]
+        }
+        closed, block = (max(one.after_rms / one.noise_floor_rms for one in figures[mode]) for mode in figures)
+        chaotic = closed > STRAYS >= block and not train.runs[0].torque_is_command
         mode = Mode.BLOCKS if chaotic else Mode.CLOSED_LOOP
         result[recorded] = ChannelFit(
             unit=CHANNELS[recorded].unit,
             mode=mode,
-            floor_from="repeated_laps" if any_laps else "white_noise",
-            train=figures(trained, channel, mode),
-            validate_=figures(validated, channel, mode) if held_out else None,
+            floor_from="repeated_laps" if laps else "white_noise",
+            train=figures[mode][0],
+            validate_=figures[mode][1] if held_out.runs else None,
         )
     return result
-
-
-def _of(found: Residuals, mode: Mode) -> dict[str, FloatArray]:
-    return found.closed_loop if mode is Mode.CLOSED_LOOP else found.blocks
-
-
-def _white(run: Measured, found: Fit, channel: str, mode: Mode, moved: dict[str, float]) -> float:
-    """White noise of a channel; block by block the motor counts from the torque that the torque channel can see, in
-    closed loop all move with what the controller answers to the noise."""
-    if mode is Mode.BLOCKS:
-        return rms(scales(run, found.model.bench, found.model.observer_s)[channel][run.judged])
-    return math.hypot(sensor_noise(run)[channel], moved[channel])

@@ -7,36 +7,31 @@ A mechanism is not testable where even the most of its variants stays below the 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
-from dataclasses import replace
+from collections.abc import Collection
 
 import numpy as np
 
-from hil.diagnosis.estimation.fit import POOL, Fit
-from hil.diagnosis.estimation.terms import Term
 from hil.diagnosis.search.forward_selection import MATERIAL, NEEDED
 from hil.diagnosis.search.initial_values import axis_facts
-from hil.identification.dataset import Measured
+from hil.identification.estimator import POOL, Fit
+from hil.identification.terms import Term
 from hil.twin.library import BY_ID, LIBRARY
 
 
-def not_testable(
-    found: Fit, runs: Sequence[Measured], asked: Collection[str] = tuple(BY_ID), margin: float = 1.0
-) -> tuple[str, ...]:
-    """Ids of the mechanisms asked for that these recordings cannot show, in the library's order.
+def not_testable(found: Fit, asked: Collection[str] = tuple(BY_ID), margin: float = 1.0) -> tuple[str, ...]:
+    """Ids of the mechanisms asked for that the data of a fit cannot show, in the library's order.
 
     `margin` is how many times as visible as needed: more than one where the recordings are only imagined.
     """
-    bench, terms = found.model.resolved(found.x)
-    present = {term.effect for term in terms} | {entry.effect for entry in bench.mechanisms}
-    axis = axis_facts(bench, runs)
-    nuisance, _ = np.linalg.qr(found.jacobian[:, : found.model.nominal_count])
-    enough = margin * max(NEEDED, MATERIAL * found.residuals.size)
+    bench, hypothesis = found.bench, found.hypothesis.rebased
+    present = {term.effect for term in found.terms} | {entry.effect for entry in bench.mechanisms}
+    axis = axis_facts(bench, found.data.runs)
+    nuisance, _ = np.linalg.qr(found.jacobian[:, : hypothesis.nominal_count])
+    enough = margin * max(NEEDED, MATERIAL * found.rows)
 
     def visible(effect: str, variant: int) -> bool:
-        model = replace(found.model, terms=(*terms, Term(effect, variant, BY_ID[effect].typical_values(axis))))
-        x = np.concatenate([found.x, model.initial()[found.x.size :]])
-        change = model.residuals(x, runs) - found.residuals
+        changed = hypothesis.with_term(Term(effect, variant, BY_ID[effect].typical_values(axis)))
+        change = found.estimator.residuals(changed).vector - found.residuals.vector
         change -= nuisance @ (nuisance.T @ change)
         return float(change @ change) > enough
 

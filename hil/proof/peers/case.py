@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import Any
 
 from hil.bench.bench_file import Bench, load_bench
-from hil.diagnosis.estimation.fit import Fit, evaluate
 from hil.diagnosis.preflight import prepare
 from hil.diagnosis.result import Verdict
-from hil.diagnosis.search import successive_halving
 from hil.diagnosis.search.initial_values import scene
 from hil.diagnosis.verdict.judge import refit_matters
-from hil.identification.dataset import Measured
+from hil.identification.dataset import Measured, prepare_dataset
+from hil.identification.estimator import Fit
+from hil.identification.nominal_fit import fit_nominal_parameters
 from hil.recording.recording import read_recording
 from hil.twin.scene import Scene
 
@@ -38,7 +38,7 @@ class PeerCase:
     @property
     def fitted(self) -> Bench:
         """The bench with the refitted nominal parameters."""
-        return self.nominal.model.resolved(self.nominal.x)[0]
+        return self.nominal.bench
 
     def answer(self, effects: Sequence[str]) -> dict[str, Any]:
         """Return the verdict and the named effects, the most important one first, in the form of diagnosis.json.
@@ -59,14 +59,12 @@ def read_case(folder: Path) -> PeerCase:
     names = (*_TRAIN, *_HELD_OUT)
     runs = prepare([read_recording(folder / f"{name}.parquet") for name in names], bench)
     train, held_out = tuple(runs[: len(_TRAIN)]), tuple(runs[len(_TRAIN) :])
-    nominal = successive_halving.nominal(bench, train)
-    fitted, _ = nominal.model.resolved(nominal.x)
-    blocks = [nominal.model.blocks(nominal.x, run) for run in train]
+    nominal = fit_nominal_parameters(prepare_dataset(train, bench))
     return PeerCase(
         bench,
         train,
         held_out,
-        evaluate(nominal.model, train),
+        nominal.estimator.evaluate(nominal.hypothesis.owner),
         nominal,
-        scene(train, fitted, blocks, nominal.model.observer_s),
+        scene(train, nominal.bench, nominal.residuals.channels, nominal.data.observer_s),
     )

@@ -7,21 +7,19 @@ screen, reduced to the share of the residual that it explains. The mechanism wit
 first; those below the materiality limit are not named.
 """
 
-from collections.abc import Sequence
 from dataclasses import replace
-from math import inf
+from functools import reduce
 from typing import Any
 
 import numpy as np
 
 from hil.arrays import FloatArray
-from hil.diagnosis.estimation.fit import POOL, Fit, evaluate, fit
-from hil.diagnosis.estimation.terms import Term
-from hil.diagnosis.search import successive_halving
 from hil.diagnosis.search.forward_selection import MATERIAL
-from hil.diagnosis.search.initial_values import Start, starts
-from hil.diagnosis.search.score_test import Lead
-from hil.identification.dataset import Measured
+from hil.diagnosis.search.initial_values import StartPoint, starts
+from hil.diagnosis.search.score_test import Candidate, screen_library
+from hil.identification.estimator import POOL, Fit
+from hil.identification.hypothesis import Hypothesis
+from hil.identification.terms import Term
 from hil.proof.peers.case import PeerCase
 from hil.twin.library import BY_ID
 
@@ -32,45 +30,37 @@ SIGNIFICANT = 2.0  # standard errors
 def fit_everything(case: PeerCase, evaluations: int = EVALUATIONS) -> dict[str, Any]:
     """Return the answer of one fit of everything to a case."""
     begun = {start.effect: start for start in starts(case.scene, case.bench)}
-    terms = tuple(_weak(lead, begun[lead.term.effect]) for lead in successive_halving.leads(case.nominal, case.train))
-    model = replace(case.nominal.model, terms=terms)
-    found = fit(
-        model,
-        case.train,
-        np.concatenate([case.nominal.x, model.initial()[case.nominal.x.size :]]),
-        evaluations=evaluations,
-    )
-    significant = [index for index in range(len(terms)) if _strength_over_error(found, index) > SIGNIFICANT]
-    grown = dict(zip(significant, POOL.map(lambda index: _without(found, index, case.train), significant), strict=True))
+    terms = tuple(_weak(one, begun[one.term.effect]) for one in screen_library(case.nominal))
+    hypothesis: Hypothesis = reduce(Hypothesis.with_term, terms, case.nominal.hypothesis)
+    found = case.nominal.estimator.fit(hypothesis, evaluations=evaluations)
+    significant = [
+        index
+        for index, term in enumerate(terms)
+        if not BY_ID[term.effect].neutral_at_zero or _strength_over_error(found, index) > SIGNIFICANT
+    ]
+    grown = dict(zip(significant, POOL.map(lambda index: _without(found, index), significant), strict=True))
     named = sorted(
-        (index for index in significant if grown[index] > MATERIAL * found.residuals.size),
+        (index for index in significant if grown[index] > MATERIAL * found.rows),
         key=lambda index: -grown[index],
     )
     return case.answer([terms[index].effect for index in named])
 
 
-def _weak(lead: Lead, start: Start) -> Term:
-    """Return a lead's term with its strength reduced to the share that it explains."""
-    values = list(lead.term.values)
+def _weak(candidate: Candidate, start: StartPoint) -> Term:
+    """Return a candidate's term with its strength reduced to the share that it explains."""
+    values = list(candidate.term.values)
     if start.strength >= 0:
         for n in range(start.harmonics):
-            values[start.strength + 2 * n] *= max(lead.share, 0.01)
-    return replace(lead.term, values=tuple(values))
+            values[start.strength + 2 * n] *= max(candidate.share, 0.01)
+    return replace(candidate.term, values=tuple(values))
 
 
 def _strength_over_error(found: Fit, index: int) -> float:
-    """Return the strength of a term in standard errors; the standard error of a logarithm is the relative error.
-
-    Infinite for mechanisms that are not neutral at zero, such as a torque limit: they are judged by the growth of the
-    residual alone.
-    """
-    mechanism = BY_ID[found.model.terms[index].effect]
-    if not mechanism.neutral_at_zero:
-        return inf
-    first = found.model.nominal_count + sum(len(other.values) for other in found.model.terms[:index])
-    at = first + mechanism.strength
+    """Return the strength of a term in standard errors; the standard error of a logarithm is the relative error."""
+    term, hypothesis = found.terms[index], found.hypothesis
+    at = hypothesis.columns(index).start + BY_ID[term.effect].strength
     error = _standard_errors(found)[at]
-    value = 1.0 if found.model.coordinates[at].logarithmic else abs(found.x[at])
+    value = 1.0 if hypothesis.coordinates[at].logarithmic else abs(hypothesis.x[at])
     return float(value / max(error, 1e-300))
 
 
@@ -82,10 +72,6 @@ def _standard_errors(found: Fit) -> FloatArray:
     return np.asarray(np.where(np.diag(normal) > 0.0, np.sqrt(np.maximum(variance, 0.0)) / size, np.inf))
 
 
-def _without(found: Fit, index: int, runs: Sequence[Measured]) -> float:
+def _without(found: Fit, index: int) -> float:
     """Return the growth of the sum of squares when a term is removed without a new fit."""
-    nominal = found.model.nominal_count
-    resolved = found.model.resolved(found.x)[1]
-    rest = replace(found.model, terms=tuple(term for k, term in enumerate(resolved) if k != index))
-    x = np.concatenate([found.x[:nominal], rest.initial()[nominal:]])
-    return evaluate(rest, runs, x).cost - found.cost
+    return found.estimator.evaluate(found.hypothesis.rebased.without(index)).cost - found.cost

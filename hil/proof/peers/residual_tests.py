@@ -17,7 +17,6 @@ from scipy.signal import correlate
 from scipy.stats import norm
 
 from hil.arrays import FloatArray
-from hil.diagnosis.estimation.hypothesis import scales
 from hil.diagnosis.search.forward_selection import MATERIAL
 from hil.identification.dataset import Measured
 from hil.proof.peers.case import PeerCase
@@ -39,11 +38,9 @@ def residual_tests(case: PeerCase) -> dict[str, Any]:
 
 def _prediction_errors(case: PeerCase, run: Measured) -> dict[str, FloatArray]:
     """Return the errors of the refitted twin's motor and transmission in units of noise, with the sign of a torque."""
-    model = case.nominal.model
-    noise = scales(run, model.bench, model.observer_s)
-    errors = model.blocks(case.nominal.x, run)
+    errors = case.nominal.residuals.over_noise(case.nominal.data.runs.index(run))
     errors["motor"] *= -1.0
-    return {block: errors[channel] / noise[channel] for block, channel in _CHANNELS.items() if channel in errors}
+    return {block: errors[channel] for block, channel in _CHANNELS.items() if channel in errors}
 
 
 def _outside(equation: Equation, bound: float) -> list[tuple[float, str]]:

@@ -6,16 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis_runs import bench, recorded
+from diagnosis_runs import bench, evaluated, recorded
 
 from hil.bench.bench_file import Bench, MechanismEntry, load_bench
-from hil.diagnosis.estimation.fit import evaluate
-from hil.diagnosis.estimation.hypothesis import Model
-from hil.diagnosis.estimation.terms import Term
-from hil.diagnosis.search import successive_halving
+from hil.diagnosis.search import forward_selection
 from hil.diagnosis.search.forward_selection import explain
 from hil.diagnosis.search.restart import from_owner, may_hide, unbent
-from hil.identification.dataset import take
+from hil.diagnosis.search.score_test import screen_library
+from hil.identification.dataset import prepare_dataset, take
+from hil.identification.hypothesis import Hypothesis
+from hil.identification.nominal_fit import fit_nominal_parameters
+from hil.identification.terms import Term
 
 NOISE_N_M = 0.001
 LOST = Term("preload_loss", 0, (60e-6, 0.08))  # wider than the nut moves under these loads: it never leaves its gap
@@ -35,14 +36,12 @@ def stiff_owner() -> tuple[Bench, Bench]:
 def test_it_is_fitted_although_the_refit_leaves_next_to_nothing() -> None:
     owner, truth = stiff_owner()
     run = take(recorded(truth, LOST, times=2), owner)
-    base = successive_halving.nominal(owner, [run])
-    assert base.cost < 0.05 * evaluate(Model(owner), [run]).cost
-    assert "preload_loss" not in [
-        lead.term.effect for lead in successive_halving.leads(base, [run]) if lead.share > 0.01
-    ]
-    found = unbent(base, [run])
-    assert found.cost <= evaluate(Model(truth, (LOST,)), [run]).cost < base.cost
-    bench, (lost,) = found.model.resolved(found.x)
+    base = fit_nominal_parameters(prepare_dataset([run], owner))
+    assert base.cost < 0.05 * base.estimator.evaluate(base.hypothesis.owner).cost
+    assert "preload_loss" not in [one.term.effect for one in screen_library(base) if one.share > 0.01]
+    found = unbent(base)
+    assert found.cost <= base.estimator.evaluate(Hypothesis(truth, (LOST,))).cost < base.cost
+    bench, (lost,) = found.hypothesis.resolved
     assert lost.values[1] == pytest.approx(0.08, rel=0.1)
     assert bench.axis.table_mass_kg == pytest.approx(truth.axis.table_mass_kg, rel=0.02)
 
@@ -50,7 +49,7 @@ def test_it_is_fitted_although_the_refit_leaves_next_to_nothing() -> None:
 def test_it_is_named_where_what_is_left_matters() -> None:
     owner, truth = stiff_owner()
     for terms in ((LOST,), ()):
-        found = explain(owner, [take(recorded(truth, *terms, torque_noise_n_m=NOISE_N_M), owner)])
+        found = explain(prepare_dataset([take(recorded(truth, *terms, torque_noise_n_m=NOISE_N_M), owner)], owner))
         assert [term.effect for term in found.terms] == [term.effect for term in terms]
 
 
@@ -61,15 +60,15 @@ def test_of_one_spring_it_would_be_that_spring() -> None:
         effect="structural_mode", parameters={"frequency_hz": 80.0, "damping_ratio": 0.05, "mass_ratio": 0.2}
     )
     for known in (owner, owner.model_copy(update={"mechanisms": (mode,)})):
-        assert not may_hide(evaluate(Model(known), [run]), [run])
+        assert not may_hide(evaluated(Hypothesis(known), [run]))
 
 
 def test_beside_a_lost_preload_and_without_a_linear_encoder_it_is_not_looked_for() -> None:
     owner = load_bench("reference_7dof")
     run = take(recorded(owner), owner)
-    assert may_hide(evaluate(Model(owner), [run]), [run])
-    assert not may_hide(evaluate(Model(owner, (LOST,)), [run]), [run])
-    assert not may_hide(evaluate(Model(owner), [run]), [replace(run, table_m=np.zeros(0))])
+    assert may_hide(evaluated(Hypothesis(owner), [run]))
+    assert not may_hide(evaluated(Hypothesis(owner, (LOST,)), [run]))
+    assert not may_hide(evaluated(Hypothesis(owner), [replace(run, table_m=np.zeros(0))]))
 
 
 def test_where_a_screen_beside_the_refit_finds_nothing_the_owners_values_are_searched(
@@ -79,11 +78,11 @@ def test_where_a_screen_beside_the_refit_finds_nothing_the_owners_values_are_sea
     owner = bench(table_mass_kg=300.0)
     pulled = Term("spring_load", 0, (6000.0, 0.02))
     run, plain = (take(recorded(bench(), *terms), owner) for terms in ((pulled,), ()))
-    base = successive_halving.nominal(owner, [run])
-    first = from_owner(base, [run])[0]
-    assert first.cost < 1.1 * base.residuals.size < 0.1 * base.cost
-    monkeypatch.setattr(successive_halving, "race", lambda base, found, runs: [])
-    (spring,) = explain(owner, [run]).terms
+    base = fit_nominal_parameters(prepare_dataset([run], owner))
+    first = from_owner(base)[0]
+    assert first.cost < 1.1 * base.rows < 0.1 * base.cost
+    monkeypatch.setattr(forward_selection, "race", lambda base, candidates: [])
+    (spring,) = explain(prepare_dataset([run], owner)).terms
     assert spring.effect == "spring_load"
     assert spring.values == pytest.approx(pulled.values, rel=0.02)
-    assert explain(owner, [plain]).terms == ()
+    assert explain(prepare_dataset([plain], owner)).terms == ()

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from diagnosis_runs import bench, changed, recorded
+from diagnosis_runs import bench, changed, dataset, recorded
 
-from hil.diagnosis.estimation.hypothesis import Model
-from hil.diagnosis.estimation.terms import Term
 from hil.diagnosis.preflight import prepare
 from hil.identification.compare import compare
+from hil.identification.dataset import FASTEST_OBSERVER_S
+from hil.identification.hypothesis import Hypothesis
+from hil.identification.terms import Term
 
 OWNER = bench()
 PLAY = Term("backlash", 0, (20e-6,))
@@ -20,8 +21,9 @@ PLAY = Term("backlash", 0, (20e-6,))
 def test_residuals_are_the_same_wherever_its_zero_lies(shift_m: float, terms: tuple[Term, ...]) -> None:
     recording = recorded(OWNER, PLAY)
     shifted = changed(recording, table_position_m=recording["table_position_m"] + shift_m)
-    model = Model(OWNER, terms)
-    known, moved = (model.residuals(model.initial(), prepare([run], OWNER)) for run in (recording, shifted))
+    hypothesis = Hypothesis(OWNER, terms)
+    data = (dataset(prepare([run], OWNER), OWNER) for run in (recording, shifted))
+    known, moved = (hypothesis.residuals(one).vector for one in data)
     np.testing.assert_allclose(moved, known, atol=1e-3 * np.std(known))
 
 
@@ -47,8 +49,7 @@ def test_a_recording_may_begin_on_one_flank_of_a_gap(rest_s: float, shift_m: flo
     columns["time_s"] = np.arange(rows.size) * whole.period_s
     columns["table_position_m"] = columns["table_position_m"] + shift_m
     (run,) = prepare([changed(whole, **columns)], OWNER)
-    model = Model(OWNER, (PLAY,))
-    table = model.blocks(model.initial(), run)["table"][run.judged]
+    table = Hypothesis(OWNER, (PLAY,)).blocks(run, FASTEST_OBSERVER_S)["table"][run.judged]
     assert np.sqrt(np.mean(table**2)) < 2.0 * run.noise.table_m
 
 
@@ -66,9 +67,9 @@ def test_a_recording_may_begin_on_one_flank_of_a_gap(rest_s: float, shift_m: flo
 )
 def test_an_axis_that_stands_has_stood_before(term: Term, force_n: float) -> None:
     """The twin begins at rest under whatever bends the transmission, it does not spring there."""
-    model = Model(OWNER, (Term("external_force", 0, (force_n, 0.0, 10.0)), term))
+    hypothesis = Hypothesis(OWNER, (Term("external_force", 0, (force_n, 0.0, 10.0)), term))
     still = np.zeros(300)
-    answer = model.twin(model.initial()).simulate(still, still)
+    answer = hypothesis.twin().simulate(still, still)
     assert np.ptp(answer.table_position_m) < 2e-9
 
 
@@ -78,7 +79,7 @@ def test_where_the_loop_goes_by_the_table_the_motor_has_the_datum(shift_rad: flo
     assert owner.gains.position_from_table
     recording = recorded(owner, PLAY)
     shifted = changed(recording, motor_position_rad=recording["motor_position_rad"] + shift_rad)
-    model = Model(owner, (PLAY,))
-    known, moved = (model.closed_loop(model.initial(), run) for run in prepare([recording, shifted], owner))
+    data = dataset(prepare([recording, shifted], owner), owner)
+    known, moved = Hypothesis(owner, (PLAY,)).residuals(data, closed=True).channels
     for channel, noise in (("motor", 1e-6 / owner.axis.ratio_m_rad), ("table", 0.3e-6), ("torque", 0.015)):
         assert np.std(moved[channel] - known[channel]) < noise, channel

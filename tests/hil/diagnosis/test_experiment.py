@@ -7,19 +7,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from diagnosis_runs import bench, moves, recorded
+from diagnosis_runs import bench, dataset, fitted, moves, recorded
 
 from hil.bench.bench_file import Bench
 from hil.bench.hardware import SetPointLimits
 from hil.diagnosis.candidate_motions import candidates, reach
-from hil.diagnosis.estimation.fit import Fit, fit
-from hil.diagnosis.estimation.hypothesis import Model
-from hil.diagnosis.estimation.model_comparison import against
-from hil.diagnosis.estimation.terms import Term
 from hil.diagnosis.experiment import Experiment, separating, showing
-from hil.diagnosis.search.forward_selection import TIED, Explanation, Rival
+from hil.diagnosis.search.forward_selection import TIED, Explanation, RivalFit
 from hil.diagnosis.verdict.observability import not_testable
-from hil.identification.dataset import Measured, take
+from hil.identification.dataset import Dataset, take
+from hil.identification.estimator import Fit
+from hil.identification.hypothesis import Hypothesis
+from hil.identification.model_comparison import against
+from hil.identification.terms import Term
 from hil.motion.profile import Profile, load_profile, write_profile
 from hil.motion.trajectory import plan
 
@@ -29,14 +29,17 @@ ONE_WAY = moves([REST, {"kind": "sine_squared", "to_m": 0.2, "feed_m_s": 0.124},
 SLOW = moves([REST, {"kind": "sine_squared", "to_m": 0.06, "feed_m_s": 0.03, "acceleration_m_s2": 0.1}, REST])
 
 
-def runs(profile: Profile, *terms: Term, seed: int = 1, believed: Bench = OWNER) -> list[Measured]:
-    return [take(recorded(OWNER, *terms, seed=seed, profile=profile), believed)]
+def runs(profile: Profile, *terms: Term, seed: int = 1, believed: Bench = OWNER) -> Dataset:
+    return dataset([take(recorded(OWNER, *terms, seed=seed, profile=profile), believed)], believed)
 
 
-def designed(train: list[Measured], right: Fit, *others: Fit, tied: bool = False) -> Experiment:
+NONE = dataset([], OWNER)
+
+
+def designed(right: Fit, *others: Fit, tied: bool = False) -> Experiment:
     """The experiment for a fit and its rivals, as evidence on these recordings has them, or taken as tied."""
-    rivals = [Rival(other, 0.0 if tied else against(right, other)) for other in others]
-    found = separating(Explanation(right, right, right, {right.model.terms[-1].key: rivals}), right, train, [])
+    rivals = [RivalFit(other, 0.0 if tied else against(right, other)) for other in others]
+    found = separating(Explanation(right, right, right, {right.terms[-1].key: rivals}), right, NONE)
     assert found is not None
     return found
 
@@ -45,17 +48,17 @@ def test_a_motion_is_designed_that_separates_what_one_way_ties() -> None:
     """Friction that changes with the position or with the time: at one feed in one direction they are the same."""
     place = Term("position_dependent_friction", 0, (0.006, 1.0, 0.0))
     train = runs(ONE_WAY, place)
-    first = fit(Model(OWNER, (place,)), train)
-    second = fit(Model(OWNER, (Term("friction_drift", 0, (0.006, 2.0)),)), train)
+    first = fitted(Hypothesis(OWNER, (place,)), train)
+    second = fitted(Hypothesis(OWNER, (Term("friction_drift", 0, (0.006, 2.0)),)), train)
     assert abs(against(first, second)) < TIED
-    found = designed(train, first, second)
+    found = designed(first, second)
     assert found.profile is not None
     assert found.separates == ("friction_drift", "position_dependent_friction")
     assert "is expected to tell friction drift from position dependent friction" in found.note
     for right, wrong in ((first, second), (second, first)):  # whichever of the two is true
-        truth = right.model.resolved(right.x)[1]
-        both = [*runs(ONE_WAY, *truth), *runs(found.profile, *truth, seed=2)]
-        a, b = (fit(found.model, both, found.x, evaluations=6) for found in (right, wrong))
+        truth = right.terms
+        both = dataset([*runs(ONE_WAY, *truth).runs, *runs(found.profile, *truth, seed=2).runs], OWNER)
+        a, b = (fitted(other.hypothesis, both, evaluations=6) for other in (right, wrong))
         assert against(a, b) > 10.0 * TIED
 
 
@@ -63,7 +66,8 @@ def test_no_motion_is_promised_that_gains_nothing() -> None:
     lag = Term("current_loop_lag", 0, (1e-4,))  # of a tenth of a tick, on a motion without jerk
     train = runs(SLOW, lag)
     found = designed(
-        train, fit(Model(OWNER, (lag,)), train), fit(Model(OWNER, (Term("transport_delay", 0, (1e-4,)),)), train)
+        fitted(Hypothesis(OWNER, (lag,)), train),
+        fitted(Hypothesis(OWNER, (Term("transport_delay", 0, (1e-4,)),)), train),
     )
     assert found.profile is None
     assert "No motion within the reach of these recordings tells current loop lag from transport delay" in found.note
@@ -72,7 +76,7 @@ def test_no_motion_is_promised_that_gains_nothing() -> None:
 def test_the_same_torque_on_every_motion_needs_no_search() -> None:
     uneven = Term("asymmetric_friction", 0, (0.2,))
     train = runs(moves([REST, {"kind": "reversal", "stroke_m": 0.05, "feed_m_s": 0.1}, REST]), uneven)
-    found = designed(train, fit(Model(OWNER, (uneven,)), train))
+    found = designed(fitted(Hypothesis(OWNER, (uneven,)), train))
     assert found.profile is None
     assert "No motion tells asymmetric friction from constant load" in found.note
 
@@ -80,24 +84,24 @@ def test_the_same_torque_on_every_motion_needs_no_search() -> None:
 def test_a_cause_without_rivals_needs_no_experiment() -> None:
     play = Term("backlash", 0, (20e-6,))
     train = runs(ONE_WAY, play)
-    right, nominal = fit(Model(OWNER, (play,)), train), fit(Model(OWNER), train)
-    assert separating(Explanation(nominal, nominal, right), right, train, []) is None
+    right, nominal = fitted(Hypothesis(OWNER, (play,)), train), fitted(Hypothesis(OWNER), train)
+    assert separating(Explanation(nominal, nominal, right), right, NONE) is None
 
 
 def test_what_a_motion_hides_is_shown_by_another() -> None:
     """Friction that changes while the axis runs, on a motion of a few seconds."""
     drift = "friction_drift"
     train = runs(moves([REST, {"kind": "sine_squared", "to_m": 0.7, "feed_m_s": 0.124}, REST]))
-    nominal = fit(Model(OWNER), train)
-    hidden = not_testable(nominal, train)
+    nominal = fitted(Hypothesis(OWNER), train)
+    hidden = not_testable(nominal)
     assert {drift, "torque_saturation"} <= set(hidden)
-    found = showing(nominal, hidden, train, [])
+    found = showing(nominal, hidden, NONE)
     assert found is not None
     assert found.profile is not None
     assert drift in found.separates
     assert "torque_saturation" not in found.separates  # takes more torque than these limits ever ask for
     shown = runs(found.profile, seed=2)
-    assert drift not in not_testable(fit(Model(OWNER), shown), shown)
+    assert drift not in not_testable(fitted(Hypothesis(OWNER), shown))
 
 
 @pytest.mark.parametrize("travel_m", [None, (-0.06, 0.36)])
@@ -114,11 +118,11 @@ def test_candidates_keep_to_what_was_recorded(travel_m: tuple[float, float] | No
         ),
         believed=owner,
     )
-    reached = reach(train, owner)
+    reached = reach(train.runs, owner)
     short, long = candidates(reached)
     assert len(short) >= 5
     assert long
-    velocity = train[0].velocity_command_m_s
+    velocity = train.runs[0].velocity_command_m_s
     fastest, hardest = np.abs(velocity).max(), np.abs(np.diff(velocity)).max() / OWNER.gains.period_s
     low, high = (0.0, 0.06) if travel_m is None else (travel_m[0] + 0.003, travel_m[1] - 0.003)
     for profile in (*short, *long):
@@ -140,12 +144,12 @@ def test_limits_of_the_bench_count_instead_of_what_was_recorded() -> None:
     assert OWNER.drive is not None
     free = OWNER.model_copy(update={"drive": OWNER.drive.model_copy(update={"limits": limits})})
     train = runs(gentle, error)
-    right = fit(Model(OWNER, (error,)), train, evaluations=6)
-    wrong = fit(Model(OWNER, (Term("periodic_lead_error", 0, (3e-7, 4.1)),)), train, evaluations=6)
-    careful = designed(train, right, wrong, tied=True).profile
+    right = fitted(Hypothesis(OWNER, (error,)), train, evaluations=6)
+    wrong = fitted(Hypothesis(OWNER, (Term("periodic_lead_error", 0, (3e-7, 4.1)),)), train, evaluations=6)
+    careful = designed(right, wrong, tied=True).profile
     assert careful is None or careful.limits.velocity_m_s <= 0.01
-    right, wrong = (replace(found, model=replace(found.model, bench=free)) for found in (right, wrong))
-    profile = designed(train, right, wrong, tied=True).profile
+    right, wrong = (replace(found, hypothesis=replace(found.hypothesis, bench=free)) for found in (right, wrong))
+    profile = designed(right, wrong, tied=True).profile
     assert profile is not None
     assert profile.limits.model_dump() == limits.model_dump()
 
@@ -161,6 +165,6 @@ def test_limits_of_the_bench_count_instead_of_what_was_recorded() -> None:
     ],
 )
 def test_an_axis_that_may_do_little_still_gets_candidates(change: dict[str, float], count: int) -> None:
-    reached = replace(reach(runs(ONE_WAY), OWNER), low_m=0.0, high_m=0.1)
+    reached = replace(reach(runs(ONE_WAY).runs, OWNER), low_m=0.0, high_m=0.1)
     short, long = candidates(replace(reached, **change))
     assert len(short) + len(long) >= count

@@ -2,43 +2,44 @@
 
 from __future__ import annotations
 
+import diagnosis_runs
 import pytest
-from diagnosis_runs import bench, recorded
+from diagnosis_runs import bench, dataset, recorded
 
 from hil.bench.bench_file import Bench, MechanismEntry
-from hil.diagnosis.estimation.fit import Fit, fit
-from hil.diagnosis.estimation.hypothesis import Model
-from hil.diagnosis.estimation.terms import Term, compatible, repeats
-from hil.diagnosis.search import successive_halving
-from hil.diagnosis.search.forward_selection import Explanation, Rival
-from hil.diagnosis.verdict.cross_validation import prove
+from hil.diagnosis.search.forward_selection import Explanation, RivalFit
+from hil.diagnosis.search.score_test import screen_library
+from hil.diagnosis.verdict.cross_validation import cross_validate
 from hil.diagnosis.verdict.findings import diagnosed_bench, findings, renamed
-from hil.identification.dataset import Measured, take
+from hil.identification.dataset import Dataset, take
+from hil.identification.estimator import Fit
+from hil.identification.hypothesis import Hypothesis
+from hil.identification.terms import Term, compatible, repeats
 
 OWNER = bench()
 
 
-def runs(*terms: Term, seed: int = 1) -> list[Measured]:
-    return [take(recorded(OWNER, *terms, seed=seed), OWNER)]
+def runs(*terms: Term, seed: int = 1) -> Dataset:
+    return dataset([take(recorded(OWNER, *terms, seed=seed), OWNER)], OWNER)
 
 
-def fitted(found: list[Measured], *terms: Term) -> Fit:
+def fitted(found: Dataset, *terms: Term) -> Fit:
     """A hypothesis from close to the truth."""
-    return fit(Model(OWNER, terms), found, evaluations=6)
+    return diagnosis_runs.fitted(Hypothesis(OWNER, terms), found, evaluations=6)
 
 
 def test_friction_that_differs_with_speed_is_no_constant_load() -> None:
     truth, load = Term("asymmetric_friction", 1, (0.15,)), Term("constant_load", 0, (0.1,))
     train, held_out = runs(truth), runs(truth, seed=2)
     plain, right, rival = fitted(train), fitted(train, truth), fitted(train, load)
-    explanation = Explanation(plain, plain, right, {truth.key: [Rival(rival, 500.0)]}, {truth.key: 900.0})
+    explanation = Explanation(plain, plain, right, {truth.key: [RivalFit(rival, 500.0)]}, {truth.key: 900.0})
     final = renamed(right)
-    (found,) = findings(explanation, final, prove(plain, final, train, held_out).ablations, {}, train, held_out)
+    (found,) = findings(explanation, final, cross_validate(plain, final, held_out).ablations, {}, held_out)
     assert (found.effect, found.variant, found.equivalents) == ("asymmetric_friction", "with speed", ())
     assert [other.effect for other in found.rivals] == ["constant_load"]
     value = found.parameters["offset_torque_n_m"]
     assert value.value == pytest.approx(0.15, abs=max(4.0 * value.std, 0.003))
-    physics = final.model.resolved(final.x)[0].axis.physics()
+    physics = final.bench.axis.physics()
     assert f"at {physics.viscous_speed:.0f} rad/s" in found.sentence
     after = diagnosed_bench(OWNER, final)
     assert after.twin().active == Bench.model_validate(after.model_dump()).twin().active
@@ -64,26 +65,24 @@ def test_the_same_torque_is_not_named_twice() -> None:
 
 def test_a_mechanism_is_offered_again_at_another_order() -> None:
     train = runs(SIX, FIFTEEN)
-    offered = {lead.term.effect: lead.term for lead in successive_halving.leads(fitted(train, SIX), train)}
+    offered = {one.term.effect: one.term for one in screen_library(fitted(train, SIX))}
     assert offered["cogging_torque"].slot == 1
     assert offered["cogging_torque"].values[1] == 15.0
-    assert "cogging_torque" not in {
-        lead.term.effect for lead in successive_halving.leads(fitted(train, SIX, FIFTEEN), train)
-    }
+    assert "cogging_torque" not in {one.term.effect for one in screen_library(fitted(train, SIX, FIFTEEN))}
 
 
 def test_two_of_a_name_are_two_findings_with_two_entries() -> None:
     train, held_out = runs(SIX, FIFTEEN), runs(SIX, FIFTEEN, seed=2)
     plain, right = fitted(train), fitted(train, SIX, FIFTEEN)
     explanation = Explanation(plain, plain, right, {}, {SIX.key: 900.0, FIFTEEN.key: 800.0})
-    proof = prove(plain, right, train, held_out)
-    found = findings(explanation, proof.final, proof.ablations, {}, train, held_out)
+    proof = cross_validate(plain, right, held_out)
+    found = findings(explanation, proof.final, proof.ablations, {}, held_out)
     assert [finding.effect for finding in found] == ["cogging_torque", "cogging_torque"]
     orders = [finding.parameters["cycles_per_rev"].value for finding in found]
     assert orders == pytest.approx([6.0, 15.0], abs=0.02)
     after = diagnosed_bench(OWNER, proof.final)
     again = Bench.model_validate(after.model_dump())
-    assert again.twin().active == proof.final.model.twin(proof.final.x).active
+    assert again.twin().active == proof.final.hypothesis.twin().active
 
 
 def test_a_mechanism_that_the_bench_has_gives_way_to_the_one_found() -> None:
@@ -97,7 +96,7 @@ def test_a_mechanism_that_the_bench_has_gives_way_to_the_one_found() -> None:
         )
         return OWNER.model_copy(update={"mechanisms": entries})
 
-    found = Model(known(SIX, FIFTEEN), (Term("cogging_torque", 0, (0.4, 6.1, 0.5)),))
+    found = Hypothesis(known(SIX, FIFTEEN), (Term("cogging_torque", 0, (0.4, 6.1, 0.5)),))
     assert [entry.parameters["cycles_per_rev"] for entry in found.kept] == [15.0]
-    assert len(found.twin(found.initial()).active) == 2
-    assert len(Model(known(SIX), (FIFTEEN,)).kept) == 1
+    assert len(found.twin().active) == 2
+    assert len(Hypothesis(known(SIX), (FIFTEEN,)).kept) == 1

@@ -6,16 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis_runs import RIG, bench, moves, recorded
+from diagnosis_runs import RIG, bench, dataset, evaluated, moves, recorded
 
 from hil.bench.bench_file import load_bench
-from hil.diagnosis.estimation.fit import evaluate
-from hil.diagnosis.estimation.hypothesis import Model, observer_time_s
-from hil.diagnosis.estimation.noise_floor import floor, laps, shaken
-from hil.diagnosis.estimation.terms import Term
 from hil.diagnosis.result import Mode
 from hil.diagnosis.verdict.fit_table import fit_table
-from hil.identification.dataset import Measured, take
+from hil.identification.dataset import Measured, prepare_dataset, take
+from hil.identification.hypothesis import Hypothesis
+from hil.identification.noise_floor import floor, noise_response
+from hil.identification.terms import Term
 from hil.proof.draw.generator import draw, rerun
 from hil.recording.importing import import_recording
 from hil.twin.library import BY_ID
@@ -29,7 +28,7 @@ def three_laps() -> Measured:
 
 
 def test_repeated_laps_are_found(three_laps: Measured) -> None:
-    found = laps(three_laps)
+    found = three_laps.laps
     assert found is not None
     period = (three_laps.motor.size - 1) / 3 * three_laps.period_s
     assert min(abs(found.lag_s - period * k) for k in (1, 2)) < 0.002
@@ -37,7 +36,7 @@ def test_repeated_laps_are_found(three_laps: Measured) -> None:
 
 @pytest.mark.parametrize("sigma", [0.01, 0.3])
 def test_only_what_does_not_repeat_is_noise(three_laps: Measured, sigma: float) -> None:
-    found = laps(three_laps)
+    found = three_laps.laps
     assert found is not None
     repeatable = 5.0 * np.sin(three_laps.position_command_m / 0.01) + 3.0 * np.sign(three_laps.velocity_command_m_s)
     noise = np.random.default_rng(3).normal(0.0, sigma, repeatable.size)
@@ -47,13 +46,13 @@ def test_only_what_does_not_repeat_is_noise(three_laps: Measured, sigma: float) 
 
 
 def test_a_floor_is_never_below_the_sensor_noise(three_laps: Measured) -> None:
-    found = laps(three_laps)
+    found = three_laps.laps
     assert floor(np.zeros(three_laps.motor.size), 0.02, found).rms == 0.02
 
 
 def test_without_laps_the_floor_is_the_sensor_noise() -> None:
     once = take(recorded(bench()), bench())
-    assert laps(once) is None
+    assert once.laps is None
     assert floor(np.ones(once.motor.size), 0.02, None).source == "white_noise"
 
 
@@ -63,17 +62,16 @@ def test_the_emps_record_has_its_published_floor() -> None:
         pytest.skip("the EMPS record is not beside the repository")
     owner = load_bench("emps_symmetric")
     run = take(import_recording(EMPS, "emps"), owner)
-    found = laps(run)
+    found = run.laps
     assert found is not None
     assert found.lag_s == pytest.approx(6.24)
-    model = Model(owner)
-    left = model.closed_loop(model.initial(), run)
+    (left,) = Hypothesis(owner).residuals(dataset([run], owner), closed=True).channels
     assert found.noise(left["motor"]) == pytest.approx(0.2e-6, rel=0.15)
     assert 0.3 <= found.noise(left["torque"]) <= 0.37
 
 
 def test_in_closed_loop_the_axis_moves_with_what_its_encoders_count() -> None:
-    """Runs of a simulated axis with coarse counts that begin within some of them differ by what `shaken` says."""
+    """Runs of a simulated axis with coarse counts that begin within some of them differ by `noise_response`."""
     case = draw("single", 101966, 20261130)
     axis, last, rng = case.draft.axis, case.draft.runs[2], np.random.default_rng(3)
     starts_m = rng.uniform(0.0, 2e-6, 4)
@@ -93,12 +91,11 @@ def test_in_closed_loop_the_axis_moves_with_what_its_encoders_count() -> None:
         BY_ID["torque_saturation"].forms.index("hidden"),
         (case.truth.effects[0].parameters["limit_n_m"],),
     )
-    model = Model(exact, (limit,), 0.3, observer_time_s([run], exact))
-    found = evaluate(model, [run])
-    moved_m = shaken(found, run)["table"]
+    found = evaluated(Hypothesis(exact, (limit,)), prepare_dataset([run], exact))
+    moved_m = noise_response(found.hypothesis, run)["table"]
     assert differ_m > 1.5 * axis.table_noise_m
     assert np.hypot(run.noise.table_m, moved_m) == pytest.approx(differ_m, rel=0.3)
-    table = fit_table(found, found, found, [run], [])["table_position_m"]
+    table = fit_table(found, found, found, dataset([], exact))["table_position_m"]
     assert table.mode is Mode.CLOSED_LOOP
     assert table.train.noise_floor_rms == pytest.approx(np.hypot(run.noise.table_m, moved_m))
 
@@ -109,7 +106,7 @@ def test_one_coarse_count_in_a_stiff_loop_is_noise_and_no_chaos() -> None:
     coarse = owner.encoders.motor.model_copy(update={"counts_per_rev": 4000})
     owner = owner.model_copy(update={"encoders": owner.encoders.model_copy(update={"motor": coarse})})
     run = take(recorded(owner), owner)
-    moved = shaken(evaluate(Model(owner, observer_s=observer_time_s([run], owner)), [run]), run)
+    moved = noise_response(Hypothesis(owner), run)
     assert moved["torque"] > 5.0 * run.noise.torque
     assert moved["motor"] > 0.0 < moved["table"]
 
@@ -125,7 +122,7 @@ def test_a_loop_that_sticks_and_slips_has_no_noise_of_its_own_making() -> None:
         ]
     )
     run = take(recorded(bench(), sticking, lead, profile=creep), bench())
-    wrong = evaluate(Model(bench(), (sticking,), 0.01, observer_time_s([run], bench())), [run])
-    assert set(shaken(wrong, run).values()) == {0.0}
-    table = fit_table(wrong, wrong, wrong, [run], [])["table_position_m"]
+    wrong = evaluated(Hypothesis(bench(), (sticking,)), prepare_dataset([run], bench()))
+    assert set(noise_response(wrong.hypothesis, run).values()) == {0.0}
+    table = fit_table(wrong, wrong, wrong, dataset([], bench()))["table_position_m"]
     assert table.train.after_rms > 50.0 * table.train.noise_floor_rms

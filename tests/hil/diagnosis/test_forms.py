@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import pytest
-from diagnosis_runs import bench, recorded
+from diagnosis_runs import bench, dataset, fitted, recorded
 
-from hil.diagnosis.estimation.fit import fit
-from hil.diagnosis.estimation.hypothesis import Model
-from hil.diagnosis.estimation.terms import Key, Term
 from hil.diagnosis.result import Finding
-from hil.diagnosis.search.forward_selection import Explanation, Rival
-from hil.diagnosis.verdict.cross_validation import Proof, prove
+from hil.diagnosis.search.forward_selection import Explanation, RivalFit
+from hil.diagnosis.verdict.cross_validation import CrossValidation, cross_validate
 from hil.diagnosis.verdict.curve_forms import OF_ITS_FORM, form_of
-from hil.diagnosis.verdict.findings import diagnosed_bench, findings, standard_errors
+from hil.diagnosis.verdict.findings import diagnosed_bench, findings
 from hil.identification.dataset import take
+from hil.identification.hypothesis import Hypothesis
+from hil.identification.terms import Key, Term
+from hil.identification.uncertainty import standard_errors
 
 OWNER = bench()
 COULOMB = OWNER.axis.physics().coulomb_n_m
@@ -30,17 +30,23 @@ def drag(share: float, variant: int = 0) -> Term:
 
 def judged(
     terms: Sequence[Term], rivals: Mapping[Key, Term] | None = None
-) -> tuple[Proof, dict[int, int], tuple[Finding, ...]]:
+) -> tuple[CrossValidation, dict[int, int], tuple[Finding, ...]]:
     """What is found on recordings of these terms, where these are what is fitted, and tied rivals of a term."""
-    train, held_out = ([take(recorded(OWNER, *terms, seed=seed, torque_noise_n_m=0.001), OWNER)] for seed in (1, 2))
-    plain, right = fit(Model(OWNER), train, evaluations=6), fit(Model(OWNER, tuple(terms)), train, evaluations=6)
-    proof = prove(plain, right, train, held_out)
+    train, held_out = (
+        dataset([take(recorded(OWNER, *terms, seed=seed, torque_noise_n_m=0.001), OWNER)], OWNER) for seed in (1, 2)
+    )
+    plain, right = (
+        fitted(Hypothesis(OWNER), train, evaluations=6),
+        fitted(Hypothesis(OWNER, tuple(terms)), train, evaluations=6),
+    )
+    proof = cross_validate(plain, right, held_out)
     tied = {
-        key: [Rival(fit(Model(OWNER, (rival,)), train, evaluations=1), 0.0)] for key, rival in (rivals or {}).items()
+        key: [RivalFit(fitted(Hypothesis(OWNER, (rival,)), train, evaluations=1), 0.0)]
+        for key, rival in (rivals or {}).items()
     }
     explanation = Explanation(plain, plain, right, tied, {term.key: 900.0 for term in terms})
     forms = form_of(explanation, proof.ablations)
-    return proof, forms, findings(explanation, proof.final, proof.ablations, forms, train, held_out)
+    return proof, forms, findings(explanation, proof.final, proof.ablations, forms, held_out)
 
 
 @pytest.mark.parametrize("terms", [(FALLING, drag(0.02)), (drag(0.02), FALLING)])
@@ -54,7 +60,7 @@ def test_a_little_drag_is_the_form_of_a_falling_curve(terms: tuple[Term, ...]) -
     assert "square of the speed" in finding.form
     static = finding.parameters["static_torque_n_m"]
     assert static.value == pytest.approx(FALLING.values[0], rel=0.01)
-    of_the_term = proof.final.model.nominal_count + sum(len(term.values) for term in terms[:falling])
+    of_the_term = proof.final.hypothesis.columns(falling).start
     assert static.std == standard_errors(proof.final)[of_the_term]
     assert {entry.effect for entry in diagnosed_bench(OWNER, proof.final).mechanisms} == {
         "stribeck_friction",

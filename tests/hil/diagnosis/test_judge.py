@@ -4,39 +4,43 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from diagnosis_runs import bench, changed, recorded
+from diagnosis_runs import bench, changed, dataset, evaluated, fitted, recorded
 
-from hil.diagnosis.estimation.fit import FLOOR, Fit, evaluate, fit
-from hil.diagnosis.estimation.hypothesis import Model
-from hil.diagnosis.estimation.noise_ratios import noise_ratios
-from hil.diagnosis.estimation.terms import Term
 from hil.diagnosis.result import Verdict
-from hil.diagnosis.search import successive_halving
-from hil.diagnosis.search.forward_selection import Explanation, Rival
-from hil.diagnosis.verdict.cross_validation import explained_share, prove
-from hil.diagnosis.verdict.findings import diagnosed_bench, findings, renamed, standard_errors
+from hil.diagnosis.search.forward_selection import Explanation, RivalFit
+from hil.diagnosis.verdict.cross_validation import cross_validate, explained_share
+from hil.diagnosis.verdict.findings import diagnosed_bench, findings, renamed
 from hil.diagnosis.verdict.judge import judge, names_stand
 from hil.diagnosis.verdict.observability import not_testable
-from hil.identification.dataset import Measured, take
+from hil.identification.dataset import Dataset, Measured, take
+from hil.identification.estimator import Fit
+from hil.identification.hypothesis import Hypothesis
+from hil.identification.noise_floor import FLOOR
+from hil.identification.nominal_fit import fit_nominal_parameters
+from hil.identification.terms import Term
+from hil.identification.uncertainty import standard_errors
 
 OWNER = bench()
 LOAD = Term("constant_load", 0, (0.4,))
 PLAY = Term("backlash", 0, (20e-6,))
 
 
-def runs(*terms: Term, seed: int = 1, **axis: float) -> list[Measured]:
-    return [take(recorded(bench(**axis), *terms, seed=seed), OWNER)]
+def runs(*terms: Term, seed: int = 1, **axis: float) -> Dataset:
+    return dataset([take(recorded(bench(**axis), *terms, seed=seed), OWNER)], OWNER)
 
 
-def believed(found: list[Measured], *terms: Term, **axis: float) -> Fit:
+NONE = dataset([], OWNER)
+
+
+def believed(found: Dataset, *terms: Term, **axis: float) -> Fit:
     """A hypothesis as it stands, nothing fitted."""
-    return evaluate(Model(bench(**axis), terms), found)
+    return evaluated(Hypothesis(bench(**axis), terms), found)
 
 
 def test_a_twin_at_the_noise_has_no_mismatch() -> None:
     found = runs()
     right = believed(found)
-    assert judge(right, right, right, found, runs(seed=2)) is Verdict.NO_MISMATCH
+    assert judge(right, right, right, runs(seed=2)) is Verdict.NO_MISMATCH
 
 
 @pytest.mark.parametrize(("damping", "noise_rad"), [(0.03, 5e-5), (0.01, 2e-4), (0.005, 2e-4)])
@@ -45,46 +49,47 @@ def test_noise_of_the_motor_encoder_rings_in_the_table_and_is_no_physics(damping
     recording = recorded(truth)
     noise = np.random.default_rng(3).normal(0.0, noise_rad, len(recording))
     run = take(changed(recording, motor_position_rad=recording["motor_position_rad"] + noise), truth)
-    right = evaluate(Model(truth, observer_s=0.002), [run])
-    table = right.parts[1]
+    data = dataset([run], truth, observer_s=0.002)
+    right = evaluated(Hypothesis(truth), data)
+    table = right.residuals.parts[0, "table"]
     assert float(table @ table) > FLOOR * table.size  # what white noise of both encoders does not explain
-    assert noise_ratios(right, run)["table"] == pytest.approx(1.0, abs=0.1)
-    softer = evaluate(Model(bench(damping_ratio=damping, stiffness_n_m=4e7), observer_s=0.002), [run])
-    assert noise_ratios(softer, run)["table"] > 2.0 * FLOOR  # and physics is none of that noise
+    assert right.noise_ratios[0]["table"] == pytest.approx(1.0, abs=0.1)
+    softer = evaluated(Hypothesis(bench(damping_ratio=damping, stiffness_n_m=4e7)), data)
+    assert softer.noise_ratios[0]["table"] > 2.0 * FLOOR  # and physics is none of that noise
 
 
 def test_a_trifle_is_no_parameter_error() -> None:
     found = runs()
     almost = believed(found, coulomb_torque_n_m=1.1002)
-    assert judge(almost, believed(found), believed(found), found, []) is Verdict.NO_MISMATCH
+    assert judge(almost, believed(found), believed(found), NONE) is Verdict.NO_MISMATCH
 
 
 def test_wrong_parameters_are_a_parameter_error() -> None:
     found = runs(coulomb_torque_n_m=1.4)
     wrong, right = believed(found), believed(found, coulomb_torque_n_m=1.4)
-    assert judge(wrong, right, right, found, runs(seed=2, coulomb_torque_n_m=1.4)) is Verdict.PARAMETER_ERROR
+    assert judge(wrong, right, right, runs(seed=2, coulomb_torque_n_m=1.4)) is Verdict.PARAMETER_ERROR
 
 
 def test_a_term_that_explains_is_missing_physics() -> None:
     found = runs(LOAD)
     plain = believed(found)
-    assert judge(plain, plain, believed(found, LOAD), found, runs(LOAD, seed=2)) is Verdict.MISSING_PHYSICS
+    assert judge(plain, plain, believed(found, LOAD), runs(LOAD, seed=2)) is Verdict.MISSING_PHYSICS
 
 
 def test_a_mismatch_without_a_term_or_with_a_poor_one_is_unexplained() -> None:
     found, held_out = runs(PLAY, LOAD), runs(PLAY, LOAD, seed=2)
     plain = believed(found)
-    assert judge(plain, plain, plain, found, held_out) is Verdict.UNEXPLAINED
+    assert judge(plain, plain, plain, held_out) is Verdict.UNEXPLAINED
     poor = believed(found, Term("constant_load", 0, (0.02,)))
-    assert explained_share(plain, poor, held_out) < 0.5
-    assert judge(plain, plain, poor, found, held_out) is Verdict.UNEXPLAINED
+    assert explained_share(plain.on(held_out), poor.on(held_out)) < 0.5
+    assert judge(plain, plain, poor, held_out) is Verdict.UNEXPLAINED
 
 
 def test_a_name_that_is_not_believed_beside_a_twin_at_the_noise_is_no_mismatch() -> None:
     """What a term takes from one channel it may add to another: with all at the noise without it, nothing lacks."""
     found = runs()
     plain, made_up = believed(found), believed(found, LOAD)
-    assert judge(plain, plain, made_up, found, runs(seed=2)) is Verdict.NO_MISMATCH
+    assert judge(plain, plain, made_up, runs(seed=2)) is Verdict.NO_MISMATCH
 
 
 @pytest.mark.parametrize(
@@ -109,10 +114,10 @@ def test_names_stand_beside_what_is_little_or_hardly_above_the_noise(left: float
 def test_a_term_that_held_out_recordings_speak_against_is_dropped() -> None:
     train, held_out = runs(LOAD), runs(seed=2)  # the load has gone
     plain, loaded = believed(train), believed(train, LOAD)
-    proof = prove(plain, loaded, train, held_out)
+    proof = cross_validate(plain, loaded, held_out)
     assert proof.final is plain
     assert [ablation.term for ablation in proof.dropped] == [LOAD]
-    kept = prove(plain, loaded, train, runs(LOAD, seed=2))
+    kept = cross_validate(plain, loaded, runs(LOAD, seed=2))
     assert kept.final is loaded
     assert kept.ablations[0].shown
     assert kept.ablations[0].train > 2.0
@@ -121,19 +126,19 @@ def test_a_term_that_held_out_recordings_speak_against_is_dropped() -> None:
 @pytest.mark.parametrize("term", [Term("cogging_torque", 0, (0.1, 6.0, 0.2)), Term("current_loop_lag", 0, (1e-3,))])
 def test_what_makes_held_out_recordings_worse_than_a_refit_is_dropped_and_has_no_name(term: Term) -> None:
     train, held_out = runs(term), runs(seed=2)  # the effect has gone
-    nominal, found = successive_halving.nominal(OWNER, train), believed(train, term)
-    proof = prove(nominal, found, train, held_out)
+    nominal, found = fit_nominal_parameters(train), believed(train, term)
+    proof = cross_validate(nominal, found, held_out)
     assert [ablation.term for ablation in proof.dropped] == [term]
-    assert judge(nominal, nominal, proof.final, train, held_out) is Verdict.UNEXPLAINED
+    assert judge(nominal, nominal, proof.final, held_out) is Verdict.UNEXPLAINED
     # nor is it believed where it was not dropped
-    assert judge(nominal, nominal, found, train, held_out) is Verdict.UNEXPLAINED
+    assert judge(nominal, nominal, found, held_out) is Verdict.UNEXPLAINED
 
 
 def test_a_term_that_speaks_of_one_lap_only_is_dropped_unless_it_is_seen_there() -> None:
     once = Term("external_force", 0, (200.0, 0.8, 1.2))
     for truth, dropped in (((), [once]), ((once,), [])):
-        train = [take(recorded(OWNER, *truth, times=2), OWNER)]
-        proof = prove(believed(train), believed(train, once), train, [])
+        train = dataset([take(recorded(OWNER, *truth, times=2), OWNER)], OWNER)
+        proof = cross_validate(believed(train), believed(train, once), NONE)
         assert [ablation.term for ablation in proof.dropped] == dropped
 
 
@@ -160,18 +165,18 @@ def test_a_term_that_held_out_recordings_do_not_show_may_stay() -> None:
         )
         for run in held_out
     ]
-    proof = prove(believed(train), believed(train, late), train, short)
+    proof = cross_validate(believed(train), believed(train, late), dataset(short, OWNER))
     assert not proof.dropped
     assert not proof.ablations[0].shown
 
 
 def test_a_constant_load_is_called_by_its_commoner_name_and_both_are_listed() -> None:
     train = runs(LOAD)
-    plain, loaded = believed(train), fit(Model(OWNER, (LOAD,)), train, evaluations=8)
-    explanation = Explanation(plain, plain, loaded, {LOAD.key: [Rival(plain_with(train), 500.0)]}, {LOAD.key: 900.0})
+    plain, loaded = believed(train), fitted(Hypothesis(OWNER, (LOAD,)), train, evaluations=8)
+    explanation = Explanation(plain, plain, loaded, {LOAD.key: [RivalFit(plain_with(train), 500.0)]}, {LOAD.key: 900.0})
     final = renamed(loaded)
-    proof = prove(plain, final, train, runs(LOAD, seed=2))
-    (found,) = findings(explanation, proof.final, proof.ablations, {}, train, runs(LOAD, seed=2))
+    proof = cross_validate(plain, final, runs(LOAD, seed=2))
+    (found,) = findings(explanation, proof.final, proof.ablations, {}, runs(LOAD, seed=2))
     assert found.effect == "asymmetric_friction"
     assert found.equivalents == ("constant_load",)
     assert [rival.effect for rival in found.rivals] == ["spring_load"]
@@ -185,7 +190,7 @@ def test_a_constant_load_is_called_by_its_commoner_name_and_both_are_listed() ->
     assert after.drive == OWNER.drive
 
 
-def plain_with(train: list[Measured]) -> Fit:
+def plain_with(train: Dataset) -> Fit:
     """A poor rival."""
     return believed(train, Term("spring_load", 0, (10.0, 0.0)))
 
@@ -199,14 +204,14 @@ def test_standard_errors_cover_the_truth() -> None:
             name: float(getattr(OWNER.axis, name) * factor)
             for name, factor in zip(OWNER.axis.NOMINAL, scale, strict=True)
         }
-        found = fit(Model(OWNER), runs(seed=seed, **truth))
-        errors.append((np.array(found.model.values(found.x)) - list(truth.values())) / standard_errors(found))
+        found = fitted(Hypothesis(OWNER), runs(seed=seed, **truth))
+        errors.append((np.array(found.hypothesis.values) - list(truth.values())) / standard_errors(found))
     assert 0.3 < float(np.sqrt(np.mean(np.square(errors)))) < 2.5
 
 
 def test_what_this_motion_cannot_show() -> None:
     train = runs()
-    hidden = not_testable(fit(Model(OWNER), train, evaluations=4), train)
+    hidden = not_testable(fitted(Hypothesis(OWNER), train, evaluations=4))
     assert "torque_saturation" in hidden  # the torque stays far from its limit
     assert "thermal_growth" in hidden  # three seconds
     assert not {"constant_load", "backlash", "stribeck_friction", "periodic_lead_error"} & set(hidden)
@@ -215,6 +220,6 @@ def test_what_this_motion_cannot_show() -> None:
 def test_without_a_linear_encoder_nothing_behind_the_motor_can_be_shown() -> None:
     blind = OWNER.model_copy(update={"encoders": OWNER.encoders.model_copy(update={"table": None})})
     train = [take(recorded(OWNER), blind)]
-    hidden = not_testable(fit(Model(blind), train, evaluations=4), train)
+    hidden = not_testable(fitted(Hypothesis(blind), train, evaluations=4))
     assert {"backlash", "periodic_lead_error", "thermal_growth", "structural_mode"} <= set(hidden)
     assert "constant_load" not in hidden

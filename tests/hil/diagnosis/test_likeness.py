@@ -5,16 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from diagnosis_runs import bench, moves, recorded
+from diagnosis_runs import bench, evaluated, fitted, moves, recorded
 
 from hil.bench.bench_file import MechanismEntry
 from hil.diagnosis.diagnose import diagnose
-from hil.diagnosis.estimation.fit import evaluate, fit
-from hil.diagnosis.estimation.hypothesis import Model
-from hil.diagnosis.estimation.terms import Term
 from hil.diagnosis.search.equivalents import likenesses
-from hil.diagnosis.search.successive_halving import offered
+from hil.diagnosis.search.score_test import offered
 from hil.identification.dataset import take
+from hil.identification.hypothesis import Hypothesis
+from hil.identification.terms import Term
 from hil.recording.recording import Recording
 from hil.twin.library import BY_ID
 
@@ -40,15 +39,15 @@ def one_way(truth: Term, feed_m_s: float, seed: int) -> Recording:
 @pytest.mark.parametrize("truth", TERMS[:2], ids=lambda term: term.effect)
 def test_each_passes_for_the_other_on_a_way_forwards(truth: Term) -> None:
     run = take(one_way(truth, 0.02, 1), OWNER)
-    with_nothing, with_truth = evaluate(Model(OWNER), [run]), evaluate(Model(OWNER, (truth,)), [run])
+    with_nothing, with_truth = evaluated(Hypothesis(OWNER), [run]), evaluated(Hypothesis(OWNER, (truth,)), [run])
     rival = next(
         alike
         for alike in likenesses([truth], OWNER)
         if alike[0].effect == ({term.effect for term in TERMS[:2]} - {truth.effect}).pop()
     )
-    nearest = min((evaluate(Model(OWNER, (term,)), [run]) for term in rival), key=lambda found: found.cost)
-    fitted = fit(nearest.model, [run])
-    assert fitted.cost - with_truth.cost < 0.001 * (with_nothing.cost - with_truth.cost)
+    nearest = min((evaluated(Hypothesis(OWNER, (term,)), [run]) for term in rival), key=lambda found: found.cost)
+    best = fitted(nearest.hypothesis, [run])
+    assert best.cost - with_truth.cost < 0.001 * (with_nothing.cost - with_truth.cost)
 
 
 @pytest.mark.parametrize("truth", TERMS, ids=lambda term: term.effect)
@@ -86,7 +85,7 @@ def test_what_there_is_no_room_for_is_not_tried() -> None:
         }
     )
     cogging, ripple = (alike[0] for alike in likenesses([TERMS[1]], OWNER))
-    for model, terms in ((Model(OWNER, tuple(two)), two), (Model(known), [])):
+    for model, terms in ((Hypothesis(OWNER, tuple(two)), two), (Hypothesis(known), [])):
         assert not offered(cogging, model, terms)
         assert offered(ripple, model, terms)
 

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import pytest
-from diagnosis_runs import bench, recorded
+from diagnosis_runs import bench, fitted, recorded
 
 from hil.bench.bench_file import Bench, MechanismEntry
 from hil.diagnosis.diagnose import diagnose
-from hil.diagnosis.estimation.fit import fit
-from hil.diagnosis.estimation.hypothesis import Model
-from hil.diagnosis.estimation.terms import Term
-from hil.diagnosis.search import forward_selection, successive_halving
+from hil.diagnosis.search import forward_selection
+from hil.diagnosis.search.score_test import screen_library
 from hil.diagnosis.search.validity import claimable
-from hil.identification.dataset import take
+from hil.identification.dataset import prepare_dataset, take
+from hil.identification.hypothesis import Hypothesis
+from hil.identification.nominal_fit import fit_nominal_parameters
+from hil.identification.terms import Term
 
 OWNER = bench()
 COULOMB_N_M = OWNER.axis.physics().coulomb_n_m
@@ -40,9 +41,7 @@ def test_another_law_takes_the_place_of_what_is_known() -> None:
     truth = Term("asymmetric_friction", 1, (0.15,))
     owner = knowing("asymmetric_friction", "offset_torque_n_m", 0.2)
     train = [recorded(OWNER, truth)]
-    lead = successive_halving.leads(
-        successive_halving.nominal(owner, [take(train[0], owner)]), [take(train[0], owner)]
-    )[0]
+    lead = screen_library(fit_nominal_parameters(prepare_dataset([take(train[0], owner)], owner)))[0]
     assert (lead.term.effect, lead.term.variant) == ("asymmetric_friction", 1)
     assert lead.share > 0.7
     assert lead.term.values[0] == pytest.approx(0.15, rel=0.1)
@@ -70,10 +69,10 @@ def test_a_spring_that_a_later_fit_moves_out_of_reach_goes() -> None:
     ratio_m_rad = OWNER.axis.ratio_m_rad
     spring = Term("spring_load", 0, (0.8 / ratio_m_rad / 8.0, -8.0))
     assert claimable(spring, OWNER)
-    found = fit(Model(OWNER, (spring, lag)), runs)
-    (out_of_reach, _) = found.model.resolved(found.x)[1]
+    found = fitted(Hypothesis(OWNER, (spring, lag)), runs)
+    (out_of_reach, _) = found.terms
     assert not claimable(out_of_reach, OWNER)
-    assert [term.effect for term in forward_selection.claimed(found, runs).model.terms] == ["current_loop_lag"]
+    assert [term.effect for term in forward_selection.claimed(found).terms] == ["current_loop_lag"]
 
 
 @pytest.mark.parametrize(

@@ -6,18 +6,17 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from diagnosis_runs import bench, recorded
+from diagnosis_runs import bench, evaluated, recorded
 from numpy.typing import NDArray
 
-from hil.diagnosis.estimation.fit import Fit, evaluate
-from hil.diagnosis.estimation.hypothesis import Model
-from hil.diagnosis.estimation.terms import Term
-from hil.diagnosis.location.locate import _range, locate, phase_shares, windows
+from hil.diagnosis.location.locate import _range, locate, phase_shares, phases, windows
 from hil.diagnosis.location.periodicity import Lock, lock
-from hil.diagnosis.location.phases import phases
 from hil.diagnosis.location.residual_energy import Energy, energies
 from hil.diagnosis.result import Location, PhaseKind
 from hil.identification.dataset import Measured, take
+from hil.identification.estimator import Fit
+from hil.identification.hypothesis import Hypothesis
+from hil.identification.terms import Term
 
 FloatArray = NDArray[np.float64]
 OWNER = bench()
@@ -26,8 +25,8 @@ OWNER = bench()
 def located(*terms: Term, named: bool = False) -> Location:
     """Location of terms that the twin lacks and whose parameters are right otherwise."""
     run = take(recorded(OWNER, *terms), OWNER)
-    without = evaluate(Model(OWNER), [run])
-    return locate(without, [run], evaluate(Model(OWNER, terms), [run]) if named else without)
+    without = evaluated(Hypothesis(OWNER), [run])
+    return locate(without, evaluated(Hypothesis(OWNER, terms), without.data) if named else without)
 
 
 @pytest.mark.parametrize(
@@ -106,7 +105,7 @@ def test_a_force_in_a_window_is_found_in_its_window() -> None:
 
 def test_windows_and_phases_of_noise_claim_nothing(clean: tuple[Fit, Measured]) -> None:
     fit, run = clean
-    seen = energies(fit, [run])
+    seen = energies(fit.hypothesis, fit.data)
     assert _range([run.position_command_m], seen) is None
     assert _range([np.abs(run.velocity_command_m_s)], seen) is None
     assert lock(seen, "torque", OWNER, ()).frequency_hz is None
@@ -140,7 +139,7 @@ def test_energy_in_one_place_is_claimed_there() -> None:
 def clean() -> tuple[Fit, Measured]:
     """The twin of an axis that is as believed."""
     run = take(recorded(OWNER), OWNER)
-    return evaluate(Model(OWNER), [run]), run
+    return evaluated(Hypothesis(OWNER), [run]), run
 
 
 def test_shares_of_nothing_are_zero(clean: tuple[Fit, Measured]) -> None:

@@ -5,19 +5,18 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from diagnosis_runs import bench, recorded
+from diagnosis_runs import bench, dataset, evaluated, recorded
 
 from hil.diagnosis.diagnose import Diagnosis
-from hil.diagnosis.estimation.fit import evaluate
-from hil.diagnosis.estimation.hypothesis import Model
-from hil.diagnosis.estimation.terms import Term
 from hil.diagnosis.pictures.findings import finding_figure
 from hil.diagnosis.result import Result, Unexplained, Verdict
 from hil.diagnosis.search.forward_selection import Explanation
 from hil.diagnosis.search.initial_values import axis_facts
-from hil.diagnosis.verdict.cross_validation import Proof
+from hil.diagnosis.verdict.cross_validation import CrossValidation
 from hil.figures.drawing import save
 from hil.identification.dataset import take
+from hil.identification.hypothesis import Hypothesis
+from hil.identification.terms import Term
 from hil.twin.library import BY_ID
 
 OWNER = bench()
@@ -35,8 +34,9 @@ def diagnosis_of(effect: str, times: float = 3.0) -> Diagnosis:
         values[1:] = [0.8, 1.2]
     term = Term(effect, 0, tuple(values))
     runs = [take(recorded(OWNER, term), OWNER)]
-    plain, right = evaluate(Model(OWNER), runs), evaluate(Model(OWNER, (term,)), runs)
-    explanation, proof = Explanation(plain, plain, right), Proof(right, (), ())
+    data = dataset(runs, OWNER)
+    plain, right = evaluated(Hypothesis(OWNER), data), evaluated(Hypothesis(OWNER, (term,)), data)
+    explanation, proof = Explanation(plain, plain, right), CrossValidation(right, (), ())
     result = Result(
         verdict=Verdict.MISSING_PHYSICS,
         statement="",
@@ -48,13 +48,13 @@ def diagnosis_of(effect: str, times: float = 3.0) -> Diagnosis:
         unexplained=Unexplained(share=0.0, description=""),
         runtime_s=0.0,
     )
-    return Diagnosis(result, OWNER, OWNER, tuple(runs), (), explanation, proof, right)
+    return Diagnosis(result, OWNER, OWNER, data, dataset([], OWNER), explanation, proof, right)
 
 
 @pytest.mark.parametrize("effect", BY_ID)
 def test_every_mechanism_has_its_picture(effect: str, tmp_path: Path) -> None:
     diagnosis = diagnosis_of(effect)
-    shown = finding_figure(diagnosis, diagnosis.final.model.terms[0])
+    shown = finding_figure(diagnosis, diagnosis.final.terms[0])
     assert save(shown.figure, tmp_path / f"{effect}.png").stat().st_size > 10_000
     assert shown.caption.endswith("Recordings: run.")
     axes = shown.figure.axes

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from diagnosis_runs import bench, changed, recorded
 
-from hil.diagnosis.estimation.terms import Term
 from hil.diagnosis.location.locate import locate
 from hil.diagnosis.location.reaction_torque import acting, stiffness_between
-from hil.diagnosis.search import successive_halving
-from hil.identification.dataset import take
+from hil.identification.dataset import prepare_dataset, take
+from hil.identification.nominal_fit import fit_nominal_parameters
+from hil.identification.terms import Term
 from hil.recording.recording import Recording
 from hil.twin.structure.chain import serial_chain, two_mass
 
@@ -39,25 +39,25 @@ def bursts() -> Recording:
 )
 def test_the_motor_tells_on_which_side_of_the_transmission_it_acts(truth: Term | None, block: str) -> None:
     runs = (take(recorded(OWNER, truth) if truth else bursts(), OWNER),)
-    left = successive_halving.nominal(OWNER, runs)
-    assert locate(left, runs, left).block == block
+    left = fit_nominal_parameters(prepare_dataset(runs, OWNER))
+    assert locate(left, left).block == block
 
 
 def test_wrong_parameters_are_placed_where_they_show_and_not_where_they_seem_to_act() -> None:
     """A heavier table loads the spring as a force on it would."""
     runs = (take(recorded(bench(table_mass_kg=1.5 * OWNER.axis.table_mass_kg)), OWNER),)
-    refitted = successive_halving.nominal(OWNER, runs)
-    owner = successive_halving.evaluate(refitted.model, runs)
-    assert acting(owner, runs) is not None
-    assert locate(owner, runs, refitted).block in ("motor_side", "transmission")
+    refitted = fit_nominal_parameters(prepare_dataset(runs, OWNER))
+    owner = refitted.estimator.evaluate(refitted.hypothesis.owner)
+    assert acting(owner) is not None
+    assert locate(owner, refitted).block in ("motor_side", "transmission")
 
 
 def test_without_a_second_encoder_nothing_is_told() -> None:
     runs = (take(recorded(OWNER, Term("external_force", 0, (150.0, 0.3, 0.6))), OWNER),)
     owner = OWNER.model_copy(update={"encoders": OWNER.encoders.model_copy(update={"table": None})})
     blind = (take(changed(recorded(owner), table_position_m=None), owner),)
-    assert acting(successive_halving.nominal(owner, blind), blind) is None
-    assert acting(successive_halving.nominal(OWNER, runs), runs) is not None
+    assert acting(fit_nominal_parameters(prepare_dataset(blind, owner))) is None
+    assert acting(fit_nominal_parameters(prepare_dataset(runs, OWNER))) is not None
 
 
 def test_the_stiffness_that_holds_the_table_is_that_of_the_springs_in_series() -> None:

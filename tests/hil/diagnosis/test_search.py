@@ -4,39 +4,42 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from diagnosis_runs import recorded
+from diagnosis_runs import dataset, recorded
 
 from hil.bench.bench_file import load_bench
 from hil.diagnosis.diagnose import diagnose
-from hil.diagnosis.estimation.fit import Fit
-from hil.diagnosis.estimation.hypothesis import CHATTER_STEP, Model, inertia
-from hil.diagnosis.estimation.terms import Term
-from hil.diagnosis.search import successive_halving
+from hil.diagnosis.search.successive_halving import owner_points
+from hil.identification.dataset import inertia
+from hil.identification.estimator import Estimator, Fit
+from hil.identification.hypothesis import CHATTER_STEP, LAST_EDGE_STEP_S, Hypothesis
+from hil.identification.residuals import Residuals
+from hil.identification.terms import Term
 
 
-def bent(model: Model, **factors: float) -> Fit:
+def bent(hypothesis: Hypothesis, **factors: float) -> Fit:
     """A fit that has multiplied nominal values."""
-    x = model.initial()
-    for index, coordinate in enumerate(model.coordinates[: model.nominal_count]):
+    x = hypothesis.x.copy()
+    for index, coordinate in enumerate(hypothesis.coordinates[: hypothesis.nominal_count]):
         x[index] += np.log(factors.get(coordinate.name, 1.0))
-    return Fit(model, x, np.zeros(1), np.zeros((1, 0)), ())
+    data = dataset([], hypothesis.bench)
+    return Fit(hypothesis.moved(x), Residuals(data, ()), np.zeros((1, 0)), Estimator(data))
 
 
 def test_springs_and_shares_of_the_masses_are_the_owners_and_the_rest_is_refitted() -> None:
     owner = load_bench("reference_7dof")
     term = Term("cogging_torque", 0, (0.1, 6.0, 0.2))
     base = bent(
-        Model(owner, (term,)),
+        Hypothesis(owner, (term,)),
         motor_inertia_kg_m2=2.0,
         table_mass_kg=0.5,
         nut_support_stiffness_n_m=0.4,
         damping_ratio=5.0,
         coulomb_torque_n_m=1.2,
     )
-    everything, hidden = successive_halving.believed(base)
-    refitted, terms = base.model.resolved(hidden)
-    assert base.model.resolved(everything)[0].axis == owner.axis
-    assert inertia(refitted) == pytest.approx(inertia(base.model.resolved(base.x)[0]))
+    everything, hidden = (base.hypothesis.moved(x) for x in owner_points(base))
+    refitted, terms = hidden.resolved
+    assert everything.resolved.bench.axis == owner.axis
+    assert inertia(refitted) == pytest.approx(inertia(base.bench))
     axis = refitted.axis
     assert axis.motor_inertia_kg_m2 / owner.axis.motor_inertia_kg_m2 == pytest.approx(
         axis.table_mass_kg / owner.axis.table_mass_kg
@@ -48,15 +51,15 @@ def test_springs_and_shares_of_the_masses_are_the_owners_and_the_rest_is_refitte
 
 
 def test_without_springs_there_is_one_such_point() -> None:
-    assert len(successive_halving.believed(bent(Model(load_bench("emps_symmetric"), ())))) == 1
+    assert len(owner_points(bent(Hypothesis(load_bench("emps_symmetric"), ())))) == 1
 
 
 def test_differences_are_wide_where_a_nut_may_chatter() -> None:
     owner = load_bench("reference_7dof")
-    plain = {c.name: c.step for c in Model(owner, ()).coordinates}
-    loose = {c.name: c.step for c in Model(owner, (Term("backlash", 0, (4e-6,)),)).coordinates}
-    assert max(plain.values()) < CHATTER_STEP
-    assert all(loose[name] == CHATTER_STEP for name in plain)
+    plain = Hypothesis(owner).steps(0.1, LAST_EDGE_STEP_S)
+    loose = Hypothesis(owner, (Term("backlash", 0, (4e-6,)),)).steps(0.1, LAST_EDGE_STEP_S)
+    assert plain.max() < CHATTER_STEP
+    assert np.all(loose[: plain.size] == CHATTER_STEP)
 
 
 def test_play_on_a_light_nut_beside_wrong_springs() -> None:

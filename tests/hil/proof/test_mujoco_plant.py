@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from drivers.sim.reality import record
-from hil.diagnosis.estimation.hypothesis import Model, observer_time_s
-from hil.diagnosis.estimation.terms import Term
-from hil.identification.dataset import take
+from hil.identification.dataset import Dataset, prepare_dataset, take
+from hil.identification.hypothesis import Hypothesis
+from hil.identification.terms import Term
 from hil.proof.draw.cases import stage
 from hil.proof.draw.mujoco_model import EFFECTS
 from hil.proof.draw.mujoco_plant import draw_mujoco, record_mujoco
@@ -23,11 +23,9 @@ def test_the_nominal_axis_leaves_as_little_as_with_the_simulated_axis() -> None:
     simulated = record(axis.truth, axis.sensors, [], axis.servo, run.position_m, run.velocity_m_s, axis.period_s, 5)
 
     def left(recording: Recording) -> dict[str, float]:
-        measured, model = take(recording, axis.true_bench), Model(axis.true_bench)
-        return {
-            name: float(np.sqrt(np.mean(values[measured.judged] ** 2)))
-            for name, values in model.closed_loop(model.initial(), measured).items()
-        }
+        measured, bench = take(recording, axis.true_bench), axis.true_bench
+        (channels,) = Hypothesis(bench).residuals(Dataset((measured,), bench), closed=True).channels
+        return {name: float(np.sqrt(np.mean(values[measured.judged] ** 2))) for name, values in channels.items()}
 
     ours, theirs = left(Recording("run", simulated, axis.period_s)), left(record_mujoco(axis, None, run, 5))
     assert theirs["torque"] == pytest.approx(ours["torque"], rel=0.02)
@@ -55,8 +53,8 @@ def test_what_mujoco_moves_is_what_the_library_says_of_an_effect(effect: str) ->
     values = tuple(true.parameters.get(name, 0.0) for name in BY_ID[effect].names)
 
     def left(*terms: Term) -> float:
-        model = Model(bench, terms, 0.3, observer_time_s([run], bench))
-        return float(np.mean(model.residuals(model.initial(), [run]) ** 2))
+        found = Hypothesis(bench, terms).residuals(prepare_dataset([run], bench))
+        return float(np.mean(found.vector**2))
 
     variant = {"exponential": 1}.get(true.form, int(effect == "backlash"))  # its flanks push only
     without, with_it = left(), left(Term(effect, variant, values))

@@ -41,8 +41,8 @@ library.register(quadratic_load.MECHANISM)
 """
 
 PRELUDE = """
-from diagnosis_runs import bench, recorded
-from hil.diagnosis.estimation.terms import Term
+from diagnosis_runs import bench, dataset, fitted, recorded
+from hil.identification.terms import Term
 owner, truth = bench(), Term("quadratic_load", 0, (0.4,))
 """
 
@@ -59,12 +59,11 @@ print(np.ptp(held), let_go[-1] - 0.05)
 """
 
 SCREEN = """
-from hil.diagnosis.estimation.fit import fit
-from hil.diagnosis.estimation.hypothesis import Model
-from hil.diagnosis.search.successive_halving import leads
+from hil.diagnosis.search.score_test import screen_library
 from hil.identification.dataset import take
-runs = [take(recorded(owner, truth), owner)]
-print(leads(fit(Model(owner), runs, evaluations=8), runs)[0].term.effect)
+from hil.identification.hypothesis import Hypothesis
+data = dataset([take(recorded(owner, truth), owner)], owner)
+print(screen_library(fitted(Hypothesis(owner), data, evaluations=8))[0].term.effect)
 """
 
 DIAGNOSIS = """

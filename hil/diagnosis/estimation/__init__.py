@@ -1,1 +1,0 @@
-"""A hypothesis, its residuals, its fit, its noise floor, its evidence."""

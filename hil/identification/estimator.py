@@ -1,0 +1,300 @@
+"""Prediction-error fit of a hypothesis (Ljung 1999, ch. 7) by the method of Levenberg and Marquardt.
+
+    min over x of  sum rho(r(x)^2),   r: weighted residuals of all channels and runs
+
+    step s:  min |J s + r|^2 + mu |diag(J) s|^2   with x + s inside the bounds;  mu after Nielsen (1999)
+
+The Jacobian J is taken by differences, one simulation per parameter, on all cores: the kernel releases the
+interpreter. While steps gain what is predicted, J is not taken anew but corrected along the step (Broyden 1965; Madsen,
+Nielsen and Tingleff 2004, sec. 3.5); a fit that converges ends with a new one. With 1e5 rows and ten parameters the
+step is found from J^T J: a decomposition of J, as in scipy's solvers, costs more than the simulations.
+"""
+
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+from functools import cached_property
+from typing import TypeVar
+
+import numpy as np
+from scipy.optimize import lsq_linear
+
+from hil.arrays import FloatArray
+from hil.bench.bench_file import Bench
+from hil.identification.dataset import TORQUE_ACCURACY, Dataset
+from hil.identification.hypothesis import EDGE_STEP_S, Hypothesis
+from hil.identification.noise_floor import FLOOR, noise_ratios
+from hil.identification.residuals import Residuals
+from hil.identification.terms import Term
+
+Output = TypeVar("Output")
+POOL = ThreadPoolExecutor(os.cpu_count() or 1)
+
+_FIRST_DAMPING = 1e-3
+_LEAST_GAIN = 1e-6  # of the cost, relative: a step that promises or brings less is the last
+_AGREES = 0.25  # by which a step may miss what it promised, relative, while the Jacobian is still good
+
+
+class FitStatus(StrEnum):
+    """How a fit ended."""
+
+    NOT_FITTED = "not_fitted"
+    CONVERGED = "converged"
+    OUT_OF_STEPS = "out_of_steps"
+    PARAMETER_AT_BOUND = "parameter_at_bound"
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A hypothesis with its weighted residuals and their Jacobian (m, p); (m, 0) where it was not fitted."""
+
+    hypothesis: Hypothesis
+    residuals: Residuals
+    jacobian: FloatArray
+    estimator: "Estimator"
+    converged: bool | None = None  # None where it was not fitted
+    _elsewhere: dict[Dataset, "Fit"] = field(default_factory=dict, init=False, repr=False)
+
+    @property
+    def data(self) -> Dataset:
+        """The data set that it was fitted to."""
+        return self.estimator.data
+
+    @property
+    def bench(self) -> Bench:
+        """Bench with the fitted nominal parameters."""
+        return self.hypothesis.resolved.bench
+
+    @property
+    def terms(self) -> tuple[Term, ...]:
+        """Terms with their fitted values."""
+        return self.hypothesis.resolved.terms
+
+    @cached_property
+    def cost(self) -> float:
+        """Sum of squared weighted residuals."""
+        return float(self.residuals.vector @ self.residuals.vector)
+
+    @property
+    def rows(self) -> int:
+        """Number of weighted residuals."""
+        return self.residuals.vector.size
+
+    @property
+    def reduced(self) -> float:
+        """Mean squared weighted residual."""
+        return self.cost / self.rows
+
+    @cached_property
+    def noise_ratios(self) -> tuple[dict[str, float], ...]:
+        """Mean square over noise of each channel, for each run."""
+        return noise_ratios(self.hypothesis, self.data)
+
+    @property
+    def worst_ratio(self) -> float:
+        """Largest mean square over noise of all channels and runs."""
+        return max(ratio for ratios in self.noise_ratios for ratio in ratios.values())
+
+    @property
+    def at_floor(self) -> bool:
+        """Whether every channel of every run is down to its noise."""
+        return self.worst_ratio <= FLOOR
+
+    @cached_property
+    def excess(self) -> float:
+        """Energy above the noise floor, in units of noise."""
+        return self.energy(lambda ratio: max(ratio - 1.0, 0.0))
+
+    def energy(self, of: Callable[[float], float]) -> float:
+        """Sum of a function of the noise ratios over all channels and judged rows."""
+        pairs = zip(self.data.runs, self.noise_ratios, strict=True)
+        return float(sum(run.motor[run.judged].size * of(ratio) for run, found in pairs for ratio in found.values()))
+
+    @property
+    def at_bound(self) -> tuple[str, ...]:
+        """Names of the parameters that ended at a bound."""
+        low, high = self.hypothesis.bounds
+        x, names = self.hypothesis.x, [coordinate.name for coordinate in self.hypothesis.coordinates]
+        return tuple(name for name, value, a, b in zip(names, x, low, high, strict=True) if value <= a or value >= b)
+
+    @property
+    def status(self) -> FitStatus:
+        """How the fit ended."""
+        if not self.converged:
+            return FitStatus.NOT_FITTED if self.converged is None else FitStatus.OUT_OF_STEPS
+        return FitStatus.PARAMETER_AT_BOUND if self.at_bound else FitStatus.CONVERGED
+
+    def on(self, data: Dataset) -> "Fit":
+        """The hypothesis evaluated on a data set; this fit itself on its own."""
+        if data is self.data:
+            return self
+        if data not in self._elsewhere:
+            self._elsewhere[data] = replace(self.estimator, data=data).evaluate(self.hypothesis)
+        return self._elsewhere[data]
+
+    def with_accuracy(self, torque_accuracy: float) -> "Fit":
+        """The hypothesis, not fitted, with another weight of the motor channel."""
+        estimator = replace(self.estimator, torque_accuracy=torque_accuracy)
+        residuals = self.residuals.weighted_by(torque_accuracy)
+        return Fit(self.hypothesis, residuals, np.zeros((residuals.vector.size, 0)), estimator)
+
+    def refit(self, evaluations: int, *, soft: float = 0.0, slopes: FloatArray | None = None) -> "Fit":
+        """A fit that goes on from this one with the same settings."""
+        return self.estimator.fit(self.hypothesis, evaluations=evaluations, soft=soft, slopes=slopes)
+
+
+@dataclass(frozen=True, eq=False)
+class Estimator:
+    """Fits hypotheses to a data set.
+
+    `edge_step_s`: step of the difference of a window's edge. `torque_accuracy`: torque that the motor channel is
+    trusted to tell, over the noise of the torque channel. `closed`: residuals of the closed loop instead of those
+    block by block.
+    """
+
+    data: Dataset
+    edge_step_s: float = EDGE_STEP_S
+    torque_accuracy: float = TORQUE_ACCURACY
+    closed: bool = False
+
+    def residuals(self, hypothesis: Hypothesis) -> Residuals:
+        """Residuals of a hypothesis, weighted by these settings."""
+        return hypothesis.residuals(self.data, self.closed).weighted_by(self.torque_accuracy)
+
+    def evaluate(self, hypothesis: Hypothesis) -> Fit:
+        """A hypothesis as it is, not fitted."""
+        residuals = self.residuals(hypothesis)
+        return Fit(hypothesis, residuals, np.zeros((residuals.vector.size, 0)), self)
+
+    def steps(self, hypothesis: Hypothesis) -> FloatArray:
+        """Steps (p,) of the forward differences."""
+        return hypothesis.steps(self.data.travel_m, self.edge_step_s)
+
+    def jacobian(self, hypothesis: Hypothesis, held: FloatArray | None = None) -> FloatArray:
+        """Derivative of the weighted residuals (m, p) by forward differences, columns in parallel.
+
+        The first columns are those `held` (m, k), where given.
+        """
+        base, x = self.residuals(hypothesis).vector, hypothesis.x
+        steps, high = self.steps(hypothesis), hypothesis.bounds[1]
+        known = 0 if held is None else held.shape[1]
+        slopes = np.empty((base.size, x.size), order="F")
+        if held is not None:
+            slopes[:, :known] = held
+
+        def column(index: int) -> None:
+            step = -steps[index] if x[index] + steps[index] > high[index] else steps[index]
+            moved = x.copy()
+            moved[index] += step
+            slopes[:, index] = (self.residuals(hypothesis.moved(moved)).vector - base) / step
+
+        list(POOL.map(column, range(known, x.size)))
+        return slopes
+
+    def fit(
+        self,
+        hypothesis: Hypothesis,
+        *,
+        soft: float = 0.0,
+        evaluations: int = 30,
+        held: FloatArray | None = None,
+        slopes: FloatArray | None = None,
+    ) -> Fit:
+        """Fit all parameters of a hypothesis, beginning at its x.
+
+        `soft` > 0 is the size of residual from which the loss grows only linearly. `held` (m, k) are derivatives by
+        the first k parameters that are taken as constant on the way: near a point where they are known, that saves
+        most simulations. `slopes` (m, p) are derivatives to start with, from somewhere near.
+        """
+        low, high = hypothesis.bounds
+        inside = np.clip(hypothesis.x, low, high)
+        at = hypothesis if np.array_equal(inside, hypothesis.x) else hypothesis.moved(inside)
+        residuals = self.residuals(at)
+        fresh = slopes is None
+        if slopes is None:
+            slopes = self.jacobian(at, held)
+        damping, growth = _FIRST_DAMPING, 2.0
+        size = np.zeros(at.x.size)
+        used, converged = 1, False
+        while used < evaluations:
+            loss, weights = _loss(residuals.vector, soft)
+            weighted = slopes if weights is None else slopes * weights[:, None]
+            normal = weighted.T @ weighted
+            descent = weighted.T @ (residuals.vector if weights is None else residuals.vector * weights)
+            size = np.maximum(size, np.sqrt(np.diag(normal)))
+            step = _step(normal, descent, damping, size, low - at.x, high - at.x)
+            promised = -float(step @ (2.0 * descent + normal @ step))
+            if promised <= _LEAST_GAIN * loss:
+                if fresh:
+                    converged = True
+                    break
+                slopes, fresh = self.jacobian(at), True
+                continue
+            moved = at.moved(at.x + step)
+            there = self.residuals(moved)
+            used += 1
+            gained = loss - _loss(there.vector, soft)[0]
+            if gained > 0.0:
+                fresh = held is not None or abs(gained / promised - 1.0) > _AGREES
+                slopes = slopes if fresh else _corrected(slopes, there.vector - residuals.vector, step, size)
+                at, residuals = moved, there
+                damping *= max(1.0 / 3.0, 1.0 - (2.0 * gained / promised - 1.0) ** 3)
+                growth = 2.0
+            else:
+                damping *= growth
+                growth *= 2.0
+            if fresh == (gained > 0.0):  # a step that failed asks for no other derivatives, if these are new
+                slopes, fresh = self.jacobian(at, held), True
+                if 0.0 < gained <= _LEAST_GAIN * loss:
+                    converged = True
+                    break
+        return Fit(at, residuals, slopes, self, converged)
+
+
+def _corrected(slopes: FloatArray, change: FloatArray, step: FloatArray, size: FloatArray) -> FloatArray:
+    """The Jacobian that agrees with the change (m,) over a step, otherwise as it was; parameters weigh by `size`."""
+    along = size**2 * step
+    return np.asarray(slopes + np.outer((change - slopes @ step) / float(step @ along), along), dtype=np.float64)
+
+
+def soft_cost(residuals: FloatArray, soft: float) -> float:
+    """Sum of rho of the rows."""
+    return _loss(residuals, soft)[0]
+
+
+def _loss(residuals: FloatArray, soft: float) -> tuple[float, FloatArray | None]:
+    """Sum of rho, and the weights sqrt(rho') of the rows; rho(z) = 2 soft^2 (sqrt(1 + z / soft^2) - 1)."""
+    if not soft:
+        return float(residuals @ residuals), None
+    root = np.sqrt(1.0 + (residuals / soft) ** 2)
+    return float(2.0 * soft**2 * np.sum(root - 1.0)), np.asarray(1.0 / np.sqrt(root), dtype=np.float64)
+
+
+def _step(
+    normal: FloatArray, descent: FloatArray, damping: float, size: FloatArray, low: FloatArray, high: FloatArray
+) -> FloatArray:
+    """The damped step of the module's equation, between `low` and `high`."""
+    scale = np.where(size > 0.0, size, 1.0)
+    damped = normal / np.outer(scale, scale) + damping * np.eye(scale.size)
+    values, vectors = np.linalg.eigh(damped)
+    root = vectors * np.sqrt(np.maximum(values, 1e-14 * values[-1]))
+    target = np.linalg.solve(root, -descent / scale)
+    free = np.linalg.solve(root.T, target)
+    if np.all(free > low * scale) and np.all(free < high * scale):
+        return np.asarray(free / scale, dtype=np.float64)
+    wide = np.maximum(high - low, 1e-12)
+    found = lsq_linear(
+        root.T,
+        target,
+        (np.minimum(low, 0.0) * scale - 1e-12 * wide * scale, np.maximum(high, 0.0) * scale + 1e-12 * wide * scale),
+        method="bvls",
+    )
+    return np.asarray(np.clip(found.x / scale, low, high), dtype=np.float64)
+
+
+def in_parallel(jobs: Sequence[Callable[[], Output]]) -> list[Output]:
+    """Results of jobs that run side by side, in order."""
+    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+        return list(pool.map(lambda job: job(), jobs))

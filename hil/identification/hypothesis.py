@@ -1,0 +1,273 @@
+"""A hypothesis: nominal parameters and mechanisms of the twin as one vector, and its residuals.
+
+Residuals come in two kinds. Block by block (`loops.observe`), each block is fed measured inputs: a mismatch shows only
+in its own block and does not accumulate; searches use this kind. In closed loop the twin gets the set-points alone;
+results are confirmed with this kind. Stick-slip and play make the closed loop chaotic: there even the true hypothesis
+does not reproduce a recording.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from hil.arrays import FloatArray
+from hil.bench.bench_file import Bench, MechanismEntry
+from hil.identification.dataset import FASTEST_OBSERVER_S, Dataset, Measured
+from hil.identification.residuals import Residuals, differences
+from hil.identification.terms import Term, repeats
+from hil.twin.axis import Response, Twin
+from hil.twin.library import BY_ID
+from hil.twin.mechanism import Parameter, Role
+from hil.twin.physics import Active
+
+# Differences by which the edges of a window are moved: first wide, then by a tick.
+EDGE_STEP_S, LAST_EDGE_STEP_S = 0.03, 0.001
+# A light nut chatters in its gap: contacts come and go with the least change, and only a wide difference averages them
+# (Moré and Wild 2012: the step grows with the noise of a function). Relative; of 1e-4, 0.01 and 0.03, only the last
+# converged from bench values that were 20 % wrong.
+CHATTER_STEP = 0.03
+# The owner's masses and stiffnesses are trusted to this factor: beyond it lie minima in which a wrong structure is
+# compensated by implausible parameters.
+TRUST = 3.0
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """One entry of the parameter vector: value = scale exp(x) if logarithmic, else scale x."""
+
+    name: str
+    scale: float
+    logarithmic: bool
+    low: float
+    high: float
+    parameter: Parameter | None = None  # of a mechanism; None for a nominal parameter
+
+    def value(self, x: float) -> float:
+        """Physical value of x."""
+        return float(self.scale * np.exp(x)) if self.logarithmic else float(self.scale * x)
+
+    def x(self, value: float) -> float:
+        """x of a physical value."""
+        return float(np.log(value / self.scale)) if self.logarithmic else value / self.scale
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Bounds of x."""
+        return self.x(self.low), self.x(self.high)
+
+    @property
+    def role(self) -> Role | None:
+        """Role of a mechanism's parameter."""
+        return self.parameter.role if self.parameter else None
+
+    @property
+    def edge(self) -> bool:
+        """Whether it is an instant at which a window begins or ends."""
+        return self.role is Role.EDGE
+
+
+class Resolved(NamedTuple):
+    """Bench with the nominal parameters of a hypothesis, and its terms with their values."""
+
+    bench: Bench
+    terms: tuple[Term, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Hypothesis:
+    """The axis of a bench with mechanisms added, at a point x of their parameters.
+
+    x (p,) has the nominal parameters first, then those of each term. Without x it is at the bench's values and the
+    terms' starting values. The values in `bench` and `terms` scale the coordinates and do not change with x.
+    """
+
+    bench: Bench
+    terms: tuple[Term, ...] = ()
+    x: FloatArray = field(default_factory=lambda: np.empty(0))
+    _known: dict[tuple[Dataset, bool], Residuals] = field(default_factory=dict, init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        if not self.x.size:
+            object.__setattr__(self, "x", self._initial)
+
+    # --- other hypotheses ---
+
+    def moved(self, x: FloatArray) -> "Hypothesis":
+        """The same mechanisms at another point x (p,)."""
+        return replace(self, x=x)
+
+    def with_term(self, term: Term) -> "Hypothesis":
+        """The hypothesis with one more term, at that term's values."""
+        longer = Hypothesis(self.bench, (*self.terms, term))
+        return replace(longer, x=np.concatenate([self.x, longer.x[self.x.size :]]))
+
+    def without(self, *indices: int) -> "Hypothesis":
+        """The hypothesis without the terms of these indices, the others at their values."""
+        kept = np.ones(self.x.size, dtype=bool)
+        for index in indices:
+            kept[self.columns(index)] = False
+        terms = tuple(term for index, term in enumerate(self.terms) if index not in indices)
+        return Hypothesis(self.bench, terms, self.x[kept])
+
+    def replaced(self, index: int, term: Term) -> "Hypothesis":
+        """The hypothesis with another term in the place of one, at that term's values."""
+        index %= len(self.terms)
+        terms = (*self.terms[:index], term, *self.terms[index + 1 :])
+        columns, start = self.columns(index), Hypothesis(self.bench, terms)
+        return start.moved(
+            np.concatenate([self.x[: columns.start], start.x[start.columns(index)], self.x[columns.stop :]])
+        )
+
+    @cached_property
+    def rebased(self) -> "Hypothesis":
+        """The same values with the coordinates of the terms scaled by them."""
+        start = Hypothesis(self.bench, self.resolved.terms)
+        return start.moved(np.concatenate([self.x[: self.nominal_count], start.x[self.nominal_count :]]))
+
+    @property
+    def owner(self) -> "Hypothesis":
+        """The hypothesis with the nominal parameters of the bench."""
+        return self.moved(np.concatenate([self._initial[: self.nominal_count], self.x[self.nominal_count :]]))
+
+    # --- parameters ---
+
+    @property
+    def nominal_count(self) -> int:
+        """Number of nominal parameters at the beginning of x."""
+        return len(self.bench.axis.NOMINAL)
+
+    def columns(self, index: int) -> slice:
+        """Entries of x that belong to a term."""
+        first = self.nominal_count + sum(len(term.values) for term in self.terms[:index])
+        return slice(first, first + len(self.terms[index].values))
+
+    @cached_property
+    def coordinates(self) -> tuple[Coordinate, ...]:
+        """Coordinates of x."""
+        found = []
+        for name in self.bench.axis.NOMINAL:
+            value = float(getattr(self.bench.axis, name))
+            if name == "damping_ratio":
+                found.append(Coordinate(name, max(value, 0.01), True, 1e-4, 0.9))
+                continue
+            scale = value if value > 0.0 else 1e-3
+            found.append(Coordinate(name, scale, True, scale / TRUST, scale * TRUST))
+        for index, term in enumerate(self.terms):
+            for parameter, start in zip(BY_ID[term.effect].parameters, term.values, strict=True):
+                positive = parameter.low > 0.0
+                scale = start if positive else abs(start) or 1.0
+                found.append(
+                    Coordinate(f"{index}.{parameter.name}", scale, positive, parameter.low, parameter.high, parameter)
+                )
+        return tuple(found)
+
+    @cached_property
+    def _initial(self) -> FloatArray:
+        starts = [float(getattr(self.bench.axis, name)) or None for name in self.bench.axis.NOMINAL]
+        values = [*starts, *(value for term in self.terms for value in term.values)]
+        return np.array(
+            [c.x(c.scale if value is None else value) for c, value in zip(self.coordinates, values, strict=True)]
+        )
+
+    @property
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Lower and upper bounds (p,) of x."""
+        pairs = np.array([c.bounds for c in self.coordinates])
+        return pairs[:, 0], pairs[:, 1]
+
+    def steps(self, travel_m: float, edge_step_s: float) -> FloatArray:
+        """Steps (p,) of x for forward differences."""
+        step = CHATTER_STEP if self._chatters else 1e-4
+        angle_rad = travel_m / self.bench.axis.ratio_m_rad * self.bench.axis.physics().angle_per_unit
+        starts = [value for term in self.terms for value in term.values]
+        found = [max(step, 1e-3) if name == "damping_ratio" else step for name in self.bench.axis.NOMINAL]
+        for coordinate, start in zip(self.coordinates[self.nominal_count :], starts, strict=True):
+            own = step
+            if coordinate.role is Role.PERIOD:
+                own = 0.01 * start / (2.0 * np.pi * max(travel_m, start))
+            elif coordinate.edge:  # an edge shows only where it lies: a wide difference reaches it
+                own = edge_step_s / max(abs(start), EDGE_STEP_S)
+            elif coordinate.role is Role.ORDER:
+                own = 0.01 / (start * max(angle_rad, 1.0))
+            if not coordinate.logarithmic:
+                own = own if coordinate.edge else max(own, 1e-3)
+                own = min(own, 0.1 * (coordinate.high - coordinate.low) / coordinate.scale)
+            found.append(own)
+        return np.array(found)
+
+    @property
+    def _chatters(self) -> bool:
+        """Whether there is play, in which a nut may chatter."""
+        effects = (*(term.effect for term in self.terms), *(entry.effect for entry in self.bench.mechanisms))
+        return any(variant.play for effect in effects for variant in BY_ID[effect].variants)
+
+    @cached_property
+    def values(self) -> list[float]:
+        """Physical values of x, kept inside their bounds."""
+        return [min(max(c.value(v), c.low), c.high) for c, v in zip(self.coordinates, self.x, strict=True)]
+
+    @cached_property
+    def resolved(self) -> Resolved:
+        """Bench and terms with the values of x."""
+        nominal = dict(zip(self.bench.axis.NOMINAL, self.values, strict=False))
+        terms = tuple(
+            replace(term, values=tuple(self.values[self.columns(index)])) for index, term in enumerate(self.terms)
+        )
+        return Resolved(self.bench.model_copy(update={"axis": self.bench.axis.model_copy(update=nominal)}), terms)
+
+    @cached_property
+    def kept(self) -> tuple[MechanismEntry, ...]:
+        """The mechanisms of the bench that no term replaces."""
+        kept = []
+        taken = [term.effect for term in self.terms]
+        for entry in self.bench.mechanisms:
+            again = any(repeats(entry.active(), term) for term in self.terms)
+            if not again and taken.count(entry.effect) < BY_ID[entry.effect].most:
+                kept.append(entry)
+                taken.append(entry.effect)
+        return tuple(kept)
+
+    # --- simulation ---
+
+    def twin(self, observer_s: float = FASTEST_OBSERVER_S) -> Twin:
+        """The twin, with the time constant of its observer."""
+        bench, terms = self.resolved
+        active = tuple(entry.active() for entry in self.kept)
+        added = tuple(Active(term.effect, term.values, term.variant) for term in terms)
+        return Twin(bench.axis.physics(), bench.gains, active + added, observer_s=observer_s)
+
+    def respond(self, run: Measured) -> Response:
+        """Response of the twin in closed loop to the set-points of a run."""
+        return self.twin().simulate(run.position_command_m, run.velocity_command_m_s, run.start, run.table_m)
+
+    def blocks(self, run: Measured, observer_s: float) -> dict[str, FloatArray]:
+        """Measured less twin with each block fed measured inputs, per channel (n,)."""
+        twin = self.twin(observer_s)
+        measured = twin.undelayed(run.response)
+        predicted = twin.observe(run.position_command_m, run.velocity_command_m_s, measured, run.start)
+        found = differences(measured, predicted, self.bench, run.judged)
+        found["command"] = measured.torque_command - predicted.torque_command
+        return found
+
+    def residuals(self, data: Dataset, closed: bool = False) -> Residuals:
+        """Residuals on a data set, block by block or in closed loop; simulated once."""
+        key = (data, closed)
+        if key not in self._known:
+            self._known[key] = Residuals(
+                data,
+                tuple(
+                    differences(run.response, self.respond(run), self.bench, run.judged)
+                    if closed
+                    else self.blocks(run, data.observer_s)
+                    for run in data.runs
+                ),
+            )
+        return self._known[key]
+
+
+def effects(terms: Sequence[Term]) -> list[tuple[str, int]]:
+    """Effect and variant of each term, in alphabetical order."""
+    return sorted((term.effect, term.variant) for term in terms)

@@ -1,0 +1,142 @@
+"""Noise floor of residuals: from repeated laps where there are any, else white sensor noise.
+
+Where the same set-points come again after a lag p, the repeatable motion cancels:
+
+    sigma^2 = mean (r_k - r_{k+p})^2 / 2        over all rows k whose set-points repeat
+
+sigma is the non-repeatable part of the residual r; the rest of its energy repeats lap by lap and is physics that a
+better twin would explain. In closed loop the axis itself moves with the noise of its encoders: see `noise_response`.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from hil.arrays import FloatArray
+from hil.identification.dataset import Dataset, Measured
+from hil.identification.hypothesis import Hypothesis
+from hil.identification.laps import Laps
+
+# Mean square of a channel over its noise, up to which it counts as explained: 25 % in rms, where something as large as
+# the noise makes 41 %. An encoder at rest errs by the same part of a count all the time, which may be three times the
+# mean square of counting.
+FLOOR = 1.25**2
+# A term that increases the energy of the differences between neighbouring laps by more than this factor is refuted.
+# Most terms repeat with the motion and leave it at 1; refitting the others moves it by less.
+REPEATS = 0.95
+# A closed-loop response to the noise below this share of its sensor's noise needs no check for chaos. One axis with
+# coarse counts was measured to move by three times its noise; a chaotic loop moves by tens and more. The torque is not
+# checked against its noise: one coarse count, and a loop of high gain, make many times that of a good current sensor.
+_LITTLE, _LARGE = 0.3, 5.0
+_HALF = 0.75  # of the response to all of the noise: half of it makes 0.5 in a linear loop, 1 in a chaotic one
+
+
+@dataclass(frozen=True)
+class Floor:
+    """Noise floor of one channel in its unit, and how it is known."""
+
+    rms: float
+    source: Literal["repeated_laps", "white_noise"]
+
+
+def floor(residual: FloatArray, white: float, laps: Laps | None) -> Floor:
+    """Floor of a residual (n,): its non-repeatable part, not below the sensor's `white` noise."""
+    if laps is None:
+        return Floor(white, "white_noise")
+    return Floor(max(laps.noise(residual), white), "repeated_laps")
+
+
+def noise_response(hypothesis: Hypothesis, run: Measured) -> dict[str, float]:
+    """Closed-loop rms of motor, table and torque caused by encoder quantisation and noise.
+
+    It is the difference between a twin with exact encoders and one with real ones; the sub-count initial position is
+    unknown. Returns 0 for all if the response to half the noise is not about half, or that of motor or table is several
+    times their sensor's noise: the loop is chaotic.
+    """
+    twin, bench = hypothesis.twin(), hypothesis.bench
+    quiet = hypothesis.respond(run)
+    table = bench.encoders.table
+    own_m = max(run.noise.table_m**2 - (bench.axis.ratio_m_rad * run.noise.motor) ** 2, 0.0) ** 0.5
+    rng = np.random.default_rng(0)
+    misread = np.array(
+        [
+            _misread(quiet.motor_position, bench.motor_count, run.motor_noise, rng),
+            _misread(quiet.table_position_m, table.resolution_m if table else 0.0, own_m, rng),
+        ]
+    )
+
+    def moved(share: float) -> dict[str, float]:
+        other = twin.simulate(run.position_command_m, run.velocity_command_m_s, run.start, run.table_m, share * misread)
+        return {
+            name: rms((a - b)[run.judged])
+            for name, a, b in (
+                ("motor", other.motor_position, quiet.motor_position),
+                ("table", other.table_position_m, quiet.table_position_m),
+                ("torque", other.torque, quiet.torque),
+            )
+        }
+
+    noise = sensor_noise(run)
+    full, half = moved(1.0), moved(0.5)
+    known = [name for name in full if noise[name] > 0.0]
+    calm = all(
+        full[name] < _LITTLE * noise[name]
+        or ((name == "torque" or full[name] < _LARGE * noise[name]) and half[name] < _HALF * full[name])
+        for name in known
+    )
+    return full if calm else dict.fromkeys(full, 0.0)
+
+
+def sensor_noise(run: Measured) -> dict[str, float]:
+    """rms noise of the sensors of motor, table and torque over a run."""
+    return {"motor": rms(run.motor_noise[run.judged]), "table": run.noise.table_m, "torque": run.noise.torque}
+
+
+def rms(values: FloatArray) -> float:
+    """Root mean square."""
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def _misread(values: FloatArray, count: float, noise: FloatArray | float, rng: np.random.Generator) -> FloatArray:
+    """Error of an encoder (n,): its counting, and white noise for the rest of its noise."""
+    counted = count * np.round(values / count) - values if count else np.zeros_like(values)
+    more = np.sqrt(np.maximum(np.square(noise) - count**2 / 12.0, 0.0))
+    return np.asarray(counted + more * rng.standard_normal(values.size))
+
+
+def unrepeated(hypothesis: Hypothesis, data: Dataset) -> float:
+    """Energy of the differences between laps, in units of noise; 0 without laps."""
+    residuals = hypothesis.residuals(data)
+    return sum(
+        laps.noise(values) ** 2 * laps.first.size
+        for run, laps in data.laps
+        for values in residuals.over_noise(run).values()
+    )
+
+
+def noise_ratios(hypothesis: Hypothesis, data: Dataset) -> tuple[dict[str, float], ...]:
+    """Mean square over noise of each channel block by block, for each run.
+
+    That of the table is reduced by the noise of the motor encoder which the transmission amplifies.
+    """
+    residuals = hypothesis.residuals(data)
+    found = []
+    for index, run in enumerate(data.runs):
+        ratios = {name: float(part @ part) / part.size for (of, name), part in residuals.parts.items() if of == index}
+        if ratios.get("table", 0.0) > 1.0:
+            added = _noise_amplification(hypothesis, run, residuals.channels[index]["table"], data.observer_s)
+            ratios["table"] /= max(1.0, 1.0 + added / run.noise.table_m**2)
+        found.append(ratios)
+    return tuple(found)
+
+
+def _noise_amplification(hypothesis: Hypothesis, run: Measured, table: FloatArray, observer_s: float) -> float:
+    """Variance [m^2] that noise of the motor encoder adds to the block residual `table` (n,) beyond its direct part.
+
+    The block of the table is fed with the measured motion of the motor: a resonance of little damping amplifies noise.
+    """
+    noise = run.motor_noise * np.random.default_rng(0).standard_normal(run.motor.size)
+    noisy = hypothesis.blocks(replace(run, motor=run.motor + noise), observer_s)["table"]
+    added = float(np.var((noisy - table)[run.judged]))
+    return added - float(np.mean((hypothesis.bench.axis.ratio_m_rad * run.motor_noise[run.judged]) ** 2))

@@ -1,0 +1,93 @@
+"""White noise of the sensors, estimated from a recording."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hil.arrays import FloatArray
+from hil.bench.bench_file import Bench
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Standard deviation of the white noise of a sensor: motor in rad (m), table in m, torque in N m (N).
+
+    `table_m` is that of table position less r x motor position, 0 without a linear encoder. `jitter_s` is that of the
+    instants at which positions are read: an error that grows with the speed, and is the same for both encoders.
+    """
+
+    motor: float
+    table_m: float
+    torque: float
+    jitter_s: float = 0.0
+
+
+def estimate_noise(
+    bench: Bench,
+    velocity: FloatArray,
+    motor: FloatArray,
+    table: FloatArray,
+    command: FloatArray,
+    torque: FloatArray,
+    period_s: float,
+) -> Noise:
+    """Noise of the sensors from channels (n,) in motor units; never below that of counting, count / sqrt(12)."""
+    motor_noise, table_noise = max(_white(motor), bench.motor_count / np.sqrt(12.0)), 0.0
+    if table.size and bench.encoders.table is not None:
+        ratio_m = bench.axis.ratio_m_rad
+        counting = np.hypot(bench.encoders.table.resolution_m, ratio_m * bench.motor_count) / np.sqrt(12.0)
+        table_noise = max(_white(table - ratio_m * motor), float(counting))
+    of_torque = _white(torque) if np.array_equal(command, torque) else _coloured(torque - command)
+    return Noise(motor_noise, table_noise, of_torque, _jitter_s(motor, velocity, motor_noise, period_s))
+
+
+def moving(velocity: FloatArray) -> NDArray[np.bool_]:
+    """Where a set velocity (n,) is one: above a thousandth of the highest, below which lies noise."""
+    speed = np.abs(velocity)
+    return np.asarray(speed > 1e-3 * np.max(speed, initial=0.0))
+
+
+def _white(signal: FloatArray) -> float:
+    """White noise of a smooth signal: fourth differences, of variance 70 sigma^2, see nothing slower.
+
+    The median over blocks keeps events, such as reversals, out of it.
+    """
+    return float(np.sqrt(np.median(_white_blocks(signal))))
+
+
+def _white_blocks(signal: FloatArray) -> FloatArray:
+    """Variance of the white noise in each block of 64 rows."""
+    differences = np.diff(signal, 4)
+    blocks = differences[: differences.size // 64 * 64].reshape(-1, 64)
+    return np.asarray(np.mean(blocks**2, axis=1) / 70.0, dtype=np.float64)
+
+
+def _jitter_s(motor: FloatArray, velocity: FloatArray, noise: float, period_s: float) -> float:
+    """Jitter of the instants of reading: by how much noise at constant feed exceeds `noise`, over the speed.
+
+    Known from six blocks of 64 rows in which the set velocity is constant, from half of the fastest such feed on; with
+    less of them 0. Less than three times the noise is not told from counting, which at half a count per row makes 2.7.
+    """
+    variance = _white_blocks(motor)
+    rows = 64 * variance.size
+    speed = np.abs(np.diff(motor)[:rows].reshape(-1, 64).mean(axis=1)) / period_s
+    steady = np.ptp(velocity[:rows].reshape(-1, 64), axis=1) <= 1e-6 * np.max(np.abs(velocity), initial=0.0)
+    steady &= moving(velocity)[:rows].reshape(-1, 64).all(axis=1)
+    fast = steady & (speed > 0.5 * np.max(speed[steady], initial=0.0))
+    if np.count_nonzero(fast) < 6:
+        return 0.0
+    more = (variance[fast] - noise**2) / speed[fast] ** 2
+    return float(np.sqrt(np.median(more))) if np.median(variance[fast]) > 3.0 * noise**2 else 0.0
+
+
+def _coloured(signal: FloatArray) -> float:
+    """Noise of a signal that is next to zero, of any colour: what varies about a straight line within 64 rows.
+
+    A current measurement is filtered: its noise is no longer white. The median again keeps events out of it.
+    """
+    rows = np.arange(64) - 31.5
+    blocks = signal[: signal.size // 64 * 64].reshape(-1, 64)
+    blocks = blocks - blocks.mean(axis=1, keepdims=True)
+    blocks = blocks - np.outer(blocks @ rows / (rows @ rows), rows)
+    return float(np.sqrt(np.median(np.sum(blocks**2, axis=1)) / 62.0))

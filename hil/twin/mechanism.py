@@ -48,8 +48,8 @@ class Stage(StrEnum):
     # nominal spring would need for the same torque
     SCREW = "screw"  # x factor on the stiffness of the screw between its bearing and the nut
     TABLE_FORCE = "table_force"  # + force on the table [N]
-    MOTOR_READING = "motor_reading"  # motor position -> what its encoder reads
-    TABLE_READING = "table_reading"  # table position -> what its encoder reads
+    MOTOR_READING = "motor_reading"  # motor position -> reading of its encoder
+    TABLE_READING = "table_reading"  # table position -> reading of its encoder
     VELOCITY_FILTER = "velocity_filter"  # time constant of the controller's velocity filter [s]
     CHAIN = "chain"  # changes the chain itself, before its modes are taken
     CHANNEL = "channel"  # changes recorded channels after the simulation
@@ -177,7 +177,7 @@ class Mechanism:
     id: str
     block: Block
     element: str  # the part of the axis an engineer would point at
-    sentence: str  # what an engineer would say; may name parameters and viscous_speed in braces
+    sentence: str  # finding in an engineer's words; may name parameters and viscous_speed in braces
     equation: str
     source: str
     parameters: tuple[Parameter, ...]

@@ -1,4 +1,4 @@
-"""Asymmetric friction: friction differs by direction, alike at every speed or the more the faster."""
+"""Asymmetric friction: friction differs by direction, by a constant torque or in proportion to speed."""
 
 from collections.abc import Sequence
 
@@ -21,7 +21,7 @@ def _offset_with_speed(value: float, at: Moment, parameters: Row, memory: Row) -
 
 
 def _valid(values: Sequence[float], variant: int, axis: AxisFacts) -> bool:
-    """Check that an offset alike at every speed is below Coulomb friction: above, it would drive the axis."""
+    """Check that a constant offset is below Coulomb friction: above, it would drive the axis."""
     return variant != 0 or abs(values[0]) <= axis.coulomb
 
 

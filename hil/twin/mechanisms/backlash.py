@@ -1,6 +1,6 @@
 """Backlash: lost motion between screw and table.
 
-Oiled flanks are held by their damping when they part, dry flanks only push.
+Damping resists the parting of oiled flanks; dry flanks only push.
 """
 
 from numba import njit

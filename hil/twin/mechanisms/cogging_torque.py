@@ -1,4 +1,4 @@
-"""Cogging torque: the magnets pull towards the teeth, whatever the current."""
+"""Cogging torque: the magnets pull towards the teeth, independent of the current."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Constant load: a weight, which the motor has to hold.
+"""Constant load, such as a weight that the motor has to hold.
 
 A positive load pulls the axis in the negative direction: it takes a positive motor torque to hold it.
 """

@@ -1,6 +1,6 @@
 """Encoder eccentricity: the motor encoder errs once per revolution.
 
-On a linear axis, which has its motor encoder read as metres, the amplitude is in metres too.
+On a linear axis, whose motor encoder reads metres, the amplitude is in metres too.
 """
 
 import math

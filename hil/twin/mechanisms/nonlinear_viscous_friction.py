@@ -1,6 +1,6 @@
 """Nonlinear viscous friction: drag beyond linear in speed.
 
-It departs with the square of the speed or, as in grease and oils that thin when they are sheared, with its root.
+The deviation grows with the square of the speed or, for grease and oils that thin in shear, with its root.
 """
 
 import math

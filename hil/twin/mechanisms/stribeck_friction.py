@@ -1,6 +1,6 @@
 """Stribeck friction: friction falls with speed from its static value.
 
-How it falls differs from contact to contact: the variants are the laws in use.
+The law differs between contacts: the variants are those in use.
 """
 
 import math

@@ -24,7 +24,7 @@ _SLOPES = np.diff(np.append(1.0 - np.exp(-_CHORDS[:-1]), 1.0)) / np.diff(_CHORDS
 ELEMENTS = _SLOPES.size
 STIFFNESS_SHARES = -np.diff(_SLOPES, append=0.0) / _SLOPES[0]
 YIELD_SHARES = -np.diff(_SLOPES, append=0.0) * _CHORDS[1:]
-_NEWTON, _SOLVED = 20, 1e-9  # steps at most, each some Fc / K nearer, and what may be missed of the velocity
+_NEWTON, _SOLVED = 20, 1e-9  # limit of steps, each some Fc / K nearer; allowed error of the velocity
 
 
 class Resistance(NamedTuple):

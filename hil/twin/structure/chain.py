@@ -29,7 +29,7 @@ class Chain:
     body. `transmission @ q` is the deflection of the transmission spring, motor side minus table
     side [rad]; zeros where the chain has none. `screw @ q` is the deflection of the screw between its bearing and
     the nut; where that is no spring of its own, it is the transmission's. `damping_n_m_s_rad` (n, n) is [C] where
-    the damping is not modal: the modes then share it, and `damping_ratio` is what each has of its own.
+    the damping is not modal: the modes then share it, and `damping_ratio` is the own one of each.
     """
 
     inertia_kg_m2: FloatArray

@@ -36,9 +36,9 @@ _FITTED_ROWS = 11  # of the motor position, for its velocity at the first row
 # Torque that the motor channel is trusted to tell, over the noise of the torque channel. A fine encoder tells much
 # less, but details below the material size lie there too: friction at zero speed, the side force of a lead error.
 TORQUE_ACCURACY = 1.0
-# Model discrepancy (Kennedy and O'Hagan 2001): two correct simulations of one axis differ by this share of the torque
-# on the motor and of the deflection of the transmission. Calibrated on simulated axes with nothing but wrong
-# parameters, where the refitted twin leaves 0.1 to 0.6 % in accelerations.
+# Model discrepancy (Kennedy and O'Hagan 2001): correct simulations of one axis differ by this share of the deflection of
+# the transmission. Calibrated on simulated axes with nothing but wrong parameters, where the refitted twin leaves 0.1 to
+# 0.6 % in accelerations. On the motor, TORQUE_ACCURACY stands for it.
 DISCREPANCY = 0.005
 # Time constants of the motor's observer. Fast: stick-slip is forgotten within a few ticks, so that even a poor start
 # leads to the right valley; faster than two ticks, the sampled observer is unstable on an elastic axis. Slow: a coarse
@@ -284,7 +284,7 @@ def scales(
     observer's time constant: the motor counts from the torque that the torque channel can still see. White noise e
     of its encoder comes back through the observer as (1 - z^-1)^2 / (1 - a z^-1)^2 e, a = 1 - T / tau.
     """
-    seen = np.hypot(torque_accuracy * run.noise.torque, discrepancy * run.torque) * observer_s**2 / inertia(bench)
+    seen = torque_accuracy * run.noise.torque * observer_s**2 / inertia(bench)
     a = 1.0 - run.period_s / observer_s
     impulse = np.zeros(round(20.0 * observer_s / run.period_s) + 3)
     impulse[0] = 1.0

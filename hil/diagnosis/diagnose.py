@@ -17,11 +17,9 @@ from hil.diagnosis.preflight import prepare
 from hil.diagnosis.result import ChannelFit, Location, Mode, NextExperiment, Result, Unexplained, Verdict
 from hil.diagnosis.search.forward_selection import Explanation, explain
 from hil.diagnosis.verdict.cross_validation import CrossValidation, cross_validate, explained_share
-from hil.diagnosis.verdict.curve_forms import form_of
-from hil.diagnosis.verdict.findings import corrections, diagnosed_bench, findings, renamed
+from hil.diagnosis.verdict.findings import corrections, diagnosed_bench, findings, form_of, renamed
 from hil.diagnosis.verdict.fit_table import channel_names, channel_residuals, fit_table
-from hil.diagnosis.verdict.judge import judge
-from hil.diagnosis.verdict.observability import not_testable
+from hil.diagnosis.verdict.judge import judge, not_testable
 from hil.diagnosis.wording import title, where_in_short
 from hil.errors import InputError
 from hil.identification.dataset import Dataset, Measured, prepare_dataset

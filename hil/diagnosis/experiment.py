@@ -20,7 +20,7 @@ from hil.bench.bench_file import Bench
 from hil.diagnosis.candidate_motions import candidates, reach
 from hil.diagnosis.search.forward_selection import ALIKE, TIED, Explanation
 from hil.diagnosis.verdict.findings import rivals_of
-from hil.diagnosis.verdict.observability import not_testable
+from hil.diagnosis.verdict.judge import not_testable
 from hil.diagnosis.wording import title
 from hil.identification.dataset import Dataset, Measured
 from hil.identification.estimator import Estimator, Fit, in_parallel

@@ -22,8 +22,7 @@ from hil.bench.hardware import DriveMode
 from hil.channels import AxisKind
 from hil.control import cascade
 from hil.errors import InputError
-from hil.identification.laps import Laps, find_laps
-from hil.identification.sensor_noise import Noise, estimate_noise, moving
+from hil.identification.noise import Laps, Noise, estimate_noise, find_laps, moving
 from hil.recording.recording import Recording
 from hil.twin.axis import Response, Start
 

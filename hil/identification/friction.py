@@ -19,7 +19,7 @@ import numpy as np
 from hil.arrays import FloatArray
 from hil.channels import AxisKind
 from hil.errors import InputError
-from hil.identification.least_squares import solve
+from hil.identification.inverse_dynamics import solve
 from hil.recording.recording import Recording
 
 if TYPE_CHECKING:

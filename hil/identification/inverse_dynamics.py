@@ -34,7 +34,6 @@ from scipy.signal import butter, cheby1, filtfilt
 from hil.arrays import FloatArray
 from hil.channels import AxisKind
 from hil.errors import InputError
-from hil.identification.least_squares import solve
 from hil.recording.recording import Recording
 
 BUTTERWORTH_ORDER = 4
@@ -123,3 +122,36 @@ def _decimate(values: FloatArray, decimation: int) -> FloatArray:
     """Low-passed and thinned, from the back so that the last sample stays."""
     chebyshev = cheby1(CHEBYSHEV_ORDER, RIPPLE_DB, CORNER / decimation)
     return _forwards_and_backwards(chebyshev, values)[(values.size - 1) % decimation :: decimation]
+
+
+@dataclass(frozen=True, eq=False)
+class LinearFit:
+    """Solution of min |y - W x|^2; errors by the textbook formula for independent, equal residuals.
+
+    values, std_errors (p,), in the units of x; residual_rms in the unit of y; relative_error |y - W x| / |y|.
+    """
+
+    values: FloatArray
+    std_errors: FloatArray
+    residual_rms: float
+    relative_error: float
+
+
+def solve(regressors: FloatArray, measured: FloatArray) -> LinearFit:
+    """Fit `measured` (n,) by columns of `regressors` (n, p), n > p, of full rank.
+
+    x = (W'W)^-1 W'y,  s^2 = |y - W x|^2 / (n - p),  std errors^2 = s^2 diag (W'W)^-1.
+    """
+    rows, columns = regressors.shape
+    # QR instead of W'W keeps the digits of badly scaled columns
+    q, r = np.linalg.qr(regressors)
+    values = np.linalg.solve(r, q.T @ measured)
+    residual = measured - regressors @ values
+    variance = float(residual @ residual) / (rows - columns)
+    std_errors = np.sqrt(variance * np.sum(np.linalg.inv(r) ** 2, axis=1))
+    return LinearFit(
+        values,
+        std_errors,
+        float(np.sqrt(np.mean(residual**2))),
+        float(np.linalg.norm(residual) / np.linalg.norm(measured)),
+    )

@@ -16,7 +16,7 @@ import numpy as np
 from hil.arrays import FloatArray
 from hil.identification.dataset import Dataset, Measured
 from hil.identification.hypothesis import Hypothesis
-from hil.identification.laps import Laps
+from hil.identification.noise import Laps
 
 # Mean square of a channel over its noise, up to which it counts as explained: 25 % in rms, where something as large as
 # the noise makes 41 %. An encoder at rest errs by the same part of a count all the time, which may be three times the

@@ -9,7 +9,7 @@ from hil.errors import HilError
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Estimator, Fit, FitStatus
 from hil.identification.hypothesis import Hypothesis
-from hil.identification.uncertainty import standard_errors
+from hil.identification.inference import standard_errors
 
 SOFT = 30.0  # residual from which the loss of a first fit is linear: far above noise, so that valleys stay convex
 MOST_STEPS = 50

@@ -15,13 +15,13 @@ from hil.paper import figures, source, tables
 from hil.paper.row import Reproduction, Row
 from hil.twin.structure.modal import modal
 
-__all__ = ["PaperResult", "Picture", "Reproduction", "Row", "run_paper"]
+__all__ = ["PaperResult", "PaperPicture", "Reproduction", "Row", "run_paper"]
 
 SCHEMA_VERSION = 1
 
 
 @dataclass(frozen=True)
-class Picture:
+class PaperPicture:
     """A picture: the figure of the source it stands for, its file beside paper.json, its caption."""
 
     figure: str
@@ -36,7 +36,7 @@ class PaperResult:
 
     folder: Path
     rows: tuple[Row, ...]
-    pictures: tuple[Picture, ...]
+    pictures: tuple[PaperPicture, ...]
     assumptions: tuple[str, ...]
     coordinates: tuple[str, ...]
     frequencies_hz: FloatArray
@@ -74,9 +74,9 @@ def run_paper(out: Path) -> PaperResult:
     return result
 
 
-def _save(out: Path, figure: str, file: str, caption: str, drawing: Figure) -> Picture:
+def _save(out: Path, figure: str, file: str, caption: str, drawing: Figure) -> PaperPicture:
     drawing.savefig(out / file, dpi=110)
-    return Picture(figure, file, caption)
+    return PaperPicture(figure, file, caption)
 
 
 def _pictures() -> list[tuple[str, str, str, Figure]]:

@@ -16,8 +16,9 @@ from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
 from hil.diagnosis.search import disturbance as estimate
 from hil.identification.dataset import Measured, inertia
-from hil.twin.library import LIBRARY
-from hil.twin.mechanism import Role
+from hil.identification.terms import Term, free_slot
+from hil.twin.library import BY_ID, LIBRARY
+from hil.twin.mechanism import Dimension, Mechanism, Role
 from hil.twin.scene import AxisFacts, Scene
 
 
@@ -138,3 +139,53 @@ def starts(scene: Scene, bench: Bench) -> list[StartPoint]:
                 for point in mechanism.start_points(number, scene)
             ]
     return found
+
+
+_PHASES = np.arange(8) * np.pi / 4.0  # the zero of the table is not the motor's, and the way back turns the sign
+
+
+def likenesses(terms: Sequence[Term], bench: Bench) -> list[list[Term]]:
+    """For each mechanism that the last term may pass for: that one at eight phases. `bench` is the one as fitted."""
+    *rest, last = terms
+    physics = bench.axis.physics()
+    lead_m = 2.0 * np.pi * bench.axis.ratio_m_rad / physics.angle_per_unit
+    if not BY_ID[last.effect].screw_locked or physics.coulomb_n_m <= 0.0:
+        return []
+    size, place = _size_and_place(BY_ID[last.effect])
+    share = last.values[size] / _unit(BY_ID[last.effect], physics.coulomb_n_m)
+    order = _other(BY_ID[last.effect], last.values[place], lead_m)
+    found = []
+    for mechanism in sorted(LIBRARY, key=lambda one: one.parameters[0].dimension is not Dimension.TORQUE):
+        if not mechanism.screw_locked or mechanism.id == last.effect:
+            continue
+        size, place = _size_and_place(mechanism)
+        repeats, bounds = _other(mechanism, order, lead_m), mechanism.parameters[place]
+        if not bounds.low <= repeats <= bounds.high:
+            continue
+        values = dict.fromkeys(range(len(mechanism.parameters)), 0.0)
+        values[size] = min(share * _unit(mechanism, physics.coulomb_n_m), mechanism.parameters[size].high)
+        values[place] = repeats
+        (turned,) = mechanism.indices(Role.PHASE)
+        slot = free_slot(mechanism.id, rest)
+        found.append([Term(mechanism.id, 0, tuple((values | {turned: phase}).values()), slot) for phase in _PHASES])
+    return found
+
+
+def _size_and_place(mechanism: Mechanism) -> tuple[int, int]:
+    """Indices of the strength, and of the order or period."""
+    return mechanism.strength, (mechanism.indices(Role.ORDER) or mechanism.indices(Role.PERIOD))[0]
+
+
+def _unit(mechanism: Mechanism, coulomb: float) -> float:
+    """Strength that is as much as Coulomb friction."""
+    return coulomb if mechanism.parameters[mechanism.strength].dimension is Dimension.TORQUE else 1.0
+
+
+def _other(mechanism: Mechanism, value: float, lead_m: float) -> float:
+    """Order of a mechanism's order or period, and the other way round."""
+    return value if mechanism.indices(Role.ORDER) else lead_m / value
+
+
+def claimable(term: Term, bench: Bench) -> bool:
+    """Check that the mechanism's name applies to the values, and that the sensors can show it."""
+    return BY_ID[term.effect].is_valid(term.values, term.variant, axis_facts(bench))

@@ -13,10 +13,9 @@ mechanism is fitted from the bench file's springs. With one spring alone it woul
 from dataclasses import replace
 from functools import partial
 
-from hil.diagnosis.search.initial_values import stretches
+from hil.diagnosis.search.initial_values import claimable, stretches
 from hil.diagnosis.search.score_test import screen_library
 from hil.diagnosis.search.successive_halving import LONG, SEARCH_ACCURACY, owner_points, race
-from hil.diagnosis.search.validity import claimable
 from hil.identification.dataset import TORQUE_ACCURACY
 from hil.identification.estimator import Fit, in_parallel
 from hil.identification.hypothesis import LAST_EDGE_STEP_S

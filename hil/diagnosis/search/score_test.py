@@ -17,7 +17,7 @@ from hil.arrays import FloatArray
 from hil.diagnosis.search.initial_values import StartPoint, scene, starts
 from hil.identification.estimator import POOL, Fit
 from hil.identification.hypothesis import Hypothesis
-from hil.identification.model_comparison import whitened, whitening
+from hil.identification.inference import whitened, whitening
 from hil.identification.terms import Term, compatible, free_slot, repeats
 from hil.twin.library import BY_ID
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
-from hil.diagnosis.search.equivalents import likenesses
+from hil.diagnosis.search.initial_values import likenesses
 from hil.diagnosis.search.score_test import Candidate, offered
 from hil.identification.dataset import TORQUE_ACCURACY, inertia
 from hil.identification.estimator import POOL, Estimator, Fit, in_parallel, soft_cost

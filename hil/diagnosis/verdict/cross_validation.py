@@ -1,6 +1,6 @@
 """Cross-validation on held-out recordings: the evidence for each term there, and which terms are dropped.
 
-    gain = sum over channels and runs of  n log(E_without / E_with),      E: whitened energy, see `model_comparison`
+    gain = sum over channels and runs of  n log(E_without / E_with),      E: whitened energy, see `inference`
 
 Both hypotheses were fitted to the training recordings, so that on the held-out ones no parameter costs evidence.
 Repeated motion is a test too: a term whose effect differs from lap to lap must reduce the measured differences.
@@ -14,7 +14,7 @@ import numpy as np
 from hil.diagnosis.search.forward_selection import TIED, claimed
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit, in_parallel
-from hil.identification.model_comparison import against
+from hil.identification.inference import against
 from hil.identification.noise_floor import REPEATS, unrepeated
 from hil.identification.terms import Term
 

@@ -1,14 +1,22 @@
-"""From fits to a verdict: no mismatch, wrong parameters, missing physics, or an unexplained mismatch."""
+"""Judgement of fits: the verdict, the confidence in a finding, and the mechanisms that the motion cannot show."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
 
 import numpy as np
 
 from hil.diagnosis.result import Verdict
 from hil.diagnosis.search.forward_selection import MATERIAL, MOST, NEEDED
+from hil.diagnosis.search.initial_values import axis_facts
 from hil.diagnosis.verdict.cross_validation import explained_share
 from hil.identification.dataset import Dataset
-from hil.identification.estimator import Fit
-from hil.identification.model_comparison import against
+from hil.identification.estimator import POOL, Fit
+from hil.identification.inference import against
 from hil.identification.noise_floor import FLOOR
+from hil.identification.terms import Term
+from hil.twin.library import BY_ID, LIBRARY
 
 # Reject findings if the unexplained share > 5 % and share x worst residual (in noise rms) > 0.25: a twentieth at five
 # times the noise, a sixth at one and a half. The same law in another form leaves less.
@@ -41,3 +49,53 @@ def refit_matters(owner: Fit, nominal: Fit) -> bool:
     """Whether evidence and a material share of energy support the refitted nominal parameters."""
     paid = nominal.hypothesis.x.size * float(np.log(nominal.rows))
     return against(nominal, owner) - paid > NEEDED and owner.cost - nominal.cost > MATERIAL * nominal.rows
+
+
+OFFSET, LEFT, FACTOR, MARGIN = 4.5, 3.0, 0.8, 0.2
+# Beyond these the evidence is no longer counted. A term without which twice the energy is left is needed beyond doubt,
+# one without which 1 % more is left is as good as none; a rival at odds of exp(-500) is out, whatever the model errors.
+_DOUBLED, _LEAST = 1.0, 0.01
+_PLENTY = 1000.0
+
+
+def confidence(left: float, factor: float, margin: float) -> float:
+    """Probability that a name is right, in [0, 1].
+
+    `left`: of all channels of all recordings, the largest rms that is left, in units of noise. `factor`: of the energy
+    of what is left without the term over that with it. `margin`: evidence against the best rival that is not
+    equivalent (BIC difference).
+    """
+    if not math.isfinite(left):
+        return 0.0
+    little = max(math.log(_DOUBLED / max(factor - 1.0, _LEAST)), 0.0)
+    close = max(math.log(_PLENTY / (1.0 + min(max(margin, 0.0), _PLENTY))), 0.0)
+    score = OFFSET - LEFT * math.log(max(left, 1.0)) - FACTOR * little - MARGIN * close
+    return 1.0 / (1.0 + math.exp(-score))
+
+
+def not_testable(found: Fit, asked: Collection[str] = tuple(BY_ID), margin: float = 1.0) -> tuple[str, ...]:
+    """Ids of the mechanisms asked for that the data of a fit cannot show, in the library's order.
+
+    `margin` is how many times as visible as needed: more than one where the recordings are only imagined.
+    """
+    bench, hypothesis = found.bench, found.hypothesis.rebased
+    present = {term.effect for term in found.terms} | {entry.effect for entry in bench.mechanisms}
+    axis = axis_facts(bench, found.data.runs)
+    nuisance, _ = np.linalg.qr(found.jacobian[:, : hypothesis.nominal_count])
+    enough = margin * max(NEEDED, MATERIAL * found.rows)
+
+    def visible(effect: str, variant: int) -> bool:
+        changed = hypothesis.with_term(Term(effect, variant, BY_ID[effect].typical_values(axis)))
+        change = found.estimator.residuals(changed).vector - found.residuals.vector
+        change -= nuisance @ (nuisance.T @ change)
+        return float(change @ change) > enough
+
+    wanted = [mechanism for mechanism in LIBRARY if mechanism.id in asked and mechanism.id not in present]
+    jobs = [
+        (mechanism.id, variant)
+        for mechanism in wanted
+        for variant in range(len(mechanism.variants))
+        if bench.has_table_encoder or not mechanism.needs_table
+    ]
+    shown = {effect for (effect, _), seen in zip(jobs, POOL.map(lambda job: visible(*job), jobs), strict=True) if seen}
+    return tuple(mechanism.id for mechanism in wanted if mechanism.id not in shown)

@@ -14,11 +14,11 @@ from hil.bench.hardware import SetPointLimits
 from hil.diagnosis.candidate_motions import candidates, reach
 from hil.diagnosis.experiment import Experiment, separating, showing
 from hil.diagnosis.search.forward_selection import TIED, Explanation, RivalFit
-from hil.diagnosis.verdict.observability import not_testable
+from hil.diagnosis.verdict.judge import not_testable
 from hil.identification.dataset import Dataset, take
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
-from hil.identification.model_comparison import against
+from hil.identification.inference import against
 from hil.identification.terms import Term
 from hil.motion.profile import Profile, load_profile, write_profile
 from hil.motion.trajectory import plan

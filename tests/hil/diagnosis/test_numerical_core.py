@@ -12,7 +12,7 @@ from hil.diagnosis.search.score_test import screen
 from hil.identification.dataset import take
 from hil.identification.estimator import Estimator, Fit, FitStatus
 from hil.identification.hypothesis import Hypothesis
-from hil.identification.model_comparison import against
+from hil.identification.inference import against
 from hil.identification.residuals import Residuals
 from hil.identification.terms import Term
 

@@ -1,11 +1,10 @@
-"""A recording as the twin meets it: channels of its axis, where the axis starts, how noisy the sensors are.
+"""Prepare recordings for the twin: channels of the axis, initial state, noise of the sensors.
 
-The set-points, the first samples and the control law fix the start of a closed-loop simulation. Which rows are
-ticks of the position loop comes from replaying the controller over the first motion: of all phases, the one that
-reproduces the torque commands best. The rows before the first such tick are left out, since the velocity reference
-they were controlled with is not known.
+The set-points, the first samples and the control law determine the initial state of a closed-loop simulation. The ticks
+of the position loop are found by replaying the controller over the first motion: the phase that reproduces the torque
+commands best. Rows before the first such tick are omitted, since their velocity reference is unknown.
 
-A drive in CSP gets positions only: the velocity that its loops feed forward is their difference from SYNC to SYNC.
+A drive in CSP gets positions only: its velocity feed-forward is their difference from SYNC to SYNC.
 """
 
 from collections.abc import Sequence
@@ -28,16 +27,16 @@ from hil.twin.axis import Response, Start
 
 Channels = tuple[FloatArray, FloatArray, FloatArray, FloatArray]  # as control.replay takes them
 
-SETTLE_S = 0.05  # the start is only roughly known: this much of it is not judged
-_REPLAYED_ROWS = 200  # to find the phase of the position loop
-_FITTED_ROWS = 11  # of the motor position, for its velocity at the first row
+SETTLE_S = 0.05  # not evaluated at the start: several time constants of the observer, for errors of the initial state
+_REPLAYED_ROWS = 200  # to find the phase of the position loop: many of its ticks
+_FITTED_ROWS = 11  # motor positions fitted by a parabola for the first velocity: averages encoder counts
 
-# Torque that the motor channel is trusted to tell, over the noise of the torque channel. A fine encoder tells much
-# less, but details below the material size lie there too: friction at zero speed, the side force of a lead error.
+# Torque resolved by the motor channel over the noise of the torque channel. A fine encoder resolves less, but there lie
+# details below the material size too: friction at zero speed, the side force of a lead error.
 TORQUE_ACCURACY = 1.0
-# Time constants of the motor's observer. Fast: stick-slip is forgotten within a few ticks, so that even a poor start
-# leads to the right valley; faster than two ticks, the sampled observer is unstable on an elastic axis. Slow: a coarse
-# encoder still tells the torque.
+# Bounds of the time constant of the motor's observer. Fast: stick-slip decays within a few ticks, so that even a poor
+# start converges; below two ticks the sampled observer is unstable on an elastic axis. Slow: a coarse encoder still
+# resolves the torque.
 FASTEST_OBSERVER_TICKS, FASTEST_OBSERVER_S, SLOWEST_OBSERVER_S = 2.0, 0.002, 0.008
 
 
@@ -87,16 +86,18 @@ class Measured:
 
     @cached_property
     def judged(self) -> slice:
-        """The rows that count: all after the start has settled, from the first motion on. How an axis came to rest
-        before is not known."""
+        """Rows that are evaluated: from the first motion on, and after the start has settled.
+
+        Before the first motion the state of friction is unknown.
+        """
         first = min(int(np.argmax(self.moving)), self.motor.size // 2)
         return slice(max(round(SETTLE_S / self.period_s), first), None)
 
 
 def take(recording: Recording, bench: Bench) -> Measured:
-    """The channels of a recording that the twin of `bench` needs.
+    """Take the channels of a recording that the twin of `bench` needs.
 
-    Raises InputError: another kind of axis or another period than the bench, a missing channel, too short.
+    Raises InputError for another kind of axis or period than the bench, a missing channel, or too few rows.
     """
     names, gains = recording.axis, bench.gains
     if (recording.kind is AxisKind.LINEAR) != bench.axis.linear:
@@ -128,7 +129,7 @@ def take(recording: Recording, bench: Bench) -> Measured:
     command = _column(recording, names.torque_command) if has_command else torque
     table = _column(recording, names.table_position) if bench.has_table_encoder else np.empty(0)
     if table.size and gains.position_from_table:
-        # the loop goes by the linear encoder: the motor's datum is the one that is free
+        # the linear encoder closes the position loop: the datum of the motor encoder is arbitrary
         motor = motor + float(np.mean(table - gains.ratio_m_rad * motor)) / gains.ratio_m_rad
     feedback = table if table.size else gains.ratio_m_rad * motor
     first = _first_tick(gains, (position, velocity, motor, feedback), command)
@@ -153,7 +154,7 @@ def take(recording: Recording, bench: Bench) -> Measured:
 
 
 def bench_of(recording: Recording) -> Bench:
-    """The bench that a run of the project's own recorded in its metadata. Raises InputError where there is none."""
+    """Return the bench stored in the metadata of a recorded run. Raises InputError if there is none."""
     described = recording.metadata.get("bench")
     if not isinstance(described, dict):
         raise InputError(f"{recording.name}: no bench is recorded in it; give one: --bench FILE or a shipped name")
@@ -165,9 +166,9 @@ def _column(recording: Recording, name: str) -> FloatArray:
 
 
 def _first_tick(gains: cascade.Gains, channels: Channels, command: FloatArray) -> int:
-    """The first row at which the position loop ran: of all, the one whose replay gives the commands best.
+    """Find the first tick of the position loop: the row whose replay reproduces the commands best.
 
-    Replayed is the beginning of the first motion: at rest, every phase gives the same.
+    The beginning of the first motion is replayed: at rest every phase gives the same.
     """
     _, velocity, motor, _ = channels
     begin = max(int(np.argmax(moving(velocity))), 2)
@@ -183,8 +184,10 @@ def _first_tick(gains: cascade.Gains, channels: Channels, command: FloatArray) -
 
 
 def _state_at(gains: cascade.Gains, channels: Channels, command: FloatArray, row: int, speed: float) -> cascade.State:
-    """State of the controller at a tick of the position loop: its integrator is the command there less the
-    proportional part. A P velocity loop has none."""
+    """State of the controller at a tick of the position loop: the integrator is the command less the proportional part.
+
+    A P velocity loop has no integrator.
+    """
     _, _, motor, _ = channels
     state = cascade.init(motor[row], speed, 0.0, gains.period_s)
     if row > 0:
@@ -196,11 +199,11 @@ def _state_at(gains: cascade.Gains, channels: Channels, command: FloatArray, row
 
 
 def _start(gains: cascade.Gains, channels: Channels, command: FloatArray) -> Start:
-    """Position and velocity of the first row, by the first few; the torque of the integrator."""
+    """Initial position and velocity from a parabola through the first rows, and the torque of the integrator."""
     motor = channels[2]
     rows = motor[:_FITTED_ROWS]
     speed = 0.0
-    if np.ptp(rows) > 0.0:  # at rest the polynomial leaves rounding behind
+    if np.ptp(rows) > 0.0:  # at rest the polynomial would give rounding errors
         speed = float(np.polyfit(np.arange(rows.size), rows, 2)[1]) / gains.period_s
     state = _state_at(gains, channels, command, 0, speed)
     return Start(float(gains.ratio_m_rad * motor[0]), gains.ratio_m_rad * speed, state.integral_n_m)
@@ -234,7 +237,7 @@ class Dataset:
 
     @property
     def rows(self) -> int:
-        """Rows of all runs that are judged."""
+        """Number of evaluated rows of all runs."""
         return sum(run.motor[run.judged].size for run in self.runs)
 
     @property
@@ -244,10 +247,10 @@ class Dataset:
 
 
 def prepare_dataset(runs: Sequence[Measured], bench: Bench) -> Dataset:
-    """The data set of recordings, its observer chosen so that the encoder's counts resolve the torque noise.
+    """Build the data set of recordings.
 
-    The time constant is that at which the motor encoder's noise moves the observed torque as much as the noise of the
-    torque channel does.
+    With the observer's time constant the noise of the motor encoder makes as much observed torque as the noise of the
+    torque channel, within the bounds of the observer.
     """
     wanted = max(np.sqrt(run.noise.motor * inertia(bench) / (TORQUE_ACCURACY * run.noise.torque)) for run in runs)
     observer_s = float(np.clip(wanted, FASTEST_OBSERVER_TICKS * runs[0].period_s, SLOWEST_OBSERVER_S))

@@ -7,7 +7,7 @@ forwards and backwards by a Butterworth filter; velocity and acceleration are ce
 unfiltered force and all four regressors are low-passed alike and decimated. On a rotary axis the same in kg m^2,
 N m s/rad, N m.
 
-What the published figures depend on, each step changed alone (computed on the EMPS record):
+Sensitivity of the published figures to each step, changed alone (computed on the EMPS record):
 
                                                   M kg     F_v N s/m   F_c N    F_0 N     error
     as published and as computed here             95.109   203.503     20.393   -3.165    4.083 %
@@ -21,7 +21,7 @@ What the published figures depend on, each step changed alone (computed on the E
     every tenth sample, not low-passed            95.273   203.839     20.390   -3.160    4.433 %
     |v| > 10 mm/s only                            94.798   198.408     20.902   -3.264    3.778 %
 
-So: sign(v) is taken at the full rate and low-passed with the rest, and the start of the record is cut.
+Therefore sign(v) is taken at the full rate and low-passed with the other columns, and the start of the record is cut.
 """
 
 from __future__ import annotations
@@ -88,10 +88,10 @@ def fit_inverse_dynamics(
     if not (velocity.min() < 0 < velocity.max()):
         raise InputError(
             f"{recording.name}: {recording.axis.motor_position}: given motion in one direction, allowed "
-            "both; Coulomb friction and offset cannot be told apart: record a return move"
+            "both; Coulomb friction and offset are not separable in one direction: record a return move"
         )
 
-    # the offset's column too: the filter's gain at zero frequency is its ripple, not 1
+    # the column of the offset is filtered too: the filter's gain at zero frequency is not exactly 1
     settled = slice(CUT_AT_START, len(recording) - cut_at_end)
     columns = (acceleration, velocity, np.sign(velocity), np.ones_like(velocity))
     regressors = np.column_stack([_decimate(column[settled], decimation) for column in columns])
@@ -119,7 +119,7 @@ def _forwards_and_backwards(coefficients: tuple[FloatArray, FloatArray], values:
 
 
 def _decimate(values: FloatArray, decimation: int) -> FloatArray:
-    """Low-passed and thinned, from the back so that the last sample stays."""
+    """Low-pass and decimate values (n,), counted from the end so that the last sample is kept."""
     chebyshev = cheby1(CHEBYSHEV_ORDER, RIPPLE_DB, CORNER / decimation)
     return _forwards_and_backwards(chebyshev, values)[(values.size - 1) % decimation :: decimation]
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import correlate
+from scipy.signal import correlate, find_peaks
 
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
@@ -16,10 +16,10 @@ from hil.bench.bench_file import Bench
 
 @dataclass(frozen=True)
 class Noise:
-    """Standard deviation of the white noise of a sensor: motor in rad (m), table in m, torque in N m (N).
+    """Standard deviation of the white noise of a sensor: motor [rad or m], table [m], torque [N m or N].
 
     `table_m` is that of table position less r x motor position, 0 without a linear encoder. `jitter_s` is that of the
-    instants at which positions are read: an error that grows with the speed, and is the same for both encoders.
+    sampling instants of the encoders: its position error is proportional to the speed and equal for both.
     """
 
     motor: float
@@ -37,7 +37,7 @@ def estimate_noise(
     torque: FloatArray,
     period_s: float,
 ) -> Noise:
-    """Noise of the sensors from channels (n,) in motor units; never below that of counting, count / sqrt(12)."""
+    """Estimate sensor noise from channels (n,) in motor units, at least that of counting: count / sqrt(12)."""
     motor_noise, table_noise = max(_white(motor), bench.motor_count / np.sqrt(12.0)), 0.0
     if table.size and bench.encoders.table is not None:
         ratio_m = bench.axis.ratio_m_rad
@@ -48,31 +48,31 @@ def estimate_noise(
 
 
 def moving(velocity: FloatArray) -> NDArray[np.bool_]:
-    """Where a set velocity (n,) is one: above a thousandth of the highest, below which lies noise."""
+    """Mark the rows (n,) at which a set velocity moves the axis: above 1/1000 of its maximum; below lies rounding."""
     speed = np.abs(velocity)
     return np.asarray(speed > 1e-3 * np.max(speed, initial=0.0))
 
 
 def _white(signal: FloatArray) -> float:
-    """White noise of a smooth signal: fourth differences, of variance 70 sigma^2, see nothing slower.
+    """White noise of a smooth signal (n,) from its fourth differences, which have the variance 70 sigma^2.
 
-    The median over blocks keeps events, such as reversals, out of it.
+    The median over blocks excludes events such as reversals.
     """
     return float(np.sqrt(np.median(_white_blocks(signal))))
 
 
 def _white_blocks(signal: FloatArray) -> FloatArray:
-    """Variance of the white noise in each block of 64 rows."""
+    """Variance (b,) of the white noise in each block of 64 rows."""
     differences = np.diff(signal, 4)
     blocks = differences[: differences.size // 64 * 64].reshape(-1, 64)
     return np.asarray(np.mean(blocks**2, axis=1) / 70.0, dtype=np.float64)
 
 
 def _jitter_s(motor: FloatArray, velocity: FloatArray, noise: float, period_s: float) -> float:
-    """Jitter of the instants of reading: by how much noise at constant feed exceeds `noise`, over the speed.
+    """Jitter of the sampling instants: excess over `noise` at constant feed, divided by the speed.
 
-    Known from six blocks of 64 rows in which the set velocity is constant, from half of the fastest such feed on; with
-    less of them 0. Less than three times the noise is not told from counting, which at half a count per row makes 2.7.
+    It takes six blocks of 64 rows at constant set velocity, at half of the fastest such feed or above; 0 with fewer.
+    Also 0 if the variance is below three times that of the noise: counting at half a count per row makes 2.7.
     """
     variance = _white_blocks(motor)
     rows = 64 * variance.size
@@ -87,9 +87,9 @@ def _jitter_s(motor: FloatArray, velocity: FloatArray, noise: float, period_s: f
 
 
 def _coloured(signal: FloatArray) -> float:
-    """Noise of a signal that is next to zero, of any colour: what varies about a straight line within 64 rows.
+    """Noise of any colour of a signal (n,) near zero: deviation from a straight line in each block of 64 rows.
 
-    A current measurement is filtered: its noise is no longer white. The median again keeps events out of it.
+    A current measurement is filtered, so its noise is not white. The median over blocks excludes events.
     """
     rows = np.arange(64) - 31.5
     blocks = signal[: signal.size // 64 * 64].reshape(-1, 64)
@@ -100,16 +100,16 @@ def _coloured(signal: FloatArray) -> float:
 
 Rows = NDArray[np.intp]
 
-_LAGS = 6  # strongest lags of the set-points that are tried
-_NEAR = 30  # rows about a peak of the correlation in which the lag is sought
-_SAME_M = 2e-6  # set-points closer than this are the same: printed ones are rounded
-_SETTLED_S = 0.3  # set-points must have been the same for so long: friction and play have a memory
-_ENOUGH_S = 1.0  # of repeated motion, to call a floor measured
+_LAGS = 6  # strongest peaks of the correlation that are tried: each row counts once, so more lags add few rows
+_NEAR = 30  # rows about a peak of the correlation that are searched: the shrinking overlap shifts a peak by a few
+_SAME_M = 2e-6  # set-points closer than this are the same: printed ones are rounded to 1 µm
+_SETTLED_S = 0.3  # set-points must have been equal for this time: friction and play depend on the past
+_ENOUGH_S = 1.0  # least repeated motion: 1000 rows at 1 kHz give the floor to a few per cent
 
 
 @dataclass(frozen=True, eq=False)
 class Laps:
-    """Rows whose set-points come again, and the rows where they do, each (m,)."""
+    """Rows of repeated set-points, and the rows of their repetition, each (m,)."""
 
     first: Rows
     again: Rows
@@ -121,14 +121,14 @@ class Laps:
 
 
 def find_laps(position: FloatArray, velocity: FloatArray, period_s: float) -> Laps | None:
-    """Rows of set-points (n,) [m, m/s] that repeat after a lag; None where less than a second of motion does."""
+    """Find the rows of set-points (n,) [m, m/s] that repeat after a lag; None if less than a second repeats."""
     matched = np.zeros(position.size, dtype=bool)
     settled = max(round(_SETTLED_S / period_s), 1)
     first, again, best, longest = list[Rows](), list[Rows](), 0.0, 0
-    # neighbouring laps first, and each row once: distant laps also differ by drift
+    # short lags first, each row once: distant laps differ by drift
     for lag in sorted(_lags(position, velocity)):
         same = np.abs(position[:-lag] - position[lag:]) < _SAME_M
-        # the same for a while before: a running count since the last difference
+        # rows since the last difference
         different = np.flatnonzero(~same)
         since = np.full(same.size, -1)
         since[different] = different
@@ -146,18 +146,11 @@ def find_laps(position: FloatArray, velocity: FloatArray, period_s: float) -> La
 
 
 def _lags(position: FloatArray, velocity: FloatArray) -> list[int]:
-    """Lags [rows] at which the set-points resemble themselves most, best first."""
+    """Lags [rows] of the largest autocorrelation of the set-points, best first."""
     n = velocity.size
     correlation = correlate(velocity, velocity, method="fft")[n - 1 :]
-    peaks = (
-        np.flatnonzero(
-            (correlation[1:-1] > correlation[:-2])
-            & (correlation[1:-1] >= correlation[2:])
-            & (correlation[1:-1] > 0.05 * correlation[0])
-        )
-        + 1
-    )
-    # the shorter the overlap, the smaller the sum: its peaks stand a few rows too early
+    peaks, _ = find_peaks(correlation, height=0.05 * correlation[0])
+    # the sum decreases with the overlap, so that its peaks lie a few rows early
     found = (
         min(
             range(max(peak - _NEAR, 1), min(peak + _NEAR, n - 1)),

@@ -14,7 +14,7 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.errors import FieldError
-from hil.motion.pieces import Array, Motion, MotionLimits, Move, MotionPhase, Piece, Ramp
+from hil.motion.pieces import Array, Motion, MotionLimits, MotionPhase, Move, Piece, Ramp
 from hil.motion.sine_squared import ramp_duration_s
 
 # 64 samples per shortest period miss a peak by at most 1 - cos(pi/64) = 0.12 %

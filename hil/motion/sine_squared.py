@@ -13,7 +13,7 @@ both ends.
 import math
 
 from hil.errors import FieldError
-from hil.motion.pieces import Cubic, MotionLimits, Move, MotionPhase, Piece, Ramp
+from hil.motion.pieces import Cubic, MotionLimits, MotionPhase, Move, Piece, Ramp
 
 
 def ramp_duration_s(step_m_s: float, limits: MotionLimits) -> float:

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import ruckig
 
 from hil.errors import FieldError, HilError, InputError
-from hil.motion.pieces import Cubic, MotionLimits, Move, MotionPhase, Piece, end_m
+from hil.motion.pieces import Cubic, MotionLimits, MotionPhase, Move, Piece, end_m
 
 END_TOLERANCE_M = 1e-10
 

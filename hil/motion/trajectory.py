@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from hil.errors import FieldError, InputError, field_name
 from hil.figures.panels import COMMAND, Line, Panel
-from hil.motion.pieces import MAX_DURATION_S, Array, Cubic, Motion, MotionLimits, Move, MotionPhase
+from hil.motion.pieces import MAX_DURATION_S, Array, Cubic, Motion, MotionLimits, MotionPhase, Move
 from hil.motion.time_optimal import MotionState, point_to_point, stop, time_optimal_duration_s
 
 if TYPE_CHECKING:

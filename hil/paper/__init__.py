@@ -15,7 +15,7 @@ from hil.paper import figures, source, tables
 from hil.paper.row import Reproduction, Row
 from hil.twin.structure.modal import modal
 
-__all__ = ["PaperResult", "PaperPicture", "Reproduction", "Row", "run_paper"]
+__all__ = ["PaperPicture", "PaperResult", "Reproduction", "Row", "run_paper"]
 
 SCHEMA_VERSION = 1
 

@@ -6,8 +6,8 @@ from hil.bench.axis_models import OneMass
 from hil.bench.bench_file import Bench
 from hil.figures.drawing import save
 from hil.files.output import write_json, write_text
-from hil.identification.blocks import BlockDeviation
-from hil.identification.compare import EXPLAINED, Comparison, Deviation
+from hil.identification.compare import EXPLAINED, Comparison
+from hil.identification.deviations import BlockDeviation, Deviation
 from hil.identification.figures import block_panels, motion_panels
 from hil.identification.inverse_dynamics import InverseDynamics
 from hil.identification.nominal_fit import FitResult

@@ -10,6 +10,7 @@ ROOT = Path(__file__).parents[2]
 SOURCES = sorted(path for package in ("hil", "drivers") for path in (ROOT / package).rglob("*.py"))
 MOST_LINES = 300
 MOST_FILES_AT_ROOT = 10
+TESTS = {"tests", *(path.stem for path in (ROOT / "tests" / "support").glob("*.py"))}
 IDS = [str(path.relative_to(ROOT)) for path in SOURCES]
 
 
@@ -39,6 +40,6 @@ def test_no_module_imports_the_tests() -> None:
         for node in ast.walk(ast.parse(path.read_text()))
         if isinstance(node, ast.Import | ast.ImportFrom)
         for name in ([node.module or ""] if isinstance(node, ast.ImportFrom) else [one.name for one in node.names])
-        if name.split(".")[0] in ("tests", "diagnosis_runs")
+        if name.split(".")[0] in TESTS
     ]
     assert imported == []

@@ -1,9 +1,9 @@
-"""What a residual is locked to: the position of the table, the angle of the screw, or time.
+"""Find the domain in which a residual is periodic: position of the table, angle of the screw, or time.
 
     share(p) = energy that a sin p + b cos p explains of the residual,   p = 2 pi x / period, n theta, or 2 pi f t
 
-The three are one and the same at a single speed. So rows of all speeds are taken together, and
-nothing is claimed where there is only one.
+At a single speed the three domains are equal. So rows of all speeds are used, and no period is reported for a single
+speed.
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ from hil.identification.terms import Term
 from hil.twin.library import BY_ID
 from hil.twin.mechanism import Role
 
-CLAIMED = 0.25  # share of the energy that one harmonic must explain
-APART = 1.5  # times the next best domain
-SPEEDS = 1.5  # ratio of feeds from which domains can be told apart
-LOWEST_HZ = 4.0  # below, the motion itself has its lines
-HIGHEST_ORDER = 48
-_MOST_ROWS = 20_000
+CLAIMED = 0.25  # least share of the energy in one harmonic: a line that dominates the residual
+APART = 1.5  # least ratio of that share to that of the next domain
+SPEEDS = 1.5  # least ratio of feeds: with less, domains differ by less than the width of a line
+LOWEST_HZ = 4.0  # lowest frequency: the motion itself has its lines below
+HIGHEST_ORDER = 48  # slots or pole passings per revolution of usual motors
+_MOST_ROWS = 20_000  # rows of a regression, thinned evenly: ample for three coefficients
 
 
 @dataclass(frozen=True)
 class Lock:
-    """Periods that are claimed; all None where nothing repeats."""
+    """Reported periods; all None without periodicity."""
 
     frequency_hz: float | None = None
     period_m: float | None = None
@@ -38,7 +38,7 @@ class Lock:
 
 
 def lock(seen: Sequence[Energy], channel: str, bench: Bench, terms: Sequence[Term]) -> Lock:
-    """What the first named term says of itself, else what the residual of `channel` shows."""
+    """Return the period of the first term, without terms that of the residual of `channel`."""
     lead_m = _lead_m(bench)
     if terms:
         return _named(terms[0], lead_m)
@@ -57,7 +57,7 @@ def lock(seen: Sequence[Energy], channel: str, bench: Bench, terms: Sequence[Ter
     signal = np.concatenate([energy.parts[channel][rows] for energy, rows in zip(seen, moving, strict=True)])
     time = np.concatenate([energy.run.time_s[rows] for energy, rows in zip(seen, moving, strict=True)])
     period_s = seen[0].run.period_s
-    # a period that goes into the lead is an order of the screw
+    # a period that divides the lead is an order of the screw
     spans = [
         float(p)
         for p in np.geomspace(np.ptp(x) / 60.0, np.ptp(x) / 1.5, 200)

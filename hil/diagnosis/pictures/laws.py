@@ -1,4 +1,4 @@
-"""Pictures of physical laws: friction over speed, lost motion over load, torque over its command."""
+"""Figures of physical laws: friction over speed, lost motion over load, torque over its command."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from hil.quantities import reading_unit
 if TYPE_CHECKING:
     from hil.diagnosis.diagnose import Diagnosis
 
-CLOUD_POINTS = 8000  # of a scatter plot: more only blacken it
-REVERSAL_S, STEEPEST_S = 0.4, 0.05  # shown before and after
+CLOUD_POINTS = 8000  # of a scatter plot: more points overlap
+REVERSAL_S, STEEPEST_S = 0.4, 0.05  # shown before and after: a reversal with its ramps, a step of the current loop
 
 
 def friction_over_speed(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:

@@ -1,8 +1,11 @@
-"""Starting values of each mechanism for the recordings at hand: where a search for it begins.
+"""Starting values of each mechanism for the recordings at hand, and the check of fitted values.
 
-A start is a point of a mechanism's parameters at small but visible strength. The screen asks how much of
-the residual the twin's answer to it explains, scales the strength, and turns the phase. The points are
-data of the mechanisms.
+A start is a point of a mechanism's parameters at small but visible strength; its data stand on the mechanism. The score
+test scales the strength and turns the phase.
+
+While an axis moves in one direction at one feed, cogging, a torque constant that varies over a turn, and friction that
+varies along the screw have the same effect. After a search found one of these screw-locked mechanisms, the others are
+started at strengths with the same torque at creep, where all torque is Coulomb friction.
 """
 
 from __future__ import annotations
@@ -24,10 +27,10 @@ from hil.twin.scene import AxisFacts, Scene
 
 @dataclass(frozen=True)
 class StartPoint:
-    """Parameter values of one variant, and which of them are strength and phase (-1: no phase).
+    """Parameter values of one variant, and the indices of strength and phase (-1: no phase).
 
-    Further pairs of strength and phase follow the first for so many `harmonics`. Without a phase, the strength counts
-    from what is `known`. What acts `instead` of something that the bench knows takes that away whatever its strength.
+    There are `harmonics` consecutive pairs of strength and phase. Without a phase, strengths are counted from the
+    `known` strength of the bench. With `instead`, the start replaces a mechanism of the bench.
     """
 
     effect: str
@@ -36,12 +39,12 @@ class StartPoint:
     strength: int = 0
     phase: int = -1
     harmonics: int = 1
-    known: float = 0.0  # of the strength, what the bench has of it already
+    known: float = 0.0  # strength of the same mechanism in the bench
     instead: bool = False
 
 
 def axis_facts(bench: Bench, runs: Sequence[Measured] = ()) -> AxisFacts:
-    """Facts of the axis of a bench with the nominal parameters as fitted, and of its recordings."""
+    """Collect facts of the axis, with the nominal parameters of `bench`, and of its recordings."""
     physics, table, limit = bench.axis.physics(), bench.encoders.table, bench.gains.torque_limit_n_m
     peak = max((float(np.max(np.abs(run.torque))) for run in runs), default=0.0)
     return AxisFacts(
@@ -55,7 +58,7 @@ def axis_facts(bench: Bench, runs: Sequence[Measured] = ()) -> AxisFacts:
 
 
 def scene(runs: Sequence[Measured], bench: Bench, blocks: Sequence[dict[str, FloatArray]], observer_s: float) -> Scene:
-    """Measure what the starting values need.
+    """Estimate the quantities that starting values are computed from.
 
     `bench` has the nominal parameters as fitted, `blocks` their residuals block by block, one per run.
     """
@@ -69,7 +72,7 @@ def scene(runs: Sequence[Measured], bench: Bench, blocks: Sequence[dict[str, Flo
     longest = max(range(len(runs)), key=lambda i: runs[i].motor.size)
     travel = max(float(np.ptp(run.position_command_m)) for run in runs)
     lead = 2.0 * np.pi * ratio / physics.angle_per_unit
-    # What is locked to the screw shows in its angle and along the travel alike: each is a start for the other.
+    # a screw-locked effect is periodic in the angle and along the travel: orders and periods start each other
     periods = estimate.friction_periods(runs, found, ratio)
     orders = estimate.orders(runs, found, physics.angle_per_unit)
     turns = [lead / order for order in dict.fromkeys((1.0, 2.0, *orders)) if _SHORTEST_M < lead / order < travel]
@@ -111,7 +114,7 @@ def scene(runs: Sequence[Measured], bench: Bench, blocks: Sequence[dict[str, Flo
 
 
 def stretches(runs: Sequence[Measured], ratio_m_rad: float) -> tuple[float, float]:
-    """Table against motor [m], typical and most, of runs with a linear encoder."""
+    """Table less motor position [m], typical and largest, of runs with a linear encoder."""
     found = [run.table_m - ratio_m_rad * run.motor for run in runs]
     typical, most = np.max(
         [np.percentile(np.abs(stretch - np.median(stretch)), (60.0, 99.9)) for stretch in found], axis=0
@@ -119,12 +122,12 @@ def stretches(runs: Sequence[Measured], ratio_m_rad: float) -> tuple[float, floa
     return float(typical), float(most)
 
 
-_SHORTEST_M = 1e-3  # along the travel: below, friction is not looked for
-_WHOLE = 0.05  # of a turn, to which a period makes a whole order of the screw
+_SHORTEST_M = 1e-3  # shortest period of friction along the travel: shorter ones are orders of the screw
+_WHOLE = 0.05  # largest deviation of lead / period from a whole order of the screw
 
 
 def starts(scene: Scene, bench: Bench) -> list[StartPoint]:
-    """All starting points of the library for this scene, every variant."""
+    """Starting points of all variants of the library for a scene."""
     found = []
     for mechanism in LIBRARY:
         phases = mechanism.indices(Role.PHASE)
@@ -141,11 +144,15 @@ def starts(scene: Scene, bench: Bench) -> list[StartPoint]:
     return found
 
 
-_PHASES = np.arange(8) * np.pi / 4.0  # the zero of the table is not the motor's, and the way back turns the sign
+# The angle is unknown, since the zero of the table is not that of the motor: eight phases are within 23 deg of any.
+_PHASES = np.arange(8) * np.pi / 4.0
 
 
 def likenesses(terms: Sequence[Term], bench: Bench) -> list[list[Term]]:
-    """For each mechanism that the last term may pass for: that one at eight phases. `bench` is the one as fitted."""
+    """Terms with the effect of the last term, at eight phases, for each other screw-locked mechanism.
+
+    `bench` has the nominal parameters as fitted.
+    """
     *rest, last = terms
     physics = bench.axis.physics()
     lead_m = 2.0 * np.pi * bench.axis.ratio_m_rad / physics.angle_per_unit
@@ -177,15 +184,15 @@ def _size_and_place(mechanism: Mechanism) -> tuple[int, int]:
 
 
 def _unit(mechanism: Mechanism, coulomb: float) -> float:
-    """Strength that is as much as Coulomb friction."""
+    """Strength with the torque of Coulomb friction."""
     return coulomb if mechanism.parameters[mechanism.strength].dimension is Dimension.TORQUE else 1.0
 
 
 def _other(mechanism: Mechanism, value: float, lead_m: float) -> float:
-    """Order of a mechanism's order or period, and the other way round."""
+    """Convert an order to the mechanism's order or period, and the reverse."""
     return value if mechanism.indices(Role.ORDER) else lead_m / value
 
 
 def claimable(term: Term, bench: Bench) -> bool:
-    """Check that the mechanism's name applies to the values, and that the sensors can show it."""
+    """True if the values are valid for the mechanism of a term, and the sensors can show it."""
     return BY_ID[term.effect].is_valid(term.values, term.variant, axis_facts(bench))

@@ -54,7 +54,7 @@ def test_a_motion_is_designed_that_separates_what_one_way_ties() -> None:
     found = designed(first, second)
     assert found.profile is not None
     assert found.separates == ("friction_drift", "position_dependent_friction")
-    assert "is expected to tell friction drift from position dependent friction" in found.note
+    assert "is expected to distinguish friction drift from position dependent friction" in found.note
     for right, wrong in ((first, second), (second, first)):  # whichever of the two is true
         truth = right.terms
         both = dataset([*runs(ONE_WAY, *truth).runs, *runs(found.profile, *truth, seed=2).runs], OWNER)
@@ -70,7 +70,10 @@ def test_no_motion_is_promised_that_gains_nothing() -> None:
         fitted(Hypothesis(OWNER, (Term("transport_delay", 0, (1e-4,)),)), train),
     )
     assert found.profile is None
-    assert "No motion within the reach of these recordings tells current loop lag from transport delay" in found.note
+    assert (
+        "No motion within the range of these recordings distinguishes current loop lag from transport delay"
+        in found.note
+    )
 
 
 def test_the_same_torque_on_every_motion_needs_no_search() -> None:
@@ -78,7 +81,7 @@ def test_the_same_torque_on_every_motion_needs_no_search() -> None:
     train = runs(moves([REST, {"kind": "reversal", "stroke_m": 0.05, "feed_m_s": 0.1}, REST]), uneven)
     found = designed(fitted(Hypothesis(OWNER, (uneven,)), train))
     assert found.profile is None
-    assert "No motion tells asymmetric friction from constant load" in found.note
+    assert "No motion distinguishes asymmetric friction from constant load" in found.note
 
 
 def test_a_cause_without_rivals_needs_no_experiment() -> None:

@@ -1,9 +1,7 @@
 """Candidate motions of an experiment.
 
-They stay within travel, velocity, acceleration and jerk of the recorded set-points, or of the bench file if given there.
+They stay within travel, velocity, acceleration and jerk of the recorded set-points or of the bench file.
 """
-
-from __future__ import annotations
 
 import math
 from collections.abc import Sequence

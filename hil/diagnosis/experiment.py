@@ -91,7 +91,8 @@ def separating(explanation: Explanation, final: Fit, held_out: Dataset) -> Exper
             question = tuple(sorted((truth.effect, other.effect)))
             if found[question] >= least:  # else the other assignment of the truth is below already
                 run = _imagined(truth, trajectory, train.runs[0])
-                found[question] = min(found[question], _left(other, run) - _own(truth, run))
+                # on its own run the truth leaves rounding and the settling of the observer
+                found[question] = min(found[question], _left(other, run) - truth.on(run).cost)
         return found
 
     best = _best(
@@ -201,13 +202,8 @@ def _alternative(effect: str, found: Fit) -> _Alternative:
     hypothesis = found.hypothesis
     once = [index for index, term in enumerate(hypothesis.terms) if BY_ID[term.effect].transient]
     gone = [column for index in once for column in range(hypothesis.x.size)[hypothesis.columns(index)]]
-    known = _triangle(np.delete(found.jacobian, gone, axis=1))
+    known = np.asarray(np.linalg.qr(np.delete(found.jacobian, gone, axis=1), mode="r"), dtype=np.float64)
     return _Alternative(effect, hypothesis.without(*once), known, found.estimator)
-
-
-def _triangle(jacobian: FloatArray) -> FloatArray:
-    """R of a QR decomposition."""
-    return np.asarray(np.linalg.qr(jacobian, mode="r"), dtype=np.float64)
 
 
 def _imagined(truth: _Alternative, trajectory: Trajectory, like: Measured) -> Measured:
@@ -227,11 +223,6 @@ def _imagined(truth: _Alternative, trajectory: Trajectory, like: Measured) -> Me
         torque_command=answer.torque_command,
         torque=answer.torque_command if like.torque_is_command else answer.torque,
     )
-
-
-def _own(truth: _Alternative, run: Measured) -> float:
-    """Energy of the residuals of the truth on its own run: rounding and the settling of the observer."""
-    return truth.on(run).cost
 
 
 def _left(other: _Alternative, run: Measured) -> float:

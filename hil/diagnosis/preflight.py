@@ -5,8 +5,6 @@
 A negative J shows a wrong sign; J and Fc that both deviate from the bench by a large factor show a wrong unit.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 

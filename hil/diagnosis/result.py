@@ -3,8 +3,6 @@
 All values in SI units. `write_schema` writes `hil/diagnosis/diagnosis.schema.json` from these models.
 """
 
-from __future__ import annotations
-
 import json
 from enum import StrEnum
 from pathlib import Path

@@ -113,11 +113,7 @@ def identify_friction(
             f"{settling_s + ENDING_S + AVERAGED_MIN_S:g} s; record profiles/friction_sweep.yaml"
         )
     fit = solve(np.column_stack([np.sign(speed), speed, np.ones_like(speed)]), torque)
-    coulomb, viscous, offset = fit.values.tolist()
-    errors = fit.std_errors.tolist()
-    return FrictionResult(
-        recording.kind, points, coulomb, viscous, offset, errors[0], errors[1], errors[2], fit.residual_rms
-    )
+    return FrictionResult(recording.kind, points, *fit.values.tolist(), *fit.std_errors.tolist(), fit.residual_rms)
 
 
 def constant_feed_stretches(velocity_command_m_s: FloatArray) -> list[tuple[int, int]]:

@@ -24,8 +24,6 @@ Sensitivity of the published figures to each step, changed alone (computed on th
 Therefore sign(v) is taken at the full rate and low-passed with the other columns, and the start of the record is cut.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -96,20 +94,7 @@ def fit_inverse_dynamics(
     columns = (acceleration, velocity, np.sign(velocity), np.ones_like(velocity))
     regressors = np.column_stack([_decimate(column[settled], decimation) for column in columns])
     fit = solve(regressors, _decimate(force[settled], decimation))
-    inertia, viscous, coulomb, offset = fit.values.tolist()
-    errors = fit.std_errors.tolist()
-    return InverseDynamics(
-        recording.kind,
-        inertia,
-        viscous,
-        coulomb,
-        offset,
-        errors[0],
-        errors[1],
-        errors[2],
-        errors[3],
-        fit.relative_error,
-    )
+    return InverseDynamics(recording.kind, *fit.values.tolist(), *fit.std_errors.tolist(), fit.relative_error)
 
 
 def _forwards_and_backwards(coefficients: tuple[FloatArray, FloatArray], values: FloatArray) -> FloatArray:

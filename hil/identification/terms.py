@@ -1,7 +1,5 @@
 """Mechanisms in a hypothesis, and the rules by which they are compatible."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations, count

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hil.arrays import FloatArray
-from hil.diagnosis.location.periodicity import Lock, lock
+from hil.diagnosis.location.periodicity import lock
 from hil.diagnosis.location.reaction_torque import acting
 from hil.diagnosis.location.residual_energy import Energy, energies, without_terms
 from hil.diagnosis.result import Location, Phase, PhaseKind
@@ -75,7 +75,7 @@ def locate(found: Fit, final: Fit) -> Location:
         windows_s=windows(seen[0]),
         position_m=_range([run.run.position_command_m for run in seen], seen),
         speed_m_s=_range([np.abs(run.run.velocity_command_m_s) for run in seen], seen),
-        **_periods(locked),
+        **asdict(locked),
     )
 
 
@@ -153,10 +153,6 @@ def _dealt(rows: FloatArray, size: int, random: np.random.Generator) -> FloatArr
     """Permute blocks of rows (n,) at random."""
     starts = np.arange(0, rows.size, size)
     return np.concatenate([rows[start : start + size] for start in random.permutation(starts)])
-
-
-def _periods(locked: Lock) -> dict[str, float | None]:
-    return asdict(locked)
 
 
 def phases(run: Measured) -> NDArray[np.str_]:

@@ -6,8 +6,6 @@ At a single speed the three domains are equal. So rows of all speeds are used, a
 speed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -16,6 +14,7 @@ import numpy as np
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
 from hil.diagnosis.location.residual_energy import Energy
+from hil.diagnosis.search.disturbance import harmonic_share
 from hil.identification.terms import Term
 from hil.twin.library import BY_ID
 from hil.twin.mechanism import Role
@@ -42,20 +41,18 @@ def lock(seen: Sequence[Energy], channel: str, bench: Bench, terms: Sequence[Ter
     lead_m = _lead_m(bench)
     if terms:
         return _named(terms[0], lead_m)
-    moving = [
-        np.abs(energy.run.velocity_command_m_s) > 0.02 * np.max(np.abs(energy.run.velocity_command_m_s))
-        for energy in seen
-    ]
-    speeds = np.concatenate(
-        [np.abs(energy.run.velocity_command_m_s[rows]) for energy, rows in zip(seen, moving, strict=True)]
-    )
-    low, high = np.percentile(speeds, [10.0, 90.0])
+    speeds = [np.abs(energy.run.velocity_command_m_s) for energy in seen]
+
+    def moving(values: Sequence[FloatArray]) -> FloatArray:
+        pairs = zip(values, speeds, strict=True)
+        return np.concatenate([one[speed > 0.02 * np.max(speed)] for one, speed in pairs])
+
+    low, high = np.percentile(moving(speeds), [10.0, 90.0])
     if high < SPEEDS * low:
         return Lock()
-    ratio = bench.axis.ratio_m_rad
-    x = np.concatenate([ratio * energy.run.motor[rows] for energy, rows in zip(seen, moving, strict=True)])
-    signal = np.concatenate([energy.parts[channel][rows] for energy, rows in zip(seen, moving, strict=True)])
-    time = np.concatenate([energy.run.time_s[rows] for energy, rows in zip(seen, moving, strict=True)])
+    x = moving([bench.axis.ratio_m_rad * energy.run.motor for energy in seen])
+    signal = moving([energy.parts[channel] for energy in seen])
+    time = moving([energy.run.time_s for energy in seen])
     period_s = seen[0].run.period_s
     # a period that divides the lead is an order of the screw
     spans = [
@@ -100,11 +97,7 @@ def _lead_m(bench: Bench) -> float:
 def _share(phase: FloatArray, signal: FloatArray) -> float:
     """Share of the energy that one harmonic explains."""
     step = max(phase.size // _MOST_ROWS, 1)
-    phase, signal = phase[::step], signal[::step] - signal[::step].mean()
-    basis = np.stack([np.sin(phase), np.cos(phase)], axis=1)
-    basis -= basis.mean(axis=0)
-    solution, *_ = np.linalg.lstsq(basis, signal, rcond=None)
-    return float(1.0 - np.sum((signal - basis @ solution) ** 2) / max(float(signal @ signal), 1e-300))
+    return harmonic_share(phase[::step], signal[::step])
 
 
 def _strongest_frequency(time: FloatArray, signal: FloatArray, period_s: float) -> tuple[float, float]:

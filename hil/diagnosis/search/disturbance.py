@@ -6,8 +6,6 @@ with the motor's innovation e (see `hil.identification.hypothesis`), the inertia
 constant tau of the observer: the torque whose effect equals the observer's correction of the motor.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -52,7 +50,7 @@ def _width(period_s: float) -> int:
     return max(round(_SMOOTH_S / period_s), 1)
 
 
-def _harmonic_share(phase: FloatArray, signal: FloatArray) -> float:
+def harmonic_share(phase: FloatArray, signal: FloatArray) -> float:
     """Share of a signal's energy that one harmonic of `phase` explains."""
     basis = np.stack([np.sin(phase), np.cos(phase), np.ones_like(phase)], axis=1)
     coefficients, *_ = np.linalg.lstsq(basis, signal, rcond=None)
@@ -84,7 +82,7 @@ def orders(
         phase, signal = np.concatenate(phases), np.concatenate(signals)
         step = max(phase.size // 10000, 1)
         phase, signal = phase[::step], signal[::step]
-        shares.append(_harmonic_share(phase, signal) * min(1.0, phase.size / 1000.0) if phase.size > 100 else 0.0)
+        shares.append(harmonic_share(phase, signal) * min(1.0, phase.size / 1000.0) if phase.size > 100 else 0.0)
     best = [float(_ORDERS[index]) for index in np.argsort(shares)[::-1][:most]]
     return list(dict.fromkeys((*best, 1.0, 2.0)))
 

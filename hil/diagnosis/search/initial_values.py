@@ -8,8 +8,6 @@ varies along the screw have the same effect. After a search found one of these s
 started at strengths with the same torque at creep, where all torque is Coulomb friction.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -76,18 +74,9 @@ def scene(runs: Sequence[Measured], bench: Bench, blocks: Sequence[dict[str, Flo
     periods = estimate.friction_periods(runs, found, ratio)
     orders = estimate.orders(runs, found, physics.angle_per_unit)
     turns = [lead / order for order in dict.fromkeys((1.0, 2.0, *orders)) if _SHORTEST_M < lead / order < travel]
-    orders = list(
-        dict.fromkeys(
-            (
-                *orders,
-                *(
-                    float(round(lead / period))
-                    for period in periods
-                    if abs(lead / period - round(lead / period)) < _WHOLE and period < lead
-                ),
-            )
-        )
-    )
+    per_lead = [lead / period for period in periods if period < lead]
+    whole = [float(round(order)) for order in per_lead if abs(order - round(order)) < _WHOLE]
+    orders = list(dict.fromkeys((*orders, *whole)))
     ripple = [
         d.torque / np.where(np.abs(run.torque) > 0.2 * physics.coulomb_n_m, run.torque, np.inf)
         for run, d in zip(runs, found, strict=True)

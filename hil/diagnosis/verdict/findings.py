@@ -5,8 +5,6 @@ of that finding. Real contacts follow no law of the library exactly, and drag fi
 hold: a Stribeck curve beside a large drag has little energy because it acts at low speed alone.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

@@ -12,8 +12,6 @@ evidence that a finding needs:
     visible = | (1 - P) (r(with) - r(without)) |^2,   P: projection on the derivatives by the nominal parameters
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection
 

@@ -94,7 +94,8 @@ def fit_inverse_dynamics(
     columns = (acceleration, velocity, np.sign(velocity), np.ones_like(velocity))
     regressors = np.column_stack([_decimate(column[settled], decimation) for column in columns])
     fit = solve(regressors, _decimate(force[settled], decimation))
-    return InverseDynamics(recording.kind, *fit.values.tolist(), *fit.std_errors.tolist(), fit.relative_error)
+    values_and_errors = np.concatenate([fit.values, fit.std_errors]).tolist()
+    return InverseDynamics(recording.kind, *values_and_errors, relative_error=fit.relative_error)
 
 
 def _forwards_and_backwards(coefficients: tuple[FloatArray, FloatArray], values: FloatArray) -> FloatArray:

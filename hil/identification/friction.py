@@ -113,8 +113,8 @@ def identify_friction(
             f"{settling_s + ENDING_S + AVERAGED_MIN_S:g} s; record profiles/friction_sweep.yaml"
         )
     fit = solve(np.column_stack([np.sign(speed), speed, np.ones_like(speed)]), torque)
-    values_and_errors = np.concatenate([fit.values, fit.std_errors]).tolist()
-    return FrictionResult(recording.kind, points, *values_and_errors, residual_rms=fit.residual_rms)
+    figures = np.concatenate([fit.values, fit.std_errors, [fit.residual_rms]])
+    return FrictionResult(recording.kind, points, *figures.tolist())
 
 
 def constant_feed_stretches(velocity_command_m_s: FloatArray) -> list[tuple[int, int]]:

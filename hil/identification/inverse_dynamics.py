@@ -64,8 +64,8 @@ def fit_inverse_dynamics(
 ) -> InverseDynamics:
     """Fit motor torque (linear axis: force) over the motion of the motor encoder.
 
-    The published evaluation keeps the end of the record, where the filters have not settled; with `cut_at_end`
-    = 49 samples it is treated like the start, which is better for a record that ends in motion.
+    The published evaluation keeps the end of the record, where the filters have not settled; `cut_at_end` = 49 samples
+    is better for a record that ends in motion.
 
     Raises InputError if the record is too short, sampled too slowly, or does not move both ways.
     """
@@ -94,8 +94,8 @@ def fit_inverse_dynamics(
     columns = (acceleration, velocity, np.sign(velocity), np.ones_like(velocity))
     regressors = np.column_stack([_decimate(column[settled], decimation) for column in columns])
     fit = solve(regressors, _decimate(force[settled], decimation))
-    values_and_errors = np.concatenate([fit.values, fit.std_errors]).tolist()
-    return InverseDynamics(recording.kind, *values_and_errors, relative_error=fit.relative_error)
+    figures = np.concatenate([fit.values, fit.std_errors, [fit.relative_error]])
+    return InverseDynamics(recording.kind, *figures.tolist())
 
 
 def _forwards_and_backwards(coefficients: tuple[FloatArray, FloatArray], values: FloatArray) -> FloatArray:

@@ -20,7 +20,7 @@ from hil.identification.estimator import Fit
 from hil.twin.mechanism import Block
 from hil.twin.structure.chain import Chain
 
-TABLE = (Block.TABLE.value, "table, its guides, and what acts on them")
+TABLE = (Block.TABLE.value, "table, its guides and external forces")
 ENCODER = (Block.SENSOR.value, "linear encoder")
 
 # Least share of k e in the torque, and least correlation of both, for a force on the table. On development axes the

@@ -9,9 +9,8 @@ from hil.identification.dataset import Dataset, Measured
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.terms import Term
 
-_MEMORY_S = (
-    0.03  # time over which a change of the table's error is assigned to a row: several time constants of the observer
-)
+# Time over which a change of the table's error is assigned to a row: several time constants of the observer.
+_MEMORY_S = 0.03
 
 
 @dataclass(frozen=True, eq=False)

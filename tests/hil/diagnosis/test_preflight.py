@@ -130,7 +130,7 @@ def test_wrong_unit_of_the_torque(run: Recording, factor: float, unit: str) -> N
 def test_a_negative_mass_is_a_wrong_sign_and_no_result(run: Recording) -> None:
     message = refused(changed(run, torque_n_m=-1.0, torque_command_n_m=-1.0))
     assert "torque_n_m has the wrong sign" in message
-    assert "no mass is negative" in message
+    assert "its regression gives a negative inertia" in message
 
 
 def test_saturation_throughout(run: Recording) -> None:

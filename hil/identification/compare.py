@@ -35,14 +35,14 @@ Progress = Callable[[str, float | None], None]  # name of the step, share that i
 class Comparison:
     """Deviations of a recording from the twin of `bench`; with a `fit`, `bench` has the fitted parameters.
 
-    `channels` are in closed loop, the torque last; `blocks` holds each block with its deviation.
+    `channels` are in closed loop, the torque last; `blocks` are block by block.
     """
 
     recording: Recording
     measured: Measured
     bench: Bench
     channels: tuple[Deviation, ...]
-    blocks: tuple[tuple[BlockDeviation, Deviation], ...]
+    blocks: tuple[BlockDeviation, ...]
     fit: FitResult | None
     inverse_dynamics: InverseDynamics | None
     notes: tuple[str, ...]
@@ -102,7 +102,7 @@ class Comparison:
         return over_time(f"{self.recording.name}: {what}", self.measured.time_s, panels, rows)
 
     def as_json(self) -> dict[str, Any]:
-        """Return the numbers as written to comparison.json; SI units in the names or beside them."""
+        """Return the numbers as written to compare.json; SI units in the names or beside them."""
         noise = self.measured.noise
         return {
             "schema_version": SCHEMA_VERSION,
@@ -121,8 +121,12 @@ class Comparison:
             },
             "channels": {channel.name: _figures(channel) for channel in self.channels},
             "blocks": {
-                block.block: {"inputs": block.inputs, "output": block.output, **_figures(deviation)}
-                for block, deviation in self.blocks
+                block.deviation.name: {
+                    "inputs": block.inputs,
+                    "output": block.deviation.label,
+                    **_figures(block.deviation),
+                }
+                for block in self.blocks
             },
             "parameters": [vars(parameter) for parameter in self.fit.parameters] if self.fit else None,
             "inverse_dynamics": vars(self.inverse_dynamics) if self.inverse_dynamics else None,
@@ -164,10 +168,7 @@ def compare(
         channels = motion_channels(measured, motor_m, simulated_m)
     name, label, unit = ("force_n", "motor force", "N") if linear else ("torque_n_m", "motor torque", "N m")
     channels.append(Deviation(name, label, unit, measured.torque, response.torque, judged))
-    blocks = tuple(
-        (block, Deviation(block.block, block.output, block.unit, block.measured, block.simulated, judged))
-        for block in compare_blocks(Hypothesis(bench), data)
-    )
+    blocks = compare_blocks(Hypothesis(bench), data)
     inverse, remarks = _inverse_dynamics(recording) if linear else (None, [])
     notes = (*_notes(measured, bench, fitted, datum), *remarks)
     return Comparison(recording, measured, bench, tuple(channels), blocks, fitted, inverse, notes)

@@ -70,21 +70,12 @@ class Deviation:
 
 @dataclass(frozen=True, eq=False)
 class BlockDeviation:
-    """Output (n,) of one block, measured and simulated from measured inputs."""
+    """Deviation of the output of one block that is fed with measured inputs."""
 
-    block: str
+    deviation: Deviation  # named after the block, labelled by its output
     inputs: str
-    output: str
-    unit: str
-    measured: FloatArray
-    simulated: FloatArray
     noise: float  # standard deviation at the noise floor; 0 if not known
     remark: str = ""
-
-    @property
-    def deviation(self) -> FloatArray:
-        """Measured less simulated (n,)."""
-        return np.asarray(self.measured - self.simulated)
 
 
 def compare_blocks(hypothesis: Hypothesis, data: Dataset) -> tuple[BlockDeviation, ...]:
@@ -100,41 +91,25 @@ def compare_blocks(hypothesis: Hypothesis, data: Dataset) -> tuple[BlockDeviatio
         )
     else:
         remark = ""
+    judged = run.judged
     command = run.torque_command - left["command"]
-    inputs = "set-points, measured positions"
-    blocks = [BlockDeviation("controller", inputs, f"{name} command", unit, run.torque_command, command, 0.0, remark)]
+    controller = Deviation("controller", f"{name} command", unit, run.torque_command, command, judged)
+    blocks = [BlockDeviation(controller, "set-points, measured positions", 0.0, remark)]
     if not run.torque_is_command:
-        simulated = run.torque - left["torque"]
-        noise = run.noise.torque
-        blocks.append(BlockDeviation("drive", f"measured {name} command", name, unit, run.torque, simulated, noise))
+        drive = Deviation("drive", name, unit, run.torque, run.torque - left["torque"], judged)
+        blocks.append(BlockDeviation(drive, f"measured {name} command", run.noise.torque))
     held = _mechanics(hypothesis, run, data.observer_s)
     torque = inertia(data.bench) / data.observer_s**2  # torque per innovation
-    blocks.append(
-        BlockDeviation(
-            "motor and load",
-            f"measured {name}, held on the measured motor position",
-            name,
-            unit,
-            run.torque,
-            run.torque + torque * held["motor"],
-            torque * rms(scale["motor"][run.judged]),
-            f"deviation: {name} missing in the twin's mechanics, up to {0.5 / np.pi / data.observer_s:.0f} Hz",
-        )
-    )
+    motor = Deviation("motor and load", name, unit, run.torque, run.torque + torque * held["motor"], judged)
+    inputs = f"measured {name}, held on the measured motor position"
+    remark = f"deviation: {name} missing in the twin's mechanics, up to {0.5 / np.pi / data.observer_s:.0f} Hz"
+    blocks.append(BlockDeviation(motor, inputs, torque * rms(scale["motor"][judged]), remark))
     if "table" in held:
         stretch = run.table_m - bench.axis.ratio_m_rad * run.motor
-        stretch = stretch - np.mean(stretch[run.judged])
-        blocks.append(
-            BlockDeviation(
-                "transmission and table",
-                "measured motor position (twin held on it)",
-                "table less motor position",
-                "m",
-                stretch,
-                stretch - held["table"],
-                run.noise.table_m,
-            )
-        )
+        stretch = stretch - np.mean(stretch[judged])
+        label = "table less motor position"
+        table = Deviation("transmission and table", label, "m", stretch, stretch - held["table"], judged)
+        blocks.append(BlockDeviation(table, "measured motor position (twin held on it)", run.noise.table_m))
     return tuple(blocks)
 
 

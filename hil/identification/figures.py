@@ -33,10 +33,10 @@ def block_panels(result: Comparison) -> list[Panel]:
     """Panels of each block's output, measured and simulated, each followed by the deviation."""
     return [
         panel
-        for block, deviation in result.blocks
+        for block in result.blocks
         for panel in (
-            _pair(f"{block.block}:\n{block.output}", deviation),
-            _difference("deviation", deviation, block.noise),
+            _pair(f"{block.deviation.name}:\n{block.deviation.label}", block.deviation),
+            _difference("deviation", block.deviation, block.noise),
         )
     ]
 

@@ -44,7 +44,7 @@ def shared(name: str) -> Path:
 
 
 def block_rms(result: Comparison) -> dict[str, float]:
-    return {block.block: deviation.rms for block, deviation in result.blocks}
+    return {block.deviation.name: block.deviation.rms for block in result.blocks}
 
 
 def test_an_axis_as_believed_leaves_noise(clean: Comparison) -> None:
@@ -205,7 +205,7 @@ def test_the_other_rigs_are_not_explained_by_parameters(folder: str, block: str)
     result = compare(recording, bench, fit=True)
     assert not result.explained
     over: dict[str, Any] = {
-        part.block: deviation.rms / part.noise for part, deviation in result.blocks if part.noise > 0.0
+        part.deviation.name: part.deviation.rms / part.noise for part in result.blocks if part.noise > 0.0
     }
     assert over[block] > 3.0
     assert over["drive"] < 1.1

@@ -168,6 +168,7 @@ def compare(
         channels = motion_channels(measured, motor_m, simulated_m)
     name, label, unit = ("force_n", "motor force", "N") if linear else ("torque_n_m", "motor torque", "N m")
     channels.append(Deviation(name, label, unit, measured.torque, response.torque, judged))
+    progress("block by block", None)
     blocks = compare_blocks(Hypothesis(bench), data)
     inverse, remarks = _inverse_dynamics(recording) if linear else (None, [])
     notes = (*_notes(measured, bench, fitted, datum), *remarks)

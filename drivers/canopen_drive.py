@@ -12,7 +12,7 @@ from typing import Final
 
 from drivers.bus import BusState
 from drivers.canopen_master import CanopenMaster
-from drivers.cia402 import ENABLE_OPERATION, STATE_BY_STATUS, DriveState, Mode, next_controlword
+from drivers.cia402 import ENABLE_OPERATION, STATE_BY_STATUS, DriveState, OperationMode, next_controlword
 from drivers.cia402_setup import (
     CONTROLWORD,
     FEEDBACK,
@@ -75,10 +75,10 @@ class CanopenDrive(Drive):
 
     # -- before the loop --------------------------------------------------------------------------------------------
 
-    def _take_mode(self, mode: Mode) -> None:
+    def _take_mode(self, mode: OperationMode) -> None:
         self._pack = layout([CONTROLWORD, TARGET[mode]]).pack
         self._target_bits = TARGET[mode].bits
-        self._holds_position = TARGET[mode].index == TARGET[Mode.CYCLIC_SYNC_POSITION].index
+        self._holds_position = TARGET[mode].index == TARGET[OperationMode.CYCLIC_SYNC_POSITION].index
 
     def set_up(self, settings: DriveSettings | None = None) -> None:
         """Identity, units, mode, limits, watchdogs, PDOs; blocking, switches the power stage off.
@@ -92,7 +92,7 @@ class CanopenDrive(Drive):
         self.info = info = answer.info
         self._rad_per_count = info.rad_per_count
         self._n_m_per_mille = info.torque_resolution_n_m
-        in_torque = self.settings.mode is Mode.CYCLIC_SYNC_TORQUE
+        in_torque = self.settings.mode is OperationMode.CYCLIC_SYNC_TORQUE
         self._target_per_unit = 1 / (info.torque_resolution_n_m if in_torque else info.rad_per_count)
         self._raw_counts = self._counts = answer.counts
         self._statusword = answer.statusword

@@ -1,4 +1,4 @@
-"""A homing run of a drive in Mode.HOMING, tick by tick, to a proven stop on the reference."""
+"""A homing run of a drive in OperationMode.HOMING, tick by tick, to a proven stop on the reference."""
 
 from __future__ import annotations
 

@@ -56,7 +56,7 @@ class Controlword(IntFlag):
     HALT = 1 << 8
 
 
-class Mode(IntEnum):
+class OperationMode(IntEnum):
     """Modes of operation, objects 0x6060 and 0x6061."""
 
     NONE = 0

@@ -8,16 +8,16 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from drivers.canopen_master import NMT_PRE_OPERATIONAL, CanopenMaster
-from drivers.cia402 import Mode
+from drivers.cia402 import OperationMode
 from drivers.pdo import EVENT_DRIVEN, EVERY_SYNC, Entry
 from drivers.port import ConfigurationError
 from drivers.sdo_setup import EDS_FOLDER, DeviceSetup
 
 TARGET: Final = {
-    Mode.CYCLIC_SYNC_TORQUE: Entry(0x6071, 0, 16, True),
-    Mode.CYCLIC_SYNC_VELOCITY: Entry(0x60FF, 0, 32, True),
-    Mode.CYCLIC_SYNC_POSITION: Entry(0x607A, 0, 32, True),
-    Mode.HOMING: Entry(0x607A, 0, 32, True),
+    OperationMode.CYCLIC_SYNC_TORQUE: Entry(0x6071, 0, 16, True),
+    OperationMode.CYCLIC_SYNC_VELOCITY: Entry(0x60FF, 0, 32, True),
+    OperationMode.CYCLIC_SYNC_POSITION: Entry(0x607A, 0, 32, True),
+    OperationMode.HOMING: Entry(0x607A, 0, 32, True),
 }
 CONTROLWORD: Final = Entry(0x6040, 0, 16)
 FEEDBACK: Final = (Entry(0x6041, 0, 16), Entry(0x6064, 0, 32, True), Entry(0x6077, 0, 16, True))
@@ -38,7 +38,7 @@ class DriveSettings:
     """How the drive is to run. Rotary: rad and N m; linear drives: m and N."""
 
     node_id: int = 5
-    mode: Mode = Mode.CYCLIC_SYNC_TORQUE
+    mode: OperationMode = OperationMode.CYCLIC_SYNC_TORQUE
     period_s: float = 0.001
     eds: Path = EDS_FOLDER / "servo_drive.eds"
     serial_number: int | None = None  # None: any of the described type
@@ -47,7 +47,7 @@ class DriveSettings:
     max_torque_n_m: float | None = None  # 0x6072; None: as the drive has it
     quick_stop_rad_s2: float | None = None  # 0x6085; None: as the drive has it
     command_transmission: int = EVENT_DRIVEN  # RPDO: acts at once (255) or at the next SYNC (1)
-    homing: HomingSettings | None = None  # for Mode.HOMING; None: as the drive has it
+    homing: HomingSettings | None = None  # for OperationMode.HOMING; None: as the drive has it
     travel_per_rev: float = 2 * math.pi  # rad per revolution; linear drives: m per "revolution" of 0x608F
 
 
@@ -85,14 +85,14 @@ def set_up_drive(master: CanopenMaster, settings: DriveSettings) -> DriveAnswer:
             )  # fmt: skip
         device.disable_pdos()
         device.write_only(0x6040, 0, 0)
-        device.write_only(0x6060, 0, Mode.NONE)  # a mode left over must not enable on an old target
+        device.write_only(0x6060, 0, OperationMode.NONE)  # a mode left over must not enable on an old target
         info = _read_info(device, settings)
         device.write(0x6060, 0, settings.mode, read_back=(0x6061, 0))
         if settings.max_torque_n_m is not None:
             device.write(0x6072, 0, round(settings.max_torque_n_m / info.torque_resolution_n_m))
         if settings.quick_stop_rad_s2 is not None:
             device.write(0x6085, 0, round(settings.quick_stop_rad_s2 / info.rad_per_count))
-        if settings.mode is Mode.HOMING and settings.homing is not None:
+        if settings.mode is OperationMode.HOMING and settings.homing is not None:
             _write_homing(device, settings.homing, info.rad_per_count)
         _write_watchdogs(device, master, settings)
         commands = (CONTROLWORD, TARGET[settings.mode])

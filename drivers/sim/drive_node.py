@@ -11,7 +11,7 @@ import math
 from pathlib import Path
 
 from drivers.bus import CanPort
-from drivers.cia402 import Controlword, DriveState, Mode, Statusword
+from drivers.cia402 import Controlword, DriveState, OperationMode, Statusword
 from drivers.port import PlantLike, ServoLike, ServoTarget
 from drivers.sim.can_node import EDS_FOLDER, SimulatedDevice
 from drivers.sim.cia402_device import REMOTE, STATUS, next_state
@@ -28,7 +28,7 @@ _TARGET_TORQUE, _TARGET_POSITION, _TARGET_VELOCITY = key_of(0x6071), key_of(0x60
 _ERROR_CODE, _QUICK_STOP_DECELERATION = key_of(0x603F), key_of(0x6085)
 _FOLLOWING_ERROR, _FOLLOWING_ERROR_WINDOW = key_of(0x60F4), key_of(0x6065)
 
-_SERVO_MODES = (Mode.HOMING, Mode.CYCLIC_SYNC_POSITION, Mode.CYCLIC_SYNC_VELOCITY)
+_SERVO_MODES = (OperationMode.HOMING, OperationMode.CYCLIC_SYNC_POSITION, OperationMode.CYCLIC_SYNC_VELOCITY)
 _SWITCHED_ON = DriveState.SWITCHED_ON  # bound once: looking a member up costs the loop
 _STOPPING = (DriveState.QUICK_STOP_ACTIVE, DriveState.FAULT_REACTION_ACTIVE)
 _FOLLOWING_ERROR_CODE = 0x8611  # CiA 402-2
@@ -100,13 +100,13 @@ class SimulatedDrive(SimulatedDevice):
     def _refresh_drive(self) -> None:
         """What follows from state and mode, worked out here and not every cycle."""
         enabled = self.state is DriveState.OPERATION_ENABLED
-        self._direct = enabled and self.values[_MODE] == Mode.CYCLIC_SYNC_TORQUE
+        self._direct = enabled and self.values[_MODE] == OperationMode.CYCLIC_SYNC_TORQUE
         self._idle = not enabled and self.state not in _STOPPING
         if not self._direct:
             self._torque_n_m = 0.0
         self._homing = None
         self._last_target = self.values[_POSITION]
-        follows = enabled and self.values[_MODE] != Mode.HOMING
+        follows = enabled and self.values[_MODE] != OperationMode.HOMING
         self._status(Statusword.FOLLOWS_COMMAND if follows else 0)
 
     def _status(self, extra: int) -> None:
@@ -133,7 +133,7 @@ class SimulatedDrive(SimulatedDevice):
                 self.values[_ERROR_CODE] = 0
                 self.emergency(0, 0, now_s)
             self._set_state(state)
-        if self.state is DriveState.OPERATION_ENABLED and self.values[_MODE] == Mode.HOMING:
+        if self.state is DriveState.OPERATION_ENABLED and self.values[_MODE] == OperationMode.HOMING:
             self._take_homing_start(bool(controlword & Controlword.HOMING_START))
 
     def _take_homing_start(self, start: bool) -> None:
@@ -182,7 +182,9 @@ class SimulatedDrive(SimulatedDevice):
         self._take_controlword(self._last_s)
 
     def _on_mode(self, index: int, subindex: int, value: int) -> None:
-        known = value in (Mode.NONE, Mode.CYCLIC_SYNC_TORQUE) or (self._loops.closed and value in _SERVO_MODES)
+        known = value in (OperationMode.NONE, OperationMode.CYCLIC_SYNC_TORQUE) or (
+            self._loops.closed and value in _SERVO_MODES
+        )
         if not known:
             raise SdoAbort(AbortCode.INVALID_VALUE)
         if self.state is DriveState.OPERATION_ENABLED:
@@ -236,11 +238,11 @@ class SimulatedDrive(SimulatedDevice):
                 self._set_state(DriveState.FAULT if fault else DriveState.SWITCH_ON_DISABLED)
                 return loops.advance(None, self.period_s, 0.0)
             target = stop
-        elif mode == Mode.CYCLIC_SYNC_VELOCITY:
+        elif mode == OperationMode.CYCLIC_SYNC_VELOCITY:
             target = ServoTarget(values[_TARGET_VELOCITY] / self._counts_per_rad)
-        elif mode == Mode.CYCLIC_SYNC_POSITION:
+        elif mode == OperationMode.CYCLIC_SYNC_POSITION:
             target = self._position_target(now_s)
-        elif mode == Mode.HOMING and self._homing is not None:
+        elif mode == OperationMode.HOMING and self._homing is not None:
             target = self._homing_target(self._homing)
         return loops.advance(target, self.period_s, values[_MAX_TORQUE] * self._n_m_per_mille)
 

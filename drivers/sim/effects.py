@@ -15,7 +15,7 @@ from types import MappingProxyType
 
 
 @dataclass(frozen=True)
-class Parameter:
+class ParameterRange:
     """Allowed range [low, high] and, where it may be left out, its default."""
 
     low: float = -inf
@@ -28,17 +28,17 @@ class Definition:
     """Physics in one sentence, parameters by name, forms (the first is the default)."""
 
     physics: str
-    parameters: Mapping[str, Parameter]
+    parameters: Mapping[str, ParameterRange]
     forms: tuple[str, ...] = ("",)
 
 
-_ANY = Parameter()
-_POSITIVE = Parameter(low=1e-12)
-_AT_LEAST_0 = Parameter(low=0.0)
-_PHASE = Parameter()
-_PHASE_0 = Parameter(default=0.0)
-_OFF = Parameter(default=0.0)
-_DELAY = Parameter(low=0.0, high=0.1)
+_ANY = ParameterRange()
+_POSITIVE = ParameterRange(low=1e-12)
+_AT_LEAST_0 = ParameterRange(low=0.0)
+_PHASE = ParameterRange()
+_PHASE_0 = ParameterRange(default=0.0)
+_OFF = ParameterRange(default=0.0)
+_DELAY = ParameterRange(low=0.0, high=0.1)
 _DRIVE_FORMS = ("visible", "hidden")  # hidden: the measured current does not show it
 
 CATALOGUE: Mapping[str, Definition] = MappingProxyType({
@@ -53,25 +53,25 @@ CATALOGUE: Mapping[str, Definition] = MappingProxyType({
         ("gaussian", "exponential", "atan")),
     "presliding_hysteresis": Definition(
         "elastic micro-motion before sliding; damping (lugre only, < 0: chosen for half-critical motor motion)",
-        {"stiffness_n_m_rad": _POSITIVE, "damping_n_m_s_rad": Parameter(default=-1.0)},
+        {"stiffness_n_m_rad": _POSITIVE, "damping_n_m_s_rad": ParameterRange(default=-1.0)},
         ("dahl", "lugre", "gms")),
     "position_dependent_friction": Definition(
         "Coulomb and static friction times 1 + fraction sin(2 pi x / period + phase)",
-        {"fraction": Parameter(-1.0, 1.0), "period_m": _POSITIVE, "phase_rad": _PHASE_0}),
+        {"fraction": ParameterRange(-1.0, 1.0), "period_m": _POSITIVE, "phase_rad": _PHASE_0}),
     "nonlinear_viscous_friction": Definition("drag quadratic v |v|", {"quadratic_n_m_s2_rad2": _AT_LEAST_0}),
     "friction_drift": Definition(
         "all friction times 1 + fraction (1 - exp(-t / time_constant))",
-        {"fraction": Parameter(low=-1.0), "time_constant_s": _POSITIVE}),
+        {"fraction": ParameterRange(low=-1.0), "time_constant_s": _POSITIVE}),
     "cogging_torque": Definition(
         "motor torque + amplitude sin(cycles theta + phase)",
         {"amplitude_n_m": _AT_LEAST_0, "cycles_per_rev": _POSITIVE, "phase_rad": _PHASE}),
     # table
     "table_side_friction": Definition(
-        "this share of the Coulomb and viscous friction acts on the table", {"share": Parameter(0.0, 1.0)}),
+        "this share of the Coulomb and viscous friction acts on the table", {"share": ParameterRange(0.0, 1.0)}),
     "structural_mode": Definition(
         "attached: a mass on a spring on the table; base: the machine base under the axis yields",
-        {"frequency_hz": _POSITIVE, "damping_ratio": Parameter(0.0, 2.0),
-         "mass_ratio": Parameter(1e-6, 1e3, default=0.2)},
+        {"frequency_hz": _POSITIVE, "damping_ratio": ParameterRange(0.0, 2.0),
+         "mass_ratio": ParameterRange(1e-6, 1e3, default=0.2)},
         ("attached", "base")),
     "external_force": Definition(
         "force on the table while start <= t < end", {"force_n": _ANY, "start_s": _ANY, "end_s": _ANY}),
@@ -81,7 +81,7 @@ CATALOGUE: Mapping[str, Definition] = MappingProxyType({
     "backlash": Definition("no force within +-gap/2 of stretch; contacts push only", {"gap_m": _AT_LEAST_0}),
     "preload_loss": Definition(
         "stiffness times stiffness_ratio within +-zone/2 of stretch, full beyond, force continuous",
-        {"zone_m": _AT_LEAST_0, "stiffness_ratio": Parameter(0.0, 1.0)}),
+        {"zone_m": _AT_LEAST_0, "stiffness_ratio": ParameterRange(0.0, 1.0)}),
     "position_dependent_stiffness": Definition(
         "k (1 + relative_slope x), x the table position; relative_slope in 1/m", {"relative_slope": _ANY}),
     "periodic_lead_error": Definition(
@@ -95,7 +95,7 @@ CATALOGUE: Mapping[str, Definition] = MappingProxyType({
     # drive
     "torque_ripple": Definition(
         "torque times 1 + fraction sin(cycles theta + phase), unseen by the current",
-        {"fraction": Parameter(0.0, 1.0), "cycles_per_rev": _POSITIVE, "phase_rad": _PHASE_0}),
+        {"fraction": ParameterRange(0.0, 1.0), "cycles_per_rev": _POSITIVE, "phase_rad": _PHASE_0}),
     "torque_constant_saturation": Definition(
         "torque = u (1 - c u^2), unseen by the current, held at its maximum beyond it",
         {"coefficient_1_n2_m2": _AT_LEAST_0}),
@@ -123,26 +123,26 @@ CATALOGUE: Mapping[str, Definition] = MappingProxyType({
 NOVEL: Mapping[str, Definition] = MappingProxyType({
     "novel_friction_bump": Definition(
         "Coulomb and static friction times 1 + fraction exp(-((x - centre) / width)^2 / 2): a tight spot",
-        {"fraction": Parameter(low=-1.0), "centre_m": _ANY, "width_m": _POSITIVE}),
+        {"fraction": ParameterRange(low=-1.0), "centre_m": _ANY, "width_m": _POSITIVE}),
     "novel_friction_wander": Definition(
         "all friction times 1 + fraction w(t / period), w four sines of incommensurate periods, rms 1",
-        {"fraction": Parameter(0.0, 0.3), "period_s": _POSITIVE, "phase_rad": _PHASE}),
+        {"fraction": ParameterRange(0.0, 0.3), "period_s": _POSITIVE, "phase_rad": _PHASE}),
     "novel_pitch_bump": Definition(
         "table = r theta + height exp(-((r theta - centre) / width)^2 / 2): a dent in the thread",
         {"height_m": _ANY, "centre_m": _ANY, "width_m": _POSITIVE}),
     "novel_mass_change": Definition(
         "from start_s on the table weighs 1 + fraction of its mass: a workpiece is put down or taken away",
-        {"fraction": Parameter(low=-0.9), "start_s": _ANY}),
+        {"fraction": ParameterRange(low=-0.9), "start_s": _ANY}),
     "novel_vibration": Definition(
         "force on the table force (sin(2 pi f t + phase) + ratio sin(2 pi f2 t)): a machine beside it",
-        {"force_n": _AT_LEAST_0, "frequency_hz": _POSITIVE, "phase_rad": _PHASE, "ratio": Parameter(0.0, 1.0),
+        {"force_n": _AT_LEAST_0, "frequency_hz": _POSITIVE, "phase_rad": _PHASE, "ratio": ParameterRange(0.0, 1.0),
          "frequency_2_hz": _POSITIVE}),
     "novel_hammering": Definition(
         "force on the table in pulses of width_s every period_s from start_s on",
         {"force_n": _ANY, "start_s": _ANY, "period_s": _POSITIVE, "width_s": _POSITIVE}),
     "novel_torque_fade": Definition(
         "torque times 1 - fraction (1 - exp(-t / time_constant)), unseen by the current: magnets that warm up",
-        {"fraction": Parameter(-1.0, 1.0), "time_constant_s": _POSITIVE}),
+        {"fraction": ParameterRange(-1.0, 1.0), "time_constant_s": _POSITIVE}),
 })  # fmt: skip
 EFFECTS: Mapping[str, Definition] = MappingProxyType({**CATALOGUE, **NOVEL})
 

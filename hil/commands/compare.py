@@ -19,7 +19,7 @@ def compare(
     from hil.bench.bench_file import load_bench
     from hil.files.output import default_folder, new_folder
     from hil.identification.compare import compare as compare_recording
-    from hil.identification.dataset import bench_of
+    from hil.identification.measured import bench_of
     from hil.recording.recording import read_recording
     from hil.report.compare_report import rows_of, verdict, write_comparison
 

@@ -29,7 +29,7 @@ def diagnose(
     from hil.bench.bench_file import load_bench
     from hil.diagnosis.diagnose import diagnose as diagnose_recordings
     from hil.files.output import default_folder, new_folder
-    from hil.identification.dataset import bench_of
+    from hil.identification.measured import bench_of
     from hil.quantities import quantity
     from hil.recording.recording import read_recording
     from hil.report.diagnosis_report import write_diagnosis

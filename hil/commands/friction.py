@@ -33,8 +33,8 @@ def friction(
     from hil.commands.run import named
     from hil.errors import InputError
     from hil.files.output import default_folder, new_folder
-    from hil.identification.dataset import bench_of
     from hil.identification.friction import identify_friction
+    from hil.identification.measured import bench_of
     from hil.loop.simulated_bench import load_simulated
     from hil.recording.recording import read_recording
     from hil.report.friction_report import rows_of, verdict, write_friction

@@ -1,7 +1,7 @@
-"""Motions that an experiment is chosen from: never farther, faster or harder than the recorded set-points went, unless
-the bench file says how far, how fast and how hard the axis may go."""
+"""Candidate motions of an experiment.
 
-from __future__ import annotations
+They stay within travel, velocity, acceleration and jerk of the recorded set-points or of the bench file.
+"""
 
 import math
 from collections.abc import Sequence
@@ -12,17 +12,17 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
-from hil.identification.dataset import Measured
+from hil.identification.measured import Measured
 from hil.motion.pieces import MotionLimits
 from hil.motion.profile import Profile
 from hil.motion.sine_squared import ramp_duration_s
 
-_WINDOW_S = 0.01  # over which acceleration and jerk of recorded set-points are taken: means, so never too high
-_STRETCH_S = 0.5  # at constant feed, where the travel allows it
-_SHORT_S = 9.0  # shorter motions are repeated: even the third that a diagnosis holds out is seconds then
-_LONG_S = 60.0  # of a motion that shows what changes while the axis runs
-_LONGEST_S = 120.0  # that a bench is asked for
-_CREEP_M_S = (0.001, 0.004, 0.015)  # around the speed where friction falls, and above it
+_WINDOW_S = 0.01  # window of the mean acceleration and jerk of recorded set-points; a mean never exceeds the peak
+_STRETCH_S = 0.5  # duration of constant feed, if the travel allows it: several settling times of a position loop
+_SHORT_S = 9.0  # shorter motions are repeated: a held-out third then lasts 3 s
+_LONG_S = 60.0  # duration of a motion for slow changes, such as friction drift
+_LONGEST_S = 120.0  # limit of the duration of an experiment
+_CREEP_M_S = (0.001, 0.004, 0.015)  # within and above the falling part of the friction curve
 
 Segments = list[dict[str, Any]]
 
@@ -40,8 +40,10 @@ class Reach:
 
 
 def reach(runs: Sequence[Measured], bench: Bench) -> Reach:
-    """What the set-points of the recordings reached, or what the bench file allows. A travel is taken up to where the
-    following error that the bench allows leads out of it."""
+    """Range of the recorded set-points, or of the bench file if it is given there.
+
+    The travel of the bench file is reduced by its largest following error.
+    """
     low = min(float(run.position_command_m.min()) for run in runs)
     high = max(float(run.position_command_m.max()) for run in runs)
     drive = bench.drive
@@ -61,14 +63,14 @@ def reach(runs: Sequence[Measured], bench: Bench) -> Reach:
 
 
 def candidates(found: Reach) -> tuple[list[Profile], list[Profile]]:
-    """The motions that can be made within a reach: up to a quarter of a minute, and longer ones.
+    """Candidate motions within a reach: those of up to 15 s, and longer ones.
 
-    None where the recordings show no acceleration: they were cut out of a constant feed.
+    Both are empty if the recordings have no acceleration (parts of a constant feed).
     """
     if not min(found.velocity_m_s, found.acceleration_m_s2, found.jerk_m_s3) > 0.0:
         return [], []
     top, room = found.velocity_m_s, max(found.high_m - found.start_m, found.start_m - found.low_m)
-    way = 1.0 if found.high_m - found.start_m >= found.start_m - found.low_m else -1.0  # to where there is room
+    way = 1.0 if found.high_m - found.start_m >= found.start_m - found.low_m else -1.0  # to the longer travel
     creep = [part for feed in _CREEP_M_S for part in _reversal(found, way * room, feed)]
     turns = [part for share in (0.1, 0.4) for part in _reversal(found, way * room, _down(share * top))]
     feeds = [part for share in (1.0, 0.5, 0.25, 0.1) for part in _feed(found, way * room, _down(share * top))]
@@ -116,7 +118,7 @@ def candidates(found: Reach) -> tuple[list[Profile], list[Profile]]:
 
 
 def _repeated(found: Reach, description: str, segments: Segments, least_s: float) -> Profile:
-    """A profile of the segments, as often as it takes to last `least_s`."""
+    """Profile of the segments, repeated to last at least `least_s`."""
     limits = {
         "velocity_m_s": found.velocity_m_s,
         "acceleration_m_s2": found.acceleration_m_s2,
@@ -138,7 +140,7 @@ def _repeated(found: Reach, description: str, segments: Segments, least_s: float
 
 
 def _reversal(found: Reach, way_m: float, feed_m_s: float) -> Segments:
-    """Triangles as long as a stretch and the turns take; nothing where the feed or the travel does not allow them."""
+    """Triangles with stretches of constant feed; empty if the feed or the travel does not allow them."""
     stroke_m = _stroke_m(found, feed_m_s, 2.0 * feed_m_s)
     if feed_m_s > found.velocity_m_s or stroke_m > abs(way_m):
         return []
@@ -152,7 +154,7 @@ def _feed(found: Reach, way_m: float, feed_m_s: float) -> Segments:
 
 
 def _stroke_m(found: Reach, feed_m_s: float, step_m_s: float) -> float:
-    """Way of a stretch at constant feed and of the ramps over a step of velocity."""
+    """Stroke of a stretch at constant feed and of the ramps over a step of velocity."""
     limits = MotionLimits(found.velocity_m_s, found.acceleration_m_s2, found.jerk_m_s3)
     return _down(feed_m_s * (_STRETCH_S + ramp_duration_s(step_m_s, limits)))
 
@@ -180,7 +182,7 @@ def _slope(values: FloatArray, period_s: float) -> FloatArray:
 
 
 def _down(value: float) -> float:
-    """Four digits, not above."""
+    """Round down to four digits."""
     if value <= 0.0:
         return value
     factor = 10.0 ** (3 - math.floor(math.log10(value)))

@@ -1,4 +1,4 @@
-"""The diagnosis of recordings: is there a mismatch, where, of what kind, by which physics, and does that help?"""
+"""Diagnose recordings: detect, locate and classify a mismatch, name the missing physics, and validate it."""
 
 from __future__ import annotations
 
@@ -17,15 +17,14 @@ from hil.diagnosis.preflight import prepare
 from hil.diagnosis.result import ChannelFit, Location, Mode, NextExperiment, Result, Unexplained, Verdict
 from hil.diagnosis.search.forward_selection import Explanation, explain
 from hil.diagnosis.verdict.cross_validation import CrossValidation, cross_validate, explained_share
-from hil.diagnosis.verdict.curve_forms import form_of
-from hil.diagnosis.verdict.findings import corrections, diagnosed_bench, findings, renamed
+from hil.diagnosis.verdict.findings import corrections, diagnosed_bench, findings, form_of, renamed
 from hil.diagnosis.verdict.fit_table import channel_names, channel_residuals, fit_table
-from hil.diagnosis.verdict.judge import judge
-from hil.diagnosis.verdict.observability import not_testable
-from hil.diagnosis.wording import title, where_in_short
+from hil.diagnosis.verdict.judge import judge, not_testable
+from hil.diagnosis.wording import title, titles, where_in_short
 from hil.errors import InputError
-from hil.identification.dataset import Dataset, Measured, prepare_dataset
+from hil.identification.dataset import Dataset, prepare_dataset
 from hil.identification.estimator import Fit, FitStatus
+from hil.identification.measured import Measured
 from hil.identification.noise_floor import FLOOR
 from hil.quantities import digits, quantity
 from hil.recording.recording import Recording
@@ -35,27 +34,26 @@ if TYPE_CHECKING:
 
 Progress = Callable[[str], None]
 
-TRAINED = 2.0 / 3.0  # of a recording, where none is held out
+TRAINED = 2.0 / 3.0  # share of a recording for training if none is held out: a common split
 NEXT_EXPERIMENT = "next_experiment.yaml"
 
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """The result, and what a report draws it from.
+    """Result of a diagnosis, with the fits and data sets that figures are drawn from.
 
-    `final` is the hypothesis that the verdict stands for: `proof.final`, or the refitted nominal twin
-    where no name is given.
+    `final` is the hypothesis of the verdict: `proof.final`, or the nominal twin if there is no finding.
     """
 
     result: Result
     bench: Bench  # with corrected parameters and the new terms
     owner: Bench
     train: Dataset
-    held_out: Dataset  # without runs where nothing was held out
+    held_out: Dataset  # without runs if nothing was held out
     explanation: Explanation
     proof: CrossValidation
     final: Fit
-    experiment: Experiment | None = None  # what to run next; None where nothing is open
+    experiment: Experiment | None = None  # next motion; None if no question is open
 
     def plot(self, what: Literal["residuals", "location", "finding"] = "residuals", number: int = 1) -> Figure:
         """Draw the residuals before and after, the location of the mismatch, or the evidence for finding `number`.
@@ -84,7 +82,7 @@ class Diagnosis:
                 for name, entry in finding.parameters.items()
             ]
             if finding.equivalents:
-                lines.append(f"    not told from {', '.join(map(title, finding.equivalents))} by this motion")
+                lines.append(f"    not distinguishable from {titles(finding.equivalents)} by this motion")
         lines += [
             f"  {name} = {digits(entry.value)} ± {digits(entry.std)} {entry.unit} (bench file {digits(entry.nominal)})"
             for name, entry in self.result.parameter_corrections.items()
@@ -100,17 +98,17 @@ class Diagnosis:
 def diagnose(
     train: Sequence[Recording], validate: Sequence[Recording], bench: Bench, progress: Progress = lambda text: None
 ) -> Diagnosis:
-    """Diagnose recordings of one axis against its bench, and prove the result on recordings of another motion.
+    """Diagnose recordings of one axis against its bench, and validate the result on recordings of another motion.
 
-    Without any of those, the last third of each recording is held out. Raises InputError for recordings that
-    cannot be diagnosed, with all reasons.
+    Without `validate` the last third of each recording is held out. `progress` gets the name of each step. Raises
+    InputError with all reasons if the recordings cannot be diagnosed.
     """
     begin = time.monotonic()
     progress("checking the recordings")
     notes = []
     if not validate:
         train, validate = _split(train)
-        notes.append("No recording was held out: the last third of each is kept for validation.")
+        notes.append("No held-out recording was given: the last third of each recording is used for validation.")
     twice = [held.name for held in validate for run in train if _same(held, run)]
     if twice:
         raise InputError(
@@ -133,14 +131,14 @@ def diagnose(
 
     progress("locating")
     location = None if verdict is Verdict.NO_MISMATCH else locate(before, final)
-    progress("judging the fit")
+    progress("comparing the fits with the noise floor")
     table = fit_table(owner, nominal, final, held_out)
     forms = form_of(explanation, proof.ablations)
     missing = findings(explanation, proof.final, proof.ablations, forms, held_out) if named else ()
-    progress("testing what this motion can show")
+    progress("testing which mechanisms this motion can show")
     hidden = not_testable(final if named else nominal)
-    progress("looking for a motion that would tell more")
-    # with findings only their rivals are open; without, what this motion hides may be the cause
+    progress("designing the next experiment")
+    # with findings only their rivals are in question; without, the cause may be a mechanism that the motion cannot show
     experiment = separating(explanation, proof.final, held_out) if named else showing(nominal, hidden, held_out)
     notes += [*_notes(table, proof, forms, verdict, explanation), *_ended(final)]
     notes += [experiment.note] if experiment else []
@@ -177,8 +175,8 @@ def statement(result: Result) -> str:
             quantity(value, entry.unit) for value in (found.before_rms, found.after_rms, found.noise_floor_rms)
         )
         return (
-            f"Missing physics: {named} With it the twin leaves {after} rms of {name} on "
-            f"{'held-out' if entry.validate_ else 'these'} recordings instead of {before}; the noise is {noise}."
+            f"Missing physics: {named} With it the residual of {name} on {'held-out' if entry.validate_ else 'these'} "
+            f"recordings decreases from {before} to {after} rms; the noise floor is {noise}."
         )
     if result.verdict is Verdict.PARAMETER_ERROR:
         worst = sorted(
@@ -190,14 +188,14 @@ def statement(result: Result) -> str:
             for name, entry in worst[:3]
             if entry.nominal > 0.0
         )
-        return f"No physics is missing; parameters of the bench are wrong: {changes}."
+        return f"No physics is missing; parameters of the bench file are wrong: {changes}."
     if result.verdict is Verdict.NO_MISMATCH:
-        return "The twin explains these recordings down to their noise."
-    return f"The twin misses something that no mechanism of the library explains: {result.unexplained.description}"
+        return "The twin reproduces these recordings to within their noise."
+    return f"The mismatch is not explained by any mechanism of the library: {result.unexplained.description}"
 
 
 def _split(recordings: Sequence[Recording]) -> tuple[list[Recording], list[Recording]]:
-    """The first two thirds of each recording, and the rest."""
+    """Split each recording into the first two thirds and the rest."""
     train, rest = [], []
     for recording in recordings:
         cut = _standstill(recording, round(TRAINED * len(recording)))
@@ -207,14 +205,14 @@ def _split(recordings: Sequence[Recording]) -> tuple[list[Recording], list[Recor
 
 
 def _same(one: Recording, other: Recording) -> bool:
-    """Whether two recordings are one and the same."""
+    """True if two recordings have the same samples."""
     return one.columns.keys() == other.columns.keys() and all(
         np.array_equal(values, other[name]) for name, values in one.columns.items()
     )
 
 
 def _standstill(recording: Recording, row: int) -> int:
-    """The row at rest nearest to `row`, the row itself where none is within a tenth of the recording."""
+    """Return the row at rest nearest to `row`; `row` itself if none is within a tenth of the recording."""
     names = recording.axis
     if names.velocity_command not in recording.columns:
         return row
@@ -242,11 +240,11 @@ def _unexplained(
                 worst[names[name]] = max(worst.get(names[name], 0.0), ratio)
     above = {name: float(np.sqrt(ratio)) for name, ratio in worst.items() if ratio > FLOOR}
     if not above:
-        return Unexplained(share=share, description="Every channel is down to its noise.")
-    text = ", ".join(f"{name} at {digits(above[name])} × its noise" for name in sorted(above, key=lambda n: -above[n]))
+        return Unexplained(share=share, description="Every channel is at its noise floor.")
+    text = ", ".join(f"{name} at {digits(above[name])} × noise rms" for name in sorted(above, key=lambda n: -above[n]))
     if verdict is Verdict.UNEXPLAINED and location is not None:
         text += f"; {where_in_short(location)}"
-    return Unexplained(share=share, description=f"Left above the noise, block by block: {text}.")
+    return Unexplained(share=share, description=f"Residuals above the noise, block by block: {text}.")
 
 
 def _notes(
@@ -258,39 +256,39 @@ def _notes(
 ) -> list[str]:
     notes = []
     if any(entry.floor_from == "repeated_laps" for entry in table.values()):
-        notes.append("The noise floor is what does not repeat from lap to lap.")
+        notes.append("The noise floor is the part of the residuals that does not repeat from lap to lap.")
     else:
         notes.append(
-            "No motion repeats: the noise floor is the white noise of the sensors, in closed loop with what "
-            "the axis does because of it, so that disturbances of the axis count as mismatch."
+            "No motion repeats: the noise floor is the white noise of the sensors, in closed loop including the "
+            "response of the axis to it. Random disturbances of the axis therefore count as mismatch."
         )
     blocks = [name for name, entry in table.items() if entry.mode is Mode.BLOCKS]
     if blocks:
         notes.append(
-            f"Figures of {', '.join(blocks)} are block by block, fed with measured inputs: in closed loop the "
-            "twin strays from the recording by more than its noise although every block is at its floor."
+            f"Figures of {', '.join(blocks)} are block by block, with measured inputs: in closed loop the twin "
+            "deviates from the recording by more than the noise although every block is at its floor (chaotic loop)."
         )
     notes += [
-        f"{title(ablation.term.effect)} was dropped: it fits the training recordings, but held-out ones or "
-        "repeated laps speak against it."
+        f"{title(ablation.term.effect)} was dropped: it improves the fit to the training recordings, but worsens that "
+        "to held-out recordings or repeated laps."
         for ablation in proof.dropped
     ]
     notes += [
-        f"{title(ablation.term.effect)} does not show in the held-out recordings: it is not proven there."
+        f"{title(ablation.term.effect)} has no visible effect in the held-out recordings: it is not validated by them."
         for index, ablation in enumerate(proof.ablations)
         if index not in forms and ablation.gain is not None and not ablation.shown
     ]
     if verdict is Verdict.UNEXPLAINED and explanation.terms:
         tried = ", ".join(title(term.effect) for term in explanation.terms)
-        notes.append(f"The nearest mechanisms ({tried}) leave too much of it, so that none is named.")
+        notes.append(f"The closest mechanisms ({tried}) leave too much of the mismatch unexplained; none is reported.")
     return notes
 
 
 def _ended(final: Fit) -> list[str]:
-    """How the final fit ended, if it did not converge between the bounds of its parameters."""
+    """Notes on a final fit that did not converge, or converged at a bound of a parameter."""
     if final.status is FitStatus.OUT_OF_STEPS:
-        return ["The final fit ended before it converged: its parameters are the best so far."]
+        return ["The final fit stopped before it converged: its parameters are the best so far."]
     names = ", ".join(name.split(".")[-1] for name in final.at_bound)
     if final.status is FitStatus.PARAMETER_AT_BOUND:
-        return [f"In the final fit {names} ended at a bound of what is possible."]
+        return [f"In the final fit {names} ended at the bound of the allowed range."]
     return []

@@ -1,10 +1,10 @@
-"""The motion that separates what the recorded one cannot: T-optimal design (Atkinson and Fedorov 1975).
+"""Design the motion that separates mechanisms that the recorded one cannot: T-optimal (Atkinson and Fedorov 1975).
 
     evidence = min over a of  |J_o a|^2 + |r + J a|^2,  less the same of the truth
 
-One hypothesis is taken as the truth: its closed loop over a candidate's set-points is a recording without noise. r are
-the residuals of the other on it, block by block in units of noise, J their derivatives, J_o those on the recordings
-that there are: what these have fixed is free no more. The evidence must be had whichever of the two is true.
+One hypothesis is assumed true: its closed loop over a candidate's set-points is a recording without noise. r are the
+residuals of the other on it, block by block in units of noise, J their derivatives, and J_o those on the existing
+recordings, which restrict the parameters. The evidence is the lower one of both assignments of the truth.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -20,11 +20,12 @@ from hil.bench.bench_file import Bench
 from hil.diagnosis.candidate_motions import candidates, reach
 from hil.diagnosis.search.forward_selection import ALIKE, TIED, Explanation
 from hil.diagnosis.verdict.findings import rivals_of
-from hil.diagnosis.verdict.observability import not_testable
+from hil.diagnosis.verdict.judge import not_testable
 from hil.diagnosis.wording import title
-from hil.identification.dataset import Dataset, Measured
+from hil.identification.dataset import Dataset
 from hil.identification.estimator import Estimator, Fit, in_parallel
 from hil.identification.hypothesis import Hypothesis
+from hil.identification.measured import Measured
 from hil.identification.terms import SAME, ambiguous, compatible
 from hil.motion.profile import Profile
 from hil.motion.trajectory import Trajectory, plan
@@ -32,17 +33,17 @@ from hil.quantities import digits
 from hil.twin.axis import Start
 from hil.twin.library import BY_ID
 
-_SURE = 2.0  # times as visible as needed must be what a motion shows that nobody has made yet
+_SURE = 2.0  # factor on the visibility needed: a margin for the difference of a real recording from its simulation
 
-Question = tuple[str, ...]  # two effects to be told apart, or one to be shown
+Question = tuple[str, ...]  # two effects to be distinguished, or one to be shown
 Answers = Mapping[Question, float]
 
 
 @dataclass(frozen=True, eq=False)
 class Experiment:
-    """The motion to run next, the mechanisms that it tells apart or shows, and what is expected of it in words.
+    """The motion to run next, the mechanisms that it distinguishes or shows, and a note on the expected result.
 
-    `profile` is None where no motion within the reach of the recordings answers anything.
+    `profile` is None if no motion within the reach of the recordings answers a question.
     """
 
     profile: Profile | None
@@ -66,32 +67,33 @@ class _Alternative:
 
 
 def separating(explanation: Explanation, final: Fit, held_out: Dataset) -> Experiment | None:
-    """The motion that tells the terms of `final` from the rivals that the recordings tie with them; None without any.
+    """Design the motion that separates the terms of `final` from their tied rivals; None if there are none.
 
-    Of the motions that separate most of them it is the one with the most evidence per second for the hardest.
+    Of the motions that separate most pairs it is the one with the most evidence per second for the hardest pair.
     """
     train = final.data
     pairs = [pair for index in range(len(final.terms)) for pair in permutations(_group(explanation, final, index), 2)]
     if not pairs:
         if not any(map(ambiguous, final.terms)):
             return None
-        return Experiment(None, (), f"No motion tells {_pairs([SAME])}: they are the same torque on every one.")
+        return Experiment(None, (), f"No motion distinguishes {_pairs([SAME])}: both cause the same torque on each.")
 
     asked: set[Question] = {tuple(sorted((truth.effect, other.effect))) for truth, other in pairs}
 
     known, channels = final.rows, final.rows / train.rows
 
     def enough(trajectory: Trajectory) -> float:
-        # beside what is recorded, the difference must be one that tells (see `Rival.tied`)
+        # with the existing recordings, the difference must refute the rival (see `RivalFit.tied`)
         return max(TIED, ALIKE * (known + channels * len(trajectory)))
 
     def answers(trajectory: Trajectory) -> Answers:
         found, least = dict.fromkeys(asked, np.inf), enough(trajectory)
         for truth, other in pairs:
             question = tuple(sorted((truth.effect, other.effect)))
-            if found[question] >= least:  # not already open the other way round
+            if found[question] >= least:  # else the other assignment of the truth is below already
                 run = _imagined(truth, trajectory, train.runs[0])
-                found[question] = min(found[question], _left(other, run) - _own(truth, run))
+                # on its own run the truth leaves rounding and the settling of the observer
+                found[question] = min(found[question], _left(other, run) - truth.on(run).cost)
         return found
 
     best = _best(
@@ -103,17 +105,17 @@ def separating(explanation: Explanation, final: Fit, held_out: Dataset) -> Exper
         lambda one: (len(one.answered), one.worth / one.duration_s),
     )
     if best is None:
-        return Experiment(None, (), f"No motion within the reach of these recordings tells {_pairs(asked)}.")
+        return Experiment(None, (), f"No motion within the range of these recordings distinguishes {_pairs(asked)}.")
     return Experiment(
         best.profile,
         best.effects,
-        f"{best.what} is expected to tell {_pairs(best.answered)}, with "
+        f"{best.what} is expected to distinguish {_pairs(best.answered)}, with "
         f"evidence of {digits(best.worth)} or more, where {TIED:g} is very strong.",
     )
 
 
 def showing(found: Fit, hidden: Sequence[str], held_out: Dataset) -> Experiment | None:
-    """The motion that shows most per second of the mechanisms that the recordings cannot show; None where all show."""
+    """Design the motion that shows most of the hidden mechanisms per second; None if none is hidden."""
     if not hidden:
         return None
     expected = _alternative("", found)
@@ -134,13 +136,13 @@ def showing(found: Fit, hidden: Sequence[str], held_out: Dataset) -> Experiment 
     )
     names = ", ".join(map(title, best.effects if best else hidden))
     if best is None:
-        return Experiment(None, (), f"No motion within the reach of these recordings shows {names}.")
-    return Experiment(best.profile, best.effects, f"{best.what} would show {names}, at a strength that matters.")
+        return Experiment(None, (), f"No motion within the range of these recordings shows {names}.")
+    return Experiment(best.profile, best.effects, f"{best.what} would show {names} at a typical strength.")
 
 
 @dataclass(frozen=True, eq=False)
 class _Tested:
-    """A candidate, how long it takes, the questions that it answers, and what it brings for the hardest of them."""
+    """A candidate motion, its duration, the questions that it answers, and the least evidence for one of them."""
 
     profile: Profile
     duration_s: float
@@ -166,7 +168,7 @@ def _best(
     enough: Callable[[Trajectory], float],
     rank: Callable[[_Tested], Any],
 ) -> _Tested | None:
-    """The candidate of the highest rank. Long ones are tried only for what no shorter one answers."""
+    """Return the candidate of the highest rank; long ones are tried only if no short one answers all questions."""
 
     def test(profile: Profile) -> _Tested:
         trajectory = plan(profile, bench.gains.period_s)
@@ -184,14 +186,14 @@ def _best(
 
 
 def _group(explanation: Explanation, final: Fit, index: int) -> list[_Alternative]:
-    """The final fit, and fits with each of the rivals that tie with one of its terms."""
+    """Return the final fit, and a fit with each tied rival of one of its terms."""
     term, rebased = final.terms[index], final.hypothesis.rebased
     group = [_alternative(term.effect, final)]
     for rival in rivals_of(explanation, term):
         if rival.tied:
             other = rival.fit.terms[-1]
             replaced = rebased.replaced(index, other)
-            if compatible(replaced.terms):  # else it was found later, as a cause of its own
+            if compatible(replaced.terms):  # else the rival is another term of the final fit
                 group.append(_alternative(other.effect, final.estimator.fit(replaced, evaluations=12)))
     return group
 
@@ -201,17 +203,12 @@ def _alternative(effect: str, found: Fit) -> _Alternative:
     hypothesis = found.hypothesis
     once = [index for index, term in enumerate(hypothesis.terms) if BY_ID[term.effect].transient]
     gone = [column for index in once for column in range(hypothesis.x.size)[hypothesis.columns(index)]]
-    known = _triangle(np.delete(found.jacobian, gone, axis=1))
+    known = np.asarray(np.linalg.qr(np.delete(found.jacobian, gone, axis=1), mode="r"), dtype=np.float64)
     return _Alternative(effect, hypothesis.without(*once), known, found.estimator)
 
 
-def _triangle(jacobian: FloatArray) -> FloatArray:
-    """R of a QR decomposition."""
-    return np.asarray(np.linalg.qr(jacobian, mode="r"), dtype=np.float64)
-
-
 def _imagined(truth: _Alternative, trajectory: Trajectory, like: Measured) -> Measured:
-    """Recording of a trajectory if the explanation were true: the noise level of a recording, none of it drawn."""
+    """Simulate the recording of a trajectory under an explanation: without noise, with the noise level of `like`."""
     position, velocity = np.array(trajectory.position_m), np.array(trajectory.velocity_m_s)
     start = Start(float(position[0]))
     answer = truth.hypothesis.twin().simulate(position, velocity, start)
@@ -227,11 +224,6 @@ def _imagined(truth: _Alternative, trajectory: Trajectory, like: Measured) -> Me
         torque_command=answer.torque_command,
         torque=answer.torque_command if like.torque_is_command else answer.torque,
     )
-
-
-def _own(truth: _Alternative, run: Measured) -> float:
-    """Energy of the residuals of the truth on its own run: rounding, and the settling of the observer."""
-    return truth.on(run).cost
 
 
 def _left(other: _Alternative, run: Measured) -> float:

@@ -1,11 +1,9 @@
-"""Before any search: recordings that cannot be diagnosed, and channels with a wrong sign or unit, are said to be so.
+"""Check recordings before a diagnosis: excitation, frozen channels, wrong signs and units, saturation.
 
     torque = J a + D v + Fc sign(v) + T0      by least squares over the measured motion
 
-A negative J is no result, and a J or Fc that is wrong by a factor of thousand is a unit, no physics.
+A negative J shows a wrong sign; J and Fc that both deviate from the bench by a large factor show a wrong unit.
 """
-
-from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
@@ -18,20 +16,20 @@ from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
 from hil.channels import AXIS_CHANNELS
 from hil.errors import InputError
-from hil.identification.dataset import Measured, take
+from hil.identification.measured import Measured, take
 from hil.quantities import digits, misread_factors
 from hil.recording.recording import Recording
 
-SHORTEST_S = 2.0  # there, back, and time to settle
-LEAST_TRAVEL_COUNTS = 50  # of the motor encoder: below this there is no motion to speak of
-LEAST_MOVING_S = 0.5
-# Nominal parameters may be wrong by a factor of three (`hil.identification.hypothesis`), units by more.
+SHORTEST_S = 2.0  # a motion there and back, and its settling
+LEAST_TRAVEL_COUNTS = 50  # of the motor encoder: below, counting is 2 % of the motion
+LEAST_MOVING_S = 0.5  # a few hundred moving rows: below, the parameters are not determined
+# Nominal parameters may be wrong by a factor of three (`hil.identification.hypothesis`), wrong units exceed that.
 WRONG_BY = 4.0
 SLOPE_TOLERANCE = 0.2  # of positions against set-points; following errors are below 5 %
-_RELATED = 0.5  # of the variance of a channel, that the other must tell
-_AWAY, _AWAY_M = 0.01, 1e-3  # of the travel, and at least: a loop that rests so far from its set-points is none
-SATURATED = 0.5  # share of the moving rows at the limit
-_SMOOTH_S = 0.021  # window of the derivatives of the motor position
+_RELATED = 0.5  # least squared correlation of two channels for a factor between them: half of the variance
+_AWAY, _AWAY_M = 0.01, 1e-3  # largest offset at rest, of the travel and absolute: a closed loop rests far below both
+SATURATED = 0.5  # share of the moving rows at the torque limit: above, most rows do not obey the control law
+_SMOOTH_S = 0.021  # window of the derivatives of the motor position: passes some 20 Hz, averages encoder counts
 
 _POSITION_UNITS = misread_factors("mm", "um", "nm", "deg", "rev", "km", "in")
 _VELOCITY_UNITS = misread_factors("m/min", "mm/s", "mm/min", "um/s")
@@ -43,10 +41,10 @@ _TORQUE_UNITS = misread_factors("mN m", "uN m", "N cm", "kN m", "kgf m", "kgf cm
 
 
 def prepare(recordings: Sequence[Recording], bench: Bench) -> list[Measured]:
-    """The recordings as the twin needs them.
+    """Check recordings and prepare them for the twin.
 
-    Raises InputError with everything found, a line each: channels missing, too short, no motion, a frozen or
-    copied channel, a wrong sign or unit of a position or of the torque, saturation throughout.
+    Raises InputError with one line per problem: missing channels, too short, no motion, a frozen or copied channel, a
+    wrong sign or unit of a position or of the torque, saturation in most of the motion.
     """
     if not recordings:
         raise InputError("given no recording, allowed one or more; give the recordings to diagnose")
@@ -84,7 +82,7 @@ def _problems(run: Measured, bench: Bench) -> Iterator[str]:
     moved = float(np.ptp(run.motor)) * ratio
     if np.ptp(command) == 0.0 or top == 0.0:
         yield (
-            "without excitation: the set-points do not move; a twin at standstill says nothing: "
+            "without excitation: the set-points do not move, so that no parameter is determined; "
             "record a motion with reversals and several feeds"
         )
         return
@@ -112,7 +110,7 @@ def _problems(run: Measured, bench: Bench) -> Iterator[str]:
     ]
     yield from found
     yield from _saturation(run, bench, moving)
-    if not found:  # the torque is judged by the measured motion
+    if not found:  # the check of the torque needs a valid measured motion
         yield from _torque_problems(run, bench)
 
 
@@ -124,8 +122,8 @@ def _position_problems(run: Measured, ratio: float, motor: str, table: str) -> I
         yield f"{motor}: {_factor(slope, _POSITION_UNITS, 'the set-points')}"
     elif abs(away_m) > max(_AWAY * float(np.ptp(run.position_command_m)), _AWAY_M):
         yield (
-            f"{motor}: lies {1e3 * away_m:.4g} mm behind the set-points at rest: their zeros differ; "
-            "shift it in the import map"
+            f"{motor}: lies {1e3 * away_m:.4g} mm behind the set-points at rest: the zeros differ; "
+            "correct the offset in the import map"
         )
     if not run.table_m.size:
         return
@@ -156,11 +154,11 @@ def _torque_problems(run: Measured, bench: Bench) -> Iterator[str]:
         slope = _slope(run.torque_command, run.torque)
         if slope < 0.0 and _correlation(run.torque_command, run.torque) < -0.5:
             yield (
-                f"{names.torque} runs against {names.torque_command} (slope {slope:.3g}): one of them has the wrong "
+                f"{names.torque} is opposite to {names.torque_command} (slope {slope:.3g}): one of them has the wrong "
                 "sign; correct it in the import map"
             )
             return
-        # a drive that saturates gives less than asked for, but no eighth of it
+        # a saturated drive gives less than its command, but not as little as an eighth
         if _correlation(run.torque_command, run.torque) > 0.5 and not 0.5 / WRONG_BY < slope < 2.0 * WRONG_BY:
             yield f"{names.torque}: {_factor(slope, _TORQUE_UNITS, names.torque_command)}"
             return
@@ -170,14 +168,14 @@ def _torque_problems(run: Measured, bench: Bench) -> Iterator[str]:
     (j, _, coulomb, _), errors = measured
     if j < -3.0 * errors[0]:
         yield (
-            f"{names.torque} has the wrong sign: the inertia that it gives is {j:.3g} ± {errors[0]:.1g}, and no "
-            "mass is negative; correct the sign of the channel, or of the encoder"
+            f"{names.torque} has the wrong sign: its regression gives a negative inertia, {j:.3g} ± {errors[0]:.1g}; "
+            "correct the sign of the channel, or of the encoder"
         )
         return
     factors = [j / inertia] if j > 5.0 * errors[0] else []
     if physics.coulomb_n_m > 0.0 and coulomb > 5.0 * errors[2]:
         factors.append(coulomb / physics.coulomb_n_m)
-    # one of them may be badly believed; a wrong unit shows in both
+    # one of them may be wrong in the bench file; a wrong unit changes both
     if factors and (min(factors) > WRONG_BY or max(factors) < 1.0 / WRONG_BY):
         factor = float(np.exp(np.mean(np.log(factors))))
         units = {} if bench.axis.linear else {1.0 / bench.axis.ratio_m_rad: "N at the table"}
@@ -186,7 +184,7 @@ def _torque_problems(run: Measured, bench: Bench) -> Iterator[str]:
 
 
 def regress(run: Measured) -> tuple[list[float], list[float]] | None:
-    """J, D, Fc, T0 of the regression above and their standard errors [motor units]; None without sliding motion."""
+    """Fit J, D, Fc, T0 of the module's equation, with standard errors [motor units]; None without sliding motion."""
     window = max(round(_SMOOTH_S / run.period_s) | 1, 5)
     if run.motor.size < 4 * window:
         return None
@@ -199,7 +197,7 @@ def regress(run: Measured) -> tuple[list[float], list[float]] | None:
         return None
     basis = np.stack([acceleration, velocity, np.sign(velocity), np.ones_like(velocity)], axis=1)[rows]
     if np.ptp(basis[:, 2]) == 0.0:
-        basis[:, 3] = 0.0  # one direction only: offset and Coulomb friction are one
+        basis[:, 3] = 0.0  # one direction only: offset and Coulomb friction are not separable
     solution, *_ = np.linalg.lstsq(basis, torque[rows], rcond=None)
     left = torque[rows] - basis @ solution
     # smoothing leaves one independent sample per window
@@ -216,7 +214,7 @@ def _saturation(run: Measured, bench: Bench, moving: NDArray[np.bool_]) -> Itera
     if share > SATURATED:
         yield (
             f"saturated throughout: the command is at its limit of {level:.4g} in {100.0 * share:.0f} % of the "
-            f"motion, allowed {100.0 * SATURATED:.0f} %; the loop is open there and tells nothing: move slower"
+            f"motion, allowed {100.0 * SATURATED:.0f} %; the control loop is open there; record a slower motion"
         )
 
 
@@ -227,10 +225,10 @@ def _slope(over: FloatArray, values: FloatArray) -> float:
 
 
 def _factor_between(over: FloatArray, values: FloatArray) -> float:
-    """Factor of `values` to `over`: of all between the two regressions, of each on the other, the one nearest to 1.
+    """Factor from `over` to `values`: the value nearest to 1 between the two regressions, of each on the other.
 
-    A unit scales exactly and leaves no choice; an axis that lags or sticks on short strokes does. Where the two have
-    little to do with each other, no factor is given the benefit of the doubt.
+    For a wrong unit both regressions agree; for an axis that lags or sticks on short strokes they differ. With little
+    correlation the slope of `values` over `over` is returned.
     """
     forward, backward = _slope(over, values), _slope(values, over)
     if forward * backward < _RELATED:
@@ -244,14 +242,14 @@ def _correlation(a: FloatArray, b: FloatArray) -> float:
 
 
 def _factor(factor: float, units: dict[float, str], against: str) -> str:
-    """What a factor between a channel and what it should be looks like."""
+    """Describe a wrong factor between a channel and its reference `against`, with the unit it suggests."""
     if factor < 0.0 and abs(factor + 1.0) < SLOPE_TOLERANCE:
-        return f"has the wrong sign: it runs against {against} (slope {factor:.3g}); correct it in the import map"
+        return f"has the wrong sign: it is opposite to {against} (slope {factor:.3g}); correct it in the import map"
     sign = "has the wrong sign and " if factor < 0.0 else ""
     size = abs(factor)
     near = min(units, key=lambda unit: abs(math.log(max(size, 1e-300) / unit)))
-    looks = f": it looks like {units[near]}" if abs(math.log(max(size, 1e-300) / near)) < math.log(1.6) else ""
+    looks = f", which suggests {units[near]}" if abs(math.log(max(size, 1e-300) / near)) < math.log(1.6) else ""
     return (
-        f"{sign}is {digits(size)} × what {against} ask for{looks}; correct its unit in the import map, "
+        f"{sign}is {digits(size)} × the value expected from {against}{looks}; correct its unit in the import map, "
         "or the bench file"
     )

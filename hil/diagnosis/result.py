@@ -1,9 +1,7 @@
-"""What a diagnosis says: the stable interface `diagnosis.json`, as models and as a JSON Schema.
+"""Result of a diagnosis: the stable interface `diagnosis.json`, as models and as a JSON Schema.
 
-SI units throughout. `hil/diagnosis/diagnosis.schema.json` is what `write_schema` makes of these models.
+All values in SI units. `write_schema` writes `hil/diagnosis/diagnosis.schema.json` from these models.
 """
-
-from __future__ import annotations
 
 import json
 from enum import StrEnum
@@ -19,7 +17,7 @@ NotNegative = Annotated[float, Field(ge=0.0)]
 
 
 class Verdict(StrEnum):
-    """Answer to: does the twin explain these recordings, and if not, what is wrong with it?"""
+    """Answer: the twin explains the recordings, has wrong parameters, lacks named physics, or lacks unknown physics."""
 
     NO_MISMATCH = "no_mismatch"
     PARAMETER_ERROR = "parameter_error"
@@ -38,7 +36,7 @@ class PhaseKind(StrEnum):
 
 
 class Mode(StrEnum):
-    """How the residuals of a channel were taken."""
+    """Simulation in which the residuals of a channel were computed."""
 
     CLOSED_LOOP = "closed_loop"
     BLOCKS = "blocks"
@@ -57,13 +55,13 @@ class Value(_Part):
 
 
 class Correction(Value):
-    """A nominal parameter of the bench as the recordings have it."""
+    """A nominal parameter of the bench, estimated from the recordings."""
 
-    nominal: float = Field(description="as the bench file has it")
+    nominal: float = Field(description="value in the bench file")
 
 
 class Rival(_Part):
-    """Another mechanism that was weighed, and why it lost."""
+    """Another mechanism that was fitted, and the evidence against it."""
 
     effect: str
     evidence: str
@@ -73,14 +71,14 @@ class Finding(_Part):
     """A mechanism that the twin lacks."""
 
     effect: str = Field(description="id in the library of mechanisms")
-    variant: str = Field("", description="the way it shows, where the mechanism has several")
+    variant: str = Field("", description="variant of the mechanism, if it has several")
     confidence: Share
-    equivalents: tuple[str, ...] = Field((), description="mechanisms that this motion cannot tell from it")
+    equivalents: tuple[str, ...] = Field((), description="mechanisms that this motion cannot distinguish from it")
     rivals: tuple[Rival, ...] = ()
     parameters: dict[str, Value]
     sentence: str
-    form: str = Field("", description="a term of the fit that only mends the form of its curve")
-    needed: str = Field("", description="what leaving it out costs, on training and on held-out recordings")
+    form: str = Field("", description="term of the fit that only corrects the form of its curve")
+    needed: str = Field("", description="residual energy without it, on training and on held-out recordings")
 
 
 class Phase(_Part):
@@ -91,13 +89,13 @@ class Phase(_Part):
 
 
 class Location(_Part):
-    """Where the mismatch is. Ranges and periods are null where it does not keep to one."""
+    """Location of the mismatch. Ranges and periods are null if it is not limited to one."""
 
     block: Literal["controller", "drive", "motor_side", "transmission", "table", "sensor"]
     element: str
-    channels: tuple[str, ...] = Field(description="recorded channels that show it, the strongest first")
+    channels: tuple[str, ...] = Field(description="recorded channels with the mismatch, the strongest first")
     phases: tuple[Phase, ...] = ()
-    windows_s: tuple[tuple[float, float], ...] = Field((), description="of the first recording, where it concentrates")
+    windows_s: tuple[tuple[float, float], ...] = Field((), description="in the first recording, with most energy")
     position_m: tuple[float, float] | None = Field(None, description="range of table position")
     speed_m_s: tuple[float, float] | None = Field(None, description="range of absolute table speed")
     frequency_hz: NotNegative | None = Field(None, description="time-locked")
@@ -127,14 +125,14 @@ class ChannelFit(_Part):
 
 
 class Unexplained(_Part):
-    """What is left above the noise floor."""
+    """Residuals above the noise floor."""
 
-    share: Share = Field(description="of the energy above the floor that the refitted nominal twin leaves")
+    share: Share = Field(description="of the energy above the floor with the refitted nominal twin")
     description: str
 
 
 class NextExperiment(_Part):
-    """The motion that separates what this one cannot."""
+    """Motion that separates mechanisms that the recorded motion cannot."""
 
     profile: str = Field(description="profile file")
     separates: tuple[str, ...]
@@ -157,7 +155,7 @@ class Result(_Part):
     runtime_s: NotNegative
 
     def as_json(self) -> dict[str, Any]:
-        """The numbers and texts as `diagnosis.json` holds them."""
+        """Return the content of `diagnosis.json`."""
         return self.model_dump(mode="json", by_alias=True)
 
 

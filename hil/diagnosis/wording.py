@@ -1,4 +1,4 @@
-"""Mechanisms, terms and locations in words."""
+"""Texts for mechanisms, terms and locations."""
 
 from collections.abc import Iterable
 
@@ -11,17 +11,17 @@ from hil.twin.mechanism import Role
 
 
 def title(effect: str) -> str:
-    """Words of an id: "constant_load" -> "constant load"."""
+    """Replace the underscores of an id by spaces: "constant_load" -> "constant load"."""
     return effect.replace("_", " ")
 
 
 def titles(effects: Iterable[str]) -> str:
-    """Words of several ids, separated by commas."""
+    """List ids in words, separated by commas."""
     return ", ".join(map(title, effects))
 
 
 def label(term: Term) -> str:
-    """Words of a term's effect, with its period or order if the effect may act more than once."""
+    """Name a term, with its period or order if the effect may act more than once."""
     mechanism = BY_ID[term.effect]
     if mechanism.most == 1:
         return title(term.effect)
@@ -32,7 +32,7 @@ def label(term: Term) -> str:
 
 
 def sentence(term: Term, bench: Bench) -> str:
-    """Sentence of a term's mechanism with the values of the term, and its variant in brackets."""
+    """Describe a term in a sentence with its values, and its variant in brackets."""
     mechanism, linear = BY_ID[term.effect], bench.axis.linear
     values = {
         parameter.name: quantity(value, parameter.dimension.unit(linear))
@@ -45,7 +45,7 @@ def sentence(term: Term, bench: Bench) -> str:
 
 
 def where(location: Location) -> dict[str, str]:
-    """A location in words: what is located (block, element, channels, phases, ...) -> where."""
+    """Describe a location: aspect (block, element, channels, phases, ...) -> text."""
     phases = [f"{title(phase.kind)} {100.0 * phase.share:.0f} %" for phase in location.phases if phase.share >= 0.005]
     found = {
         "block": title(location.block),
@@ -68,6 +68,6 @@ def where(location: Location) -> dict[str, str]:
 
 
 def where_in_short(location: Location) -> str:
-    """Block, phases, ranges and repetition of a location in one clause."""
+    """Describe block, phases, ranges and repetition of a location in one clause."""
     wanted = ("block", "phases of motion", "position", "speed", "repetition")
     return ", ".join(f"{what} {text}" for what, text in where(location).items() if what in wanted)

@@ -1,13 +1,13 @@
-"""Prediction-error fit of a hypothesis (Ljung 1999, ch. 7) by the method of Levenberg and Marquardt.
+"""Prediction-error fit of a hypothesis (Ljung 1999, ch. 7) by the Levenberg-Marquardt method.
 
     min over x of  sum rho(r(x)^2),   r: weighted residuals of all channels and runs
 
     step s:  min |J s + r|^2 + mu |diag(J) s|^2   with x + s inside the bounds;  mu after Nielsen (1999)
 
-The Jacobian J is taken by differences, one simulation per parameter, on all cores: the kernel releases the
-interpreter. While steps gain what is predicted, J is not taken anew but corrected along the step (Broyden 1965; Madsen,
-Nielsen and Tingleff 2004, sec. 3.5); a fit that converges ends with a new one. With 1e5 rows and ten parameters the
-step is found from J^T J: a decomposition of J, as in scipy's solvers, costs more than the simulations.
+The Jacobian J is computed by forward differences, one simulation per parameter, on all cores. While steps gain what the
+linear model predicts, J is updated along the step instead (Broyden 1965; Madsen, Nielsen and Tingleff 2004, sec. 3.5);
+a converged fit ends with a new J. The step is computed from J^T J: with 1e5 rows and ten parameters a decomposition of
+J, as in scipy's solvers, takes longer than the simulations.
 """
 
 import os
@@ -32,9 +32,9 @@ from hil.identification.terms import Term
 Output = TypeVar("Output")
 POOL = ThreadPoolExecutor(os.cpu_count() or 1)
 
-_FIRST_DAMPING = 1e-3
-_LEAST_GAIN = 1e-6  # of the cost, relative: a step that promises or brings less is the last
-_AGREES = 0.25  # by which a step may miss what it promised, relative, while the Jacobian is still good
+_FIRST_DAMPING = 1e-3  # relative to diag(J)^2: for a moderately good start (Madsen, Nielsen and Tingleff 2004)
+_LEAST_GAIN = 1e-6  # relative to the cost: a step that predicts or gains less ends the fit; far below any evidence
+_AGREES = 0.25  # largest relative error of the predicted gain at which the Jacobian is updated, not recomputed
 
 
 class FitStatus(StrEnum):
@@ -48,18 +48,18 @@ class FitStatus(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """A hypothesis with its weighted residuals and their Jacobian (m, p); (m, 0) where it was not fitted."""
+    """A hypothesis with its weighted residuals and their Jacobian (m, p); (m, 0) if it was not fitted."""
 
     hypothesis: Hypothesis
     residuals: Residuals
     jacobian: FloatArray
     estimator: "Estimator"
-    converged: bool | None = None  # None where it was not fitted
+    converged: bool | None = None  # None if it was not fitted
     _elsewhere: dict[Dataset, "Fit"] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def data(self) -> Dataset:
-        """The data set that it was fitted to."""
+        """Data set of the fit."""
         return self.estimator.data
 
     @property
@@ -99,12 +99,12 @@ class Fit:
 
     @property
     def at_floor(self) -> bool:
-        """Whether every channel of every run is down to its noise."""
+        """True if every channel of every run is at its noise floor."""
         return self.worst_ratio <= FLOOR
 
     @cached_property
     def excess(self) -> float:
-        """Energy above the noise floor, in units of noise."""
+        """Energy above the noise floor in units of noise^2."""
         return self.energy(lambda ratio: max(ratio - 1.0, 0.0))
 
     def energy(self, of: Callable[[float], float]) -> float:
@@ -127,7 +127,7 @@ class Fit:
         return FitStatus.PARAMETER_AT_BOUND if self.at_bound else FitStatus.CONVERGED
 
     def on(self, data: Dataset) -> "Fit":
-        """The hypothesis evaluated on a data set; this fit itself on its own."""
+        """Evaluate the hypothesis on a data set; on its own data set this is the fit itself."""
         if data is self.data:
             return self
         if data not in self._elsewhere:
@@ -135,13 +135,13 @@ class Fit:
         return self._elsewhere[data]
 
     def with_accuracy(self, torque_accuracy: float) -> "Fit":
-        """The hypothesis, not fitted, with another weight of the motor channel."""
+        """Evaluate the hypothesis, not fitted, with another weight of the motor channel."""
         estimator = replace(self.estimator, torque_accuracy=torque_accuracy)
         residuals = self.residuals.weighted_by(torque_accuracy)
         return Fit(self.hypothesis, residuals, np.zeros((residuals.vector.size, 0)), estimator)
 
     def refit(self, evaluations: int, *, soft: float = 0.0, slopes: FloatArray | None = None) -> "Fit":
-        """A fit that goes on from this one with the same settings."""
+        """Continue the fit with the same settings."""
         return self.estimator.fit(self.hypothesis, evaluations=evaluations, soft=soft, slopes=slopes)
 
 
@@ -149,9 +149,8 @@ class Fit:
 class Estimator:
     """Fits hypotheses to a data set.
 
-    `edge_step_s`: step of the difference of a window's edge. `torque_accuracy`: torque that the motor channel is
-    trusted to tell, over the noise of the torque channel. `closed`: residuals of the closed loop instead of those
-    block by block.
+    `edge_step_s` is the forward-difference step for the edge of a window, `torque_accuracy` the torque resolved by the
+    motor channel over the noise of the torque channel. `closed` selects residuals in closed loop.
     """
 
     data: Dataset
@@ -164,7 +163,7 @@ class Estimator:
         return hypothesis.residuals(self.data, self.closed).weighted_by(self.torque_accuracy)
 
     def evaluate(self, hypothesis: Hypothesis) -> Fit:
-        """A hypothesis as it is, not fitted."""
+        """Evaluate a hypothesis without fitting it."""
         residuals = self.residuals(hypothesis)
         return Fit(hypothesis, residuals, np.zeros((residuals.vector.size, 0)), self)
 
@@ -175,7 +174,7 @@ class Estimator:
     def jacobian(self, hypothesis: Hypothesis, held: FloatArray | None = None) -> FloatArray:
         """Derivative of the weighted residuals (m, p) by forward differences, columns in parallel.
 
-        The first columns are those `held` (m, k), where given.
+        The first columns are `held` (m, k) if given.
         """
         base, x = self.residuals(hypothesis).vector, hypothesis.x
         steps, high = self.steps(hypothesis), hypothesis.bounds[1]
@@ -202,11 +201,10 @@ class Estimator:
         held: FloatArray | None = None,
         slopes: FloatArray | None = None,
     ) -> Fit:
-        """Fit all parameters of a hypothesis, beginning at its x.
+        """Fit all parameters of a hypothesis from its x with at most so many `evaluations`.
 
-        `soft` > 0 is the size of residual from which the loss grows only linearly. `held` (m, k) are derivatives by
-        the first k parameters that are taken as constant on the way: near a point where they are known, that saves
-        most simulations. `slopes` (m, p) are derivatives to start with, from somewhere near.
+        `soft` > 0 is the residual above which the loss is linear. `held` (m, k) are derivatives by the first k
+        parameters that are kept constant, which saves simulations. `slopes` (m, p) is a first Jacobian from nearby.
         """
         low, high = hypothesis.bounds
         inside = np.clip(hypothesis.x, low, high)
@@ -245,7 +243,7 @@ class Estimator:
             else:
                 damping *= growth
                 growth *= 2.0
-            if fresh == (gained > 0.0):  # a step that failed asks for no other derivatives, if these are new
+            if fresh == (gained > 0.0):  # after a failed step with a new Jacobian only the damping changes
                 slopes, fresh = self.jacobian(at, held), True
                 if 0.0 < gained <= _LEAST_GAIN * loss:
                     converged = True
@@ -254,13 +252,13 @@ class Estimator:
 
 
 def _corrected(slopes: FloatArray, change: FloatArray, step: FloatArray, size: FloatArray) -> FloatArray:
-    """The Jacobian that agrees with the change (m,) over a step, otherwise as it was; parameters weigh by `size`."""
+    """Broyden update of the Jacobian by the change (m,) of the residuals over a step, parameters weighted by `size`."""
     along = size**2 * step
     return np.asarray(slopes + np.outer((change - slopes @ step) / float(step @ along), along), dtype=np.float64)
 
 
 def soft_cost(residuals: FloatArray, soft: float) -> float:
-    """Sum of rho of the rows."""
+    """Sum of rho over residuals (m,); see `_loss`."""
     return _loss(residuals, soft)[0]
 
 
@@ -295,6 +293,6 @@ def _step(
 
 
 def in_parallel(jobs: Sequence[Callable[[], Output]]) -> list[Output]:
-    """Results of jobs that run side by side, in order."""
+    """Run jobs in parallel; results in order."""
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
         return list(pool.map(lambda job: job(), jobs))

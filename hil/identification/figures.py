@@ -1,4 +1,4 @@
-"""Pictures of a comparison and of a friction identification."""
+"""Figures of a comparison and of a friction identification."""
 
 from __future__ import annotations
 
@@ -11,10 +11,11 @@ from hil.figures.panels import DEVIATION, MEASURED, SIMULATED, Line, Panel
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from hil.identification.compare import Comparison, Deviation
+    from hil.identification.compare import Comparison
+    from hil.identification.deviations import Deviation
     from hil.identification.friction import FrictionResult
 
-MOVE_MARGIN_S = 0.1  # of standstill shown before and after the fastest move
+MOVE_MARGIN_S = 0.1  # standstill shown before and after the fastest move: enough for the settling
 
 
 def motion_panels(result: Comparison) -> list[Panel]:
@@ -32,10 +33,10 @@ def block_panels(result: Comparison) -> list[Panel]:
     """Panels of each block's output, measured and simulated, each followed by the deviation."""
     return [
         panel
-        for block, deviation in result.blocks
+        for block in result.blocks
         for panel in (
-            _pair(f"{block.block}:\n{block.output}", deviation),
-            _difference("deviation", deviation, block.noise),
+            _pair(f"{block.deviation.name}:\n{block.deviation.label}", block.deviation),
+            _difference("deviation", block.deviation, block.noise),
         )
     ]
 
@@ -97,7 +98,7 @@ def friction_figure(result: FrictionResult) -> Figure:
 
 
 def _with_error(value: float, error: float) -> str:
-    """A value with its error, in as many digits as give the error two."""
+    """Format a value and its error so that the error has two digits."""
     if error <= 0.0 or not np.isfinite(error):
         return f"{value:.6g}"
     digits = max(0, 1 - int(np.floor(np.log10(error))))

@@ -1,12 +1,11 @@
-"""Friction identification at constant feed, as in Sec. 3.2.3 of the source.
+"""Identify friction at constant feed, as in Sec. 3.2.3 of the source.
 
-At constant feed nothing accelerates, so the mean torque is friction (Eq. 24, with the offset by which the
-directions differ, such as weight or a preloaded cable):
+Without acceleration the mean torque is friction (Eq. 24, with an offset for constant loads such as weight):
 
     tau = tau_C sign(omega) + c omega + tau_0
 
-One point per stretch of constant feed, transients cut, both directions; least squares gives the three.
-A linear axis is the same in N, N s/m and m/s.
+Least squares over one point per stretch of constant feed, transients cut, in both directions. On a linear axis the
+units are N, N s/m and m/s.
 """
 
 from __future__ import annotations
@@ -19,17 +18,17 @@ import numpy as np
 from hil.arrays import FloatArray
 from hil.channels import AxisKind
 from hil.errors import InputError
-from hil.identification.least_squares import solve
+from hil.identification.inverse_dynamics import solve
 from hil.recording.recording import Recording
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-FEED_TOLERANCE = 1e-3  # of the feed: what counts as constant
+FEED_TOLERANCE = 1e-3  # relative deviation from a constant feed: above the rounding of printed set-points
 FEED_RESOLUTION_M_S = 2e-6  # two of the last digits that recordings are usually printed with
-SETTLING_S = 0.15  # transient after the feed is reached; several time constants of a position loop
-ENDING_S = 0.01  # before the feed changes again
-AVERAGED_MIN_S = 0.1  # a shorter mean holds more of the last transient than of friction
+SETTLING_S = 0.15  # transient after the feed is reached: several time constants of a position loop
+ENDING_S = 0.01  # cut before the feed changes: a margin of several ticks
+AVERAGED_MIN_S = 0.1  # least duration of a mean: in a shorter one the remaining transient dominates
 
 
 class FrictionUnits(NamedTuple):
@@ -54,7 +53,7 @@ class FrictionPoint:
     speed: float  # motor speed [rad/s], linear axis [m/s]
     torque: float  # [N m], linear axis [N]
     feed_m_s: float  # velocity set-point
-    start_s: float  # of what was averaged
+    start_s: float  # of the averaged rows
     duration_s: float
 
 
@@ -62,7 +61,7 @@ class FrictionPoint:
 class FrictionResult:
     """Coulomb [N m], viscous [N m s/rad] and offset [N m], on a linear axis [N], [N s/m], [N].
 
-    The errors are standard errors of the regression: they say how well the line fits the points.
+    The errors are standard errors of the regression.
     """
 
     kind: AxisKind
@@ -87,17 +86,17 @@ class FrictionResult:
         return friction_figure(self)
 
     def torque(self, speed: FloatArray) -> FloatArray:
-        """Friction of the line [N m] or [N] over speed [rad/s] or [m/s]."""
+        """Friction of the line [N m] or [N] at speeds [rad/s] or [m/s]."""
         return np.asarray(self.coulomb * np.sign(speed) + self.viscous * speed + self.offset, dtype=np.float64)
 
 
 def identify_friction(
     recording: Recording, *, settling_s: float = SETTLING_S, speed_min: float = 0.0
 ) -> FrictionResult:
-    """Coulomb and viscous friction and offset of a recording with several feeds in both directions.
+    """Fit Coulomb friction, viscous friction and offset to a recording with several feeds in both directions.
 
-    `settling_s` is cut after each feed is reached; points below `speed_min` [rad/s] or [m/s] are left out (at low
-    speed a Stribeck fall bends the line). The speed is that of the motor encoder.
+    `settling_s` is cut after each feed is reached; points below `speed_min` [rad/s] or [m/s] are omitted (Stribeck
+    friction deviates from the line). The speed is that of the motor encoder.
     Raises InputError if constant feeds are too few, too short, or of one direction.
     """
     points = tuple(
@@ -106,7 +105,7 @@ def identify_friction(
     speed = np.array([point.speed for point in points])
     torque = np.array([point.torque for point in points])
     forward, backward = int((speed > 0).sum()), int((speed < 0).sum())
-    # two speeds in one direction give the slope, one point in the other direction splits Coulomb and offset
+    # two speeds in one direction give the slope, a point in the other direction separates Coulomb friction and offset
     if min(forward, backward) < 1 or len(points) < 4 or np.ptp(np.abs(speed)) < 0.1 * np.abs(speed).max():
         raise InputError(
             f"{recording.name}: velocity_command_m_s: given {forward} forward and {backward} backward stretches of "
@@ -114,15 +113,12 @@ def identify_friction(
             f"{settling_s + ENDING_S + AVERAGED_MIN_S:g} s; record profiles/friction_sweep.yaml"
         )
     fit = solve(np.column_stack([np.sign(speed), speed, np.ones_like(speed)]), torque)
-    coulomb, viscous, offset = fit.values.tolist()
-    errors = fit.std_errors.tolist()
-    return FrictionResult(
-        recording.kind, points, coulomb, viscous, offset, errors[0], errors[1], errors[2], fit.residual_rms
-    )
+    figures = np.concatenate([fit.values, fit.std_errors, [fit.residual_rms]])
+    return FrictionResult(recording.kind, points, *figures.tolist())
 
 
 def constant_feed_stretches(velocity_command_m_s: FloatArray) -> list[tuple[int, int]]:
-    """Stretches [first, end) in which the set-point stays within 0.1 % of its first value, standstill left out."""
+    """Stretches [first, end) in which the set-point stays within 0.1 % of its first value, without standstill."""
     velocity = velocity_command_m_s.tolist()
     stretches = []
     first = 0

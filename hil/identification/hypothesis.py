@@ -1,9 +1,9 @@
-"""A hypothesis: nominal parameters and mechanisms of the twin as one vector, and its residuals.
+"""Hypothesis: nominal parameters and mechanisms of the twin as one vector, and its residuals.
 
-Residuals come in two kinds. Block by block (`loops.observe`), each block is fed measured inputs: a mismatch shows only
-in its own block and does not accumulate; searches use this kind. In closed loop the twin gets the set-points alone;
-results are confirmed with this kind. Stick-slip and play make the closed loop chaotic: there even the true hypothesis
-does not reproduce a recording.
+Residuals exist in two kinds. Block by block (`loops.observe`), each block is fed measured inputs: a mismatch shows only
+in its own block and does not accumulate; searches use this kind. In closed loop the twin is fed the set-points alone;
+results are confirmed with this kind. With stick-slip or play the closed loop may be chaotic: then even the true
+hypothesis does not reproduce a recording.
 """
 
 from collections.abc import Sequence
@@ -15,7 +15,8 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench, MechanismEntry
-from hil.identification.dataset import FASTEST_OBSERVER_S, Dataset, Measured
+from hil.identification.dataset import FASTEST_OBSERVER_S, Dataset
+from hil.identification.measured import Measured
 from hil.identification.residuals import Residuals, differences
 from hil.identification.terms import Term, repeats
 from hil.twin.axis import Response, Twin
@@ -23,14 +24,13 @@ from hil.twin.library import BY_ID
 from hil.twin.mechanism import Parameter, Role
 from hil.twin.physics import Active
 
-# Differences by which the edges of a window are moved: first wide, then by a tick.
+# Steps of the forward difference for the edges of a window: first wide, to reach the edge, at last one tick at 1 kHz.
 EDGE_STEP_S, LAST_EDGE_STEP_S = 0.03, 0.001
-# A light nut chatters in its gap: contacts come and go with the least change, and only a wide difference averages them
-# (Moré and Wild 2012: the step grows with the noise of a function). Relative; of 1e-4, 0.01 and 0.03, only the last
-# converged from bench values that were 20 % wrong.
+# Relative step with play: a light nut chatters in its gap, so residuals are noisy functions of the parameters, and only
+# a wide step averages them (Moré and Wild 2012). Of 1e-4, 0.01 and 0.03 only the last converged from values 20 % wrong.
 CHATTER_STEP = 0.03
-# The owner's masses and stiffnesses are trusted to this factor: beyond it lie minima in which a wrong structure is
-# compensated by implausible parameters.
+# Bound of nominal parameters over the bench file, as a factor: beyond it lie minima in which implausible parameters
+# compensate for a wrong structure.
 TRUST = 3.0
 
 
@@ -65,7 +65,7 @@ class Coordinate:
 
     @property
     def edge(self) -> bool:
-        """Whether it is an instant at which a window begins or ends."""
+        """True for an instant at which a window begins or ends."""
         return self.role is Role.EDGE
 
 
@@ -188,7 +188,7 @@ class Hypothesis:
             own = step
             if coordinate.role is Role.PERIOD:
                 own = 0.01 * start / (2.0 * np.pi * max(travel_m, start))
-            elif coordinate.edge:  # an edge shows only where it lies: a wide difference reaches it
+            elif coordinate.edge:  # residuals change near the edge only: a wide step reaches it
                 own = edge_step_s / max(abs(start), EDGE_STEP_S)
             elif coordinate.role is Role.ORDER:
                 own = 0.01 / (start * max(angle_rad, 1.0))
@@ -200,7 +200,7 @@ class Hypothesis:
 
     @property
     def _chatters(self) -> bool:
-        """Whether there is play, in which a nut may chatter."""
+        """True with play, in which a nut may chatter."""
         effects = (*(term.effect for term in self.terms), *(entry.effect for entry in self.bench.mechanisms))
         return any(variant.play for effect in effects for variant in BY_ID[effect].variants)
 
@@ -220,7 +220,7 @@ class Hypothesis:
 
     @cached_property
     def kept(self) -> tuple[MechanismEntry, ...]:
-        """The mechanisms of the bench that no term replaces."""
+        """Mechanisms of the bench that no term replaces."""
         kept = []
         taken = [term.effect for term in self.terms]
         for entry in self.bench.mechanisms:

@@ -7,7 +7,7 @@ forwards and backwards by a Butterworth filter; velocity and acceleration are ce
 unfiltered force and all four regressors are low-passed alike and decimated. On a rotary axis the same in kg m^2,
 N m s/rad, N m.
 
-What the published figures depend on, each step changed alone (computed on the EMPS record):
+Sensitivity of the published figures to each step, changed alone (computed on the EMPS record):
 
                                                   M kg     F_v N s/m   F_c N    F_0 N     error
     as published and as computed here             95.109   203.503     20.393   -3.165    4.083 %
@@ -21,10 +21,8 @@ What the published figures depend on, each step changed alone (computed on the E
     every tenth sample, not low-passed            95.273   203.839     20.390   -3.160    4.433 %
     |v| > 10 mm/s only                            94.798   198.408     20.902   -3.264    3.778 %
 
-So: sign(v) is taken at the full rate and low-passed with the rest, and the start of the record is cut.
+Therefore sign(v) is taken at the full rate and low-passed with the other columns, and the start of the record is cut.
 """
-
-from __future__ import annotations
 
 from dataclasses import dataclass
 
@@ -34,7 +32,6 @@ from scipy.signal import butter, cheby1, filtfilt
 from hil.arrays import FloatArray
 from hil.channels import AxisKind
 from hil.errors import InputError
-from hil.identification.least_squares import solve
 from hil.recording.recording import Recording
 
 BUTTERWORTH_ORDER = 4
@@ -67,8 +64,8 @@ def fit_inverse_dynamics(
 ) -> InverseDynamics:
     """Fit motor torque (linear axis: force) over the motion of the motor encoder.
 
-    The published evaluation keeps the end of the record, where the filters have not settled; with `cut_at_end`
-    = 49 samples it is treated like the start, which is better for a record that ends in motion.
+    The published evaluation keeps the end of the record, where the filters have not settled; `cut_at_end` = 49 samples
+    is better for a record that ends in motion.
 
     Raises InputError if the record is too short, sampled too slowly, or does not move both ways.
     """
@@ -89,28 +86,16 @@ def fit_inverse_dynamics(
     if not (velocity.min() < 0 < velocity.max()):
         raise InputError(
             f"{recording.name}: {recording.axis.motor_position}: given motion in one direction, allowed "
-            "both; Coulomb friction and offset cannot be told apart: record a return move"
+            "both; Coulomb friction and offset are not separable in one direction: record a return move"
         )
 
-    # the offset's column too: the filter's gain at zero frequency is its ripple, not 1
+    # the column of the offset is filtered too: the filter's gain at zero frequency is not exactly 1
     settled = slice(CUT_AT_START, len(recording) - cut_at_end)
     columns = (acceleration, velocity, np.sign(velocity), np.ones_like(velocity))
     regressors = np.column_stack([_decimate(column[settled], decimation) for column in columns])
     fit = solve(regressors, _decimate(force[settled], decimation))
-    inertia, viscous, coulomb, offset = fit.values.tolist()
-    errors = fit.std_errors.tolist()
-    return InverseDynamics(
-        recording.kind,
-        inertia,
-        viscous,
-        coulomb,
-        offset,
-        errors[0],
-        errors[1],
-        errors[2],
-        errors[3],
-        fit.relative_error,
-    )
+    figures = np.concatenate([fit.values, fit.std_errors, [fit.relative_error]])
+    return InverseDynamics(recording.kind, *figures.tolist())
 
 
 def _forwards_and_backwards(coefficients: tuple[FloatArray, FloatArray], values: FloatArray) -> FloatArray:
@@ -120,6 +105,39 @@ def _forwards_and_backwards(coefficients: tuple[FloatArray, FloatArray], values:
 
 
 def _decimate(values: FloatArray, decimation: int) -> FloatArray:
-    """Low-passed and thinned, from the back so that the last sample stays."""
+    """Low-pass and decimate values (n,), counted from the end so that the last sample is kept."""
     chebyshev = cheby1(CHEBYSHEV_ORDER, RIPPLE_DB, CORNER / decimation)
     return _forwards_and_backwards(chebyshev, values)[(values.size - 1) % decimation :: decimation]
+
+
+@dataclass(frozen=True, eq=False)
+class LinearFit:
+    """Solution of min |y - W x|^2; errors by the textbook formula for independent, equal residuals.
+
+    values, std_errors (p,), in the units of x; residual_rms in the unit of y; relative_error |y - W x| / |y|.
+    """
+
+    values: FloatArray
+    std_errors: FloatArray
+    residual_rms: float
+    relative_error: float
+
+
+def solve(regressors: FloatArray, measured: FloatArray) -> LinearFit:
+    """Fit `measured` (n,) by columns of `regressors` (n, p), n > p, of full rank.
+
+    x = (W'W)^-1 W'y,  s^2 = |y - W x|^2 / (n - p),  std errors^2 = s^2 diag (W'W)^-1.
+    """
+    rows, columns = regressors.shape
+    # QR instead of W'W keeps the digits of badly scaled columns
+    q, r = np.linalg.qr(regressors)
+    values = np.linalg.solve(r, q.T @ measured)
+    residual = measured - regressors @ values
+    variance = float(residual @ residual) / (rows - columns)
+    std_errors = np.sqrt(variance * np.sum(np.linalg.inv(r) ** 2, axis=1))
+    return LinearFit(
+        values,
+        std_errors,
+        float(np.sqrt(np.mean(residual**2))),
+        float(np.linalg.norm(residual) / np.linalg.norm(measured)),
+    )

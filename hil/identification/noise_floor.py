@@ -1,11 +1,11 @@
-"""Noise floor of residuals: from repeated laps where there are any, else white sensor noise.
+"""Noise floor of residuals: from repeated laps if there are any, else white sensor noise.
 
-Where the same set-points come again after a lag p, the repeatable motion cancels:
+If the same set-points repeat after a lag p, the repeatable motion cancels:
 
     sigma^2 = mean (r_k - r_{k+p})^2 / 2        over all rows k whose set-points repeat
 
-sigma is the non-repeatable part of the residual r; the rest of its energy repeats lap by lap and is physics that a
-better twin would explain. In closed loop the axis itself moves with the noise of its encoders: see `noise_response`.
+sigma is the non-repeatable part of the residual r; the repeatable part is physics that the twin lacks. In closed loop
+the noise of the encoders moves the axis: see `noise_response`.
 """
 
 from dataclasses import dataclass, replace
@@ -14,34 +14,35 @@ from typing import Literal
 import numpy as np
 
 from hil.arrays import FloatArray
-from hil.identification.dataset import Dataset, Measured
+from hil.identification.dataset import Dataset
 from hil.identification.hypothesis import Hypothesis
-from hil.identification.laps import Laps
+from hil.identification.measured import Measured
+from hil.identification.noise import Laps
 
-# Mean square of a channel over its noise, up to which it counts as explained: 25 % in rms, where something as large as
-# the noise makes 41 %. An encoder at rest errs by the same part of a count all the time, which may be three times the
-# mean square of counting.
+# Mean square of a channel over its noise up to which it is explained: 25 % above the noise in rms. An unmodelled effect
+# as large as the noise makes 41 %. An encoder at rest has a constant error of up to half a count, whose square is three
+# times that of counting noise.
 FLOOR = 1.25**2
-# A term that increases the energy of the differences between neighbouring laps by more than this factor is refuted.
-# Most terms repeat with the motion and leave it at 1; refitting the others moves it by less.
+# Least ratio of the non-repeating energy without a term to that with it; a term below it is refuted. Most terms repeat
+# with the motion and have 1; the refit of the other parameters changes it by less than 5 %.
 REPEATS = 0.95
-# A closed-loop response to the noise below this share of its sensor's noise needs no check for chaos. One axis with
-# coarse counts was measured to move by three times its noise; a chaotic loop moves by tens and more. The torque is not
-# checked against its noise: one coarse count, and a loop of high gain, make many times that of a good current sensor.
+# Closed-loop response in units of its sensor's noise: below the first it needs no check for chaos, above the second the
+# loop is chaotic. A regular axis with coarse counts moved by 3, chaotic loops by tens. The torque has no upper limit:
+# one coarse count in a loop of high gain makes many times the noise of a good current sensor.
 _LITTLE, _LARGE = 0.3, 5.0
-_HALF = 0.75  # of the response to all of the noise: half of it makes 0.5 in a linear loop, 1 in a chaotic one
+_HALF = 0.75  # response to half the noise over that to all of it: 0.5 in a linear loop, 1 in a chaotic one
 
 
 @dataclass(frozen=True)
 class Floor:
-    """Noise floor of one channel in its unit, and how it is known."""
+    """Noise floor of one channel in its unit, and its source."""
 
     rms: float
     source: Literal["repeated_laps", "white_noise"]
 
 
 def floor(residual: FloatArray, white: float, laps: Laps | None) -> Floor:
-    """Floor of a residual (n,): its non-repeatable part, not below the sensor's `white` noise."""
+    """Noise floor of a residual (n,): its non-repeatable part, at least the sensor's `white` noise."""
     if laps is None:
         return Floor(white, "white_noise")
     return Floor(max(laps.noise(residual), white), "repeated_laps")
@@ -99,14 +100,14 @@ def rms(values: FloatArray) -> float:
 
 
 def _misread(values: FloatArray, count: float, noise: FloatArray | float, rng: np.random.Generator) -> FloatArray:
-    """Error of an encoder (n,): its counting, and white noise for the rest of its noise."""
+    """Error (n,) of an encoder with a noise (n,) or (): its counting, and white noise for the remaining variance."""
     counted = count * np.round(values / count) - values if count else np.zeros_like(values)
     more = np.sqrt(np.maximum(np.square(noise) - count**2 / 12.0, 0.0))
     return np.asarray(counted + more * rng.standard_normal(values.size))
 
 
 def unrepeated(hypothesis: Hypothesis, data: Dataset) -> float:
-    """Energy of the differences between laps, in units of noise; 0 without laps."""
+    """Energy of the differences between laps in units of noise^2; 0 without laps."""
     residuals = hypothesis.residuals(data)
     return sum(
         laps.noise(values) ** 2 * laps.first.size
@@ -118,7 +119,7 @@ def unrepeated(hypothesis: Hypothesis, data: Dataset) -> float:
 def noise_ratios(hypothesis: Hypothesis, data: Dataset) -> tuple[dict[str, float], ...]:
     """Mean square over noise of each channel block by block, for each run.
 
-    That of the table is reduced by the noise of the motor encoder which the transmission amplifies.
+    The ratio of the table is corrected for the noise of the motor encoder amplified by the transmission.
     """
     residuals = hypothesis.residuals(data)
     found = []
@@ -134,7 +135,7 @@ def noise_ratios(hypothesis: Hypothesis, data: Dataset) -> tuple[dict[str, float
 def _noise_amplification(hypothesis: Hypothesis, run: Measured, table: FloatArray, observer_s: float) -> float:
     """Variance [m^2] that noise of the motor encoder adds to the block residual `table` (n,) beyond its direct part.
 
-    The block of the table is fed with the measured motion of the motor: a resonance of little damping amplifies noise.
+    The input of the table block is the measured motion of the motor: a lightly damped resonance amplifies its noise.
     """
     noise = run.motor_noise * np.random.default_rng(0).standard_normal(run.motor.size)
     noisy = hypothesis.blocks(replace(run, motor=run.motor + noise), observer_s)["table"]

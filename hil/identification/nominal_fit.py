@@ -1,4 +1,4 @@
-"""Fit of the nominal parameters of an axis to recordings, block by block: the first step of every diagnosis."""
+"""Fit the nominal parameters of an axis to recordings, block by block: the first step of every diagnosis."""
 
 from dataclasses import dataclass
 
@@ -9,11 +9,11 @@ from hil.errors import HilError
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Estimator, Fit, FitStatus
 from hil.identification.hypothesis import Hypothesis
-from hil.identification.uncertainty import standard_errors
+from hil.identification.inference import standard_errors
 
-SOFT = 30.0  # residual from which the loss of a first fit is linear: far above noise, so that valleys stay convex
-MOST_STEPS = 50
-_FIRST, _SECOND = 8, 10  # evaluations: a search begins with a fit that is near its end
+SOFT = 30.0  # residual [noise] above which the loss of a first fit is linear: outliers do not dominate the first steps
+MOST_STEPS = 50  # evaluations of a fit to convergence; a fit that needs more is reported as not converged
+_FIRST, _SECOND = 8, 10  # evaluations: a search needs a nearly converged fit only
 
 
 @dataclass(frozen=True)
@@ -36,19 +36,19 @@ class FitResult:
 
     @property
     def converged(self) -> bool:
-        """False where the fit was ended while the parameters still changed: these are the best so far."""
+        """False if the fit ran out of steps: the parameters are the best so far."""
         return self.status is not FitStatus.OUT_OF_STEPS
 
 
 def fit_nominal_parameters(data: Dataset, evaluations: int = _SECOND) -> Fit:
-    """Fit of the nominal parameters alone, first with a loss that large residuals dominate less."""
+    """Fit the nominal parameters alone, first with a robust loss."""
     return Estimator(data).fit(Hypothesis(data.bench), soft=SOFT, evaluations=_FIRST).refit(evaluations)
 
 
 def fit_nominal(data: Dataset) -> FitResult:
-    """Fit the nominal parameters of a bench to convergence, within a factor of three of those of the bench file.
+    """Fit the nominal parameters of a bench to convergence, within a factor of three of the bench file.
 
-    Raises HilError where the residuals are not finite.
+    Raises HilError if the residuals are not finite.
     """
     found = fit_nominal_parameters(data, MOST_STEPS)
     axis = data.bench.axis

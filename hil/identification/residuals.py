@@ -1,7 +1,7 @@
 """Residuals, measured less simulated, by named channel and run.
 
-Each encoder has its own datum; only that of the position loop is the datum of the set-points. A channel that is not
-recorded is absent.
+Each encoder has its own datum; only that of the position loop is the datum of the set-points. Channels that are not
+recorded are absent.
 """
 
 from collections.abc import Iterator
@@ -87,7 +87,7 @@ def datum_m(measured: Response, simulated: Response, ratio_m: float, judged: sli
 def differences(measured: Response, simulated: Response, bench: Bench, judged: slice) -> dict[str, FloatArray]:
     """Measured less simulated (n,): motor [rad or m], table less motor [m], torque [N m or N], free of the datums.
 
-    Not finite where the simulation is not. Without a linear encoder there is no "table".
+    Values are not finite where the simulation is not. Without a linear encoder there is no "table".
     """
     ratio_m = bench.axis.ratio_m_rad
     with np.errstate(invalid="ignore", over="ignore"):  # a hypothesis may be unstable

@@ -1,6 +1,4 @@
-"""The mechanisms in a hypothesis, and which of them can act at once."""
-
-from __future__ import annotations
+"""Mechanisms in a hypothesis, and the rules by which they are compatible."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,38 +10,37 @@ from hil.twin.physics import Active
 
 Key = tuple[str, int, int]
 
-# Periods, or orders, further apart than this factor are two causes.
+# Periods (or orders) further apart than this factor are two causes: a travel of ten periods resolves 10 %.
 _APART = 1.1
-# One set: Coulomb friction that differs by direction, alike at every speed, is its band shifted by a constant torque.
+# Equal on every motion: direction-dependent Coulomb friction is symmetric friction plus a constant torque.
 SAME = FRICTION, LOAD = next((mechanism.id, mechanism.same_as) for mechanism in LIBRARY if mechanism.same_as)
 
 
 @dataclass(frozen=True)
 class Term:
-    """A mechanism in a hypothesis, with the values it starts from; those left out at the end are the defaults."""
+    """A mechanism in a hypothesis, with its starting values; missing ones at the end are the defaults."""
 
     effect: str
     variant: int
     values: tuple[float, ...]
-    slot: int = 0  # which of those of its effect
+    slot: int = 0  # number among the terms of the same effect
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "values", BY_ID[self.effect].complete(self.values))
 
     @property
     def key(self) -> Key:
-        """Effect, variant and slot: its own among the terms of a hypothesis."""
+        """Effect, variant and slot: unique among the terms of a hypothesis."""
         return self.effect, self.variant, self.slot
 
 
 def ambiguous(one: Term | Active) -> bool:
-    """Whether a mechanism is one of the set that no motion tells apart."""
+    """True for constant load and asymmetric Coulomb friction, which no motion distinguishes."""
     return one.effect in SAME and one.variant == 0
 
 
 def repeats(one: Term | Active, other: Term | Active) -> bool:
-    """Whether a mechanism is another over again: the same effect and, where it has one, the same period or order; or
-    the other of two that no motion tells apart."""
+    """True if two mechanisms are the same: equal effect and period or order, or both `ambiguous`."""
     if one.effect != other.effect:
         return ambiguous(one) and ambiguous(other)
     for parameter, value, other_value in zip(BY_ID[one.effect].parameters, one.values, other.values, strict=True):
@@ -53,13 +50,13 @@ def repeats(one: Term | Active, other: Term | Active) -> bool:
 
 
 def free_slot(effect: str, beside: Sequence[Term]) -> int:
-    """The first slot of an effect that none of its terms has."""
+    """Return the first unused slot of an effect."""
     used = [term.slot for term in beside if term.effect == effect]
     return next(slot for slot in count() if slot not in used)
 
 
 def compatible(found: Sequence[Term | Active]) -> bool:
-    """Whether mechanisms can act at once: each as often as it may, and none over again."""
+    """True if mechanisms can act at once: none more often than allowed and none repeated."""
     effects = [one.effect for one in found]
     return all(effects.count(effect) <= BY_ID[effect].most for effect in effects) and not any(
         repeats(one, other) for one, other in combinations(found, 2)

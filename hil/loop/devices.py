@@ -16,7 +16,7 @@ from drivers.bus import BusConfig, CanPort, PumpedPort, PythonCanPort, open_bus
 from drivers.canopen_drive import CanopenDrive, DriveSettings
 from drivers.canopen_encoder import CanopenEncoder, EncoderSettings
 from drivers.canopen_master import CanopenMaster
-from drivers.cia402 import Mode
+from drivers.cia402 import OperationMode
 from drivers.inprocess import InProcessBus
 from drivers.modelled_bus import frame_bits
 from drivers.port import ConfigurationError, Drive, DriverError, Encoder, Master, PlantLike
@@ -28,9 +28,9 @@ from hil.errors import FieldError, HilError
 from hil.loop.simulated_bench import SimulatedNodes
 
 MODES = {
-    DriveMode.CST: Mode.CYCLIC_SYNC_TORQUE,
-    DriveMode.CSV: Mode.CYCLIC_SYNC_VELOCITY,
-    DriveMode.CSP: Mode.CYCLIC_SYNC_POSITION,
+    DriveMode.CST: OperationMode.CYCLIC_SYNC_TORQUE,
+    DriveMode.CSV: OperationMode.CYCLIC_SYNC_VELOCITY,
+    DriveMode.CSP: OperationMode.CYCLIC_SYNC_POSITION,
 }
 _TARGET_BYTES = {DriveMode.CST: 2, DriveMode.CSV: 4, DriveMode.CSP: 4}
 

@@ -45,8 +45,8 @@ _NO_ENCODER = EncoderSample(0.0, 0, 0.0, 0, Condition.OK)
 _SETPOINTS = {DriveMode.CST: Setpoint.TORQUE, DriveMode.CSV: Setpoint.VELOCITY, DriveMode.CSP: Setpoint.POSITION}
 
 
-class Phase(IntEnum):
-    """What the loop is doing."""
+class LoopPhase(IntEnum):
+    """Phase of the loop: running, stopping under control, or stopped by the drive."""
 
     RUN = 0
     STOP = 1
@@ -88,7 +88,7 @@ class Session:
         self._now_s = 0.0  # of the tick: tick x period
         self._bus_tick = 0  # ticks since the clock was started
         self._stops_asked = 0
-        self._phase = Phase.RUN
+        self._phase = LoopPhase.RUN
         self._ending, self._reason = Ending.COMPLETE, "the profile is done"
         self._last_tick = len(trajectory) - 1  # of the phase
         self._lateness_s: list[float] = []
@@ -210,25 +210,25 @@ class Session:
         self, tick: int, index: int, sample: DriveSample, seen: EncoderSample, passed: int
     ) -> Trajectory | None:
         """Change the phase if need be; the stop that begins now, if one does."""
-        if self._phase is Phase.QUICK_STOP:
+        if self._phase is LoopPhase.QUICK_STOP:
             if not sample.powered:
                 self._last_tick = min(self._last_tick, tick + self._ticks(AFTERMATH_S))
             return None
-        stopping = self._phase is Phase.STOP
+        stopping = self._phase is LoopPhase.STOP
         findings = find(self._rig, seen, passed, self._lateness_s[-1], self._stops_asked, stopping=stopping)
         # an axis that is being stopped already: only what prevents that matters
         found = next((finding for finding in findings if finding.quick or not stopping), None)
         if found is None:
             return None
-        if self._phase is Phase.RUN:
+        if self._phase is LoopPhase.RUN:
             self._ending, self._reason = found.ending, found.reason
         stop = self._stop(index, sample, seen, measured=passed != 0)
         if found.quick:
-            self._phase = Phase.QUICK_STOP
+            self._phase = LoopPhase.QUICK_STOP
             self._drive.goal = DriveGoal.QUICK_STOP
             self._last_tick = tick + self._ticks(QUICK_STOP_LIMIT_S)
         else:
-            self._phase = Phase.STOP
+            self._phase = LoopPhase.STOP
             self._last_tick = tick + len(stop) + self._ticks(SETTLE_S)
         return stop
 

@@ -27,7 +27,7 @@ class Ending(StrEnum):
     OVERRUN = "loop too late"
 
 
-class Finding(NamedTuple):
+class StopCause(NamedTuple):
     """How the run ends, why in words, and whether only the drive's own ramp can stop the axis now."""
 
     ending: Ending
@@ -37,30 +37,30 @@ class Finding(NamedTuple):
 
 def find(
     rig: Devices, seen: EncoderSample, passed: int, lateness_s: float, stops_asked: int, *, stopping: bool
-) -> Iterator[Finding]:
+) -> Iterator[StopCause]:
     """What is wrong, the gravest first. passed: the `Limit`s; lateness_s of the tick; stopping: under control."""
     section, gains = rig.section, rig.bench.gains
     if rig.drive.tripped:
-        yield Finding(Ending.DRIVE_FAULT, _text(rig.drive.check), True)
+        yield StopCause(Ending.DRIVE_FAULT, _text(rig.drive.check), True)
     if seen.condition & _ENCODER_LOST and rig.encoder is not None:
-        yield Finding(Ending.ENCODER_FAULT, _text(rig.encoder.check), gains.position_from_table)
+        yield StopCause(Ending.ENCODER_FAULT, _text(rig.encoder.check), gains.position_from_table)
     if passed & Limit.FOLLOWING_ERROR:
-        yield Finding(
+        yield StopCause(
             Ending.FOLLOWING_ERROR,
             f"the axis is more than {section.following_error_m} m from its set-point "
             "(drive.following_error_m): blocked, overloaded, or badly tuned",
             stopping,
         )
     if passed & Limit.TRAVEL:
-        yield Finding(
+        yield StopCause(
             Ending.TRAVEL_LIMIT,
             f"the axis left {section.travel_m} m (drive.travel_m): correct the profile or home the axis",
             False,
         )
     if stops_asked:
-        yield Finding(Ending.INTERRUPTED, "stopped by the user", stops_asked > 1)
+        yield StopCause(Ending.INTERRUPTED, "stopped by the user", stops_asked > 1)
     if lateness_s > section.overrun_s:
-        yield Finding(
+        yield StopCause(
             Ending.OVERRUN,
             f"the loop was {lateness_s:.3f} s late, allowed {section.overrun_s} s "
             "(drive.overrun_s): take load off the machine",

@@ -14,7 +14,7 @@ Array = FloatArray
 MAX_DURATION_S = 3600.0  # of a trajectory, which is held in memory
 
 
-class Phase(IntEnum):
+class MotionPhase(IntEnum):
     """Kind of motion at a set-point; stored as one byte per sample of a trajectory."""
 
     STANDSTILL = 0
@@ -54,7 +54,7 @@ class Piece(Protocol):
     @property
     def duration_s(self) -> float: ...
     @property
-    def phase(self) -> Phase: ...
+    def phase(self) -> MotionPhase: ...
 
     def at(self, time_s: Array) -> Motion:
         """Set-points at times within the piece."""
@@ -65,7 +65,7 @@ class Cubic:
     """Constant jerk: rest, constant feed, and the sections of ruckig."""
 
     duration_s: float
-    phase: Phase
+    phase: MotionPhase
     position_m: float
     velocity_m_s: float = 0.0
     acceleration_m_s2: float = 0.0
@@ -81,7 +81,7 @@ class Ramp:
     """Change of velocity by the square of a sine, v = v0 + dv sin^2(pi t/(2 T)); see hil.motion.sine_squared."""
 
     duration_s: float
-    phase: Phase
+    phase: MotionPhase
     position_m: float
     velocity_m_s: float
     end_velocity_m_s: float
@@ -119,4 +119,4 @@ def end_m(piece: Piece) -> float:
 
 def dwell(start_m: float, duration_s: float) -> Move:
     """Rest at start_m."""
-    return Move((Cubic(duration_s, Phase.STANDSTILL, start_m),), start_m)
+    return Move((Cubic(duration_s, MotionPhase.STANDSTILL, start_m),), start_m)

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import ruckig
 
 from hil.errors import FieldError, HilError, InputError
-from hil.motion.pieces import Cubic, MotionLimits, Move, Phase, Piece, end_m
+from hil.motion.pieces import Cubic, MotionLimits, MotionPhase, Move, Piece, end_m
 
 END_TOLERANCE_M = 1e-10
 
@@ -23,15 +23,15 @@ class _Unsolved(HilError):
     """ruckig finds no trajectory."""
 
 
-class State(NamedTuple):
-    """State in which a motion starts."""
+class MotionState(NamedTuple):
+    """MotionState in which a motion starts."""
 
     position_m: float
     velocity_m_s: float = 0.0
     acceleration_m_s2: float = 0.0
 
 
-def point_to_point(state: State, target_m: float, limits: MotionLimits) -> Move:
+def point_to_point(state: MotionState, target_m: float, limits: MotionLimits) -> Move:
     """Time-optimal motion from any state to rest at target_m.
 
     Some states far beyond their limits ruckig cannot solve in one go; then the axis stops first and a note
@@ -48,16 +48,16 @@ def point_to_point(state: State, target_m: float, limits: MotionLimits) -> Move:
         pieces, notes = stop(state, limits).pieces, ("stops first: ruckig finds no direct way to the target",)
     # ruckig itself accepts 1e-8 m; a second, tiny move from the rest reached closes what is left
     if pieces and abs(end_m(pieces[-1]) - target_m) > END_TOLERANCE_M * max(1.0, abs(target_m)):
-        pieces += point_to_point(State(end_m(pieces[-1])), target_m, limits).pieces
+        pieces += point_to_point(MotionState(end_m(pieces[-1])), target_m, limits).pieces
     return Move(pieces, target_m, notes)
 
 
-def stop(state: State, limits: MotionLimits) -> Move:
+def stop(state: MotionState, limits: MotionLimits) -> Move:
     """Shortest way to rest from any state, wherever that is. Raises as point_to_point."""
     return velocity_step(state, 0.0, limits)
 
 
-def velocity_step(state: State, velocity_m_s: float, limits: MotionLimits) -> Move:
+def velocity_step(state: MotionState, velocity_m_s: float, limits: MotionLimits) -> Move:
     """Time-optimal change from any state to a constant velocity; ends moving. Raises as point_to_point."""
     order = _order(state, limits)
     order.control_interface = ruckig.ControlInterface.Velocity
@@ -71,7 +71,7 @@ def jog(start_m: float, velocity_m_s: float, duration_s: float, limits: MotionLi
 
     Raises FieldError when the velocity is not reached within the duration.
     """
-    speed_up = velocity_step(State(start_m), velocity_m_s, limits)
+    speed_up = velocity_step(MotionState(start_m), velocity_m_s, limits)
     constant_s = duration_s - speed_up.duration_s
     if constant_s < 0:
         raise FieldError(
@@ -79,17 +79,17 @@ def jog(start_m: float, velocity_m_s: float, duration_s: float, limits: MotionLi
             f"given {duration_s:.6g} s, allowed at least {speed_up.duration_s:.6g} s "
             f"to reach {velocity_m_s:.6g} m/s; raise it or lower the velocity",
         )
-    constant = Cubic(constant_s, Phase.CONSTANT_FEED, speed_up.end_m, velocity_m_s)
-    slow_down = stop(State(end_m(constant), velocity_m_s), limits)
+    constant = Cubic(constant_s, MotionPhase.CONSTANT_FEED, speed_up.end_m, velocity_m_s)
+    slow_down = stop(MotionState(end_m(constant), velocity_m_s), limits)
     return Move((*speed_up.pieces, constant, *slow_down.pieces), slow_down.end_m)
 
 
 def time_optimal_duration_s(stroke_m: float, limits: MotionLimits) -> float:
     """Duration [s] that no move from rest to rest over the stroke within the limits can go below."""
-    return point_to_point(State(0.0), stroke_m, limits).duration_s
+    return point_to_point(MotionState(0.0), stroke_m, limits).duration_s
 
 
-def _order(state: State, limits: MotionLimits) -> ruckig.InputParameter:
+def _order(state: MotionState, limits: MotionLimits) -> ruckig.InputParameter:
     order = ruckig.InputParameter(1)
     order.current_position = [_finite("position_m", state.position_m)]
     order.current_velocity = [_finite("velocity_m_s", state.velocity_m_s)]
@@ -117,12 +117,12 @@ def _solve(order: ruckig.InputParameter) -> tuple[Cubic, ...]:
     )
 
 
-def _phase(duration_s: float, velocity: float, acceleration: float, jerk: float) -> Phase:
+def _phase(duration_s: float, velocity: float, acceleration: float, jerk: float) -> MotionPhase:
     mean_acceleration = acceleration + jerk * duration_s / 2
     mean_velocity = velocity + duration_s * (acceleration / 2 + jerk * duration_s / 6)
     if abs(mean_acceleration) < 1e-9 and jerk == 0:
-        return Phase.CONSTANT_FEED if mean_velocity else Phase.STANDSTILL
-    return Phase.ACCELERATION if mean_acceleration * mean_velocity > 0 else Phase.DECELERATION
+        return MotionPhase.CONSTANT_FEED if mean_velocity else MotionPhase.STANDSTILL
+    return MotionPhase.ACCELERATION if mean_acceleration * mean_velocity > 0 else MotionPhase.DECELERATION
 
 
 def _finite(name: str, value: float) -> float:

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from hil.errors import FieldError, InputError, field_name
 from hil.figures.panels import COMMAND, Line, Panel
-from hil.motion.pieces import MAX_DURATION_S, Array, Cubic, Motion, MotionLimits, Move, Phase
-from hil.motion.time_optimal import State, point_to_point, stop, time_optimal_duration_s
+from hil.motion.pieces import MAX_DURATION_S, Array, Cubic, Motion, MotionLimits, MotionPhase, Move
+from hil.motion.time_optimal import MotionState, point_to_point, stop, time_optimal_duration_s
 
 if TYPE_CHECKING:
     from hil.motion.profile import Profile
@@ -43,7 +43,7 @@ class SegmentRun(NamedTuple):
 class Trajectory:
     """Set-points at t = k period_s; arrays of one length, read-only.
 
-    `segment` indexes `runs`, `phase` holds values of hil.motion.pieces.Phase. The last sample is at rest.
+    `segment` indexes `runs`, `phase` holds values of hil.motion.pieces.MotionPhase. The last sample is at rest.
     `notes` say what was changed to hold the limits.
     """
 
@@ -112,7 +112,7 @@ def plan(profile: Profile, period_s: float, start_m: float | None = None) -> Tra
     notes: list[str] = []
     slot = 0
     if start_m is not None and start_m != profile.start_m:
-        approach = point_to_point(State(start_m), profile.start_m, profile.motion_limits)
+        approach = point_to_point(MotionState(start_m), profile.start_m, profile.motion_limits)
         profile.check_position(("start_m",), min(start_m, profile.start_m), max(start_m, profile.start_m))
         timed.append((0.0, APPROACH, "approach", 0, approach))
         slot = profile.slots(approach)
@@ -143,7 +143,7 @@ def stop_from(
     A velocity or acceleration beyond its limit is brought back in the shortest time. Raises InputError for
     values that are not finite and for a state so far beyond the limits that it takes more than an hour.
     """
-    state = State(position_m, velocity_m_s, acceleration_m_s2)
+    state = MotionState(position_m, velocity_m_s, acceleration_m_s2)
     return _single("stop", stop(state, limits), state, limits, period_s)
 
 
@@ -156,11 +156,11 @@ def replan(
     period_s: float,
 ) -> Trajectory:
     """Time-optimal motion from any state to rest at target_m; states beyond the limits as in stop_from."""
-    state = State(position_m, velocity_m_s, acceleration_m_s2)
+    state = MotionState(position_m, velocity_m_s, acceleration_m_s2)
     return _single("replan", point_to_point(state, target_m, limits), state, limits, period_s)
 
 
-def _single(name: str, move: Move, state: State, limits: MotionLimits, period_s: float) -> Trajectory:
+def _single(name: str, move: Move, state: MotionState, limits: MotionLimits, period_s: float) -> Trajectory:
     _check_period(period_s)
     if move.duration_s > MAX_DURATION_S:
         raise InputError(
@@ -185,7 +185,7 @@ def _sampled(
         end = count if index == len(runs) - 1 else _first_tick(run.end_s / period_s)
         segment[_first_tick(start) : end] = index
         begin_s = 0.0
-        for piece in (*move.pieces, Cubic(run.end_s - run.start_s, Phase.STANDSTILL, move.end_m)):
+        for piece in (*move.pieces, Cubic(run.end_s - run.start_s, MotionPhase.STANDSTILL, move.end_m)):
             end_s = begin_s + piece.duration_s
             ticks = slice(_first_tick(start + begin_s / period_s), min(end, _first_tick(start + end_s / period_s)))
             within_s = np.clip((np.arange(ticks.start, ticks.stop) - start) * period_s - begin_s, 0.0, piece.duration_s)

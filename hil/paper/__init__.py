@@ -16,13 +16,13 @@ from hil.paper import figures, source, tables
 from hil.paper.row import Reproduction, Row
 from hil.twin.structure.modal import modal
 
-__all__ = ["PaperResult", "Picture", "Reproduction", "Row", "run_paper"]
+__all__ = ["PaperPicture", "PaperResult", "Reproduction", "Row", "run_paper"]
 
 SCHEMA_VERSION = 1
 
 
 @dataclass(frozen=True)
-class Picture:
+class PaperPicture:
     """Picture: figure of the source, file beside paper.json, caption."""
 
     figure: str
@@ -40,7 +40,7 @@ class PaperResult:
 
     folder: Path
     rows: tuple[Row, ...]
-    pictures: tuple[Picture, ...]
+    pictures: tuple[PaperPicture, ...]
     assumptions: tuple[str, ...]
     coordinates: tuple[str, ...]
     frequencies_hz: FloatArray
@@ -78,12 +78,12 @@ def run_paper(out: Path) -> PaperResult:
     return result
 
 
-def _pictures(out: Path) -> Iterator[Picture]:
+def _pictures(out: Path) -> Iterator[PaperPicture]:
     """Draw the figures of the source and save them to `out`."""
 
-    def save(figure: str, file: str, drawing: Figure, caption: str) -> Picture:
+    def save(figure: str, file: str, drawing: Figure, caption: str) -> PaperPicture:
         drawing.savefig(out / file, dpi=110)
-        return Picture(figure, file, caption)
+        return PaperPicture(figure, file, caption)
 
     two, seven = source.chains().values()
     yield save(

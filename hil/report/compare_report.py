@@ -6,8 +6,8 @@ from hil.bench.axis_models import OneMass
 from hil.bench.bench_file import Bench
 from hil.figures.drawing import save
 from hil.files.output import write_json, write_text
-from hil.identification.blocks import BlockDeviation
-from hil.identification.compare import EXPLAINED, Comparison, Deviation
+from hil.identification.compare import EXPLAINED, Comparison
+from hil.identification.deviations import BlockDeviation, Deviation
 from hil.identification.figures import block_panels, motion_panels
 from hil.identification.inverse_dynamics import InverseDynamics
 from hil.identification.nominal_fit import FitResult
@@ -35,7 +35,7 @@ def write_comparison(result: Comparison, folder: Path) -> None:
     page.text("The input of each block is the measured one, so that its deviation is not that of another block.")
     page.table(
         ("block", "input", "output", "rms deviation", "largest deviation", "relative", "rms / noise"),
-        [_block_row(block, deviation) for block, deviation in result.blocks],
+        [_block_row(block) for block in result.blocks],
     )
     page.plot(plots.over_time(time_s, block_panels(result), [150, 120] * len(result.blocks)))
     if result.fit is not None:
@@ -50,7 +50,9 @@ def write_comparison(result: Comparison, folder: Path) -> None:
     )
     save(result.plot(blocks=True), folder / "blocks.png")
     page.heading("How it was computed")
-    page.items([*result.notes, *(f"{block.block}: {block.remark}." for block, _ in result.blocks if block.remark)])
+    page.items(
+        [*result.notes, *(f"{block.deviation.name}: {block.remark}." for block in result.blocks if block.remark)]
+    )
     write_json(folder / "compare.json", result.as_json())
     if result.fit is not None:
         write_bench(result.bench, folder / "bench.fitted.yaml")
@@ -72,7 +74,7 @@ def verdict(result: Comparison) -> str:
     )
     if result.explained:
         return f"The twin explains this recording: {figures}."
-    worst = [(deviation.rms / block.noise, block.block) for block, deviation in result.blocks if block.noise > 0.0]
+    worst = [(block.deviation.rms / block.noise, block.deviation.name) for block in result.blocks if block.noise > 0.0]
     if worst and max(worst)[0] <= EXPLAINED:
         return (
             f"The control loop of the twin differs from the real one: {figures}. Drive and axis by themselves are "
@@ -109,9 +111,10 @@ def _figures(deviation: Deviation) -> tuple[Number, ...]:
     return rms, peak, Number(percent(deviation.relative))
 
 
-def _block_row(block: BlockDeviation, deviation: Deviation) -> tuple[str, ...]:
+def _block_row(block: BlockDeviation) -> tuple[str, ...]:
+    deviation = block.deviation
     over_noise = digits(deviation.rms / block.noise) if block.noise > 0.0 else "–"
-    return block.block, block.inputs, block.output, *_figures(deviation), Number(over_noise)
+    return deviation.name, block.inputs, deviation.label, *_figures(deviation), Number(over_noise)
 
 
 def _fit(page: Page, fit: FitResult) -> None:

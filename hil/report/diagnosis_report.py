@@ -53,7 +53,7 @@ def write_diagnosis(diagnosis: Diagnosis, folder: Path) -> None:
     page.heading("What this motion cannot show")
     page.text(
         titles(result.not_testable)
-        or "Every mechanism of the library would show in these recordings at a strength that matters."
+        or "Every mechanism of the library would show in these recordings at a typical strength."
     )
     _next_experiment(page, diagnosis, folder)
     page.heading("How it was judged")

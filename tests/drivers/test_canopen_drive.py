@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from drivers.canopen_drive import CanopenDrive, DriveSettings, HomingSettings
 from drivers.canopen_homing import HomingRun
 from drivers.canopen_master import CanopenMaster
-from drivers.cia402 import DriveState, HomingPhase, Mode
+from drivers.cia402 import DriveState, HomingPhase, OperationMode
 from drivers.inprocess import InProcessBus
 from drivers.port import Condition, ConfigurationError, DriveGoal
 from drivers.sim.drive_node import SimulatedDrive
@@ -62,7 +62,11 @@ def test_synchronous_rpdo_acts_one_sync_later() -> None:
 
 
 def test_enabling_never_jumps_whatever_is_commanded() -> None:
-    for mode in (Mode.CYCLIC_SYNC_TORQUE, Mode.CYCLIC_SYNC_VELOCITY, Mode.CYCLIC_SYNC_POSITION):
+    for mode in (
+        OperationMode.CYCLIC_SYNC_TORQUE,
+        OperationMode.CYCLIC_SYNC_VELOCITY,
+        OperationMode.CYCLIC_SYNC_POSITION,
+    ):
         rig = in_process(settings=DriveSettings(mode=mode), servo=soft_servo(), plant=Mass(motor_position_rad=5.0))
         rig.set_up()
         rig.drive.goal = DriveGoal.ENABLED
@@ -95,7 +99,7 @@ def test_disable_and_enable_again() -> None:
 
 
 def test_csv_follows_velocity_in_drive() -> None:
-    rig = in_process(settings=DriveSettings(mode=Mode.CYCLIC_SYNC_VELOCITY), servo=soft_servo())
+    rig = in_process(settings=DriveSettings(mode=OperationMode.CYCLIC_SYNC_VELOCITY), servo=soft_servo())
     rig.set_up()
     rig.enable()
     for _ in range(300):
@@ -105,7 +109,7 @@ def test_csv_follows_velocity_in_drive() -> None:
 
 def test_csp_follows_position_in_drive_across_the_counter_wrap() -> None:
     start_rad = ((1 << 31) - 50_000) * 2 * math.pi / (1 << 20)  # 50 000 counts below the wrap of an INTEGER32
-    rig = in_process(settings=DriveSettings(mode=Mode.CYCLIC_SYNC_POSITION), servo=soft_servo(),
+    rig = in_process(settings=DriveSettings(mode=OperationMode.CYCLIC_SYNC_POSITION), servo=soft_servo(),
                      plant=Mass(motor_position_rad=start_rad))  # fmt: skip
     rig.set_up()
     sample = rig.enable()
@@ -117,7 +121,7 @@ def test_csp_follows_position_in_drive_across_the_counter_wrap() -> None:
 
 
 def test_csv_with_a_slower_sync_runs_the_inner_loop_every_millisecond() -> None:
-    settings_ = DriveSettings(mode=Mode.CYCLIC_SYNC_VELOCITY, period_s=0.004)
+    settings_ = DriveSettings(mode=OperationMode.CYCLIC_SYNC_VELOCITY, period_s=0.004)
     rig = in_process(settings=settings_, servo=soft_servo())
     rig.set_up()
     assert rig.node.period_s == 0.004
@@ -128,7 +132,7 @@ def test_csv_with_a_slower_sync_runs_the_inner_loop_every_millisecond() -> None:
 
 
 def test_following_error_trips_the_drive() -> None:
-    rig = in_process(settings=DriveSettings(mode=Mode.CYCLIC_SYNC_POSITION), servo=soft_servo())
+    rig = in_process(settings=DriveSettings(mode=OperationMode.CYCLIC_SYNC_POSITION), servo=soft_servo())
     rig.node.values[0x6065_00] = 20_000
     rig.set_up()
     rig.enable()
@@ -140,7 +144,7 @@ def test_following_error_trips_the_drive() -> None:
 
 
 def test_quick_stop_brakes_on_its_ramp_and_switches_off() -> None:
-    velocity = DriveSettings(mode=Mode.CYCLIC_SYNC_VELOCITY, quick_stop_rad_s2=200.0)
+    velocity = DriveSettings(mode=OperationMode.CYCLIC_SYNC_VELOCITY, quick_stop_rad_s2=200.0)
     rig = in_process(settings=velocity, servo=soft_servo())
     rig.set_up()
     rig.enable()
@@ -186,7 +190,7 @@ def test_fault_is_reset_by_one_edge_and_only_when_its_cause_is_gone() -> None:
 def test_homing_ends_on_the_index_pulse_at_rest(method: int, index: int | None) -> None:
     start_rad = 2.3 * 2 * math.pi
     homing = HomingSettings(method, speed_rad_s=10.0, acceleration_rad_s2=300.0, offset_rad=1.0)
-    rig = in_process(settings=DriveSettings(mode=Mode.HOMING, homing=homing), servo=soft_servo(),
+    rig = in_process(settings=DriveSettings(mode=OperationMode.HOMING, homing=homing), servo=soft_servo(),
                      plant=Mass(motor_position_rad=start_rad))  # fmt: skip
     rig.set_up()
     rig.enable()
@@ -200,7 +204,7 @@ def test_homing_ends_on_the_index_pulse_at_rest(method: int, index: int | None) 
     assert rig.drive.read(rig.now_s).motor_position_rad - 1.0 == pytest.approx(
         rig.plant.motor_position_rad - reference_rad, abs=1e-4
     )
-    rig.drive.set_up(replace(rig.settings, mode=Mode.CYCLIC_SYNC_TORQUE))
+    rig.drive.set_up(replace(rig.settings, mode=OperationMode.CYCLIC_SYNC_TORQUE))
     rig.master.start(rig.now_s)
     assert rig.enable().condition is Condition.OK
     assert rig.cycle(0.5).motor_position_rad - 1.0 == pytest.approx(

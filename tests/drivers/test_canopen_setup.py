@@ -11,7 +11,7 @@ from drive_rig import Rig, in_process
 
 from drivers.bus import BusConfig, PythonCanPort, open_bus
 from drivers.canopen_drive import DriveSettings
-from drivers.cia402 import DriveState, Mode
+from drivers.cia402 import DriveState, OperationMode
 from drivers.port import ConfigurationError, IdentityError, ResponseTimeout
 from drivers.sdo_setup import EDS_FOLDER, DeviceSetup, SetupNetwork
 
@@ -34,7 +34,7 @@ def test_an_encoder_is_no_drive() -> None:
 
 
 def test_a_mode_the_drive_refuses_is_reported() -> None:
-    rig = in_process(settings=DriveSettings(mode=Mode.CYCLIC_SYNC_VELOCITY))  # no loops inside this drive
+    rig = in_process(settings=DriveSettings(mode=OperationMode.CYCLIC_SYNC_VELOCITY))  # no loops inside this drive
     with pytest.raises(ConfigurationError, match=r"0x6060:00 \(Modes of operation\): the device refuses.*0x06090030"):
         rig.set_up()
 

@@ -10,7 +10,7 @@ from drive_rig import Rig
 
 from drivers.bus import BusState
 from drivers.canopen_drive import DriveSettings
-from drivers.cia402 import DriveState, Mode
+from drivers.cia402 import DriveState, OperationMode
 from drivers.emcy import decode_emergency
 from drivers.modelled_bus import Fault, FaultKind, ModelledBus
 from drivers.port import Condition, DriveFault, DriveGoal, EncoderError
@@ -223,7 +223,7 @@ def test_encoder_loss_and_alarm_are_seen_in_its_samples_only() -> None:
 
 def test_quick_stop_without_loops_in_the_drive_switches_off() -> None:
     bus = ModelledBus(1_000_000)
-    rig = Rig(bus.port(), bus.port(), reply_s=0.0006, settings=DriveSettings(mode=Mode.CYCLIC_SYNC_TORQUE))
+    rig = Rig(bus.port(), bus.port(), reply_s=0.0006, settings=DriveSettings(mode=OperationMode.CYCLIC_SYNC_TORQUE))
     rig.set_up()
     rig.enable()
     rig.drive.goal = DriveGoal.QUICK_STOP

@@ -13,8 +13,10 @@ from compare_runs import bench_with, record
 
 from hil.bench.bench_file import Bench, load_bench
 from hil.errors import HilError, InputError
-from hil.identification.compare import Comparison, compare, low_pass
-from hil.identification.dataset import bench_of, prepare_dataset, take
+from hil.identification.compare import Comparison, compare
+from hil.identification.dataset import prepare_dataset
+from hil.identification.deviations import low_pass
+from hil.identification.measured import bench_of, take
 from hil.identification.nominal_fit import fit_nominal
 from hil.recording.importing import import_recording
 from hil.recording.recording import Recording, read_recording
@@ -43,7 +45,7 @@ def shared(name: str) -> Path:
 
 
 def block_rms(result: Comparison) -> dict[str, float]:
-    return {block.block: deviation.rms for block, deviation in result.blocks}
+    return {block.deviation.name: block.deviation.rms for block in result.blocks}
 
 
 def test_an_axis_as_believed_leaves_noise(clean: Comparison) -> None:
@@ -64,7 +66,7 @@ def test_loops_in_the_drive_are_those_of_the_twin(tmp_path: Path, mode: str) -> 
     assert result.explained
     assert result.torque_over_noise < 1.0
     assert result.channel("following_error_m").rms < 1.0e-6
-    assert any(f"In {mode} the drive closes loops of its own" in note for note in result.notes)
+    assert any(f"In {mode} the drive closes its own control loops" in note for note in result.notes)
 
 
 @pytest.mark.parametrize(
@@ -204,7 +206,7 @@ def test_the_other_rigs_are_not_explained_by_parameters(folder: str, block: str)
     result = compare(recording, bench, fit=True)
     assert not result.explained
     over: dict[str, Any] = {
-        part.block: deviation.rms / part.noise for part, deviation in result.blocks if part.noise > 0.0
+        part.deviation.name: part.deviation.rms / part.noise for part in result.blocks if part.noise > 0.0
     }
     assert over[block] > 3.0
     assert over["drive"] < 1.1
@@ -217,7 +219,7 @@ def test_a_fit_that_creeps_gives_its_best_and_says_so(run: Recording, monkeypatc
     result = compare(run, wrong, fit=True)
     assert result.fit is not None
     assert not result.fit.converged
-    assert any("still crept" in note for note in result.notes)
+    assert any("before it converged" in note for note in result.notes)
     assert result.torque.rms < compare(run, wrong).torque.rms
 
 

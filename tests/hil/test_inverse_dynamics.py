@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from hil.errors import InputError
-from hil.identification.inverse_dynamics import fit_inverse_dynamics
-from hil.identification.least_squares import solve
+from hil.identification.inverse_dynamics import fit_inverse_dynamics, solve
 from hil.recording.importing import import_recording
 from hil.recording.recording import Recording
 

@@ -14,7 +14,7 @@ from bench_runs import bench_with
 from hil.commands.investigate import _confirmed, investigate
 from hil.diagnosis.candidate_motions import reach
 from hil.errors import HilError, InputError
-from hil.identification.dataset import take
+from hil.identification.measured import take
 from hil.investigation import investigate as investigate_bench
 from hil.loop.run import RunResult, run_profile
 from hil.motion.profile import Profile, load_profile
@@ -70,7 +70,7 @@ def test_what_one_direction_hides_is_found_by_the_motion_that_it_designs(
     assert last["next_experiment"] is None
     assert (out / "report.html").is_file()
     text = capsys.readouterr().out
-    assert "No motion tells asymmetric friction from constant load" in text
+    assert "No motion distinguishes asymmetric friction from constant load" in text
     # what it ran by itself went no farther, faster or harder than what it had seen
     recorded = reach([take(read_recording(out / "round_1" / "one_way.parquet"), bench_with())], bench_with())
     designed = load_profile(out / "round_2" / "next_experiment_1.yaml")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hil.identification.sensor_noise import _jitter_s, _white
+from hil.identification.noise import _jitter_s, _white
 
 PERIOD_S = 1e-3
 

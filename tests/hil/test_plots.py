@@ -11,7 +11,7 @@ from compare_runs import bench_with, record
 
 from hil.errors import InputError
 from hil.identification.compare import compare
-from hil.identification.dataset import bench_of
+from hil.identification.measured import bench_of
 from hil.motion.profile import load_profile
 from hil.motion.trajectory import plan
 

@@ -21,8 +21,8 @@ from hil.errors import InputError
 from hil.figures.panels import MEASURED, SIMULATED, Line, Panel, thin
 from hil.files.output import new_folder, write_json
 from hil.identification.compare import compare
-from hil.identification.dataset import bench_of
 from hil.identification.figures import fastest_move
+from hil.identification.measured import bench_of
 from hil.quantities import quantity
 from hil.report.compare_report import verdict, write_bench, write_comparison
 from hil.report.page import Number, Page

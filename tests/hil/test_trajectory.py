@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from hil.errors import FieldError, InputError
-from hil.motion.pieces import MotionLimits, Phase
+from hil.motion.pieces import MotionLimits, MotionPhase
 from hil.motion.profile import load_profile
 from hil.motion.trajectory import Trajectory, plan, replan, stop_from, time_optimal_duration_s
 
@@ -38,7 +38,7 @@ def test_a_shipped_profile_holds_its_limits_and_is_consistent(path: Path, period
     assert profile.position_max_m is not None
     assert profile.position_min_m <= t.position_m.min() < t.position_m.max() <= profile.position_max_m
     assert abs(t.position_m[-1] - profile.runs[-1].move.end_m) <= 1e-9
-    assert (t.velocity_m_s[-1], t.acceleration_m_s2[-1], t.phase[-1]) == (0, 0, Phase.STANDSTILL)
+    assert (t.velocity_m_s[-1], t.acceleration_m_s2[-1], t.phase[-1]) == (0, 0, MotionPhase.STANDSTILL)
     # each derivative integrates to the one above it: trapezoid, whose error the next derivative bounds
     limits = profile.limits
     for value, slope, bound in (
@@ -55,7 +55,7 @@ def test_the_reference_moves_are_those_of_the_source() -> None:
         assert trajectory.velocity_m_s.max() * 60 == pytest.approx(feed_m_min, rel=1e-4)
         assert trajectory.position_m.max() == pytest.approx(0.1, abs=1e-9)
         assert trajectory.notes == ()
-    constant = [np.mean(t.phase[t.segment == 1] == Phase.CONSTANT_FEED) for t in (slow, fast, lowered)]
+    constant = [np.mean(t.phase[t.segment == 1] == MotionPhase.CONSTANT_FEED) for t in (slow, fast, lowered)]
     assert constant[0] > 0.8
     assert 0 < constant[1] < 0.1  # "very little time at constant feed"
     assert constant[2] == 0
@@ -78,7 +78,7 @@ def test_laps_repeat_sample_by_sample(name: str) -> None:
 
 def test_a_feed_sweep_has_both_directions_at_every_feed() -> None:
     t = planned("friction_sweep")
-    constant = t.velocity_m_s[t.phase == Phase.CONSTANT_FEED]
+    constant = t.velocity_m_s[t.phase == MotionPhase.CONSTANT_FEED]
     feeds, counts = np.unique(np.round(constant, 9), return_counts=True)
     expected = (0.002, 0.005, 0.01, 0.02, 0.04, 0.07, 0.11, 0.16, 0.22, 0.3)
     assert feeds.tolist() == sorted(sign * feed for feed in expected for sign in (-1, 1))
@@ -135,7 +135,7 @@ def test_a_new_target_is_reached_in_the_shortest_time() -> None:
 
 def test_a_state_far_beyond_the_limits_is_refused() -> None:
     limits = MotionLimits(0.0016, 23.0, 5.2)
-    with pytest.raises(InputError, match=r"replan: given State\(.*, allowed up to 3600 s; raise the limits"):
+    with pytest.raises(InputError, match=r"replan: given MotionState\(.*, allowed up to 3600 s; raise the limits"):
         replan(0.0, 0.003, 46.0, 0.7, limits, PERIOD_S)
 
 

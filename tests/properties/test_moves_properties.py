@@ -13,7 +13,7 @@ from hil.errors import FieldError
 from hil.motion.excitation import Chirp, Multisine, Spectrum, excitation
 from hil.motion.pieces import Motion, MotionLimits, Piece
 from hil.motion.sine_squared import reversals, sine_squared
-from hil.motion.time_optimal import State, point_to_point, stop, time_optimal_duration_s
+from hil.motion.time_optimal import MotionState, point_to_point, stop, time_optimal_duration_s
 
 TOLERANCE = 1e-9
 
@@ -26,13 +26,13 @@ def sampled(pieces: Iterable[Piece], count: int = 33) -> list[Motion]:
     return [piece.at(np.linspace(0.0, piece.duration_s, count)) for piece in pieces]
 
 
-def assert_smooth(motions: list[Motion], start: State) -> State:
+def assert_smooth(motions: list[Motion], start: MotionState) -> MotionState:
     """Position, velocity and acceleration go on from piece to piece; returns the state at the end."""
     state = start
     for motion in motions:
-        first = State(*(float(values[0]) for values in motion[:3]))
+        first = MotionState(*(float(values[0]) for values in motion[:3]))
         assert first == pytest.approx(state, rel=1e-9, abs=1e-9)
-        state = State(*(float(values[-1]) for values in motion[:3]))
+        state = MotionState(*(float(values[-1]) for values in motion[:3]))
     return state
 
 
@@ -47,7 +47,7 @@ def check_move(start_m: float, stroke_m: float, limits: MotionLimits) -> None:
     move = sine_squared(start_m, start_m + stroke_m, limits)
     motions = sampled(move.pieces)
     assert_within(motions, limits)
-    end = assert_smooth(motions, State(start_m))
+    end = assert_smooth(motions, MotionState(start_m))
     assert abs(end.position_m - (start_m + stroke_m)) <= TOLERANCE
     assert end[1:] == pytest.approx((0, 0), abs=1e-12 * limits.acceleration_m_s2)
     # the shape keeps one direction, so that it never leaves the stroke
@@ -83,13 +83,13 @@ def test_reversals_turn_at_both_ends_and_come_back(
         reject()
     motions = sampled(move.pieces)
     assert_within(motions, limits)
-    assert assert_smooth(motions, State(start_m)).position_m == pytest.approx(start_m, abs=TOLERANCE)
+    assert assert_smooth(motions, MotionState(start_m)).position_m == pytest.approx(start_m, abs=TOLERANCE)
     positions = np.concatenate([motion.position_m for motion in motions])
     ends = sorted((start_m, start_m + stroke_m))
     assert (positions.min(), positions.max()) == pytest.approx(ends, abs=TOLERANCE)
 
 
-def check_from_any_state(state: State, target_m: float, limits: MotionLimits) -> None:
+def check_from_any_state(state: MotionState, target_m: float, limits: MotionLimits) -> None:
     # what cannot be helped: the acceleration is brought to zero at full jerk, and the velocity goes on meanwhile
     carried = state.velocity_m_s + state.acceleration_m_s2 * abs(state.acceleration_m_s2) / (2 * limits.jerk_m_s3)
     reach = MotionLimits(
@@ -110,7 +110,7 @@ def test_three_thousand_random_states_stop_and_reach_new_targets() -> None:
     rng = np.random.default_rng(21)
     for _ in range(3000):
         limits = MotionLimits(*(10.0 ** rng.uniform([-3, -1, 0.5], [0.5, 1.5, 4])))
-        state = State(
+        state = MotionState(
             rng.uniform(-1, 1), limits.velocity_m_s * rng.uniform(-2, 2), limits.acceleration_m_s2 * rng.uniform(-2, 2)
         )
         check_from_any_state(state, rng.uniform(-1, 1), limits)
@@ -118,15 +118,15 @@ def test_three_thousand_random_states_stop_and_reach_new_targets() -> None:
 
 def test_a_state_that_ruckig_cannot_solve_stops_first_and_says_so() -> None:
     limits = MotionLimits(0.0018335300048613272, 30.84484941908126, 4.287886878535557)
-    state = State(0.851260338497686, -0.00041242671679140837, -35.713438204052764)
+    state = MotionState(0.851260338497686, -0.00041242671679140837, -35.713438204052764)
     move = point_to_point(state, -0.589292536165579, limits)
     assert "stops first" in move.notes[0]
     assert assert_smooth(sampled(move.pieces), state).position_m == pytest.approx(-0.589292536165579, abs=TOLERANCE)
 
 
-@given(st.builds(State, position, st.floats(-3, 3), st.floats(-30, 30)), position, limits_of)
+@given(st.builds(MotionState, position, st.floats(-3, 3), st.floats(-30, 30)), position, limits_of)
 @settings(deadline=None)
-def test_any_state_stops_and_reaches_a_new_target(state: State, target_m: float, limits: MotionLimits) -> None:
+def test_any_state_stops_and_reaches_a_new_target(state: MotionState, target_m: float, limits: MotionLimits) -> None:
     check_from_any_state(state, target_m, limits)
 
 
@@ -147,7 +147,7 @@ def test_excitations_hold_limits_between_the_samples_too(
     move = excitation(0.1, signal, 4.0, 0.5, amplitude_m, feed, limits)
     motions = sampled(move.pieces, 40_001)
     assert_within(motions, limits)
-    assert assert_smooth(motions, State(0.1)) == pytest.approx((move.end_m, 0, 0), abs=TOLERANCE)
+    assert assert_smooth(motions, MotionState(0.1)) == pytest.approx((move.end_m, 0, 0), abs=TOLERANCE)
     wave = motions[len(motions) // 2]
     base = wave.position_m[0] + feed * np.linspace(0, 4.0, 40_001)
     assert np.abs(wave.position_m - base).max() <= amplitude_m * 1.003

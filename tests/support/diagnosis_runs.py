@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 
 from hil.bench.bench_file import Bench, load_bench
-from hil.identification.dataset import Dataset, Measured
+from hil.identification.dataset import Dataset
 from hil.identification.estimator import Estimator, Fit
 from hil.identification.hypothesis import Hypothesis
+from hil.identification.measured import Measured
 from hil.identification.terms import Term
 from hil.motion.profile import Profile
 from hil.motion.trajectory import plan

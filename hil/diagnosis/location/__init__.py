@@ -1,1 +1,1 @@
-"""Where a mismatch acts: block, phase of motion, position, speed, period."""
+"""Location of a mismatch: block, phase of motion, position, speed, period."""

@@ -1,8 +1,8 @@
-"""Where a mismatch is: block, channels, time windows, phases of motion, range of position and of speed, periods.
+"""Locate a mismatch: block, channels, time windows, phases of motion, ranges of position and speed, periods.
 
-Rows are weighted by the energy of their residual above the noise floor, block by block, so that energy shows where
-it arises. A range is claimed only where it is narrow against what the motion covers and where the same energy, cut
-into blocks that are dealt out at random (a block-permutation null), hardly ever concentrates so much.
+Rows are weighted by the energy of their residual above the noise floor, block by block, so that energy is located where
+it arises. A range is reported only if it is narrow against the motion and significant: blocks of the same energy in
+random order (block-permutation test) are as concentrated in at most 1 % of the cases.
 """
 
 from collections.abc import Sequence
@@ -12,16 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hil.arrays import FloatArray
-from hil.diagnosis.location.periodicity import Lock, lock
+from hil.diagnosis.location.periodicity import lock
 from hil.diagnosis.location.reaction_torque import acting
 from hil.diagnosis.location.residual_energy import Energy, energies, without_terms
 from hil.diagnosis.result import Location, Phase, PhaseKind
 from hil.diagnosis.verdict.fit_table import channel_names
-from hil.identification.dataset import Measured
 from hil.identification.estimator import Fit
+from hil.identification.measured import Measured
 from hil.twin.library import BY_ID
 
-# Channel of the twin -> block whose output it is, and the part of the axis an engineer would look at
+# Channel of the twin -> block whose output it is, and the parts of the axis to inspect
 BLOCKS = {
     "command": ("controller", "control law and its inputs"),
     "torque": ("drive", "drive and current loop"),
@@ -29,20 +29,20 @@ BLOCKS = {
     "table": ("transmission", "ball screw, nut and linear encoder"),
 }
 
-CONCENTRATED = 0.8  # share of the energy that a window or a range holds
-NARROW = 0.5  # of what the motion covers: a range beyond is no range
-SURE = 0.01  # of the null may concentrate as much
-CREEP = 0.05  # of the top speed
-ACCELERATING = 0.02  # of the top acceleration
-AFTER_REVERSAL_S = 0.06  # the flanks and the friction have turned round by then
-_SHUFFLES = 199
-_BLOCK_S = 0.1  # of time: longer than residuals remember
-_BINS = 40
-_WINDOWS = 5
+CONCENTRATED = 0.8  # share of the energy in a window or a range: the rest is spread by the observer and by noise
+NARROW = 0.5  # largest share of the motion that a reported range covers; a wider one gives no location
+SURE = 0.01  # level of significance of a range; two ranges are tested per diagnosis
+CREEP = 0.05  # of the top speed: below, Stribeck friction dominates
+ACCELERATING = 0.02  # of the top acceleration: below is rounding of the set-points
+AFTER_REVERSAL_S = 0.06  # duration of a reversal: flanks and friction have changed sides by then
+_SHUFFLES = 199  # permutations: the least number that resolves SURE twice (1 / 200)
+_BLOCK_S = 0.1  # block of a permutation: longer than the correlation of residuals
+_BINS = 40  # resolution of a range: 2.5 % of the motion
+_WINDOWS = 5  # time windows that are reported: more are not read
 
 
 def block_shares(found: Fit) -> dict[str, float]:
-    """Share of each channel of the twin in the energy above the floor."""
+    """Share of each channel in the energy above the noise floor."""
     total = dict.fromkeys(found.noise_ratios[0], 0.0)
     for run, ratios in zip(found.data.runs, found.noise_ratios, strict=True):
         for name, ratio in ratios.items():
@@ -52,7 +52,7 @@ def block_shares(found: Fit) -> dict[str, float]:
 
 
 def locate(found: Fit, final: Fit) -> Location:
-    """Where `found` deviates from its recordings; `final` is the fit with the terms that explain it, if any do."""
+    """Locate the deviation of `found` from its recordings; `final` is the fit with explaining terms, if any."""
     bench, terms, data = final.hypothesis.bench, final.terms, found.data
     shares = block_shares(found)
     names = channel_names(bench, data.runs[0])
@@ -62,9 +62,9 @@ def locate(found: Fit, final: Fit) -> Location:
     if terms:
         mechanism = BY_ID[terms[0].effect]
         block, element = mechanism.block.value, mechanism.element
-    elif found is final and strongest[0] in ("motor", "table"):  # no refit moves it either
+    elif found is final and strongest[0] in ("motor", "table"):  # no refit removes it
         block, element = acting(found) or (block, element)
-    # the effect of a finding is known without noise
+    # with findings the energy is that of their effect, which has no noise
     seen = mismatch_energies(found, final)
     locked = lock(seen, max(strongest, key=lambda name: shares[name]), bench, terms)
     return Location(
@@ -75,7 +75,7 @@ def locate(found: Fit, final: Fit) -> Location:
         windows_s=windows(seen[0]),
         position_m=_range([run.run.position_command_m for run in seen], seen),
         speed_m_s=_range([np.abs(run.run.velocity_command_m_s) for run in seen], seen),
-        **_periods(locked),
+        **asdict(locked),
     )
 
 
@@ -99,7 +99,7 @@ def phase_shares(seen: Sequence[Energy]) -> tuple[Phase, ...]:
 
 
 def windows(energy: Energy) -> tuple[tuple[float, float], ...]:
-    """The fewest stretches of time that hold most of the energy; none where it is everywhere."""
+    """Shortest time windows [s] with most of the energy; none if it is spread over the recording."""
     run = energy.run
     size = max(round(_BLOCK_S / run.period_s), 1)
     starts = np.arange(0, energy.rows.size, size)
@@ -119,7 +119,7 @@ def windows(energy: Energy) -> tuple[tuple[float, float], ...]:
 
 
 def _range(labels: Sequence[FloatArray], seen: Sequence[Energy]) -> tuple[float, float] | None:
-    """The narrowest range of a quantity that holds most of the energy, where that is a claim."""
+    """Narrowest range of a quantity with most of the energy; None if it is wide or not significant."""
     size = max(round(_BLOCK_S / seen[0].run.period_s), 1)
     low, high = min(float(x.min()) for x in labels), max(float(x.max()) for x in labels)
     if high <= low:
@@ -150,17 +150,13 @@ def _range(labels: Sequence[FloatArray], seen: Sequence[Energy]) -> tuple[float,
 
 
 def _dealt(rows: FloatArray, size: int, random: np.random.Generator) -> FloatArray:
-    """Rows (n,) cut into blocks, dealt out anew."""
+    """Permute blocks of rows (n,) at random."""
     starts = np.arange(0, rows.size, size)
     return np.concatenate([rows[start : start + size] for start in random.permutation(starts)])
 
 
-def _periods(locked: Lock) -> dict[str, float | None]:
-    return asdict(locked)
-
-
 def phases(run: Measured) -> NDArray[np.str_]:
-    """The phase (n,) of each row, by its set-points; a reversal lasts until the axis has turned round."""
+    """Phase of motion (n,) at each row by its set-points; a reversal lasts `AFTER_REVERSAL_S`."""
     speed = run.velocity_command_m_s
     top = float(np.max(np.abs(speed))) or 1.0
     acceleration = np.gradient(speed, run.period_s)

@@ -1,12 +1,10 @@
-"""What a residual is locked to: the position of the table, the angle of the screw, or time.
+"""Find the domain in which a residual is periodic: position of the table, angle of the screw, or time.
 
     share(p) = energy that a sin p + b cos p explains of the residual,   p = 2 pi x / period, n theta, or 2 pi f t
 
-The three are one and the same at a single speed. So rows of all speeds are taken together, and
-nothing is claimed where there is only one.
+At a single speed the three domains are equal. So rows of all speeds are used, and no period is reported for a single
+speed.
 """
-
-from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,21 +14,22 @@ import numpy as np
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
 from hil.diagnosis.location.residual_energy import Energy
+from hil.diagnosis.search.disturbance import harmonic_share
 from hil.identification.terms import Term
 from hil.twin.library import BY_ID
 from hil.twin.mechanism import Role
 
-CLAIMED = 0.25  # share of the energy that one harmonic must explain
-APART = 1.5  # times the next best domain
-SPEEDS = 1.5  # ratio of feeds from which domains can be told apart
-LOWEST_HZ = 4.0  # below, the motion itself has its lines
-HIGHEST_ORDER = 48
-_MOST_ROWS = 20_000
+CLAIMED = 0.25  # least share of the energy in one harmonic: a line that dominates the residual
+APART = 1.5  # least ratio of that share to that of the next domain
+SPEEDS = 1.5  # least ratio of feeds: with less, domains differ by less than the width of a line
+LOWEST_HZ = 4.0  # lowest frequency: the motion itself has its lines below
+HIGHEST_ORDER = 48  # slots or pole passings per revolution of usual motors
+_MOST_ROWS = 20_000  # rows of a regression, thinned evenly: ample for three coefficients
 
 
 @dataclass(frozen=True)
 class Lock:
-    """Periods that are claimed; all None where nothing repeats."""
+    """Reported periods; all None without periodicity."""
 
     frequency_hz: float | None = None
     period_m: float | None = None
@@ -38,26 +37,24 @@ class Lock:
 
 
 def lock(seen: Sequence[Energy], channel: str, bench: Bench, terms: Sequence[Term]) -> Lock:
-    """What the first named term says of itself, else what the residual of `channel` shows."""
+    """Return the period of the first term, without terms that of the residual of `channel`."""
     lead_m = _lead_m(bench)
     if terms:
         return _named(terms[0], lead_m)
-    moving = [
-        np.abs(energy.run.velocity_command_m_s) > 0.02 * np.max(np.abs(energy.run.velocity_command_m_s))
-        for energy in seen
-    ]
-    speeds = np.concatenate(
-        [np.abs(energy.run.velocity_command_m_s[rows]) for energy, rows in zip(seen, moving, strict=True)]
-    )
-    low, high = np.percentile(speeds, [10.0, 90.0])
+    speeds = [np.abs(energy.run.velocity_command_m_s) for energy in seen]
+
+    def moving(values: Sequence[FloatArray]) -> FloatArray:
+        pairs = zip(values, speeds, strict=True)
+        return np.concatenate([one[speed > 0.02 * np.max(speed)] for one, speed in pairs])
+
+    low, high = np.percentile(moving(speeds), [10.0, 90.0])
     if high < SPEEDS * low:
         return Lock()
-    ratio = bench.axis.ratio_m_rad
-    x = np.concatenate([ratio * energy.run.motor[rows] for energy, rows in zip(seen, moving, strict=True)])
-    signal = np.concatenate([energy.parts[channel][rows] for energy, rows in zip(seen, moving, strict=True)])
-    time = np.concatenate([energy.run.time_s[rows] for energy, rows in zip(seen, moving, strict=True)])
+    x = moving([bench.axis.ratio_m_rad * energy.run.motor for energy in seen])
+    signal = moving([energy.parts[channel] for energy in seen])
+    time = moving([energy.run.time_s for energy in seen])
     period_s = seen[0].run.period_s
-    # a period that goes into the lead is an order of the screw
+    # a period that divides the lead is an order of the screw
     spans = [
         float(p)
         for p in np.geomspace(np.ptp(x) / 60.0, np.ptp(x) / 1.5, 200)
@@ -100,11 +97,7 @@ def _lead_m(bench: Bench) -> float:
 def _share(phase: FloatArray, signal: FloatArray) -> float:
     """Share of the energy that one harmonic explains."""
     step = max(phase.size // _MOST_ROWS, 1)
-    phase, signal = phase[::step], signal[::step] - signal[::step].mean()
-    basis = np.stack([np.sin(phase), np.cos(phase)], axis=1)
-    basis -= basis.mean(axis=0)
-    solution, *_ = np.linalg.lstsq(basis, signal, rcond=None)
-    return float(1.0 - np.sum((signal - basis @ solution) ** 2) / max(float(signal @ signal), 1e-300))
+    return harmonic_share(phase[::step], signal[::step])
 
 
 def _strongest_frequency(time: FloatArray, signal: FloatArray, period_s: float) -> tuple[float, float]:

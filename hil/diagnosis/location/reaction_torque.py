@@ -15,26 +15,27 @@ from scipy.signal import lfilter
 
 from hil.arrays import FloatArray
 from hil.diagnosis.search.disturbance import disturbance, smooth
-from hil.identification.dataset import Measured, inertia
+from hil.identification.dataset import inertia
 from hil.identification.estimator import Fit
+from hil.identification.measured import Measured
 from hil.twin.mechanism import Block
 from hil.twin.structure.chain import Chain
 
-TABLE = (Block.TABLE.value, "table, its guides, and what acts on them")
+TABLE = (Block.TABLE.value, "table, its guides and external forces")
 ENCODER = (Block.SENSOR.value, "linear encoder")
 
-# A force acts on both ends: the share of k e in the torque is above a half, refitted springs included, and little else
-# is in it. On development axes forces had 0.9 to 5, errors of the transmission 0.6 at most, of encoders 0.1.
+# Least share of k e in the torque, and least correlation of both, for a force on the table. On development axes the
+# share was 0.9 to 5 for forces, at most 0.6 for errors of the transmission, and 0.1 for errors of encoders.
 _PASSED, _ALONE = 0.7, 0.5
-# Inertia that would stand so far out of what the motor feels anyway, and of which it feels less than this, is not
-# there: errors of the linear encoder had 0.02 at most, those of the transmission 0.5 and more. Fewer rows than pass in
-# some ten of the means that a disturbance is smoothed by could be one knock.
+# The linear encoder is at fault if the expected reaction torque exceeds `_STANDS_OUT` times the usual torque for more
+# than `_FEW_S` and its share is below `_MISSING`: errors of the linear encoder had at most 0.02, those of the
+# transmission 0.5 and more. `_FEW_S` is some ten windows of the moving mean: fewer rows may be a single impact.
 _STANDS_OUT, _MISSING, _FEW_S = 5.0, 0.25, 0.05
 _DEVIATION = 1.4826  # standard deviation of Gaussian noise over the median of its size
 
 
 def acting(found: Fit) -> tuple[str, str] | None:
-    """Block and element, where the reaction torque isolates the table or the linear encoder; else None."""
+    """Block and element if the reaction torque isolates the table or the linear encoder, else None."""
     fitted, runs = found.bench, found.data.runs
     chain = fitted.axis.physics().chain
     if len(chain.names) < 2 or not all(run.table_m.size for run in runs):
@@ -44,7 +45,7 @@ def acting(found: Fit) -> tuple[str, str] | None:
     for run, blocks in zip(runs, found.residuals.channels, strict=True):
         seen = disturbance(run, blocks["motor"], inertia(fitted), observer_s)
         table = smooth(_observed(blocks["table"] / fitted.axis.ratio_m_rad, run, observer_s), run.period_s)
-        table = smooth(table, run.period_s)  # like the torque, which is smooth already, and once more below
+        table = smooth(table, run.period_s)  # like the torque, which is smoothed twice too
         speed = np.gradient(table, run.period_s)
         rows = np.flatnonzero(seen.sliding[run.judged]) + (run.judged.start or 0)
         felt.append(smooth(seen.torque, run.period_s)[rows])
@@ -63,14 +64,14 @@ def acting(found: Fit) -> tuple[str, str] | None:
 
 
 def stiffness_between(chain: Chain) -> float:
-    """Stiffness [motor units] with which the table is held while the motor stands."""
+    """Stiffness [motor units] of the table against the motor at standstill."""
     free = [place for place in range(len(chain.names)) if place != chain.motor]
     at_table = np.eye(len(free))[free.index(chain.table)]
     return 1.0 / float(at_table @ np.linalg.solve(chain.stiffness_n_m_rad[np.ix_(free, free)], at_table))
 
 
 def _observed(values: FloatArray, run: Measured, observer_s: float) -> FloatArray:
-    """Values (n,) as slow as the observer of the motor tells a torque: two lags of its time constant."""
+    """Filter values (n,) like the observer filters a torque: two lags of its time constant."""
     kept = float(np.exp(-run.period_s / observer_s))
     for _ in range(2):
         values = lfilter([1.0 - kept], [1.0, -kept], values)

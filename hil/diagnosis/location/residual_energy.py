@@ -5,11 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from hil.arrays import FloatArray
-from hil.identification.dataset import Dataset, Measured
+from hil.identification.dataset import Dataset
 from hil.identification.hypothesis import Hypothesis
+from hil.identification.measured import Measured
 from hil.identification.terms import Term
 
-_MEMORY_S = 0.03  # for so long, a change of the table's error counts as new
+# Time over which a change of the table's error is assigned to a row: several time constants of the observer.
+_MEMORY_S = 0.03
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,15 +40,15 @@ def energies(hypothesis: Hypothesis, data: Dataset, reference: Hypothesis | None
 
 
 def without_terms(hypothesis: Hypothesis, off: Term | None = None) -> Hypothesis:
-    """The hypothesis with its terms, or one of them, switched off and the rest as it is."""
+    """Remove all terms of a hypothesis, or one of them, without refitting."""
     keys = [term.key for term in hypothesis.terms]
     return hypothesis.without(*(index for index, key in enumerate(keys) if off is None or key == off.key))
 
 
 def _arising(channel: str, values: FloatArray, run: Measured) -> FloatArray:
-    """The part of a residual (n,) that arises at each row.
+    """Part of a residual (n,) that arises at each row.
 
-    The table keeps an error, at standstill too: its change counts.
+    An error of the table persists, at standstill too, so that its change is taken.
     """
     if channel != "table":
         return values

@@ -1,1 +1,1 @@
-"""Pictures of a diagnosis, as matplotlib figures."""
+"""Matplotlib figures of a diagnosis."""

@@ -1,4 +1,4 @@
-"""Picture of a finding: the quantity in which its mechanism shows best, measured and modelled."""
+"""Figure of a finding: the characteristic quantity of its mechanism, measured and modelled."""
 
 from __future__ import annotations
 
@@ -35,10 +35,10 @@ from hil.twin.mechanism import Picture
 if TYPE_CHECKING:
     from hil.diagnosis.diagnose import Diagnosis
 
-BINS = 120
+BINS = 120  # points that a figure of this width resolves
 SAMPLES_PER_BIN = 60  # on average; a shorter recording gets wider bins, so that medians stay smooth
-FOLDED_FROM = 6  # periods within the travel: from here on the position is taken within the period
-DRAWN_ROWS = 6000
+FOLDED_FROM = 6  # periods within the travel from which the position is taken within the period: more are not readable
+DRAWN_ROWS = 6000  # several per pixel
 POINTS, CURVE = "measured - twin without this term", "modelled by this term"
 
 
@@ -162,12 +162,12 @@ def _spectrum(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:
         ]
         density = np.sqrt(np.mean([power for _, power in spectra], axis=0))
         axis.loglog(spectra[0][0][1:], density[1:], color=colour, label=label)
-    # the motor's residual is a position here, not turned into a torque
+    # here the motor's residual is a position, not converted to a torque
     unit = "m" if channel == "table" or diagnosis.owner.axis.linear else "rad"
     label = CHANNEL_LABELS["table"] if channel == "table" else "motor position"
     style_axis(axis, f"{label} [{unit}/√Hz]", "frequency [Hz]", "Spectrum of the residual")
     axis.legend(frameon=False)
-    return Captioned(figure, "A mode that the twin lacks shows as a peak before, which disappears with the findings.")
+    return Captioned(figure, "A mode that the twin lacks is a peak of the nominal twin and absent with the findings.")
 
 
 def _over_time(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:

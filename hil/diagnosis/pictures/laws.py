@@ -1,4 +1,4 @@
-"""Pictures of physical laws: friction over speed, lost motion over load, torque over its command."""
+"""Figures of physical laws: friction over speed, lost motion over load, torque over its command."""
 
 from __future__ import annotations
 
@@ -14,15 +14,16 @@ from hil.arrays import FloatArray
 from hil.diagnosis.pictures.view import Captioned, Curve, View, around, binned, longest, three_curves
 from hil.figures.drawing import style_axis
 from hil.figures.panels import COMMAND, DEVIATION, MEASURED, SIMULATED
-from hil.identification.dataset import Measured, inertia
+from hil.identification.dataset import inertia
 from hil.identification.estimator import Fit
+from hil.identification.measured import Measured
 from hil.quantities import reading_unit
 
 if TYPE_CHECKING:
     from hil.diagnosis.diagnose import Diagnosis
 
-CLOUD_POINTS = 8000  # of a scatter plot: more only blacken it
-REVERSAL_S, STEEPEST_S = 0.4, 0.05  # shown before and after
+CLOUD_POINTS = 8000  # of a scatter plot: more points overlap
+REVERSAL_S, STEEPEST_S = 0.4, 0.05  # shown before and after: a reversal with its ramps, a step of the current loop
 
 
 def friction_over_speed(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:

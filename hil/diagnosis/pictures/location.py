@@ -1,4 +1,4 @@
-"""Pictures of the location of a mismatch, and of the residuals before and after."""
+"""Figures of the location of a mismatch, and of the residuals before and after."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from hil.diagnosis.verdict.fit_table import channel_names
 from hil.diagnosis.wording import title
 from hil.figures.drawing import style_axis
 from hil.figures.panels import COMMAND, DEVIATION, MEASURED, SIMULATED, Line, Panel
-from hil.identification.dataset import Measured
 from hil.identification.estimator import Fit
+from hil.identification.measured import Measured
 
 if TYPE_CHECKING:
     from hil.diagnosis.diagnose import Diagnosis
 
-BINS = 40
-TIME_BIN_S = 0.05
+BINS = 40  # as in the location
+TIME_BIN_S = 0.05  # resolves single moves
 ENERGY = "residual² / noise²"
 
 
@@ -34,7 +34,7 @@ def location_figure(diagnosis: Diagnosis) -> Figure:
     figure = Figure(figsize=(10.0, 8.2), layout="constrained")
     axes = figure.subplot_mosaic([["block", "phase"], ["position", "speed"], ["time", "time"]])
     blocks = {title(BLOCKS[name][0]): share for name, share in block_shares(before).items()}
-    _shares(axes["block"], blocks, "Block in whose output it shows")
+    _shares(axes["block"], blocks, "Block with the mismatch in its output")
     _shares(axes["phase"], {title(phase.kind): phase.share for phase in phase_shares(seen)}, "Phase of motion")
     excess = np.concatenate([energy.rows for energy in seen])
     position = np.concatenate([1e3 * energy.run.position_command_m for energy in seen])
@@ -56,7 +56,7 @@ def location_figure(diagnosis: Diagnosis) -> Figure:
 
 
 def reference_fit(diagnosis: Diagnosis) -> Fit:
-    """The hypothesis whose mismatch is located: the bench file if only its parameters are wrong, else refitted."""
+    """Return the fit whose mismatch is located: that of the bench file if only parameters are wrong, else the refit."""
     if diagnosis.result.verdict in (Verdict.PARAMETER_ERROR, Verdict.NO_MISMATCH):
         return diagnosis.explanation.owner
     return diagnosis.explanation.nominal

@@ -1,4 +1,4 @@
-"""Data of the picture of a finding: residuals without the finding's term, and the part that the term models."""
+"""Data of the figure of a finding: residuals without the finding's term, and the part that the term models."""
 
 from __future__ import annotations
 
@@ -13,13 +13,14 @@ from hil.arrays import FloatArray
 from hil.diagnosis.location.residual_energy import without_terms
 from hil.diagnosis.search.disturbance import Disturbance, disturbance
 from hil.figures.panels import COMMAND, MEASURED, SIMULATED
-from hil.identification.dataset import Measured, inertia
+from hil.identification.dataset import inertia
+from hil.identification.measured import Measured
 from hil.identification.terms import Term
 
 if TYPE_CHECKING:
     from hil.diagnosis.diagnose import Diagnosis
 
-BIN_SAMPLES_MIN = 8  # of a bin that is drawn: quartiles of fewer samples scatter too much
+BIN_SAMPLES_MIN = 8  # samples of a drawn bin: quartiles of fewer have a large variance
 CHANNEL_LABELS = {
     "motor": "torque on the motor",
     "table": "table - motor position",
@@ -57,7 +58,7 @@ Drawer = Callable[["Diagnosis", Sequence[View]], Captioned]
 
 
 class Curve(NamedTuple):
-    """A signal (n,) of one run as measured or as a twin has it, with its look."""
+    """A signal (n,) of one run, measured or simulated, with its label and colour."""
 
     label: str
     values: FloatArray
@@ -77,7 +78,7 @@ def view_of(diagnosis: Diagnosis, run: Measured, term: Term) -> View:
 
 
 def three_curves(diagnosis: Diagnosis, run: Measured, channel: str, measured: FloatArray) -> list[Curve]:
-    """A signal (n,) as measured, as the refitted nominal twin has it, and as the final twin has it."""
+    """A signal (n,) measured, simulated by the refitted nominal twin, and simulated by the final twin."""
     nominal, final = (
         measured - diagnosis.residuals(fit, run)[channel] for fit in (diagnosis.explanation.nominal, diagnosis.final)
     )

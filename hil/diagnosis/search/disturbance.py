@@ -1,14 +1,10 @@
-"""What acts on the axis beside the nominal physics, read off the measurement, to start searches from.
+"""Estimate the disturbance torque of a recording, and from it starting values of the search.
 
     d = e J / tau^2
 
 with the motor's innovation e (see `hil.identification.hypothesis`), the inertia J of the whole axis and the time
-constant tau of the observer: the torque whose effect the correction of the motor just holds.
-
-These are starting values only: every verdict comes from the closed-loop fit.
+constant tau of the observer: the torque whose effect equals the observer's correction of the motor.
 """
-
-from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hil.arrays import FloatArray
-from hil.identification.dataset import Measured
+from hil.identification.measured import Measured
 
-_SMOOTH_S = 0.006  # of the innovations: passes 60 Hz
-_PASS_HZ = 60.0
+_SMOOTH_S = 0.006  # mean of the innovations: passes 60 Hz, reduces encoder counts
+_PASS_HZ = 60.0  # above, the mean attenuates a ripple by more than a fifth
 _ORDERS = np.arange(1, 49)  # of the motor angle; up to 48 slots or pole passings per revolution
 
 
@@ -45,7 +41,7 @@ def disturbance(run: Measured, innovation: FloatArray, inertia: float, observer_
 
 
 def smooth(values: FloatArray, period_s: float) -> FloatArray:
-    """Means (n,) over as much time as leaves a disturbance."""
+    """Moving mean (n,) that passes a disturbance up to 60 Hz."""
     width = _width(period_s)
     return np.convolve(values, np.ones(width) / width, "same")
 
@@ -54,7 +50,7 @@ def _width(period_s: float) -> int:
     return max(round(_SMOOTH_S / period_s), 1)
 
 
-def _harmonic_share(phase: FloatArray, signal: FloatArray) -> float:
+def harmonic_share(phase: FloatArray, signal: FloatArray) -> float:
     """Share of a signal's energy that one harmonic of `phase` explains."""
     basis = np.stack([np.sin(phase), np.cos(phase), np.ones_like(phase)], axis=1)
     coefficients, *_ = np.linalg.lstsq(basis, signal, rcond=None)
@@ -70,10 +66,10 @@ def orders(
     most: int = 3,
     weight: Sequence[FloatArray] | None = None,
 ) -> list[float]:
-    """Orders per motor revolution in which the disturbance is strongest, best first, and always the first two.
+    """Orders per motor revolution with the strongest disturbance, best first, and always orders 1 and 2.
 
-    Only rows slow enough for the differences to pass the order are used. Where those are less than some turns, high
-    orders fit anything; an unbalanced or bent screw shows once or twice a turn.
+    Only rows slow enough for the moving mean to pass the order are used; with few turns of them high orders overfit.
+    Orders 1 and 2 are typical of an unbalanced or bent screw.
     """
     shares = []
     for order in _ORDERS:
@@ -86,7 +82,7 @@ def orders(
         phase, signal = np.concatenate(phases), np.concatenate(signals)
         step = max(phase.size // 10000, 1)
         phase, signal = phase[::step], signal[::step]
-        shares.append(_harmonic_share(phase, signal) * min(1.0, phase.size / 1000.0) if phase.size > 100 else 0.0)
+        shares.append(harmonic_share(phase, signal) * min(1.0, phase.size / 1000.0) if phase.size > 100 else 0.0)
     best = [float(_ORDERS[index]) for index in np.argsort(shares)[::-1][:most]]
     return list(dict.fromkeys((*best, 1.0, 2.0)))
 
@@ -94,7 +90,7 @@ def orders(
 def friction_periods(
     runs: Sequence[Measured], found: Sequence[Disturbance], ratio: float, most: int = 4
 ) -> list[float]:
-    """Periods along the travel [m], from 1 mm up, with which friction varies most, best first."""
+    """Periods along the travel [m], from 1 mm up, with the largest variation of friction, best first."""
     x = [ratio * run.motor[d.sliding] for run, d in zip(runs, found, strict=True)]
     friction = [d.torque[d.sliding] * np.sign(d.velocity[d.sliding]) for d in found]
     return _periods(x, friction, 1e-4, 1e-3, most)
@@ -110,7 +106,7 @@ def scale_periods(runs: Sequence[Measured], errors: Sequence[FloatArray], most: 
 def _periods(
     positions: Sequence[FloatArray], values: Sequence[FloatArray], bin_m: float, shortest_m: float, most: int
 ) -> list[float]:
-    """Peaks of the spectrum of values over position [m]: averaged over bins, transformed, best first."""
+    """Periods [m] of the spectral peaks of values (n,) over position (n,) [m], averaged in bins, best first."""
     x, y = np.concatenate(list(positions)), np.concatenate(list(values))
     if x.size < 100 or np.ptp(x) < 4.0 * shortest_m:
         return []
@@ -118,7 +114,7 @@ def _periods(
     index = np.minimum(((x - x.min()) / np.ptp(x) * count).astype(int), count - 1)
     rows = np.bincount(index, minlength=count)
     mean = np.bincount(index, weights=y, minlength=count) / np.maximum(rows, 1)
-    size = 4 * (1 << (count - 1).bit_length())  # padded: a peak is read to a quarter of its width
+    size = 4 * (1 << (count - 1).bit_length())  # zero-padded: a resolution of a quarter of a peak width
     spectrum = np.abs(np.fft.rfft(np.where(rows > 0, mean - mean[rows > 0].mean(), 0.0), size))
     frequency = np.fft.rfftfreq(size, float(np.ptp(x)) / count)
     width = size // count + 1
@@ -134,7 +130,7 @@ def _periods(
 
 
 def force_window(run: Measured, d: Disturbance) -> tuple[float, float, float]:
-    """Start, end [s] and level [motor units] of the constant disturbance that stands out most."""
+    """Start, end [s] and level [motor units] of the most significant constant disturbance."""
     block = max(int(0.02 / run.period_s), 1)
     n = run.motor.size // block
     mask = d.sliding[: n * block].reshape(n, block)

@@ -1,8 +1,7 @@
-"""Forward selection: how many mechanisms, which, and their rivals.
+"""Forward selection of mechanisms, with their rivals.
 
-Terms are added one at a time while the evidence asks for them, each against the whole library. After every addition
-the terms that are no longer needed are removed, so that a first term which only imitated two causes goes once both
-are there.
+Terms are added one at a time from the whole library while the evidence supports them. After every addition the terms
+that are no longer needed are removed: a first term may have imitated two causes that are found later.
 """
 
 from collections.abc import Callable, Sequence
@@ -11,21 +10,21 @@ from functools import partial
 
 import numpy as np
 
+from hil.diagnosis.search.initial_values import claimable
 from hil.diagnosis.search.restart import from_owner, may_hide, unbent
 from hil.diagnosis.search.score_test import Candidate, screen_library
 from hil.diagnosis.search.successive_halving import race
-from hil.diagnosis.search.validity import claimable
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit, in_parallel
 from hil.identification.hypothesis import LAST_EDGE_STEP_S, effects
-from hil.identification.model_comparison import against, whitening
+from hil.identification.inference import against, whitening
 from hil.identification.noise_floor import REPEATS, unrepeated
 from hil.identification.nominal_fit import fit_nominal_parameters
 from hil.identification.terms import FRICTION, Key, Term
 
 Progress = Callable[[str], None]
 
-MOST_TERMS = 8  # at once; more than an engineer could act on, and the search stays affordable
+MOST_TERMS = 8  # at once: more than an engineer can act on; limits the duration of a search
 # BIC differences. "Very strong" evidence is 10 (Kass and Raftery 1995); the search looks at some 45 variants at some
 # 90 starts, which costs 2 log 90 = 9 more.
 NEEDED = 20.0
@@ -33,22 +32,22 @@ TIED = 10.0  # a rival closer than this is not refuted
 # Ablation fits stop early when the cost without the term is > 1.43 x (1 / 0.7) the cost with it; others are iterated to
 # convergence. A term that removes less may be the remainder of a hidden effect, which restarts look for.
 _CLEAR = 0.7
-# A term must also matter: remove so much energy, in units of the noise's: 14 % of the noise in rms.
-# Two honest simulations of one axis differ by details below that.
+# Least energy that a term removes per row, in units of noise^2: 14 % of the noise in rms. The model discrepancy of two
+# simulations of one axis is below that.
 MATERIAL = 0.02
-# And so much of the energy above the noise: many mechanisms that each explain next to nothing are a series expansion
-# of something else.
+# Least share of the energy above the noise that a term removes: many terms of less are a series expansion of another
+# effect.
 WORTH = 0.02
-# Terms that together leave more than this share of the energy above the floor are a fit, not an explanation. After so
-# many of them the search ends.
+# Terms that together leave more than this share of the energy above the floor do not explain the mismatch. After
+# `_IN_VAIN` such terms the search ends.
 MOST, _IN_VAIN = 0.5, 3
-_ENDED = 40  # evaluations, within which a fit that began near its end gets there
-# The same law may be written in another form. A residual below this share of the energy that a term removed from a
-# channel, a twentieth in rms, may be due to its form, and no second mechanism.
+_ENDED = 40  # evaluations: a fit that starts near its minimum converges within them
+# Share of the energy that a term removed from a channel, 1/20 in rms, below which the remainder may be due to another
+# form of the same law and not to a second mechanism.
 FORM = 0.0025
 
-# A rival whose energy per row exceeds the best's by no more than this is not refuted either, whatever the evidence: a
-# quarter of what is material, 7 % of the noise in rms. Two simulations of the same axis differ by as much.
+# Difference in energy per row up to which a rival is not refuted, whatever the evidence: a quarter of MATERIAL, 7 % of
+# the noise in rms. The model discrepancy of two simulations of one axis is as large.
 ALIKE = 0.25 * MATERIAL
 
 
@@ -56,7 +55,7 @@ ALIKE = 0.25 * MATERIAL
 class RivalFit:
     """Another explanation of the same residual and the evidence against it (BIC difference).
 
-    `more` is its energy per row, in units of noise, less that of the explanation chosen.
+    `more` is its energy per row in units of noise^2 less that of the chosen explanation.
     """
 
     fit: Fit
@@ -65,7 +64,7 @@ class RivalFit:
 
     @property
     def tied(self) -> bool:
-        """Whether it is not refuted."""
+        """True if it is not refuted."""
         return self.evidence < TIED or self.more < ALIKE
 
 
@@ -87,7 +86,7 @@ class Explanation:
 
 
 def explain(data: Dataset, progress: Progress = lambda text: None) -> Explanation:
-    """Search for the physics that the twin of a bench lacks on the recordings of a data set."""
+    """Search for the mechanisms that the twin of a bench lacks on the recordings of a data set."""
     progress("refitting the nominal parameters")
     base = fit_nominal_parameters(data)
     owner, nominal = base.estimator.evaluate(base.hypothesis.owner), base
@@ -102,7 +101,7 @@ def explain(data: Dataset, progress: Progress = lambda text: None) -> Explanatio
             break
         best = _simplest([best, *(other for other in found if other is not best and against(best, other) < TIED)])
         found = [other for other in found if other is not best]
-        if not best.jacobian.size:  # evaluated, not fitted, while another that was fitted was refused
+        if not best.jacobian.size:  # only evaluated so far, since the fitted ones were rejected
             best = replace(best.estimator, edge_step_s=LAST_EDGE_STEP_S).fit(best.hypothesis)
         filters = whitening(best)
         rivals[best.terms[-1].key] = sorted(
@@ -110,7 +109,7 @@ def explain(data: Dataset, progress: Progress = lambda text: None) -> Explanatio
             key=lambda rival: rival.evidence,
         )
         best, needed = _pruned(best, nominal)
-        # converged: the residual of an unfinished fit resembles other mechanisms
+        # to convergence: the residual of an unfinished fit resembles other mechanisms
         base = claimed(best.refit(_ENDED, slopes=best.jacobian))
         if effects(base.terms) in tried:
             break  # the term that was added has been removed again
@@ -126,8 +125,8 @@ def explain(data: Dataset, progress: Progress = lambda text: None) -> Explanatio
 def _next_term(
     base: Fit, owner: Fit, nominal: Fit, candidates: Sequence[Candidate], progress: Progress
 ) -> tuple[list[Fit], Fit | None]:
-    """Fits of the base with one more term, and the first of them that is worth it, if any."""
-    bits = 1.0 - float(np.exp(-NEEDED / base.rows))  # share of white residuals that evidence of NEEDED removes
+    """Fit the base with one more term; return the fits and the first one with sufficient evidence, if any."""
+    bits = 1.0 - float(np.exp(-NEEDED / base.rows))  # share of white residuals whose removal gives evidence of NEEDED
     promising = [one for one in candidates if one.share > bits and one.share * base.cost > MATERIAL * base.rows]
     found: list[Fit] = []
     if promising:
@@ -150,7 +149,7 @@ def _claimable(found: Sequence[Fit]) -> list[Fit]:
 
 
 def _worthwhile(found: Sequence[Fit], base: Fit, nominal: Fit) -> Fit | None:
-    """The first whose last term the evidence supports, that is material, and that repeats from lap to lap."""
+    """Return the first fit whose last term has evidence, a material energy, and repeats from lap to lap."""
     enough = max(MATERIAL * base.rows, WORTH * base.excess)
     differs = unrepeated(base.hypothesis, base.data)
     return next(
@@ -166,7 +165,7 @@ def _worthwhile(found: Sequence[Fit], base: Fit, nominal: Fit) -> Fit | None:
 
 
 def gain(without: Fit, found: Fit, nominal: Fit) -> float:
-    """Energy that a term removes, channel by channel beyond what may be due to the form of the terms before it."""
+    """Energy that a term removes, by channel, less the share that may be due to the form of the terms before it."""
     parts = (fit.residuals.parts.values() for fit in (without, found, nominal))
     return sum(
         max(float(a @ a - b @ b) - FORM * max(float(n @ n - a @ a), 0.0), 0.0) for a, b, n in zip(*parts, strict=True)
@@ -174,22 +173,22 @@ def gain(without: Fit, found: Fit, nominal: Fit) -> float:
 
 
 def _simplest(tied: list[Fit]) -> Fit:
-    """Of explanations that the evidence does not separate, the one with the fewest parameters.
+    """Return the explanation with the fewest parameters of those that the evidence does not separate.
 
-    A constant torque and friction that differs by direction, alike at every speed, are the same on every motion: the
-    second is named, since most axes are horizontal.
+    Constant torque and direction-dependent Coulomb friction are equal on every motion; friction is preferred, since
+    most axes are horizontal.
     """
     return min(tied, key=lambda found: (found.hypothesis.x.size, found.terms[-1].key[:2] != (FRICTION, 0)))
 
 
 def _without(found: Fit, index: int) -> Fit:
-    """A first fit without one of the terms."""
+    """Fit the hypothesis without one of the terms, in few evaluations."""
     slopes = np.delete(found.jacobian, found.hypothesis.columns(index), axis=1)
     return found.estimator.fit(found.hypothesis.without(index), evaluations=6, slopes=slopes)
 
 
 def claimed(found: Fit) -> Fit:
-    """The fit without the terms whose values are no longer valid for their mechanism."""
+    """Remove the terms whose values are not valid for their mechanism."""
     while True:
         lost = next((index for index, term in enumerate(found.terms) if not claimable(term, found.bench)), None)
         if lost is None:
@@ -199,7 +198,7 @@ def claimed(found: Fit) -> Fit:
 
 
 def _pruned(found: Fit, nominal: Fit) -> tuple[Fit, dict[Key, float]]:
-    """Remove the terms that the evidence does not support, weakest first; the fit and the evidence for the others."""
+    """Remove terms without evidence, weakest first; return the fit and the evidence for the remaining terms."""
 
     def ablated(index: int) -> tuple[float, Fit]:
         other = _without(found, index)

@@ -1,11 +1,12 @@
-"""Starting values of each mechanism for the recordings at hand: where a search for it begins.
+"""Starting values of each mechanism for the recordings at hand, and the check of fitted values.
 
-A start is a point of a mechanism's parameters at small but visible strength. The screen asks how much of
-the residual the twin's answer to it explains, scales the strength, and turns the phase. The points are
-data of the mechanisms.
+A start is a point of a mechanism's parameters at small but visible strength; its data stand on the mechanism. The score
+test scales the strength and turns the phase.
+
+While an axis moves in one direction at one feed, cogging, a torque constant that varies over a turn, and friction that
+varies along the screw have the same effect. After a search found one of these screw-locked mechanisms, the others are
+started at strengths with the same torque at creep, where all torque is Coulomb friction.
 """
-
-from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,18 +16,20 @@ import numpy as np
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
 from hil.diagnosis.search import disturbance as estimate
-from hil.identification.dataset import Measured, inertia
-from hil.twin.library import LIBRARY
-from hil.twin.mechanism import Role
+from hil.identification.dataset import inertia
+from hil.identification.measured import Measured
+from hil.identification.terms import Term, free_slot
+from hil.twin.library import BY_ID, LIBRARY
+from hil.twin.mechanism import Dimension, Mechanism, Role
 from hil.twin.scene import AxisFacts, Scene
 
 
 @dataclass(frozen=True)
 class StartPoint:
-    """Parameter values of one variant, and which of them are strength and phase (-1: no phase).
+    """Parameter values of one variant, and the indices of strength and phase (-1: no phase).
 
-    Further pairs of strength and phase follow the first for so many `harmonics`. Without a phase, the strength counts
-    from what is `known`. What acts `instead` of something that the bench knows takes that away whatever its strength.
+    There are `harmonics` consecutive pairs of strength and phase. Without a phase, strengths are counted from the
+    `known` strength of the bench. With `instead`, the start replaces a mechanism of the bench.
     """
 
     effect: str
@@ -35,12 +38,12 @@ class StartPoint:
     strength: int = 0
     phase: int = -1
     harmonics: int = 1
-    known: float = 0.0  # of the strength, what the bench has of it already
+    known: float = 0.0  # strength of the same mechanism in the bench
     instead: bool = False
 
 
 def axis_facts(bench: Bench, runs: Sequence[Measured] = ()) -> AxisFacts:
-    """Facts of the axis of a bench with the nominal parameters as fitted, and of its recordings."""
+    """Collect facts of the axis, with the nominal parameters of `bench`, and of its recordings."""
     physics, table, limit = bench.axis.physics(), bench.encoders.table, bench.gains.torque_limit_n_m
     peak = max((float(np.max(np.abs(run.torque))) for run in runs), default=0.0)
     return AxisFacts(
@@ -54,7 +57,7 @@ def axis_facts(bench: Bench, runs: Sequence[Measured] = ()) -> AxisFacts:
 
 
 def scene(runs: Sequence[Measured], bench: Bench, blocks: Sequence[dict[str, FloatArray]], observer_s: float) -> Scene:
-    """Measure what the starting values need.
+    """Estimate the quantities that starting values are computed from.
 
     `bench` has the nominal parameters as fitted, `blocks` their residuals block by block, one per run.
     """
@@ -68,22 +71,13 @@ def scene(runs: Sequence[Measured], bench: Bench, blocks: Sequence[dict[str, Flo
     longest = max(range(len(runs)), key=lambda i: runs[i].motor.size)
     travel = max(float(np.ptp(run.position_command_m)) for run in runs)
     lead = 2.0 * np.pi * ratio / physics.angle_per_unit
-    # What is locked to the screw shows in its angle and along the travel alike: each is a start for the other.
+    # a screw-locked effect is periodic in the angle and along the travel: orders and periods start each other
     periods = estimate.friction_periods(runs, found, ratio)
     orders = estimate.orders(runs, found, physics.angle_per_unit)
     turns = [lead / order for order in dict.fromkeys((1.0, 2.0, *orders)) if _SHORTEST_M < lead / order < travel]
-    orders = list(
-        dict.fromkeys(
-            (
-                *orders,
-                *(
-                    float(round(lead / period))
-                    for period in periods
-                    if abs(lead / period - round(lead / period)) < _WHOLE and period < lead
-                ),
-            )
-        )
-    )
+    per_lead = [lead / period for period in periods if period < lead]
+    whole = [float(round(order)) for order in per_lead if abs(order - round(order)) < _WHOLE]
+    orders = list(dict.fromkeys((*orders, *whole)))
     ripple = [
         d.torque / np.where(np.abs(run.torque) > 0.2 * physics.coulomb_n_m, run.torque, np.inf)
         for run, d in zip(runs, found, strict=True)
@@ -110,7 +104,7 @@ def scene(runs: Sequence[Measured], bench: Bench, blocks: Sequence[dict[str, Flo
 
 
 def stretches(runs: Sequence[Measured], ratio_m_rad: float) -> tuple[float, float]:
-    """Table against motor [m], typical and most, of runs with a linear encoder."""
+    """Table less motor position [m], typical and largest, of runs with a linear encoder."""
     found = [run.table_m - ratio_m_rad * run.motor for run in runs]
     typical, most = np.max(
         [np.percentile(np.abs(stretch - np.median(stretch)), (60.0, 99.9)) for stretch in found], axis=0
@@ -118,12 +112,12 @@ def stretches(runs: Sequence[Measured], ratio_m_rad: float) -> tuple[float, floa
     return float(typical), float(most)
 
 
-_SHORTEST_M = 1e-3  # along the travel: below, friction is not looked for
-_WHOLE = 0.05  # of a turn, to which a period makes a whole order of the screw
+_SHORTEST_M = 1e-3  # shortest period of friction along the travel: shorter ones are orders of the screw
+_WHOLE = 0.05  # largest deviation of lead / period from a whole order of the screw
 
 
 def starts(scene: Scene, bench: Bench) -> list[StartPoint]:
-    """All starting points of the library for this scene, every variant."""
+    """Starting points of all variants of the library for a scene."""
     found = []
     for mechanism in LIBRARY:
         phases = mechanism.indices(Role.PHASE)
@@ -138,3 +132,57 @@ def starts(scene: Scene, bench: Bench) -> list[StartPoint]:
                 for point in mechanism.start_points(number, scene)
             ]
     return found
+
+
+# The angle is unknown, since the zero of the table is not that of the motor: eight phases are within 23 deg of any.
+_PHASES = np.arange(8) * np.pi / 4.0
+
+
+def likenesses(terms: Sequence[Term], bench: Bench) -> list[list[Term]]:
+    """Terms with the effect of the last term, at eight phases, for each other screw-locked mechanism.
+
+    `bench` has the nominal parameters as fitted.
+    """
+    *rest, last = terms
+    physics = bench.axis.physics()
+    lead_m = 2.0 * np.pi * bench.axis.ratio_m_rad / physics.angle_per_unit
+    if not BY_ID[last.effect].screw_locked or physics.coulomb_n_m <= 0.0:
+        return []
+    size, place = _size_and_place(BY_ID[last.effect])
+    share = last.values[size] / _unit(BY_ID[last.effect], physics.coulomb_n_m)
+    order = _other(BY_ID[last.effect], last.values[place], lead_m)
+    found = []
+    for mechanism in sorted(LIBRARY, key=lambda one: one.parameters[0].dimension is not Dimension.TORQUE):
+        if not mechanism.screw_locked or mechanism.id == last.effect:
+            continue
+        size, place = _size_and_place(mechanism)
+        repeats, bounds = _other(mechanism, order, lead_m), mechanism.parameters[place]
+        if not bounds.low <= repeats <= bounds.high:
+            continue
+        values = dict.fromkeys(range(len(mechanism.parameters)), 0.0)
+        values[size] = min(share * _unit(mechanism, physics.coulomb_n_m), mechanism.parameters[size].high)
+        values[place] = repeats
+        (turned,) = mechanism.indices(Role.PHASE)
+        slot = free_slot(mechanism.id, rest)
+        found.append([Term(mechanism.id, 0, tuple((values | {turned: phase}).values()), slot) for phase in _PHASES])
+    return found
+
+
+def _size_and_place(mechanism: Mechanism) -> tuple[int, int]:
+    """Indices of the strength, and of the order or period."""
+    return mechanism.strength, (mechanism.indices(Role.ORDER) or mechanism.indices(Role.PERIOD))[0]
+
+
+def _unit(mechanism: Mechanism, coulomb: float) -> float:
+    """Strength with the torque of Coulomb friction."""
+    return coulomb if mechanism.parameters[mechanism.strength].dimension is Dimension.TORQUE else 1.0
+
+
+def _other(mechanism: Mechanism, value: float, lead_m: float) -> float:
+    """Convert an order to the mechanism's order or period, and the reverse."""
+    return value if mechanism.indices(Role.ORDER) else lead_m / value
+
+
+def claimable(term: Term, bench: Bench) -> bool:
+    """True if the values are valid for the mechanism of a term, and the sensors can show it."""
+    return BY_ID[term.effect].is_valid(term.values, term.variant, axis_facts(bench))

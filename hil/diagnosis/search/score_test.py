@@ -1,11 +1,11 @@
-"""Score tests: the share of a residual that each mechanism of the library would explain.
+"""Score tests: share of the residual energy that each mechanism of the library would explain.
 
     minimise over a, c:  | W (r + J a + D c) |^2
 
 r: residuals of the hypothesis, J: their derivatives by its parameters, D: change of the residuals when a
-mechanism is switched on at a start, W: weights against wild instants. Because a is free, only what
-no parameter can explain counts (Rao's score test with nuisance parameters). Where another law acts instead of one that
-the bench knows, and can be scaled, r and D are those without that one.
+mechanism is switched on at a start, W: robust weights. The free a removes everything that the parameters of the
+hypothesis can explain (Rao's score test with nuisance parameters). If a scalable mechanism replaces one of the bench, r
+and D are those without the latter.
 """
 
 from collections.abc import Sequence
@@ -17,21 +17,20 @@ from hil.arrays import FloatArray
 from hil.diagnosis.search.initial_values import StartPoint, scene, starts
 from hil.identification.estimator import POOL, Fit
 from hil.identification.hypothesis import Hypothesis
-from hil.identification.model_comparison import whitened, whitening
+from hil.identification.inference import whitened, whitening
 from hil.identification.terms import Term, compatible, free_slot, repeats
 from hil.twin.library import BY_ID
 
-_SOFT = 3.0  # residuals beyond so many typical ones lose weight
+_SOFT = 3.0  # residual in robust standard deviations above which the weight falls: 0.3 % of Gaussian rows are above
 _WEAKER = (0.3, 0.1)  # of the strength from the linear score test: half an order of magnitude apart
-_OTHERS = 6  # starts of one mechanism that are kept
+_OTHERS = 6  # starts of one mechanism that are kept: limits the evaluations of a race
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """A mechanism worth fitting: its start, scaled, and the share of the residual it would explain.
+    """A mechanism to be fitted: its scaled start, and the share of the residual energy that it would explain.
 
-    `others` are starts of the same mechanism at less strength or other values: the response to a large change is not
-    linear.
+    `others` are starts of the same mechanism at less strength or other values, since large changes act nonlinearly.
     """
 
     term: Term
@@ -50,7 +49,7 @@ class _View:
     filters: list[FloatArray] | None
 
     def of(self, change: FloatArray) -> FloatArray:
-        """A change of the residuals, seen the same way."""
+        """Filter, weight and project a change (m,) of the residuals in the same way."""
         seen = change if self.filters is None else whitened(change, self.splits, self.filters)
         seen = self.weights * seen
         return np.asarray(seen - self.nuisance @ (self.nuisance.T @ seen), dtype=np.float64)
@@ -69,13 +68,13 @@ def _view(base: Fit, white: bool) -> _View:
 
 
 def _weights(part: FloatArray) -> FloatArray:
-    """Weights of the residuals of one channel of one run: less for those far beyond its typical one."""
+    """Robust weights (n,) of the residuals of one channel of one run."""
     typical = max(float(np.median(np.abs(part))) / 0.6745, 0.1)
     return np.asarray(1.0 / np.sqrt(np.sqrt(1.0 + (part / (_SOFT * typical)) ** 2)), dtype=np.float64)
 
 
 def screen_library(base: Fit) -> list[Candidate]:
-    """One candidate for each mechanism that fits beside the terms of the base, best first."""
+    """Make one candidate of each mechanism that is compatible with the terms of the base, best first."""
     hypothesis, terms = base.hypothesis, base.terms
     residuals = hypothesis.residuals(base.data)
     known = scene(base.data.runs, base.bench, residuals.channels, base.data.observer_s)
@@ -100,13 +99,13 @@ def screen_library(base: Fit) -> list[Candidate]:
 
 
 def offered(new: Term, hypothesis: Hypothesis, terms: Sequence[Term]) -> bool:
-    """Whether a mechanism can act beside the terms. Mechanisms of the bench that it repeats are replaced by it."""
+    """True if a mechanism is compatible with the terms; it replaces mechanisms of the bench that it repeats."""
     known = [entry.active() for entry in hypothesis.kept]
     return compatible((*terms, new, *(other for other in known if not repeats(new, other))))
 
 
 def _from_known(start: StartPoint, hypothesis: Hypothesis) -> StartPoint:
-    """The start, its strength counted from that of the mechanism of the bench that it replaces, if any."""
+    """Count the strength of a start from that of the mechanism of the bench that it replaces, if any."""
     new = Term(start.effect, start.variant, start.values)
     taken = [entry.active() for entry in hypothesis.kept if repeats(new, entry.active())]
     if start.strength < 0 or not taken:
@@ -117,10 +116,10 @@ def _from_known(start: StartPoint, hypothesis: Hypothesis) -> StartPoint:
 
 
 def screen(base: Fit, points: Sequence[StartPoint]) -> list[Candidate]:
-    """A candidate for each start, best first.
+    """Score each start, best first.
 
-    Each is scored twice: on the residuals as they are, where the largest cause shows, and whitened, where a
-    faint one shows beside a large one. The better share counts.
+    The score is the larger of two: on plain residuals, sensitive to the largest cause, and on whitened residuals,
+    sensitive to a small cause beside a large one.
     """
     views = [_view(base, False), _view(base, True)]
 
@@ -142,7 +141,7 @@ def screen(base: Fit, points: Sequence[StartPoint]) -> list[Candidate]:
         left = without + span @ coefficients
         share = 1.0 - float(left @ left) / energy
         if start.strength < 0:
-            # a start that cannot be scaled also counts as it stands
+            # a start that cannot be scaled is also scored at its own strength
             whole = float(2.0 * target[0] - products[0, 0]) / energy
             return Candidate(
                 Term(start.effect, start.variant, start.values), max(share if coefficients[0] > 0.0 else 0.0, whole)
@@ -157,12 +156,12 @@ def screen(base: Fit, points: Sequence[StartPoint]) -> list[Candidate]:
 
 
 def _pairs(start: StartPoint) -> list[tuple[int, int]]:
-    """Places of strength and phase of each harmonic."""
+    """Indices of strength and phase of each harmonic."""
     return [(start.strength + 2 * n, start.phase + 2 * n) for n in range(start.harmonics)]
 
 
 def _directions(start: StartPoint) -> list[tuple[float, ...]]:
-    """Values that span the effect of the start: its strength, or sine and cosine of each harmonic."""
+    """Parameter values that span the effect of a start: its strength, or sine and cosine of each harmonic."""
     if start.phase < 0:
         values = list(start.values)
         values[start.strength] += start.known
@@ -179,7 +178,7 @@ def _directions(start: StartPoint) -> list[tuple[float, ...]]:
 
 
 def _scaled(start: StartPoint, coefficients: FloatArray) -> tuple[float, ...]:
-    """The start at the strengths (and phases) that the score test asks for, within bounds."""
+    """Values of the start at the strengths and phases of the score test, within bounds."""
     values = list(start.values)
     unit = start.values[start.strength]
     for n, (strength, phase) in enumerate(_pairs(start)):

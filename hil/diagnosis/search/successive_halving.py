@@ -11,7 +11,7 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
-from hil.diagnosis.search.equivalents import likenesses
+from hil.diagnosis.search.initial_values import likenesses
 from hil.diagnosis.search.score_test import Candidate, offered
 from hil.identification.dataset import TORQUE_ACCURACY, inertia
 from hil.identification.estimator import POOL, Estimator, Fit, in_parallel, soft_cost
@@ -20,34 +20,32 @@ from hil.identification.nominal_fit import SOFT
 from hil.identification.terms import compatible
 from hil.twin.library import BY_ID
 
-# Weight of the motor channel in a search: the full resolution of the encoder makes the valleys of stick-slip convex.
+# Torque accuracy of the motor channel in a search: its higher weight makes the cost of stick-slip smoother.
 SEARCH_ACCURACY = 0.2
+# Halving: 8 candidates get a first fit, 4 a second, 3 are converged; more of them only extend the search.
+_STARTED, _CONTINUED, _FINISHED = 8, 4, 3
+_FIRST, _SECOND = 6, 4  # evaluations of the first fit (with the derivatives of the base) and of the second
 LONG = 25  # evaluations of a last fit
-_STARTED = 8  # candidates that are fitted
-_CONTINUED = 4  # of which are fitted on
-_FINISHED = 3  # of which are fitted to the end
-_FIRST = 6  # evaluations of a first fit with the derivatives of the base
-_SECOND = 4  # and of the one after it
-_BEATEN = 5.0  # times the cost of the leader: a second fit above is not converged,
-_LEVEL = 1.5  # except where it is level with the leader's second fit;
-_BEHIND = 0.5  # nor one whose gain is less than this share of the leader's
-_HOPELESS = 0.02  # share of the first candidate's: below, a candidate is not fitted
-_EDGE_SHIFTS_S = np.arange(-15, 16) * 0.005  # of an edge, where it may have been missed
+# A second fit is converged if its cost is below _BEATEN times that of the converged leader or _LEVEL times that of the
+# leader's second fit, and its gain above the share _BEHIND of the leader's: unconverged fits may be far from their end.
+_BEATEN, _LEVEL, _BEHIND = 5.0, 1.5, 0.5
+_HOPELESS = 0.02  # share of the residual energy over that of the first candidate: below, a candidate is not fitted
+_EDGE_SHIFTS_S = np.arange(-15, 16) * 0.005  # tried shifts of an edge: its valley is narrower than a step of the fit
 
 
 def race(base: Fit, candidates: Sequence[Candidate]) -> list[Fit]:
-    """Fits of the base with each of the first candidates, best first.
+    """Fit the base with each of the first candidates, best first.
 
-    All start; the best is converged, in all its variants. Others are converged, too, if they come near it.
+    The best is converged in all its variants, others only if their cost is near it.
     """
     return _Race(base, [one for one in candidates[:_STARTED] if one.share > _HOPELESS * candidates[0].share]).run()
 
 
 def owner_points(base: Fit) -> list[FloatArray]:
-    """The x of a base with the nominal parameters of the bench: all of them, and those hidden by a rigid-body fit.
+    """Points x of a base with nominal parameters of the bench: all of them, and only springs and shares of the masses.
 
-    The fitted parameters of the base may compensate for missing physics. A mechanism between motor and table distorts
-    the springs and the shares of the masses; friction and the total mass stay right.
+    Fitted parameters may compensate for missing physics. A mechanism between motor and table changes the fitted springs
+    and shares of the masses; friction and total mass remain right.
     """
     hypothesis, owner = base.hypothesis, base.hypothesis.owner.x
     bench, axis = hypothesis.bench, hypothesis.bench.axis
@@ -72,7 +70,7 @@ def owner_points(base: Fit) -> list[FloatArray]:
 
 @dataclass(frozen=True, eq=False)
 class _Race:
-    """One race: a base, the candidates beside it, and what all their fits share."""
+    """One race: a base, its candidates, and the data shared by their fits."""
 
     base: Fit
     candidates: list[Candidate]
@@ -94,10 +92,10 @@ class _Race:
         return {tuple(x): self.search.jacobian(self.base.hypothesis.moved(x)) for x in points}
 
     def run(self) -> list[Fit]:
-        """The best fit of each mechanism, best first."""
-        self.derivatives  # noqa: B018  before threads ask for them
+        """Return the best fit of each mechanism, best first."""
+        self.derivatives  # noqa: B018  computed before the threads start
         started = in_parallel([partial(self._first_fit, one) for one in self.candidates])
-        # the best so far, and the first of the score test, which may only converge slowly
+        # the best so far, and the first of the score test, which may converge slowly
         better = sorted(started, key=lambda fit: fit.cost)[:_CONTINUED]
         second = in_parallel([partial(self._second_fit, fit) for fit in _unique([*started[:2], *better])])
         ranked = sorted(second, key=lambda fit: fit.cost)
@@ -114,10 +112,10 @@ class _Race:
         return sorted(found.values(), key=lambda fit: fit.cost)
 
     def _first_fit(self, candidate: Candidate) -> Fit:
-        """A short fit with the derivatives of the base, from the base or from the parameters of the bench.
+        """Fit a candidate briefly with the derivatives of the base, at the base or at the bench's parameters.
 
-        Of the first candidates the variant preferred by the score test starts too: another may have so little effect
-        that its cost is lower at the start.
+        The first candidates also start with the variant preferred by the score test: another variant may have a lower
+        cost at the start only because its effect is small.
         """
         here = self.base.hypothesis.x
         begun = [self._best_start(candidate, here)]
@@ -138,24 +136,24 @@ class _Race:
         return min(fits, key=_soft)
 
     def _best_start(self, candidate: Candidate, x: FloatArray) -> Fit:
-        """The start of a candidate that leaves the least cost beside the base at x."""
+        """Return the start of a candidate with the least cost at x."""
         base = self.base.hypothesis.moved(x)
         return min(
             (self.search.evaluate(base.with_term(term)) for term in (candidate.term, *candidate.others)), key=_soft
         )
 
     def _owner_start(self, candidate: Candidate) -> Fit:
-        """The best start of a candidate at the parameters of the bench."""
+        """Return the best start of a candidate at the parameters of the bench."""
         return min((self._best_start(candidate, x) for x in self.owner), key=_soft)
 
     def _second_fit(self, fit: Fit) -> Fit:
         return fit.refit(_SECOND, soft=SOFT, slopes=fit.jacobian)
 
     def _followers(self, leader: Fit, before: Fit, others: Sequence[Fit]) -> list[Fit]:
-        """Evaluations of the second fits, and those of them that come near the leader fitted to the end.
+        """Evaluate the second fits, and converge those with a cost near that of the leader.
 
-        `before` is the leader's second fit. Where the leader is above the noise floor, its mechanism is fitted again
-        from the parameters of the bench.
+        `before` is the leader's second fit. If the leader is above the noise floor, its mechanism is also fitted from
+        the parameters of the bench.
         """
         level, *reached = [fit.with_accuracy(TORQUE_ACCURACY) for fit in (before, *others)]
         beaten = max(_BEATEN * leader.cost, _LEVEL * level.cost)
@@ -168,19 +166,19 @@ class _Race:
         return [*reached, *in_parallel([*again, *near])]
 
     def _from_owner(self, fit: Fit) -> Fit:
-        """A fit of the same mechanism from the parameters of the bench, with derivatives of its own."""
+        """Fit the same mechanism from the parameters of the bench with its own derivatives."""
         candidate = next(one for one in self.candidates if one.term.effect == fit.terms[-1].effect)
         again = self._owner_start(candidate).refit(_SECOND, soft=SOFT)
         return _finish(again) if self._gain(again) > 0.0 else again
 
     def _variants(self, fit: Fit) -> list[Fit]:
-        """The other variants of the last term, from its values."""
+        """Fit the other variants of the last term from its values."""
         last, rebased = fit.terms[-1], fit.hypothesis.rebased
         others = [replace(last, variant=v) for v in range(len(BY_ID[last.effect].variants)) if v != last.variant]
         return in_parallel([partial(fit.estimator.fit, rebased.replaced(-1, term)) for term in others])
 
     def _equivalents(self, fit: Fit) -> list[Fit]:
-        """Mechanisms that may have the same effect as the last term on this motion, from its values."""
+        """Fit the mechanisms that may have the same effect as the last term on this motion."""
         terms, rebased = fit.terms, fit.hypothesis.rebased
         jobs = []
         for alike in likenesses(terms, fit.bench):
@@ -194,7 +192,7 @@ class _Race:
 
 
 def _finish(fit: Fit) -> Fit:
-    """Fit to the end, at last with the accuracy of the final weights."""
+    """Converge a fit, at last with the final weights."""
     if any(coordinate.edge for coordinate in fit.hypothesis.coordinates):
         fit = _edges_moved(fit.refit(LONG, slopes=fit.jacobian))
     last = replace(fit.estimator, edge_step_s=LAST_EDGE_STEP_S)
@@ -203,7 +201,7 @@ def _finish(fit: Fit) -> Fit:
 
 
 def _edges_moved(fit: Fit) -> Fit:
-    """A fit with each edge of a window where the cost is least: its valley is narrower than a step."""
+    """Move each edge of a window to the least cost within 75 ms, then fit."""
     hypothesis = fit.hypothesis
     for index, coordinate in enumerate(hypothesis.coordinates):
         if coordinate.edge:

@@ -1,9 +1,9 @@
-"""Cross-validation on held-out recordings: the evidence for each term there, and which terms are dropped.
+"""Cross-validation: evidence for each term on held-out recordings; terms that they refute are dropped.
 
-    gain = sum over channels and runs of  n log(E_without / E_with),      E: whitened energy, see `model_comparison`
+    gain = sum over channels and runs of  n log(E_without / E_with),      E: whitened energy, see `inference`
 
-Both hypotheses were fitted to the training recordings, so that on the held-out ones no parameter costs evidence.
-Repeated motion is a test too: a term whose effect differs from lap to lap must reduce the measured differences.
+Both hypotheses are fitted to the training recordings, so that the gain has no penalty for parameters. Repeated motion
+is a second test: a term whose effect differs from lap to lap must reduce the measured differences between laps.
 """
 
 from dataclasses import dataclass
@@ -14,17 +14,18 @@ import numpy as np
 from hil.diagnosis.search.forward_selection import TIED, claimed
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit, in_parallel
-from hil.identification.model_comparison import against
+from hil.identification.inference import against
 from hil.identification.noise_floor import REPEATS, unrepeated
 from hil.identification.terms import Term
 
 
 @dataclass(frozen=True, eq=False)
 class Ablation:
-    """A term, the fit without it, and by which factor the energy above the floor grows without it.
+    """A term and the fit without it.
 
-    `gain` is the evidence for the term on the held-out recordings, None without any. `laps` is the factor by which
-    the part that does not repeat from lap to lap grows without it, None without laps.
+    `train` and `held_out` are the residual energy without the term over that with it, `laps` the same ratio of the part
+    that does not repeat from lap to lap. `gain` is the evidence for the term on the held-out recordings. They are None
+    without held-out recordings or laps.
     """
 
     term: Term
@@ -36,12 +37,12 @@ class Ablation:
 
     @property
     def harms(self) -> bool:
-        """Whether held-out recordings or laps speak against the term. A motion that does not show it says nothing."""
+        """True if held-out recordings or laps refute the term; a motion without its effect does not."""
         return (self.gain is not None and self.gain < -TIED) or (self.laps is not None and self.laps < REPEATS)
 
     @property
     def shown(self) -> bool:
-        """Whether held-out recordings speak for the term."""
+        """True if held-out recordings support the term."""
         return self.gain is not None and self.gain > TIED
 
 
@@ -55,7 +56,7 @@ class CrossValidation:
 
 
 def cross_validate(nominal: Fit, final: Fit, held_out: Dataset) -> CrossValidation:
-    """Ablate every term; drop, the most harmful first, those that held-out recordings speak against."""
+    """Ablate every term; drop those that held-out recordings or laps refute, the most harmful first."""
     dropped: list[Ablation] = []
     while True:
         ablations = _ablate(nominal, final, held_out)
@@ -70,7 +71,7 @@ def cross_validate(nominal: Fit, final: Fit, held_out: Dataset) -> CrossValidati
 
 
 def energy(found: Fit) -> float:
-    """Energy of the residuals block by block, n m summed; not below that of the noise."""
+    """Energy of the residuals block by block in units of noise^2, at least that of the noise."""
     return found.energy(lambda ratio: max(ratio, 1.0))
 
 
@@ -108,7 +109,7 @@ def _ablate(nominal: Fit, final: Fit, held_out: Dataset) -> list[Ablation]:
 def _gain(found: Fit, without: Fit) -> float:
     """Evidence for the term on held-out recordings, negative where it harms.
 
-    Both are judged by the noise of the one with less cost: the whitening filter of the other would hide the harm.
+    Both residuals are whitened by the filter of the fit with less cost: that of the other would hide the harm.
     """
     paid = (found.hypothesis.x.size - without.hypothesis.x.size) * float(np.log(found.rows))
     return against(found, without) + paid if found.cost <= without.cost else paid - against(without, found)

@@ -1,9 +1,8 @@
-"""Fit before and after, channel by channel, on training and on held-out recordings, against the noise floor.
+"""Residuals before and after, by channel, on training and on held-out recordings, beside the noise floor.
 
-Figures are of the closed loop unless that is chaotic: where stick-slip or play let two recordings of the same axis
-diverge, a twin at the noise floor in every block still deviates from the recording in closed loop. Then the figures
-are those of the block, which is fed measured inputs. The same holds for the position of the motor: its encoder
-resolves far less than the motion caused by the torque noise.
+Figures are in closed loop unless the loop is chaotic: with stick-slip or play two recordings of the same axis diverge,
+and a twin at the noise floor in every block deviates from the recording. Then the figures are block by block, with
+measured inputs. The same holds for the motor position if its encoder resolves the motion caused by the torque noise.
 """
 
 import math
@@ -15,16 +14,19 @@ from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
 from hil.channels import AXIS_CHANNELS, CHANNELS
 from hil.diagnosis.result import ChannelFit, FitFigures, Mode
-from hil.identification.dataset import Dataset, Measured
+from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
+from hil.identification.measured import Measured
 from hil.identification.noise_floor import floor, noise_response, rms, sensor_noise
 
-STRAYS = 1.15  # times its floor: a closed loop above, though its block is at the floor, counts as chaotic
+# Closed-loop rms over its floor above which the loop counts as chaotic if the block is below: a margin for the
+# uncertainty of the closed-loop floor.
+STRAYS = 1.15
 
 
 def channel_names(bench: Bench, run: Measured) -> dict[str, str]:
-    """Channel of the twin -> name of the recorded channel."""
+    """Map channels of the twin to names of recorded channels."""
     names = AXIS_CHANNELS[run.kind]
     found = {"motor": names.motor_position, "torque": names.torque, "command": names.torque_command}
     if bench.has_table_encoder:
@@ -35,7 +37,7 @@ def channel_names(bench: Bench, run: Measured) -> dict[str, str]:
 def channel_residuals(hypothesis: Hypothesis, data: Dataset, mode: Mode) -> tuple[dict[str, FloatArray], ...]:
     """Residuals (n,) of each run by channel, in its unit.
 
-    In closed loop the table is compared as it is, block by block less the motor.
+    The table channel is the table position in closed loop, table less motor position block by block.
     """
     if mode is Mode.BLOCKS:
         return hypothesis.residuals(data).channels
@@ -78,9 +80,9 @@ class _ChannelTable:
         return rms(np.concatenate([values[run.judged] for values, run in pairs]))
 
     def _floors(self, data: Dataset) -> list[tuple[float, bool]]:
-        """Floor of each run, and whether it is from repeated laps.
+        """Floor of each run, True if from repeated laps.
 
-        The lower one of two hypotheses: a difference from lap to lap that only one of them has is its own error.
+        It is the lower one of two hypotheses: a lap-to-lap difference of only one of them is its own error.
         """
         found = []
         runs = zip(data.runs, self._of(self.nominal, data), self._of(self.final, data), strict=True)
@@ -93,8 +95,8 @@ class _ChannelTable:
     def _white(self, data: Dataset, index: int) -> float:
         """White noise of the channel in a run.
 
-        Block by block that of its scale: the motor counts from the torque that the torque channel resolves. In closed
-        loop the response of the axis to the noise of its encoders adds to that of the sensor.
+        Block by block it is the scale of the weighted residuals. In closed loop it is the noise of the sensor and the
+        response of the axis to the noise of its encoders.
         """
         run = data.runs[index]
         if self.mode is Mode.BLOCKS:
@@ -103,7 +105,7 @@ class _ChannelTable:
 
 
 def fit_table(owner: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> dict[str, ChannelFit]:
-    """The table, by recorded channel."""
+    """Compute the figures of each recorded channel."""
     train = final.data
     sets = [data for data in (train, held_out) if data.runs]
     laps = any(data.laps for data in sets)

@@ -14,8 +14,9 @@ from hil.diagnosis.preflight import prepare
 from hil.diagnosis.result import Verdict
 from hil.diagnosis.search.initial_values import scene
 from hil.diagnosis.verdict.judge import refit_matters
-from hil.identification.dataset import Measured, prepare_dataset
+from hil.identification.dataset import prepare_dataset
 from hil.identification.estimator import Fit
+from hil.identification.measured import Measured
 from hil.identification.nominal_fit import fit_nominal_parameters
 from hil.recording.recording import read_recording
 from hil.twin.scene import Scene

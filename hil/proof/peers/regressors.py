@@ -16,7 +16,7 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.diagnosis.search.forward_selection import MATERIAL
-from hil.identification.dataset import Measured
+from hil.identification.measured import Measured
 from hil.proof.peers.case import PeerCase
 from hil.proof.peers.terms import MAKERS, Effects
 

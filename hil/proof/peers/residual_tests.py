@@ -18,7 +18,7 @@ from scipy.stats import norm
 
 from hil.arrays import FloatArray
 from hil.diagnosis.search.forward_selection import MATERIAL
-from hil.identification.dataset import Measured
+from hil.identification.measured import Measured
 from hil.proof.peers.case import PeerCase
 from hil.proof.peers.regressors import Equation, equations
 

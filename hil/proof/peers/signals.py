@@ -15,7 +15,7 @@ from scipy.signal import bilinear, lfilter
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
 from hil.control import cascade
-from hil.identification.dataset import Measured
+from hil.identification.measured import Measured
 
 SMOOTH_S = 0.002  # standard deviation of the Gaussian: cut-off at 66 Hz
 _TRUNCATE = 8.0  # standard deviations: derivatives of a constant are zero to rounding

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
-from hil.identification.dataset import Measured
+from hil.identification.measured import Measured
 from hil.proof.peers import signals
 from hil.twin.scene import Scene
 

@@ -15,7 +15,7 @@ from hil.twin.stepping.contact import COMPILE, Resistance
 from hil.twin.stepping.contact import rigid as _rigid
 from hil.twin.stepping.friction import friction as _friction
 from hil.twin.stepping.records import coupling_of, shapes_of, step_of
-from hil.twin.stepping.transmission import Motion, along, moment
+from hil.twin.stepping.transmission import AxisMotion, along, moment
 from hil.twin.stepping.transmission import transmit as _transmit
 
 _current, _torque, _motor_torque = stages.current, stages.torque, stages.motor_torque
@@ -41,7 +41,7 @@ def _look(shapes, delta):  # type: ignore[no-untyped-def]
         table_speed += shapes.table[i] * v
         stretch += shapes.spring[i] * d
         stretch_rate += shapes.spring[i] * v
-    return Motion(position, speed, table, table_speed, stretch, stretch_rate)
+    return AxisMotion(position, speed, table, table_speed, stretch, stretch_rate)
 
 
 @njit(**_PART)
@@ -91,7 +91,7 @@ def _build_advance(digest: str) -> Any:
         c, own, shapes, coupling = constants[0], memory[0], shapes_of(modes), coupling_of(modes)
         effects = _Effects(values, codes[0], own.mechanisms)
         any_active = c.any_active > 0
-        motion = Motion(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        motion = AxisMotion(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         if any_active:
             motion = _look(shapes, delta)
             speed = motion.speed

@@ -12,8 +12,8 @@ _transmission, _screw = stages.transmission, stages.screw
 NUDGE = 1e-9  # of the deflection [motor units], to measure the local stiffness
 
 
-class Motion(NamedTuple):
-    """Motion of motor, table and transmission spring, in motor units."""
+class AxisMotion(NamedTuple):
+    """AxisMotion of motor, table and transmission spring, in motor units."""
 
     position: float
     speed: float

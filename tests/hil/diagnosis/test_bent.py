@@ -13,8 +13,9 @@ from hil.diagnosis.search import forward_selection
 from hil.diagnosis.search.forward_selection import explain
 from hil.diagnosis.search.restart import from_owner, may_hide, unbent
 from hil.diagnosis.search.score_test import screen_library
-from hil.identification.dataset import prepare_dataset, take
+from hil.identification.dataset import prepare_dataset
 from hil.identification.hypothesis import Hypothesis
+from hil.identification.measured import take
 from hil.identification.nominal_fit import fit_nominal_parameters
 from hil.identification.terms import Term
 

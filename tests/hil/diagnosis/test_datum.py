@@ -33,7 +33,7 @@ def test_the_comparison_takes_it_off_and_says_so() -> None:
     before, after = compare(recording, OWNER), compare(shifted, OWNER)
     for one, other in zip(before.channels, after.channels, strict=True):
         assert other.rms == pytest.approx(one.rms, rel=1e-6, abs=1e-12)
-    assert any("linear encoder has a datum" in note and "50 µm" in note for note in after.notes)
+    assert any("position of the linear encoder" in note and "50 µm" in note for note in after.notes)
 
 
 @pytest.mark.parametrize("rest_s", [0.2, 3.0])

@@ -39,7 +39,7 @@ def test_a_table_in_millimetres_is_refused(tmp_path: Path, bench_file: str) -> N
     run = changed(recorded(bench(), times=3), table_position_m=1e3)
     message = refused(tmp_path, bench_file, run)
     assert "table_position_m: is 100" in message
-    assert "× what the set-points ask for: it looks like mm" in message
+    assert "× the value expected from the set-points, which suggests mm" in message
 
 
 def test_a_recording_that_holds_out_too_little_is_refused(tmp_path: Path, bench_file: str) -> None:

@@ -14,7 +14,7 @@ from diagnosis_runs import rig
 from hil.bench.bench_file import load_bench
 from hil.diagnosis.diagnose import Diagnosis, diagnose
 from hil.diagnosis.result import schema
-from hil.identification.dataset import take
+from hil.identification.measured import take
 from hil.recording.recording import read_recording
 from hil.report.diagnosis_report import write_diagnosis
 from hil.twin.library import BY_ID

@@ -14,11 +14,12 @@ from hil.bench.hardware import SetPointLimits
 from hil.diagnosis.candidate_motions import candidates, reach
 from hil.diagnosis.experiment import Experiment, separating, showing
 from hil.diagnosis.search.forward_selection import TIED, Explanation, RivalFit
-from hil.diagnosis.verdict.observability import not_testable
-from hil.identification.dataset import Dataset, take
+from hil.diagnosis.verdict.judge import not_testable
+from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
-from hil.identification.model_comparison import against
+from hil.identification.inference import against
+from hil.identification.measured import take
 from hil.identification.terms import Term
 from hil.motion.profile import Profile, load_profile, write_profile
 from hil.motion.trajectory import plan
@@ -54,7 +55,7 @@ def test_a_motion_is_designed_that_separates_what_one_way_ties() -> None:
     found = designed(first, second)
     assert found.profile is not None
     assert found.separates == ("friction_drift", "position_dependent_friction")
-    assert "is expected to tell friction drift from position dependent friction" in found.note
+    assert "is expected to distinguish friction drift from position dependent friction" in found.note
     for right, wrong in ((first, second), (second, first)):  # whichever of the two is true
         truth = right.terms
         both = dataset([*runs(ONE_WAY, *truth).runs, *runs(found.profile, *truth, seed=2).runs], OWNER)
@@ -70,7 +71,10 @@ def test_no_motion_is_promised_that_gains_nothing() -> None:
         fitted(Hypothesis(OWNER, (Term("transport_delay", 0, (1e-4,)),)), train),
     )
     assert found.profile is None
-    assert "No motion within the reach of these recordings tells current loop lag from transport delay" in found.note
+    assert (
+        "No motion within the range of these recordings distinguishes current loop lag from transport delay"
+        in found.note
+    )
 
 
 def test_the_same_torque_on_every_motion_needs_no_search() -> None:
@@ -78,7 +82,7 @@ def test_the_same_torque_on_every_motion_needs_no_search() -> None:
     train = runs(moves([REST, {"kind": "reversal", "stroke_m": 0.05, "feed_m_s": 0.1}, REST]), uneven)
     found = designed(fitted(Hypothesis(OWNER, (uneven,)), train))
     assert found.profile is None
-    assert "No motion tells asymmetric friction from constant load" in found.note
+    assert "No motion distinguishes asymmetric friction from constant load" in found.note
 
 
 def test_a_cause_without_rivals_needs_no_experiment() -> None:

@@ -11,9 +11,10 @@ from hil.diagnosis.search.forward_selection import Explanation, RivalFit
 from hil.diagnosis.search.score_test import screen_library
 from hil.diagnosis.verdict.cross_validation import cross_validate
 from hil.diagnosis.verdict.findings import diagnosed_bench, findings, renamed
-from hil.identification.dataset import Dataset, take
+from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
+from hil.identification.measured import take
 from hil.identification.terms import Term, compatible, repeats
 
 OWNER = bench()

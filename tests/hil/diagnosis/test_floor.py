@@ -11,8 +11,9 @@ from diagnosis_runs import RIG, bench, dataset, evaluated, moves, recorded
 from hil.bench.bench_file import load_bench
 from hil.diagnosis.result import Mode
 from hil.diagnosis.verdict.fit_table import fit_table
-from hil.identification.dataset import Measured, prepare_dataset, take
+from hil.identification.dataset import prepare_dataset
 from hil.identification.hypothesis import Hypothesis
+from hil.identification.measured import Measured, take
 from hil.identification.noise_floor import floor, noise_response
 from hil.identification.terms import Term
 from hil.proof.draw.generator import draw, rerun

@@ -10,12 +10,11 @@ from diagnosis_runs import bench, dataset, fitted, recorded
 from hil.diagnosis.result import Finding
 from hil.diagnosis.search.forward_selection import Explanation, RivalFit
 from hil.diagnosis.verdict.cross_validation import CrossValidation, cross_validate
-from hil.diagnosis.verdict.curve_forms import OF_ITS_FORM, form_of
-from hil.diagnosis.verdict.findings import diagnosed_bench, findings
-from hil.identification.dataset import take
+from hil.diagnosis.verdict.findings import OF_ITS_FORM, diagnosed_bench, findings, form_of
 from hil.identification.hypothesis import Hypothesis
+from hil.identification.inference import standard_errors
+from hil.identification.measured import take
 from hil.identification.terms import Key, Term
-from hil.identification.uncertainty import standard_errors
 
 OWNER = bench()
 COULOMB = OWNER.axis.physics().coulomb_n_m

@@ -10,15 +10,15 @@ from hil.diagnosis.result import Verdict
 from hil.diagnosis.search.forward_selection import Explanation, RivalFit
 from hil.diagnosis.verdict.cross_validation import cross_validate, explained_share
 from hil.diagnosis.verdict.findings import diagnosed_bench, findings, renamed
-from hil.diagnosis.verdict.judge import judge, names_stand
-from hil.diagnosis.verdict.observability import not_testable
-from hil.identification.dataset import Dataset, Measured, take
+from hil.diagnosis.verdict.judge import judge, names_stand, not_testable
+from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
+from hil.identification.inference import standard_errors
+from hil.identification.measured import Measured, take
 from hil.identification.noise_floor import FLOOR
 from hil.identification.nominal_fit import fit_nominal_parameters
 from hil.identification.terms import Term
-from hil.identification.uncertainty import standard_errors
 
 OWNER = bench()
 LOAD = Term("constant_load", 0, (0.4,))

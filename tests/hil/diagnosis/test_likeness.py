@@ -9,10 +9,10 @@ from diagnosis_runs import bench, evaluated, fitted, moves, recorded
 
 from hil.bench.bench_file import MechanismEntry
 from hil.diagnosis.diagnose import diagnose
-from hil.diagnosis.search.equivalents import likenesses
+from hil.diagnosis.search.initial_values import likenesses
 from hil.diagnosis.search.score_test import offered
-from hil.identification.dataset import take
 from hil.identification.hypothesis import Hypothesis
+from hil.identification.measured import take
 from hil.identification.terms import Term
 from hil.recording.recording import Recording
 from hil.twin.library import BY_ID

@@ -8,10 +8,11 @@ from diagnosis_runs import bench, fitted, recorded
 from hil.bench.bench_file import Bench, MechanismEntry
 from hil.diagnosis.diagnose import diagnose
 from hil.diagnosis.search import forward_selection
+from hil.diagnosis.search.initial_values import claimable
 from hil.diagnosis.search.score_test import screen_library
-from hil.diagnosis.search.validity import claimable
-from hil.identification.dataset import prepare_dataset, take
+from hil.identification.dataset import prepare_dataset
 from hil.identification.hypothesis import Hypothesis
+from hil.identification.measured import take
 from hil.identification.nominal_fit import fit_nominal_parameters
 from hil.identification.terms import Term
 

@@ -13,9 +13,9 @@ from hil.diagnosis.location.locate import _range, locate, phase_shares, phases, 
 from hil.diagnosis.location.periodicity import Lock, lock
 from hil.diagnosis.location.residual_energy import Energy, energies
 from hil.diagnosis.result import Location, PhaseKind
-from hil.identification.dataset import Measured, take
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
+from hil.identification.measured import Measured, take
 from hil.identification.terms import Term
 
 FloatArray = NDArray[np.float64]

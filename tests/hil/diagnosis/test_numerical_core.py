@@ -9,10 +9,10 @@ from scipy.signal import lfilter
 from hil.arrays import FloatArray
 from hil.diagnosis.search.initial_values import StartPoint
 from hil.diagnosis.search.score_test import screen
-from hil.identification.dataset import take
 from hil.identification.estimator import Estimator, Fit, FitStatus
 from hil.identification.hypothesis import Hypothesis
-from hil.identification.model_comparison import against
+from hil.identification.inference import against
+from hil.identification.measured import take
 from hil.identification.residuals import Residuals
 from hil.identification.terms import Term
 

@@ -14,8 +14,8 @@ from hil.diagnosis.search.forward_selection import Explanation
 from hil.diagnosis.search.initial_values import axis_facts
 from hil.diagnosis.verdict.cross_validation import CrossValidation
 from hil.figures.drawing import save
-from hil.identification.dataset import take
 from hil.identification.hypothesis import Hypothesis
+from hil.identification.measured import take
 from hil.identification.terms import Term
 from hil.twin.library import BY_ID
 

@@ -100,13 +100,17 @@ def test_copied_channel(run: Recording) -> None:
     ("channel", "factor", "message"),
     [
         ("motor_position_rad", -1.0, "motor_position_rad: has the wrong sign"),
-        ("motor_position_rad", 180.0 / math.pi, "looks like degrees"),
-        ("motor_position_rad", 0.5 / math.pi, "looks like revolutions"),
+        ("motor_position_rad", 180.0 / math.pi, "which suggests degrees"),
+        ("motor_position_rad", 0.5 / math.pi, "which suggests revolutions"),
         ("table_position_m", -1.0, "table_position_m: has the wrong sign"),
-        ("table_position_m", 1e3, "looks like mm"),
-        ("velocity_command_m_s", 60.0, "looks like m/min"),
-        ("torque_command_n_m", 1e-3, "torque_n_m: is 1000 × what torque_command_n_m ask for: it looks like mN m"),
-        ("torque_n_m", -1.0, "torque_n_m runs against torque_command_n_m"),
+        ("table_position_m", 1e3, "which suggests mm"),
+        ("velocity_command_m_s", 60.0, "which suggests m/min"),
+        (
+            "torque_command_n_m",
+            1e-3,
+            "is 1000 × the value expected from torque_command_n_m, which suggests mN m",
+        ),
+        ("torque_n_m", -1.0, "torque_n_m is opposite to torque_command_n_m"),
     ],
 )
 def test_wrong_sign_or_unit_of_one_channel(run: Recording, channel: str, factor: float, message: str) -> None:
@@ -119,14 +123,14 @@ def test_wrong_sign_or_unit_of_one_channel(run: Recording, channel: str, factor:
 )
 def test_wrong_unit_of_the_torque(run: Recording, factor: float, unit: str) -> None:
     message = refused(changed(run, torque_n_m=factor, torque_command_n_m=factor))
-    assert "what the inertia and friction of the bench (N m) ask for" in message
-    assert not unit or f"looks like {unit}" in message
+    assert "the value expected from the inertia and friction of the bench (N m)" in message
+    assert not unit or f"which suggests {unit}" in message
 
 
 def test_a_negative_mass_is_a_wrong_sign_and_no_result(run: Recording) -> None:
     message = refused(changed(run, torque_n_m=-1.0, torque_command_n_m=-1.0))
     assert "torque_n_m has the wrong sign" in message
-    assert "no mass is negative" in message
+    assert "its regression gives a negative inertia" in message
 
 
 def test_saturation_throughout(run: Recording) -> None:

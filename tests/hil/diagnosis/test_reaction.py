@@ -8,7 +8,8 @@ from diagnosis_runs import bench, changed, recorded
 
 from hil.diagnosis.location.locate import locate
 from hil.diagnosis.location.reaction_torque import acting, stiffness_between
-from hil.identification.dataset import prepare_dataset, take
+from hil.identification.dataset import prepare_dataset
+from hil.identification.measured import take
 from hil.identification.nominal_fit import fit_nominal_parameters
 from hil.identification.terms import Term
 from hil.recording.recording import Recording

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hil.diagnosis.result import SCHEMA_FILE, Result, schema
-from hil.diagnosis.verdict.confidence import confidence
+from hil.diagnosis.verdict.judge import confidence
 
 FIGURES = {"before_rms": 0.08, "after_rms": 0.0101, "noise_floor_rms": 0.0099, "owner_rms": 0.2}
 EXAMPLE: dict[str, Any] = {

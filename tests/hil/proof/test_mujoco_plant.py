@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from drivers.sim.reality import record
-from hil.identification.dataset import Dataset, prepare_dataset, take
+from hil.identification.dataset import Dataset, prepare_dataset
 from hil.identification.hypothesis import Hypothesis
+from hil.identification.measured import take
 from hil.identification.terms import Term
 from hil.proof.draw.cases import stage
 from hil.proof.draw.mujoco_model import EFFECTS

@@ -60,7 +60,7 @@ print(np.ptp(held), let_go[-1] - 0.05)
 
 SCREEN = """
 from hil.diagnosis.search.score_test import screen_library
-from hil.identification.dataset import take
+from hil.identification.measured import take
 from hil.identification.hypothesis import Hypothesis
 data = dataset([take(recorded(owner, truth), owner)], owner)
 print(screen_library(fitted(Hypothesis(owner), data, evaluations=8))[0].term.effect)

@@ -1,0 +1,152 @@
+"""Measured less simulated: of the whole axis in closed loop, and block by block.
+
+Velocity, acceleration and jerk are derivatives of the table position (of the motor position without a linear encoder),
+measured and simulated alike low-passed first: Butterworth, 4th order, 100 Hz, forwards and backwards.
+
+Block by block, each block of the bench is fed measured inputs, so that a mismatch shows only in its own block.
+
+    controller          set-points and measured positions   -> torque command
+    drive               measured torque command             -> torque
+    motor and load      measured torque                     -> that torque less what the twin's mechanics lack
+    transmission        measured motor position             -> table less motor position
+
+Controller and drive are the block residuals that the diagnosis fits. Motor and transmission come from the same kernel
+(`hil.twin.stepping.loops.observe`), but are fed the measured torque instead of that of the twin's drive. The
+innovation e of the motor's observer is given as the torque d = e J / tau^2, with the inertia J of the whole axis and
+the observer's time constant tau.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.signal import butter, filtfilt
+
+from hil.arrays import FloatArray
+from hil.identification.dataset import Dataset, inertia
+from hil.identification.hypothesis import Hypothesis
+from hil.identification.measured import Measured
+from hil.identification.noise_floor import rms
+from hil.identification.residuals import differences
+from hil.twin.library import BY_ID
+from hil.twin.mechanism import Stage
+from hil.twin.stepping.loops import INTEGRATOR_S
+from hil.twin.stepping.stages import stage_of
+
+LOW_PASS_HZ, LOW_PASS_ORDER = 100.0, 4  # as in the inverse-dynamics identification of EMPS
+_DRIVE = (Stage.CURRENT, Stage.CHANNEL)
+
+
+@dataclass(frozen=True, eq=False)
+class Deviation:
+    """One channel (n,), measured and simulated, evaluated over the rows `judged`."""
+
+    name: str
+    label: str
+    unit: str
+    measured: FloatArray
+    simulated: FloatArray
+    judged: slice
+
+    @property
+    def values(self) -> FloatArray:
+        """Measured less simulated (n,)."""
+        return self.measured - self.simulated
+
+    @cached_property
+    def rms(self) -> float:
+        """Root mean square of measured less simulated."""
+        return rms(self.values[self.judged])
+
+    @cached_property
+    def peak(self) -> float:
+        """Largest absolute deviation."""
+        return float(np.max(np.abs(self.values[self.judged])))
+
+    @cached_property
+    def relative(self) -> float:
+        """rms of the deviation over rms of the measured channel; 0 where the channel is 0 throughout."""
+        return self.rms / (rms(self.measured[self.judged]) or np.inf)
+
+
+@dataclass(frozen=True, eq=False)
+class BlockDeviation:
+    """Deviation of the output of one block that is fed with measured inputs."""
+
+    deviation: Deviation  # named after the block, labelled by its output
+    inputs: str
+    noise: float  # standard deviation at the noise floor; 0 if not known
+    remark: str = ""
+
+
+def compare_blocks(hypothesis: Hypothesis, data: Dataset) -> tuple[BlockDeviation, ...]:
+    """Compare the blocks of a hypothesis with the first run of a data set."""
+    run, left, scale = data.runs[0], hypothesis.residuals(data).channels[0], data.noise[0]
+    bench = hypothesis.resolved.bench
+    name, unit = ("force", "N") if bench.axis.linear else ("torque", "N m")
+    if not np.any(left["command"]):
+        remark = "the replay is bit-identical to the recording"
+    elif bench.gains.integral_gain_n_m_rad:
+        remark = (
+            f"the integrator is corrected to the recording within {INTEGRATOR_S:g} s: rounded set-points accumulate"
+        )
+    else:
+        remark = ""
+    judged = run.judged
+    command = run.torque_command - left["command"]
+    controller = Deviation("controller", f"{name} command", unit, run.torque_command, command, judged)
+    blocks = [BlockDeviation(controller, "set-points, measured positions", 0.0, remark)]
+    if not run.torque_is_command:
+        drive = Deviation("drive", name, unit, run.torque, run.torque - left["torque"], judged)
+        blocks.append(BlockDeviation(drive, f"measured {name} command", run.noise.torque))
+    held = _mechanics(hypothesis, run, data.observer_s)
+    torque = inertia(data.bench) / data.observer_s**2  # torque per innovation
+    motor = Deviation("motor and load", name, unit, run.torque, run.torque + torque * held["motor"], judged)
+    inputs = f"measured {name}, held on the measured motor position"
+    remark = f"deviation: {name} missing in the twin's mechanics, up to {0.5 / np.pi / data.observer_s:.0f} Hz"
+    blocks.append(BlockDeviation(motor, inputs, torque * rms(scale["motor"][judged]), remark))
+    if "table" in held:
+        stretch = run.table_m - bench.axis.ratio_m_rad * run.motor
+        stretch = stretch - np.mean(stretch[judged])
+        label = "table less motor position"
+        table = Deviation("transmission and table", label, "m", stretch, stretch - held["table"], judged)
+        blocks.append(BlockDeviation(table, "measured motor position (twin held on it)", run.noise.table_m))
+    return tuple(blocks)
+
+
+def _mechanics(hypothesis: Hypothesis, run: Measured, observer_s: float) -> dict[str, FloatArray]:
+    """Residuals (n,) of motor and table with the measured torque as input.
+
+    Mechanisms of the drive and of the recorded channels are omitted: the measured torque already contains them.
+    """
+    twin = hypothesis.twin(observer_s)
+    measured = twin.undelayed(run.response)
+    mechanical = tuple(active for active in twin.active if stage_of(BY_ID[active.effect], active.variant) not in _DRIVE)
+    inputs = measured._replace(torque_command=measured.torque)
+    held = replace(twin, active=mechanical).observe(run.position_command_m, run.velocity_command_m_s, inputs, run.start)
+    return differences(measured, held, hypothesis.bench, run.judged)
+
+
+def low_pass(values: FloatArray, period_s: float) -> FloatArray:
+    """Low-pass values (n,) forwards and backwards; the corner is at most 0.4 of the sampling rate."""
+    corner = min(2.0 * LOW_PASS_HZ * period_s, 0.8)
+    return np.asarray(filtfilt(*butter(LOW_PASS_ORDER, corner), values), dtype=np.float64)
+
+
+def motion_channels(measured: Measured, position: FloatArray, simulated: FloatArray) -> list[Deviation]:
+    """Position, following error, velocity, acceleration and jerk from positions (n,) [m], measured and simulated."""
+    where = "table" if measured.table_m.size else "motor"
+    command, period_s = measured.position_command_m, measured.period_s
+    entries = [
+        (f"{where}_position_m", f"{where} position", "m", position, simulated),
+        ("following_error_m", "following error", "m", command - position, command - simulated),
+    ]
+    pair = [low_pass(position, period_s), low_pass(simulated, period_s)]
+    for name, label, unit in (
+        ("velocity_m_s", "velocity", "m/s"),
+        ("acceleration_m_s2", "acceleration", "m/s^2"),
+        ("jerk_m_s3", "jerk", "m/s^3"),
+    ):
+        pair = [np.gradient(values, period_s) for values in pair]
+        entries.append((name, label, unit, pair[0], pair[1]))
+    return [Deviation(*entry, measured.judged) for entry in entries]

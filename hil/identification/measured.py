@@ -1,0 +1,199 @@
+"""Prepare recordings for the twin: channels of the axis, initial state, noise of the sensors.
+
+The set-points, the first samples and the control law determine the initial state of a closed-loop simulation. The ticks
+of the position loop are found by replaying the controller over the first motion: the phase that reproduces the torque
+commands best. Rows before the first such tick are omitted, since their velocity reference is unknown.
+
+A drive in CSP gets positions only: its velocity feed-forward is their difference from SYNC to SYNC.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hil.arrays import FloatArray
+from hil.bench.bench_file import Bench
+from hil.bench.hardware import DriveMode
+from hil.channels import AxisKind
+from hil.control import cascade
+from hil.errors import InputError
+from hil.identification.noise import Laps, Noise, estimate_noise, find_laps, moving
+from hil.recording.recording import Recording
+from hil.twin.axis import Response, Start
+
+Channels = tuple[FloatArray, FloatArray, FloatArray, FloatArray]  # as control.replay takes them
+
+SETTLE_S = 0.05  # not evaluated at the start: several time constants of the observer, for errors of the initial state
+_REPLAYED_ROWS = 200  # to find the phase of the position loop: many of its ticks
+_FITTED_ROWS = 11  # motor positions fitted by a parabola for the first velocity: averages encoder counts
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """One recording ready to be compared, channels (n,) in motor units: rad and N m, or m and N."""
+
+    name: str
+    kind: AxisKind
+    period_s: float
+    position_command_m: FloatArray
+    velocity_command_m_s: FloatArray
+    motor: FloatArray
+    table_m: FloatArray  # empty without a linear encoder
+    torque_command: FloatArray
+    torque: FloatArray
+    torque_is_command: bool  # only one of the two was recorded
+    start: Start
+    noise: Noise
+    left_out: int = 0  # rows of the recording before the first tick of the position loop
+
+    @property
+    def time_s(self) -> FloatArray:
+        """Time from the first row of the recording, tick x period."""
+        return np.asarray((self.left_out + np.arange(self.motor.size)) * self.period_s, dtype=np.float64)
+
+    @cached_property
+    def motor_noise(self) -> FloatArray:
+        """Noise of the motor position at each row (n,), with that of the instant of its reading."""
+        speed = np.gradient(self.motor) / self.period_s
+        return np.asarray(np.hypot(self.noise.motor, self.noise.jitter_s * speed), dtype=np.float64)
+
+    @cached_property
+    def laps(self) -> Laps | None:
+        """Repeated motion; None where no motion is made twice."""
+        return find_laps(self.position_command_m, self.velocity_command_m_s, self.period_s)
+
+    @property
+    def response(self) -> Response:
+        """The measured channels in the twin's order."""
+        return Response(self.motor, self.table_m, self.torque_command, self.torque)
+
+    @cached_property
+    def moving(self) -> NDArray[np.bool_]:
+        """Rows (n,) at which the set-points move."""
+        return moving(self.velocity_command_m_s)
+
+    @cached_property
+    def judged(self) -> slice:
+        """Rows that are evaluated: from the first motion on, and after the start has settled.
+
+        Before the first motion the state of friction is unknown.
+        """
+        first = min(int(np.argmax(self.moving)), self.motor.size // 2)
+        return slice(max(round(SETTLE_S / self.period_s), first), None)
+
+
+def take(recording: Recording, bench: Bench) -> Measured:
+    """Take the channels of a recording that the twin of `bench` needs.
+
+    Raises InputError for another kind of axis or period than the bench, a missing channel, or too few rows.
+    """
+    names, gains = recording.axis, bench.gains
+    if (recording.kind is AxisKind.LINEAR) != bench.axis.linear:
+        raise InputError(
+            f"{recording.name}: given a recording of a {recording.kind} axis, allowed a "
+            f"{'linear' if bench.axis.linear else 'rotary'} one, as in the bench {bench.name}; "
+            "give the bench of this axis"
+        )
+    if abs(recording.period_s - gains.period_s) > 0.01 * gains.period_s:
+        raise InputError(
+            f"{recording.name}: given a period of {recording.period_s:g} s, allowed velocity_period_s of "
+            f"the bench {bench.name}, {gains.period_s:g} s; record one row per tick of the velocity loop"
+        )
+    if len(recording) * recording.period_s < 4.0 * SETTLE_S:
+        raise InputError(
+            f"{recording.name}: given {len(recording)} rows, allowed {4.0 * SETTLE_S:g} s or more; "
+            "give a longer recording"
+        )
+    if bench.has_table_encoder and names.table_position not in recording.columns:
+        raise InputError(
+            f"{recording.name}: {names.table_position} is not recorded, but the bench {bench.name} has a "
+            "linear encoder; record it, or write 'table: null' under encoders in the bench file"
+        )
+    motor, torque = _column(recording, names.motor_position), _column(recording, names.torque)
+    position, velocity = _column(recording, names.position_command), _column(recording, names.velocity_command)
+    if bench.drive is not None and bench.drive.mode is DriveMode.CSP:
+        velocity = np.diff(position, prepend=2.0 * position[0] - position[1]) / gains.period_s
+    has_command = names.torque_command in recording.columns
+    command = _column(recording, names.torque_command) if has_command else torque
+    table = _column(recording, names.table_position) if bench.has_table_encoder else np.empty(0)
+    if table.size and gains.position_from_table:
+        # the linear encoder closes the position loop: the datum of the motor encoder is arbitrary
+        motor = motor + float(np.mean(table - gains.ratio_m_rad * motor)) / gains.ratio_m_rad
+    feedback = table if table.size else gains.ratio_m_rad * motor
+    first = _first_tick(gains, (position, velocity, motor, feedback), command)
+    position, velocity, motor, feedback, table, command, torque = (
+        values[first:] for values in (position, velocity, motor, feedback, table, command, torque)
+    )
+    return Measured(
+        recording.name,
+        recording.kind,
+        recording.period_s,
+        position,
+        velocity,
+        motor,
+        table,
+        command,
+        torque,
+        bool(np.array_equal(command, torque)),
+        _start(gains, (position, velocity, motor, feedback), command),
+        estimate_noise(bench, velocity, motor, table, command, torque, recording.period_s),
+        first,
+    )
+
+
+def bench_of(recording: Recording) -> Bench:
+    """Return the bench stored in the metadata of a recorded run. Raises InputError if there is none."""
+    described = recording.metadata.get("bench")
+    if not isinstance(described, dict):
+        raise InputError(f"{recording.name}: no bench is recorded in it; give one: --bench FILE or a shipped name")
+    return Bench.model_validate(described)
+
+
+def _column(recording: Recording, name: str) -> FloatArray:
+    return np.ascontiguousarray(recording[name], dtype=np.float64)
+
+
+def _first_tick(gains: cascade.Gains, channels: Channels, command: FloatArray) -> int:
+    """Find the first tick of the position loop: the row whose replay reproduces the commands best.
+
+    The beginning of the first motion is replayed: at rest every phase gives the same.
+    """
+    _, velocity, motor, _ = channels
+    begin = max(int(np.argmax(moving(velocity))), 2)
+
+    def misfit(row: int) -> float:
+        rows = slice(row, row + _REPLAYED_ROWS)
+        state = _state_at(gains, channels, command, row, (motor[row - 1] - motor[row - 2]) / gains.period_s)
+        replayed, _ = cascade.replay(gains, state, *(values[rows] for values in channels))
+        return float(np.mean((replayed - command[rows]) ** 2))
+
+    rows = range(begin, begin + gains.position_ticks)
+    return min(rows, key=misfit) % gains.position_ticks
+
+
+def _state_at(gains: cascade.Gains, channels: Channels, command: FloatArray, row: int, speed: float) -> cascade.State:
+    """State of the controller at a tick of the position loop: the integrator is the command less the proportional part.
+
+    A P velocity loop has no integrator.
+    """
+    _, _, motor, _ = channels
+    state = cascade.init(motor[row], speed, 0.0, gains.period_s)
+    if row > 0:
+        state = state._replace(previous_motor_rad=motor[row - 1], previous2_motor_rad=motor[max(row - 2, 0)])
+    if gains.integral_gain_n_m_rad == 0.0:
+        return state
+    proportional, _ = cascade.replay(gains, state, *(values[row : row + 1] for values in channels))
+    return state._replace(integral_n_m=float(command[row] - proportional[0]))
+
+
+def _start(gains: cascade.Gains, channels: Channels, command: FloatArray) -> Start:
+    """Initial position and velocity from a parabola through the first rows, and the torque of the integrator."""
+    motor = channels[2]
+    rows = motor[:_FITTED_ROWS]
+    speed = 0.0
+    if np.ptp(rows) > 0.0:  # at rest the polynomial would give rounding errors
+        speed = float(np.polyfit(np.arange(rows.size), rows, 2)[1]) / gains.period_s
+    state = _state_at(gains, channels, command, 0, speed)
+    return Start(float(gains.ratio_m_rad * motor[0]), gains.ratio_m_rad * speed, state.integral_n_m)

@@ -1,0 +1,161 @@
+"""Noise of a recording: white noise of its sensors, and the rows at which its motion repeats.
+
+The noise of a sensor is estimated from its own channel. Repeated motion gives the part of a residual that does not
+repeat, which includes disturbances of the axis.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import correlate, find_peaks
+
+from hil.arrays import FloatArray
+from hil.bench.bench_file import Bench
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Standard deviation of the white noise of a sensor: motor [rad or m], table [m], torque [N m or N].
+
+    `table_m` is that of table position less r x motor position, 0 without a linear encoder. `jitter_s` is that of the
+    sampling instants of the encoders: its position error is proportional to the speed and equal for both.
+    """
+
+    motor: float
+    table_m: float
+    torque: float
+    jitter_s: float = 0.0
+
+
+def estimate_noise(
+    bench: Bench,
+    velocity: FloatArray,
+    motor: FloatArray,
+    table: FloatArray,
+    command: FloatArray,
+    torque: FloatArray,
+    period_s: float,
+) -> Noise:
+    """Estimate sensor noise from channels (n,) in motor units, at least that of counting: count / sqrt(12)."""
+    motor_noise, table_noise = max(_white(motor), bench.motor_count / np.sqrt(12.0)), 0.0
+    if table.size and bench.encoders.table is not None:
+        ratio_m = bench.axis.ratio_m_rad
+        counting = np.hypot(bench.encoders.table.resolution_m, ratio_m * bench.motor_count) / np.sqrt(12.0)
+        table_noise = max(_white(table - ratio_m * motor), float(counting))
+    of_torque = _white(torque) if np.array_equal(command, torque) else _coloured(torque - command)
+    return Noise(motor_noise, table_noise, of_torque, _jitter_s(motor, velocity, motor_noise, period_s))
+
+
+def moving(velocity: FloatArray) -> NDArray[np.bool_]:
+    """Mark the rows (n,) at which a set velocity moves the axis: above 1/1000 of its maximum; below lies rounding."""
+    speed = np.abs(velocity)
+    return np.asarray(speed > 1e-3 * np.max(speed, initial=0.0))
+
+
+def _white(signal: FloatArray) -> float:
+    """White noise of a smooth signal (n,) from its fourth differences, which have the variance 70 sigma^2.
+
+    The median over blocks excludes events such as reversals.
+    """
+    return float(np.sqrt(np.median(_white_blocks(signal))))
+
+
+def _white_blocks(signal: FloatArray) -> FloatArray:
+    """Variance (b,) of the white noise in each block of 64 rows."""
+    differences = np.diff(signal, 4)
+    blocks = differences[: differences.size // 64 * 64].reshape(-1, 64)
+    return np.asarray(np.mean(blocks**2, axis=1) / 70.0, dtype=np.float64)
+
+
+def _jitter_s(motor: FloatArray, velocity: FloatArray, noise: float, period_s: float) -> float:
+    """Jitter of the sampling instants: excess over `noise` at constant feed, divided by the speed.
+
+    It takes six blocks of 64 rows at constant set velocity, at half of the fastest such feed or above; 0 with fewer.
+    Also 0 if the variance is below three times that of the noise: counting at half a count per row makes 2.7.
+    """
+    variance = _white_blocks(motor)
+    rows = 64 * variance.size
+    speed = np.abs(np.diff(motor)[:rows].reshape(-1, 64).mean(axis=1)) / period_s
+    steady = np.ptp(velocity[:rows].reshape(-1, 64), axis=1) <= 1e-6 * np.max(np.abs(velocity), initial=0.0)
+    steady &= moving(velocity)[:rows].reshape(-1, 64).all(axis=1)
+    fast = steady & (speed > 0.5 * np.max(speed[steady], initial=0.0))
+    if np.count_nonzero(fast) < 6:
+        return 0.0
+    more = (variance[fast] - noise**2) / speed[fast] ** 2
+    return float(np.sqrt(np.median(more))) if np.median(variance[fast]) > 3.0 * noise**2 else 0.0
+
+
+def _coloured(signal: FloatArray) -> float:
+    """Noise of any colour of a signal (n,) near zero: deviation from a straight line in each block of 64 rows.
+
+    A current measurement is filtered, so its noise is not white. The median over blocks excludes events.
+    """
+    rows = np.arange(64) - 31.5
+    blocks = signal[: signal.size // 64 * 64].reshape(-1, 64)
+    blocks = blocks - blocks.mean(axis=1, keepdims=True)
+    blocks = blocks - np.outer(blocks @ rows / (rows @ rows), rows)
+    return float(np.sqrt(np.median(np.sum(blocks**2, axis=1)) / 62.0))
+
+
+Rows = NDArray[np.intp]
+
+_LAGS = 6  # strongest peaks of the correlation that are tried: each row counts once, so more lags add few rows
+_NEAR = 30  # rows about a peak of the correlation that are searched: the shrinking overlap shifts a peak by a few
+_SAME_M = 2e-6  # set-points closer than this are the same: printed ones are rounded to 1 µm
+_SETTLED_S = 0.3  # set-points must have been equal for this time: friction and play depend on the past
+_ENOUGH_S = 1.0  # least repeated motion: 1000 rows at 1 kHz give the floor to a few per cent
+
+
+@dataclass(frozen=True, eq=False)
+class Laps:
+    """Rows of repeated set-points, and the rows of their repetition, each (m,)."""
+
+    first: Rows
+    again: Rows
+    lag_s: float  # the lag with the most rows
+
+    def noise(self, residual: FloatArray) -> float:
+        """Standard deviation of the non-repeating part of a residual (n,)."""
+        return float(np.sqrt(np.mean((residual[self.first] - residual[self.again]) ** 2) / 2.0))
+
+
+def find_laps(position: FloatArray, velocity: FloatArray, period_s: float) -> Laps | None:
+    """Find the rows of set-points (n,) [m, m/s] that repeat after a lag; None if less than a second repeats."""
+    matched = np.zeros(position.size, dtype=bool)
+    settled = max(round(_SETTLED_S / period_s), 1)
+    first, again, best, longest = list[Rows](), list[Rows](), 0.0, 0
+    # short lags first, each row once: distant laps differ by drift
+    for lag in sorted(_lags(position, velocity)):
+        same = np.abs(position[:-lag] - position[lag:]) < _SAME_M
+        # rows since the last difference
+        different = np.flatnonzero(~same)
+        since = np.full(same.size, -1)
+        since[different] = different
+        since = np.arange(same.size) - np.maximum.accumulate(since)
+        moving = np.abs(velocity[:-lag]) > 1e-3 * np.max(np.abs(velocity))
+        rows = np.flatnonzero((since > settled) & moving & ~matched[:-lag])
+        matched[rows] = True
+        first.append(rows)
+        again.append(rows + lag)
+        if rows.size > longest:
+            best, longest = lag * period_s, rows.size
+    if longest * period_s < _ENOUGH_S:
+        return None
+    return Laps(np.concatenate(first), np.concatenate(again), best)
+
+
+def _lags(position: FloatArray, velocity: FloatArray) -> list[int]:
+    """Lags [rows] of the largest autocorrelation of the set-points, best first."""
+    n = velocity.size
+    correlation = correlate(velocity, velocity, method="fft")[n - 1 :]
+    peaks, _ = find_peaks(correlation, height=0.05 * correlation[0])
+    # the sum decreases with the overlap, so that its peaks lie a few rows early
+    found = (
+        min(
+            range(max(peak - _NEAR, 1), min(peak + _NEAR, n - 1)),
+            key=lambda lag: float(np.mean(np.abs(position[: n - lag : 7] - position[lag::7]))),
+        )
+        for peak in peaks[np.argsort(correlation[peaks])[::-1][:_LAGS]].tolist()
+    )
+    return list(dict.fromkeys(found))

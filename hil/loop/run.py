@@ -23,7 +23,7 @@ from hil.loop.realtime import Jitter, NotPunctual, check_punctual, measure_jitte
 from hil.loop.session import Outcome, Session, make_cycle
 from hil.loop.simulated_bench import make_plant
 from hil.loop.supervision import Ending
-from hil.loop.virtual import VirtualSession
+from hil.loop.virtual import compiled_ticks
 from hil.motion.profile import Profile
 from hil.motion.trajectory import Trajectory, plan
 from hil.recording.writer import Recorder, run_metadata
@@ -116,8 +116,8 @@ def run_profile(
         recorder = Recorder(folder, name, cycle.channels, gains.period_s, metadata, lossless=virtual)
         ended = "failed"
         try:
-            kind = VirtualSession if virtual else Session
-            session = kind(rig, cycle, trajectory, profile.motion_limits, clock, recorder)
+            ticks = compiled_ticks(rig, recorder) if virtual else None
+            session = Session(rig, cycle, trajectory, profile.motion_limits, clock, recorder, ticks)
             with _interruptible(session):
                 outcome = session.run()
             ended = f"{outcome.ending}: {outcome.reason}"
@@ -182,19 +182,22 @@ def _refused(force: bool, check: Callable[[], None]) -> str:
     return ""
 
 
-class _Rehearsal(VirtualClock):
-    """Asks for a stop after some ticks."""
+class _AlarmClock(VirtualClock):
+    """Virtual clock that calls `alarm` at tick REHEARSED_TICKS."""
 
-    def __init__(self) -> None:
-        self.session: Session | None = None
+    alarm: Callable[[], None]
 
     def wait(self, tick: int) -> float:
-        if tick == REHEARSED_TICKS and self.session is not None:
-            self.session.ask_stop()
+        if tick == REHEARSED_TICKS:
+            self.alarm()
         return 0.0
 
+
+class _NoRows:
+    """Recorder of a rehearsal."""
+
     def record(self, row: Sequence[float]) -> None:
-        """Nothing is recorded."""
+        """Discard the row."""
 
 
 def rehearse(bench: Bench, trajectory: Trajectory, profile: Profile) -> None:
@@ -208,10 +211,11 @@ def rehearse(bench: Bench, trajectory: Trajectory, profile: Profile) -> None:
     plant.reset(float(trajectory.position_m[0]))
     with Rig(copy, plant=plant) as rig:
         rig.set_up()
-        clock = _Rehearsal()
+        clock = _AlarmClock()
         cycle = make_cycle(rig, rig.drive.read(0.0).motor_position_rad)
-        clock.session = Session(rig, cycle, trajectory, profile.motion_limits, clock, clock)
-        clock.session.run()
+        session = Session(rig, cycle, trajectory, profile.motion_limits, clock, _NoRows())
+        clock.alarm = session.ask_stop
+        session.run()
 
 
 @contextlib.contextmanager

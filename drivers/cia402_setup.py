@@ -44,6 +44,7 @@ class DriveSettings:
     serial_number: int | None = None  # None: any of the described type
     heartbeat_s: float = 0.02  # the drive's; it counts as lost after three
     missed_answers_allowed: int = 3  # SYNCs in a row without a TPDO before the data count as stale
+    rated_torque_n_m: float | None = None  # checked against 0x6076; None: not checked
     max_torque_n_m: float | None = None  # 0x6072; None: as the drive has it
     quick_stop_rad_s2: float | None = None  # 0x6085; None: as the drive has it
     command_transmission: int = EVENT_DRIVEN  # RPDO: acts at once (255) or at the next SYNC (1)
@@ -112,6 +113,15 @@ def _read_info(device: DeviceSetup, settings: DriveSettings) -> DriveInfo:
             given=f"{counts_per_rev} counts/rev, {rated_torque_n_m} N m, {rated_current_a} A",
             advice="Set them with the drive's commissioning tool.",
         )  # fmt: skip
+    described_n_m = settings.rated_torque_n_m
+    if described_n_m is not None and abs(rated_torque_n_m - described_n_m) > 0.001 * described_n_m:
+        raise ConfigurationError(
+            "another rated torque than described",
+            where=f"drive node {device.node_id}, object 0x6076",
+            given=f"{rated_torque_n_m} N m",
+            allowed=f"{described_n_m} N m",
+            advice="Correct drive.rated_torque_n_m in the bench file, or the drive.",
+        )
     return DriveInfo(
         rad_per_count=settings.travel_per_rev / counts_per_rev,
         rated_torque_n_m=rated_torque_n_m,

@@ -69,7 +69,13 @@ def simulate(bench: Bench, trajectory: Trajectory, *, seed: int | None = None, n
             f"{bench.name}; plan it with bench.period_s",
         )
     drive = (bench.drive or DriveSection()).model_copy(
-        update={"interface": "inprocess", "encoder": EncoderConnection(), "eds": None, "serial_number": None}
+        update={
+            "protocol": "canopen",
+            "interface": "inprocess",
+            "encoder": EncoderConnection(),
+            "eds": None,
+            "serial_number": None,
+        }
     )
     bench = bench.model_copy(update={"drive": drive, "simulation": bench.simulation or SimulationSection()})
     plant = make_plant(bench, seed)

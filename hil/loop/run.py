@@ -18,7 +18,7 @@ from hil.bench.bench_file import Bench
 from hil.bench.hardware import DriveSection, EncoderConnection, SimulationSection
 from hil.errors import FieldError
 from hil.loop.clock import Clock, VirtualClock, WallClock
-from hil.loop.devices import Rig
+from hil.loop.devices import Devices, Rig, open_devices
 from hil.loop.realtime import Jitter, NotPunctual, check_punctual, measure_jitter, now_text, real_time, report
 from hil.loop.session import Outcome, Session, make_cycle
 from hil.loop.simulated_bench import make_plant
@@ -58,7 +58,7 @@ def run_profile(
     force: bool = False,
     seed: int | None = None,
     planned: Callable[[Trajectory], None] | None = None,
-    rig: Rig | None = None,
+    rig: Devices | None = None,
 ) -> RunResult:
     """Run a profile on a bench and record it as `folder`/`name`.parquet.
 
@@ -75,7 +75,7 @@ def run_profile(
         seed = bench.simulation.seed
     with contextlib.ExitStack() as stack:
         if rig is None:
-            rig = stack.enter_context(Rig(bench, seed))
+            rig = stack.enter_context(open_devices(bench, seed))
         rig.set_up()
         sample = rig.drive.read(0.0)
         encoder = rig.encoder.read(0.0) if rig.encoder is not None else None
@@ -161,7 +161,7 @@ def _check_set_points(trajectory: Trajectory, section: DriveSection) -> None:
             )
 
 
-def _check_bus_load(rig: Rig, section: DriveSection) -> None:
+def _check_bus_load(rig: Devices, section: DriveSection) -> None:
     load = rig.bus_load()
     if load > section.bus_load:
         raise NotPunctual(
@@ -204,7 +204,13 @@ def rehearse(bench: Bench, trajectory: Trajectory, profile: Profile) -> None:
     """Arm, begin and stop the run in virtual time on a simulated copy of the bench, so that all is compiled and at hand
     before the real one."""
     section = (bench.drive or DriveSection()).model_copy(
-        update={"interface": "inprocess", "encoder": EncoderConnection(), "eds": None, "serial_number": None}
+        update={
+            "protocol": "canopen",
+            "interface": "inprocess",
+            "encoder": EncoderConnection(),
+            "eds": None,
+            "serial_number": None,
+        }
     )
     copy = bench.model_copy(update={"drive": section, "simulation": bench.simulation or SimulationSection()})
     plant = make_plant(copy)

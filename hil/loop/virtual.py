@@ -22,12 +22,13 @@ from hil.arrays import FloatArray
 from hil.bench.hardware import DriveMode
 from hil.compiled.source_digest import source_digest
 from hil.loop.cycle import Cycle, Samples, compiled_cycle
-from hil.loop.devices import Rig
+from hil.loop.devices import Devices, Rig
 from hil.loop.session import Rows
 
 SNAPSHOT_TICKS = 2000
 LAST_TICKS = 20  # over the bus again, so that the devices know where the axis is when they disarm
 _MAX_TORQUE, _RATED_TORQUE, _COUNTS = 0x6072, 0x6076, 0x608F
+
 
 class Scales(NamedTuple):
     """Conversions of the simulated drive and encoder and of their drivers, to counts and back."""
@@ -124,8 +125,10 @@ class CompiledTicks:
         return tick, sample._replace(motor_position_rad=motor, torque_n_m=torque), seen._replace(position_m=table)
 
 
-def compiled_ticks(rig: Rig, recorder: BlockRows) -> CompiledTicks | None:
+def compiled_ticks(rig: Devices, recorder: BlockRows) -> CompiledTicks | None:
     """Compile the ticks of a rig in torque control of a simulated axis on an ideal bus; None for any other rig."""
+    if not isinstance(rig, Rig):
+        return None
     plant = rig.nodes.plant if rig.nodes is not None else None
     if (
         rig.section.mode is not DriveMode.CST
@@ -144,12 +147,14 @@ def _scales(rig: Rig) -> Scales:
     number = rig.nodes.drive.dictionary.number
     info, rated_mn_m = rig.drive.info, number(_RATED_TORQUE)
     table = rig.bench.encoders.table
-    has_table = isinstance(rig.encoder, CanopenEncoder) and table is not None
+    resolution_m, step_m = 1.0, 1.0
+    if isinstance(rig.encoder, CanopenEncoder) and table is not None:
+        resolution_m, step_m = table.resolution_m, rig.encoder.step_m
     return Scales(
         counts_per_rad=number(_COUNTS, 1) / (2.0 * math.pi),
         rad_per_count=info.rad_per_count,
-        counts_per_m=1.0 / table.resolution_m if has_table else 1.0,
-        m_per_count=rig.encoder.step_m if has_table else 1.0,
+        counts_per_m=1.0 / resolution_m,
+        m_per_count=step_m,
         command_mille_per_n_m=1 / info.torque_resolution_n_m,
         command_n_m_per_mille=rated_mn_m / 1e6,
         mille_per_n_m=1e6 / rated_mn_m,

@@ -13,8 +13,8 @@ from hil.loop.clock import VirtualClock
 from hil.loop.devices import Rig
 from hil.loop.run import _interruptible
 from hil.loop.session import Outcome, Session, make_cycle
-from hil.loop.virtual import compiled_ticks
 from hil.loop.simulated_bench import load_simulated
+from hil.loop.virtual import compiled_ticks
 from hil.motion.profile import Profile
 from hil.motion.trajectory import plan
 from hil.recording.recording import Recording, read_recording

@@ -7,8 +7,6 @@ report its `health`. Time is handed in; nothing here reads a clock. `PythonCanPo
 Error frames are counted and decoded here, since the canopen package drops them and a bus-off would stay invisible.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum

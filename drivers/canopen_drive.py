@@ -5,14 +5,21 @@ is wrong shows in `DriveSample.condition`. A condition that forbids motion sets 
 `reset_fault`; `check` raises it with its text.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Final
 
 from drivers.bus import BusState
 from drivers.canopen_master import CanopenMaster
-from drivers.cia402 import ENABLE_OPERATION, STATE_BY_STATUS, DriveState, Mode, next_controlword
+from drivers.cia402 import (
+    ENABLE_OPERATION,
+    STATE_BY_STATUS,
+    Controlword,
+    DriveState,
+    HomingPhase,
+    Mode,
+    next_controlword,
+    next_homing_phase,
+)
 from drivers.cia402_setup import (
     CONTROLWORD,
     FEEDBACK,
@@ -27,7 +34,7 @@ from drivers.emcy import Emergency, decode_emergency
 from drivers.pdo import layout, saturate
 from drivers.port import Condition, Drive, DriveFault, DriveGoal, DriveSample
 
-__all__ = ["TRIPPING", "CanopenDrive", "DriveInfo", "DriveSettings", "HomingSettings"]
+__all__ = ["TRIPPING", "CanopenDrive", "DriveInfo", "DriveSettings", "HomingRun", "HomingSettings"]
 
 # Conditions under which the loop must not go on moving the axis.
 TRIPPING: Final = (
@@ -226,3 +233,28 @@ class CanopenDrive(Drive):
             given=active[-1] if active else self._health.last_error,
             advice="Remove the cause, then reset the fault.",
         )
+
+
+class HomingRun:
+    """A homing run of a drive in Mode.HOMING, tick by tick, to a proven stop on the reference.
+
+    Call `step` with each sample, then `drive.command(now_s, 0.0)`, until `phase` is DONE or FAILED.
+
+    standstill_rad_s: speed below which the axis counts as at rest (linear axis: m/s). The run has no time-out of its
+    own: give up after as many ticks as the longest search may take, by setting the drive's goal.
+    """
+
+    def __init__(self, drive: CanopenDrive, standstill_rad_s: float) -> None:
+        self._drive, self._standstill_rad_s = drive, standstill_rad_s
+        self._last: DriveSample | None = None
+        self.phase = HomingPhase.READY
+
+    def step(self, sample: DriveSample) -> HomingPhase:
+        """Take one sample in; sets or takes back the start bit of the next controlword."""
+        last, self._last = self._last, sample
+        if last is not None and sample.time_s > last.time_s:
+            speed = (sample.motor_position_rad - last.motor_position_rad) / (sample.time_s - last.time_s)
+            self.phase = next_homing_phase(self.phase, sample.statusword, speed, self._standstill_rad_s)
+        running = self.phase in (HomingPhase.STARTED, HomingPhase.RUNNING)
+        self._drive.controlword_bits = int(Controlword.HOMING_START) if running else 0
+        return self.phase

@@ -1,7 +1,5 @@
 """A CiA 406 linear encoder as the loop sees it: step and range read by SDO, then one TPDO after each SYNC."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +10,7 @@ from drivers.bus import BusState
 from drivers.canopen_master import NMT_PRE_OPERATIONAL, CanopenMaster
 from drivers.counting import Unwrapper
 from drivers.emcy import Emergency, decode_emergency
+from drivers.object_index import ObjectIndex as Index
 from drivers.pdo import EVERY_SYNC
 from drivers.port import Condition, ConfigurationError, Encoder, EncoderError, EncoderSample
 from drivers.sdo_setup import EDS_FOLDER, DeviceSetup
@@ -65,7 +64,7 @@ class CanopenEncoder(Encoder):
         with DeviceSetup(master.network, settings.node_id, settings.eds) as device:
             master.nmt(NMT_PRE_OPERATIONAL, settings.node_id)
             device.check_identity(406, settings.serial_number)
-            step_m = device.read(0x6005, 1) / 1e9
+            step_m = device.read(Index.ENCODER_STEP_SETTINGS, 1) / 1e9
             if step_m <= 0 or (settings.step_m is not None and not math.isclose(step_m, settings.step_m)):
                 raise ConfigurationError(
                     "another measuring step than described", where=f"{self._name}, object 0x6005:01",
@@ -74,10 +73,14 @@ class CanopenEncoder(Encoder):
                 )  # fmt: skip
             self.step_m = step_m
             device.disable_pdos()
-            device.write(0x6000, 0, _REVERSED if settings.reversed else _PLAIN_DIRECTION)
-            device.write(0x1017, 0, round(1000 * settings.heartbeat_s))
-            device.map_pdo(0x1800, (device.entry(0x6004),), EVERY_SYNC, 0x180 + settings.node_id)
-            self._unwrapper = Unwrapper(device.read(0x6002) or 1 << 32, device.read(0x6004))
+            device.write(Index.ENCODER_OPERATING_PARAMETERS, 0, _REVERSED if settings.reversed else _PLAIN_DIRECTION)
+            device.write(Index.PRODUCER_HEARTBEAT_TIME, 0, round(1000 * settings.heartbeat_s))
+            device.map_pdo(
+                Index.TPDO_COMMUNICATION, (device.entry(Index.ENCODER_POSITION),), EVERY_SYNC, 0x180 + settings.node_id
+            )
+            self._unwrapper = Unwrapper(
+                device.read(Index.ENCODER_MEASURING_RANGE) or 1 << 32, device.read(Index.ENCODER_POSITION)
+            )
         self._answered = self._set_up_at = master.syncs
         self._latched = 0
         self._heartbeat_deadline_s = math.inf
@@ -85,8 +88,8 @@ class CanopenEncoder(Encoder):
     def preset(self, position_m: float) -> None:
         """Where the axis stands now reads `position_m` from here on (object 0x6003); blocking."""
         with DeviceSetup(self._master.network, self.settings.node_id, self.settings.eds) as device:
-            device.write_only(0x6003, 0, round(position_m / self.step_m))
-            self._unwrapper.restart(device.read(0x6004))
+            device.write_only(Index.ENCODER_PRESET, 0, round(position_m / self.step_m))
+            self._unwrapper.restart(device.read(Index.ENCODER_POSITION))
 
     def _on_tpdo(self, can_id: int, data: bytes, now_s: float) -> None:
         if len(data) != 4:

@@ -1,7 +1,5 @@
 """EMCY messages decoded to text (CiA 301 table 26, CiA 402-2 error codes)."""
 
-from __future__ import annotations
-
 from typing import Final, NamedTuple
 
 # The most exact entry wins: whole code, then upper byte, then upper nibble.

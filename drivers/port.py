@@ -22,8 +22,6 @@ same as an error with the text a person needs.
     └── ResponseTimeout             a device does not answer during set-up
 """
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """A linear encoder on a serial line (pyserial), read without blocking. Frames: see `drivers.serial_frames`."""
 
-from __future__ import annotations
-
 import os
 import stat
 from dataclasses import dataclass

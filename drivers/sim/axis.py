@@ -4,8 +4,6 @@ Every coordinate is kept as translation at the table: y = r theta for a rotary o
 hence J becomes J / r^2 [kg] and a torsional stiffness k_t / r^2 [N/m].
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import pi

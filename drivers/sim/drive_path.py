@@ -1,7 +1,5 @@
 """From torque command to torque at the motor shaft: delay, limit, dead zone, lag, torque constant, cogging."""
 
-from __future__ import annotations
-
 from math import exp, sin, sqrt
 from typing import Any
 

@@ -6,8 +6,6 @@ On a linear axis read N for n_m, m for rad, N s/m for n_m_s_rad; angles of the s
 The equations stand in contact.py (friction, nut), drive_path.py, sensors.py and kernel.py (table).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf, isfinite

@@ -4,8 +4,6 @@ Every effect of the catalogue is a nested record named by its id, holding `on`, 
 off it is all zeros. Adding an effect: one entry in effects.CATALOGUE (or NOVEL) and its term in a kernel.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 from zlib import crc32

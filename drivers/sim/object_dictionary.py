@@ -1,7 +1,5 @@
 """Object dictionary of a simulated node, built from its EDS: typed values, access rights, limits."""
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass

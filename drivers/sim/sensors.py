@@ -1,7 +1,5 @@
 """Encoders and torque measurement of the simulated axis: resolution, offset, noise, sampling jitter."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, fields
 from math import cos, isfinite, log, pi, sin, sqrt
 from typing import Any

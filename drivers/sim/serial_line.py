@@ -4,8 +4,6 @@ Nothing is sent by itself: `send` puts out the position of this instant, at what
 cut frames can be put on the line, and the line can be taken away.
 """
 
-from __future__ import annotations
-
 import os
 import tty
 

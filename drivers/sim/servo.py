@@ -10,8 +10,6 @@ v_meas is the backward difference of the motor encoder, or the derivative of its
 (q_k - q_k-2) / 2T, through an optional first-order filter. A linear axis: r = 1, metres and newtons.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, fields
 from enum import StrEnum
 from math import exp, isnan

@@ -3,8 +3,6 @@
 Tick k is due at start + k x period, never at now + period: an error of one tick is not handed on to the next.
 """
 
-from __future__ import annotations
-
 import time
 from typing import Protocol
 

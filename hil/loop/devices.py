@@ -5,8 +5,6 @@ own connection and are served by the loop's own polling, so that no second threa
 by themselves. Another protocol is a subclass of `Devices` and one line in `PROTOCOLS`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType

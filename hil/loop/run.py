@@ -1,7 +1,5 @@
 """One run of a profile on a bench: open, set up, prepare for real time, arm, move, record."""
 
-from __future__ import annotations
-
 import contextlib
 import signal
 import sys

@@ -16,8 +16,6 @@ The drive is stopped in a defined way whatever happens, and the recording ends r
 The same code runs on the wall clock and in virtual time.
 """
 
-from __future__ import annotations
-
 import contextlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """What is wrong at a tick of the loop, and whether the loop can still stop the axis itself."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from enum import StrEnum
 from typing import NamedTuple

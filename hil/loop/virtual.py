@@ -5,8 +5,6 @@ and the same compiled axis take turns, with values rounded as CAN frames round t
 would give. When a limit of the axis is passed, the ticks since the last snapshot are run again over the bus.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any, NamedTuple, Protocol
@@ -15,6 +13,7 @@ import numpy as np
 from numba import njit
 
 from drivers.canopen_encoder import CanopenEncoder
+from drivers.object_index import ObjectIndex as Index
 from drivers.port import DriveSample, EncoderSample
 from drivers.sim import kernel
 from drivers.sim.plant import Plant
@@ -27,7 +26,6 @@ from hil.loop.session import Rows
 
 SNAPSHOT_TICKS = 2000
 LAST_TICKS = 20  # over the bus again, so that the devices know where the axis is when they disarm
-_MAX_TORQUE, _RATED_TORQUE, _COUNTS = 0x6072, 0x6076, 0x608F
 
 
 class Scales(NamedTuple):
@@ -145,13 +143,13 @@ def _scales(rig: Rig) -> Scales:
     """Conversions of the simulated devices and the drivers, in the same order of operations."""
     assert rig.nodes is not None
     number = rig.nodes.drive.dictionary.number
-    info, rated_mn_m = rig.drive.info, number(_RATED_TORQUE)
+    info, rated_mn_m = rig.drive.info, number(Index.RATED_TORQUE)
     table = rig.bench.encoders.table
     resolution_m, step_m = 1.0, 1.0
     if isinstance(rig.encoder, CanopenEncoder) and table is not None:
         resolution_m, step_m = table.resolution_m, rig.encoder.step_m
     return Scales(
-        counts_per_rad=number(_COUNTS, 1) / (2.0 * math.pi),
+        counts_per_rad=number(Index.POSITION_ENCODER_RESOLUTION, 1) / (2.0 * math.pi),
         rad_per_count=info.rad_per_count,
         counts_per_m=1.0 / resolution_m,
         m_per_count=step_m,
@@ -159,5 +157,5 @@ def _scales(rig: Rig) -> Scales:
         command_n_m_per_mille=rated_mn_m / 1e6,
         mille_per_n_m=1e6 / rated_mn_m,
         n_m_per_mille=info.torque_resolution_n_m,
-        max_mille=float(number(_MAX_TORQUE)),
+        max_mille=float(number(Index.MAX_TORQUE)),
     )

@@ -6,10 +6,10 @@ from pathlib import Path
 from struct import Struct
 from typing import Final
 
-from drivers.bus import BusState
 from drivers.canopen_master import NMT_PRE_OPERATIONAL, CanopenMaster
+from drivers.canopen_node import CanopenNode, condition_names
 from drivers.counting import Unwrapper
-from drivers.emcy import Emergency, decode_emergency
+from drivers.emcy import Emergency
 from drivers.object_index import ObjectIndex as Index
 from drivers.pdo import EVERY_SYNC
 from drivers.port import Condition, ConfigurationError, Encoder, EncoderError, EncoderSample
@@ -17,7 +17,6 @@ from drivers.sdo_setup import EDS_FOLDER, DeviceSetup
 
 _POSITION: Final = Struct("<i")
 _PLAIN_DIRECTION, _REVERSED = 0x0000, 0x0008  # 0x6000 bit 3: measuring direction
-_OPERATIONAL: Final = 5
 _OK = Condition.OK
 _new = tuple.__new__  # makes a named tuple without its Python-level constructor
 
@@ -35,25 +34,16 @@ class EncoderSettings:
     missed_answers_allowed: int = 3
 
 
-class CanopenEncoder(Encoder):
-    """One encoder on a master's bus; implements `drivers.port.Encoder`."""
+class CanopenEncoder(CanopenNode, Encoder):
+    """One encoder on a master's bus."""
+
+    settings: EncoderSettings
 
     def __init__(self, master: CanopenMaster, settings: EncoderSettings) -> None:
-        self._master, self.settings = master, settings
-        self._health = master.health
-        self._name = f"encoder node {settings.node_id}"
+        super().__init__(master, settings, "encoder")
         self.step_m = 0.0
-        self.emergencies: list[Emergency] = []
-        self.malformed_frames = 0
         self._unwrapper = Unwrapper(1 << 32)
-        self._answered = self._set_up_at = 0
-        self._sample_time_s = 0.0
-        self._latched = 0
         self._condition = Condition.OK
-        self._heartbeat_deadline_s = math.inf
-        master.port.listen(0x180 + settings.node_id, self._on_tpdo)
-        master.port.listen(0x080 + settings.node_id, self._on_emergency)
-        master.port.listen(0x700 + settings.node_id, self._on_heartbeat)
 
     def set_up(self) -> None:
         """Identity, step, direction, range, watchdog, PDO; blocking.
@@ -81,9 +71,7 @@ class CanopenEncoder(Encoder):
             self._unwrapper = Unwrapper(
                 device.read(Index.ENCODER_MEASURING_RANGE) or 1 << 32, device.read(Index.ENCODER_POSITION)
             )
-        self._answered = self._set_up_at = master.syncs
-        self._latched = 0
-        self._heartbeat_deadline_s = math.inf
+        self._begin()
 
     def preset(self, position_m: float) -> None:
         """Where the axis stands now reads `position_m` from here on (object 0x6003); blocking."""
@@ -99,50 +87,29 @@ class CanopenEncoder(Encoder):
         self._answered = self._master.syncs
         self._sample_time_s = self._master.sync_time_s
 
-    def _on_emergency(self, can_id: int, data: bytes, now_s: float) -> None:
-        emergency = decode_emergency(data, now_s)
-        self.emergencies.append(emergency)
+    def _latch(self, emergency: Emergency) -> None:
         # A reset ends the alarm by itself: an encoder has nothing to acknowledge.
         self._latched = self._latched | Condition.ALARM if emergency.active else self._latched & ~Condition.ALARM
-
-    def _on_heartbeat(self, can_id: int, data: bytes, now_s: float) -> None:
-        if self._answered == self._set_up_at:
-            return  # the loop does not run yet
-        self._heartbeat_deadline_s = now_s + 3 * self.settings.heartbeat_s
-        if len(data) == 1 and data[0] & 0x7F != _OPERATIONAL:
-            self._latched |= Condition.NOT_OPERATIONAL
 
     def read(self, now_s: float) -> EncoderSample:
         """The sample of the latest answered SYNC, and what is wrong. Never raises, never waits."""
         age = self._master.syncs - self._answered
         self._condition = _OK
         if age or self._latched or self._health.state or now_s > self._heartbeat_deadline_s:
-            self._condition = self._diagnose(age, now_s)
+            self._condition = self._node_condition(age, now_s)
         counts = self._unwrapper.total
         return _new(EncoderSample, (self._sample_time_s, age, counts * self.step_m, counts, self._condition))
-
-    def _diagnose(self, age: int, now_s: float) -> Condition:
-        condition = Condition(self._latched)
-        if age:
-            condition |= Condition.LATE
-        if age > self.settings.missed_answers_allowed:
-            condition |= Condition.STALE
-        if now_s > self._heartbeat_deadline_s:
-            condition |= Condition.HEARTBEAT_LOST
-        if self._health.state is BusState.OFF:
-            condition |= Condition.BUS_OFF
-        elif self._health.state is BusState.PASSIVE:
-            condition |= Condition.BUS_PASSIVE
-        return condition
 
     def check(self) -> None:
         """Raise EncoderError if the sample read last cannot be trusted."""
         condition = self._condition & ~(Condition.LATE | Condition.BUS_PASSIVE)
         if condition:
-            active = [emergency.text for emergency in self.emergencies if emergency.active]
-            names = " | ".join(str(flag.name) for flag in Condition if flag in condition)
-            raise EncoderError(names, where=self._name, given=active[-1] if active else self._health.last_error,
-                               advice="Check the encoder, its supply and its wiring.")  # fmt: skip
+            raise EncoderError(
+                condition_names(condition),
+                where=self._name,
+                given=self._cause(),
+                advice="Check the encoder, its supply and its wiring.",
+            )
 
     def close(self) -> None:
         """Nothing to release: the bus belongs to the master."""

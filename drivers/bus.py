@@ -30,7 +30,7 @@ class BusState(IntEnum):
 
 @dataclass(slots=True)
 class BusHealth:
-    """What a controller knows about its bus; counters since it was opened."""
+    """State of a CAN controller; counters since the bus was opened."""
 
     state: BusState = BusState.ACTIVE
     error_frames: int = 0
@@ -60,7 +60,7 @@ class CanPort(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class BusConfig:
-    """How to open a bus: python-can's interface name, channel and bit rate."""
+    """Settings of a bus: python-can's interface name, channel and bit rate."""
 
     interface: str = "virtual"
     channel: str = "hil"

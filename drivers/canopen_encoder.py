@@ -23,7 +23,7 @@ _new = tuple.__new__  # makes a named tuple without its Python-level constructor
 
 @dataclass(frozen=True, slots=True)
 class EncoderSettings:
-    """How the encoder is to run. step_m: what the bench believes; None: as the device says (0x6005:1, nm)."""
+    """Settings of the encoder. step_m: as described by the bench; None: as the device says (0x6005:1, nm)."""
 
     node_id: int = 6
     eds: Path = EDS_FOLDER / "linear_encoder.eds"
@@ -48,7 +48,7 @@ class CanopenEncoder(CanopenNode, Encoder):
     def set_up(self) -> None:
         """Identity, step, direction, range, watchdog, PDO; blocking.
 
-        Raises ResponseTimeout, IdentityError or ConfigurationError (a step other than the bench believes).
+        Raises ResponseTimeout, IdentityError or ConfigurationError (another step than the bench describes).
         """
         settings, master = self.settings, self._master
         with DeviceSetup(master.network, settings.node_id, settings.eds) as device:
@@ -74,7 +74,7 @@ class CanopenEncoder(CanopenNode, Encoder):
         self._begin()
 
     def preset(self, position_m: float) -> None:
-        """Where the axis stands now reads `position_m` from here on (object 0x6003); blocking."""
+        """Set the reading at the present position to `position_m` (object 0x6003); blocking."""
         with DeviceSetup(self._master.network, self.settings.node_id, self.settings.eds) as device:
             device.write_only(Index.ENCODER_PRESET, 0, round(position_m / self.step_m))
             self._unwrapper.restart(device.read(Index.ENCODER_POSITION))
@@ -112,4 +112,4 @@ class CanopenEncoder(CanopenNode, Encoder):
             )
 
     def close(self) -> None:
-        """Nothing to release: the bus belongs to the master."""
+        """Do nothing: the bus belongs to the master."""

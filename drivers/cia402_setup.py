@@ -1,4 +1,4 @@
-"""What a CiA 402 drive is told before the loop, by SDO and read back, and what it says about itself."""
+"""Configure a CiA 402 drive by SDO before the loop, with read-back, and read its units and ratings."""
 
 import math
 from dataclasses import dataclass
@@ -38,7 +38,7 @@ class HomingSettings:
 
 @dataclass(frozen=True, slots=True)
 class DriveSettings:
-    """How the drive is to run. Rotary: rad and N m; linear drives: m and N."""
+    """Settings of the drive. Rotary: rad and N m; linear drives: m and N."""
 
     node_id: int = 5
     mode: Mode = Mode.CYCLIC_SYNC_TORQUE
@@ -57,7 +57,7 @@ class DriveSettings:
 
 @dataclass(frozen=True, slots=True)
 class DriveInfo:
-    """What the drive said about itself. torque_resolution_n_m is one per mille of the rated torque (CiA 402)."""
+    """Units and ratings read from the drive. torque_resolution_n_m is one per mille of the rated torque (CiA 402)."""
 
     rad_per_count: float
     rated_torque_n_m: float

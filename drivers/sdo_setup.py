@@ -103,7 +103,7 @@ class DeviceSetup:
         return int(value)
 
     def has(self, index: int, subindex: int = 0) -> bool:
-        """Whether the EDS knows the object."""
+        """Return True if the EDS has the object."""
         return self.dictionary.get_variable(index, subindex) is not None
 
     def write(self, index: int, subindex: int, value: int, *, read_back: tuple[int, int] | None = None) -> None:

@@ -41,7 +41,7 @@ class Nut:
 
 @dataclass(frozen=True)
 class AxisTruth:
-    """What the axis really is. Build it with one_mass, two_mass, seven_dof or serial_chain.
+    """True parameters of the axis. Build it with one_mass, two_mass, seven_dof or serial_chain.
 
     mass_kg: chain from the motor (first) to the table (last), as translation at the table.
     damping_ratio: of every elastic mode of the chain. None: C = a M + b K instead, with

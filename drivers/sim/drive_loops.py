@@ -25,7 +25,7 @@ class DriveLoops:
 
     @property
     def closed(self) -> bool:
-        """Whether there are loops to close."""
+        """True if the drive has loops of its own."""
         return self._servo is not None
 
     def start(self, velocity_rad_s: float) -> None:

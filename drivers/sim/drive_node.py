@@ -104,7 +104,7 @@ class SimulatedDrive(SimulatedDevice):
         self._refresh_drive()
 
     def _refresh_drive(self) -> None:
-        """What follows from state and mode, worked out here and not every cycle."""
+        """Compute the values that depend on state and mode only, once for each change."""
         enabled = self.state is DriveState.OPERATION_ENABLED
         self._direct = enabled and self.values[_MODE] == Mode.CYCLIC_SYNC_TORQUE
         self._idle = not enabled and self.state not in _STOPPING
@@ -274,5 +274,5 @@ class SimulatedDrive(SimulatedDevice):
 
 
 def _wrap(counts: int) -> int:
-    """As an INTEGER32 holds it."""
+    """Wrap a value to INTEGER32."""
     return ((counts + 0x80000000) & 0xFFFFFFFF) - 0x80000000

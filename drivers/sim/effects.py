@@ -176,7 +176,7 @@ class Effect:
 
     @property
     def delays_feedback(self) -> bool:
-        """Whether the motor encoder is late, which a loop on the bus would see as well."""
+        """True if the motor encoder is delayed, which a loop on the bus sees as well."""
         return self.id == "channel_time_skew" and self.form == "motor_position"
 
     @property

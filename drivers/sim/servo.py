@@ -23,7 +23,7 @@ from drivers.port import ServoTarget
 
 
 class VelocityEstimate(StrEnum):
-    """How the velocity loop gets its feedback from the motor encoder."""
+    """Estimate of the velocity from the motor encoder."""
 
     BACKWARD_DIFFERENCE = "backward_difference"
     TWO_SAMPLE_MEAN = "two_sample_mean"

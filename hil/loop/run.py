@@ -32,7 +32,7 @@ VIRTUAL_START = "virtual time"  # where a recording names the start of a run
 
 @dataclass(frozen=True)
 class RunResult:
-    """What came of a run. `recording`: the Parquet file. `jitter` of its ticks, `doubts`: what was overridden."""
+    """Result of a run. recording: the Parquet file; jitter: of its ticks; doubts: refusals that were overridden."""
 
     outcome: Outcome
     recording: Path | None
@@ -42,7 +42,7 @@ class RunResult:
 
     @property
     def complete(self) -> bool:
-        """Whether the profile was run to its end."""
+        """True if the profile was run to its end."""
         return self.outcome.ending is Ending.COMPLETE
 
 

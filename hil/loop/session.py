@@ -44,7 +44,7 @@ _SETPOINTS = {DriveMode.CST: Setpoint.TORQUE, DriveMode.CSV: Setpoint.VELOCITY, 
 
 
 class Phase(IntEnum):
-    """What the loop is doing."""
+    """Phase of the loop."""
 
     RUN = 0
     STOP = 1
@@ -53,7 +53,7 @@ class Phase(IntEnum):
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a run ended: why, in words, and how late its ticks were [s]."""
+    """Ending of a run, its reason in words, number of rows, and lateness of its ticks [s]."""
 
     ending: Ending
     reason: str
@@ -120,7 +120,7 @@ class Session:
 
     def run(self) -> Outcome:
         """Arm, run, stop, disarm. Raises HilError when the drive cannot be armed or a device fails in the loop;
-        whatever is raised, the drive is told to stop first."""
+        the drive is commanded to stop before any exception leaves."""
         try:
             self._clock.start()
             self._master.start(0.0)
@@ -250,7 +250,7 @@ class Session:
         return stop_from(position, velocity, acceleration, self._limits, self._period_s)
 
     def _position_m(self, sample: DriveSample, seen: EncoderSample) -> float:
-        """Of the axis, as the position loop sees it."""
+        """Return the position of the axis from the encoder of the position loop."""
         return seen.position_m if self._from_table else self._ratio * sample.motor_position_rad
 
     def _disarm(self) -> None:

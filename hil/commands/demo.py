@@ -30,9 +30,9 @@ def demo(
     """Conceal an effect in the simulated axis, move it over CANopen, compare it with its twin, and find the effect."""
     import secrets
 
-    from hil import demo as concealed
     from hil.files.output import default_folder, new_folder
     from hil.loop.simulated_bench import load_simulated
+    from hil.proof.draw import demo as concealed
 
     folder = folder or default_folder("demo")
     seed = secrets.randbelow(10_000) if seed is None else seed

@@ -1,1 +1,1 @@
-"""What every compiled kernel needs: rounding without fused products, and a folder for the cache."""
+"""Support of compiled kernels: rounding without fused products, cache folder, digest of their sources."""

@@ -1,10 +1,8 @@
-"""Where numba keeps compiled kernels when it finds no place of its own.
+"""Cache folder of compiled kernels where numba finds no writable one.
 
-It tries the folder NUMBA_CACHE_DIR, then `__pycache__` beside the source, then the user's cache folder, and fails
+Numba tries the folder NUMBA_CACHE_DIR, then `__pycache__` beside the source, then the user's cache folder, and fails
 with all of them read-only, as in a container or a shared installation.
 """
-
-from __future__ import annotations
 
 import os
 import stat
@@ -27,7 +25,7 @@ def provide_kernel_cache() -> None:
         return
     try:
         folder = Path(tempfile.gettempdir()) / f"hil-kernels-{os.getuid()}"
-        if not _writable(folder) or not _private(folder):  # kernels are code: nobody else may place them
+        if not _writable(folder) or not _private(folder):  # kernels are code: other users must not write there
             folder = Path(tempfile.mkdtemp(prefix="hil-kernels-"))
     except OSError:
         raise HilError(
@@ -47,6 +45,6 @@ def _writable(folder: Path) -> bool:
 
 
 def _private(folder: Path) -> bool:
-    """Whether it is this user's own folder, no link, and closed to others."""
+    """Check that a folder is this user's own, no link, and closed to others."""
     found = folder.lstat()
     return stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid() and not found.st_mode & 0o077

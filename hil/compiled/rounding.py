@@ -1,10 +1,8 @@
-"""Round where the program says so: keeps the compiler from fusing a product into a sum.
+"""Rounding of products, which keeps the compiler from fusing them into sums.
 
-LLVM turns a*b + c into one fused multiply-add where it sees fit, and that depends on the code around it: the same
-function inlined in two places gives results that differ in the last bit. The control law must not.
+LLVM turns a*b + c into one fused multiply-add depending on the code around it: the same function inlined in two places
+gives results that differ in the last bit. The control law must give the same bits everywhere.
 """
-
-from __future__ import annotations
 
 from typing import Any
 
@@ -14,7 +12,7 @@ from numba.extending import intrinsic, overload
 
 
 def rounded(product: float) -> float:
-    """The product itself, rounded to float64 before anything else is done with it."""
+    """Round a product to float64 before its next use."""
     return product
 
 

@@ -1,1 +1,1 @@
-"""The control law."""
+"""Control law."""

@@ -10,8 +10,6 @@ loop, the simulation and the replay of a recording call this one function, so th
 the same bits.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 
@@ -44,7 +42,7 @@ class Gains(NamedTuple):
 
 
 class State(NamedTuple):
-    """What the controller remembers from tick to tick."""
+    """State of the controller between ticks."""
 
     tick: int
     velocity_reference_m_s: float
@@ -55,7 +53,7 @@ class State(NamedTuple):
 
 
 class Inputs(NamedTuple):
-    """What the controller reads at a tick."""
+    """Inputs of the controller at a tick."""
 
     position_command_m: float
     velocity_command_m_s: float
@@ -64,7 +62,7 @@ class Inputs(NamedTuple):
 
 
 class Outputs(NamedTuple):
-    """What it commands: torque (CST) and, for drives that close the velocity loop (CSV), the velocity."""
+    """Commands: torque (CST), and velocity for drives that close the velocity loop (CSV)."""
 
     torque_n_m: float
     velocity_reference_m_s: float
@@ -84,7 +82,7 @@ def make_gains(
     two_sample_mean: bool = False,
     velocity_filter_time_constant_s: float = 0.0,
 ) -> Gains:
-    """Gains of the law above from SI values.
+    """Build the gains of the law above from SI values.
 
     Raises ValueError where the position period is no whole multiple of the velocity period.
     """
@@ -117,8 +115,7 @@ def init(
     period_s: float = 0.001,
     tick: int = 0,
 ) -> State:
-    """State of a controller that takes over an axis moving at `motor_velocity_rad_s` with its
-    integrator at `torque_n_m`: the motor does not jump."""
+    """Start a controller without a jump: motor at `motor_velocity_rad_s`, integrator at `torque_n_m`."""
     step_rad = motor_velocity_rad_s * period_s
     return State(
         tick,
@@ -132,7 +129,7 @@ def init(
 
 @njit(cache=True, nogil=True, fastmath=False)
 def step(gains: Gains, state: State, inputs: Inputs) -> tuple[State, Outputs]:
-    """One tick of the control law at the top of this module; pure."""
+    """Compute one tick of the control law at the top of this module; pure."""
     reference = state.velocity_reference_m_s
     if state.tick % gains.position_ticks == 0:
         if gains.position_from_table:
@@ -171,7 +168,7 @@ def replay(
     motor_position_rad: FloatArray,
     table_position_m: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """Torque and velocity reference (n,) of the controller fed with measured positions (n,)."""
+    """Compute torque and velocity reference (n,) of the controller from measured positions (n,)."""
     n = motor_position_rad.size
     torque = np.empty(n)
     reference = np.empty(n)

@@ -49,7 +49,7 @@ class BlockDeviation:
 
 def compare_blocks(hypothesis: Hypothesis, data: Dataset) -> tuple[BlockDeviation, ...]:
     """The blocks that the first run of a data set distinguishes."""
-    run, left, scale = data.runs[0], hypothesis.residuals(data).channels[0], data.scales()[0]
+    run, left, scale = data.runs[0], hypothesis.residuals(data).channels[0], data.noise[0]
     bench = hypothesis.resolved.bench
     name, unit = ("force", "N") if bench.axis.linear else ("torque", "N m")
     if not np.any(left["command"]):

@@ -191,6 +191,7 @@ def compare(
     datum = datum_m(measured.response, response, ratio, measured.judged)
     # the encoder that the position loop goes by has that of the set-points
     of_table, of_motor = (0.0, -datum) if bench.gains.position_from_table else (datum, 0.0)
+    progress("block by block", None)
     blocks = compare_blocks(hypothesis, data)
     table = measured.table_m.size > 0
     positions = (

@@ -38,7 +38,7 @@ class Residuals:
 
     def over_noise(self, run: int) -> dict[str, FloatArray]:
         """Residuals (n,) of all rows of a run in units of noise."""
-        scale = self.data.scales()[run]
+        scale = self.data.noise[run]
         return {name: values / scale[name] for name, values in self.channels[run].items()}
 
     @cached_property

@@ -3,6 +3,7 @@
 `run_paper` computes and writes numbers and pictures; `hil.report.paper_report` writes the page.
 """
 
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -22,7 +23,7 @@ SCHEMA_VERSION = 1
 
 @dataclass(frozen=True)
 class Picture:
-    """A picture: the figure of the source it stands for, its file beside paper.json, its caption."""
+    """Picture: figure of the source, file beside paper.json, caption."""
 
     figure: str
     file: str
@@ -31,8 +32,11 @@ class Picture:
 
 @dataclass(frozen=True)
 class PaperResult:
-    """The reproduction as written to `folder`. `modal_matrix` (7, 7) stands for Eq. 21, whose entries are
-    lost: mass-normalised columns [1/sqrt(kg m^2)], rows named by `coordinates`."""
+    """Reproduction as written to `folder`.
+
+    `modal_matrix` (7, 7) replaces Eq. 21, whose entries are lost: mass-normalised columns [1/sqrt(kg m^2)], rows named
+    by `coordinates`.
+    """
 
     folder: Path
     rows: tuple[Row, ...]
@@ -64,7 +68,7 @@ def run_paper(out: Path) -> PaperResult:
     result = PaperResult(
         folder=out,
         rows=tables.rows(),
-        pictures=tuple(_save(out, *picture) for picture in _pictures()),
+        pictures=tuple(_pictures(out)),
         assumptions=source.ASSUMPTIONS,
         coordinates=chain.names,
         frequencies_hz=tables.frequencies_hz("7-dof"),
@@ -74,49 +78,35 @@ def run_paper(out: Path) -> PaperResult:
     return result
 
 
-def _save(out: Path, figure: str, file: str, caption: str, drawing: Figure) -> Picture:
-    drawing.savefig(out / file, dpi=110)
-    return Picture(figure, file, caption)
+def _pictures(out: Path) -> Iterator[Picture]:
+    """Draw the figures of the source and save them to `out`."""
 
+    def save(figure: str, file: str, drawing: Figure, caption: str) -> Picture:
+        drawing.savefig(out / file, dpi=110)
+        return Picture(figure, file, caption)
 
-def _pictures() -> list[tuple[str, str, str, Figure]]:
     two, seven = source.chains().values()
-    pictures = [
-        (
-            "Fig. 6",
-            "modes.png",
-            "First three modes of the 7-dof model: the second mainly axial, between nut and "
-            "table; the third mainly torsional, in the screw.",
-            figures.mode_shapes(),
-        ),
-    ]
+    yield save(
+        "Fig. 6",
+        "modes.png",
+        figures.mode_shapes(),
+        "First three modes of the 7-dof model: the second mainly axial, between nut and table; the third mainly "
+        "torsional, in the screw.",
+    )
     for figure, feed in (("Fig. 7", 7.0), ("Fig. 8", 22.0)):
-        run = source.simulate(seven, feed)
         caption = (
             f"7-dof model against the command at {feed:g} m/min; the source's measurement is not printed as "
             "numbers. The ripple of 250 and 500 Hz in torque and jerk is the 4 ms stair of the position loop."
         )
-        pictures.append((figure, f"move_{feed:.0f}_m_min.png", caption, figures.move_over_time([("7-dof", run)])))
-    pictures += [
-        ("Fig. 9a", "bode_tf1.png", "Primary transfer function, motor angle over torque.", figures.bode_transfer(1)),
-        ("Fig. 9b", "bode_tf2.png", "Secondary transfer function, table over motor.", figures.bode_transfer(2)),
-        (
-            "Fig. 9c",
-            "bode_closed_loop.png",
-            "Position loop, command to table, without and with feed-forward.",
-            figures.bode_closed_loop(),
-        ),
-        (
-            "Fig. 10",
-            "move_30_m_min.png",
-            "2-dof against 7-dof model at 30 m/min.",
-            figures.move_over_time([("7-dof", source.simulate(seven, 30.0)), ("2-dof", source.simulate(two, 30.0))]),
-        ),
-        (
-            "Sec. 3.3.3",
-            "nut_travel.png",
-            "What the position of the nut changes: the source suspects it of the delays it cannot explain.",
-            figures.nut_travel(),
-        ),
-    ]
-    return pictures
+        drawing = figures.move_over_time([("7-dof", source.simulate(seven, feed))])
+        yield save(figure, f"move_{feed:.0f}_m_min.png", drawing, caption)
+    caption = "Primary transfer function, motor angle over torque."
+    yield save("Fig. 9a", "bode_tf1.png", figures.bode_transfer(1), caption)
+    yield save("Fig. 9b", "bode_tf2.png", figures.bode_transfer(2), "Secondary transfer function, table over motor.")
+    caption = "Position loop, command to table, without and with feed-forward."
+    yield save("Fig. 9c", "bode_closed_loop.png", figures.bode_closed_loop(), caption)
+    runs = [(name, source.simulate(chain, 30.0)) for name, chain in (("7-dof", seven), ("2-dof", two))]
+    caption = "2-dof against 7-dof model at 30 m/min."
+    yield save("Fig. 10", "move_30_m_min.png", figures.move_over_time(runs), caption)
+    caption = "Screw stiffness and frequencies over the nut's travel, which the source suspects of unexplained delays."
+    yield save("Sec. 3.3.3", "nut_travel.png", figures.nut_travel(), caption)

@@ -23,7 +23,7 @@ _MODEL_STYLE = {"2-dof": {"color": TWO, "linestyle": "--"}, "7-dof": {"color": S
 
 
 def mode_shapes() -> Figure:
-    """The first three modes of the 7-dof model (Fig. 6), each to its largest component."""
+    """Draw the first three modes of the 7-dof model (Fig. 6), each to its largest component."""
     chain = source.chains()["7-dof"]
     modes = modal(chain)
     figure = Figure(figsize=(9.0, 7.0), layout="constrained")
@@ -46,7 +46,7 @@ def mode_shapes() -> Figure:
 
 
 def bode_transfer(number: int) -> Figure:
-    """Bode diagram of TF1 or TF2 for the 2- and the 7-dof model (Fig. 9 a, b)."""
+    """Draw the Bode diagram of TF1 or TF2 for the 2- and the 7-dof model (Fig. 9 a, b)."""
     frequency_hz = np.geomspace(1.0, 10_000.0, 6000)
     figure, magnitude, phase = _bode_axes()
     for name, chain in source.chains().items():
@@ -64,7 +64,7 @@ def bode_transfer(number: int) -> Figure:
 
 
 def bode_closed_loop() -> Figure:
-    """Position command to table, without and with feed-forward, for both models (Fig. 9 c)."""
+    """Draw position command to table, without and with feed-forward, for both models (Fig. 9 c)."""
     frequency_hz = np.geomspace(0.1, 1000.0, 6000)
     figure, magnitude, phase = _bode_axes()
     for name, chain in source.chains().items():
@@ -108,7 +108,7 @@ def _bode(
 
 
 def move_over_time(runs: Sequence[tuple[str, source.SimulatedMove]]) -> Figure:
-    """Position, following error, velocity, acceleration, jerk and torque of one move (Fig. 7, 8, 10)."""
+    """Draw position, following error, velocity, acceleration, jerk and torque of one move (Fig. 7, 8, 10)."""
     figure = Figure(figsize=(9.0, 12.0), layout="constrained")
     axes = figure.subplots(6, 1, sharex=True)
     first = runs[0][1]
@@ -149,7 +149,7 @@ def _kinematics(motion: Motion | Trajectory) -> tuple[FloatArray, FloatArray, Fl
 
 
 def nut_travel() -> Figure:
-    """Stiffness of the screw (Eq. 18 and G J / L) and frequencies of the 7-dof model over the nut's travel."""
+    """Draw stiffness of the screw (Eq. 18 and G J / L) and frequencies of the 7-dof model over the nut's travel."""
     nut_m = np.linspace(0.0, 0.4, 81)
     p = RECONSTRUCTED_TABLE_1
     hz = np.array([modal(seven_dof(p, source.DAMPING_RATIO, x)).frequency_rad_s / (2.0 * pi) for x in nut_m])

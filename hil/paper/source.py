@@ -40,7 +40,7 @@ ASSUMPTIONS = (
 
 
 def chains() -> dict[str, Chain]:
-    """The two models of the source by name: "2-dof" with its printed values, "7-dof" reconstructed."""
+    """Build the two models of the source by name: "2-dof" with its printed values, "7-dof" reconstructed."""
     return {
         "2-dof": two_mass(MOTOR_MASS_KG, TABLE_MASS_KG, STIFFNESS_N_M, DAMPING_RATIO, LEAD_M),
         "7-dof": seven_dof(RECONSTRUCTED_TABLE_1, DAMPING_RATIO),
@@ -48,7 +48,7 @@ def chains() -> dict[str, Chain]:
 
 
 def gains(velocity_feedforward: float, position_from_table: bool = False) -> Gains:
-    """The cascade of Table 2."""
+    """Build the cascade of Table 2."""
     return make_gains(
         position_gain_1_s=POSITION_GAIN_1_S,
         velocity_gain_n_m_s_rad=VELOCITY_GAIN_N_M_S_RAD,
@@ -61,7 +61,7 @@ def gains(velocity_feedforward: float, position_from_table: bool = False) -> Gai
 
 @dataclass(frozen=True)
 class SimulatedMove:
-    """One simulated move: set-points and response (n,) at the control period."""
+    """Simulated move: set-points and response (n,) at the control period."""
 
     feed_m_min: float
     command: Trajectory
@@ -83,7 +83,7 @@ class SimulatedMove:
 
 
 def simulate(chain: Chain, feed_m_min: float, velocity_feedforward: float = 1.0) -> SimulatedMove:
-    """A 100 mm move of an axis with friction by Eq. 24, from rest, in closed loop."""
+    """Simulate a 100 mm move of an axis with friction by Eq. 24, from rest, in closed loop."""
     law = gains(velocity_feedforward)
     profile = Profile.model_validate(
         {

@@ -1,25 +1,23 @@
-"""The twin of an axis in the time domain: its physics, its active mechanisms, its simulation.
+"""Twin of an axis in the time domain: physics, active mechanisms, simulation.
 
 The same packed arrays and kernel serve offline simulation in closed loop and the live twin in the control loop.
 """
 
-from __future__ import annotations
-
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hil.arrays import FloatArray
 from hil.control import cascade
-from hil.twin.library import BY_ID, SLOTS
-from hil.twin.mechanism import WIDTH, Stage
+from hil.twin.mechanism import Stage, Variant
 from hil.twin.physics import Active, Physics
 from hil.twin.stepping import loops
-from hil.twin.stepping.packing import Arrays, Steps, pack_constants, pack_mechanisms, pack_modes
+from hil.twin.stepping.records import Arrays, Axis, pack, start_memory
 from hil.twin.stepping.static_equilibrium import settle
 from hil.twin.structure.chain import Chain
 from hil.twin.structure.modal import Modal, modal, truncate
@@ -36,7 +34,7 @@ _ANSWER = "torque"  # the recorded channel that is an answer of the axis only, a
 
 
 class Response(NamedTuple):
-    """What the twin answers with, each (n,): SI values in the units of the axis."""
+    """Channels of the twin, each (n,): SI values in the units of the axis."""
 
     motor_position: FloatArray
     table_position_m: FloatArray
@@ -45,7 +43,7 @@ class Response(NamedTuple):
 
 
 class Start(NamedTuple):
-    """Where a simulation starts: table position, velocity, and the torque of the integrator."""
+    """Start of a simulation: table position, velocity, torque of the integrator, control tick."""
 
     position_m: float = 0.0
     velocity_m_s: float = 0.0
@@ -58,7 +56,7 @@ _AT_REST = Start()
 
 @dataclass(frozen=True)
 class Twin:
-    """An axis with its control law and its active mechanisms.
+    """Axis with its control law and its active mechanisms.
 
     `modes` keeps only the lowest modes of the chain (None: all). `fine_step_s` and `coarse_step_s` are the longest
     internal steps, of which a whole number makes a control tick; equal values give a fixed step.
@@ -74,12 +72,11 @@ class Twin:
 
     @cached_property
     def chain(self) -> Chain:
-        """The chain of the axis, with those mechanisms that change it."""
+        """Chain of the axis, with the mechanisms that change it."""
         chain = self.physics.chain
         for active in self.active:
-            variant = BY_ID[active.effect].variants[active.variant]
-            if variant.stage is Stage.CHAIN:
-                chain = variant.contribution(chain, active.values, active.variant)
+            if active.form.stage is Stage.CHAIN:
+                chain = active.form.contribution(chain, active.values)
         return chain
 
     @cached_property
@@ -90,33 +87,27 @@ class Twin:
 
     @cached_property
     def _arrays(self) -> Arrays:
-        steps = Steps(
-            *(
-                max(math.ceil(self.gains.period_s / longest_s - 1e-6), 1)
-                for longest_s in (self.coarse_step_s, self.fine_step_s)
-            )
+        coarse, fine = (
+            max(math.ceil(self.gains.period_s / longest_s - 1e-6), 1)
+            for longest_s in (self.coarse_step_s, self.fine_step_s)
         )
-        modes = pack_modes(self.physics.chain, self.chain, self.modal, self.gains.period_s, steps)
-        constants = pack_constants(self.physics, self.active, self.gains, self.observer_s, modes, steps)
-        return constants, modes, *pack_mechanisms(self.active, coupled=self.chain.damping_n_m_s_rad is not None)
+        return pack(self.physics, self.chain, self.modal, self.gains, self.active, (coarse, fine), self.observer_s)
 
     @cached_property
     def loop_gains(self) -> cascade.Gains:
-        """The gains, with the velocity filter of an active mechanism."""
+        """Gains, with the velocity filter of an active mechanism."""
         gains = self.gains
         for active in self.active:
-            if BY_ID[active.effect].variants[active.variant].stage is Stage.VELOCITY_FILTER:
+            if active.form.stage is Stage.VELOCITY_FILTER:
                 gains = gains._replace(filter_coefficient=1.0 - math.exp(-gains.period_s / max(active.values[0], 1e-9)))
         return gains
 
-    def state(self, start: Start = _AT_REST) -> tuple[FloatArray, FloatArray]:
+    def state(self, start: Start = _AT_REST) -> tuple[FloatArray, NDArray[np.void]]:
         """Modal state (2, modes) and memory of an axis that moves as one body at `start`, at rest under its loads."""
         modes, ratio = self.modal, self.gains.ratio_m_rad
         delta = np.zeros((2, modes.frequency_rad_s.size))
-        rigid = modes.shape[modes.motor, 0]
-        delta[0, 0] = start.position_m / ratio / rigid
-        delta[1, 0] = start.velocity_m_s / ratio / rigid
-        memory = np.zeros((len(SLOTS) + 1, WIDTH))
+        delta[:, 0] = np.array(start[:2]) / ratio / modes.shape[modes.motor, 0]
+        memory = start_memory()
         settle(*self.arrays(), delta, memory)
         return delta, memory
 
@@ -132,30 +123,21 @@ class Twin:
         measured_table_m: FloatArray = _NOTHING,
         misread: FloatArray = _RIGHT,
     ) -> Response:
-        """The axis in closed loop over set-points (n,), one per control tick, from `start`.
+        """Simulate the axis in closed loop over set-points (n,), one per control tick, from `start`.
 
         `measured_table_m` (n,) holds a table that floats in a gap, see `hil.twin.stepping.loops`. `misread` (2, n):
-        what the motor encoder [motor units] and the table encoder [m] tell the controller too much.
+        error of the motor encoder [motor units] and of the table encoder [m] that the controller sees.
         """
-        delta, memory = self.state(start)
+        setpoints = loops.Setpoints(position_command_m, velocity_command_m_s)
         channels = loops.closed_loop(
-            self.loop_gains,
-            self._controller(start),
-            position_command_m,
-            velocity_command_m_s,
-            misread,
-            measured_table_m,
-            *self.arrays(),
-            delta,
-            memory,
+            self.loop_gains, self._controller(start), setpoints, misread, measured_table_m, self._axis(start)
         )
-        return self._channels(Response(*channels))
+        return self._recorded(Response(*channels))
 
     def drive(self, torque_command: FloatArray, start: Start = _AT_REST) -> Response:
-        """The axis without its controller under a given torque command (n,), from `start`."""
-        delta, memory = self.state(start)
-        motor, table, torque = loops.open_loop(torque_command, *self.arrays(), delta, memory)
-        return self._channels(Response(motor, table, torque_command, torque))
+        """Simulate the axis without its controller under a given torque command (n,), from `start`."""
+        motor, table, torque = loops.open_loop(torque_command, self._axis(start))
+        return self._recorded(Response(motor, table, torque_command, torque))
 
     def observe(
         self,
@@ -164,42 +146,28 @@ class Twin:
         measured: Response,
         start: Start = _AT_REST,
     ) -> Response:
-        """The axis block by block, each fed with measured inputs; see `hil.twin.stepping.loops`.
+        """Simulate the axis block by block, each on measured inputs; see `hil.twin.stepping.loops`.
 
         `measured.table_position_m` is empty without a linear encoder. Recorded lateness of a channel must
         have been undone, see `undelayed`.
         """
-        delta, memory = self.state(start)
+        setpoints = loops.Setpoints(position_command_m, velocity_command_m_s)
         channels = loops.observe(
-            self.loop_gains,
-            self._controller(start),
-            position_command_m,
-            velocity_command_m_s,
-            measured.torque_command,
-            measured.motor_position,
-            measured.table_position_m,
-            *self.arrays(),
-            delta,
-            memory,
+            self.loop_gains, self._controller(start), setpoints, Response(*measured), self._axis(start)
         )
-        response = Response(*channels)
-        for active in self.active:  # lateness of an input is taken back, that of the answer is simulated
-            variant = BY_ID[active.effect].variants[active.variant]
-            if variant.stage is Stage.CHANNEL and variant.name == _ANSWER:
-                response = Response(
-                    *variant.contribution(tuple(response), active.values, active.variant, self.gains.period_s)
-                )
-        return response
+        # lateness of an input is taken back, that of the answer is simulated
+        return self._recorded(Response(*channels), lambda variant: variant.name == _ANSWER)
 
     def undelayed(self, measured: Response) -> Response:
-        """Measured inputs with the lateness that active mechanisms give them taken back."""
-        for active in self.active:
-            variant = BY_ID[active.effect].variants[active.variant]
-            present = not variant.needs_table or measured.table_position_m.size
-            if variant.stage is Stage.CHANNEL and variant.name != _ANSWER and present:
-                back = tuple(-value for value in active.values)
-                measured = Response(*variant.contribution(tuple(measured), back, active.variant, self.gains.period_s))
-        return measured
+        """Undo the lateness that active mechanisms give to measured inputs."""
+
+        def present(variant: Variant) -> bool:
+            return variant.name != _ANSWER and bool(not variant.needs_table or measured.table_position_m.size)
+
+        return self._recorded(measured, present, -1.0)
+
+    def _axis(self, start: Start) -> Axis:
+        return Axis(*self.arrays(), *self.state(start))
 
     def _controller(self, start: Start) -> cascade.State:
         ratio = self.gains.ratio_m_rad
@@ -207,11 +175,12 @@ class Twin:
             start.position_m / ratio, start.velocity_m_s / ratio, start.torque, self.gains.period_s, start.tick
         )
 
-    def _channels(self, response: Response) -> Response:
+    def _recorded(
+        self, response: Response, which: Callable[[Variant], bool] = lambda _: True, times: float = 1.0
+    ) -> Response:
+        """Apply active mechanisms of the recording to the channels, with their parameters multiplied."""
         for active in self.active:
-            variant = BY_ID[active.effect].variants[active.variant]
-            if variant.stage is Stage.CHANNEL:
-                response = Response(
-                    *variant.contribution(tuple(response), active.values, active.variant, self.gains.period_s)
-                )
+            if active.form.stage is Stage.CHANNEL and which(active.form):
+                values = tuple(times * value for value in active.values)
+                response = Response(*active.form.contribution(tuple(response), values, self.gains.period_s))
         return response

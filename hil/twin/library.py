@@ -1,9 +1,7 @@
-"""The library of mechanisms: one import and one line of the list each.
+"""Library of mechanisms: one import and one line of the list each.
 
 The order of the list is the order in which the contributions of one stage are composed.
 """
-
-from __future__ import annotations
 
 import inspect
 import sys

@@ -1,18 +1,14 @@
-"""What a mechanism is: a piece of physics the nominal twin leaves out, and where it enters the twin.
+"""Definition of a mechanism: a piece of physics that the nominal twin leaves out, and its stage in the twin.
 
-Each file of `hil.twin.mechanisms` describes one. Its contribution is a small compiled function of
-one signature, whatever the stage:
+Each file of `hil.twin.mechanisms` describes one. Its contribution is a small compiled function of one signature:
 
     contribution(value, at, parameters, memory) -> value
 
-`value` is what the stage hands on (see `Stage`), `at` is the moment (see `Moment`), `parameters` the
-mechanism's own values in the order it declares them, `memory` its own WIDTH numbers of state. Units
-are those of the motor side: rad and N m, or m and N on a linear axis.
+with the value of the stage (see `Stage`), the moment (see `Moment`), the parameters of the mechanism in their declared
+order, and its own WIDTH numbers of state. Units are those of the motor side: rad and N m, or m and N on a linear axis.
 """
 
-from __future__ import annotations
-
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, MutableSequence, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from itertools import product
@@ -20,8 +16,9 @@ from typing import Any, NamedTuple
 
 from hil.twin.scene import AxisFacts, Scene
 
-PARAMETERS = 8  # the most parameters a mechanism may have; the last place tells its variant
+PARAMETERS = 8  # the most parameters a mechanism may have
 WIDTH = 16  # numbers of state a mechanism may keep
+Row = MutableSequence[float]  # (PARAMETERS,) or (WIDTH,), a row of an array
 
 
 class Block(StrEnum):
@@ -36,7 +33,7 @@ class Block(StrEnum):
 
 
 class Stage(StrEnum):
-    """Where a contribution enters the twin, and what its value is there."""
+    """Stage of the twin at which a contribution enters, and its value there."""
 
     CURRENT = "current"  # torque command -> torque of the current, as measured
     TORQUE = "torque"  # that torque -> torque on the motor shaft
@@ -51,15 +48,15 @@ class Stage(StrEnum):
     # nominal spring would need for the same torque
     SCREW = "screw"  # x factor on the stiffness of the screw between its bearing and the nut
     TABLE_FORCE = "table_force"  # + force on the table [N]
-    MOTOR_READING = "motor_reading"  # motor position -> what its encoder reads
-    TABLE_READING = "table_reading"  # table position -> what its encoder reads
+    MOTOR_READING = "motor_reading"  # motor position -> reading of its encoder
+    TABLE_READING = "table_reading"  # table position -> reading of its encoder
     VELOCITY_FILTER = "velocity_filter"  # time constant of the controller's velocity filter [s]
     CHAIN = "chain"  # changes the chain itself, before its modes are taken
     CHANNEL = "channel"  # changes recorded channels after the simulation
 
 
 class Moment(NamedTuple):
-    """What a contribution may look at: the present state of the axis."""
+    """Present state of the axis, as a contribution sees it."""
 
     time_s: float
     within_s: float  # since the last control tick; 0 at the first internal step of a tick
@@ -73,7 +70,7 @@ class Moment(NamedTuple):
 
 
 class Dimension(StrEnum):
-    """What a parameter measures; decides its unit on rotary and on linear axes."""
+    """Dimension of a parameter; gives its unit on rotary and on linear axes."""
 
     TORQUE = "N m"
     MOTOR_SPEED = "rad/s"
@@ -91,7 +88,7 @@ class Dimension(StrEnum):
     COUNT = "1/rev"
 
     def unit(self, linear: bool) -> str:
-        """The SI unit on a rotary or on a linear axis."""
+        """SI unit on a rotary or on a linear axis."""
         return _LINEAR_UNITS.get(self, self.value) if linear else self.value
 
 
@@ -139,7 +136,7 @@ Points = Sequence[tuple[float, ...]]
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter of a mechanism: name with unit, dimension, physical bounds, default (None: required) and role."""
+    """Parameter of a mechanism: name with unit, dimension, physical bounds, default (None: required) and role."""
 
     name: str
     dimension: Dimension
@@ -151,11 +148,10 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Variant:
-    """One form of a mechanism, searched separately.
+    """Form of a mechanism, searched separately.
 
     `contribution` is compiled (`numba.njit`) for stages in the stepping kernel; for Stage.CHAIN it is
-    `(chain, parameters, variant) -> chain`, for Stage.CHANNEL `(channels, parameters, variant, period_s) -> channels`,
-    both plain Python.
+    `(chain, parameters) -> chain`, for Stage.CHANNEL `(channels, parameters, period_s) -> channels`, both plain Python.
     """
 
     stage: Stage
@@ -172,7 +168,7 @@ class Variant:
 
 @dataclass(frozen=True)
 class Mechanism:
-    """One piece of physics, and all that the search, the screen, the report and the scoring know of it.
+    """Description of one mechanism for twin, search, report and scoring.
 
     Required are physics, text and bounds. All other fields have defaults: `starts` and `typical` follow from the
     dimensions and roles of the parameters.
@@ -181,7 +177,7 @@ class Mechanism:
     id: str
     block: Block
     element: str  # the part of the axis an engineer would point at
-    sentence: str  # what an engineer would say; may name parameters and viscous_speed in braces
+    sentence: str  # finding in an engineer's words; may name parameters and viscous_speed in braces
     equation: str
     source: str
     parameters: tuple[Parameter, ...]
@@ -259,8 +255,10 @@ def _start_values(parameter: Parameter, scene: Scene) -> list[float]:
     }
     if parameter.role in by_role:
         return by_role[parameter.role]
-    torque, speed, length = 0.05 * scene.coulomb, 0.1 * scene.peak_speed, scene.stretch
-    return [_by_dimension(parameter, torque, speed, length, scene.ratio, scene.travel_m, 0.02 * scene.duration_s)]
+    scales = _Scales(
+        0.05 * scene.coulomb, 0.1 * scene.peak_speed, scene.stretch, scene.ratio, scene.travel_m, scene.duration_s
+    )
+    return [scales.of(parameter.dimension)]
 
 
 def _typical_value(parameter: Parameter, axis: AxisFacts) -> float:
@@ -268,29 +266,35 @@ def _typical_value(parameter: Parameter, axis: AxisFacts) -> float:
     by_role = {Role.PHASE: 0.0, Role.ORDER: 6.0, Role.PERIOD: 0.1, Role.EDGE: 0.5 * axis.duration_s}
     if parameter.role in by_role:
         return by_role[parameter.role]
-    return _by_dimension(
-        parameter, 0.2 * axis.friction, 0.1 / axis.ratio, 3e-6, axis.ratio, 0.1, 0.02 * axis.duration_s
-    )
+    scales = _Scales(0.2 * axis.friction, 0.1 / axis.ratio, 3e-6, axis.ratio, 0.1, axis.duration_s)
+    return scales.of(parameter.dimension)
 
 
-def _by_dimension(
-    parameter: Parameter, torque: float, speed: float, length_m: float, ratio_m: float, travel_m: float, time_s: float
-) -> float:
-    """Scale of a parameter from a torque, a speed, a small length, the travel and a time; motor units."""
-    scales = {
-        Dimension.TORQUE: torque,
-        Dimension.MOTOR_SPEED: speed,
-        Dimension.MOTOR_STIFFNESS: torque * ratio_m / length_m,
-        Dimension.MOTOR_DRAG: torque / speed**2,
-        Dimension.INVERSE_TORQUE_SQUARED: 1e-4 / torque**2,
-        Dimension.ANGLE: 1e-4,
-        Dimension.LENGTH: length_m,
-        Dimension.TIME: time_s,
-        Dimension.FORCE: torque / ratio_m,
-        Dimension.STIFFNESS: torque / ratio_m / travel_m,
-        Dimension.FREQUENCY: 40.0,
-        Dimension.RATIO: 0.05,
-        Dimension.PER_LENGTH: 0.1 / travel_m,
-        Dimension.COUNT: 6.0,
-    }
-    return scales[parameter.dimension]
+class _Scales(NamedTuple):
+    """Scales of an axis, in motor units, from which defaults of all dimensions follow."""
+
+    torque: float
+    speed: float
+    length_m: float
+    ratio_m: float
+    travel_m: float
+    duration_s: float
+
+    def of(self, dimension: Dimension) -> float:
+        """Scale of a dimension."""
+        return {
+            Dimension.TORQUE: self.torque,
+            Dimension.MOTOR_SPEED: self.speed,
+            Dimension.MOTOR_STIFFNESS: self.torque * self.ratio_m / self.length_m,
+            Dimension.MOTOR_DRAG: self.torque / self.speed**2,
+            Dimension.INVERSE_TORQUE_SQUARED: 1e-4 / self.torque**2,
+            Dimension.ANGLE: 1e-4,
+            Dimension.LENGTH: self.length_m,
+            Dimension.TIME: 0.02 * self.duration_s,
+            Dimension.FORCE: self.torque / self.ratio_m,
+            Dimension.STIFFNESS: self.torque / self.ratio_m / self.travel_m,
+            Dimension.FREQUENCY: 40.0,
+            Dimension.RATIO: 0.05,
+            Dimension.PER_LENGTH: 0.1 / self.travel_m,
+            Dimension.COUNT: 6.0,
+        }[dimension]

@@ -1,24 +1,29 @@
-"""What a twin is made of: the nominal physics of an axis, and the mechanisms that are on."""
-
-from __future__ import annotations
+"""Nominal physics of an axis, and the mechanisms that are on."""
 
 from dataclasses import dataclass
 
+from hil.twin.library import BY_ID
+from hil.twin.mechanism import Variant
 from hil.twin.structure.chain import Chain
 
 
 @dataclass(frozen=True)
 class Active:
-    """A mechanism that is on: its id, its parameters in the library's order, its variant."""
+    """Active mechanism: its id, its parameters in the library's order, its variant."""
 
     effect: str
     values: tuple[float, ...]
     variant: int = 0
 
+    @property
+    def form(self) -> Variant:
+        """Its entry in the library."""
+        return BY_ID[self.effect].variants[self.variant]
+
 
 @dataclass(frozen=True)
 class Physics:
-    """What the nominal twin knows of an axis, in motor units (rad, N m; on a linear axis m, N)."""
+    """Nominal parameters of an axis, in motor units (rad, N m; on a linear axis m, N)."""
 
     chain: Chain
     coulomb_n_m: float

@@ -226,4 +226,4 @@ def test_a_loop_elsewhere_is_not_blamed_on_the_axis(run: Recording) -> None:
     gains = bench.control.model_copy(update={"position_gain_1_s": 1.5 * bench.control.position_gain_1_s})
     result = compare(run, bench.model_copy(update={"control": gains}))
     assert not result.explained
-    assert verdict(result).startswith("The control loop is not as the twin has it")
+    assert verdict(result).startswith("The control loop of the twin differs from the real one")

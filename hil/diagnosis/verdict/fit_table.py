@@ -98,7 +98,7 @@ class _ChannelTable:
         """
         run = data.runs[index]
         if self.mode is Mode.BLOCKS:
-            return rms(data.scales()[index][self.channel][run.judged])
+            return rms(data.noise[index][self.channel][run.judged])
         return math.hypot(sensor_noise(run)[self.channel], self.noise[run][self.channel])
 
 

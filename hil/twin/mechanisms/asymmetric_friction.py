@@ -1,25 +1,27 @@
-"""Asymmetric friction: friction differs by direction, alike at every speed or the more the faster."""
+"""Asymmetric friction: friction differs by direction, by a constant torque or in proportion to speed."""
 
-from collections.abc import MutableSequence, Sequence
+from collections.abc import Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import PARAMETERS, Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Stage, Variant
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Row, Stage, Variant
 from hil.twin.scene import AxisFacts
 
 
 @njit
-def _offset(value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]) -> float:
-    offset, variant = parameters[0], parameters[PARAMETERS - 1]
-    if variant == 0.0:
-        return value + offset
+def _offset(value: float, at: Moment, parameters: Row, memory: Row) -> float:
+    return value + parameters[0]
+
+
+@njit
+def _offset_with_speed(value: float, at: Moment, parameters: Row, memory: Row) -> float:
     if at.viscous_speed <= 0.0:
         return value
-    return value + offset * abs(at.velocity) / at.viscous_speed
+    return value + parameters[0] * abs(at.velocity) / at.viscous_speed
 
 
 def _valid(values: Sequence[float], variant: int, axis: AxisFacts) -> bool:
-    """Check that an offset alike at every speed is below Coulomb friction: above, it would drive the axis."""
+    """Check that a constant offset is below Coulomb friction: above, it would drive the axis."""
     return variant != 0 or abs(values[0]) <= axis.coulomb
 
 
@@ -36,7 +38,7 @@ MECHANISM = Mechanism(
         Variant(Stage.BIAS, _offset),
         Variant(
             Stage.DRAG,
-            _offset,
+            _offset_with_speed,
             "with speed",
             sentence=(
                 "Friction differs by direction, the more the faster: at {viscous_speed}, where viscous friction "

@@ -1,17 +1,15 @@
 """Backlash: lost motion between screw and table.
 
-Oiled flanks are held by their damping when they part, dry flanks only push.
+Damping resists the parting of oiled flanks; dry flanks only push.
 """
-
-from collections.abc import MutableSequence, Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Stage, Variant
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Row, Stage, Variant
 
 
 @njit
-def _free_play(value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]) -> float:
+def _free_play(value: float, at: Moment, parameters: Row, memory: Row) -> float:
     half = 0.5 * parameters[0] / at.ratio_m
     if value > half:
         return value - half

@@ -10,21 +10,24 @@ from hil.twin.mechanism import Block, Dimension, Mechanism, Parameter, Role, Sta
 
 Channels = tuple[FloatArray, ...]  # motor position, table position, torque command, torque
 
-_VARIANTS = {"table_position": 1, "torque": 3, "motor_position": 0}  # name: index in Channels
+
+def _late_motor(channels: Channels, parameters: Sequence[float], period_s: float) -> Channels:
+    motor, table, command, torque = channels
+    return _delayed(motor, parameters[0] / period_s), table, command, torque
 
 
-def _skewed(channels: Channels, parameters: Sequence[float], variant: int, period_s: float) -> Channels:
-    """The channels, each (n,), with that of the variant late by the delay; its ends are held."""
-    name, late = list(_VARIANTS.items())[variant]
-    delayed = _delayed_mean if name == "torque" else _delayed
-    return tuple(
-        delayed(channel, parameters[0] / period_s) if index == late else channel
-        for index, channel in enumerate(channels)
-    )
+def _late_table(channels: Channels, parameters: Sequence[float], period_s: float) -> Channels:
+    motor, table, command, torque = channels
+    return motor, _delayed(table, parameters[0] / period_s), command, torque
+
+
+def _late_torque(channels: Channels, parameters: Sequence[float], period_s: float) -> Channels:
+    motor, table, command, torque = channels
+    return motor, table, command, _delayed_mean(torque, parameters[0] / period_s)
 
 
 def _delayed_mean(means: FloatArray, periods: float) -> FloatArray:
-    """Means over each period (n,) of what is held over it, later by a number of periods."""
+    """Delay means over each period (n,) of a held quantity by a number of periods; the ends are held."""
     whole = math.floor(periods)
     f, last = periods - whole, means.size - 1
     nearest = np.arange(means.size) - whole
@@ -34,7 +37,7 @@ def _delayed_mean(means: FloatArray, periods: float) -> FloatArray:
 
 
 def _delayed(samples: FloatArray, periods: float) -> FloatArray:
-    """Samples (n,) later by a number of periods: cubic convolution, continuous in delay and slope."""
+    """Delay samples (n,) by a number of periods: cubic convolution, continuous in delay and slope."""
     whole = math.floor(periods)
     f = periods - whole
     # weights of the samples 1 after to 2 before the whole delay (Keys, a = -1/2)
@@ -61,9 +64,9 @@ MECHANISM = Mechanism(
     source="Keys, IEEE Trans. Acoustics, Speech, and Signal Processing 29 (1981) 1153, cubic convolution",
     parameters=(Parameter("delay_s", Dimension.TIME, -0.01, 0.01, role=Role.STRENGTH),),
     variants=(
-        Variant(Stage.CHANNEL, _skewed, "table_position", needs_table=True),
-        Variant(Stage.CHANNEL, _skewed, "torque"),
-        Variant(Stage.CHANNEL, _skewed, "motor_position"),
+        Variant(Stage.CHANNEL, _late_table, "table_position", needs_table=True),
+        Variant(Stage.CHANNEL, _late_torque, "torque"),
+        Variant(Stage.CHANNEL, _late_motor, "motor_position"),
     ),
     starts=lambda s: [(2e-4,)],
     typical=lambda a: (2e-4,),

@@ -1,15 +1,14 @@
-"""Cogging torque: the magnets pull towards the teeth, whatever the current."""
+"""Cogging torque: the magnets pull towards the teeth, independent of the current."""
 
 import math
-from collections.abc import MutableSequence, Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Stage, Variant
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Row, Stage, Variant
 
 
 @njit
-def _cogging(value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]) -> float:
+def _cogging(value: float, at: Moment, parameters: Row, memory: Row) -> float:
     return value + parameters[0] * math.sin(parameters[1] * at.angle_rad + parameters[2])
 
 

@@ -1,17 +1,15 @@
-"""Constant load: a weight, which the motor has to hold.
+"""Constant load, such as a weight that the motor has to hold.
 
 A positive load pulls the axis in the negative direction: it takes a positive motor torque to hold it.
 """
 
-from collections.abc import MutableSequence, Sequence
-
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Stage, Variant
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Row, Stage, Variant
 
 
 @njit
-def _load(value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]) -> float:
+def _load(value: float, at: Moment, parameters: Row, memory: Row) -> float:
     return value - parameters[0]
 
 

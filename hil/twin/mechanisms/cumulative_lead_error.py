@@ -1,14 +1,12 @@
 """Cumulative lead error: an error of the lead that grows along the travel."""
 
-from collections.abc import MutableSequence, Sequence
-
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Stage, Variant
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Row, Stage, Variant
 
 
 @njit
-def _longer_lead(value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]) -> float:
+def _longer_lead(value: float, at: Moment, parameters: Row, memory: Row) -> float:
     # the motor position is the table's, but for deflections of the order of the error
     return value + parameters[0] * at.table_position_m / at.ratio_m
 

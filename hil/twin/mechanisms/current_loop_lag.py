@@ -1,16 +1,15 @@
 """Current loop lag: the current follows its command late."""
 
 import math
-from collections.abc import MutableSequence, Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Stage, Variant
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Row, Stage, Variant
 
 
 @njit
-def _lagging_current(value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]) -> float:
-    # memory: the torque at the end of the last step, and whether there was one
+def _lagging_current(value: float, at: Moment, parameters: Row, memory: Row) -> float:
+    # memory: torque at the end of the last step; 1 after the first step
     if memory[1] == 0.0:
         memory[0] = value
         memory[1] = 1.0
@@ -19,7 +18,7 @@ def _lagging_current(value: float, at: Moment, parameters: Sequence[float], memo
     if time_constant_s <= 0.0:
         memory[0] = value
         return value
-    # exact for a command held over the step; what acts is the mean over the step
+    # exact for a command held over the step; the mean over the step acts
     gone = -math.expm1(-at.step_s / time_constant_s)
     memory[0] = value + behind * (1.0 - gone)
     return value + behind * gone * time_constant_s / at.step_s

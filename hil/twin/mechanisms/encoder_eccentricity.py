@@ -1,18 +1,17 @@
 """Encoder eccentricity: the motor encoder errs once per revolution.
 
-On a linear axis, which has its motor encoder read as metres, the amplitude is in metres too.
+On a linear axis, whose motor encoder reads metres, the amplitude is in metres too.
 """
 
 import math
-from collections.abc import MutableSequence, Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Stage, Variant
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Row, Stage, Variant
 
 
 @njit
-def _eccentric_reading(value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]) -> float:
+def _eccentric_reading(value: float, at: Moment, parameters: Row, memory: Row) -> float:
     return value + parameters[0] * math.sin(at.angle_rad + parameters[1])
 
 

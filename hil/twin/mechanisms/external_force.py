@@ -1,14 +1,12 @@
 """External force: something pushes the table during a window of time."""
 
-from collections.abc import MutableSequence, Sequence
-
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Role, Stage, Variant
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Role, Row, Stage, Variant
 
 
 @njit
-def _push(value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]) -> float:
+def _push(value: float, at: Moment, parameters: Row, memory: Row) -> float:
     force_n, start_s, end_s = parameters[0], parameters[1], parameters[2]
     if at.step_s <= 0.0:
         return value + force_n if start_s <= at.time_s < end_s else value

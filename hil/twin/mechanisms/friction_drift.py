@@ -1,15 +1,14 @@
 """Friction drift: friction changes as the axis warms up."""
 
 import math
-from collections.abc import MutableSequence, Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Role, Stage, Variant
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Role, Row, Stage, Variant
 
 
 @njit
-def _warming(value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]) -> float:
+def _warming(value: float, at: Moment, parameters: Row, memory: Row) -> float:
     fraction, time_constant_s = parameters[0], parameters[1]
     if time_constant_s <= 0.0:
         return value * (1.0 + fraction)

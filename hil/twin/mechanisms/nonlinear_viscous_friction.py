@@ -1,26 +1,25 @@
 """Nonlinear viscous friction: drag beyond linear in speed.
 
-It departs with the square of the speed or, as in grease and oils that thin when they are sheared, with its root.
+The deviation grows with the square of the speed or, for grease and oils that thin in shear, with its root.
 """
 
 import math
-from collections.abc import MutableSequence, Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import PARAMETERS, Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Stage, Variant
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Row, Stage, Variant
 
 
 @njit
-def _drag(value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]) -> float:
-    quadratic, variant = parameters[0], parameters[PARAMETERS - 1]
-    speed = abs(at.velocity)
-    if variant == 0.0:
-        drag = quadratic * speed * speed
-    elif at.viscous_speed > 0.0:
-        drag = max(quadratic, 0.0) * at.viscous_speed**2 * math.sqrt(speed / at.viscous_speed)
-    else:
-        drag = 0.0
+def _quadratic_drag(value: float, at: Moment, parameters: Row, memory: Row) -> float:
+    return value + parameters[0] * at.velocity * abs(at.velocity)
+
+
+@njit
+def _thinning_drag(value: float, at: Moment, parameters: Row, memory: Row) -> float:
+    if at.viscous_speed <= 0.0:
+        return value
+    drag = max(parameters[0], 0.0) * at.viscous_speed**2 * math.sqrt(abs(at.velocity) / at.viscous_speed)
     return value + drag if at.velocity > 0.0 else value - drag
 
 
@@ -35,10 +34,10 @@ MECHANISM = Mechanism(
     "Casson, in Mill (ed.), Rheology of Disperse Systems (1959) 84",
     parameters=(Parameter("quadratic_n_m_s2_rad2", Dimension.MOTOR_DRAG, -1e5, 1e5, role=Role.STRENGTH),),
     variants=(
-        Variant(Stage.DRAG, _drag, form_of="stribeck_friction"),
+        Variant(Stage.DRAG, _quadratic_drag, form_of="stribeck_friction"),
         Variant(
             Stage.DRAG,
-            _drag,
+            _thinning_drag,
             "thinning lubricant",
             sentence=(
                 "Drag rises steeply from rest and then ever less, with the root of the speed: at {viscous_speed} "

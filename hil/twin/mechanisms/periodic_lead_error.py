@@ -1,18 +1,17 @@
 """Periodic lead error: the table runs ahead and behind with the angle of the screw.
 
-A ground screw hardly ever errs by a pure sine: three harmonics are one cause.
+The error of a ground screw is rarely a pure sine: three harmonics count as one cause.
 """
 
 import math
-from collections.abc import MutableSequence, Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Stage, Variant
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Row, Stage, Variant
 
 
 @njit
-def _wobble(value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]) -> float:
+def _wobble(value: float, at: Moment, parameters: Row, memory: Row) -> float:
     error = 0.0
     for harmonic in range(3):
         amplitude_m, phase = parameters[2 * harmonic], parameters[2 * harmonic + 1]

@@ -1,15 +1,14 @@
 """Position-dependent friction: friction varies along the travel."""
 
 import math
-from collections.abc import MutableSequence, Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Stage, Variant
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Row, Stage, Variant
 
 
 @njit
-def _level_along_travel(value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]) -> float:
+def _level_along_travel(value: float, at: Moment, parameters: Row, memory: Row) -> float:
     fraction, period_m, phase_rad = parameters[0], parameters[1], parameters[2]
     if period_m <= 0.0:
         return value

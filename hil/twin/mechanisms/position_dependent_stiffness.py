@@ -1,16 +1,12 @@
 """Position-dependent stiffness: the screw is stiffer or softer with the position of its nut."""
 
-from collections.abc import MutableSequence, Sequence
-
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Role, Stage, Variant
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Role, Row, Stage, Variant
 
 
 @njit
-def _stiffness_along_travel(
-    value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]
-) -> float:
+def _stiffness_along_travel(value: float, at: Moment, parameters: Row, memory: Row) -> float:
     return value * max(1.0 + parameters[0] * at.table_position_m, 0.0)
 
 

@@ -1,14 +1,12 @@
 """Preload loss: the transmission is soft around zero load."""
 
-from collections.abc import MutableSequence, Sequence
-
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Stage, Variant
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Row, Stage, Variant
 
 
 @njit
-def _soft_zone(value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]) -> float:
+def _soft_zone(value: float, at: Moment, parameters: Row, memory: Row) -> float:
     half, ratio = 0.5 * parameters[0] / at.ratio_m, parameters[1]
     if value > half:
         return value - (1.0 - ratio) * half

@@ -1,14 +1,12 @@
 """Presliding hysteresis: elastic micro-motion of the contact before it slides."""
 
-from collections.abc import MutableSequence, Sequence
-
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Role, Stage, Variant
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Role, Row, Stage, Variant
 
 
 @njit
-def _contact_stiffness(value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]) -> float:
+def _contact_stiffness(value: float, at: Moment, parameters: Row, memory: Row) -> float:
     return value + parameters[0]
 
 

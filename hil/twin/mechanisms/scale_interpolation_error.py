@@ -1,18 +1,16 @@
 """Interpolation error of the scale: the linear encoder errs within its signal period."""
 
 import math
-from collections.abc import MutableSequence, Sequence
+from collections.abc import Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Stage, Variant
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Row, Stage, Variant
 from hil.twin.scene import AxisFacts, Scene
 
 
 @njit
-def _interpolated_reading(
-    value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]
-) -> float:
+def _interpolated_reading(value: float, at: Moment, parameters: Row, memory: Row) -> float:
     amplitude_m, period_m, phase_rad = parameters[0], parameters[1], parameters[2]
     if period_m <= 0.0:
         return value

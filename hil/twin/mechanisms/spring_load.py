@@ -1,15 +1,15 @@
 """Spring load: a force on the table proportional to its position."""
 
-from collections.abc import MutableSequence, Sequence
+from collections.abc import Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Stage, Variant
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Row, Stage, Variant
 from hil.twin.scene import AxisFacts, Scene
 
 
 @njit
-def _pull_to_rest(value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]) -> float:
+def _pull_to_rest(value: float, at: Moment, parameters: Row, memory: Row) -> float:
     return value - parameters[0] * (at.table_position_m - parameters[1])
 
 
@@ -18,7 +18,7 @@ _NEAR = 0.9  # of the reach: a rest position beyond is a constant load
 
 
 def _starts(s: Scene) -> list[tuple[float, ...]]:
-    """At rest where the axis starts, or so far away that the force hardly changes over a short motion."""
+    """Rest positions at the start of the axis, and 20 travels away, where the force is nearly constant."""
     return [(0.02 * s.coulomb / s.ratio / s.travel_m, f * s.travel_m) for f in (0.0, -20.0, 20.0)]
 
 

@@ -1,31 +1,38 @@
 """Stribeck friction: friction falls with speed from its static value.
 
-How it falls differs from contact to contact: the variants are the laws in use.
+The law differs between contacts: the variants are those in use.
 """
 
 import math
-from collections.abc import MutableSequence, Sequence
+from collections.abc import Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import PARAMETERS, Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Stage, Variant
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Row, Stage, Variant
 from hil.twin.scene import AxisFacts
 
 
 @njit
-def _stribeck_level(value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]) -> float:
-    static, stribeck_velocity = parameters[0], parameters[1]
-    if stribeck_velocity <= 0.0:
+def _gaussian(value: float, at: Moment, parameters: Row, memory: Row) -> float:
+    if parameters[1] <= 0.0:
         return value
-    u = abs(at.velocity) / stribeck_velocity
-    variant = parameters[PARAMETERS - 1]
-    if variant == 1.0:
-        share = math.exp(-u)
-    elif variant == 2.0:
-        share = 1.0 / (1.0 + u * u)
-    else:
-        share = math.exp(-u * u)
-    return value + (static - value) * share
+    u = at.velocity / parameters[1]
+    return value + (parameters[0] - value) * math.exp(-u * u)
+
+
+@njit
+def _exponential(value: float, at: Moment, parameters: Row, memory: Row) -> float:
+    if parameters[1] <= 0.0:
+        return value
+    return value + (parameters[0] - value) * math.exp(-abs(at.velocity) / parameters[1])
+
+
+@njit
+def _lorentzian(value: float, at: Moment, parameters: Row, memory: Row) -> float:
+    if parameters[1] <= 0.0:
+        return value
+    u = at.velocity / parameters[1]
+    return value + (parameters[0] - value) / (1.0 + u * u)
 
 
 def _valid(values: Sequence[float], variant: int, axis: AxisFacts) -> bool:
@@ -46,9 +53,9 @@ MECHANISM = Mechanism(
         Parameter("stribeck_velocity_rad_s", Dimension.MOTOR_SPEED, 1e-5, 1e3),
     ),
     variants=(
-        Variant(Stage.COULOMB, _stribeck_level, "Gaussian"),
-        Variant(Stage.COULOMB, _stribeck_level, "exponential"),
-        Variant(Stage.COULOMB, _stribeck_level, "Lorentzian"),
+        Variant(Stage.COULOMB, _gaussian, "Gaussian"),
+        Variant(Stage.COULOMB, _exponential, "exponential"),
+        Variant(Stage.COULOMB, _lorentzian, "Lorentzian"),
     ),
     starts=lambda s: [(1.3 * s.coulomb, f * s.peak_speed) for f in (0.003, 0.01, 0.04)],
     typical=lambda a: (1.5 * a.friction, 2e-3 / a.ratio),

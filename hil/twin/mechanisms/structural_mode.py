@@ -1,7 +1,7 @@
-"""Structural mode: a flexible mode that the chain has not, such as machine base, column or screw torsion."""
+"""Structural mode: a flexible mode that is not in the chain, such as machine base, column or screw torsion."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -16,31 +16,43 @@ from hil.twin.structure.modal import modal
 _MOST = 0.99  # a modal damping ratio stays below 1
 
 
-def _with_structure(chain: Chain, parameters: Sequence[float], variant: int = 0) -> Chain:
-    """The chain with one more mass on a spring; a mass ratio of 0 leaves it as it is."""
-    frequency_hz, damping_ratio, mass_ratio = parameters[:3]
+def _with_mass_on_table(chain: Chain, parameters: Sequence[float]) -> Chain:
+    """Add a mass that sways on the table."""
+    return _with_structure(chain, parameters, _on_the_table)
+
+
+def _with_yielding_base(chain: Chain, parameters: Sequence[float]) -> Chain:
+    """Add a machine base that yields."""
+    return _with_structure(chain, parameters, _under_the_axis)
+
+
+def _with_structure(
+    chain: Chain, parameters: Sequence[float], added: Callable[[Chain, float, float], tuple[Chain, FloatArray]]
+) -> Chain:
+    """Add one more mass on a spring; a mass ratio of 0 leaves the chain unchanged."""
+    frequency_hz, damping_ratio, mass_ratio = parameters
     if mass_ratio <= 0.0:
         return chain
     omega = 2.0 * math.pi * frequency_hz
-    extended, spring = (_on_the_table, _under_the_axis)[variant](chain, omega**2, mass_ratio)
+    extended, spring = added(chain, omega**2, mass_ratio)
     stiffness = extended.stiffness_n_m_rad[-1, -1]
     modes = modal(extended)
     elastic = np.where(modes.frequency_rad_s > 0.0, modes.frequency_rad_s, np.inf)
 
     def shared(damping: FloatArray) -> FloatArray:
-        # each mode is damped by what its shape takes of the dampers (modal strain energy, Johnson and Kienholz 1982)
+        # damping of each mode by its share in the dampers (modal strain energy, Johnson and Kienholz 1982)
         taken = np.einsum("im,ij,jm->m", modes.shape, damping, modes.shape)
         return np.asarray(np.maximum(taken, 0.0) / (2.0 * elastic))
 
     damping = np.pad(modal_damping(chain, modal(chain)), (0, 1))
     damping += 2.0 * damping_ratio / omega * stiffness * np.outer(spring, spring)
-    # dampers that no longer let a mode swing are weakened until they do
+    # keep all modes below critical damping
     damping *= min(_MOST / max(float(shared(damping).max()), _MOST), 1.0)
     return replace(extended, damping_ratio=shared(damping), damping_n_m_s_rad=damping)
 
 
 def _on_the_table(chain: Chain, square: float, mass_ratio: float) -> tuple[Chain, FloatArray]:
-    """A mass that sways on the table."""
+    """Extend the chain by a mass on a spring on the table."""
     n, table = len(chain.names), chain.table
     inertia = mass_ratio * chain.inertia_kg_m2[table, table]
     extended = _longer(chain)
@@ -52,8 +64,8 @@ def _on_the_table(chain: Chain, square: float, mass_ratio: float) -> tuple[Chain
 
 
 def _under_the_axis(chain: Chain, square: float, mass_ratio: float) -> tuple[Chain, FloatArray]:
-    """A machine base that yields, with the linear encoder on it: all that travels with the nut is seen from it, and
-    has its motion as well."""
+    """Extend the chain by a machine base on a spring, with the linear encoder on it: coordinates that travel with the
+    nut are relative to the base, and move with it as well."""
     n = len(chain.names)
     travelling = chain.inertia_kg_m2 @ (1.0 - chain.side(chain.motor))
     table = chain.inertia_kg_m2[chain.table, chain.table]
@@ -65,7 +77,7 @@ def _under_the_axis(chain: Chain, square: float, mass_ratio: float) -> tuple[Cha
 
 
 def _longer(chain: Chain) -> Chain:
-    """The chain with one more coordinate that nothing holds yet."""
+    """Extend the chain by a free coordinate."""
     return replace(
         chain,
         inertia_kg_m2=np.pad(chain.inertia_kg_m2, (0, 1)),
@@ -100,10 +112,10 @@ MECHANISM = Mechanism(
         Parameter("mass_ratio", Dimension.RATIO, 1e-3, 10.0, role=Role.STRENGTH),
     ),
     variants=(
-        Variant(Stage.CHAIN, _with_structure, "mass on the table"),
+        Variant(Stage.CHAIN, _with_mass_on_table, "mass on the table"),
         Variant(
             Stage.CHAIN,
-            _with_structure,
+            _with_yielding_base,
             "yielding base",
             sentence=(
                 "The machine base yields: it sways with the table at {frequency_hz}, damped by {damping_ratio}; "

@@ -1,14 +1,12 @@
 """Table-side friction: part of the friction acts on the guideway, behind the compliance."""
 
-from collections.abc import MutableSequence, Sequence
-
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Role, Stage, Variant
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Role, Row, Stage, Variant
 
 
 @njit
-def _share_on_table(value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]) -> float:
+def _share_on_table(value: float, at: Moment, parameters: Row, memory: Row) -> float:
     return value + parameters[0]
 
 

@@ -1,15 +1,14 @@
 """Thermal growth: the screw grows while the axis runs."""
 
 import math
-from collections.abc import MutableSequence, Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Role, Stage, Variant
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Role, Row, Stage, Variant
 
 
 @njit
-def _grown_lead(value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]) -> float:
+def _grown_lead(value: float, at: Moment, parameters: Row, memory: Row) -> float:
     growth, time_constant_s = parameters[0], parameters[1]
     if time_constant_s > 0.0:
         growth *= -math.expm1(-at.time_s / time_constant_s)

@@ -1,17 +1,14 @@
 """Saturation of the torque constant: torque per ampere falls with current."""
 
 import math
-from collections.abc import MutableSequence, Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Stage, Variant
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Row, Stage, Variant
 
 
 @njit
-def _saturating_torque_constant(
-    value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]
-) -> float:
+def _saturating_torque_constant(value: float, at: Moment, parameters: Row, memory: Row) -> float:
     falling = parameters[0]
     if falling <= 0.0:
         return value

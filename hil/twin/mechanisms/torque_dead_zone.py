@@ -1,22 +1,21 @@
 """Torque dead zone: the drive answers small commands with no torque."""
 
-from collections.abc import MutableSequence, Sequence
-
 from numba import njit
 
-from hil.twin.mechanism import PARAMETERS, Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Stage, Variant
-
-_GATE = 2.0  # from this variant on, the torque outside the zone is unchanged
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Row, Stage, Variant
 
 
 @njit
-def _dead_zone(value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]) -> float:
+def _dead_zone(value: float, at: Moment, parameters: Row, memory: Row) -> float:
     half_width = parameters[0]
     if abs(value) <= half_width:
         return 0.0
-    if parameters[PARAMETERS - 1] >= _GATE:
-        return value
     return value - half_width if value > 0.0 else value + half_width
+
+
+@njit
+def _gate(value: float, at: Moment, parameters: Row, memory: Row) -> float:
+    return 0.0 if abs(value) <= parameters[0] else value
 
 
 MECHANISM = Mechanism(
@@ -30,8 +29,8 @@ MECHANISM = Mechanism(
     variants=(
         Variant(Stage.CURRENT, _dead_zone, "measured"),
         Variant(Stage.TORQUE, _dead_zone, "hidden"),
-        Variant(Stage.CURRENT, _dead_zone, "measured gate"),
-        Variant(Stage.TORQUE, _dead_zone, "hidden gate"),
+        Variant(Stage.CURRENT, _gate, "measured gate"),
+        Variant(Stage.TORQUE, _gate, "hidden gate"),
     ),
     starts=lambda s: [(f * s.coulomb,) for f in (0.03, 0.15)],
     typical=lambda a: (0.05 * a.friction,),

@@ -1,15 +1,14 @@
 """Torque ripple: the torque constant is periodic in the motor angle."""
 
 import math
-from collections.abc import MutableSequence, Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Stage, Variant
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Row, Stage, Variant
 
 
 @njit
-def _rippling_torque(value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]) -> float:
+def _rippling_torque(value: float, at: Moment, parameters: Row, memory: Row) -> float:
     return value * (1.0 + parameters[0] * math.sin(parameters[1] * at.angle_rad + parameters[2]))
 
 

@@ -1,14 +1,12 @@
 """Torque saturation: the drive gives less than commanded."""
 
-from collections.abc import MutableSequence, Sequence
-
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Stage, Variant
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Row, Stage, Variant
 
 
 @njit
-def _limited_torque(value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]) -> float:
+def _limited_torque(value: float, at: Moment, parameters: Row, memory: Row) -> float:
     return min(max(value, -parameters[0]), parameters[0])
 
 

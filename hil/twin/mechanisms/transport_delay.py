@@ -1,18 +1,17 @@
 """Transport delay: the torque command acts late."""
 
 import math
-from collections.abc import MutableSequence, Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Stage, Variant
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Row, Stage, Variant
 
 _OLDEST = 14  # age in ticks of the oldest command kept: 12 ticks of delay, a fraction, and its step
 _STARTED = 15  # memory[_STARTED] is 0 until the first command has come
 
 
 @njit
-def _delayed_command(value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]) -> float:
+def _delayed_command(value: float, at: Moment, parameters: Row, memory: Row) -> float:
     # memory[j] is the command of j ticks ago; before the first one the command was the same
     if at.within_s == 0.0:
         for age in range(_OLDEST, 0, -1):

@@ -1,14 +1,12 @@
 """Velocity filter lag: the controller filters its velocity feedback."""
 
-from collections.abc import MutableSequence, Sequence
-
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Role, Stage, Variant
+from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Role, Row, Stage, Variant
 
 
 @njit
-def _time_constant(value: float, at: Moment, parameters: Sequence[float], memory: MutableSequence[float]) -> float:
+def _time_constant(value: float, at: Moment, parameters: Row, memory: Row) -> float:
     return value + parameters[0]
 
 

@@ -1,1 +1,1 @@
-"""The compiled simulation of the twin: packed arrays, one step, loops over ticks."""
+"""Compiled simulation of the twin: records, one step, loops over ticks."""

@@ -8,9 +8,7 @@ so that sticking is exact and needs no smoothed sign function (time stepping aft
 Drag may stop a sliding axis, but not turn it round.
 """
 
-from __future__ import annotations
-
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -26,12 +24,22 @@ _SLOPES = np.diff(np.append(1.0 - np.exp(-_CHORDS[:-1]), 1.0)) / np.diff(_CHORDS
 ELEMENTS = _SLOPES.size
 STIFFNESS_SHARES = -np.diff(_SLOPES, append=0.0) / _SLOPES[0]
 YIELD_SHARES = -np.diff(_SLOPES, append=0.0) * _CHORDS[1:]
-_NEWTON, _SOLVED = 20, 1e-9  # steps at most, each some Fc / K nearer, and what may be missed of the velocity
+_NEWTON, _SOLVED = 20, 1e-9  # limit of steps, each some Fc / K nearer; allowed error of the velocity
+
+
+class Resistance(NamedTuple):
+    """Resistance of a contact to sliding, in motor units."""
+
+    bound: float  # Coulomb friction
+    viscous: float
+    shift: float  # of the band of Coulomb friction
+    opposing: float  # drag beyond Coulomb and viscous friction
 
 
 @njit(**COMPILE)
-def rigid(free, gain, bound, viscous, shift, opposing):  # type: ignore[no-untyped-def]
+def rigid(free, gain, resistance):  # type: ignore[no-untyped-def]
     """Friction torque of a rigid contact that meets velocity `free`; see the module's equations."""
+    bound, viscous, shift, opposing = resistance
     stop = free / gain
     if abs(stop - shift) <= bound:
         return stop
@@ -51,12 +59,13 @@ def _late(gain, stiffness, step):  # type: ignore[no-untyped-def]
 
 
 @njit(**COMPILE)
-def elastic(free, gain, bound, viscous, shift, opposing, stiffness, deflection, step, before):  # type: ignore[no-untyped-def]
+def elastic(free, gain, resistance, stiffness, deflection, step, before):  # type: ignore[no-untyped-def]
     """Friction torque over a step and deflection after it of an elastic contact (Dahl 1968), at velocity `before` it.
 
     dF/dx = K (1 - sign(v) F / Fc), solved exactly along the travel x of the step, which goes by the velocity that is
     sought: Newton's method.
     """
+    bound, viscous, shift, opposing = resistance
     pull = stiffness * deflection
     sign = 1.0 if free - gain * (pull + shift) > 0.0 else -1.0
     if sign * (free - gain * (pull + shift + opposing)) <= 0.0:
@@ -82,13 +91,14 @@ def elastic(free, gain, bound, viscous, shift, opposing, stiffness, deflection, 
 
 
 @njit(**COMPILE)
-def slipping(free, gain, bound, viscous, shift, opposing, stiffness, elements, step, before):  # type: ignore[no-untyped-def]
+def slipping(free, gain, resistance, stiffness, elements, step, before):  # type: ignore[no-untyped-def]
     """Friction torque over a step of a contact of Maxwell slip elements, at velocity `before` it; advances their
     torques (ELEMENTS,).
 
     f_i = f_i + k_i x within +-y_i, x the travel of the step: linear in the velocity that is sought piece by piece,
     hence solved by Newton's method in at most one step for each element.
     """
+    bound, viscous, shift, opposing = resistance
     pull = 0.0
     for i in range(ELEMENTS):
         limit = YIELD_SHARES[i] * bound

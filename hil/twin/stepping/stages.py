@@ -1,26 +1,26 @@
 """Compiled chains of the library's contributions, one for each stage of the stepping kernel.
 
-Contributions of a stage are composed in the order of the library, so that adding a mechanism needs no
-change here or in the kernel. A mechanism that is off is one comparison; a stage without any
-active mechanism is not entered at all.
+Contributions of a stage are composed in the order of the library, so that a new mechanism needs no change here or in
+the kernel. A mechanism that is off costs one comparison, and so does a stage without active mechanisms.
 """
 
-from __future__ import annotations
-
-from typing import Any
+from typing import Any, NamedTuple
 
 from numba import njit
 
 from hil.twin.library import SLOTS
 from hil.twin.mechanism import Mechanism, Stage
 
-# fmt: off
-KERNEL_STAGES = (
-    Stage.CURRENT, Stage.TORQUE, Stage.MOTOR_TORQUE, Stage.COULOMB, Stage.FRICTION_SCALE, Stage.DRAG,
-    Stage.BIAS, Stage.BRISTLE, Stage.TABLE_SHARE, Stage.TRANSMISSION, Stage.SCREW, Stage.TABLE_FORCE,
-    Stage.MOTOR_READING, Stage.TABLE_READING,
-)
-# fmt: on
+_OUTSIDE = (Stage.VELOCITY_FILTER, Stage.CHAIN, Stage.CHANNEL)
+KERNEL_STAGES = tuple(stage for stage in Stage if stage not in _OUTSIDE)
+
+
+class Effects(NamedTuple):
+    """The mechanisms as the stages take them: see `hil.twin.stepping.records`."""
+
+    values: Any  # (slots, PARAMETERS)
+    codes: Any  # record
+    memory: Any  # (slots, WIDTH)
 
 
 def stage_of(mechanism: Mechanism, variant: int) -> Stage:
@@ -29,25 +29,25 @@ def stage_of(mechanism: Mechanism, variant: int) -> Stage:
 
 
 def _compose(entries: list[tuple[Any, int, int]]) -> Any:
-    """A compiled `(value, at, values, codes, memory) -> value` that runs the entries in order.
+    """Build a compiled `(value, at, effects) -> value` that runs the entries in order.
 
     An entry is (contribution, slot of the mechanism, bit mask of the variants that enter here).
     """
     if not entries:
 
         @njit
-        def nothing(value: float, at: Any, values: Any, codes: Any, memory: Any) -> Any:
+        def nothing(value: float, at: Any, effects: Any) -> Any:
             return value
 
         return nothing
     (contribution, index, mask), rest = entries[0], _compose(entries[1:])
 
     @njit(inline="always")
-    def chained(value: float, at: Any, values: Any, codes: Any, memory: Any) -> Any:
-        code = codes[index]
+    def chained(value: float, at: Any, effects: Any) -> Any:
+        code = effects.codes.slots[index]
         if code != 0 and (mask >> (code - 1)) & 1:
-            value = contribution(value, at, values[index], memory[index])
-        return rest(value, at, values, codes, memory)
+            value = contribution(value, at, effects.values[index], effects.memory[index])
+        return rest(value, at, effects)
 
     return chained
 
@@ -60,7 +60,15 @@ def _stage(stage: Stage) -> Any:
             if variant.stage is stage:
                 masks[variant.contribution] = masks.get(variant.contribution, 0) | 1 << number
         entries += [(contribution, index, mask) for contribution, mask in masks.items()]
-    return _compose(entries)
+    name, run = stage.value, _compose(entries)
+
+    @njit(inline="always")
+    def entered(value: float, at: Any, effects: Any) -> Any:
+        if effects.codes[name]:
+            value = run(value, at, effects)
+        return value
+
+    return entered
 
 
 current = _stage(Stage.CURRENT)

@@ -1,6 +1,8 @@
-"""Parameters of the 7-dof ball-screw drive: screw stiffness with the nut anywhere, equivalent 2-dof model."""
+"""Ball-screw drive: stiffness of its parts, parameters of the 7-dof model, equivalent 2-dof model.
 
-from __future__ import annotations
+By the theory of elasticity (paper, appendix and Eq. 18):
+    K_torsional = G J / L        K_axial = E A / L
+"""
 
 from dataclasses import dataclass
 from math import pi
@@ -8,7 +10,38 @@ from math import pi
 import numpy as np
 
 from hil.arrays import FloatArray
-from hil.twin.structure import elasticity
+
+STEEL_YOUNG_PA = 2.06e11
+
+
+def torsional_stiffness(rigidity_n_m2: float, length_m: float) -> float:
+    """K = G J / L [N m/rad] of a bar in torsion with rigidity G J."""
+    return rigidity_n_m2 / length_m
+
+
+def axial_stiffness(rigidity_n: float, length_m: float) -> float:
+    """K = E A / L [N/m] of a bar in tension or compression with rigidity E A."""
+    return rigidity_n / length_m
+
+
+def round_area(diameter_m: float) -> float:
+    """A = pi d^2 / 4 [m^2] of a solid round section."""
+    return pi * diameter_m**2 / 4.0
+
+
+def in_series(*stiffnesses: float) -> float:
+    """1 / k = 1 / k_1 + 1 / k_2 + ... : springs that carry the same load, all in one unit."""
+    return 1.0 / sum(1.0 / stiffness for stiffness in stiffnesses)
+
+
+def supported_screw_stiffness(
+    front_bearing_n_m: float, front_screw_n_m: float, back_bearing_n_m: float, back_screw_n_m: float
+) -> float:
+    """Axial stiffness k_a4 [N/m] of a screw held at both ends, seen from the nut (Eq. 18).
+
+    Each bearing is in series with its side of the screw; the two sides act in parallel.
+    """
+    return in_series(front_bearing_n_m, front_screw_n_m) + in_series(back_bearing_n_m, back_screw_n_m)
 
 
 @dataclass(frozen=True)
@@ -56,16 +89,16 @@ class SevenDof:
     def screw_torsion_n_m_rad(self, nut_position_m: float | None = None) -> float:
         """k_t3 = G J / L: only the screw between the front bearing and the nut is twisted (Sec. 3.1)."""
         front, _ = self.screw_lengths_m(nut_position_m)
-        return elasticity.torsional_stiffness(self.screw_torsional_rigidity_n_m2, front)
+        return torsional_stiffness(self.screw_torsional_rigidity_n_m2, front)
 
     def screw_axial_n_m(self, nut_position_m: float | None = None) -> float:
         """k_a4 by Eq. 18: each bearing in series with its side of the screw, the sides in parallel."""
         front, back = self.screw_lengths_m(nut_position_m)
-        return elasticity.supported_screw_stiffness(
+        return supported_screw_stiffness(
             self.front_bearing_stiffness_n_m,
-            elasticity.axial_stiffness(self.screw_axial_rigidity_n, front),
+            axial_stiffness(self.screw_axial_rigidity_n, front),
             self.back_bearing_stiffness_n_m,
-            elasticity.axial_stiffness(self.screw_axial_rigidity_n, back),
+            axial_stiffness(self.screw_axial_rigidity_n, back),
         )
 
     def reduced(self, nut_position_m: float | None = None) -> tuple[FloatArray, FloatArray]:
@@ -96,7 +129,7 @@ class SevenDof:
 
 
 _SPAN_M = 0.42
-_SCREW_AXIAL_RIGIDITY_N = elasticity.STEEL_YOUNG_PA * elasticity.round_area(0.032)
+_SCREW_AXIAL_RIGIDITY_N = STEEL_YOUNG_PA * round_area(0.032)
 
 RECONSTRUCTED_TABLE_1 = SevenDof(
     lead_m=0.010,
@@ -120,7 +153,7 @@ RECONSTRUCTED_TABLE_1 = SevenDof(
     nut_support_stiffness_n_m=6.53e7,
     reference_nut_position_m=0.200,
 )
-"""A RECONSTRUCTION of the paper's Table 1, which is lost: NOT the authors' numbers.
+"""Reconstruction of the paper's Table 1, which is lost: NOT the authors' numbers.
 
 It keeps m1 = 335 kg and m2 = 384 kg of Eq. 22 and k of Eq. 23 and gives the frequencies of Eq. 20 within
 0.25 %. The screw (32 mm steel) and its span are assumed too: the paper says that the nut at 200 mm is the
@@ -145,7 +178,7 @@ class EquivalentTwoMass:
 
 
 def equivalent_two_mass(parameters: SevenDof, nut_position_m: float | None = None) -> EquivalentTwoMass:
-    """The 2-dof model that stands for a 7-dof one (Eq. 22-23); the screw's axial mass m5 is left out."""
+    """Reduce a 7-dof model to a 2-dof one (Eq. 22-23), without the screw's axial mass m5."""
     r2 = (parameters.lead_m / (2.0 * pi)) ** 2
     inertias, stiffnesses = parameters.reduced(nut_position_m)
     torsion, axial = stiffnesses[2], stiffnesses[3]
@@ -153,6 +186,6 @@ def equivalent_two_mass(parameters: SevenDof, nut_position_m: float | None = Non
     return EquivalentTwoMass(
         motor_mass_kg=float(inertias[0] / r2),
         table_mass_kg=float((inertias[5:].sum() + inertias[1:4].sum()) / r2),
-        stiffness_parallel_n_m=float(elasticity.in_series(torsion + axial, *others) / r2),
-        stiffness_series_n_m=float(elasticity.in_series(torsion, axial, *others) / r2),
+        stiffness_parallel_n_m=float(in_series(torsion + axial, *others) / r2),
+        stiffness_series_n_m=float(in_series(torsion, axial, *others) / r2),
     )

@@ -7,8 +7,6 @@ Every coordinate is an angle of the motor shaft or its equivalent, which keeps t
 A linear axis is the same chain with r = 1: its angles are metres and its torques newtons.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import pi
@@ -16,20 +14,8 @@ from math import pi
 import numpy as np
 
 from hil.arrays import FloatArray
-from hil.twin.structure.ballscrew import RECONSTRUCTED_TABLE_1, SevenDof
-from hil.twin.structure.elasticity import in_series
-
-__all__ = [
-    "LINEAR_LEAD_M",
-    "RECONSTRUCTED_TABLE_1",
-    "Chain",
-    "FloatArray",
-    "SevenDof",
-    "one_mass",
-    "serial_chain",
-    "seven_dof",
-    "two_mass",
-]
+from hil.twin.structure.ballscrew import RECONSTRUCTED_TABLE_1 as RECONSTRUCTED_TABLE_1
+from hil.twin.structure.ballscrew import SevenDof, in_series
 
 LINEAR_LEAD_M = 2.0 * pi
 """Lead of an axis without a screw: r = 1, so that motor and table share metres and newtons."""
@@ -37,13 +23,13 @@ LINEAR_LEAD_M = 2.0 * pi
 
 @dataclass(frozen=True)
 class Chain:
-    """A chain of n lumped inertias, free to move as a rigid body.
+    """Chain of n lumped inertias, free to move as a rigid body.
 
     `damping_ratio` holds one modal damping ratio per mode, in ascending frequency, 0 for the rigid
     body. `transmission @ q` is the deflection of the transmission spring, motor side minus table
     side [rad]; zeros where the chain has none. `screw @ q` is the deflection of the screw between its bearing and
     the nut; where that is no spring of its own, it is the transmission's. `damping_n_m_s_rad` (n, n) is [C] where
-    the damping is not modal: the modes then share it, and `damping_ratio` is what each has of its own.
+    the damping is not modal: the modes then share it, and `damping_ratio` is the own one of each.
     """
 
     inertia_kg_m2: FloatArray
@@ -70,31 +56,17 @@ class Chain:
 
 
 def one_mass(mass_kg: float, lead_m: float = LINEAR_LEAD_M) -> Chain:
-    """A rigid axis: motor and table are one mass [kg], seen at the table."""
-    r = lead_m / (2.0 * pi)
-    zero = np.zeros(1)
-    return Chain(np.array([[mass_kg * r**2]]), np.zeros((1, 1)), lead_m, zero, ("axis",), 0, 0, zero, 0.0, zero, 0.0)
+    """Build a rigid axis: motor and table are one mass [kg], seen at the table."""
+    return serial_chain([mass_kg * (lead_m / (2.0 * pi)) ** 2], [], 0.0, lead_m, names=("axis",))
 
 
 def two_mass(
     motor_mass_kg: float, table_mass_kg: float, stiffness_n_m: float, damping_ratio: float, lead_m: float
 ) -> Chain:
-    """The 2-dof model of Eq. 1: motor and table mass [kg] and a spring [N/m], all seen at the table."""
+    """Build the 2-dof model of Eq. 1: motor and table mass [kg] and a spring [N/m], all seen at the table."""
     r2 = (lead_m / (2.0 * pi)) ** 2
-    k = stiffness_n_m * r2
-    return Chain(
-        inertia_kg_m2=np.array([[motor_mass_kg * r2, 0.0], [0.0, table_mass_kg * r2]]),
-        stiffness_n_m_rad=np.array([[k, -k], [-k, k]]),
-        lead_m=lead_m,
-        damping_ratio=np.array([0.0, damping_ratio]),
-        names=("motor", "table"),
-        motor=0,
-        table=1,
-        transmission=np.array([1.0, -1.0]),
-        transmission_stiffness_n_m_rad=k,
-        screw=np.array([1.0, -1.0]),
-        screw_stiffness_n_m_rad=k,
-    )
+    masses = (motor_mass_kg * r2, table_mass_kg * r2)
+    return serial_chain(masses, [stiffness_n_m * r2], damping_ratio, lead_m, names=("motor", "table"))
 
 
 def serial_chain(
@@ -106,7 +78,7 @@ def serial_chain(
     names: Sequence[str] = (),
     transmission: int = -1,
 ) -> Chain:
-    """n inertias in a row with n - 1 springs between them, all reduced to the motor shaft (Eq. 13).
+    """Build n inertias in a row with n - 1 springs between them, all reduced to the motor shaft (Eq. 13).
 
     The first inertia carries the motor encoder, the last the linear encoder. `damping_ratio` is one
     number for all n - 1 elastic modes or one for each. `transmission` is the index of the spring that
@@ -148,7 +120,7 @@ def _elastic_damping(damping_ratio: float | Sequence[float], n: int) -> FloatArr
 
 
 def seven_dof(parameters: SevenDof, damping_ratio: float, nut_position_m: float | None = None) -> Chain:
-    """The 7-dof chain of Fig. 4 and Eq. 14 with the nut anywhere between the bearings.
+    """Build the 7-dof chain of Fig. 4 and Eq. 14 with the nut anywhere between the bearings.
 
     Potential energy, with axial stiffnesses reduced by Eq. 13 (theta5 is the axial motion of the screw):
         k_t1 (t1 - t2)^2 + k_t2 (t2 - t3)^2 + k_t3 (t3 - t4)^2 + k_t4 t5^2

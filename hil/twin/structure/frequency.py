@@ -2,11 +2,9 @@
 
     TF1 = theta_motor / tau        TF2 = theta_table / theta_motor           (Eq. 16-17)
 
-In natural coordinates by inverting ([J] s^2 + [C] s + [K]) or by the recursion of the appendix, in
-modal coordinates as a sum over the modes; all at s = 2 pi i f. Responses are complex (k,) arrays.
+In natural coordinates by inverting ([J] s^2 + [C] s + [K]), in modal coordinates as a sum over the modes; all at
+s = 2 pi i f. Responses are complex (k,) arrays.
 """
-
-from __future__ import annotations
 
 from math import pi
 
@@ -55,34 +53,6 @@ def modal_damping(chain: Chain, modal: Modal) -> FloatArray:
     """[C] = [J] phi diag(2 xi w) phi^T [J]: the matrix (n, n) with the modal damping of Eq. 7."""
     basis = chain.inertia_kg_m2 @ modal.shape
     return (basis * (2.0 * modal.damping_ratio * modal.frequency_rad_s)) @ basis.T
-
-
-def recursive_transfer(
-    inertia_kg_m2: FloatArray,
-    stiffness_n_m_rad: FloatArray,
-    damping_n_m_s_rad: FloatArray,
-    frequency_hz: FloatArray,
-) -> tuple[ComplexArray, ComplexArray]:
-    """TF1 and TF2 of the 7-dof drive by the recursion of the appendix, from table to motor.
-
-    Takes J_1..J_7, k_t1..k_t6 (`SevenDof.reduced`) and the dampers c_t1..c_t6 beside the springs. Two
-    formulas are corrected: TF_3-4 has (c_t3 + c_t5) s, where c_t5 s is printed, and TF_4-5 a minus sign,
-    since the nut spring acts on theta4 + theta5 - theta6. TF_4-5 and TF_5-6 are printed in terms of
-    each other; here the pair is solved for TF_4-5.
-    """
-    s = laplace(frequency_hz)
-    j1, j2, j3, j4, j5, j6, j7 = (j * s**2 for j in inertia_kg_m2)
-    z1, z2, z3, z4, z5, z6 = (c * s + k for c, k in zip(damping_n_m_s_rad, stiffness_n_m_rad, strict=True))
-    tf67 = z6 / (j7 + z6)
-    nut = z5 / (j6 + z5 + z6 - z6 * tf67)  # theta6 / (theta4 + theta5)
-    free = (j6 + j7 * tf67) / (j6 + z5 + z6 - z6 * tf67)  # 1 - nut, without cancellation
-    tf45 = -z5 * free / (j5 + z4 + z5 * free)
-    tf56 = nut * (1.0 / tf45 + 1.0)
-    tf34 = z3 / (j4 + z3 + z5 + z5 * tf45 * (1.0 - tf56))
-    tf23 = z2 / (j3 + z2 + z3 - z3 * tf34)
-    tf12 = z1 / (j2 + z1 + z2 - z2 * tf23)
-    tf1 = 1.0 / (j1 + z1 - z1 * tf12)
-    return tf1, tf12 * tf23 * tf34 * tf45 * tf56 * tf67
 
 
 def closed_loop(modal: Modal, gains: Gains, frequency_hz: FloatArray) -> ComplexArray:

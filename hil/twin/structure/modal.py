@@ -7,8 +7,6 @@ Eq. 6 prints {f} = [phi]{g}; with mass-normalised modes the modal force is g = p
 the damping on the position; it acts on the velocity.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -34,7 +32,6 @@ class Modal:
     damping_ratio: FloatArray
     motor: int
     table: int
-    lead_m: float
     transmission: FloatArray
     screw: FloatArray
 
@@ -51,7 +48,7 @@ class Discrete(NamedTuple):
 
 
 def modal(chain: Chain) -> Modal:
-    """Modes of a chain by the symmetric eigenproblem L^-1 K L^-T with J = L L^T.
+    """Compute the modes of a chain by the symmetric eigenproblem L^-1 K L^-T with J = L L^T.
 
     The rigid body has frequency exactly 0. Raises numpy.linalg.LinAlgError where the inertia is not
     positive definite.
@@ -67,14 +64,13 @@ def modal(chain: Chain) -> Modal:
         damping_ratio=chain.damping_ratio,
         motor=chain.motor,
         table=chain.table,
-        lead_m=chain.lead_m,
         transmission=chain.transmission @ shape,
         screw=chain.screw @ shape,
     )
 
 
 def truncate(modal: Modal, modes: int) -> Modal:
-    """The lowest `modes` modes. Raises ValueError where there are not as many."""
+    """Keep the lowest `modes` modes. Raises ValueError where there are not as many."""
     available = modal.frequency_rad_s.size
     if not 1 <= modes <= available:
         raise ValueError(f"modes must lie between 1 and {available}, got {modes}")
@@ -89,7 +85,7 @@ def truncate(modal: Modal, modes: int) -> Modal:
 
 
 def discretise(modal: Modal, period_s: float) -> Discrete:
-    """Exact discretisation of every mode under a modal force held for `period_s` (zero-order hold).
+    """Discretise every mode exactly under a modal force held for `period_s` (zero-order hold).
 
     With s = xi w, w_d = w sqrt(1 - xi^2), e = exp(-s T):
         a11 = e (cos w_d T + s/w_d sin w_d T)     a12 = e sin(w_d T) / w_d

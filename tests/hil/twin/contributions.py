@@ -26,11 +26,10 @@ moments = st.builds(
 )
 
 
-def row(parameters, variant=0):
-    """The row of parameters that the kernel hands to a contribution: its own, zeros, then the variant."""
+def row(parameters):
+    """The row of parameters that the kernel hands to a contribution: its own, then zeros."""
     values = np.zeros(PARAMETERS)
     values[: len(parameters)] = parameters
-    values[-1] = variant
     return values
 
 
@@ -38,13 +37,13 @@ def call(effect, value, at=AT_REST, *, variant=0, **parameters):
     """One call without a past."""
     mechanism = BY_ID[effect]
     assert set(parameters) == set(mechanism.names)
-    values = row([float(parameters[name]) for name in mechanism.names], variant)
+    values = row([float(parameters[name]) for name in mechanism.names])
     return mechanism.variants[variant].contribution(float(value), at, values, np.zeros(WIDTH))
 
 
 def per_tick(effect, commands, steps, parameters, variant=0):
     """Mean answer in each control period to commands held over it, by a number of internal steps."""
-    values, memory = row(parameters, variant), np.zeros(WIDTH)
+    values, memory = row(parameters), np.zeros(WIDTH)
     step_s = PERIOD_S / steps
     means = np.zeros(len(commands))
     for tick, command in enumerate(commands):

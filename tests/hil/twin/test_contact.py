@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hil.twin.stepping import contact
+from hil.twin.stepping.contact import Resistance
 
 STIFFNESS, BOUND, STEP_S = 1000.0, 2.0, 1e-4
 YIELD_M = BOUND / STIFFNESS
@@ -18,7 +19,7 @@ def friction_along(path, elements=None):
     forces = []
     for step in np.diff(path, prepend=0.0):
         speed = step * YIELD_M / STEP_S
-        contact.slipping(speed, LIGHT, BOUND, 0.0, 0.0, 0.0, STIFFNESS, elements, STEP_S, speed)
+        contact.slipping(speed, LIGHT, Resistance(BOUND, 0.0, 0.0, 0.0), STIFFNESS, elements, STEP_S, speed)
         forces.append(elements.sum())
     return np.array(forces)
 
@@ -28,7 +29,9 @@ def dahl_along(path):
     deflection, forces = 0.0, []
     for step in np.diff(path, prepend=0.0):
         speed = step * YIELD_M / STEP_S
-        _, deflection = contact.elastic(speed, LIGHT, BOUND, 0.0, 0.0, 0.0, STIFFNESS, deflection, STEP_S, speed)
+        _, deflection = contact.elastic(
+            speed, LIGHT, Resistance(BOUND, 0.0, 0.0, 0.0), STIFFNESS, deflection, STEP_S, speed
+        )
         forces.append(STIFFNESS * deflection)
     return np.array(forces)
 
@@ -38,7 +41,9 @@ def swing(steps):
     step_s, position, speed, deflection = 0.3 / steps, 0.0, 0.0, 0.0
     for tick in range(steps):
         free = speed + step_s * (3.0 if 3 * tick < steps else 0.0)
-        force, deflection = contact.elastic(free, step_s, BOUND, 0.0, 0.1, 0.0, STIFFNESS, deflection, step_s, speed)
+        force, deflection = contact.elastic(
+            free, step_s, Resistance(BOUND, 0.0, 0.1, 0.0), STIFFNESS, deflection, step_s, speed
+        )
         before, speed = speed, free - step_s * force
         position += 0.5 * step_s * (before + speed)
     return position
@@ -70,7 +75,9 @@ def test_a_step_of_an_elastic_contact_is_of_second_order() -> None:
 def test_a_swing_that_no_step_resolves_dies_down() -> None:
     gain, stiffness, speed, deflection, speeds = 1.0, 1e9, 0.01, 0.0, []
     for _ in range(50):
-        force, deflection = contact.elastic(speed, gain, 1e3, 0.0, 0.0, 0.0, stiffness, deflection, STEP_S, speed)
+        force, deflection = contact.elastic(
+            speed, gain, Resistance(1e3, 0.0, 0.0, 0.0), stiffness, deflection, STEP_S, speed
+        )
         speed -= gain * force
         speeds.append(abs(speed))
     assert speeds[-1] < 1e-3 * speeds[0]
@@ -116,7 +123,7 @@ def test_the_step_solves_its_equation(free, gain, viscous, bound, stiffness, shi
     limits = contact.YIELD_SHARES * bound
     elements = limits * np.array(start)
     first = elements.copy()
-    torque = contact.slipping(free, gain, bound, viscous, shift, 0.0, stiffness, elements, STEP_S, before)
+    torque = contact.slipping(free, gain, Resistance(bound, viscous, shift, 0.0), stiffness, elements, STEP_S, before)
     velocity = free - gain * torque
     late = contact._late(gain, stiffness, STEP_S)
     travel = STEP_S * ((1.0 - late) * before + late * velocity)
@@ -140,7 +147,9 @@ def test_the_step_solves_its_equation(free, gain, viscous, bound, stiffness, shi
 @settings(max_examples=300, deadline=None)
 def test_so_does_that_of_dahls_contact(free, gain, viscous, bound, stiffness, shift, before, start) -> None:
     pull = start * bound
-    torque, after = contact.elastic(free, gain, bound, viscous, shift, 0.0, stiffness, pull / stiffness, STEP_S, before)
+    torque, after = contact.elastic(
+        free, gain, Resistance(bound, viscous, shift, 0.0), stiffness, pull / stiffness, STEP_S, before
+    )
     velocity = free - gain * torque
     late = contact._late(gain, stiffness, STEP_S)
     travel = STEP_S * ((1.0 - late) * before + late * velocity)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from hil.control import cascade
+from hil.paper.formulas import recursive_transfer
 from hil.twin.structure.chain import RECONSTRUCTED_TABLE_1, seven_dof, two_mass
 from hil.twin.structure.frequency import (
     bandwidth_hz,
@@ -14,7 +15,6 @@ from hil.twin.structure.frequency import (
     modal_damping,
     modal_transfer,
     natural_transfer,
-    recursive_transfer,
     sampled_closed_loop,
     sampled_transfer,
 )

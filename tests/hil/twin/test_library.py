@@ -111,7 +111,7 @@ def fields(sentence):
 
 @each
 def test_bounds_units_and_text(mechanism) -> None:
-    assert len(mechanism.parameters) < PARAMETERS  # the last of the row is the variant
+    assert len(mechanism.parameters) <= PARAMETERS
     for parameter in mechanism.parameters:
         assert np.isfinite([parameter.low, parameter.high]).all()
         assert parameter.low < parameter.high
@@ -148,7 +148,7 @@ def test_compiles_to_the_one_signature(mechanism) -> None:
 def test_neutral_at_zero_strength(mechanism, at) -> None:
     neutral = NEUTRAL.get(mechanism.id, dict.fromkeys(mechanism.names, 0.0))
     for variant in range(len(mechanism.variants)):
-        values = row([neutral[name] for name in mechanism.names], variant)
+        values = row([neutral[name] for name in mechanism.names])
         first = at._replace(within_s=0.0)
         assert mechanism.variants[variant].contribution(VALUE, first, values, np.zeros(WIDTH)) == pytest.approx(
             VALUE, rel=1e-12
@@ -161,7 +161,7 @@ def test_neutral_structure_and_skew() -> None:
     channels = tuple(np.random.default_rng(1).normal(size=(4, 50)))
     for variant in range(3):
         np.testing.assert_array_equal(
-            BY_ID["channel_time_skew"].variants[variant].contribution(channels, (0.0,), variant, PERIOD_S), channels
+            BY_ID["channel_time_skew"].variants[variant].contribution(channels, (0.0,), PERIOD_S), channels
         )
 
 
@@ -171,7 +171,7 @@ def test_neutral_structure_and_skew() -> None:
 def test_finite_within_bounds_and_at_zero(mechanism, data, at, value) -> None:
     strategies = [st.floats(p.low, p.high) | st.sampled_from([0.0, p.low, p.high]) for p in mechanism.parameters]
     variant = data.draw(st.integers(0, len(mechanism.variants) - 1))
-    values = row(data.draw(st.tuples(*strategies)), variant)
+    values = row(data.draw(st.tuples(*strategies)))
     memory = np.zeros(WIDTH)
     for within_s in (0.0, at.step_s, 0.0):
         out = mechanism.variants[variant].contribution(value, at._replace(within_s=within_s), values, memory)

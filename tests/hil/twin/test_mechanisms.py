@@ -308,7 +308,7 @@ def test_channel_time_skew_delays_the_one_channel(delay_s, variant) -> None:
     follows the record is held."""
     time_s = np.arange(100) * PERIOD_S
     channels = tuple(factor * (1.0 + time_s - 3.0 * time_s**2) for factor in (1.0, 2.0, 3.0, 4.0))
-    skewed = BY_ID["channel_time_skew"].variants[variant].contribution(channels, (delay_s,), variant, PERIOD_S)
+    skewed = BY_ID["channel_time_skew"].variants[variant].contribution(channels, (delay_s,), PERIOD_S)
     late = {"table_position": 1, "torque": 3, "motor_position": 0}[BY_ID["channel_time_skew"].forms[variant]]
     for index, (before, after) in enumerate(zip(channels, skewed, strict=True)):
         assert after.shape == before.shape

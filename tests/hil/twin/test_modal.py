@@ -84,7 +84,7 @@ def test_truncation_keeps_the_lowest_modes() -> None:
 
 def one_mode(frequency_rad_s: float, damping_ratio: float) -> Modal:
     one = np.ones((1, 1))
-    return Modal(np.array([frequency_rad_s]), one, np.array([damping_ratio]), 0, 0, LEAD_M, np.zeros(1), np.zeros(1))
+    return Modal(np.array([frequency_rad_s]), one, np.array([damping_ratio]), 0, 0, np.zeros(1), np.zeros(1))
 
 
 @given(

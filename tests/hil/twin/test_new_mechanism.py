@@ -34,13 +34,28 @@ MECHANISM = Mechanism(
 """
 
 # The one line is the first that follows the imports.
-PRELUDE = """
+REGISTER = """
 from hil.twin import library
 import quadratic_load
 library.register(quadratic_load.MECHANISM)
+"""
+
+PRELUDE = """
 from diagnosis_runs import bench, dataset, fitted, recorded
 from hil.identification.terms import Term
 owner, truth = bench(), Term("quadratic_load", 0, (0.4,))
+"""
+
+MOTION = """
+import numpy as np
+from hil.control.cascade import make_gains
+from hil.twin.axis import Start, Twin
+from hil.twin.physics import Active, Physics
+from hil.twin.structure.chain import one_mass
+law = make_gains(position_gain_1_s=30.0, velocity_gain_n_m_s_rad=0.5, ratio_m_rad=1.0)
+twin = Twin(Physics(one_mass(1.0), 0.0, 0.0), law, (Active("quadratic_load", (0.4,)),))
+held, let_go = (twin.drive(np.full(11, force), Start(0.05)).motor_position for force in (0.4, 0.0))
+print(np.ptp(held), let_go[-1] - 0.05)
 """
 
 SCREEN = """
@@ -63,20 +78,27 @@ def printed(folder, script):
     (folder / "quadratic_load.py").write_text(MECHANISM)
     path = os.pathsep.join([str(folder), str(SUPPORT), *sys.path])
     environment = os.environ | {"PYTHONPATH": path}
-    command = [sys.executable, "-c", PRELUDE + script]
+    command = [sys.executable, "-c", REGISTER + script]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     return done.stdout.splitlines()[-1]
 
 
+def test_it_acts_on_the_axis(tmp_path) -> None:
+    """At 50 mm the load is 0.4 N: an equal force holds 1 kg there, and without one it falls by a t^2 / 2 in 10 ms."""
+    ripple, fallen = map(float, printed(tmp_path, MOTION).split())
+    assert ripple < 1e-12
+    assert fallen == pytest.approx(-0.5 * 0.4 * 0.01**2, rel=1e-3)
+
+
 @pytest.mark.long
 def test_the_screen_puts_it_first(tmp_path) -> None:
-    assert printed(tmp_path, SCREEN) == "quadratic_load"
+    assert printed(tmp_path, PRELUDE + SCREEN) == "quadratic_load"
 
 
 @pytest.mark.long
 def test_the_diagnosis_names_it_first_with_its_strength(tmp_path) -> None:
-    effect, strength, sentence = printed(tmp_path, DIAGNOSIS).split(" ", 2)
+    effect, strength, sentence = printed(tmp_path, PRELUDE + DIAGNOSIS).split(" ", 2)
     assert effect == "quadratic_load"
     assert float(strength) == pytest.approx(0.4, rel=0.03)
     assert sentence.startswith("A load rises with the square of the position, to 0.4")

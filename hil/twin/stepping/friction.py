@@ -1,0 +1,67 @@
+"""Friction torques of motor and table over one internal step, with the mechanisms that change them."""
+
+from numba import njit
+
+from hil.twin.mechanism import Moment
+from hil.twin.stepping import contact, stages
+from hil.twin.stepping.contact import COMPILE, Resistance
+
+_coulomb, _friction_scale, _drag = stages.coulomb, stages.friction_scale, stages.drag
+_bias, _bristle, _table_share = stages.bias, stages.bristle, stages.table_share
+_rigid, _elastic, _slipping = contact.rigid, contact.elastic, contact.slipping
+
+
+@njit(**COMPILE)
+def _at_speed(at, speed):  # type: ignore[no-untyped-def]
+    """Change the speed of a moment."""
+    return Moment(
+        at.time_s,
+        at.within_s,
+        at.period_s,
+        at.step_s,
+        at.angle_rad,
+        speed,
+        at.table_position_m,
+        at.ratio_m,
+        at.viscous_speed,
+    )
+
+
+@njit(_nrt=False, forceinline=True, **COMPILE)
+def _level(c, scale, at, effects):  # type: ignore[no-untyped-def]
+    """Coulomb friction and drag at the speed of the moment."""
+    return scale * max(_coulomb(c.coulomb, at, effects), 0.0), scale * _drag(0.0, at, effects)
+
+
+@njit(_nrt=False, forceinline=True, **COMPILE)
+def friction(c, own, internal, motion, at, effects, free, table_free):  # type: ignore[no-untyped-def]
+    """Friction torques on motor and table, which without friction would have velocities `free` and `table_free`."""
+    gain = internal.motor_gain
+    shift = _bias(0.0, at, effects)
+    share = _table_share(0.0, at, effects)
+    stiffness = _bristle(0.0, at, effects)
+    scale = max(_friction_scale(1.0, at, effects), 0.0)
+    viscous, rest = scale * c.viscous, 1.0 - share
+    bound, opposing = _level(c, scale, at, effects)
+    if effects.codes.coulomb or effects.codes.drag:  # at the middle of the step friction over speed is second order
+        met = _rigid(free, gain, Resistance(rest * bound, rest * viscous, shift, rest * opposing))
+        bound, opposing = _level(c, scale, _at_speed(at, 0.5 * (motion.speed + free - gain * met)), effects)
+    resistance = Resistance(rest * bound, rest * viscous, shift, rest * opposing)
+    if stiffness > 0.0 and c.slips > 0:
+        motor = _slipping(free, gain, resistance, stiffness, own.slip_elements, at.step_s, motion.speed)
+    elif stiffness > 0.0:
+        motor, own.bristle_deflection = _elastic(
+            free, gain, resistance, stiffness, own.bristle_deflection, at.step_s, motion.speed
+        )
+    else:
+        motor = _rigid(free, gain, resistance)
+    guide = 0.0
+    if share > 0.0:
+        met, gain, opposing = table_free - internal.cross_gain * motor, internal.table_gain, 0.0
+        if effects.codes.drag:  # at the table's own speed: at the motor's it would drive a table that swings
+            guide = _rigid(met, gain, Resistance(share * bound, share * viscous, 0.0, 0.0))
+            speed = 0.5 * (motion.table_speed + met - gain * guide)
+            opposing = scale * _drag(0.0, _at_speed(at, speed), effects)
+        # a torque that differs by direction, alike at every speed, is a load and stays on the motor
+        guide = _rigid(met, gain, Resistance(share * bound, share * viscous, 0.0, share * opposing))
+    return motor, guide

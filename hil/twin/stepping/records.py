@@ -1,0 +1,187 @@
+"""Records that the compiled kernels work on, and their packing from a twin.
+
+`constants`, `codes` and `memory` are arrays of one record; `modes` (20 + n, n) has a row for each quantity of the n
+modes, read through `shapes_of`, `step_of` and `coupling_of`; `values` (slots, PARAMETERS) holds the parameters of the
+mechanisms.
+"""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from hil.arrays import FloatArray
+from hil.control import cascade
+from hil.twin.library import BY_ID, SLOTS
+from hil.twin.mechanism import PARAMETERS, WIDTH
+from hil.twin.physics import Active, Physics
+from hil.twin.stepping.contact import ELEMENTS
+from hil.twin.stepping.stages import KERNEL_STAGES
+from hil.twin.structure.chain import Chain
+from hil.twin.structure.modal import Discrete, Modal, discretise
+
+_ROUNDING = 1e-12  # of all damping: below, a whole axis as one side has only rounding of it
+# The step is fine while the motor moves slower than this, or could reverse within two ticks. Alike for a lead of 10 mm.
+SLOW_RAD_S, SLOW_M_S = 0.02, 32e-6
+
+# An internal step: number per control tick, velocity of the motor or table per unit of torque on the motor or table.
+_STEP = np.dtype([("number", np.int64)] + [(name, np.float64) for name in ("motor_gain", "cross_gain", "table_gain")])
+_NUMBERS = (
+    "period", "ratio", "angle_per_unit", "coulomb", "viscous", "viscous_speed", "spring", "screw", "damper",
+    "slow_velocity", "observer",
+)  # fmt: skip
+_FLAGS = ("any_active", "coupled", "always_fine", "play", "slips", "screw_apart")
+CONSTANTS = np.dtype(
+    [(name, np.float64) for name in _NUMBERS]
+    + [(name, np.int64) for name in _FLAGS]
+    + [("coarse", _STEP), ("fine", _STEP)],
+    align=True,
+)
+# Variant + 1 of the mechanism in each slot (0: off), then whether each stage has an active mechanism.
+CODES = np.dtype([("slots", np.int64, (len(SLOTS),))] + [(stage.value, np.int64) for stage in KERNEL_STAGES])
+MEMORY = np.dtype(
+    [
+        ("mechanisms", np.float64, (len(SLOTS), WIDTH)),
+        ("clock", np.float64),  # [s]
+        ("bristle_deflection", np.float64),  # of the contact after Dahl
+        ("spring_extra", np.float64),  # deflection by mechanisms of the transmission at the last step
+        ("floating", np.float64),  # 1: the table floats in a gap
+        ("last_speed", np.float64),  # of the motor at the last tick
+        ("slip_elements", np.float64, (ELEMENTS,)),  # their torques
+    ],
+    align=True,
+)
+
+
+class Arrays(NamedTuple):
+    """A twin as the kernels take it."""
+
+    constants: NDArray[np.void]
+    modes: FloatArray
+    values: FloatArray
+    codes: NDArray[np.void]
+
+
+class Axis(NamedTuple):
+    """A twin as the kernels take it, with its state: `delta` (2, n) of the modes, and `memory`."""
+
+    constants: NDArray[np.void]
+    modes: FloatArray
+    values: FloatArray
+    codes: NDArray[np.void]
+    delta: FloatArray
+    memory: NDArray[np.void]
+
+
+class Shapes(NamedTuple):
+    """Shares of the modes (n,) in displacements and forces."""
+
+    motor: FloatArray
+    table: FloatArray
+    spring: FloatArray  # deflection of the transmission
+    screw: FloatArray  # deflection of the screw
+    damper: FloatArray  # damping against the sides of the transmission moving apart
+    table_side: FloatArray  # momentum of the table side of the transmission, all that mechanisms added included
+    table_impulse: FloatArray  # momentum of the table side of the nominal chain
+    motor_impulse: FloatArray  # and of its motor side
+
+
+@njit(inline="always")
+def step_of(modes, fine):  # type: ignore[no-untyped-def]
+    """Exact discretisation of the coarse or the fine step, each (n,)."""
+    k = 6 if fine else 0
+    return Discrete(modes[k], modes[k + 1], modes[k + 2], modes[k + 3], modes[k + 4], modes[k + 5])
+
+
+@njit(inline="always")
+def shapes_of(modes):  # type: ignore[no-untyped-def]
+    """Shares of the modes in displacements and forces."""
+    return Shapes(modes[12], modes[13], modes[14], modes[15], modes[16], modes[17], modes[18], modes[19])
+
+
+@njit(inline="always")
+def coupling_of(modes):  # type: ignore[no-untyped-def]
+    """Damping that modes share (n, n)."""
+    return modes[20:]
+
+
+def start_memory() -> NDArray[np.void]:
+    """Memory before the first step."""
+    return np.zeros(1, MEMORY)
+
+
+def pack(
+    physics: Physics,
+    chain: Chain,
+    modes: Modal,
+    gains: cascade.Gains,
+    active: Sequence[Active],
+    steps: tuple[int, int],
+    observer_s: float,
+) -> Arrays:
+    """Pack a twin; `chain`: with the changes by mechanisms; `steps`: coarse and fine ones per tick.
+
+    Raises ValueError where a mechanism acts more often than it may.
+    """
+    values, codes = _pack_mechanisms(active)
+    coarse, fine = (discretise(modes, gains.period_s / number) for number in steps)
+    modal_damping = np.diag(2.0 * modes.damping_ratio * modes.frequency_rad_s)
+    given = chain.damping_n_m_s_rad
+    damping = modal_damping if given is None else modes.shape.T @ given @ modes.shape
+    shapes = _pack_shapes(physics.chain, chain, modes, damping)
+
+    constants = np.zeros(1, CONSTANTS)
+    c = constants[0]
+    c["period"], c["ratio"], c["observer"] = gains.period_s, gains.ratio_m_rad, observer_s
+    c["angle_per_unit"], c["viscous_speed"] = physics.angle_per_unit, physics.viscous_speed
+    c["coulomb"], c["viscous"] = physics.coulomb_n_m, physics.viscous_n_m_s_rad
+    c["slow_velocity"] = SLOW_M_S if physics.linear else SLOW_RAD_S
+    c["spring"] = physics.chain.transmission_stiffness_n_m_rad
+    c["screw"] = physics.chain.screw_stiffness_n_m_rad
+    c["screw_apart"] = not np.array_equal(physics.chain.screw, physics.chain.transmission)
+    # s^T C s: resists the two sides of the transmission moving apart as two bodies. Play removes it; for a lead error
+    # the table's place with the error counts. The rest of the damping drives no mode.
+    c["damper"] = -shapes.damper @ shapes.table_side
+    c["play"] = any(one.form.play for one in active)
+    c["slips"] = any(one.form.slips for one in active)
+    c["coupled"] = given is not None
+    c["any_active"] = c["coupled"] or codes["slots"].any()
+    # a spring's change beside the modes is held over a step, and modes of a long chain are faster than a coarse one
+    c["always_fine"] = any(BY_ID[one.effect].softens for one in active) and np.count_nonzero(shapes.spring[1:]) > 1
+    motor, table = shapes.motor, shapes.table
+    for name, number, step in (("coarse", steps[0], coarse), ("fine", steps[1], fine)):
+        c[name] = (number, motor * step.b2 @ motor, motor * step.b2 @ table, table * step.b2 @ table)
+    return Arrays(constants, np.vstack([*coarse, *fine, *shapes, damping - modal_damping]), values, codes)
+
+
+def _pack_shapes(own: Chain, chain: Chain, modes: Modal, damping: FloatArray) -> Shapes:
+    """Shares of the modes; `own`: the chain without the coordinates that mechanisms add after its own."""
+    table_side = chain.inertia_kg_m2 @ chain.side(chain.table) @ modes.shape
+    table, motor = (
+        own.inertia_kg_m2 @ own.side(place) @ modes.shape[: len(own.names)] for place in (own.table, own.motor)
+    )
+    # a side that is the whole axis is damped by rounding alone, which play must not remove
+    resisting = damping @ table_side
+    some = resisting @ table_side > _ROUNDING * np.trace(damping) * np.sum(table_side**2)
+    damper = -resisting if some else np.zeros(resisting.size)
+    at_motor, at_table = modes.shape[modes.motor], modes.shape[modes.table]
+    return Shapes(at_motor, at_table, modes.transmission, modes.screw, damper, table_side, table, motor)
+
+
+def _pack_mechanisms(active: Sequence[Active]) -> tuple[FloatArray, NDArray[np.void]]:
+    """Values (slots, PARAMETERS) and codes of the mechanisms that act in the kernel."""
+    values, codes = np.zeros((len(SLOTS), PARAMETERS)), np.zeros(1, CODES)
+    record: Any = codes[0]
+    free = dict(enumerate(SLOTS))
+    for one in active:
+        mechanism = BY_ID[one.effect]
+        slot = next((slot for slot, other in free.items() if other is mechanism), None)
+        if slot is None:
+            raise ValueError(f"{mechanism.id} must act at most {mechanism.most} times at once, got more")
+        del free[slot]
+        if one.form.stage in KERNEL_STAGES:
+            values[slot, : len(one.values)] = one.values
+            record["slots"][slot], record[one.form.stage.value] = one.variant + 1, 1
+    return values, codes

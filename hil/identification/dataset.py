@@ -36,9 +36,9 @@ _FITTED_ROWS = 11  # of the motor position, for its velocity at the first row
 # Torque that the motor channel is trusted to tell, over the noise of the torque channel. A fine encoder tells much
 # less, but details below the material size lie there too: friction at zero speed, the side force of a lead error.
 TORQUE_ACCURACY = 1.0
-# Model discrepancy (Kennedy and O'Hagan 2001): correct simulations of one axis differ by this share of the deflection of
-# the transmission. Calibrated on simulated axes with nothing but wrong parameters, where the refitted twin leaves 0.1 to
-# 0.6 % in accelerations. On the motor, TORQUE_ACCURACY stands for it.
+# Model discrepancy (Kennedy and O'Hagan 2001): correct simulations of one axis differ by this share of the deflection
+# of the transmission. Calibrated on simulated axes with nothing but wrong parameters, where the refitted twin leaves
+# 0.1 to 0.6 % in accelerations. On the motor, TORQUE_ACCURACY stands for it.
 DISCREPANCY = 0.005
 # Time constants of the motor's observer. Fast: stick-slip is forgotten within a few ticks, so that even a poor start
 # leads to the right valley; faster than two ticks, the sampled observer is unstable on an elastic axis. Slow: a coarse

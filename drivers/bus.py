@@ -7,8 +7,6 @@ report its `health`. Time is handed in; nothing here reads a clock. `PythonCanPo
 Error frames are counted and decoded here, since the canopen package drops them and a bus-off would stay invisible.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
@@ -32,7 +30,7 @@ class BusState(IntEnum):
 
 @dataclass(slots=True)
 class BusHealth:
-    """What a controller knows about its bus; counters since it was opened."""
+    """State of a CAN controller; counters since the bus was opened."""
 
     state: BusState = BusState.ACTIVE
     error_frames: int = 0
@@ -62,7 +60,7 @@ class CanPort(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class BusConfig:
-    """How to open a bus: python-can's interface name, channel and bit rate."""
+    """Settings of a bus: python-can's interface name, channel and bit rate."""
 
     interface: str = "virtual"
     channel: str = "hil"

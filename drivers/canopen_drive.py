@@ -5,14 +5,20 @@ is wrong shows in `DriveSample.condition`. A condition that forbids motion sets 
 `reset_fault`; `check` raises it with its text.
 """
 
-from __future__ import annotations
-
-import math
 from typing import Final
 
-from drivers.bus import BusState
 from drivers.canopen_master import CanopenMaster
-from drivers.cia402 import ENABLE_OPERATION, STATE_BY_STATUS, DriveState, OperationMode, next_controlword
+from drivers.canopen_node import CanopenNode, condition_names
+from drivers.cia402 import (
+    ENABLE_OPERATION,
+    STATE_BY_STATUS,
+    Controlword,
+    DriveState,
+    HomingPhase,
+    OperationMode,
+    next_controlword,
+    next_homing_phase,
+)
 from drivers.cia402_setup import (
     CONTROLWORD,
     FEEDBACK,
@@ -23,39 +29,35 @@ from drivers.cia402_setup import (
     HomingSettings,
     set_up_drive,
 )
-from drivers.emcy import Emergency, decode_emergency
+from drivers.emcy import Emergency
 from drivers.pdo import layout, saturate
 from drivers.port import Condition, Drive, DriveFault, DriveGoal, DriveSample
 
-__all__ = ["TRIPPING", "CanopenDrive", "DriveInfo", "DriveSettings", "HomingSettings"]
+__all__ = ["TRIPPING", "CanopenDrive", "DriveInfo", "DriveSettings", "HomingRun", "HomingSettings"]
 
 # Conditions under which the loop must not go on moving the axis.
 TRIPPING: Final = (
     Condition.STALE | Condition.HEARTBEAT_LOST | Condition.EMERGENCY | Condition.FAULT | Condition.DISABLED
     | Condition.BUS_OFF | Condition.NOT_OPERATIONAL
 )  # fmt: skip
-_OPERATIONAL: Final = 5
 # Bound once: looking a member up in its enumeration costs the loop.
 _OK, _ENABLED_STATE, _ENABLED = Condition.OK, DriveState.OPERATION_ENABLED, DriveGoal.ENABLED
 _POWERED: Final = (_ENABLED_STATE, DriveState.QUICK_STOP_ACTIVE, DriveState.FAULT_REACTION_ACTIVE)
 _new = tuple.__new__  # makes a named tuple without its Python-level constructor
 
 
-class CanopenDrive(Drive):
+class CanopenDrive(CanopenNode, Drive):
     """One CiA 402 drive on a master's bus."""
 
+    settings: DriveSettings
+
     def __init__(self, master: CanopenMaster, settings: DriveSettings) -> None:
-        self._master, self.settings = master, settings
+        super().__init__(master, settings, "drive")
         self.goal = DriveGoal.DISABLED
         self.info = NO_INFO
         self.tripped = Condition.OK  # what tripped the drive, until reset_fault
-        self.emergencies: list[Emergency] = []  # newest last
         self.controlword_bits = 0  # mode-specific bits (homing start), or-ed in while enabled
-        self.malformed_frames = 0
-        node_id = settings.node_id
-        self._health, self._send = master.health, master.port.send
-        self._name = f"drive node {node_id}"
-        self._rpdo_id, self._tpdo_id = 0x200 + node_id, 0x180 + node_id
+        self._send, self._rpdo_id = master.port.send, 0x200 + settings.node_id
         self._unpack = layout(FEEDBACK).unpack
         self._take_mode(settings.mode)
         self._rad_per_count = self._n_m_per_mille = self._target_per_unit = 0.0
@@ -63,15 +65,8 @@ class CanopenDrive(Drive):
         self._raw_counts = 0  # as the drive counts, wrapping
         self._counts = 0  # unwrapped
         self._torque = 0
-        self._answered = self._set_up_at = 0  # number of the SYNC answered last
-        self._sample_time_s = 0.0
         self._controlword = 0
         self._was_enabled = self._reset_requested = False
-        self._latched = 0  # Condition bits; an int, for a flag's truth is tested in Python code
-        self._heartbeat_deadline_s = math.inf  # until the first heartbeat
-        master.port.listen(self._tpdo_id, self._on_tpdo)
-        master.port.listen(0x080 + node_id, self._on_emergency)
-        master.port.listen(0x700 + node_id, self._on_heartbeat)
 
     # -- before the loop --------------------------------------------------------------------------------------------
 
@@ -96,11 +91,10 @@ class CanopenDrive(Drive):
         self._target_per_unit = 1 / (info.torque_resolution_n_m if in_torque else info.rad_per_count)
         self._raw_counts = self._counts = answer.counts
         self._statusword = answer.statusword
-        self._answered = self._set_up_at = self._master.syncs
-        self._latched, self.tripped = 0, Condition.OK
+        self._begin()
+        self.tripped = Condition.OK
         self.goal = DriveGoal.DISABLED
         self._was_enabled = self._reset_requested = False
-        self._heartbeat_deadline_s = math.inf
 
     # -- frames -----------------------------------------------------------------------------------------------------
 
@@ -114,18 +108,9 @@ class CanopenDrive(Drive):
         self._answered = self._master.syncs
         self._sample_time_s = self._master.sync_time_s
 
-    def _on_emergency(self, can_id: int, data: bytes, now_s: float) -> None:
-        emergency = decode_emergency(data, now_s)
-        self.emergencies.append(emergency)
+    def _latch(self, emergency: Emergency) -> None:
         if emergency.active:
             self._latched |= Condition.EMERGENCY
-
-    def _on_heartbeat(self, can_id: int, data: bytes, now_s: float) -> None:
-        if self._answered == self._set_up_at:
-            return  # the loop does not run yet: other states, and another time, are in order
-        self._heartbeat_deadline_s = now_s + 3 * self.settings.heartbeat_s
-        if len(data) == 1 and data[0] & 0x7F != _OPERATIONAL:
-            self._latched |= Condition.NOT_OPERATIONAL  # boot-up (0) included: it lost its configuration
 
     # -- in the loop ------------------------------------------------------------------------------------------------
 
@@ -145,22 +130,11 @@ class CanopenDrive(Drive):
                                   enabled or state in _POWERED))  # fmt: skip
 
     def _diagnose(self, age: int, state: DriveState, now_s: float) -> Condition:
-        condition = Condition(self._latched)
-        if age:
-            condition |= Condition.LATE
-        if age > self.settings.missed_answers_allowed:
-            condition |= Condition.STALE
-        if now_s > self._heartbeat_deadline_s:
-            condition |= Condition.HEARTBEAT_LOST
+        condition = self._node_condition(age, now_s)
         if state in (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE):
             condition |= Condition.FAULT
         if self._was_enabled and self.goal is DriveGoal.ENABLED and state is not DriveState.OPERATION_ENABLED:
             condition |= Condition.DISABLED
-        bus = self._health.state
-        if bus is BusState.PASSIVE:
-            condition |= Condition.BUS_PASSIVE
-        elif bus is BusState.OFF:
-            condition |= Condition.BUS_OFF
         trips = condition & TRIPPING
         if trips:
             self.tripped |= trips
@@ -218,11 +192,34 @@ class CanopenDrive(Drive):
         """Raise DriveFault if something tripped the drive since the last `reset_fault`."""
         if not self.tripped:
             return
-        active = [emergency.text for emergency in self.emergencies if emergency.active]
-        names = " | ".join(str(flag.name) for flag in Condition if flag in self.tripped)
         raise DriveFault(
-            f"tripped: {names}",
+            f"tripped: {condition_names(self.tripped)}",
             where=self._name,
-            given=active[-1] if active else self._health.last_error,
+            given=self._cause(),
             advice="Remove the cause, then reset the fault.",
         )
+
+
+class HomingRun:
+    """A homing run of a drive in OperationMode.HOMING, tick by tick, to a proven stop on the reference.
+
+    Call `step` with each sample, then `drive.command(now_s, 0.0)`, until `phase` is DONE or FAILED.
+
+    standstill_rad_s: speed below which the axis counts as at rest (linear axis: m/s). The run has no time-out of its
+    own: give up after as many ticks as the longest search may take, by setting the drive's goal.
+    """
+
+    def __init__(self, drive: CanopenDrive, standstill_rad_s: float) -> None:
+        self._drive, self._standstill_rad_s = drive, standstill_rad_s
+        self._last: DriveSample | None = None
+        self.phase = HomingPhase.READY
+
+    def step(self, sample: DriveSample) -> HomingPhase:
+        """Take one sample in; sets or takes back the start bit of the next controlword."""
+        last, self._last = self._last, sample
+        if last is not None and sample.time_s > last.time_s:
+            speed = (sample.motor_position_rad - last.motor_position_rad) / (sample.time_s - last.time_s)
+            self.phase = next_homing_phase(self.phase, sample.statusword, speed, self._standstill_rad_s)
+        running = self.phase in (HomingPhase.STARTED, HomingPhase.RUNNING)
+        self._drive.controlword_bits = int(Controlword.HOMING_START) if running else 0
+        return self.phase

@@ -1,31 +1,29 @@
 """A CiA 406 linear encoder as the loop sees it: step and range read by SDO, then one TPDO after each SYNC."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from pathlib import Path
 from struct import Struct
 from typing import Final
 
-from drivers.bus import BusState
 from drivers.canopen_master import NMT_PRE_OPERATIONAL, CanopenMaster
+from drivers.canopen_node import CanopenNode, condition_names
 from drivers.counting import Unwrapper
-from drivers.emcy import Emergency, decode_emergency
+from drivers.emcy import Emergency
+from drivers.object_index import ObjectIndex as Index
 from drivers.pdo import EVERY_SYNC
 from drivers.port import Condition, ConfigurationError, Encoder, EncoderError, EncoderSample
 from drivers.sdo_setup import EDS_FOLDER, DeviceSetup
 
 _POSITION: Final = Struct("<i")
 _PLAIN_DIRECTION, _REVERSED = 0x0000, 0x0008  # 0x6000 bit 3: measuring direction
-_OPERATIONAL: Final = 5
 _OK = Condition.OK
 _new = tuple.__new__  # makes a named tuple without its Python-level constructor
 
 
 @dataclass(frozen=True, slots=True)
 class EncoderSettings:
-    """How the encoder is to run. step_m: what the bench believes; None: as the device says (0x6005:1, nm)."""
+    """Settings of the encoder. step_m: as described by the bench; None: as the device says (0x6005:1, nm)."""
 
     node_id: int = 6
     eds: Path = EDS_FOLDER / "linear_encoder.eds"
@@ -36,36 +34,27 @@ class EncoderSettings:
     missed_answers_allowed: int = 3
 
 
-class CanopenEncoder(Encoder):
-    """One encoder on a master's bus; implements `drivers.port.Encoder`."""
+class CanopenEncoder(CanopenNode, Encoder):
+    """One encoder on a master's bus."""
+
+    settings: EncoderSettings
 
     def __init__(self, master: CanopenMaster, settings: EncoderSettings) -> None:
-        self._master, self.settings = master, settings
-        self._health = master.health
-        self._name = f"encoder node {settings.node_id}"
+        super().__init__(master, settings, "encoder")
         self.step_m = 0.0
-        self.emergencies: list[Emergency] = []
-        self.malformed_frames = 0
         self._unwrapper = Unwrapper(1 << 32)
-        self._answered = self._set_up_at = 0
-        self._sample_time_s = 0.0
-        self._latched = 0
         self._condition = Condition.OK
-        self._heartbeat_deadline_s = math.inf
-        master.port.listen(0x180 + settings.node_id, self._on_tpdo)
-        master.port.listen(0x080 + settings.node_id, self._on_emergency)
-        master.port.listen(0x700 + settings.node_id, self._on_heartbeat)
 
     def set_up(self) -> None:
         """Identity, step, direction, range, watchdog, PDO; blocking.
 
-        Raises ResponseTimeout, IdentityError or ConfigurationError (a step other than the bench believes).
+        Raises ResponseTimeout, IdentityError or ConfigurationError (another step than the bench describes).
         """
         settings, master = self.settings, self._master
         with DeviceSetup(master.network, settings.node_id, settings.eds) as device:
             master.nmt(NMT_PRE_OPERATIONAL, settings.node_id)
             device.check_identity(406, settings.serial_number)
-            step_m = device.read(0x6005, 1) / 1e9
+            step_m = device.read(Index.ENCODER_STEP_SETTINGS, 1) / 1e9
             if step_m <= 0 or (settings.step_m is not None and not math.isclose(step_m, settings.step_m)):
                 raise ConfigurationError(
                     "another measuring step than described", where=f"{self._name}, object 0x6005:01",
@@ -74,19 +63,21 @@ class CanopenEncoder(Encoder):
                 )  # fmt: skip
             self.step_m = step_m
             device.disable_pdos()
-            device.write(0x6000, 0, _REVERSED if settings.reversed else _PLAIN_DIRECTION)
-            device.write(0x1017, 0, round(1000 * settings.heartbeat_s))
-            device.map_pdo(0x1800, (device.entry(0x6004),), EVERY_SYNC, 0x180 + settings.node_id)
-            self._unwrapper = Unwrapper(device.read(0x6002) or 1 << 32, device.read(0x6004))
-        self._answered = self._set_up_at = master.syncs
-        self._latched = 0
-        self._heartbeat_deadline_s = math.inf
+            device.write(Index.ENCODER_OPERATING_PARAMETERS, 0, _REVERSED if settings.reversed else _PLAIN_DIRECTION)
+            device.write(Index.PRODUCER_HEARTBEAT_TIME, 0, round(1000 * settings.heartbeat_s))
+            device.map_pdo(
+                Index.TPDO_COMMUNICATION, (device.entry(Index.ENCODER_POSITION),), EVERY_SYNC, 0x180 + settings.node_id
+            )
+            self._unwrapper = Unwrapper(
+                device.read(Index.ENCODER_MEASURING_RANGE) or 1 << 32, device.read(Index.ENCODER_POSITION)
+            )
+        self._begin()
 
     def preset(self, position_m: float) -> None:
-        """Where the axis stands now reads `position_m` from here on (object 0x6003); blocking."""
+        """Set the reading at the present position to `position_m` (object 0x6003); blocking."""
         with DeviceSetup(self._master.network, self.settings.node_id, self.settings.eds) as device:
-            device.write_only(0x6003, 0, round(position_m / self.step_m))
-            self._unwrapper.restart(device.read(0x6004))
+            device.write_only(Index.ENCODER_PRESET, 0, round(position_m / self.step_m))
+            self._unwrapper.restart(device.read(Index.ENCODER_POSITION))
 
     def _on_tpdo(self, can_id: int, data: bytes, now_s: float) -> None:
         if len(data) != 4:
@@ -96,50 +87,29 @@ class CanopenEncoder(Encoder):
         self._answered = self._master.syncs
         self._sample_time_s = self._master.sync_time_s
 
-    def _on_emergency(self, can_id: int, data: bytes, now_s: float) -> None:
-        emergency = decode_emergency(data, now_s)
-        self.emergencies.append(emergency)
+    def _latch(self, emergency: Emergency) -> None:
         # A reset ends the alarm by itself: an encoder has nothing to acknowledge.
         self._latched = self._latched | Condition.ALARM if emergency.active else self._latched & ~Condition.ALARM
-
-    def _on_heartbeat(self, can_id: int, data: bytes, now_s: float) -> None:
-        if self._answered == self._set_up_at:
-            return  # the loop does not run yet
-        self._heartbeat_deadline_s = now_s + 3 * self.settings.heartbeat_s
-        if len(data) == 1 and data[0] & 0x7F != _OPERATIONAL:
-            self._latched |= Condition.NOT_OPERATIONAL
 
     def read(self, now_s: float) -> EncoderSample:
         """The sample of the latest answered SYNC, and what is wrong. Never raises, never waits."""
         age = self._master.syncs - self._answered
         self._condition = _OK
         if age or self._latched or self._health.state or now_s > self._heartbeat_deadline_s:
-            self._condition = self._diagnose(age, now_s)
+            self._condition = self._node_condition(age, now_s)
         counts = self._unwrapper.total
         return _new(EncoderSample, (self._sample_time_s, age, counts * self.step_m, counts, self._condition))
-
-    def _diagnose(self, age: int, now_s: float) -> Condition:
-        condition = Condition(self._latched)
-        if age:
-            condition |= Condition.LATE
-        if age > self.settings.missed_answers_allowed:
-            condition |= Condition.STALE
-        if now_s > self._heartbeat_deadline_s:
-            condition |= Condition.HEARTBEAT_LOST
-        if self._health.state is BusState.OFF:
-            condition |= Condition.BUS_OFF
-        elif self._health.state is BusState.PASSIVE:
-            condition |= Condition.BUS_PASSIVE
-        return condition
 
     def check(self) -> None:
         """Raise EncoderError if the sample read last cannot be trusted."""
         condition = self._condition & ~(Condition.LATE | Condition.BUS_PASSIVE)
         if condition:
-            active = [emergency.text for emergency in self.emergencies if emergency.active]
-            names = " | ".join(str(flag.name) for flag in Condition if flag in condition)
-            raise EncoderError(names, where=self._name, given=active[-1] if active else self._health.last_error,
-                               advice="Check the encoder, its supply and its wiring.")  # fmt: skip
+            raise EncoderError(
+                condition_names(condition),
+                where=self._name,
+                given=self._cause(),
+                advice="Check the encoder, its supply and its wiring.",
+            )
 
     def close(self) -> None:
-        """Nothing to release: the bus belongs to the master."""
+        """Do nothing: the bus belongs to the master."""

@@ -4,8 +4,6 @@ SYNC and heartbeat are sent by the loop itself, never by `send_periodic`: on soc
 would go on feeding the drive's watchdog after this process hangs.
 """
 
-from __future__ import annotations
-
 from typing import Final
 
 from drivers.bus import BusHealth, CanPort

@@ -4,8 +4,6 @@ Statusword -> state, (state, goal) -> controlword, homing. Nothing here waits, s
 statusword per cycle and sends the controlword it gets back.
 """
 
-from __future__ import annotations
-
 from enum import IntEnum, IntFlag
 from typing import Final
 

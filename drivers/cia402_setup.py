@@ -1,6 +1,4 @@
-"""What a CiA 402 drive is told before the loop, by SDO and read back, and what it says about itself."""
-
-from __future__ import annotations
+"""Configure a CiA 402 drive by SDO before the loop, with read-back, and read its units and ratings."""
 
 import math
 from dataclasses import dataclass
@@ -9,18 +7,23 @@ from typing import Final, NamedTuple
 
 from drivers.canopen_master import NMT_PRE_OPERATIONAL, CanopenMaster
 from drivers.cia402 import OperationMode
+from drivers.object_index import ObjectIndex as Index
 from drivers.pdo import EVENT_DRIVEN, EVERY_SYNC, Entry
 from drivers.port import ConfigurationError
 from drivers.sdo_setup import EDS_FOLDER, DeviceSetup
 
 TARGET: Final = {
-    OperationMode.CYCLIC_SYNC_TORQUE: Entry(0x6071, 0, 16, True),
-    OperationMode.CYCLIC_SYNC_VELOCITY: Entry(0x60FF, 0, 32, True),
-    OperationMode.CYCLIC_SYNC_POSITION: Entry(0x607A, 0, 32, True),
-    OperationMode.HOMING: Entry(0x607A, 0, 32, True),
+    OperationMode.CYCLIC_SYNC_TORQUE: Entry(Index.TARGET_TORQUE, 0, 16, True),
+    OperationMode.CYCLIC_SYNC_VELOCITY: Entry(Index.TARGET_VELOCITY, 0, 32, True),
+    OperationMode.CYCLIC_SYNC_POSITION: Entry(Index.TARGET_POSITION, 0, 32, True),
+    OperationMode.HOMING: Entry(Index.TARGET_POSITION, 0, 32, True),
 }
-CONTROLWORD: Final = Entry(0x6040, 0, 16)
-FEEDBACK: Final = (Entry(0x6041, 0, 16), Entry(0x6064, 0, 32, True), Entry(0x6077, 0, 16, True))
+CONTROLWORD: Final = Entry(Index.CONTROLWORD, 0, 16)
+FEEDBACK: Final = (
+    Entry(Index.STATUSWORD, 0, 16),
+    Entry(Index.POSITION_ACTUAL, 0, 32, True),
+    Entry(Index.TORQUE_ACTUAL, 0, 16, True),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +38,7 @@ class HomingSettings:
 
 @dataclass(frozen=True, slots=True)
 class DriveSettings:
-    """How the drive is to run. Rotary: rad and N m; linear drives: m and N."""
+    """Settings of the drive. Rotary: rad and N m; linear drives: m and N."""
 
     node_id: int = 5
     mode: OperationMode = OperationMode.CYCLIC_SYNC_TORQUE
@@ -44,6 +47,7 @@ class DriveSettings:
     serial_number: int | None = None  # None: any of the described type
     heartbeat_s: float = 0.02  # the drive's; it counts as lost after three
     missed_answers_allowed: int = 3  # SYNCs in a row without a TPDO before the data count as stale
+    rated_torque_n_m: float | None = None  # checked against 0x6076; None: not checked
     max_torque_n_m: float | None = None  # 0x6072; None: as the drive has it
     quick_stop_rad_s2: float | None = None  # 0x6085; None: as the drive has it
     command_transmission: int = EVENT_DRIVEN  # RPDO: acts at once (255) or at the next SYNC (1)
@@ -53,7 +57,7 @@ class DriveSettings:
 
 @dataclass(frozen=True, slots=True)
 class DriveInfo:
-    """What the drive said about itself. torque_resolution_n_m is one per mille of the rated torque (CiA 402)."""
+    """Units and ratings read from the drive. torque_resolution_n_m is one per mille of the rated torque (CiA 402)."""
 
     rad_per_count: float
     rated_torque_n_m: float
@@ -78,33 +82,37 @@ def set_up_drive(master: CanopenMaster, settings: DriveSettings) -> DriveAnswer:
     with DeviceSetup(master.network, node_id, settings.eds) as device:
         master.nmt(NMT_PRE_OPERATIONAL, node_id)
         device.check_identity(402, settings.serial_number)
-        if not device.read(0x6502) >> (settings.mode - 1) & 1:
+        if not device.read(Index.SUPPORTED_MODES) >> (settings.mode - 1) & 1:
             raise ConfigurationError(
                 "the drive does not have this mode", where=f"drive node {node_id}, object 0x6502",
                 given=settings.mode.name, advice="Choose another mode in the bench description.",
             )  # fmt: skip
         device.disable_pdos()
-        device.write_only(0x6040, 0, 0)
-        device.write_only(0x6060, 0, OperationMode.NONE)  # a mode left over must not enable on an old target
+        device.write_only(Index.CONTROLWORD, 0, 0)
+        device.write_only(
+            Index.MODE_OF_OPERATION, 0, OperationMode.NONE
+        )  # a mode left over must not enable on an old target
         info = _read_info(device, settings)
-        device.write(0x6060, 0, settings.mode, read_back=(0x6061, 0))
+        device.write(Index.MODE_OF_OPERATION, 0, settings.mode, read_back=(Index.MODE_DISPLAY, 0))
         if settings.max_torque_n_m is not None:
-            device.write(0x6072, 0, round(settings.max_torque_n_m / info.torque_resolution_n_m))
+            device.write(Index.MAX_TORQUE, 0, round(settings.max_torque_n_m / info.torque_resolution_n_m))
         if settings.quick_stop_rad_s2 is not None:
-            device.write(0x6085, 0, round(settings.quick_stop_rad_s2 / info.rad_per_count))
+            device.write(Index.QUICK_STOP_DECELERATION, 0, round(settings.quick_stop_rad_s2 / info.rad_per_count))
         if settings.mode is OperationMode.HOMING and settings.homing is not None:
             _write_homing(device, settings.homing, info.rad_per_count)
         _write_watchdogs(device, master, settings)
         commands = (CONTROLWORD, TARGET[settings.mode])
-        device.map_pdo(0x1400, commands, settings.command_transmission, 0x200 + node_id)
-        device.map_pdo(0x1800, FEEDBACK, EVERY_SYNC, 0x180 + node_id)
-        return DriveAnswer(info, device.read(0x6064), device.read(0x6041))
+        device.map_pdo(Index.RPDO_COMMUNICATION, commands, settings.command_transmission, 0x200 + node_id)
+        device.map_pdo(Index.TPDO_COMMUNICATION, FEEDBACK, EVERY_SYNC, 0x180 + node_id)
+        return DriveAnswer(info, device.read(Index.POSITION_ACTUAL), device.read(Index.STATUSWORD))
 
 
 def _read_info(device: DeviceSetup, settings: DriveSettings) -> DriveInfo:
-    counts_per_rev = device.read(0x608F, 1) / max(device.read(0x608F, 2), 1)
-    rated_torque_n_m = device.read(0x6076) / 1000
-    rated_current_a = device.read(0x6075) / 1000
+    counts_per_rev = device.read(Index.POSITION_ENCODER_RESOLUTION, 1) / max(
+        device.read(Index.POSITION_ENCODER_RESOLUTION, 2), 1
+    )
+    rated_torque_n_m = device.read(Index.RATED_TORQUE) / 1000
+    rated_current_a = device.read(Index.RATED_CURRENT) / 1000
     if min(counts_per_rev, rated_torque_n_m, rated_current_a) <= 0:
         raise ConfigurationError(
             "encoder resolution, rated torque and rated current must be positive",
@@ -112,6 +120,15 @@ def _read_info(device: DeviceSetup, settings: DriveSettings) -> DriveInfo:
             given=f"{counts_per_rev} counts/rev, {rated_torque_n_m} N m, {rated_current_a} A",
             advice="Set them with the drive's commissioning tool.",
         )  # fmt: skip
+    described_n_m = settings.rated_torque_n_m
+    if described_n_m is not None and abs(rated_torque_n_m - described_n_m) > 0.001 * described_n_m:
+        raise ConfigurationError(
+            "another rated torque than described",
+            where=f"drive node {device.node_id}, object 0x6076",
+            given=f"{rated_torque_n_m} N m",
+            allowed=f"{described_n_m} N m",
+            advice="Correct drive.rated_torque_n_m in the bench file, or the drive.",
+        )
     return DriveInfo(
         rad_per_count=settings.travel_per_rev / counts_per_rev,
         rated_torque_n_m=rated_torque_n_m,
@@ -122,20 +139,20 @@ def _read_info(device: DeviceSetup, settings: DriveSettings) -> DriveInfo:
 
 def _write_homing(device: DeviceSetup, homing: HomingSettings, rad_per_count: float) -> None:
     speed = round(homing.speed_rad_s / rad_per_count)
-    device.write(0x6098, 0, homing.method)
-    device.write(0x6099, 1, speed)
-    device.write(0x6099, 2, speed)
-    device.write(0x609A, 0, round(homing.acceleration_rad_s2 / rad_per_count))
-    device.write(0x607C, 0, round(homing.offset_rad / rad_per_count))
+    device.write(Index.HOMING_METHOD, 0, homing.method)
+    device.write(Index.HOMING_SPEEDS, 1, speed)
+    device.write(Index.HOMING_SPEEDS, 2, speed)
+    device.write(Index.HOMING_ACCELERATION, 0, round(homing.acceleration_rad_s2 / rad_per_count))
+    device.write(Index.HOME_OFFSET, 0, round(homing.offset_rad / rad_per_count))
 
 
 def _write_watchdogs(device: DeviceSetup, master: CanopenMaster, settings: DriveSettings) -> None:
     """Stop reactions, cycle times and heartbeats both ways."""
-    device.write(0x605A, 0, 2)  # quick stop: ramp, then SWITCH ON DISABLED
-    device.write(0x605E, 0, 2)  # fault reaction: the same ramp, then FAULT
-    device.write(0x6007, 0, 1)  # master lost: fault
-    device.write(0x1029, 1, 1)  # and stay operational, so that the master sees it
+    device.write(Index.QUICK_STOP_OPTION, 0, 2)  # quick stop: ramp, then SWITCH ON DISABLED
+    device.write(Index.FAULT_REACTION_OPTION, 0, 2)  # fault reaction: the same ramp, then FAULT
+    device.write(Index.ABORT_CONNECTION_OPTION, 0, 1)  # master lost: fault
+    device.write(Index.ERROR_BEHAVIOUR, 1, 1)  # and stay operational, so that the master sees it
     device.set_interpolation_time(settings.period_s)
-    device.write(0x1006, 0, round(settings.period_s * 1e6))
-    device.write(0x1016, 1, master.node_id << 16 | round(3000 * master.heartbeat_s))
-    device.write(0x1017, 0, round(1000 * settings.heartbeat_s))
+    device.write(Index.COMMUNICATION_CYCLE_PERIOD, 0, round(settings.period_s * 1e6))
+    device.write(Index.CONSUMER_HEARTBEAT_TIME, 1, master.node_id << 16 | round(3000 * master.heartbeat_s))
+    device.write(Index.PRODUCER_HEARTBEAT_TIME, 0, round(1000 * settings.heartbeat_s))

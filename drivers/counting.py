@@ -1,7 +1,5 @@
 """Counts to positions: wrap-around, direction, resolution. Pure; shared by all encoders."""
 
-from __future__ import annotations
-
 
 class Unwrapper:
     """Running total of a counter that wraps at `modulus` counts (2^n for n bits, or any range).

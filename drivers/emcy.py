@@ -1,7 +1,5 @@
 """EMCY messages decoded to text (CiA 301 table 26, CiA 402-2 error codes)."""
 
-from __future__ import annotations
-
 from typing import Final, NamedTuple
 
 # The most exact entry wins: whole code, then upper byte, then upper nibble.
@@ -48,7 +46,7 @@ class Emergency(NamedTuple):
 
     @property
     def text(self) -> str:
-        """What a person reads."""
+        """Message with code, class, error register and detail."""
         text = _CODES.get(self.code) or _BYTES.get(self.code >> 8) or _NIBBLES.get(self.code >> 12) or "unknown class"
         bits = [name for bit, name in enumerate(_REGISTER) if self.register >> bit & 1]
         register = f", error register: {', '.join(bits)}" if bits else ""
@@ -57,6 +55,6 @@ class Emergency(NamedTuple):
 
 
 def decode_emergency(data: bytes, time_s: float) -> Emergency:
-    """From an EMCY frame of 0..8 bytes; what is missing counts as zero."""
+    """Decode an EMCY frame of 0..8 bytes; missing bytes are zero."""
     padded = data.ljust(3, b"\0")
     return Emergency(time_s, int.from_bytes(padded[:2], "little"), padded[2], bytes(data[3:8]))

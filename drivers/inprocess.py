@@ -50,7 +50,7 @@ class InProcessPort:
         self._bus.forget_routes()
 
     def listeners(self, can_id: int) -> list[Listener]:
-        """Who on this port hears a frame."""
+        """Return the listeners of this port for a frame."""
         return self._listeners.get(can_id, []) + self._all
 
     def forget_routes(self) -> None:
@@ -62,7 +62,7 @@ class InProcessPort:
             listener(can_id, data, now_s)
 
     def poll(self, now_s: float, timeout_s: float = 0.0) -> None:
-        """Nothing waits on an ideal bus."""
+        """Do nothing: no frame waits on an ideal bus."""
 
     def close(self) -> None:
         self._bus.remove(self)
@@ -88,7 +88,7 @@ class InProcessBus:
             self.forget_routes()
 
     def listeners(self, can_id: int, *, but: InProcessPort) -> tuple[Listener, ...]:
-        """Who hears a frame of the port `but`: everybody else."""
+        """Return the listeners of all ports except `but` for a frame."""
         return tuple(heard for port in self._ports if port is not but for heard in port.listeners(can_id))
 
     def forget_routes(self) -> None:
@@ -98,7 +98,7 @@ class InProcessBus:
 
 
 class AsBusABC(can.BusABC):  # type: ignore[misc]  # python-can is not typed here
-    """Any `CanPort` as a python-can bus, for whoever wants one: canopen's own Network, python-can's loggers."""
+    """Adapter of a `CanPort` to a python-can bus, for canopen's own Network, python-can's loggers."""
 
     def __init__(self, port: CanPort, clock: Callable[[], float] = time.monotonic) -> None:
         self._port, self._clock = port, clock

@@ -30,9 +30,9 @@ def frame_bits(size: int) -> int:
 
 
 class FaultKind(StrEnum):
-    """What happens to a frame."""
+    """Fate of a frame on the bus."""
 
-    DROP = "drop"  # passes the bus, nobody receives it
+    DROP = "drop"  # passes the bus, no node receives it
     DELAY = "delay"  # its sender holds it back
     CORRUPT = "corrupt"  # its first byte arrives inverted (an error the CRC of the frame did not see)
     TRUNCATE = "truncate"  # arrives one byte short

@@ -1,7 +1,5 @@
 """Process data objects: mapping entries and their packing by `struct` (CiA 301, little-endian, 0.1 us per frame)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from struct import Struct

@@ -22,8 +22,6 @@ same as an error with the text a person needs.
     └── ResponseTimeout             a device does not answer during set-up
 """
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -85,7 +83,7 @@ class ResponseTimeout(DriverError):
 
 
 class Condition(IntFlag):
-    """What is wrong with a device, as seen from the loop; several bits may be set."""
+    """Faults of a device as seen from the loop; several bits may be set."""
 
     OK = 0
     LATE = 1  # no answer to the last SYNC yet: the sample is one or more cycles old
@@ -103,7 +101,7 @@ class Condition(IntFlag):
 
 
 class DriveGoal(IntEnum):
-    """What the loop wants of the drive; the controlwords follow from it and from the statusword."""
+    """Goal of the drive; its commands follow from the goal and its state."""
 
     DISABLED = 0  # power stage off, READY TO SWITCH ON
     ENABLED = 1  # OPERATION ENABLED
@@ -214,7 +212,7 @@ class Encoder(Protocol):
 
 
 class PlantLike(Protocol):
-    """What a simulated drive and encoder move and read (sensors as the devices would digitise them)."""
+    """Plant moved and read by a simulated drive and encoder (sensor values as digitised by the devices)."""
 
     @property
     def motor_position_rad(self) -> float: ...
@@ -232,7 +230,7 @@ class PlantLike(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class ServoTarget:
-    """What the loops inside a simulated drive follow."""
+    """Set-point of the loops inside a simulated drive."""
 
     velocity_rad_s: float
     position_rad: float | None = None  # None: velocity loop only

@@ -16,6 +16,7 @@ from canopen.objectdictionary import ODVariable, datatypes
 from canopen.sdo import SdoAbortedError, SdoClient, SdoCommunicationError
 
 from drivers.bus import CanPort
+from drivers.object_index import ObjectIndex as Index
 from drivers.pdo import PDO_INVALID, PDO_NO_RTR, Entry, layout
 from drivers.port import ConfigurationError, IdentityError, ResponseTimeout
 
@@ -102,7 +103,7 @@ class DeviceSetup:
         return int(value)
 
     def has(self, index: int, subindex: int = 0) -> bool:
-        """Whether the EDS knows the object."""
+        """Return True if the EDS has the object."""
         return self.dictionary.get_variable(index, subindex) is not None
 
     def write(self, index: int, subindex: int, value: int, *, read_back: tuple[int, int] | None = None) -> None:
@@ -132,11 +133,11 @@ class DeviceSetup:
         """Device profile (0x1000), vendor, product, major revision (0x1018) as in the EDS; serial number if given."""
         information = self.dictionary.device_information
         expected = [
-            ("device profile", 0x1000, 0, 0xFFFF, profile),
-            ("vendor-ID", 0x1018, 1, 0xFFFFFFFF, information.vendor_number),
-            ("product code", 0x1018, 2, 0xFFFFFFFF, information.product_number),
-            ("major revision", 0x1018, 3, 0xFFFF0000, information.revision_number),
-            ("serial number", 0x1018, 4, 0xFFFFFFFF, serial_number),
+            ("device profile", Index.DEVICE_TYPE, 0, 0xFFFF, profile),
+            ("vendor-ID", Index.IDENTITY, 1, 0xFFFFFFFF, information.vendor_number),
+            ("product code", Index.IDENTITY, 2, 0xFFFFFFFF, information.product_number),
+            ("major revision", Index.IDENTITY, 3, 0xFFFF0000, information.revision_number),
+            ("serial number", Index.IDENTITY, 4, 0xFFFFFFFF, serial_number),
         ]
         for name, index, subindex, mask, value in expected:
             if value is None:
@@ -153,7 +154,7 @@ class DeviceSetup:
         """Write a PDO as CiA 301 prescribes (invalid, number 0, entries, number, type, valid), reading each back."""
         layout(entries)
         mapping = communication + 0x200
-        flags = 0 if communication < 0x1800 else PDO_NO_RTR
+        flags = 0 if communication < Index.TPDO_COMMUNICATION else PDO_NO_RTR
         self.write_only(communication, 1, cob_id | flags | PDO_INVALID)
         self.write_only(mapping, 0, 0)
         for k, entry in enumerate(entries, start=1):
@@ -164,7 +165,8 @@ class DeviceSetup:
 
     def disable_pdos(self) -> None:
         """All PDOs the EDS knows: invalid, so that nothing unexpected moves or loads the bus."""
-        for index in (*range(0x1400, 0x1404), *range(0x1800, 0x1804)):
+        first = (Index.RPDO_COMMUNICATION, Index.TPDO_COMMUNICATION)
+        for index in (communication + k for communication in first for k in range(4)):
             if self.has(index, 1):
                 self.write_only(index, 1, self.read(index, 1) | PDO_INVALID)
 
@@ -173,11 +175,11 @@ class DeviceSetup:
         for exponent in range(0, -7, -1):
             value = round(period_s / 10.0**exponent)
             if 1 <= value <= 255 and abs(value * 10.0**exponent - period_s) < 1e-9 * period_s:
-                self.write(0x60C2, 2, exponent)
-                self.write(0x60C2, 1, value)
+                self.write(Index.INTERPOLATION_TIME, 2, exponent)
+                self.write(Index.INTERPOLATION_TIME, 1, value)
                 return
         raise ConfigurationError(
-            "the period cannot be expressed", where=self._where(0x60C2, 1), given=f"{period_s} s",
+            "the period cannot be expressed", where=self._where(Index.INTERPOLATION_TIME, 1), given=f"{period_s} s",
             allowed="1..255 x 10^n s", advice="Choose a period of 1, 2, 4 or 5 ms, or 500 or 250 us.",
         )  # fmt: skip
 

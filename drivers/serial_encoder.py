@@ -1,7 +1,5 @@
 """A linear encoder on a serial line (pyserial), read without blocking. Frames: see `drivers.serial_frames`."""
 
-from __future__ import annotations
-
 import os
 import stat
 from dataclasses import dataclass
@@ -15,7 +13,7 @@ from drivers.serial_frames import AsciiParser, BinaryParser, Parser, Reading
 
 
 class SerialFormat(StrEnum):
-    """What the encoder sends."""
+    """Format of the frames."""
 
     BINARY = "binary"
     ASCII = "ascii"
@@ -23,7 +21,7 @@ class SerialFormat(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class SerialSettings:
-    """How the encoder is connected. step_m: of one count (binary), and the resolution of the counts of a read-out."""
+    """Settings of the line. step_m: of one count (binary), and the resolution of the counts of a read-out."""
 
     device: str
     baudrate: int = 921_600
@@ -65,7 +63,7 @@ class SerialEncoder(Encoder):
         return self._parser.errors
 
     def set_up(self) -> None:
-        """Nothing to configure: the line is open and the device sends by itself."""
+        """Do nothing: the line is open and the device sends by itself."""
 
     def read(self, now_s: float) -> EncoderSample:
         """Take in what has arrived; the newest position, and what is wrong. Never raises, never waits."""
@@ -128,7 +126,7 @@ class SerialEncoder(Encoder):
         return data
 
     def _vanished(self) -> bool:
-        """Whether the device file is gone or another one."""
+        """Return True if the device file is gone or another one."""
         try:
             there, ours = os.stat(self.settings.device), os.fstat(self._line.fileno())
         except OSError:

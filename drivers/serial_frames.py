@@ -14,8 +14,6 @@ ASCII read-out, one line per position: optional sign, digits with a decimal poin
 feed with or without carriage return, as in "+00012.3456 mm\\r\\n". Without a unit: mm.
 """
 
-from __future__ import annotations
-
 import re
 from binascii import crc_hqx
 from struct import Struct

@@ -55,10 +55,10 @@ def simulate(bench: Bench, trajectory: Trajectory, *, seed: int | None = None, n
     from hil.bench.hardware import DriveSection, EncoderConnection, SimulationSection
     from hil.loop.clock import VirtualClock
     from hil.loop.devices import Rig
-    from hil.loop.session import make_cycle
+    from hil.loop.session import Session, make_cycle
     from hil.loop.simulated_bench import make_plant
     from hil.loop.supervision import Ending
-    from hil.loop.virtual import VirtualSession
+    from hil.loop.virtual import compiled_ticks
     from hil.motion.pieces import MotionLimits
     from hil.recording.recording import Recording
 
@@ -69,7 +69,13 @@ def simulate(bench: Bench, trajectory: Trajectory, *, seed: int | None = None, n
             f"{bench.name}; plan it with bench.period_s",
         )
     drive = (bench.drive or DriveSection()).model_copy(
-        update={"interface": "inprocess", "encoder": EncoderConnection(), "eds": None, "serial_number": None}
+        update={
+            "protocol": "canopen",
+            "interface": "inprocess",
+            "encoder": EncoderConnection(),
+            "eds": None,
+            "serial_number": None,
+        }
     )
     bench = bench.model_copy(update={"drive": drive, "simulation": bench.simulation or SimulationSection()})
     plant = make_plant(bench, seed)
@@ -81,7 +87,8 @@ def simulate(bench: Bench, trajectory: Trajectory, *, seed: int | None = None, n
     with Rig(bench, plant=plant) as rig:
         rig.set_up()
         cycle = make_cycle(rig, rig.drive.read(0.0).motor_position_rad)
-        outcome = VirtualSession(rig, cycle, trajectory, limits, VirtualClock(), rows).run()
+        ticks = compiled_ticks(rig, rows)
+        outcome = Session(rig, cycle, trajectory, limits, VirtualClock(), rows, ticks).run()
     if outcome.ending is not Ending.COMPLETE:
         raise HilError(f"{bench.name}: the simulated run stopped: {outcome.ending}: {outcome.reason}")
     columns = dict(zip(cycle.channels, np.ascontiguousarray(np.concatenate(rows.blocks).T), strict=True))

@@ -4,8 +4,6 @@ Every coordinate is kept as translation at the table: y = r theta for a rotary o
 hence J becomes J / r^2 [kg] and a torsional stiffness k_t / r^2 [N/m].
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import pi
@@ -43,7 +41,7 @@ class Nut:
 
 @dataclass(frozen=True)
 class AxisTruth:
-    """What the axis really is. Build it with one_mass, two_mass, seven_dof or serial_chain.
+    """True parameters of the axis. Build it with one_mass, two_mass, seven_dof or serial_chain.
 
     mass_kg: chain from the motor (first) to the table (last), as translation at the table.
     damping_ratio: of every elastic mode of the chain. None: C = a M + b K instead, with

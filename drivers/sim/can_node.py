@@ -5,20 +5,20 @@ What kind of device it is, a subclass says: `process_sync` moves and measures, `
 the SYNCs; where none come, somebody calls `tick`.
 """
 
-from __future__ import annotations
-
 import struct
 from enum import IntEnum
 from pathlib import Path
 from typing import Final
 
 from drivers.bus import CanPort
-from drivers.sim.object_dictionary import Dictionary
+from drivers.object_index import ObjectIndex as Index
+from drivers.sim.object_dictionary import Dictionary, key_of
 from drivers.sim.process_data import ProcessData
 from drivers.sim.sdo_server import AbortCode, SdoAbort, SdoServer
 
 EDS_FOLDER: Final = Path(__file__).parent.parent / "eds"
 _EMCY: Final = struct.Struct("<HB5s")
+_HISTORY: Final = key_of(Index.ERROR_HISTORY)
 HEARTBEAT_ERROR: Final = 0x8130  # EMCY: heartbeat consumer time-out, CiA 301 table 26
 
 
@@ -58,8 +58,8 @@ class SimulatedDevice:
         self._timer_s = 0.0
         self._last_s = 0.0
         self.mute = False  # fault injection: the node computes on but sends nothing
-        self.dictionary.on_write(0x1016, self._on_consumer_written)
-        self.dictionary.on_write(0x1017, self._on_producer_written)
+        self.dictionary.on_write(Index.CONSUMER_HEARTBEAT_TIME, self._on_consumer_written)
+        self.dictionary.on_write(Index.PRODUCER_HEARTBEAT_TIME, self._on_producer_written)
         port.listen(0x000, self._on_nmt)
         port.listen(0x080, self._on_sync)
         port.listen(0x600 + node_id, self._on_sdo)
@@ -116,7 +116,7 @@ class SimulatedDevice:
             self._consumed = dict.fromkeys(self._consumed, now_s + self._consumer_time_s())
             self._heartbeat_due_s = now_s
         self._last_s = now_s
-        period_s = self.dictionary.number(0x1017) / 1000
+        period_s = self.dictionary.number(Index.PRODUCER_HEARTBEAT_TIME) / 1000
         if period_s and now_s >= self._heartbeat_due_s:
             self._send(0x700 + self.node_id, bytes([self.nmt_state]), now_s)
             self._heartbeat_due_s = max(self._heartbeat_due_s + period_s, now_s)
@@ -124,23 +124,23 @@ class SimulatedDevice:
             if now_s >= deadline_s:
                 del self._consumed[node_id]
                 self.emergency(HEARTBEAT_ERROR, 0x11, now_s, bytes([node_id]))
-                if self.dictionary.number(0x1029, 1) == 0 and self.nmt_state is NmtState.OPERATIONAL:
+                if self.dictionary.number(Index.ERROR_BEHAVIOUR, 1) == 0 and self.nmt_state is NmtState.OPERATIONAL:
                     self._enter(NmtState.PRE_OPERATIONAL)
                 self.communication_lost(now_s)
         self._schedule(now_s)
 
     def _schedule(self, now_s: float) -> None:
         due = [*self._consumed.values()]
-        if self.dictionary.number(0x1017):
+        if self.dictionary.number(Index.PRODUCER_HEARTBEAT_TIME):
             due.append(self._heartbeat_due_s)
         self._last_s = now_s
         self._timer_s = min(due, default=float("inf"))
 
     def _consumer_time_s(self) -> float:
-        return (self.dictionary.number(0x1016, 1) & 0xFFFF) / 1000
+        return (self.dictionary.number(Index.CONSUMER_HEARTBEAT_TIME, 1) & 0xFFFF) / 1000
 
     def _on_consumer_written(self, index: int, subindex: int, value: int) -> None:
-        old = self.dictionary.number(0x1016, 1) >> 16 & 0x7F
+        old = self.dictionary.number(Index.CONSUMER_HEARTBEAT_TIME, 1) >> 16 & 0x7F
         node_id, time_ms = value >> 16 & 0x7F, value & 0xFFFF
         self._consumed.clear()
         if old:
@@ -178,10 +178,10 @@ class SimulatedDevice:
         """Send an EMCY, keep it in 0x1003 (newest first) and in the error register; code 0: errors reset."""
         self.values[0x1001_00] = register
         if code:
-            history = [self.dictionary.number(0x1003, k) for k in range(1, 9)]
+            history = [self.dictionary.number(Index.ERROR_HISTORY, k) for k in range(1, 9)]
             for k, entry in enumerate([code, *history[:7]], start=1):
-                self.values[0x1003_00 + k] = entry
-            self.values[0x1003_00] = min(self.dictionary.number(0x1003) + 1, 8)
+                self.values[_HISTORY + k] = entry
+            self.values[_HISTORY] = min(self.dictionary.number(Index.ERROR_HISTORY) + 1, 8)
         if self.nmt_state is not NmtState.STOPPED:
             self._send(0x080 + self.node_id, _EMCY.pack(code, register, detail), now_s)
 

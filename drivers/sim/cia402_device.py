@@ -1,7 +1,5 @@
 """State machine of CiA 402 as the drive runs it: which state a controlword leads to, and the statusword of a state."""
 
-from __future__ import annotations
-
 from typing import Final
 
 from drivers.cia402 import Controlword, DriveState, Statusword

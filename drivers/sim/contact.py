@@ -4,8 +4,6 @@ Records `p` and `s` are laid out in layout.py. Friction is in the motor's unit (
 linear axis N over m/s), nut forces are N.
 """
 
-from __future__ import annotations
-
 from math import atan, exp, pi, sin, sqrt
 from typing import Any
 

@@ -5,28 +5,34 @@ before, then the positions and torques of that instant go out. A torque that arr
 SYNC k thus acts from SYNC k to k + 1, one by a synchronous RPDO (type 1) from SYNC k + 1 on, as CiA 301 says.
 """
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 
 from drivers.bus import CanPort
 from drivers.cia402 import Controlword, DriveState, OperationMode, Statusword
+from drivers.object_index import ObjectIndex as Index
 from drivers.port import PlantLike, ServoLike, ServoTarget
 from drivers.sim.can_node import EDS_FOLDER, SimulatedDevice
 from drivers.sim.cia402_device import REMOTE, STATUS, next_state
-from drivers.sim.drive_loops import DriveLoops
-from drivers.sim.homing import Homing, HomingMethod, step_homing
+from drivers.sim.drive_loops import DriveLoops, Homing, HomingMethod, step_homing
 from drivers.sim.object_dictionary import key_of
 from drivers.sim.sdo_server import AbortCode, SdoAbort
 
-_CONTROLWORD, _STATUSWORD = key_of(0x6040), key_of(0x6041)
-_MODE, _MODE_DISPLAY = key_of(0x6060), key_of(0x6061)
-_POSITION, _VELOCITY, _TORQUE = key_of(0x6064), key_of(0x606C), key_of(0x6077)
-_MAX_TORQUE = key_of(0x6072)
-_TARGET_TORQUE, _TARGET_POSITION, _TARGET_VELOCITY = key_of(0x6071), key_of(0x607A), key_of(0x60FF)
-_ERROR_CODE, _QUICK_STOP_DECELERATION = key_of(0x603F), key_of(0x6085)
-_FOLLOWING_ERROR, _FOLLOWING_ERROR_WINDOW = key_of(0x60F4), key_of(0x6065)
+_CONTROLWORD, _STATUSWORD = key_of(Index.CONTROLWORD), key_of(Index.STATUSWORD)
+_MODE, _MODE_DISPLAY = key_of(Index.MODE_OF_OPERATION), key_of(Index.MODE_DISPLAY)
+_POSITION, _VELOCITY, _TORQUE = (
+    key_of(Index.POSITION_ACTUAL),
+    key_of(Index.VELOCITY_ACTUAL),
+    key_of(Index.TORQUE_ACTUAL),
+)
+_MAX_TORQUE = key_of(Index.MAX_TORQUE)
+_TARGET_TORQUE, _TARGET_POSITION, _TARGET_VELOCITY = (
+    key_of(Index.TARGET_TORQUE),
+    key_of(Index.TARGET_POSITION),
+    key_of(Index.TARGET_VELOCITY),
+)
+_ERROR_CODE, _QUICK_STOP_DECELERATION = key_of(Index.ERROR_CODE), key_of(Index.QUICK_STOP_DECELERATION)
+_FOLLOWING_ERROR, _FOLLOWING_ERROR_WINDOW = key_of(Index.FOLLOWING_ERROR_ACTUAL), key_of(Index.FOLLOWING_ERROR_WINDOW)
 
 _SERVO_MODES = (OperationMode.HOMING, OperationMode.CYCLIC_SYNC_POSITION, OperationMode.CYCLIC_SYNC_VELOCITY)
 _SWITCHED_ON = DriveState.SWITCHED_ON  # bound once: looking a member up costs the loop
@@ -62,16 +68,16 @@ class SimulatedDrive(SimulatedDevice):
         self.state = DriveState.NOT_READY_TO_SWITCH_ON
         self._controlword = 0
         super().__init__(port, eds, node_id)
-        self.dictionary.on_write(0x6040, self._on_controlword_sdo)
-        self.dictionary.on_write(0x6060, self._on_mode)
-        self.dictionary.on_write(0x60C2, self._on_interpolation_time)
-        self.dictionary.on_write(0x6098, self._on_homing_method)
+        self.dictionary.on_write(Index.CONTROLWORD, self._on_controlword_sdo)
+        self.dictionary.on_write(Index.MODE_OF_OPERATION, self._on_mode)
+        self.dictionary.on_write(Index.INTERPOLATION_TIME, self._on_interpolation_time)
+        self.dictionary.on_write(Index.HOMING_METHOD, self._on_homing_method)
         self._power_up()
 
     def _power_up(self) -> None:
         values = self.values
-        values[key_of(0x6076)] = self._rated_torque_mn_m
-        values[key_of(0x608F, 1)] = self._counts_per_rev
+        values[key_of(Index.RATED_TORQUE)] = self._rated_torque_mn_m
+        values[key_of(Index.POSITION_ENCODER_RESOLUTION, 1)] = self._counts_per_rev
         self._n_m_per_mille = self._rated_torque_mn_m / 1e6
         self._mille_per_n_m = 1e6 / self._rated_torque_mn_m
         self._counts_per_rad = self._counts_per_rev / self._travel_per_rev
@@ -98,7 +104,7 @@ class SimulatedDrive(SimulatedDevice):
         self._refresh_drive()
 
     def _refresh_drive(self) -> None:
-        """What follows from state and mode, worked out here and not every cycle."""
+        """Compute the values that depend on state and mode only, once for each change."""
         enabled = self.state is DriveState.OPERATION_ENABLED
         self._direct = enabled and self.values[_MODE] == OperationMode.CYCLIC_SYNC_TORQUE
         self._idle = not enabled and self.state not in _STOPPING
@@ -125,7 +131,7 @@ class SimulatedDrive(SimulatedDevice):
             self._torque_n_m = torque * self._n_m_per_mille
 
     def _take_controlword(self, now_s: float) -> None:
-        controlword, previous = self.dictionary.number(0x6040), self._controlword
+        controlword, previous = self.dictionary.number(Index.CONTROLWORD), self._controlword
         self._controlword = controlword
         state = next_state(self.state, controlword, previous, cause_gone=not self._fault_present)
         if state is not self.state:
@@ -141,8 +147,8 @@ class SimulatedDrive(SimulatedDevice):
             self._homing = None
         elif self._homing is None:
             number = self.dictionary.number
-            self._homing = Homing(HomingMethod(number(0x6098)), number(0x6099, 2), number(0x609A),
-                                  self._counts_per_rev)  # fmt: skip
+            method, speed = HomingMethod(number(Index.HOMING_METHOD)), number(Index.HOMING_SPEEDS, 2)
+            self._homing = Homing(method, speed, number(Index.HOMING_ACCELERATION), self._counts_per_rev)
             self._status(0)
 
     def trip(self, code: int, register: int, now_s: float, *, lasting: bool = False) -> None:
@@ -159,9 +165,9 @@ class SimulatedDrive(SimulatedDevice):
 
     def communication_lost(self, now_s: float) -> None:
         """Abort connection option code 0x6007: 0 nothing, 1 fault, 2 disable voltage, 3 quick stop."""
-        option = self.dictionary.number(0x6007)
+        option = self.dictionary.number(Index.ABORT_CONNECTION_OPTION)
         if option == 1:
-            self.values[_ERROR_CODE] = self.dictionary.number(0x1003, 1)
+            self.values[_ERROR_CODE] = self.dictionary.number(Index.ERROR_HISTORY, 1)
             self._react(DriveState.FAULT_REACTION_ACTIVE)
         elif option == 2 and self.state is not DriveState.FAULT:
             self._set_state(DriveState.SWITCH_ON_DISABLED)
@@ -198,7 +204,11 @@ class SimulatedDrive(SimulatedDevice):
 
     def _on_interpolation_time(self, index: int, subindex: int, value: int) -> None:
         number = self.dictionary.number
-        units, exponent = (value, number(0x60C2, 2)) if subindex == 1 else (number(0x60C2, 1), value)
+        units, exponent = (
+            (value, number(Index.INTERPOLATION_TIME, 2))
+            if subindex == 1
+            else (number(Index.INTERPOLATION_TIME, 1), value)
+        )
         if units == 0:
             raise SdoAbort(AbortCode.INVALID_VALUE)
         self._set_period(units * 10**exponent if exponent >= 0 else units / 10**-exponent)
@@ -260,11 +270,11 @@ class SimulatedDrive(SimulatedDevice):
     def _homing_target(self, before: Homing) -> ServoTarget:
         run = self._homing = step_homing(before, self._counts, self._last_counts, self.period_s)
         if run.attained and not before.attained:
-            self._offset_counts = run.reference - self.dictionary.number(0x607C)
+            self._offset_counts = run.reference - self.dictionary.number(Index.HOME_OFFSET)
         self._status(Statusword.HOMING_ATTAINED * run.attained | Statusword.TARGET_REACHED * run.done)
         return ServoTarget(run.velocity / self._counts_per_rad)
 
 
 def _wrap(counts: int) -> int:
-    """As an INTEGER32 holds it."""
+    """Wrap a value to INTEGER32."""
     return ((counts + 0x80000000) & 0xFFFFFFFF) - 0x80000000

@@ -1,6 +1,4 @@
-"""From torque command to torque at the motor shaft: delay, limit, dead zone, lag, torque constant, cogging."""
-
-from __future__ import annotations
+"""Drive path from torque command to motor shaft: delay, limit, dead zone, lag, torque constant, cogging."""
 
 from math import exp, sin, sqrt
 from typing import Any

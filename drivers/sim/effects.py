@@ -6,8 +6,6 @@ On a linear axis read N for n_m, m for rad, N s/m for n_m_s_rad; angles of the s
 The equations stand in contact.py (friction, nut), drive_path.py, sensors.py and kernel.py (table).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf, isfinite
@@ -178,7 +176,7 @@ class Effect:
 
     @property
     def delays_feedback(self) -> bool:
-        """Whether the motor encoder is late, which a loop on the bus would see as well."""
+        """True if the motor encoder is delayed, which a loop on the bus sees as well."""
         return self.id == "channel_time_skew" and self.form == "motor_position"
 
     @property

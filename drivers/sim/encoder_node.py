@@ -5,17 +5,20 @@
 On a bus it must stand behind the drive node, which moves the plant at the SYNC.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from drivers.bus import CanPort
+from drivers.object_index import ObjectIndex as Index
 from drivers.port import PlantLike
 from drivers.sim.can_node import EDS_FOLDER, SimulatedDevice
 from drivers.sim.object_dictionary import key_of
 
-_POSITION, _OFFSET, _ALARMS = key_of(0x6004), key_of(0x6509), key_of(0x6503)
-_STEP, _RANGE, _PARAMETERS = key_of(0x6005, 1), key_of(0x6002), key_of(0x6000)
+_POSITION, _OFFSET, _ALARMS = key_of(Index.ENCODER_POSITION), key_of(Index.ENCODER_OFFSET), key_of(Index.ENCODER_ALARMS)
+_STEP, _RANGE, _PARAMETERS = (
+    key_of(Index.ENCODER_STEP_SETTINGS, 1),
+    key_of(Index.ENCODER_MEASURING_RANGE),
+    key_of(Index.ENCODER_OPERATING_PARAMETERS),
+)
 _REVERSED = 0x0008
 _SENSOR_FAULT = 0x7310  # EMCY of the position error alarm
 _POSITION_ERROR = 0x0001  # alarm bit 0
@@ -36,14 +39,14 @@ class SimulatedEncoder(SimulatedDevice):
     ) -> None:
         self.plant, self._step_m, self._delivered_range = plant, step_m, range_counts
         super().__init__(port, eds, node_id)
-        self.dictionary.on_write(0x6000, self._on_parameters)
-        self.dictionary.on_write(0x6002, self._on_range)
-        self.dictionary.on_write(0x6003, self._on_preset)
+        self.dictionary.on_write(Index.ENCODER_OPERATING_PARAMETERS, self._on_parameters)
+        self.dictionary.on_write(Index.ENCODER_MEASURING_RANGE, self._on_range)
+        self.dictionary.on_write(Index.ENCODER_PRESET, self._on_preset)
         self._power_up()
 
     def _power_up(self) -> None:
         values = self.values
-        values[_STEP] = values[key_of(0x6501)] = round(self._step_m * 1e9)
+        values[_STEP] = values[key_of(Index.ENCODER_SINGLE_TURN_RESOLUTION)] = round(self._step_m * 1e9)
         values[_RANGE] = self._delivered_range
         self._set_range(self._delivered_range)
         self._refresh(values[_PARAMETERS], 0)

@@ -7,8 +7,6 @@ Leapfrog with friction as an impulse (Moreau's time stepping, diagonal M): posit
 second order in h for springs and torque, exact rest in stiction. A torque that changes at t_k acts with its mean there.
 """
 
-from __future__ import annotations
-
 from math import pi, sin, sqrt
 from typing import Any
 

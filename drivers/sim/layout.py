@@ -1,10 +1,8 @@
-"""What the compiled kernels work on: parameters of one simulated axis, its state, and delay lines.
+"""Records of the compiled kernels: parameters of one simulated axis, its state, and delay lines.
 
 Every effect of the catalogue is a nested record named by its id, holding `on`, `form` and its parameters; switched
 off it is all zeros. Adding an effect: one entry in effects.CATALOGUE (or NOVEL) and its term in a kernel.
 """
-
-from __future__ import annotations
 
 from pathlib import Path
 from typing import Any

@@ -3,8 +3,6 @@
 python -m drivers.sim.node --bus udp_multicast --channel 239.74.163.2
 """
 
-from __future__ import annotations
-
 import argparse
 import threading
 import time

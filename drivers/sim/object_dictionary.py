@@ -1,7 +1,5 @@
 """Object dictionary of a simulated node, built from its EDS: typed values, access rights, limits."""
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -31,7 +29,7 @@ def key_of(index: int, subindex: int = 0) -> int:
 
 @dataclass(frozen=True, slots=True)
 class Item:
-    """What the EDS says about one variable."""
+    """Description of one variable in the EDS."""
 
     index: int
     subindex: int
@@ -45,7 +43,7 @@ class Item:
 
     @property
     def entry(self) -> Entry:
-        """As mapped into a PDO."""
+        """Mapping entry of the variable."""
         return Entry(self.index, self.subindex, 8 * struct.calcsize(self.code), self.code.islower())
 
 
@@ -113,7 +111,7 @@ class Dictionary:
         self.values[key_of(index, subindex)] = value
 
 
-@cache  # reading an EDS takes milliseconds, and nobody changes the items
+@cache  # reading an EDS takes milliseconds, and the items do not change
 def _read_eds(eds: Path, node_id: int) -> dict[int, Item]:
     objects = canopen.import_od(str(eds), node_id=node_id).values()
     variables = [variable for o in objects for variable in ([o] if isinstance(o, ODVariable) else o.values())]

@@ -1,7 +1,5 @@
 """Turns axis, sensors and effects into the parameter record of the kernels."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from math import pi, sqrt
 from typing import Any

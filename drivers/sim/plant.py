@@ -1,7 +1,5 @@
 """The simulated reality of a servo axis: axis, sensors and concealed effects, moved in time."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import ceil, isfinite
 

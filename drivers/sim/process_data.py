@@ -1,7 +1,5 @@
 """PDOs of a simulated node: communication and mapping parameters (CiA 301, 7.5.2.35 ff.) compiled to struct packers."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from operator import itemgetter
@@ -9,12 +7,13 @@ from struct import Struct
 from typing import Any, Final
 
 from drivers.bus import CanPort, Listener
+from drivers.object_index import ObjectIndex as Index
 from drivers.pdo import PDO_INVALID, layout
 from drivers.sim.object_dictionary import Dictionary, Item, key_of
 from drivers.sim.sdo_server import AbortCode, SdoAbort
 
-RPDO_COMMUNICATION, RPDO_MAPPING = 0x1400, 0x1600
-TPDO_COMMUNICATION, TPDO_MAPPING = 0x1800, 0x1A00
+RPDO_COMMUNICATION, RPDO_MAPPING = int(Index.RPDO_COMMUNICATION), int(Index.RPDO_MAPPING)
+TPDO_COMMUNICATION, TPDO_MAPPING = int(Index.TPDO_COMMUNICATION), int(Index.TPDO_MAPPING)
 _LENGTH_TOO_SHORT: Final = 0x8210  # EMCY: PDO not processed due to length error
 _LENGTH_EXCEEDED: Final = 0x8220  # EMCY: PDO length exceeded
 

@@ -1,7 +1,5 @@
 """Recordings of the simulated reality under its servo: the whole closed loop in one compiled call."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any

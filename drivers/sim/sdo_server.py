@@ -3,8 +3,6 @@
 One request frame in, one response frame out; block transfers are aborted, as CiA 301 allows a server without them.
 """
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Callable
 from enum import IntEnum

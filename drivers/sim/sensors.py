@@ -1,7 +1,5 @@
 """Encoders and torque measurement of the simulated axis: resolution, offset, noise, sampling jitter."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, fields
 from math import cos, isfinite, log, pi, sin, sqrt
 from typing import Any
@@ -95,7 +93,7 @@ def sample(p: Any, s: Any, lines: Any) -> None:
 
 @njit(cache=True)
 def motor_truth(p: Any, s: Any) -> float:
-    """What the motor encoder would read without resolution and noise."""
+    """Reading of the motor encoder without resolution and noise."""
     e = p.encoder_eccentricity
     reading: float = s.position[0] / p.drive_ratio + p.motor_offset
     if e.on:
@@ -105,7 +103,7 @@ def motor_truth(p: Any, s: Any) -> float:
 
 @njit(cache=True)
 def table_truth(p: Any, s: Any) -> float:
-    """What the linear encoder, fixed to the machine base, would read without resolution and noise."""
+    """Reading of the linear encoder, fixed to the machine base, without resolution and noise."""
     e = p.scale_interpolation_error
     reading: float = s.position[p.table] + p.table_offset
     if p.base >= 0:

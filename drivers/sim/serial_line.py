@@ -4,8 +4,6 @@ Nothing is sent by itself: `send` puts out the position of this instant, at what
 cut frames can be put on the line, and the line can be taken away.
 """
 
-from __future__ import annotations
-
 import os
 import tty
 
@@ -46,14 +44,14 @@ class SimulatedSerialEncoder:
         return encode_frame(counts, self._sequence, status, elapsed_us)
 
     def put(self, data: bytes) -> None:
-        """Any bytes. What nobody reads is lost once the line is full, as on a real one."""
+        """Send any bytes; those that find the line full are lost, as on a real one."""
         try:
             os.write(self._master, data)
         except BlockingIOError:
             return
 
     def vanish(self) -> None:
-        """Pull the plug."""
+        """Close both ends, as when the plug is pulled."""
         for descriptor in (self._master, self._slave):
             if descriptor >= 0:
                 os.close(descriptor)

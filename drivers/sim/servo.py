@@ -10,8 +10,6 @@ v_meas is the backward difference of the motor encoder, or the derivative of its
 (q_k - q_k-2) / 2T, through an optional first-order filter. A linear axis: r = 1, metres and newtons.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, fields
 from enum import StrEnum
 from math import exp, isnan
@@ -25,7 +23,7 @@ from drivers.port import ServoTarget
 
 
 class VelocityEstimate(StrEnum):
-    """How the velocity loop gets its feedback from the motor encoder."""
+    """Estimate of the velocity from the motor encoder."""
 
     BACKWARD_DIFFERENCE = "backward_difference"
     TWO_SAMPLE_MEAN = "two_sample_mean"

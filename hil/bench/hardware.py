@@ -47,6 +47,7 @@ class SetPointLimits(_Model):
 class DriveSection(_Model):
     """Bus, drive and linear encoder, and what the loop allows before it stops the axis."""
 
+    protocol: str = Field("canopen", description="protocol of the drive, a key of hil.loop.devices.PROTOCOLS")
     interface: Literal["inprocess", "virtual", "udp_multicast", "socketcan"] = "inprocess"
     channel: str = Field("hil", description="socketcan: can0; udp_multicast: a group address")
     bitrate: Annotated[int, Field(ge=10_000, le=1_000_000, description="bit/s")] = 1_000_000

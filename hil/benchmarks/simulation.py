@@ -8,7 +8,7 @@ from hil.benchmarks.figure import Figure, best_of
 from hil.loop.clock import VirtualClock
 from hil.loop.devices import Rig
 from hil.loop.session import Session, make_cycle
-from hil.loop.virtual import VirtualSession
+from hil.loop.virtual import compiled_ticks
 from hil.recording.writer import Recorder
 from hil.twin.axis import Twin
 
@@ -16,7 +16,7 @@ REPEATS = 5
 TWIN_LAPS, TWIN_REPEATS = 10, 15
 
 
-def whole_bench(kind: type[Session]) -> float:
+def whole_bench(*, compiled: bool) -> float:
     """Times real time: the reference bench in virtual time, twin and recorder included."""
     bench, profile = two_mass(), moves()
     motion = trajectory(bench.gains.period_s)
@@ -27,7 +27,8 @@ def whole_bench(kind: type[Session]) -> float:
             cycle = make_cycle(rig, rig.drive.read(0.0).motor_position_rad)
             with Recorder(folder, "bench", cycle.channels, bench.gains.period_s, {}, lossless=True) as recorder:
                 start = perf_counter()
-                kind(rig, cycle, motion, profile.motion_limits, VirtualClock(), recorder).run()
+                ticks = compiled_ticks(rig, recorder) if compiled else None
+                Session(rig, cycle, motion, profile.motion_limits, VirtualClock(), recorder, ticks).run()
                 best_s = min(best_s, perf_counter() - start)
     return motion.duration_s / best_s
 
@@ -49,7 +50,7 @@ def figures() -> list[Figure]:
     return [
         Figure(
             "whole bench in virtual time",
-            whole_bench(VirtualSession),
+            whole_bench(compiled=True),
             real,
             200.0,
             False,
@@ -57,7 +58,7 @@ def figures() -> list[Figure]:
         ),
         Figure(
             "whole bench in virtual time, every frame",
-            whole_bench(Session),
+            whole_bench(compiled=False),
             real,
             None,
             False,

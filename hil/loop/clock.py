@@ -3,8 +3,6 @@
 Tick k is due at start + k x period, never at now + period: an error of one tick is not handed on to the next.
 """
 
-from __future__ import annotations
-
 import time
 from typing import Protocol
 
@@ -12,7 +10,7 @@ SPIN_S = 100e-6  # sleep up to here before the deadline, then spin: waking takes
 
 
 class Clock(Protocol):
-    """When the ticks of a loop come."""
+    """Times of the ticks of a loop."""
 
     def start(self) -> None:
         """Tick 0 is due now."""
@@ -24,7 +22,7 @@ class Clock(Protocol):
         """Time since the tick was due [s]."""
 
     def may_wait(self, tick: int, span_s: float) -> bool:
-        """Whether something may still happen within `span_s` after the tick was due."""
+        """Return True until `span_s` after the tick was due; waiting for late answers is allowed."""
 
 
 class WallClock:
@@ -60,7 +58,7 @@ class VirtualClock:
     """Time that passes as fast as the machine allows: every tick is on time and takes none."""
 
     def start(self) -> None:
-        """Nothing to do."""
+        """Do nothing."""
 
     def wait(self, tick: int) -> float:
         return 0.0

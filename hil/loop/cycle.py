@@ -2,19 +2,21 @@
 
     samples of tick k -> set-point for the drive;   twin: read -> the same law -> its own torque -> advance
 
-The twin runs its own closed loop along the same set-points, so that what it says depends on nothing measured. The
-torque of tick k is measured as the mean until tick k + 1, hence a row is complete one tick later: two take turns.
+The twin runs its own closed loop along the same set-points, independent of the measured values. The torque of tick k is
+measured as the mean until tick k + 1, so a row is complete one tick later; two rows are used in turn.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
 from enum import IntEnum, IntFlag
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
+from numba import njit, typeof
 
+from hil.arrays import FloatArray
 from hil.channels import AXIS_CHANNELS, AxisKind
 from hil.compiled.source_digest import source_digest
 from hil.control import cascade
@@ -22,33 +24,9 @@ from hil.motion.trajectory import Trajectory
 from hil.twin.axis import Start, Twin
 from hil.twin.stepping import kernel
 
-# Columns in the order the compiled part writes them; `_names` names them.
-(
-    TIME,
-    POSITION_COMMAND,
-    VELOCITY_COMMAND,
-    ACCELERATION_COMMAND,
-    MOTOR,
-    TABLE,
-    TORQUE_COMMAND,
-    TORQUE,
-    VELOCITY_REFERENCE,
-    TWIN_MOTOR,
-    TWIN_TABLE,
-    TWIN_TORQUE,
-    DRIVE_STATE,
-    ERROR_CODE,
-    SEGMENT,
-    LATENESS,
-    CYCLE,
-) = range(17)
-
-# Entries of `watch`: what the drive takes, and the limits of the axis.
-SETPOINT, FOLLOWING_ERROR, TRAVEL_LOW, TRAVEL_HIGH = range(4)
-
 
 class Setpoint(IntEnum):
-    """What the drive is given at each tick: both loops here, the position loop here, none here."""
+    """Quantity commanded to the drive: torque (both loops here), velocity (position loop here), or position."""
 
     TORQUE = 0
     VELOCITY = 1
@@ -56,11 +34,110 @@ class Setpoint(IntEnum):
 
 
 class Limit(IntFlag):
-    """Which limits of the axis are passed."""
+    """Limits of the axis that are passed."""
 
     NONE = 0
     FOLLOWING_ERROR = 1
     TRAVEL = 2
+
+
+@dataclass(frozen=True)
+class Watch:
+    """Quantity commanded to the drive, presence of a linear encoder, and limits of the axis [m]."""
+
+    setpoint: Setpoint
+    has_table: bool
+    following_error_m: float
+    travel_m: tuple[float, float]
+
+
+def _always(watch: Watch) -> bool:
+    return True
+
+
+def _with_table(watch: Watch) -> bool:
+    return watch.has_table
+
+
+def _with_velocity_loop(watch: Watch) -> bool:
+    return watch.setpoint is Setpoint.TORQUE
+
+
+def _with_position_loop(watch: Watch) -> bool:
+    return watch.setpoint is not Setpoint.POSITION
+
+
+class Column(IntEnum):
+    """Columns of a row, in order: channel (fields of `hil.channels.AxisChannels` in braces) and its condition.
+
+    A new channel is one line here and one line in `cycle`.
+    """
+
+    channel: str
+    present: Callable[[Watch], bool]
+
+    def __new__(cls, channel: str, present: Callable[[Watch], bool] = _always) -> Column:
+        column = int.__new__(cls, len(cls.__members__))
+        column._value_ = len(cls.__members__)
+        column.channel, column.present = channel, present
+        return column
+
+    TIME = "time_s"
+    POSITION_COMMAND = "{position_command}"
+    VELOCITY_COMMAND = "{velocity_command}"
+    ACCELERATION_COMMAND = "acceleration_command_m_s2"
+    MOTOR = "{motor_position}"
+    TABLE = "{table_position}", _with_table
+    TORQUE_COMMAND = "{torque_command}", _with_velocity_loop
+    TORQUE = "{torque}"
+    VELOCITY_REFERENCE = "velocity_reference_m_s", _with_position_loop
+    TWIN_MOTOR = "twin_{motor_position}"
+    TWIN_TABLE = "twin_{table_position}", _with_table
+    TWIN_TORQUE = "twin_{torque}"
+    DRIVE_STATE = "drive_state"
+    ERROR_CODE = "drive_error_code"
+    SEGMENT = "segment"
+    LATENESS = "lateness_s"
+    CYCLE = "cycle_s"
+
+
+class Samples(NamedTuple):
+    """Inputs of a tick; torque [N m or N] and cycle time belong to the tick before."""
+
+    motor: float  # rad or m
+    table: float  # m
+    torque: float
+    drive_state: int
+    error_code: int
+    lateness_s: float
+    cycle_s: float
+
+
+class Limits(NamedTuple):
+    """Quantity commanded to the drive (`Setpoint`) and limits of the axis [m]."""
+
+    setpoint: int
+    following_error_m: float
+    travel_low_m: float
+    travel_high_m: float
+
+
+class Law(NamedTuple):
+    """A controller: gains, and the values of `cascade.State` (6,), which a step changes."""
+
+    gains: cascade.Gains
+    state: FloatArray
+
+
+class Loop(NamedTuple):
+    """Arguments of the compiled cycle that stay the same objects during a run."""
+
+    limits: Limits
+    law: Law
+    twin_law: Law
+    twin: tuple[Any, ...]  # arrays of the kernel, with modal state and memory at the end
+    rows: FloatArray  # (2, columns + 1): in turn; values of absent columns go to the last place
+    place: np.ndarray[Any, np.dtype[np.int64]]  # (len(Column),): place of each column in a row
 
 
 _read, _advance, _step = kernel.read, kernel.advance, cascade.step
@@ -69,13 +146,11 @@ _FOLLOWING_ERROR, _TRAVEL = int(Limit.FOLLOWING_ERROR), int(Limit.TRAVEL)
 
 
 @njit(_nrt=False, error_model="numpy")  # no references counted: see hil.twin.stepping.kernel
-def _controller(law, state, position, velocity, motor, table):  # type: ignore[no-untyped-def]
-    """One step of `hil.control.cascade` on arrays: gains (11,), state (6,)."""
-    gains = cascade.Gains(
-        law[0], law[1], law[2], law[3], law[4], law[5], law[6], int(law[7]), law[8] != 0.0, law[9] != 0.0, law[10]
-    )
+def _control(law, position, velocity, motor, table):  # type: ignore[no-untyped-def]
+    """One step of `hil.control.cascade`, the state kept in an array."""
+    state = law.state
     before = cascade.State(int(state[0]), state[1], state[2], state[3], state[4], state[5])
-    after, out = _step(gains, before, cascade.Inputs(position, velocity, motor, table))
+    after, out = _step(law.gains, before, cascade.Inputs(position, velocity, motor, table))
     state[0], state[1], state[2] = after.tick, after.velocity_reference_m_s, after.integral_n_m
     state[3], state[4] = after.previous_motor_rad, after.previous2_motor_rad
     state[5] = after.filtered_velocity_rad_s
@@ -84,67 +159,44 @@ def _controller(law, state, position, velocity, motor, table):  # type: ignore[n
 
 def _build_cycle(digest: str) -> Any:
     @njit(cache=True, _nrt=False, error_model="numpy")
-    def cycle(  # type: ignore[no-untyped-def]
-        tick,
-        index,
-        motor,
-        table,
-        torque,
-        drive_state,
-        error_code,
-        lateness,
-        cycle_s,
-        setpoints,
-        watch,
-        laws,
-        states,
-        constants,
-        modes,
-        values,
-        codes,
-        delta,
-        memory,
-        rows,
-        place,
-    ):
-        """Tick `tick` with the set-points of row `index`: completes the row before (torque, cycle time) and fills this
-        one; set-point for the drive, and the limits passed."""
+    def cycle(tick, first, samples, setpoints, loop):  # type: ignore[no-untyped-def]
+        """Tick `tick` of set-points (n, 4) that begin at tick `first`: completes the row before (torque, cycle time)
+        and fills this one. Returns the set-point for the drive and the limits passed."""
         assert digest
-        law = laws[0]
-        ratio, period = law[5], law[6]
+        gains, limits, place = loop.law.gains, loop.limits, loop.place
+        index = min(tick - first, setpoints.shape[0] - 1)
         position, velocity = setpoints[index, 0], setpoints[index, 1]
-        command, reference = _controller(law, states[0], position, velocity, motor, table)
-        twin_motor, twin_table = _read(constants, modes, values, codes, delta, memory)
-        twin_command, _ = _controller(laws[1], states[1], position, velocity, twin_motor, twin_table)
-        twin_torque = _advance(twin_command, constants, modes, values, codes, delta, memory)
-        before, row = rows[(tick + 1) & 1], rows[tick & 1]
-        before[place[TORQUE]] = torque
-        before[place[CYCLE]] = cycle_s
-        row[place[TIME]] = tick * period
-        row[place[POSITION_COMMAND]] = position
-        row[place[VELOCITY_COMMAND]] = velocity
-        row[place[ACCELERATION_COMMAND]] = setpoints[index, 2]
-        row[place[SEGMENT]] = setpoints[index, 3]
-        row[place[MOTOR]] = motor
-        row[place[TABLE]] = table
-        row[place[TORQUE_COMMAND]] = command
-        row[place[VELOCITY_REFERENCE]] = reference
-        row[place[TWIN_MOTOR]] = twin_motor
-        row[place[TWIN_TABLE]] = twin_table
-        row[place[TWIN_TORQUE]] = twin_torque
-        row[place[DRIVE_STATE]] = drive_state
-        row[place[ERROR_CODE]] = error_code
-        row[place[LATENESS]] = lateness
-        actual = ratio * motor
+        command, reference = _control(loop.law, position, velocity, samples.motor, samples.table)
+        twin_motor, twin_table = _read(*loop.twin)
+        twin_command, _ = _control(loop.twin_law, position, velocity, twin_motor, twin_table)
+        twin_torque = _advance(twin_command, *loop.twin)
+        before, row = loop.rows[(tick + 1) & 1], loop.rows[tick & 1]
+        before[place[Column.TORQUE]] = samples.torque
+        before[place[Column.CYCLE]] = samples.cycle_s
+        row[place[Column.TIME]] = tick * gains.period_s
+        row[place[Column.POSITION_COMMAND]] = position
+        row[place[Column.VELOCITY_COMMAND]] = velocity
+        row[place[Column.ACCELERATION_COMMAND]] = setpoints[index, 2]
+        row[place[Column.SEGMENT]] = setpoints[index, 3]
+        row[place[Column.MOTOR]] = samples.motor
+        row[place[Column.TABLE]] = samples.table
+        row[place[Column.TORQUE_COMMAND]] = command
+        row[place[Column.VELOCITY_REFERENCE]] = reference
+        row[place[Column.TWIN_MOTOR]] = twin_motor
+        row[place[Column.TWIN_TABLE]] = twin_table
+        row[place[Column.TWIN_TORQUE]] = twin_torque
+        row[place[Column.DRIVE_STATE]] = samples.drive_state
+        row[place[Column.ERROR_CODE]] = samples.error_code
+        row[place[Column.LATENESS]] = samples.lateness_s
+        actual = gains.ratio_m_rad * samples.motor
         passed = 0
-        if abs(position - actual) > watch[FOLLOWING_ERROR]:
+        if abs(position - actual) > limits.following_error_m:
             passed |= _FOLLOWING_ERROR
-        if not watch[TRAVEL_LOW] <= actual <= watch[TRAVEL_HIGH]:
+        if not limits.travel_low_m <= actual <= limits.travel_high_m:
             passed |= _TRAVEL
-        kind = int(watch[SETPOINT])
-        if kind == _TO_TORQUE:
+        if limits.setpoint == _TO_TORQUE:
             return command, passed
-        return (reference if kind == _TO_VELOCITY else position) / ratio, passed
+        return (reference if limits.setpoint == _TO_VELOCITY else position) / gains.ratio_m_rad, passed
 
     return cycle
 
@@ -152,91 +204,65 @@ def _build_cycle(digest: str) -> Any:
 compiled_cycle = _build_cycle(source_digest())
 
 
-@dataclass(frozen=True)
-class Watch:
-    """What the drive takes, whether a linear encoder is there, and the limits of the axis [m]."""
-
-    setpoint: Setpoint
-    has_table: bool
-    following_error_m: float
-    travel_m: tuple[float, float]
-
-
-def _names(kind: AxisKind, watch: Watch) -> tuple[str, ...]:
-    """Channel of each column; "" where this bench has none: CSV and CSP have the velocity loop in the drive."""
-    axis = AXIS_CHANNELS[kind]
-    table = axis.table_position if watch.has_table else ""
-    return (
-        "time_s", axis.position_command, axis.velocity_command, "acceleration_command_m_s2", axis.motor_position,
-        table, axis.torque_command if watch.setpoint is Setpoint.TORQUE else "", axis.torque,
-        "velocity_reference_m_s" if watch.setpoint is not Setpoint.POSITION else "",
-        f"twin_{axis.motor_position}", f"twin_{table}" if table else "", f"twin_{axis.torque}",
-        "drive_state", "drive_error_code", "segment", "lateness_s", "cycle_s",
-    )  # fmt: skip
-
-
 class Cycle:
     """Controller, live twin and rows of one run, for an axis at rest at `motor_position` [rad or m]."""
 
     def __init__(self, twin: Twin, kind: AxisKind, watch: Watch, motor_position: float) -> None:
-        names = _names(kind, watch)
-        self.channels = tuple(name for name in names if name)
-        width = len(self.channels)
-        self._place = np.array([self.channels.index(name) if name else width for name in names], dtype=np.int64)
-        self._rows = np.zeros((2, width + 1))  # the last value is thrown away
-        self._views = tuple(memoryview(row)[:width] for row in self._rows)  # type: ignore[arg-type]
+        names = asdict(AXIS_CHANNELS[kind])
+        present = [column for column in Column if column.present(watch)]
+        self.channels = tuple(column.channel.format(**names) for column in present)
+        width = len(present)
+        place = np.array([present.index(column) if column in present else width for column in Column], dtype=np.int64)
+        rows = np.zeros((2, width + 1))
+        self._views = tuple(memoryview(row)[:width] for row in rows)  # type: ignore[arg-type]
         gains, ratio = twin.gains, twin.gains.ratio_m_rad
         delta, memory = twin.state(Start(ratio * motor_position))
-        start = cascade.init(motor_position, period_s=gains.period_s)
-        laws = np.array([gains, twin.loop_gains], dtype=np.float64)
-        states = np.array([start, start], dtype=np.float64)
-        limits = np.array([watch.setpoint, watch.following_error_m, *watch.travel_m], dtype=np.float64)
-        self.state_arrays = (states, delta, memory, self._rows)  # what a step changes
-        self.arrays = (limits, laws, states, *twin.arrays(), delta, memory, self._rows, self._place)
+        start = np.array(cascade.init(motor_position, period_s=gains.period_s), dtype=np.float64)
+        self.loop = Loop(
+            Limits(int(watch.setpoint), watch.following_error_m, *watch.travel_m),
+            Law(gains, start.copy()),
+            Law(twin.loop_gains, start.copy()),
+            (*twin.arrays(), delta, memory),
+            rows,
+            place,
+        )
+        self.state_arrays = (self.loop.law.state, self.loop.twin_law.state, delta, memory, rows)  # changed by a step
+        self.first_tick = 0  # of the set-points
         self.setpoints = np.array([[ratio * motor_position, 0.0, 0.0, 0.0]])
+        # Compiled for these types here; a call of the result omits the look-up of types, which takes 3 us for records.
+        arguments = (0, 0, Samples(0.0, 0.0, 0.0, 0, 0, 0.0, 0.0), self.setpoints, self.loop)
+        self._compiled = compiled_cycle.compile(tuple(typeof(argument) for argument in arguments))
 
-    def follow(self, trajectory: Trajectory, segment: int | None = None) -> None:
-        """Set-points from here on; index 0 is its first. segment: number recorded instead of the trajectory's own."""
+    def follow(self, trajectory: Trajectory, first_tick: int = 0, segment: int | None = None) -> None:
+        """Take set-points that begin at `first_tick`. segment: number recorded instead of the trajectory's own."""
         segments = trajectory.segment if segment is None else np.full(len(trajectory), segment)
+        self.first_tick = first_tick
         self.setpoints = np.column_stack(
             (trajectory.position_m, trajectory.velocity_m_s, trajectory.acceleration_m_s2, segments)
-        )
+        ).astype(np.float64, order="C", copy=False)
+
+    def setpoint(self, tick: int) -> tuple[float, float, float]:
+        """Position, velocity and acceleration set-point of a tick [m, m/s, m/s^2]; the last ones are held."""
+        position, velocity, acceleration, _ = self.setpoints[min(tick - self.first_tick, len(self.setpoints) - 1)]
+        return float(position), float(velocity), float(acceleration)
 
     @property
     def velocity_m_s(self) -> float:
-        """Of the motor at the last step, as the controller sees it, at the table."""
-        laws, states = self.arrays[1:3]
-        return float(states[0, 5] * laws[0, 5])
+        """Motor velocity at the last step as the controller estimates it, at the table."""
+        velocity_rad_s = cascade.State(*self.loop.law.state.tolist()).filtered_velocity_rad_s
+        return velocity_rad_s * self.loop.law.gains.ratio_m_rad
 
-    def step(
-        self, tick: int, index: int, motor: float, table: float, torque: float, drive_state: int, error_code: int,
-        lateness_s: float, cycle_s: float,
-    ) -> tuple[float, int]:  # fmt: skip
-        """Tick `tick`: motor [rad or m], table [m], and of the tick before its torque [N m or N] and cycle time.
-
-        Set-point for the drive in its unit, and the limits passed (`Limit`).
-        """
-        result: tuple[float, int] = compiled_cycle(
-            tick,
-            index,
-            motor,
-            table,
-            torque,
-            drive_state,
-            error_code,
-            lateness_s,
-            cycle_s,
-            self.setpoints,
-            *self.arrays,
-        )
+    def step(self, tick: int, samples: Samples) -> tuple[float, int]:
+        """Compute tick `tick`: set-point for the drive in its unit, and the limits passed (`Limit`)."""
+        result: tuple[float, int] = self._compiled(tick, self.first_tick, samples, self.setpoints, self.loop)
         return result
 
     def row(self, tick: int) -> memoryview:
-        """The row of a tick, complete after the step of the next one or `complete`."""
+        """Return the row of a tick, complete after the step of the next one or `complete`."""
         return self._views[tick & 1]
 
     def complete(self, tick: int, torque: float, cycle_s: float) -> memoryview:
-        """The row of the last tick, with what came after it."""
-        row = self._rows[tick & 1]
-        row[self._place[TORQUE]], row[self._place[CYCLE]] = torque, cycle_s
+        """Complete and return the row of the last tick with its torque and cycle time."""
+        row, place = self.loop.rows[tick & 1], self.loop.place
+        row[place[Column.TORQUE]], row[place[Column.CYCLE]] = torque, cycle_s
         return self._views[tick & 1]

@@ -2,15 +2,13 @@
 
 On the in-process bus a SYNC returns when every node has answered. On a python-can bus the simulated nodes have their
 own connection and are served by the loop's own polling, so that no second thread disturbs it; real devices answer
-by themselves.
+by themselves. Another protocol is a subclass of `Devices` and one line in `PROTOCOLS`.
 """
-
-from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
-from typing import Protocol, Self
+from typing import Self
 
 from drivers.bus import BusConfig, CanPort, PumpedPort, PythonCanPort, open_bus
 from drivers.canopen_drive import CanopenDrive, DriveSettings
@@ -19,7 +17,7 @@ from drivers.canopen_master import CanopenMaster
 from drivers.cia402 import OperationMode
 from drivers.inprocess import InProcessBus
 from drivers.modelled_bus import frame_bits
-from drivers.port import ConfigurationError, Drive, DriverError, Encoder, Master, PlantLike
+from drivers.port import Drive, DriverError, Encoder, Master, PlantLike
 from drivers.sdo_setup import EDS_FOLDER
 from drivers.serial_encoder import SerialEncoder, SerialFormat, SerialSettings
 from hil.bench.bench_file import Bench
@@ -35,30 +33,54 @@ MODES = {
 _TARGET_BYTES = {DriveMode.CST: 2, DriveMode.CSV: 4, DriveMode.CSP: 4}
 
 
-class Devices(Protocol):
-    """What a session needs: the bench, its devices behind the port, and nothing of their protocol."""
+class Devices:
+    """Opened devices of a bench behind `drivers.port`; a context manager. Each protocol has a subclass."""
 
     bench: Bench
     section: DriveSection
+    master: Master
+    drive: Drive
+    encoder: Encoder | None
 
-    @property
-    def master(self) -> Master: ...
+    def set_up(self) -> None:
+        """Configure the devices, power stage off; blocking. Raises HilError if a device refuses."""
+        try:
+            self.drive.set_up()
+            if self.encoder is not None:
+                self.encoder.set_up()
+        except DriverError as error:
+            raise HilError(str(error)) from error
 
-    @property
-    def drive(self) -> Drive: ...
+    def bus_load(self) -> float:
+        """Share of the bus's time used in each period; 0 where the protocol has no limit."""
+        return 0.0
 
-    @property
-    def encoder(self) -> Encoder | None: ...
+    def close(self) -> None:
+        """Close the connections."""
+        if self.encoder is not None:
+            self.encoder.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
 
 
-class Rig:
-    """Bus, drive and encoder of a bench; a context manager. `nodes` are the simulated devices, None on real ones;
-    `ports` the connections to a python-can bus, the master's first.
+class Rig(Devices):
+    """CANopen bus, CiA 402 drive and encoder of a bench. `nodes` are the simulated devices, None on real ones; `ports`
+    the connections to a python-can bus, the master's first.
 
-    bus: an in-process bus to use instead of opening one (for injecting faults). plant: what the simulated devices move
+    bus: an in-process bus to use instead of opening one (for injecting faults). plant: moved by the simulated devices
     instead of the bench's axis. Raises FieldError for a bench that cannot be run, HilError when a device cannot be
     opened.
     """
+
+    master: CanopenMaster
+    drive: CanopenDrive
+    encoder: CanopenEncoder | SerialEncoder | None
 
     def __init__(
         self, bench: Bench, seed: int | None = None, bus: InProcessBus | None = None, plant: PlantLike | None = None
@@ -66,7 +88,7 @@ class Rig:
         self.bench, self.section = bench, bench.drive or DriveSection()
         check_runnable(bench)
         self.nodes: SimulatedNodes | None = None
-        self.encoder: CanopenEncoder | SerialEncoder | None = None
+        self.encoder = None
         self.ports: list[CanPort] = []
         try:
             self.port = self._connect(bus, lambda port: SimulatedNodes(bench, port, seed, plant))
@@ -80,24 +102,6 @@ class Rig:
             self.close()
             raise HilError(str(error)) from error
 
-    def set_up(self) -> None:
-        """Configure the devices, power stage off; blocking. Raises HilError with what a device refused."""
-        try:
-            self.drive.set_up()
-            rated = self.section.rated_torque_n_m
-            if rated is not None and abs(self.drive.info.rated_torque_n_m - rated) > 0.001 * rated:
-                raise ConfigurationError(
-                    "another rated torque than described",
-                    where=f"drive node {self.section.node_id}, object 0x6076",
-                    given=f"{self.drive.info.rated_torque_n_m} N m",
-                    allowed=f"{rated} N m",
-                    advice="Correct drive.rated_torque_n_m in the bench file, or the drive.",
-                )
-            if self.encoder is not None:
-                self.encoder.set_up()
-        except DriverError as error:
-            raise HilError(str(error)) from error
-
     def bus_load(self) -> float:
         """Share of the bus's time that SYNC, RPDO, TPDO and encoder take, with the longest bit stuffing."""
         frames = [0, 2 + _TARGET_BYTES[self.section.mode], 8]
@@ -106,22 +110,12 @@ class Rig:
         return sum(map(frame_bits, frames)) / (self.section.bitrate * self.bench.gains.period_s)
 
     def close(self) -> None:
-        """Close encoder line and bus."""
-        if self.encoder is not None:
-            self.encoder.close()
+        super().close()
         for port in self.ports:
             port.close()
         if self.nodes is not None:
             self.nodes.close()
         self.ports = []
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def _connect(self, bus: InProcessBus | None, simulate: Callable[[CanPort], SimulatedNodes]) -> CanPort:
         if self.section.interface == "inprocess":
@@ -144,7 +138,7 @@ class Rig:
             node_id=section.node_id, mode=MODES[section.mode], period_s=self.bench.gains.period_s,
             eds=Path(section.eds) if section.eds else EDS_FOLDER / "servo_drive.eds",
             serial_number=section.serial_number, heartbeat_s=section.heartbeat_s,
-            missed_answers_allowed=section.missed_answers)  # fmt: skip
+            missed_answers_allowed=section.missed_answers, rated_torque_n_m=section.rated_torque_n_m)  # fmt: skip
 
     def _open_encoder(self) -> CanopenEncoder | SerialEncoder:
         connection, table = self.section.encoder, self.bench.encoders.table
@@ -162,8 +156,20 @@ class Rig:
             reversed=table.direction < 0, latency_s=connection.latency_s))  # fmt: skip
 
 
+# Protocol of the drive (`drive.protocol` of the bench file) -> its devices, made from bench and seed of the sensors.
+PROTOCOLS: dict[str, Callable[[Bench, int | None], Devices]] = {"canopen": Rig}
+
+
+def open_devices(bench: Bench, seed: int | None = None) -> Devices:
+    """Open the devices of a bench by its protocol. Raises FieldError for an unknown one, and as the protocol does."""
+    protocol = (bench.drive or DriveSection()).protocol
+    if protocol not in PROTOCOLS:
+        raise FieldError(("drive", "protocol"), f"given {protocol}, allowed {', '.join(PROTOCOLS)}; correct it")
+    return PROTOCOLS[protocol](bench, seed)
+
+
 def check_runnable(bench: Bench) -> None:
-    """Raise FieldError at the field for which a bench cannot be run."""
+    """Raise FieldError at the field for which a bench cannot be run over CANopen."""
     section = bench.drive or DriveSection()
     if bench.drive is None and bench.simulation is None:
         raise FieldError(

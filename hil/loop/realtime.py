@@ -1,4 +1,4 @@
-"""Make this process as punctual as the machine allows, say what was granted, and measure what it is worth.
+"""Request real-time conditions for this process, report the granted ones, and measure the jitter.
 
 Linux, without a module outside the standard library. Nothing here is needed for the loop to run: each setting is tried,
 and what was refused (mostly for want of rights) is reported with its reason.
@@ -39,7 +39,7 @@ class Grant:
 
 @dataclass(frozen=True)
 class Jitter:
-    """How late the ticks of a loop were [s]."""
+    """Lateness of the ticks of a loop [s]."""
 
     ticks: int
     p50_s: float
@@ -49,7 +49,7 @@ class Jitter:
 
     @classmethod
     def of(cls, lateness_s: list[float], period_s: float) -> Jitter:
-        """Of the lateness of each tick; nearest-rank percentiles."""
+        """Compute from the lateness of each tick; nearest-rank percentiles."""
         ordered = sorted(lateness_s) or [0.0]
 
         def rank(part: float) -> float:
@@ -59,7 +59,7 @@ class Jitter:
 
     @property
     def text(self) -> str:
-        """For a person."""
+        """Percentiles and missed ticks in one line."""
         return (
             f"p50 {1e6 * self.p50_s:.0f} us, p99 {1e6 * self.p99_s:.0f} us, largest {1e6 * self.max_s:.0f} us, "
             f"{self.missed} of {self.ticks} ticks missed"
@@ -109,7 +109,7 @@ def measure_jitter(period_s: float, duration_s: float = 0.5, clock: WallClock | 
 
 
 def machine_state() -> dict[str, Any]:
-    """What decides how punctual this machine can be: kernel, preemption, governor, throttling, cores."""
+    """Read the settings that limit the punctuality of this machine: kernel, preemption, governor, throttling, cores."""
 
     def read(path: str) -> str:
         try:

@@ -1,7 +1,5 @@
 """One run of a profile on a bench: open, set up, prepare for real time, arm, move, record."""
 
-from __future__ import annotations
-
 import contextlib
 import signal
 import sys
@@ -18,12 +16,12 @@ from hil.bench.bench_file import Bench
 from hil.bench.hardware import DriveSection, EncoderConnection, SimulationSection
 from hil.errors import FieldError
 from hil.loop.clock import Clock, VirtualClock, WallClock
-from hil.loop.devices import Rig
+from hil.loop.devices import Devices, Rig, open_devices
 from hil.loop.realtime import Jitter, NotPunctual, check_punctual, measure_jitter, now_text, real_time, report
 from hil.loop.session import Outcome, Session, make_cycle
 from hil.loop.simulated_bench import make_plant
 from hil.loop.supervision import Ending
-from hil.loop.virtual import VirtualSession
+from hil.loop.virtual import compiled_ticks
 from hil.motion.profile import Profile
 from hil.motion.trajectory import Trajectory, plan
 from hil.recording.writer import Recorder, run_metadata
@@ -34,7 +32,7 @@ VIRTUAL_START = "virtual time"  # where a recording names the start of a run
 
 @dataclass(frozen=True)
 class RunResult:
-    """What came of a run. `recording`: the Parquet file. `jitter` of its ticks, `doubts`: what was overridden."""
+    """Result of a run. recording: the Parquet file; jitter: of its ticks; doubts: refusals that were overridden."""
 
     outcome: Outcome
     recording: Path | None
@@ -44,7 +42,7 @@ class RunResult:
 
     @property
     def complete(self) -> bool:
-        """Whether the profile was run to its end."""
+        """True if the profile was run to its end."""
         return self.outcome.ending is Ending.COMPLETE
 
 
@@ -58,7 +56,7 @@ def run_profile(
     force: bool = False,
     seed: int | None = None,
     planned: Callable[[Trajectory], None] | None = None,
-    rig: Rig | None = None,
+    rig: Devices | None = None,
 ) -> RunResult:
     """Run a profile on a bench and record it as `folder`/`name`.parquet.
 
@@ -75,7 +73,7 @@ def run_profile(
         seed = bench.simulation.seed
     with contextlib.ExitStack() as stack:
         if rig is None:
-            rig = stack.enter_context(Rig(bench, seed))
+            rig = stack.enter_context(open_devices(bench, seed))
         rig.set_up()
         sample = rig.drive.read(0.0)
         encoder = rig.encoder.read(0.0) if rig.encoder is not None else None
@@ -116,8 +114,8 @@ def run_profile(
         recorder = Recorder(folder, name, cycle.channels, gains.period_s, metadata, lossless=virtual)
         ended = "failed"
         try:
-            kind = VirtualSession if virtual else Session
-            session = kind(rig, cycle, trajectory, profile.motion_limits, clock, recorder)
+            ticks = compiled_ticks(rig, recorder) if virtual else None
+            session = Session(rig, cycle, trajectory, profile.motion_limits, clock, recorder, ticks)
             with _interruptible(session):
                 outcome = session.run()
             ended = f"{outcome.ending}: {outcome.reason}"
@@ -161,7 +159,7 @@ def _check_set_points(trajectory: Trajectory, section: DriveSection) -> None:
             )
 
 
-def _check_bus_load(rig: Rig, section: DriveSection) -> None:
+def _check_bus_load(rig: Devices, section: DriveSection) -> None:
     load = rig.bus_load()
     if load > section.bus_load:
         raise NotPunctual(
@@ -182,36 +180,46 @@ def _refused(force: bool, check: Callable[[], None]) -> str:
     return ""
 
 
-class _Rehearsal(VirtualClock):
-    """Asks for a stop after some ticks."""
+class _AlarmClock(VirtualClock):
+    """Virtual clock that calls `alarm` at tick REHEARSED_TICKS."""
 
-    def __init__(self) -> None:
-        self.session: Session | None = None
+    alarm: Callable[[], None]
 
     def wait(self, tick: int) -> float:
-        if tick == REHEARSED_TICKS and self.session is not None:
-            self.session.ask_stop()
+        if tick == REHEARSED_TICKS:
+            self.alarm()
         return 0.0
 
+
+class _NoRows:
+    """Recorder of a rehearsal."""
+
     def record(self, row: Sequence[float]) -> None:
-        """Nothing is recorded."""
+        """Discard the row."""
 
 
 def rehearse(bench: Bench, trajectory: Trajectory, profile: Profile) -> None:
     """Arm, begin and stop the run in virtual time on a simulated copy of the bench, so that all is compiled and at hand
     before the real one."""
     section = (bench.drive or DriveSection()).model_copy(
-        update={"interface": "inprocess", "encoder": EncoderConnection(), "eds": None, "serial_number": None}
+        update={
+            "protocol": "canopen",
+            "interface": "inprocess",
+            "encoder": EncoderConnection(),
+            "eds": None,
+            "serial_number": None,
+        }
     )
     copy = bench.model_copy(update={"drive": section, "simulation": bench.simulation or SimulationSection()})
     plant = make_plant(copy)
     plant.reset(float(trajectory.position_m[0]))
     with Rig(copy, plant=plant) as rig:
         rig.set_up()
-        clock = _Rehearsal()
+        clock = _AlarmClock()
         cycle = make_cycle(rig, rig.drive.read(0.0).motor_position_rad)
-        clock.session = Session(rig, cycle, trajectory, profile.motion_limits, clock, clock)
-        clock.session.run()
+        session = Session(rig, cycle, trajectory, profile.motion_limits, clock, _NoRows())
+        clock.alarm = session.ask_stop
+        session.run()
 
 
 @contextlib.contextmanager

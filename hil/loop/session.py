@@ -16,10 +16,8 @@ The drive is stopped in a defined way whatever happens, and the recording ends r
 The same code runs on the wall clock and in virtual time.
 """
 
-from __future__ import annotations
-
 import contextlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Protocol
@@ -29,7 +27,7 @@ from hil.bench.hardware import DriveMode
 from hil.channels import AxisKind
 from hil.errors import HilError
 from hil.loop.clock import Clock
-from hil.loop.cycle import Cycle, Setpoint, Watch
+from hil.loop.cycle import Cycle, Samples, Setpoint, Watch
 from hil.loop.devices import Devices
 from hil.loop.supervision import Ending, find
 from hil.motion.pieces import MotionLimits
@@ -46,7 +44,7 @@ _SETPOINTS = {DriveMode.CST: Setpoint.TORQUE, DriveMode.CSV: Setpoint.VELOCITY, 
 
 
 class LoopPhase(IntEnum):
-    """Phase of the loop: running, stopping under control, or stopped by the drive."""
+    """LoopPhase of the loop."""
 
     RUN = 0
     STOP = 1
@@ -55,7 +53,7 @@ class LoopPhase(IntEnum):
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a run ended: why, in words, and how late its ticks were [s]."""
+    """Ending of a run, its reason in words, number of rows, and lateness of its ticks [s]."""
 
     ending: Ending
     reason: str
@@ -64,21 +62,42 @@ class Outcome:
 
 
 class Rows(Protocol):
-    """What a session records to; a `Recorder`, or whatever else takes rows."""
+    """Destination of the rows of a session, for example a `Recorder`."""
 
     def record(self, row: Sequence[float]) -> None: ...
+
+
+class FastForward(Protocol):
+    """Runs the first ticks of a session without the bus, as `hil.loop.virtual.CompiledTicks`."""
+
+    def run(
+        self, cycle: Cycle, sample: DriveSample, seen: EncoderSample, stop_asked: Callable[[], bool]
+    ) -> tuple[int, DriveSample, EncoderSample]:
+        """Run ticks from 0 on, whose samples are given, and record them.
+
+        Returns the tick to continue with over the bus, and its samples.
+        """
 
 
 class Session:
     """One run on an opened rig. The rig is set up and stands; `trajectory` begins where it stands.
 
-    `ask_stop` may be called from a signal handler.
+    fast_forward: runs the uneventful ticks after arming; None: every tick goes over the bus. `ask_stop` may be called
+    from a signal handler.
     """
 
     def __init__(
-        self, rig: Devices, cycle: Cycle, trajectory: Trajectory, limits: MotionLimits, clock: Clock, recorder: Rows
+        self,
+        rig: Devices,
+        cycle: Cycle,
+        trajectory: Trajectory,
+        limits: MotionLimits,
+        clock: Clock,
+        recorder: Rows,
+        fast_forward: FastForward | None = None,
     ) -> None:
         self._rig, self._cycle, self._clock, self._recorder = rig, cycle, clock, recorder
+        self._fast_forward = fast_forward
         self._trajectory, self._limits = trajectory, limits
         self._master, self._drive, self._encoder = rig.master, rig.drive, rig.encoder
         gains = rig.bench.gains
@@ -86,11 +105,11 @@ class Session:
         self._response_s = rig.section.response * gains.period_s
         self._from_table = gains.position_from_table
         self._now_s = 0.0  # of the tick: tick x period
-        self._bus_tick = 0  # ticks since the clock was started
+        self._clock_tick = 0  # ticks since the clock was started; the rows count from the first after arming
         self._stops_asked = 0
         self._phase = LoopPhase.RUN
         self._ending, self._reason = Ending.COMPLETE, "the profile is done"
-        self._last_tick = len(trajectory) - 1  # of the phase
+        self._last_tick = len(trajectory) - 1  # row at which the phase ends
         self._lateness_s: list[float] = []
 
     def ask_stop(self) -> None:
@@ -101,7 +120,7 @@ class Session:
 
     def run(self) -> Outcome:
         """Arm, run, stop, disarm. Raises HilError when the drive cannot be armed or a device fails in the loop;
-        whatever is raised, the drive is told to stop first."""
+        the drive is commanded to stop before any exception leaves."""
         try:
             self._clock.start()
             self._master.start(0.0)
@@ -119,7 +138,7 @@ class Session:
 
     def _exchange(self) -> tuple[DriveSample, EncoderSample]:
         """Wait for the next tick, send SYNC, take in the answers."""
-        self._bus_tick = tick = self._bus_tick + 1
+        self._clock_tick = tick = self._clock_tick + 1
         start_s = tick * self._period_s
         self._lateness_s.append(self._clock.wait(tick))
         self._master.sync(start_s)
@@ -160,45 +179,37 @@ class Session:
                 "while the drive was armed; find out why"
             )
 
-    def _loop(self, sample: DriveSample, seen: EncoderSample, tick: int = 0) -> int:
-        """From `tick` on, whose samples are given, to the end. Returns the rows recorded in all."""
+    def _loop(self, sample: DriveSample, seen: EncoderSample) -> int:
+        """Run from tick 0, whose samples are given, to the end. Returns the number of recorded rows."""
         cycle, drive, clock, record = self._cycle, self._drive, self._clock, self._recorder.record
         step, row, exchange = cycle.step, cycle.row, self._exchange
         cycle.follow(self._trajectory)
         lateness = self._lateness_s
         del lateness[:-1]
         overrun_s = self._rig.section.overrun_s
-        last_index = len(self._trajectory) - 1
-        index = min(tick, last_index)
-        error_code, cycle_s = 0, 0.0
+        tick, error_code, cycle_s = 0, 0, 0.0
+        if self._fast_forward is not None:
+            tick, sample, seen = self._fast_forward.run(cycle, sample, seen, lambda: self._stops_asked > 0)
+            lateness.extend([0.0] * tick)
         while True:
+            motor, torque = sample.motor_position_rad, sample.torque_n_m
             setpoint, passed = step(
-                tick,
-                index,
-                sample.motor_position_rad,
-                seen.position_m,
-                sample.torque_n_m,
-                int(sample.state),
-                error_code,
-                lateness[-1],
-                cycle_s,
+                tick, Samples(motor, seen.position_m, torque, sample.state, error_code, lateness[-1], cycle_s)
             )
             drive.command(self._now_s, setpoint)
             if tick:
                 record(row(tick - 1))
             late = lateness[-1] > overrun_s
             if sample.condition or seen.condition or passed or late or self._stops_asked or self._phase:
-                stop = self._supervise(tick, index, sample, seen, passed)
+                stop = self._supervise(tick, sample, seen, passed)
                 error_code = drive.error_code
                 if stop is not None:
-                    cycle.follow(stop, STOP_SEGMENT)
-                    index, last_index = 0, len(stop) - 1
-            cycle_s = clock.since(self._bus_tick) - lateness[-1]
+                    cycle.follow(stop, tick, STOP_SEGMENT)
+            cycle_s = clock.since(self._clock_tick) - lateness[-1]
             if tick >= self._last_tick:
                 break
             sample, seen = exchange()
             tick += 1
-            index += index < last_index
         sample, seen = exchange()  # the torque of the last tick
         record(cycle.complete(tick, sample.torque_n_m, cycle_s))
         drive.command(self._now_s, setpoint)
@@ -206,10 +217,8 @@ class Session:
 
     # -- when something is wrong ----------------------------------------------------------------------------------
 
-    def _supervise(
-        self, tick: int, index: int, sample: DriveSample, seen: EncoderSample, passed: int
-    ) -> Trajectory | None:
-        """Change the phase if need be; the stop that begins now, if one does."""
+    def _supervise(self, tick: int, sample: DriveSample, seen: EncoderSample, passed: int) -> Trajectory | None:
+        """Change the phase if required; return the stop that begins at this tick, if any."""
         if self._phase is LoopPhase.QUICK_STOP:
             if not sample.powered:
                 self._last_tick = min(self._last_tick, tick + self._ticks(AFTERMATH_S))
@@ -222,7 +231,7 @@ class Session:
             return None
         if self._phase is LoopPhase.RUN:
             self._ending, self._reason = found.ending, found.reason
-        stop = self._stop(index, sample, seen, measured=passed != 0)
+        stop = self._stop(tick, sample, seen, measured=passed != 0)
         if found.quick:
             self._phase = LoopPhase.QUICK_STOP
             self._drive.goal = DriveGoal.QUICK_STOP
@@ -232,16 +241,16 @@ class Session:
             self._last_tick = tick + len(stop) + self._ticks(SETTLE_S)
         return stop
 
-    def _stop(self, index: int, sample: DriveSample, seen: EncoderSample, *, measured: bool) -> Trajectory:
-        """Shortest stop from the set-point, or from where the axis is when it does not follow."""
-        position, velocity, acceleration, _ = self._cycle.setpoints[index]
+    def _stop(self, tick: int, sample: DriveSample, seen: EncoderSample, *, measured: bool) -> Trajectory:
+        """Plan the shortest stop from the set-point, or from the measured state when the axis does not follow."""
+        position, velocity, acceleration = self._cycle.setpoint(tick)
         if measured:
             position, velocity = self._position_m(sample, seen), self._cycle.velocity_m_s
             acceleration = 0.0
-        return stop_from(float(position), float(velocity), float(acceleration), self._limits, self._period_s)
+        return stop_from(position, velocity, acceleration, self._limits, self._period_s)
 
     def _position_m(self, sample: DriveSample, seen: EncoderSample) -> float:
-        """Of the axis, as the position loop sees it."""
+        """Return the position of the axis from the encoder of the position loop."""
         return seen.position_m if self._from_table else self._ratio * sample.motor_position_rad
 
     def _disarm(self) -> None:

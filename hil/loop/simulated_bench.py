@@ -44,7 +44,7 @@ class _Simulated(Bench):
 
 
 def load_simulated(source: str | Path) -> Bench:
-    """As `load_bench`, and the simulated axis is checked too. Raises InputError with file, line and field."""
+    """Load a bench file and check its simulated axis. Raises InputError with file, line and field."""
     path = bench_path(source)
     bench = load_model(path, _Simulated)
     return bench if bench.name else bench.model_copy(update={"name": path.stem})

@@ -1,6 +1,4 @@
-"""What is wrong at a tick of the loop, and whether the loop can still stop the axis itself."""
-
-from __future__ import annotations
+"""Find the faults at a tick of the loop, and decide if the loop can still stop the axis under control."""
 
 from collections.abc import Callable, Iterator
 from enum import StrEnum
@@ -28,7 +26,7 @@ class Ending(StrEnum):
 
 
 class StopCause(NamedTuple):
-    """How the run ends, why in words, and whether only the drive's own ramp can stop the axis now."""
+    """Ending of the run, its reason in words, and True if only the drive's own ramp can stop the axis."""
 
     ending: Ending
     reason: str
@@ -38,7 +36,7 @@ class StopCause(NamedTuple):
 def find(
     rig: Devices, seen: EncoderSample, passed: int, lateness_s: float, stops_asked: int, *, stopping: bool
 ) -> Iterator[StopCause]:
-    """What is wrong, the gravest first. passed: the `Limit`s; lateness_s of the tick; stopping: under control."""
+    """Yield the faults, the gravest first. passed: the `Limit`s; lateness_s of the tick; stopping: under control."""
     section, gains = rig.section, rig.bench.gains
     if rig.drive.tripped:
         yield StopCause(Ending.DRIVE_FAULT, _text(rig.drive.check), True)

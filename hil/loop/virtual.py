@@ -5,120 +5,87 @@ and the same compiled axis take turns, with values rounded as CAN frames round t
 would give. When a limit of the axis is passed, the ticks since the last snapshot are run again over the bus.
 """
 
-from __future__ import annotations
-
 import math
-from typing import Any, Protocol
+from collections.abc import Callable
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numba import njit
 
 from drivers.canopen_encoder import CanopenEncoder
+from drivers.object_index import ObjectIndex as Index
 from drivers.port import DriveSample, EncoderSample
 from drivers.sim import kernel
 from drivers.sim.plant import Plant
 from hil.arrays import FloatArray
 from hil.bench.hardware import DriveMode
 from hil.compiled.source_digest import source_digest
-from hil.loop import cycle as compiled
-from hil.loop.devices import Rig
-from hil.loop.session import Rows, Session
+from hil.loop.cycle import Cycle, Samples, compiled_cycle
+from hil.loop.devices import Devices, Rig
+from hil.loop.session import Rows
 
 SNAPSHOT_TICKS = 2000
 LAST_TICKS = 20  # over the bus again, so that the devices know where the axis is when they disarm
-_MAX_TORQUE, _RATED_TORQUE, _COUNTS = 0x6072, 0x6076, 0x608F
 
-# Entries of `scales`: to counts and back, of the motor, the table, the commanded and the measured torque.
-(
-    COUNTS_PER_RAD,
-    RAD_PER_COUNT,
-    COUNTS_PER_M,
-    M_PER_COUNT,
-    COMMAND_MILLE_PER_N_M,
-    COMMAND_N_M_PER_MILLE,
-    MILLE_PER_N_M,
-    N_M_PER_MILLE,
-    MAX_MILLE,
-    SCALES,
-) = range(10)
-# Entries of `sample`: motor [rad or m], table [m], torque [N m or N].
-MOTOR, TABLE, TORQUE = range(3)
+
+class Scales(NamedTuple):
+    """Conversions of the simulated drive and encoder and of their drivers, to counts and back."""
+
+    counts_per_rad: float
+    rad_per_count: float
+    counts_per_m: float
+    m_per_count: float
+    command_mille_per_n_m: float
+    command_n_m_per_mille: float
+    mille_per_n_m: float
+    n_m_per_mille: float
+    max_mille: float
+
+
+class SimulatedAxis(NamedTuple):
+    """Arguments of the compiled axis (`drivers.sim.kernel.advance`) and the conversions of its devices."""
+
+    parameters: np.ndarray[Any, Any]
+    state: np.ndarray[Any, Any]
+    lines: FloatArray
+    steps: int
+    scales: Scales
 
 
 class BlockRows(Rows, Protocol):
-    """What takes rows one by one and many at once."""
+    """Destination of rows one by one and in blocks (n, columns)."""
 
     def record_block(self, rows: FloatArray) -> None: ...
 
 
-_cycle, _advance = compiled.compiled_cycle, kernel.advance
+_cycle, _advance = compiled_cycle, kernel.advance
 
 
 def _build_ticks(digest: str) -> Any:
     @njit(cache=True, _nrt=False, error_model="numpy")
-    def ticks(  # type: ignore[no-untyped-def]
-        first,
-        count,
-        drive_state,
-        sample,
-        scales,
-        block,
-        plant,
-        state,
-        lines,
-        steps,
-        setpoints,
-        watch,
-        laws,
-        states,
-        constants,
-        modes,
-        values,
-        codes,
-        delta,
-        memory,
-        rows,
-        place,
-    ):
-        """Ticks first .. first + count - 1; block[k] is the row before tick first + k. Whether no limit was passed."""
+    def ticks(first, count, drive_state, measured, block, setpoints, loop, axis):  # type: ignore[no-untyped-def]
+        """Run ticks first .. first + count - 1 with the set-points of row `tick`; returns False if a limit was passed.
+
+        measured: motor [rad or m], table [m] and torque [N m or N] of the next tick. block[k] becomes the row before
+        tick first + k.
+        """
         assert digest
-        width = block.shape[1]
+        width, scales, state = block.shape[1], axis.scales, axis.state[0]
         for k in range(count):
             tick = first + k
-            setpoint, passed = _cycle(
-                tick,
-                tick,
-                sample[MOTOR],
-                sample[TABLE],
-                sample[TORQUE],
-                drive_state,
-                0,
-                0.0,
-                0.0,
-                setpoints,
-                watch,
-                laws,
-                states,
-                constants,
-                modes,
-                values,
-                codes,
-                delta,
-                memory,
-                rows,
-                place,
-            )
+            samples = Samples(measured[0], measured[1], measured[2], drive_state, 0, 0.0, 0.0)
+            setpoint, passed = _cycle(tick, 0, samples, setpoints, loop)
             for column in range(width):
-                block[k, column] = rows[(tick + 1) & 1, column]
+                block[k, column] = loop.rows[(tick + 1) & 1, column]
             if passed:
                 return False
-            mille = np.rint(setpoint * scales[COMMAND_MILLE_PER_N_M])
-            mille = min(max(mille, -scales[MAX_MILLE]), scales[MAX_MILLE])
-            _advance(plant[0], state[0], lines, mille * scales[COMMAND_N_M_PER_MILLE], steps)
-            sample[MOTOR] = np.rint(state[0].motor_recorded * scales[COUNTS_PER_RAD]) * scales[RAD_PER_COUNT]
-            sample[TABLE] = np.rint(state[0].table_recorded * scales[COUNTS_PER_M]) * scales[M_PER_COUNT]
-            torque = np.rint(state[0].torque_recorded * scales[MILLE_PER_N_M])
-            sample[TORQUE] = min(max(torque, -32768.0), 32767.0) * scales[N_M_PER_MILLE]
+            mille = np.rint(setpoint * scales.command_mille_per_n_m)
+            mille = min(max(mille, -scales.max_mille), scales.max_mille)
+            _advance(axis.parameters[0], state, axis.lines, mille * scales.command_n_m_per_mille, axis.steps)
+            measured[0] = np.rint(state.motor_recorded * scales.counts_per_rad) * scales.rad_per_count
+            measured[1] = np.rint(state.table_recorded * scales.counts_per_m) * scales.m_per_count
+            torque = np.rint(state.torque_recorded * scales.mille_per_n_m)
+            measured[2] = min(max(torque, -32768.0), 32767.0) * scales.n_m_per_mille
         return True
 
     return ticks
@@ -128,83 +95,67 @@ def _build_ticks(digest: str) -> Any:
 _ticks = _build_ticks(source_digest("loop/cycle.py"))
 
 
-class VirtualSession(Session):
-    """A session in virtual time on a simulated bench; see the module."""
+class CompiledTicks:
+    """The uneventful ticks of a run on a simulated axis, in one compiled call for each block; see the module."""
 
-    def _loop(self, sample: DriveSample, seen: EncoderSample, tick: int = 0) -> int:
-        if self._can_be_compiled():
-            tick, sample, seen = self._run_compiled(sample, seen)
-        return super()._loop(sample, seen, tick)
+    def __init__(self, axis: SimulatedAxis, recorder: BlockRows) -> None:
+        self._axis, self._recorder = axis, recorder
 
-    def _can_be_compiled(self) -> bool:
-        """Torque control of a simulated axis on an ideal bus; the rest goes over the bus."""
-        rig, section = self._rig, self._rig.section
-        if not isinstance(rig, Rig):  # other devices have no compiled counterpart
-            return False
-        encoder_is_ideal = rig.encoder is None or isinstance(rig.encoder, CanopenEncoder)
-        return (
-            section.mode is DriveMode.CST
-            and section.interface == "inprocess"
-            and encoder_is_ideal
-            and rig.nodes is not None
-            and isinstance(rig.nodes.plant, Plant)
-            and not rig.ports
-        )
-
-    def _run_compiled(self, sample: DriveSample, seen: EncoderSample) -> tuple[int, DriveSample, EncoderSample]:
-        """The tick to go on with over the bus, and its samples."""
-        assert isinstance(self._rig, Rig)
-        nodes = self._rig.nodes
-        assert nodes is not None
-        plant = nodes.plant
-        assert isinstance(plant, Plant)
-        cycle, recorder = self._cycle, self._recorder
-        cycle.follow(self._trajectory)
-        numbers = np.array([sample.motor_position_rad, seen.position_m, sample.torque_n_m])
-        scales, steps = self._scales(), plant.steps_in(self._period_s)
-        moving = (plant.state, plant.lines, numbers, *cycle.state_arrays)
+    def run(
+        self, cycle: Cycle, sample: DriveSample, seen: EncoderSample, stop_asked: Callable[[], bool]
+    ) -> tuple[int, DriveSample, EncoderSample]:
+        """Run and record ticks from 0 on; see `hil.loop.session.FastForward`."""
+        measured = np.array([sample.motor_position_rad, seen.position_m, sample.torque_n_m])
+        moving = (self._axis.state, self._axis.lines, measured, *cycle.state_arrays)
         block = np.empty((SNAPSHOT_TICKS, len(cycle.channels)))
-        tick, end = 0, max(0, len(self._trajectory) - LAST_TICKS)
-        while tick < end and not self._stops_asked:
+        tick, end = 0, max(0, len(cycle.setpoints) - LAST_TICKS)
+        while tick < end and not stop_asked():
             snapshot = [array.copy() for array in moving]
             count = min(SNAPSHOT_TICKS, end - tick)
-            if not _ticks(
-                tick,
-                count,
-                int(sample.state),
-                numbers,
-                scales,
-                block,
-                plant.parameters,
-                plant.state,
-                plant.lines,
-                steps,
-                cycle.setpoints,
-                *cycle.arrays,
-            ):
+            state = int(sample.state)
+            if not _ticks(tick, count, state, measured, block, cycle.setpoints, cycle.loop, self._axis):
                 for array, before in zip(moving, snapshot, strict=True):
                     array[...] = before
                 break
-            recorder.record_block(block[tick == 0 : count])  # type: ignore[attr-defined]   # no row before the first
+            self._recorder.record_block(block[tick == 0 : count])  # no row before the first
             tick += count
-        self._lateness_s.extend([0.0] * tick)
-        motor, table, torque = numbers.tolist()
-        return (tick, sample._replace(motor_position_rad=motor, torque_n_m=torque), seen._replace(position_m=table))
+        motor, table, torque = measured.tolist()
+        return tick, sample._replace(motor_position_rad=motor, torque_n_m=torque), seen._replace(position_m=table)
 
-    def _scales(self) -> FloatArray:
-        """As the simulated drive and the real driver convert, in the same order of operations."""
-        rig = self._rig
-        assert isinstance(rig, Rig)
-        assert rig.nodes is not None
-        number = rig.nodes.drive.dictionary.number
-        scales = np.ones(SCALES)
-        info, rated_mn_m = rig.drive.info, number(_RATED_TORQUE)
-        scales[COUNTS_PER_RAD], scales[RAD_PER_COUNT] = number(_COUNTS, 1) / (2.0 * math.pi), info.rad_per_count
-        scales[COMMAND_MILLE_PER_N_M] = 1 / info.torque_resolution_n_m
-        scales[COMMAND_N_M_PER_MILLE] = rated_mn_m / 1e6
-        scales[MILLE_PER_N_M], scales[N_M_PER_MILLE] = 1e6 / rated_mn_m, info.torque_resolution_n_m
-        scales[MAX_MILLE] = number(_MAX_TORQUE)
-        table = rig.bench.encoders.table
-        if isinstance(rig.encoder, CanopenEncoder) and table is not None:
-            scales[COUNTS_PER_M], scales[M_PER_COUNT] = 1.0 / table.resolution_m, rig.encoder.step_m
-        return scales
+
+def compiled_ticks(rig: Devices, recorder: BlockRows) -> CompiledTicks | None:
+    """Compile the ticks of a rig in torque control of a simulated axis on an ideal bus; None for any other rig."""
+    if not isinstance(rig, Rig):
+        return None
+    plant = rig.nodes.plant if rig.nodes is not None else None
+    if (
+        rig.section.mode is not DriveMode.CST
+        or rig.section.interface != "inprocess"
+        or not isinstance(plant, Plant)
+        or not (rig.encoder is None or isinstance(rig.encoder, CanopenEncoder))
+    ):
+        return None
+    steps = plant.steps_in(rig.bench.gains.period_s)
+    return CompiledTicks(SimulatedAxis(plant.parameters, plant.state, plant.lines, steps, _scales(rig)), recorder)
+
+
+def _scales(rig: Rig) -> Scales:
+    """Conversions of the simulated devices and the drivers, in the same order of operations."""
+    assert rig.nodes is not None
+    number = rig.nodes.drive.dictionary.number
+    info, rated_mn_m = rig.drive.info, number(Index.RATED_TORQUE)
+    table = rig.bench.encoders.table
+    resolution_m, step_m = 1.0, 1.0
+    if isinstance(rig.encoder, CanopenEncoder) and table is not None:
+        resolution_m, step_m = table.resolution_m, rig.encoder.step_m
+    return Scales(
+        counts_per_rad=number(Index.POSITION_ENCODER_RESOLUTION, 1) / (2.0 * math.pi),
+        rad_per_count=info.rad_per_count,
+        counts_per_m=1.0 / resolution_m,
+        m_per_count=step_m,
+        command_mille_per_n_m=1 / info.torque_resolution_n_m,
+        command_n_m_per_mille=rated_mn_m / 1e6,
+        mille_per_n_m=1e6 / rated_mn_m,
+        n_m_per_mille=info.torque_resolution_n_m,
+        max_mille=float(number(Index.MAX_TORQUE)),
+    )

@@ -1,11 +1,12 @@
 """A second drive protocol on the port: ASCII lines to a drive with its own small motor, in one process."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
-from drivers.port import Condition, Drive, DriveFault, DriveGoal, DriveSample, Encoder, Master
+from drivers.port import Condition, Drive, DriveFault, DriveGoal, DriveSample, Master
+from hil.bench.axis_models import TwoMass
 from hil.bench.bench_file import Bench
 from hil.bench.hardware import DriveSection
+from hil.loop.devices import Devices
 
 _OFF, _ENABLED = 2, 4  # numbers of the states READY_TO_SWITCH_ON and OPERATION_ENABLED
 
@@ -73,15 +74,13 @@ class AsciiDrive(Drive, Master):
         return "enabled" if self.sample.enabled else "off"
 
 
-@dataclass
-class AsciiDevices:
-    """The devices of a bench without a linear encoder."""
+class AsciiDevices(Devices):
+    """The devices of a bench without a linear encoder; PROTOCOLS takes this class."""
 
-    bench: Bench
-    section: DriveSection
-    drive: AsciiDrive
-    encoder: Encoder | None = None
-
-    @property
-    def master(self) -> Master:
-        return self.drive
+    def __init__(self, bench: Bench, seed: int | None = None) -> None:
+        assert isinstance(bench.axis, TwoMass)
+        self.bench, self.section = bench, bench.drive or DriveSection()
+        inertia_kg_m2 = (bench.axis.motor_mass_kg + bench.axis.table_mass_kg) * bench.gains.ratio_m_rad**2
+        self.motor = AsciiMotor(inertia_kg_m2, bench.gains.period_s)
+        self.drive = self.master = AsciiDrive(self.motor)
+        self.encoder = None

@@ -11,8 +11,7 @@ from drive_rig import Mass, Rig, in_process
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.canopen_drive import CanopenDrive, DriveSettings, HomingSettings
-from drivers.canopen_homing import HomingRun
+from drivers.canopen_drive import CanopenDrive, DriveSettings, HomingRun, HomingSettings
 from drivers.canopen_master import CanopenMaster
 from drivers.cia402 import DriveState, HomingPhase, OperationMode
 from drivers.inprocess import InProcessBus

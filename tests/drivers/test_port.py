@@ -3,15 +3,18 @@
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from ascii_drive import AsciiDevices, AsciiDrive, AsciiMotor
+from ascii_drive import AsciiDevices, AsciiDrive
 from bench_runs import MOVE, ScriptedClock, bench_with
 
 from drivers.port import DriveGoal
-from hil.bench.axis_models import TwoMass
-from hil.bench.hardware import DriveSection
+from hil.bench.bench_file import Bench
+from hil.errors import FieldError
+from hil.loop import devices
+from hil.loop.run import run_profile
 from hil.loop.session import Outcome, Session, make_cycle
 from hil.loop.supervision import Ending
 from hil.motion.trajectory import plan
@@ -28,22 +31,23 @@ class Incomplete({port}):
 """
 
 
+def ascii_bench(**drive: Any) -> Bench:
+    """The reference bench without linear encoder, over the ASCII protocol."""
+    bench = bench_with(drive={"protocol": "ascii"} | drive)
+    return bench.model_copy(update={"encoders": bench.encoders.model_copy(update={"table": None})})
+
+
 def session(folder: Path, trip_at: int | None = None) -> tuple[Outcome, Recording, AsciiDrive]:
     """Run the standard move over the ASCII drive; its motor trips with code 7 at tick `trip_at`."""
-    bench = bench_with()
-    bench = bench.model_copy(update={"encoders": bench.encoders.model_copy(update={"table": None})})
-    period_s = bench.gains.period_s
-    assert isinstance(bench.axis, TwoMass)
-    inertia_kg_m2 = (bench.axis.motor_mass_kg + bench.axis.table_mass_kg) * bench.gains.ratio_m_rad**2
-    motor = AsciiMotor(inertia_kg_m2, period_s)
-    devices = AsciiDevices(bench, bench.drive or DriveSection(), AsciiDrive(motor))
-    devices.drive.set_up()
-    cycle = make_cycle(devices, 0.0)
-    clock = ScriptedClock({} if trip_at is None else {trip_at: lambda: setattr(motor, "trips", 7)})
+    opened = AsciiDevices(ascii_bench())
+    period_s = opened.bench.gains.period_s
+    opened.set_up()
+    cycle = make_cycle(opened, 0.0)
+    clock = ScriptedClock({} if trip_at is None else {trip_at: lambda: setattr(opened.motor, "trips", 7)})
     with Recorder(folder, "ascii", cycle.channels, period_s, {}, lossless=True) as recorder:
-        run = Session(devices, cycle, plan(MOVE, period_s, 0.0), MOVE.motion_limits, clock, recorder)
+        run = Session(opened, cycle, plan(MOVE, period_s, 0.0), MOVE.motion_limits, clock, recorder)
         outcome = run.run()
-    return outcome, read_recording(recorder.path), devices.drive
+    return outcome, read_recording(recorder.path), opened.drive
 
 
 def test_a_session_over_a_second_protocol_is_complete_and_recorded(tmp_path: Path) -> None:
@@ -65,9 +69,22 @@ def test_a_trip_of_a_second_protocol_ends_the_run(tmp_path: Path) -> None:
     assert not drive.motor.enabled
 
 
+def test_a_bench_file_chooses_the_protocol_by_its_registration(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    bench = ascii_bench()
+    with pytest.raises(FieldError, match="given ascii, allowed canopen"):
+        run_profile(bench, MOVE, tmp_path, "refused", virtual=True)
+    monkeypatch.setitem(devices.PROTOCOLS, "ascii", AsciiDevices)
+    ran = run_profile(bench, MOVE, tmp_path, "ascii", virtual=True)
+    assert ran.complete
+    assert ran.recording is not None
+    recording, (by_hand_outcome, by_hand, _) = read_recording(ran.recording), session(tmp_path / "by_hand")
+    assert ran.outcome.rows == by_hand_outcome.rows
+    assert np.array_equal(recording["torque_n_m"], by_hand["torque_n_m"])
+
+
 def test_the_second_protocol_is_written_in_less_than_80_lines_of_drive() -> None:
     text = (Path(__file__).parent / "ascii_drive.py").read_text()
-    drive = text[text.index("class AsciiDrive") : text.index("@dataclass")]
+    drive = text[text.index("class AsciiDrive") : text.index("class AsciiDevices")]
     assert len(drive.splitlines()) < 80
 
 

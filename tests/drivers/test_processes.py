@@ -92,7 +92,7 @@ def test_a_drive_in_another_process_runs_in_wall_clock_time(nodes: subprocess.Po
 
 def test_the_loop_imports_nothing_heavy_and_nothing_of_hil() -> None:
     code = (
-        "import sys, drivers.canopen_drive, drivers.canopen_encoder, drivers.canopen_homing, drivers.serial_encoder, "
+        "import sys, drivers.canopen_drive, drivers.canopen_encoder, drivers.serial_encoder, "
         "drivers.modelled_bus, drivers.sim.drive_node, drivers.sim.encoder_node, drivers.sim.serial_line;"
         "print([m for m in ('scipy', 'matplotlib', 'bokeh', 'pyarrow', 'pydantic', 'hil') if m in sys.modules])"
     )

@@ -13,7 +13,6 @@ from hil.errors import HilError
 from hil.loop import virtual
 from hil.loop.simulated_bench import load_simulated
 from hil.loop.supervision import Ending
-from hil.loop.virtual import VirtualSession
 
 PUSH = {"effect": "external_force", "parameters": {"force_n": -9000.0, "start_s": 0.4, "end_s": 0.6}}
 CASES: dict[str, tuple[dict[str, Any], Ending]] = {
@@ -36,7 +35,7 @@ def test_same_bits_as_over_the_bus(tmp_path: Path, name: str, monkeypatch: pytes
     changes, ending = CASES[name]
     bench = bench_with(**changes)
     framed = run(tmp_path / "framed", bench)
-    compiled = run(tmp_path / "compiled", bench, kind=VirtualSession)
+    compiled = run(tmp_path / "compiled", bench, compiled=True)
     assert framed.outcome.ending is compiled.outcome.ending is ending
     assert framed.outcome.rows == compiled.outcome.rows
     for channel in framed.recording.columns:
@@ -45,7 +44,7 @@ def test_same_bits_as_over_the_bus(tmp_path: Path, name: str, monkeypatch: pytes
 
 def test_seven_dof_bench(tmp_path: Path) -> None:
     bench = load_simulated("reference_7dof")
-    framed, compiled = run(tmp_path / "framed", bench), run(tmp_path / "compiled", bench, kind=VirtualSession)
+    framed, compiled = run(tmp_path / "framed", bench), run(tmp_path / "compiled", bench, compiled=True)
     assert framed.outcome.ending is Ending.COMPLETE
     for channel in framed.recording.columns:
         assert np.array_equal(framed.recording[channel], compiled.recording[channel]), channel
@@ -53,4 +52,4 @@ def test_seven_dof_bench(tmp_path: Path) -> None:
 
 def test_stop_asked_while_arming_moves_nothing(tmp_path: Path) -> None:
     with pytest.raises(HilError, match="nothing moved"):
-        run(tmp_path, kind=VirtualSession, script=lambda _, session: {2: session.ask_stop})
+        run(tmp_path, compiled=True, script=lambda _, session: {2: session.ask_stop})

@@ -14,6 +14,7 @@ from hil.loop.devices import Rig
 from hil.loop.run import _interruptible
 from hil.loop.session import Outcome, Session, make_cycle
 from hil.loop.simulated_bench import load_simulated
+from hil.loop.virtual import compiled_ticks
 from hil.motion.profile import Profile
 from hil.motion.trajectory import plan
 from hil.recording.recording import Recording, read_recording
@@ -67,7 +68,8 @@ def run(
     script: Callable[[Rig, Session], Mapping[int, Callable[[], Any]]] | None = None,
     profile: Profile = MOVE,
     bus: InProcessBus | None = None,
-    kind: type[Session] = Session,
+    *,
+    compiled: bool = False,
 ) -> Ran:
     """Run a profile; `script` says what happens at which tick of the clock (some five before the first row)."""
     bench = bench or bench_with()
@@ -78,7 +80,8 @@ def run(
         trajectory = plan(profile, bench.gains.period_s, 0.0)
         clock = ScriptedClock({})
         with Recorder(folder, "run", cycle.channels, bench.gains.period_s, {}, lossless=True) as recorder:
-            session = kind(rig, cycle, trajectory, profile.motion_limits, clock, recorder)
+            ticks = compiled_ticks(rig, recorder) if compiled else None
+            session = Session(rig, cycle, trajectory, profile.motion_limits, clock, recorder, ticks)
             clock.script = script(rig, session) if script else {}
             with _interruptible(session):
                 outcome = session.run()

@@ -89,7 +89,7 @@ def test_the_second_protocol_is_written_in_less_than_80_lines_of_drive() -> None
 
 
 def mypy(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "mypy", "--strict", "--config-file", "pyproject.toml", *map(str, arguments)]
+    command = [sys.executable, "-m", "mypy", "--config-file", "pyproject.toml", *map(str, arguments)]
     root = Path(__file__).parents[2]
     return subprocess.run(command, cwd=root, capture_output=True, text=True, check=False)
 

@@ -34,7 +34,7 @@ class Setpoint(IntEnum):
 
 
 class Limit(IntFlag):
-    """Limits of the axis that are passed."""
+    """AxisLimits of the axis that are passed."""
 
     NONE = 0
     FOLLOWING_ERROR = 1
@@ -113,7 +113,7 @@ class Samples(NamedTuple):
     cycle_s: float
 
 
-class Limits(NamedTuple):
+class AxisLimits(NamedTuple):
     """Quantity commanded to the drive (`Setpoint`) and limits of the axis [m]."""
 
     setpoint: int
@@ -132,7 +132,7 @@ class Law(NamedTuple):
 class Loop(NamedTuple):
     """Arguments of the compiled cycle that stay the same objects during a run."""
 
-    limits: Limits
+    limits: AxisLimits
     law: Law
     twin_law: Law
     twin: tuple[Any, ...]  # arrays of the kernel, with modal state and memory at the end
@@ -219,7 +219,7 @@ class Cycle:
         delta, memory = twin.state(Start(ratio * motor_position))
         start = np.array(cascade.init(motor_position, period_s=gains.period_s), dtype=np.float64)
         self.loop = Loop(
-            Limits(int(watch.setpoint), watch.following_error_m, *watch.travel_m),
+            AxisLimits(int(watch.setpoint), watch.following_error_m, *watch.travel_m),
             Law(gains, start.copy()),
             Law(twin.loop_gains, start.copy()),
             (*twin.arrays(), delta, memory),

@@ -50,6 +50,7 @@ def test_a_period_that_cannot_be_expressed_is_refused() -> None:
 @pytest.fixture
 def local_node() -> Iterator[tuple[SetupNetwork, canopen.LocalNode]]:
     """canopen's LocalNode behind its own Notifier thread, our set-up in front of a virtual bus."""
+    before = threading.enumerate()
     network = canopen.Network()
     network.NOTIFIER_CYCLE = 0.05
     network.bus = open_bus(BusConfig("virtual", "test_local_node"))
@@ -59,7 +60,7 @@ def local_node() -> Iterator[tuple[SetupNetwork, canopen.LocalNode]]:
     yield SetupNetwork(port), node
     network.disconnect()
     port.close()
-    assert threading.active_count() == 1
+    assert [thread for thread in threading.enumerate() if thread not in before] == []
 
 
 def test_set_up_against_canopens_server(local_node: tuple[SetupNetwork, canopen.LocalNode]) -> None:

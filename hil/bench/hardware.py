@@ -37,7 +37,7 @@ class EncoderConnection(_Model):
 
 
 class SetPointLimits(_Model):
-    """What no set-point may pass on this bench, whatever a profile asks for."""
+    """Limits of every set-point on this bench; a profile beyond them is refused."""
 
     velocity_m_s: Positive
     acceleration_m_s2: Positive
@@ -97,7 +97,7 @@ class SimulatedEffect(_Model):
 
 
 class SimulationSection(_Model):
-    """What a simulated bench really is, beside what its owner believes. Present: the devices are simulated."""
+    """True parameters and effects of a simulated bench. If the section is present, the devices are simulated."""
 
     axis: dict[str, float] = Field({}, description="true values of keys of `axis`, where they differ")
     effects: tuple[SimulatedEffect, ...] = ()

@@ -1,1 +1,1 @@
-"""What the bench and its twin can do, measured on this machine: run by `hil bench`, never by the tests."""
+"""Benchmarks of the loop, the simulation and the diagnosis on this machine; run by `hil bench`, never by tests."""

@@ -46,7 +46,7 @@ def point_to_point(state: MotionState, target_m: float, limits: MotionLimits) ->
         if not (state.velocity_m_s or state.acceleration_m_s2):
             raise
         pieces, notes = stop(state, limits).pieces, ("stops first: ruckig finds no direct way to the target",)
-    # ruckig itself accepts 1e-8 m; a second, tiny move from the rest reached closes what is left
+    # ruckig itself accepts 1e-8 m; a second, tiny move from the rest reached closes the remaining distance
     if pieces and abs(end_m(pieces[-1]) - target_m) > END_TOLERANCE_M * max(1.0, abs(target_m)):
         pieces += point_to_point(MotionState(end_m(pieces[-1])), target_m, limits).pieces
     return Move(pieces, target_m, notes)

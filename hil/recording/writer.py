@@ -35,7 +35,7 @@ _VERSIONS = ("hil-servo", "numpy", "numba", "python-can", "canopen", "pyserial",
 def run_metadata(
     *, bench: Any, profile: Any, seed: int | None, commands: Sequence[str], start_time: str
 ) -> dict[str, Any]:
-    """What must be known to repeat a run: bench and profile in full, seed, command line, versions, computer.
+    """Collect the metadata that repeat a run: bench and profile in full, seed, command line, versions, computer.
 
     `start_time` is an ISO 8601 text; in virtual time the caller gives what is to stand there, for nothing
     here reads a clock. All values must be such as JSON holds.
@@ -178,7 +178,7 @@ class Recorder:
         self.close("complete" if kind is None else kind.__name__)
 
     def _make_room(self) -> bool:
-        """Whether the ring has a free row, after waiting for one if `lossless`."""
+        """Return True if the ring has a free row; with `lossless` wait for one."""
         if self.rows_lost == 0:
             self._limit = self.rows_on_disk + self._ring_rows
             while self._lossless and self._head >= self._limit:

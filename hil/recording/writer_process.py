@@ -111,7 +111,7 @@ def _answer(**fields: str | None) -> None:
     try:
         print(json.dumps(fields), flush=True)
     except BrokenPipeError:
-        os._exit(1)  # nobody listens any more
+        os._exit(1)  # the reader of the pipe has ended
 
 
 if __name__ == "__main__":

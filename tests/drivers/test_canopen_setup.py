@@ -1,4 +1,4 @@
-"""What set-up of a drive refuses, on the simulated drive and on canopen's own SDO server."""
+"""Set-up of a drive refuses wrong devices and settings: simulated drive, and the SDO server of canopen."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is known of the sensors from a recording alone."""
+"""Noise and timing of the sensors are estimated from a recording alone."""
 
 import numpy as np
 import pytest

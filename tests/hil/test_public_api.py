@@ -64,7 +64,7 @@ MOVE = hil.Profile.model_validate(
 
 
 def fresh(code: str) -> str:
-    """What a new interpreter prints for the code."""
+    """Output of the code in a new interpreter."""
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, timeout=60, check=True)
     return ran.stdout
 
@@ -118,7 +118,7 @@ def test_a_public_name_is_documented(name: str) -> None:
     value = getattr(hil, name)
     text = value.__doc__ or ""
     assert len(text.split()) > 2
-    assert not text.startswith(f"{name}(")  # what dataclass writes where nobody wrote anything
+    assert not text.startswith(f"{name}(")  # the default docstring of a dataclass
     if name in VERBS:
         assert name == "design_experiment" or "Raises" in text or "InputError" in text, "errors are not documented"
         signature = inspect.signature(value)

@@ -23,7 +23,7 @@ MANY = 100_000
 
 
 def at_rest(ran: Ran) -> bool:
-    """Whether the motor stands at the end: below 0.5 rad/s, 1 % of the speed of the move, over the last 20 ms."""
+    """Return True if the motor stands at the end: below 0.5 rad/s, 1 % of the speed of the move, over the last 20 ms."""
     return bool(np.ptp(ran.recording["motor_position_rad"][-20:]) < 0.01)
 
 
@@ -112,7 +112,7 @@ def test_bus_off_leaves_the_drive_to_its_watchdog(tmp_path: Path) -> None:
     assert ran.outcome.ending is Ending.DRIVE_FAULT
     assert "BUS_OFF" in ran.outcome.reason
     drive = ran.rig.nodes.drive
-    assert drive.state is DriveState.OPERATION_ENABLED  # nobody could tell it
+    assert drive.state is DriveState.OPERATION_ENABLED  # no command reached it
     drive.tick(10.0)  # the master's heartbeat is overdue
     assert drive.state is DriveState.FAULT_REACTION_ACTIVE
 

@@ -175,7 +175,7 @@ def compact(result: dict[str, Any]) -> dict[str, Any]:
 
 
 def right(entry: dict[str, Any]) -> bool:
-    """Whether the verdict is right, every concealed effect is named or in a reported set, and nothing else is named."""
+    """Return True for the right verdict with every concealed effect named or in a reported set, and no other name."""
     verdict, laws = entry["wanted"]
     named = [{effect, *equivalents} for effect, _, _, equivalents in entry["named"]]
     return bool(
@@ -221,7 +221,7 @@ def report(before: dict[str, Any], after: dict[str, Any]) -> int:
 
 
 def changes(old: dict[str, Any], new: dict[str, Any]) -> list[str]:
-    """What differs between two answers to a case, a line each."""
+    """List the differences between two answers to a case, a line each."""
     found = []
     if old["data"] != new["data"]:
         found.append("its recordings differ from those of the reference: the answers cannot be compared")

@@ -13,7 +13,7 @@ from hil.control import cascade
 
 
 def differing(recorded: np.ndarray, replayed: np.ndarray) -> str:
-    """What a person reads of a difference: which rows, and by how much."""
+    """Describe a difference for a reader: which rows, and by how much."""
     rows = np.flatnonzero(recorded != replayed)
     if not rows.size:
         return ""

@@ -47,7 +47,7 @@ class ScriptedClock(VirtualClock):
 
 @dataclass
 class Ran:
-    """What came of a run."""
+    """Result of a run."""
 
     outcome: Outcome
     recording: Recording

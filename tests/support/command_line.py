@@ -15,7 +15,7 @@ from hil.cli import main
 
 
 class Ran(NamedTuple):
-    """What came of a command."""
+    """Result of a command."""
 
     returncode: int
     stdout: str

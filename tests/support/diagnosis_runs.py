@@ -61,7 +61,7 @@ def recorded(
     profile: Profile | None = None,
     torque_noise_n_m: float = 0.01,
 ) -> Recording:
-    """What an axis that is `truth` with `terms` records over a profile, else over the segments, `times` times over."""
+    """Record an axis `truth` with `terms` over a profile, by default over the segments, `times` times."""
     trajectory = plan(profile or moves(SEGMENTS, times), truth.gains.period_s)
     twin = Hypothesis(truth, terms).twin()
     answer = twin.simulate(trajectory.position_m, trajectory.velocity_m_s, Start())

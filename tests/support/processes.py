@@ -26,5 +26,5 @@ def state_of(pid: int) -> str:
 
 
 def is_over(pid: int) -> bool:
-    """Whether a process has ended; its parent may not have been told yet."""
+    """Return True if a process has ended; its parent may not have been told yet."""
     return state_of(pid) in ("", "Z")

@@ -59,7 +59,7 @@ def marked(of: Truth, *missing: dict[str, Any], verdict: str = "", **more: Any) 
 
 
 def scores(*cases: tuple[Truth, dict[str, Any] | None]) -> Scores:
-    """Of truths with their answers."""
+    """Score truths with their answers."""
     return score(
         {str(at): of for at, (of, _) in enumerate(cases)},
         {str(at): parse_answer(answer) for at, (_, answer) in enumerate(cases) if answer is not None},

@@ -39,7 +39,7 @@ def test_the_comparison_takes_it_off_and_says_so() -> None:
 @pytest.mark.parametrize("rest_s", [0.2, 3.0])
 @pytest.mark.parametrize("shift_m", [0.0, 1e-3])
 def test_a_recording_may_begin_on_one_flank_of_a_gap(rest_s: float, shift_m: float) -> None:
-    """As every axis with play does: only the twin begins in its middle."""
+    """An axis with play starts anywhere in its gap; only the twin starts in the middle."""
     whole = recorded(OWNER, PLAY, times=2)
     stands = np.flatnonzero(whole["velocity_command_m_s"] == 0.0)
     begin = int(stands[stands > 1000][0]) + 20  # in a rest after a move

@@ -20,7 +20,7 @@ def bench_file(tmp_path: Path) -> str:
 
 
 def refused(folder: Path, bench_file: str, recording: Recording) -> str:
-    """What the command says to a recording that it must refuse."""
+    """Message of the command for a recording that it must refuse."""
     run = folder / "run.parquet"
     write_parquet(recording, run)
     with pytest.raises(InputError) as error:

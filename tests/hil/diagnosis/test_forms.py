@@ -1,4 +1,4 @@
-"""What mends the form of a friction curve is no second cause; all else is, and so is much more than a form takes."""
+"""A small drag that corrects the form of a friction curve is reported with that curve, a larger one as a second cause."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def drag(share: float, variant: int = 0) -> Term:
 def judged(
     terms: Sequence[Term], rivals: Mapping[Key, Term] | None = None
 ) -> tuple[CrossValidation, dict[int, int], tuple[Finding, ...]]:
-    """What is found on recordings of these terms, where these are what is fitted, and tied rivals of a term."""
+    """Findings on recordings of these terms with these terms fitted, and with tied rivals of a term."""
     train, held_out = (
         dataset([take(recorded(OWNER, *terms, seed=seed, torque_noise_n_m=0.001), OWNER)], OWNER) for seed in (1, 2)
     )

@@ -86,7 +86,7 @@ def test_a_mismatch_without_a_term_or_with_a_poor_one_is_unexplained() -> None:
 
 
 def test_a_name_that_is_not_believed_beside_a_twin_at_the_noise_is_no_mismatch() -> None:
-    """What a term takes from one channel it may add to another: with all at the noise without it, nothing lacks."""
+    """A term may reduce one channel and increase another: if all are at the noise without it, it is not reported."""
     found = runs()
     plain, made_up = believed(found), believed(found, LOAD)
     assert judge(plain, plain, made_up, runs(seed=2)) is Verdict.NO_MISMATCH
@@ -196,7 +196,7 @@ def plain_with(train: Dataset) -> Fit:
 
 
 def test_standard_errors_cover_the_truth() -> None:
-    """Of axes with other masses and friction: errors of all parameters over the standard errors that are stated."""
+    """Errors of all parameters over their stated standard errors, on axes with other masses and friction."""
     errors = []
     for seed in range(6):
         scale = np.random.default_rng(seed).uniform(0.8, 1.25, len(OWNER.axis.NOMINAL))

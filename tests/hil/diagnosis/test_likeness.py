@@ -1,4 +1,4 @@
-"""What repeats with the screw: on a motion that goes one way, each passes for the others, and all are reported."""
+"""Effects that repeat with the screw cannot be told apart on a motion in one direction; all are reported as a set."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What acts without a name: on the table, in the transmission, in the linear encoder, on the motor."""
+"""An unnamed fault is located on the table, in the transmission, in the linear encoder or on the motor."""
 
 from __future__ import annotations
 

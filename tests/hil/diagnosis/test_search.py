@@ -1,4 +1,4 @@
-"""Where the search begins: the owner's values beside those that the refit has bent, and play on a light nut."""
+"""Starting points of the search: parameters of the bench file beside the refitted ones, and play on a light nut."""
 
 from __future__ import annotations
 

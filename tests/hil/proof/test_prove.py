@@ -38,7 +38,7 @@ def quiet(*what: object) -> None:
 
 @pytest.fixture(scope="module")
 def sealed(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Two sealed cases that nobody has diagnosed."""
+    """Two sealed cases without answers."""
     folder = tmp_path_factory.mktemp("sealed")
     draw_cases(folder, QUICK, 7, 1, quiet)
     seal(folder, QUICK, "hil prove --cases 2 --seed 7 --out DIR", 7)
@@ -293,7 +293,7 @@ def test_a_small_proof(tmp_path: Path) -> None:
 
 @pytest.mark.long
 def test_forty_cases(tmp_path: Path) -> None:
-    """What hil prove does when nothing else is said, with wide margins."""
+    """Defaults of hil prove, with wide margins."""
     planned = plan(40, 1)
     found: Scores = prove(tmp_path, planned, 1, 2, quiet, quiet)
     measured = {goal.name: goal.value for goal in found.goals}

@@ -133,7 +133,7 @@ def test_the_screw_gives_by_torsion_and_along_its_axis_one_after_the_other() -> 
 
 
 def test_sides_of_the_transmission() -> None:
-    """Of the seven coordinates, four turn with the motor; nut bracket and table are beyond the nut."""
+    """Four of the seven coordinates turn with the motor; nut bracket and table are beyond the nut."""
     chain = seven_dof(RECONSTRUCTED_TABLE_1, 0.03)
     assert chain.side(chain.motor).tolist() == [1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0]
     assert chain.side(chain.table).tolist() == [0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0]

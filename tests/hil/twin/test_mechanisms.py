@@ -1,4 +1,4 @@
-"""What each mechanism of drive, motor side, table and sensors does: the property that an engineer would check."""
+"""Each mechanism of drive, motor side, table and sensors has the property that an engineer would check."""
 
 from math import e, pi
 

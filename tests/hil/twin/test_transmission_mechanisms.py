@@ -1,4 +1,4 @@
-"""What mechanisms of the transmission and of the structure do: where the table stands, how stiff, which modes."""
+"""Mechanisms of transmission and structure change table position, stiffness and modes as their equations say."""
 
 from math import e, pi
 
@@ -20,7 +20,7 @@ positions = st.floats(-1.0, 1.0)
 
 
 def unloaded_table(effect, angle_rad, *, time_s=0.0, variant=0, **parameters):
-    """Where the table stands [m] with the motor at an angle and no torque in the spring."""
+    """Table position [m] with the motor at an angle and no torque in the spring."""
 
     def deflection(x):
         at = AT_REST._replace(time_s=time_s, angle_rad=angle_rad, table_position_m=x)

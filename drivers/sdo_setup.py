@@ -1,7 +1,8 @@
 """Before the loop: SDO, NMT and object dictionary by the canopen package, without its threads.
 
-canopen's Network normally reads the bus in a Notifier thread, which an exception ends silently. Here the caller that waits for
-an SDO response pumps the port himself: one thread, the same on real and simulated buses. Every write is read back.
+The Network of canopen reads the bus in a Notifier thread, which an exception ends without a message. Here the caller
+that waits for an SDO response polls the port itself: one thread, the same on real and simulated buses. Every write is
+read back.
 """
 
 from __future__ import annotations

@@ -23,7 +23,7 @@ MANY = 100_000
 
 
 def at_rest(ran: Ran) -> bool:
-    """Return True if the motor stands at the end: below 0.5 rad/s, 1 % of the speed of the move, over the last 20 ms."""
+    """True if the motor stands at the end: below 0.5 rad/s, 1 % of the speed of the move, over the last 20 ms."""
     return bool(np.ptp(ran.recording["motor_position_rad"][-20:]) < 0.01)
 
 

@@ -1,4 +1,4 @@
-"""A small drag that corrects the form of a friction curve is reported with that curve, a larger one as a second cause."""
+"""A small drag that corrects the form of a friction curve is reported with that curve, a larger one separately."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """A CiA 402 drive as the loop sees it: set up by SDO and read back, then one RPDO and one TPDO a cycle.
 
-RPDO1 carries controlword and target of the mode, TPDO1 statusword, position and torque; both packed by `struct`. What
-is wrong shows in `DriveSample.condition`. A condition that forbids motion sets the goal to QUICK_STOP and stays until
+RPDO1 carries controlword and target of the mode, TPDO1 statusword, position and torque; both packed by `struct`.
+Faults are bits of `DriveSample.condition`. A condition that forbids motion sets the goal to QUICK_STOP and stays until
 `reset_fault`; `check` raises it with its text.
 """
 
@@ -115,7 +115,7 @@ class CanopenDrive(CanopenNode, Drive):
     # -- in the loop ------------------------------------------------------------------------------------------------
 
     def read(self, now_s: float) -> DriveSample:
-        """The sample of the latest answered SYNC, and what is wrong. Never raises, never waits."""
+        """Return the sample of the latest answered SYNC and its fault bits. Never raises, never waits."""
         age = self._master.syncs - self._answered
         statusword = self._statusword
         state = STATE_BY_STATUS[statusword & 0x7F]
@@ -172,7 +172,7 @@ class CanopenDrive(CanopenNode, Drive):
         return saturate(target, self._target_bits)
 
     def reset_fault(self) -> None:
-        """Forget what tripped the drive and give one rising edge of the fault-reset bit; the goal becomes DISABLED."""
+        """Clear the latched fault and send one rising edge of the fault-reset bit; the goal becomes DISABLED."""
         self.goal = DriveGoal.DISABLED
         self._latched, self.tripped = 0, Condition.OK
         self._reset_requested = True

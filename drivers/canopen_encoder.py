@@ -92,7 +92,7 @@ class CanopenEncoder(CanopenNode, Encoder):
         self._latched = self._latched | Condition.ALARM if emergency.active else self._latched & ~Condition.ALARM
 
     def read(self, now_s: float) -> EncoderSample:
-        """The sample of the latest answered SYNC, and what is wrong. Never raises, never waits."""
+        """Return the sample of the latest answered SYNC and its fault bits. Never raises, never waits."""
         age = self._master.syncs - self._answered
         self._condition = _OK
         if age or self._latched or self._health.state or now_s > self._heartbeat_deadline_s:

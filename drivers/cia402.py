@@ -148,7 +148,7 @@ class HomingPhase(IntEnum):
 def next_homing_phase(phase: HomingPhase, statusword: int, speed: float, standstill_speed: float) -> HomingPhase:
     """One cycle of homing; speed and standstill_speed in the same unit, measured by the caller.
 
-    "Attained" alone proves nothing: it may be left over from an earlier run, or set while the axis still moves. DONE
+    "Attained" alone is not sufficient: it may be left over from an earlier run, or set while the axis still moves. DONE
     takes bit 12 seen low since the start, then bits 10 and 12 set, bit 13 not set, and |speed| <= standstill_speed.
     """
     if phase in (HomingPhase.DONE, HomingPhase.FAILED):

@@ -4,7 +4,7 @@
 class Unwrapper:
     """Running total of a counter that wraps at `modulus` counts (2^n for n bits, or any range).
 
-    Right as long as the encoder moves by less than half the modulus between two readings.
+    Valid as long as the encoder moves by less than half the modulus between two readings.
     """
 
     __slots__ = ("_half", "_last", "_modulus", "total")

@@ -41,7 +41,7 @@ class Emergency(NamedTuple):
 
     @property
     def active(self) -> bool:
-        """An error, not its reset."""
+        """Return True for an error, False for its reset."""
         return self.code & 0xFF00 != 0
 
     @property

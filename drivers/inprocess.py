@@ -114,7 +114,7 @@ class AsBusABC(can.BusABC):  # type: ignore[misc]  # python-can is not typed her
         self._port.send(msg.arbitration_id, bytes(msg.data), self._clock())
 
     def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
-        """Waits in slices: on a modelled bus a frame arrives only when somebody moves the time."""
+        """Wait in slices: on a modelled bus a frame arrives only when the caller advances the time."""
         self._port.poll(self._clock())
         try:
             return self._received.get(timeout=0.005 if timeout is None else min(timeout, 0.005)), False

@@ -25,7 +25,7 @@ _PASSIVE_ABOVE, _OFF_ABOVE = 127, 255
 
 
 def frame_bits(size: int) -> int:
-    """Length of a standard data frame of `size` bytes, stuffed as badly as possible."""
+    """Length [bits] of a standard data frame of `size` bytes with the longest bit stuffing."""
     return 47 + 8 * size + (34 + 8 * size - 1) // 4
 
 
@@ -42,7 +42,7 @@ class FaultKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """Befalls `count` frames with this identifier (None: any), beginning with the `first` one after `inject`."""
+    """Fault of `count` frames with this identifier (None: any), beginning with the `first` one after `inject`."""
 
     kind: FaultKind
     can_id: int | None = None
@@ -57,7 +57,7 @@ class _Armed:
     seen: int = 0
 
     def hits(self, can_id: int) -> bool:
-        """Count a frame; whether the fault befalls it."""
+        """Count a frame; return True if the fault applies to it."""
         if self.fault.can_id not in (None, can_id):
             return False
         self.seen += 1
@@ -117,7 +117,7 @@ class ModelledPort(InProcessPort):
             self._set_state(BusState.PASSIVE)
 
     def switch_off(self) -> None:
-        """Bus-off: neither sends nor hears."""
+        """Enter bus-off: neither send nor receive."""
         self._set_state(BusState.OFF)
         self.health.last_error = "bus off"
 
@@ -157,7 +157,7 @@ class ModelledBus(InProcessBus):
         return share
 
     def submit(self, sender: ModelledPort, can_id: int, data: bytes, now_s: float) -> None:
-        """A controller asks for the bus."""
+        """Queue a frame of a controller for arbitration."""
         self._age += 1
         frame = _Frame(now_s, can_id, self._age, data, sender)
         for armed in self._armed:
@@ -185,7 +185,7 @@ class ModelledBus(InProcessBus):
             self._destroy(frame)
 
     def _destroy(self, frame: _Frame) -> None:
-        """Everybody sees the error frame; the sender counts it and tries again."""
+        """Signal an error frame to all ports; the sender counts it and retransmits."""
         bits_s = (frame_bits(len(frame.data)) + ERROR_FRAME_BITS) * self._bit_s
         self._free_s = max(self._free_s, frame.request_s) + bits_s
         self._busy_s += bits_s

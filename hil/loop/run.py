@@ -170,7 +170,7 @@ def _check_bus_load(rig: Devices, section: DriveSection) -> None:
 
 
 def _refused(force: bool, check: Callable[[], None]) -> str:
-    """The text of a refusal that is overridden, "" where there is none."""
+    """Return the text of a refusal that is overridden, "" if there is none."""
     try:
         check()
     except NotPunctual as error:

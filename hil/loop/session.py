@@ -254,7 +254,7 @@ class Session:
         return seen.position_m if self._from_table else self._ratio * sample.motor_position_rad
 
     def _disarm(self) -> None:
-        """Power stage off; the recording is over."""
+        """Switch the power stage off; the recording has ended."""
         self._drive.goal = DriveGoal.DISABLED
         for _ in range(self._ticks(DISARM_TIMEOUT_S)):
             sample, _ = self._exchange()
@@ -263,7 +263,7 @@ class Session:
                 return
 
     def _abandon(self) -> None:
-        """After an exception: as many quick-stop commands as the bus still takes."""
+        """Send quick-stop commands after an exception, as long as the bus accepts them."""
         self._drive.goal = DriveGoal.QUICK_STOP
         for _ in range(self._ticks(DISARM_TIMEOUT_S)):
             with contextlib.suppress(Exception):

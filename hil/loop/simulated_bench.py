@@ -51,7 +51,7 @@ def load_simulated(source: str | Path) -> Bench:
 
 
 def make_plant(bench: Bench, seed: int | None = None) -> Plant:
-    """The simulated axis at rest at 0. Raises FieldError at the field that cannot be."""
+    """Build the simulated axis at rest at 0. Raises FieldError at an invalid field."""
     simulation = bench.simulation or SimulationSection()
     axis = _true_axis(bench.axis, simulation)
     effects = []
@@ -155,7 +155,7 @@ def _seven_dof(axis: SevenDofAxis, friction: dict[str, Any]) -> AxisTruth:
             "bench: its stiffnesses are those with the nut in the middle; the effect "
             "position_dependent_stiffness varies them",
         )
-    # what the bench file does not name is as in the reconstruction of the source's Table 1
+    # parameters absent from the bench file: reconstruction of the source's Table 1
     return truth.seven_dof(
         inertia_kg_m2=(axis.motor_inertia_kg_m2, 1.04e-4, 4.89e-5, 6.62e-4),
         axial_mass_kg=(5.25, 3.49, axis.table_mass_kg),

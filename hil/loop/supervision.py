@@ -8,7 +8,7 @@ from drivers.port import Condition, DriverError, EncoderSample
 from hil.loop.cycle import Limit
 from hil.loop.devices import Devices
 
-# What makes a linear encoder useless; a late sample or a broken frame does not.
+# Conditions that make a linear encoder unusable; a late sample or a damaged frame does not.
 _ENCODER_LOST = (Condition.STALE | Condition.HEARTBEAT_LOST | Condition.BUS_OFF | Condition.NOT_OPERATIONAL
                  | Condition.ALARM | Condition.LINE_LOST)  # fmt: skip
 

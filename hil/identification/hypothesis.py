@@ -21,7 +21,7 @@ from hil.identification.residuals import Residuals, differences
 from hil.identification.terms import Term, repeats
 from hil.twin.axis import Response, Twin
 from hil.twin.library import BY_ID
-from hil.twin.mechanism import Parameter, Role
+from hil.twin.parameter import Parameter, Role
 from hil.twin.physics import Active
 
 # Steps of the forward difference for the edges of a window: first wide, to reach the edge, at last one tick at 1 kHz.

@@ -89,7 +89,7 @@ class Picture(StrEnum):
 
 
 Points = Sequence[tuple[float, ...]]
-_NO_SIZE = 1e-9  # strength over its bound: above rounding of a fit that ends at zero, far below any sensor
+_NO_SIZE = 1e-6  # strength over a typical defect: above rounding of a fit that ends at zero, far below any sensor
 
 
 @dataclass(frozen=True)
@@ -185,12 +185,13 @@ class Mechanism:
 
     def is_valid(self, values: Sequence[float], variant: int, axis: AxisFacts) -> bool:
         """Check that the effect has a size, that its name applies, and that the sensors can show it."""
-        return self._has_size(values) and (self.valid is None or self.valid(values, variant, axis))
+        return self._has_size(values, axis) and (self.valid is None or self.valid(values, variant, axis))
 
-    def _has_size(self, values: Sequence[float]) -> bool:
+    def _has_size(self, values: Sequence[float], axis: AxisFacts) -> bool:
         """Check that a strength is off the bound at which there is no effect."""
-        sizes = [(v, p) for v, p in zip(values, self.parameters, strict=False) if p.role is Role.STRENGTH]
-        return not self.neutral_at_zero or any(abs(v - max(p.low, 0.0)) > _NO_SIZE * p.high for v, p in sizes)
+        rows = zip(values, self.parameters, self.complete(self.typical_values(axis)), strict=False)
+        sizes = [(value - max(p.low, 0.0), typical) for value, p, typical in rows if p.role is Role.STRENGTH]
+        return not self.neutral_at_zero or any(abs(size) > _NO_SIZE * abs(typical) for size, typical in sizes)
 
     def _inside(self, values: Sequence[float]) -> tuple[float, ...]:
         return tuple(min(max(value, p.low), p.high) for value, p in zip(values, self.parameters, strict=True))

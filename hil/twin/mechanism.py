@@ -189,9 +189,10 @@ class Mechanism:
 
     def _has_size(self, values: Sequence[float], axis: AxisFacts) -> bool:
         """Check that a strength is off the bound at which there is no effect."""
-        rows = zip(values, self.parameters, self.complete(self.typical_values(axis)), strict=False)
-        sizes = [(value - max(p.low, 0.0), typical) for value, p, typical in rows if p.role is Role.STRENGTH]
-        return not self.neutral_at_zero or any(abs(size) > _NO_SIZE * abs(typical) for size, typical in sizes)
+        sizes = self.indices(Role.STRENGTH)
+        size = max(abs(values[i] - max(self.parameters[i].low, 0.0)) for i in sizes if i < len(values))
+        typical = self.typical_values(axis)
+        return not self.neutral_at_zero or size > _NO_SIZE * max(abs(typical[i]) for i in sizes if i < len(typical))
 
     def _inside(self, values: Sequence[float]) -> tuple[float, ...]:
         return tuple(min(max(value, p.low), p.high) for value, p in zip(values, self.parameters, strict=True))

@@ -1,0 +1,23 @@
+"""Simulations in parallel: compiled kernels run without the GIL, so threads take all cores."""
+
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, TypeVar, cast
+
+from threadpoolctl import threadpool_limits
+
+Output = TypeVar("Output")
+Function = TypeVar("Function", bound=Callable[..., Any])
+POOL = ThreadPoolExecutor(os.cpu_count() or 1)
+
+
+def in_parallel(jobs: Sequence[Callable[[], Output]]) -> list[Output]:
+    """Run jobs in parallel; results in order. Jobs may use `POOL`."""
+    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+        return list(pool.map(lambda job: job(), jobs))
+
+
+def one_blas_thread(function: Function) -> Function:
+    """Limit linear algebra to one thread during a function: its threads wait actively and slow simulations down."""
+    return cast(Function, threadpool_limits.wrap(limits=1, user_api="blas")(function))

@@ -8,14 +8,18 @@ included; on a python-can bus it is excluded, since real devices serve their end
 import tempfile
 from time import perf_counter_ns
 
+import can
+
+from drivers.bus import BusConfig, open_bus
 from hil.benchmarks.axis import moves, trajectory, twenty_modes
-from hil.benchmarks.figure import Figure, percentile
+from hil.benchmarks.figure import Figure, Reference, ReferenceKind, percentile
 from hil.loop.clock import VirtualClock
 from hil.loop.devices import Rig
 from hil.loop.session import Session, make_cycle
 from hil.recording.writer import Recorder
 
 LOOPS = 4
+ALONE_CYCLES = 5000  # of frames without a loop; their median is steady to some per cent
 
 
 class StandingAxis:
@@ -81,15 +85,43 @@ def whole_cycle(interface: str) -> tuple[list[float], list[float]]:
     return durations, devices
 
 
+def frames_alone() -> float:
+    """Median time [s] in which python-can alone sends SYNC and RPDO and receives both TPDOs, on its virtual bus."""
+    config = BusConfig("virtual", "hil-bench-frames")
+    sync = can.Message(arbitration_id=0x080, is_extended_id=False)
+    pdo = can.Message(arbitration_id=0x205, data=bytes(8), is_extended_id=False)
+    durations: list[float] = []
+    with open_bus(config) as near, open_bus(config) as far:
+        for _ in range(ALONE_CYCLES):
+            far.send(pdo)
+            far.send(pdo)
+            start_ns = perf_counter_ns()
+            near.send(sync)
+            while near.recv(0.0) is not None:
+                pass
+            near.send(pdo)
+            durations.append(1e-9 * (perf_counter_ns() - start_ns))
+            while far.recv(0.0) is not None:
+                pass
+    return percentile(durations, 0.5)
+
+
 def figures() -> list[Figure]:
     """Cycle times on the in-process bus and through python-can."""
     inside, _ = whole_cycle("inprocess")
     outside, devices = whole_cycle("virtual")
+    frames = Reference("frames alone", ReferenceKind.LIMIT, 1e6 * frames_alone())
     detail = f"{len(inside)} cycles, twin of 20 modes, simulated devices included"
     apart = f"twin of 20 modes; without the {1e6 * percentile(devices, 0.5):.0f} us of the simulated devices"
+
+    def figure(bus: str, label: str, seconds: list[float], part: float, target: float | None, how: str) -> Figure:
+        beside = (frames,) if seconds is outside and part == 0.5 else ()
+        name, value = f"whole cycle, {bus} bus, p{100 * part:.0f}", 1e6 * percentile(seconds, part)
+        return Figure(name, f"{label}, p{100 * part:.0f}", value, "us", target, True, how, beside)
+
     return [
-        Figure("whole cycle, in-process bus, p50", 1e6 * percentile(inside, 0.5), "us", 10.0, True, detail),
-        Figure("whole cycle, in-process bus, p99", 1e6 * percentile(inside, 0.99), "us", 50.0, True, detail),
-        Figure("whole cycle, python-can virtual bus, p50", 1e6 * percentile(outside, 0.5), "us", 40.0, True, apart),
-        Figure("whole cycle, python-can virtual bus, p99", 1e6 * percentile(outside, 0.99), "us", None, True, apart),
+        figure("in-process", "cycle, in-process", inside, 0.5, 10.0, detail),
+        figure("in-process", "cycle, in-process", inside, 0.99, 50.0, detail),
+        figure("python-can virtual", "cycle, python-can", outside, 0.5, 40.0, apart),
+        figure("python-can virtual", "cycle, python-can", outside, 0.99, None, apart),
     ]

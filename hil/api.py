@@ -5,6 +5,7 @@ Everything heavy is imported inside the functions, so that `hil.simulate` does n
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
 from itertools import count
@@ -148,19 +149,21 @@ def diagnose(
     *,
     held_out: Recording | Sequence[Recording] = (),
     progress: Callable[[str], None] = lambda text: None,
+    budget_s: float = math.inf,
 ) -> Diagnosis:
     """Find the physics that the twin of a bench lacks: where it acts, its parameters, and a proof.
 
     recordings: to learn from, of one axis. bench: as its owner describes it; wrong parameters are estimated. held_out:
     recordings of another motion that nothing is fitted to; without any, the last third of each recording. progress:
-    called with a text at each step. Takes from half a minute to some minutes.
+    called with a text at each step. budget_s: time after which the search ends with the best explanation so far,
+    marked in `result.time_budget`; without it from some seconds to some minutes.
 
     Returns the diagnosis; `result` has verdict, findings with standard errors, location and held-out figures, `bench`
     the corrected bench. Raises InputError for recordings that cannot be diagnosed, with all reasons.
     """
     from hil.diagnosis.diagnose import diagnose as diagnose_recordings
 
-    return diagnose_recordings(_sequence(recordings), _sequence(held_out), bench, progress)
+    return diagnose_recordings(_sequence(recordings), _sequence(held_out), bench, progress, budget_s)
 
 
 def design_experiment(diagnosis: Diagnosis) -> Experiment | None:

@@ -1,5 +1,6 @@
 """hil diagnose."""
 
+import math
 from pathlib import Path
 from typing import Annotated
 
@@ -22,6 +23,15 @@ def diagnose(
             "Default: the last third of each recording.",
         ),
     ] = None,
+    budget_s: Annotated[
+        float | None,
+        typer.Option(
+            "--budget",
+            metavar="SECONDS",
+            show_default="no limit",
+            help="Time after which the search ends with the best answer so far; the result says what was not tried.",
+        ),
+    ] = None,
     bench: RecordedBench = None,
     folder: Out = None,
 ) -> None:
@@ -39,7 +49,7 @@ def diagnose(
     believed = load_bench(bench) if bench else bench_of(train[0])
     folder = folder or default_folder(f"diagnose-{train[0].name}")
     with new_folder(folder) as part, progress() as tell:
-        diagnosis = diagnose_recordings(train, held_out, believed, tell)
+        diagnosis = diagnose_recordings(train, held_out, believed, tell, math.inf if budget_s is None else budget_s)
         tell("writing the report")
         write_diagnosis(diagnosis, part)
     result = diagnosis.result
@@ -62,4 +72,8 @@ def diagnose(
             for figures in (entry.validate_ or entry.train,)
         ],
     )
+    if result.time_budget:
+        out.print(
+            f"\nThe search ended with its time budget before {result.time_budget.stopped_before}: best answer so far."
+        )
     out.print(f"\n{result.statement}\n\nReport: {folder / 'report.html'}")

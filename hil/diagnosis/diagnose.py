@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Container, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -14,8 +15,10 @@ from hil.bench.bench_file import Bench
 from hil.diagnosis.experiment import Experiment, separating, showing
 from hil.diagnosis.location.locate import locate
 from hil.diagnosis.preflight import prepare
-from hil.diagnosis.result import ChannelFit, Location, Mode, NextExperiment, Result, Unexplained, Verdict
+from hil.diagnosis.result import ChannelFit, Location, Mode, NextExperiment, Result, TimeBudget, Unexplained, Verdict
 from hil.diagnosis.search.forward_selection import Explanation, explain
+from hil.diagnosis.split import same, split
+from hil.diagnosis.time_left import with_time_left
 from hil.diagnosis.verdict.cross_validation import CrossValidation, cross_validate, explained_share
 from hil.diagnosis.verdict.findings import corrections, diagnosed_bench, findings, form_of, renamed
 from hil.diagnosis.verdict.fit_table import channel_names, channel_residuals, fit_table
@@ -35,7 +38,7 @@ if TYPE_CHECKING:
 
 Progress = Callable[[str], None]
 
-TRAINED = 2.0 / 3.0  # share of a recording for training if none is held out: a common split
+SEARCH_SHARE = 0.7  # of a time budget for the search; the rest for held-out recordings, location and report
 NEXT_EXPERIMENT = "next_experiment.yaml"
 
 
@@ -98,20 +101,28 @@ class Diagnosis:
 
 @one_blas_thread
 def diagnose(
-    train: Sequence[Recording], validate: Sequence[Recording], bench: Bench, progress: Progress = lambda text: None
+    train: Sequence[Recording],
+    validate: Sequence[Recording],
+    bench: Bench,
+    progress: Progress = lambda text: None,
+    budget_s: float = math.inf,
 ) -> Diagnosis:
     """Diagnose recordings of one axis against its bench, and validate the result on recordings of another motion.
 
-    Without `validate` the last third of each recording is held out. `progress` gets the name of each step. Raises
+    Without `validate` the last third of each recording is held out. `progress` gets the name of each step and the time
+    left. After `budget_s` the search ends with the best explanation so far; the rest takes some seconds more. Raises
     InputError with all reasons if the recordings cannot be diagnosed.
     """
+    if not budget_s > 0.0:
+        raise InputError(f"budget: given {budget_s:g} s, allowed above 0 s")
     begin = time.monotonic()
+    progress = with_time_left(progress, begin, budget_s)
     progress("checking the recordings")
     notes = []
     if not validate:
-        train, validate = _split(train)
+        train, validate = split(train)
         notes.append("No held-out recording was given: the last third of each recording is used for validation.")
-    twice = [held.name for held in validate for run in train if _same(held, run)]
+    twice = [held.name for held in validate for run in train if same(held, run)]
     if twice:
         raise InputError(
             f"--validate: given {', '.join(twice)}, which is a training recording too, allowed recordings "
@@ -121,7 +132,7 @@ def diagnose(
     data = prepare_dataset(prepared[: len(train)], bench)
     held_out = data.over(prepared[len(train) :])
 
-    explanation = explain(data, progress)
+    explanation = explain(data, progress, begin + SEARCH_SHARE * budget_s)
     owner, nominal = explanation.owner, explanation.nominal
     progress("testing on held-out recordings")
     proof = cross_validate(nominal, renamed(explanation.final), held_out)
@@ -141,9 +152,12 @@ def diagnose(
     hidden = not_testable(final if named else nominal)
     progress("designing the next experiment")
     # with findings only their rivals are in question; without, the cause may be a mechanism that the motion cannot show
-    experiment = separating(explanation, proof.final, held_out) if named else showing(nominal, hidden, held_out)
+    experiment = None
+    if not explanation.stopped_at:
+        experiment = separating(explanation, proof.final, held_out) if named else showing(nominal, hidden, held_out)
     notes += [*_notes(table, proof, forms, verdict, explanation), *_ended(final)]
     notes += [experiment.note] if experiment else []
+    notes += [_stopped(explanation, budget_s)] if explanation.stopped_at else []
     result = Result(
         verdict=verdict,
         statement="",
@@ -155,6 +169,11 @@ def diagnose(
         unexplained=_unexplained(before, final, held_out, location, verdict),
         next_experiment=NextExperiment(profile=NEXT_EXPERIMENT, separates=experiment.separates)
         if experiment and experiment.profile
+        else None,
+        time_budget=TimeBudget(
+            budget_s=budget_s, stopped_before=explanation.stopped_at, not_tried=explanation.not_tried
+        )
+        if explanation.stopped_at
         else None,
         notes=tuple(notes),
         runtime_s=time.monotonic() - begin,
@@ -194,38 +213,6 @@ def statement(result: Result) -> str:
     if result.verdict is Verdict.NO_MISMATCH:
         return "The twin reproduces these recordings to within their noise."
     return f"The mismatch is not explained by any mechanism of the library: {result.unexplained.description}"
-
-
-def _split(recordings: Sequence[Recording]) -> tuple[list[Recording], list[Recording]]:
-    """Split each recording into the first two thirds and the rest."""
-    train, rest = [], []
-    for recording in recordings:
-        cut = _standstill(recording, round(TRAINED * len(recording)))
-        train.append(_part(recording, slice(0, cut), "first part"))
-        rest.append(_part(recording, slice(cut, None), "last part"))
-    return train, rest
-
-
-def _same(one: Recording, other: Recording) -> bool:
-    """True if two recordings have the same samples."""
-    return one.columns.keys() == other.columns.keys() and all(
-        np.array_equal(values, other[name]) for name, values in one.columns.items()
-    )
-
-
-def _standstill(recording: Recording, row: int) -> int:
-    """Return the row at rest nearest to `row`; `row` itself if none is within a tenth of the recording."""
-    names = recording.axis
-    if names.velocity_command not in recording.columns:
-        return row
-    still = np.flatnonzero(recording[names.velocity_command] == 0.0)
-    near = still[np.abs(still - row) < 0.1 * len(recording)]
-    return int(near[np.argmin(np.abs(near - row))]) if near.size else row
-
-
-def _part(recording: Recording, rows: slice, what: str) -> Recording:
-    columns = {name: values[rows] for name, values in recording.columns.items()}
-    return replace(recording, name=f"{recording.name} ({what})", columns=columns)
 
 
 def _unexplained(
@@ -284,6 +271,15 @@ def _notes(
         tried = ", ".join(title(term.effect) for term in explanation.terms)
         notes.append(f"The closest mechanisms ({tried}) leave too much of the mismatch unexplained; none is reported.")
     return notes
+
+
+def _stopped(explanation: Explanation, budget_s: float) -> str:
+    """Note on a search that ended with its time budget."""
+    others = titles(explanation.not_tried) if explanation.not_tried else "no mechanism"
+    return (
+        f"The search ended with its time budget of {digits(budget_s)} s before {explanation.stopped_at}: this is the "
+        f"best explanation so far. Not fitted beside it: {others}. No next experiment was designed."
+    )
 
 
 def _ended(final: Fit) -> list[str]:

@@ -138,6 +138,14 @@ class NextExperiment(_Part):
     separates: tuple[str, ...]
 
 
+class TimeBudget(_Part):
+    """A search that its time budget ended: the result is the best so far."""
+
+    budget_s: NotNegative
+    stopped_before: str = Field(description="first step of the search that was not done")
+    not_tried: tuple[str, ...] = Field(description="mechanisms that were not fitted beside those found")
+
+
 class Result(_Part):
     """diagnosis.json."""
 
@@ -151,6 +159,7 @@ class Result(_Part):
     not_testable: tuple[str, ...] = Field(description="mechanisms this motion cannot show")
     unexplained: Unexplained
     next_experiment: NextExperiment | None = None
+    time_budget: TimeBudget | None = Field(None, description="null if the search was completed")
     notes: tuple[str, ...] = ()
     runtime_s: NotNegative
 

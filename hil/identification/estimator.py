@@ -11,6 +11,8 @@ a converged fit ends with a new J. The step is computed from J^T J: with 1e5 row
 J, as in scipy's solvers, takes longer than the simulations.
 """
 
+import math
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
@@ -130,6 +132,10 @@ class Fit:
             self._elsewhere[data] = replace(self.estimator, data=data).evaluate(self.hypothesis)
         return self._elsewhere[data]
 
+    def without_deadline(self) -> "Fit":
+        """The same fit, whose refits are not limited in time."""
+        return replace(self, estimator=replace(self.estimator, deadline_s=math.inf))
+
     def with_accuracy(self, torque_accuracy: float) -> "Fit":
         """Evaluate the hypothesis, not fitted, with another weight of the motor channel and the twin's own steps."""
         return replace(self.estimator, torque_accuracy=torque_accuracy, fast=False).evaluate(self.hypothesis)
@@ -145,7 +151,8 @@ class Estimator:
 
     `edge_step_s` is the forward-difference step for the edge of a window, `torque_accuracy` the torque resolved by the
     motor channel over the noise of the torque channel. `closed` selects residuals in closed loop,
-    `fast` those with the internal steps of a search.
+    `fast` those with the internal steps of a search. After `deadline_s` of the
+    monotonic clock fits take no more steps.
     """
 
     data: Dataset
@@ -153,6 +160,12 @@ class Estimator:
     torque_accuracy: float = TORQUE_ACCURACY
     closed: bool = False
     fast: bool = False
+    deadline_s: float = math.inf
+
+    @property
+    def expired(self) -> bool:
+        """True after the deadline."""
+        return time.monotonic() > self.deadline_s
 
     def residuals(self, hypothesis: Hypothesis) -> Residuals:
         """Residuals of a hypothesis, weighted by these settings."""
@@ -213,7 +226,7 @@ class Estimator:
         damping, growth = _FIRST_DAMPING, 2.0
         size = np.zeros(at.x.size)
         used, converged = 1, False
-        while used < evaluations:
+        while used < evaluations and not self.expired:
             loss, weights = _loss(residuals.vector, soft)
             weighted = slopes if weights is None else slopes * weights[:, None]
             normal = weighted.T @ weighted

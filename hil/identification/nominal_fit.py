@@ -1,5 +1,6 @@
 """Fit the nominal parameters of an axis to recordings, block by block: the first step of every diagnosis."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,9 +43,13 @@ class FitResult:
 
 
 @one_blas_thread
-def fit_nominal_parameters(data: Dataset, evaluations: int = _SECOND) -> Fit:
-    """Fit the nominal parameters alone, first with a robust loss."""
-    return Estimator(data).fit(Hypothesis(data.bench), soft=SOFT, evaluations=_FIRST).refit(evaluations)
+def fit_nominal_parameters(data: Dataset, evaluations: int = _SECOND, deadline_s: float = math.inf) -> Fit:
+    """Fit the nominal parameters alone, first with a robust loss; fits from it have the same deadline."""
+    return (
+        Estimator(data, deadline_s=deadline_s)
+        .fit(Hypothesis(data.bench), soft=SOFT, evaluations=_FIRST)
+        .refit(evaluations)
+    )
 
 
 def fit_nominal(data: Dataset) -> FitResult:

@@ -32,7 +32,7 @@ def write_diagnosis(diagnosis: Diagnosis, folder: Path) -> None:
     """Write diagnosis.json, report.html with its PNGs, bench.diagnosed.yaml and, if one helps, next_experiment.yaml."""
     result = diagnosis.result
     names = ", ".join(run.name for run in diagnosis.train.runs)
-    good = result.verdict is not Verdict.UNEXPLAINED
+    good = result.verdict is not Verdict.UNEXPLAINED and result.time_budget is None
     page = Page(f"Diagnosis of {names}", _lead(diagnosis), result.statement, good)
     for index in range(len(result.missing)):
         _finding(page, diagnosis, index, folder)
@@ -74,7 +74,8 @@ def _lead(diagnosis: Diagnosis) -> str:
     seconds = sum(run.motor.size * run.period_s for run in diagnosis.train.runs)
     held_out = ", ".join(run.name for run in diagnosis.held_out.runs) or "nothing"
     bench = f"bench {diagnosis.owner.name} ({diagnosis.owner.axis.model})"
-    return f"{seconds:.1f} s of training, held out: {held_out} · {bench}"
+    ended = " · ended by its time budget, see How it was judged" if diagnosis.result.time_budget else ""
+    return f"{seconds:.1f} s of training, held out: {held_out} · {bench}{ended}"
 
 
 def _finding(page: Page, diagnosis: Diagnosis, index: int, folder: Path) -> None:

@@ -4,6 +4,8 @@ Terms are added one at a time from the whole library while the evidence supports
 that are no longer needed are removed: a first term may have imitated two causes that are found later.
 """
 
+import math
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -22,6 +24,7 @@ from hil.identification.noise_floor import REPEATS, unrepeated
 from hil.identification.nominal_fit import fit_nominal_parameters
 from hil.identification.parallel import in_parallel
 from hil.identification.terms import FRICTION, Key, Term
+from hil.twin.library import BY_ID
 
 Progress = Callable[[str], None]
 
@@ -79,6 +82,8 @@ class Explanation:
     rivals: dict[Key, list[RivalFit]] = field(default_factory=dict)
     needed: dict[Key, float] = field(default_factory=dict)  # evidence that each term is needed
     candidates: tuple[Candidate, ...] = ()  # of the first score test
+    stopped_at: str = ""  # step of the search at which the time was over; empty if it was completed
+    not_tried: tuple[str, ...] = ()  # ids that were not fitted beside the terms found
 
     @property
     def terms(self) -> tuple[Term, ...]:
@@ -86,18 +91,33 @@ class Explanation:
         return self.final.terms
 
 
-def explain(data: Dataset, progress: Progress = lambda text: None) -> Explanation:
-    """Search for the mechanisms that the twin of a bench lacks on the recordings of a data set."""
-    progress("refitting the nominal parameters")
-    base = fit_nominal_parameters(data)
+def explain(data: Dataset, progress: Progress = lambda text: None, deadline_s: float = math.inf) -> Explanation:
+    """Search for the mechanisms that the twin of a bench lacks on the recordings of a data set.
+
+    After `deadline_s` of the monotonic clock the search ends with the best explanation so far.
+    """
+    stopped_at = ""
+
+    def step(text: str) -> None:
+        nonlocal stopped_at
+        if time.monotonic() > deadline_s:
+            stopped_at = stopped_at or text
+        else:
+            progress(text)
+
+    step("refitting the nominal parameters")
+    base = fit_nominal_parameters(data, deadline_s=deadline_s)
     owner, nominal = base.estimator.evaluate(base.hypothesis.owner), base
     rivals, needed, first = dict[Key, list[RivalFit]](), dict[Key, float](), list[Candidate]()
-    tried = [effects(())]
+    tried, fitted = [effects(())], set[str]()
     while len(base.terms) < MOST_TERMS:
-        progress(f"screening the library beside {len(base.terms)} terms")
+        step(f"screening the library beside {len(base.terms)} terms")
+        if stopped_at:
+            break
         candidates = [one for one in screen_library(base) if claimable(one.term, base.bench)]
         first = first or candidates
-        found, best = _next_term(base, owner, nominal, candidates, progress)
+        found, best = _next_term(base, owner, nominal, candidates, step)
+        fitted = {fit.terms[-1].effect for fit in found if not base.estimator.expired}
         if best is None:
             break
         best = _simplest([best, *(other for other in found if other is not best and against(best, other) < TIED)])
@@ -117,29 +137,39 @@ def explain(data: Dataset, progress: Progress = lambda text: None) -> Explanatio
         tried.append(effects(base.terms))
         if len(base.terms) >= _IN_VAIN and base.excess > MOST * nominal.excess:
             break
+    step("fitting the explanation to convergence")
     final = base.refit(_ENDED)
     kept = {term.key for term in final.terms}
+    present = {*fitted, *(term.effect for term in final.terms)}
+    not_tried = tuple(effect for effect in BY_ID if effect not in present) if stopped_at else ()
     rivals = {key: value for key, value in rivals.items() if key in kept}
-    return Explanation(owner, nominal, final, rivals, needed, tuple(first))
+    owner, nominal, final = (fit.without_deadline() for fit in (owner, nominal, final))
+    rivals = {key: [replace(rival, fit=rival.fit.without_deadline()) for rival in rivals[key]] for key in rivals}
+    return Explanation(owner, nominal, final, rivals, needed, tuple(first), stopped_at, not_tried)
 
 
 def _next_term(
-    base: Fit, owner: Fit, nominal: Fit, candidates: Sequence[Candidate], progress: Progress
+    base: Fit, owner: Fit, nominal: Fit, candidates: Sequence[Candidate], step: Progress
 ) -> tuple[list[Fit], Fit | None]:
     """Fit the base with one more term; return the fits and the first one with sufficient evidence, if any."""
     bits = 1.0 - float(np.exp(-NEEDED / base.rows))  # share of white residuals whose removal gives evidence of NEEDED
     promising = [one for one in candidates if one.share > bits and one.share * base.cost > MATERIAL * base.rows]
     found: list[Fit] = []
     if promising:
-        progress("fitting " + ", ".join(one.term.effect for one in promising[:3]))
+        step("fitting " + ", ".join(one.term.effect for one in promising[:3]))
         found = _claimable(race(base, promising))
     best = _worthwhile(found, base, nominal)
-    if (best is None or best.cost > _CLEAR * base.cost) and not owner.at_floor and may_hide(base):
-        progress("fitting a lost preload from the springs of the bench file")
+    if (
+        (best is None or best.cost > _CLEAR * base.cost)
+        and not owner.at_floor
+        and may_hide(base)
+        and not base.estimator.expired
+    ):
+        step("fitting a lost preload from the springs of the bench file")
         found = sorted([*found, unbent(base)], key=lambda other: other.cost)
         best = _worthwhile(found, base, nominal)
-    if best is None and not base.at_floor and base.excess > MOST * nominal.excess:
-        progress("searching again beside the parameters of the bench file")
+    if best is None and not base.at_floor and base.excess > MOST * nominal.excess and not base.estimator.expired:
+        step("searching again beside the parameters of the bench file")
         found = _claimable(from_owner(base))
         best = _worthwhile(found, base, nominal)
     return found, best

@@ -104,7 +104,8 @@ class _Race:
         others = [fit for fit in _unique([*second[:2], *ranked[:_FINISHED]]) if fit is not ranked[0]]
         results = [leader, *self._followers(leader, ranked[0], others)]
         best = min(results, key=lambda fit: fit.cost)
-        results += [*self._variants(best), *self._equivalents(best)]
+        if not self.search.expired:
+            results += [*self._variants(best), *self._equivalents(best)]
         found: dict[str, Fit] = {}
         for fit in results:
             effect = fit.terms[-1].effect

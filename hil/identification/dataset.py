@@ -78,7 +78,8 @@ def prepare_dataset(runs: Sequence[Measured], bench: Bench) -> Dataset:
     torque channel, within the bounds of the observer.
     """
     wanted = max(np.sqrt(run.noise.motor * inertia(bench) / (TORQUE_ACCURACY * run.noise.torque)) for run in runs)
-    observer_s = float(np.clip(wanted, FASTEST_OBSERVER_TICKS * runs[0].period_s, SLOWEST_OBSERVER_S))
+    fastest_s = FASTEST_OBSERVER_TICKS * runs[0].period_s
+    observer_s = float(np.clip(wanted, fastest_s, max(SLOWEST_OBSERVER_S, fastest_s)))
     return Dataset(tuple(runs), bench, observer_s, max(float(np.ptp(run.position_command_m)) for run in runs))
 
 

@@ -245,7 +245,8 @@ class Hypothesis:
         return Twin(bench.axis.physics(), bench.gains, active + added, None, coarse_s, fine_s, observer_s)
 
     def respond(self, run: Measured) -> Response:
-        """Response of the twin in closed loop to the set-points of a run."""
+        """Response of the twin in closed loop to the set-points of a run. Raises FieldError without a control law."""
+        _ = self.bench.known_control  # raises
         return self.twin().simulate(run.position_command_m, run.velocity_command_m_s, run.start, run.table_m)
 
     def blocks(self, run: Measured, observer_s: float, fast: bool = False) -> dict[str, FloatArray]:
@@ -266,11 +267,16 @@ class Hypothesis:
                 tuple(
                     differences(run.response, self.respond(run), self.bench, run.judged)
                     if closed
-                    else self.blocks(run, data.observer_s, fast)
+                    else seen(self.blocks(run, data.observer_s, fast), run)
                     for run in data.runs
                 ),
             )
         return self._known[key]
+
+
+def seen(channels: dict[str, FloatArray], run: Measured) -> dict[str, FloatArray]:
+    """The channels of a run that have a residual."""
+    return {name: values for name, values in channels.items() if name not in run.unseen}
 
 
 def effects(terms: Sequence[Term]) -> list[tuple[str, int]]:

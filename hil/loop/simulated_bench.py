@@ -166,7 +166,7 @@ def _seven_dof(axis: SevenDofAxis, friction: dict[str, Any]) -> AxisTruth:
 
 def _servo(bench: Bench) -> DriveServo:
     """Loops inside the simulated drive, for CSV, CSP and stops: the law of the bench on the motor encoder."""
-    gains, control = bench.gains, bench.control
+    control, gains = bench.known_control, bench.gains
     integral = gains.integral_gain_n_m_rad
     servo = Servo(
         position_gain_1_s=gains.position_gain_1_s, velocity_feedforward=gains.velocity_feedforward,

@@ -28,8 +28,8 @@ def _of_torque(run: Measured) -> list[str]:
     if "torque" in run.unseen:
         return [
             f"No torque is recorded: only the transmission was judged, from {names.motor_position} to "
-            f"{names.table_position}. Inertia and friction of the motor side, loads on it and the drive cannot be "
-            f"told; record {names.torque} or {names.torque_command}."
+            f"{names.table_position}. Friction and loads of the motor side and the drive cannot be told, and of masses "
+            f"and stiffness only their ratio; record {names.torque} or {names.torque_command}."
         ]
     if run.torque_is_command:
         return [

@@ -21,6 +21,7 @@ from hil.identification.noise import white_noise
 from hil.recording.recording import Recording
 
 SMOOTH_S = 0.021  # window of the derivatives of the motor position: passes some 20 Hz, averages encoder counts
+_SHORTEST = 5  # rows of a parabola: the fewest that average noise on both sides
 _REST = 5.0  # speed at rest in standard deviations of its noise: one row in a million is above
 _SLOW = 1e-3  # of the top speed: below lies rest, as for set-points (`noise.moving`)
 DERIVED = "derived"  # key of the metadata: channel -> how it was derived
@@ -50,7 +51,7 @@ def completed(recording: Recording, bench: Bench) -> Recording:
         travelled = cumulative_trapezoid(columns[names.motor_velocity], dx=recording.period_s, initial=0.0)
         add(names.motor_position, np.asarray(travelled, dtype=np.float64), f"sum of {names.motor_velocity}")
     motor = columns[names.motor_position]
-    velocity, acceleration = derivatives(motor, recording.period_s)
+    velocity = derivatives(motor, recording.period_s)[0]
     ratio = bench.axis.ratio_m_rad
     add(names.position_command, ratio * motor, f"measured {names.motor_position}")
     add(names.velocity_command, ratio * without_rest(velocity, motor, bench, recording.period_s), "measured motion")
@@ -59,6 +60,7 @@ def completed(recording: Recording, bench: Bench) -> Recording:
             add(name, columns[other].copy(), f"copy of {other}, the only one recorded")
     if names.torque not in columns:
         physics = bench.axis.physics()
+        acceleration = derivatives(motor, recording.period_s, _SHORTEST)[1]
         friction = physics.coulomb_n_m * np.sign(without_rest(velocity, motor, bench, recording.period_s))
         torque = (
             float(physics.chain.inertia_kg_m2.sum()) * acceleration + physics.viscous_n_m_s_rad * velocity + friction
@@ -74,9 +76,12 @@ def torque_is_measured(recording: Recording) -> bool:
     return bool(recording.metadata.get(DERIVED, {}).get(recording.axis.torque) != FROM_BENCH)
 
 
-def derivatives(position: FloatArray, period_s: float) -> tuple[FloatArray, FloatArray]:
-    """Smoothed velocity and acceleration (n,) of a position (n,); of one shorter than the window, plain differences."""
-    window = _window(period_s)
+def derivatives(position: FloatArray, period_s: float, window: int | None = None) -> tuple[FloatArray, FloatArray]:
+    """Smoothed velocity and acceleration (n,) of a position (n,); of one shorter than the window, plain differences.
+
+    `window` is the number of rows of the parabola, by default of `SMOOTH_S`.
+    """
+    window = window or _window(period_s)
     if position.size <= window:
         velocity = np.gradient(position, period_s)
         return velocity, np.gradient(velocity, period_s)
@@ -98,4 +103,4 @@ def without_rest(velocity: FloatArray, position: FloatArray, bench: Bench, perio
 
 
 def _window(period_s: float) -> int:
-    return max(round(SMOOTH_S / period_s) | 1, 5)
+    return max(round(SMOOTH_S / period_s) | 1, _SHORTEST)

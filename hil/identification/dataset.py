@@ -75,10 +75,11 @@ def prepare_dataset(runs: Sequence[Measured], bench: Bench) -> Dataset:
     """Build the data set of recordings.
 
     With the observer's time constant the noise of the motor encoder makes as much observed torque as the noise of the
-    torque channel, within the bounds of the observer.
+    torque channel, within the bounds of the observer. Without a torque the fastest one moves the motor as measured.
     """
     wanted = max(np.sqrt(run.noise.motor * inertia(bench) / (TORQUE_ACCURACY * run.noise.torque)) for run in runs)
     fastest_s = FASTEST_OBSERVER_TICKS * runs[0].period_s
+    wanted = fastest_s if any("motor" in run.unseen for run in runs) else wanted
     observer_s = float(np.clip(wanted, fastest_s, max(SLOWEST_OBSERVER_S, fastest_s)))
     return Dataset(tuple(runs), bench, observer_s, max(float(np.ptp(run.position_command_m)) for run in runs))
 

@@ -250,13 +250,13 @@ class Hypothesis:
         return self.twin().simulate(run.position_command_m, run.velocity_command_m_s, run.start, run.table_m)
 
     def blocks(self, run: Measured, observer_s: float, fast: bool = False) -> dict[str, FloatArray]:
-        """Measured less twin with each block fed measured inputs, per channel (n,)."""
+        """Measured less twin with each block fed measured inputs, per channel (n,); 0 for channels that are unseen."""
         twin = self.twin(observer_s, fast)
         measured = twin.undelayed(run.response)
         predicted = twin.observe(run.position_command_m, run.velocity_command_m_s, measured, run.start)
         found = differences(measured, predicted, self.bench, run.judged)
         found["command"] = measured.torque_command - predicted.torque_command
-        return found
+        return found | {name: np.zeros(run.motor.size) for name in run.unseen}
 
     def residuals(self, data: Dataset, closed: bool = False, fast: bool = False) -> Residuals:
         """Residuals on a data set, block by block or in closed loop; `fast`: with the steps of a search."""
@@ -267,16 +267,11 @@ class Hypothesis:
                 tuple(
                     differences(run.response, self.respond(run), self.bench, run.judged)
                     if closed
-                    else seen(self.blocks(run, data.observer_s, fast), run)
+                    else self.blocks(run, data.observer_s, fast)
                     for run in data.runs
                 ),
             )
         return self._known[key]
-
-
-def seen(channels: dict[str, FloatArray], run: Measured) -> dict[str, FloatArray]:
-    """The channels of a run that have a residual."""
-    return {name: values for name, values in channels.items() if name not in run.unseen}
 
 
 def effects(terms: Sequence[Term]) -> list[tuple[str, int]]:

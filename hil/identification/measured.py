@@ -48,7 +48,7 @@ class Measured:
     start: Start
     noise: Noise
     left_out: int = 0  # rows of the recording before the first tick of the position loop
-    unseen: frozenset[str] = frozenset()  # channels of the twin without a residual: their input or output is unknown
+    unseen: frozenset[str] = frozenset()  # channels of the twin whose input or output is unknown: their residual is 0
 
     @property
     def time_s(self) -> FloatArray:

@@ -91,8 +91,8 @@ def read_recording(path: str | Path) -> Recording:
 
     An Arrow stream that was cut off is read to its last complete batch; `metadata["recovered"]` then says
     so. Columns that the channel table does not know are left out and listed in `metadata["unknown_columns"]`.
-    Raises InputError with file, row and column: no such file, not this format, a required channel missing
-    (time, position or velocity of the motor, torque or its command or the table's position), NaN or infinity, text, a clock that
+    Raises InputError with file, row and column: no such file, not this format, a required channel missing (time,
+    position or velocity of the motor, torque, its command or the table's position), NaN or infinity, text, a clock that
     repeats, runs back or is irregular.
     """
     path = Path(path)

@@ -14,7 +14,6 @@ from hil.diagnosis.location.residual_energy import without_terms
 from hil.diagnosis.search.disturbance import Disturbance, disturbance
 from hil.figures.panels import COMMAND, MEASURED, SIMULATED
 from hil.identification.dataset import inertia
-from hil.identification.hypothesis import seen
 from hil.identification.measured import Measured
 from hil.identification.terms import Term
 
@@ -69,12 +68,11 @@ class Curve(NamedTuple):
 def view_of(diagnosis: Diagnosis, run: Measured, term: Term) -> View:
     """Simulate a run without a term of the final hypothesis."""
     final, observer_s = diagnosis.final, diagnosis.train.observer_s
-    measured = seen(without_terms(final.hypothesis, term).blocks(run, observer_s), run)
+    measured = without_terms(final.hypothesis, term).blocks(run, observer_s)
     left = diagnosis.residuals(final, run)
-    modelled = {name: measured[name] - values for name, values in left.items()}
+    modelled = {name: measured[name] - left[name] for name in measured}
     torque, torque_modelled = (
-        disturbance(run, values.get("motor", np.zeros(run.motor.size)), inertia(final.bench), observer_s)
-        for values in (measured, modelled)
+        disturbance(run, values["motor"], inertia(final.bench), observer_s) for values in (measured, modelled)
     )
     return View(term, run, measured, modelled, torque, torque_modelled)
 

@@ -65,7 +65,7 @@ def scene(runs: Sequence[Measured], bench: Bench, blocks: Sequence[dict[str, Flo
     physics = bench.axis.physics()
     ratio = bench.axis.ratio_m_rad
     found = [
-        estimate.disturbance(run, block.get("motor", np.zeros(run.motor.size)), inertia(bench), observer_s)
+        estimate.disturbance(run, block["motor"], inertia(bench), observer_s)
         for run, block in zip(runs, blocks, strict=True)
     ]
     stretch, most_stretch = stretches(runs, ratio) if runs[0].table_m.size else (0.0, 0.0)

@@ -26,7 +26,7 @@ from hil.diagnosis.verdict.fit_table import channel_names, channel_residuals, fi
 from hil.diagnosis.verdict.judge import judge, not_testable
 from hil.diagnosis.wording import title, titles, where_in_short
 from hil.errors import InputError
-from hil.identification.completion import completed
+from hil.identification.completion import completed, reduced
 from hil.identification.dataset import Dataset, prepare_dataset
 from hil.identification.estimator import Fit, FitStatus
 from hil.identification.measured import Measured
@@ -120,8 +120,7 @@ def diagnose(
     begin = time.monotonic()
     progress = with_time_left(progress, begin, budget_s)
     progress("checking the recordings")
-    if train:
-        bench = bench.sampled(train[0].period_s)
+    bench = reduced(bench, [*train, *validate])
     train, validate = ([completed(run, bench) for run in runs] for runs in (train, validate))
     notes = []
     if not validate:

@@ -43,6 +43,8 @@ def _of_encoders(run: Measured, bench: Bench) -> list[str]:
     if bench.has_table_encoder:
         return []
     hidden = titles([mechanism.id for mechanism in LIBRARY if mechanism.needs_table])
+    names = AXIS_CHANNELS[run.kind]
     return [
-        f"No second encoder is recorded: {hidden} cannot be tested; record {AXIS_CHANNELS[run.kind].table_position}."
+        f"Only one position is recorded: {hidden} cannot be tested; record both {names.motor_position} and "
+        f"{names.table_position}."
     ]

@@ -8,6 +8,7 @@ The set-points then only tell motion from rest; nothing is simulated from them. 
 input for the twin and no measurement: the residuals of motor and torque are left out (`Measured.unseen`).
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -71,9 +72,27 @@ def completed(recording: Recording, bench: Bench) -> Recording:
     return replace(recording, columns=columns, metadata={**recording.metadata, DERIVED: {**known, **derived}})
 
 
+def reduced(bench: Bench, recordings: Sequence[Recording]) -> Bench:
+    """The part of a bench without a control law that recordings can judge.
+
+    It has the period of the recordings, and no table encoder unless all have both positions: the sum of a velocity
+    drifts, so that it cannot be compared with the table.
+    """
+    if bench.law_known or not recordings:
+        return bench
+    if not all({run.axis.motor_position, run.axis.table_position} <= set(run.columns) for run in recordings):
+        bench = bench.model_copy(update={"encoders": bench.encoders.model_copy(update={"table": None})})
+    return bench.sampled(recordings[0].period_s)
+
+
 def torque_is_measured(recording: Recording) -> bool:
     """False if the torque of a completed recording comes from the bench."""
     return bool(recording.metadata.get(DERIVED, {}).get(recording.axis.torque) != FROM_BENCH)
+
+
+def position_is_measured(recording: Recording) -> bool:
+    """False if the motor position of a completed recording is the sum of its velocity."""
+    return recording.axis.motor_position not in recording.metadata.get(DERIVED, {})
 
 
 def derivatives(position: FloatArray, period_s: float, window: int | None = None) -> tuple[FloatArray, FloatArray]:

@@ -7,7 +7,7 @@ commands best. Rows before the first such tick are omitted, since their velocity
 A drive in CSP gets positions only: its velocity feed-forward is their difference from SYNC to SYNC.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -19,8 +19,8 @@ from hil.bench.hardware import DriveMode
 from hil.channels import AxisKind
 from hil.control import cascade
 from hil.errors import InputError
-from hil.identification.completion import completed, torque_is_measured
-from hil.identification.noise import Laps, Noise, estimate_noise, find_laps, moving
+from hil.identification.completion import completed, position_is_measured, torque_is_measured
+from hil.identification.noise import Laps, Noise, estimate_noise, find_laps, moving, white_noise
 from hil.recording.recording import Recording
 from hil.twin.axis import Response, Start
 
@@ -49,6 +49,7 @@ class Measured:
     noise: Noise
     left_out: int = 0  # rows of the recording before the first tick of the position loop
     unseen: frozenset[str] = frozenset()  # channels of the twin whose input or output is unknown: their residual is 0
+    integrated: bool = False  # the motor position is the sum of its measured velocity
 
     @property
     def time_s(self) -> FloatArray:
@@ -129,6 +130,10 @@ def take(recording: Recording, bench: Bench) -> Measured:
     position, velocity, motor, feedback, table, command, torque = (
         values[first:] for values in (position, velocity, motor, feedback, table, command, torque)
     )
+    noise = estimate_noise(bench, velocity, motor, table, command, torque, recording.period_s)
+    integrated = not position_is_measured(recording)
+    if integrated:
+        noise = replace(noise, motor=recording.period_s * white_noise(_column(recording, names.motor_velocity)))
     return Measured(
         recording.name,
         recording.kind,
@@ -141,9 +146,10 @@ def take(recording: Recording, bench: Bench) -> Measured:
         torque,
         bool(np.array_equal(command, torque)),
         _start(gains, (position, velocity, motor, feedback), command),
-        estimate_noise(bench, velocity, motor, table, command, torque, recording.period_s),
+        noise,
         first,
         _unseen(recording, bench),
+        integrated,
     )
 
 

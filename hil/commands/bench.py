@@ -18,9 +18,11 @@ def bench(
     file: Annotated[Path, typer.Option("--out", help="JSON file for the figures.")] = Path("runs/bench.json"),
 ) -> None:
     """Measure loop, simulated bench and twin on this machine, and compare them with other simulators."""
+    from hil.commands.warm_up import compile_kernels
     from hil.files.output import write_json
     from hil.loop.realtime import machine_state, measure_jitter, now_text, real_time
 
+    compile_kernels()
     with progress() as tell, real_time() as grants:
         figures = list(_figures(tell))
         tell("jitter of an empty loop", None)

@@ -50,6 +50,7 @@ def prove(
     import signal
     from math import inf
 
+    from hil.commands.warm_up import compile_kernels
     from hil.errors import InputError
     from hil.proof.draw.plan import PLANTS, plan
     from hil.proof.run import prove as run
@@ -68,6 +69,7 @@ def prove(
     count = whole if full else 40 if cases is None else cases
     planned = plan(count, seed, plant, only or ())
     tiers = [tier for tier in PLANTS[plant] if tier in (only or ())]
+    compile_kernels()
     # ended by a service or kill: like ctrl-C, with all processes that were started
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:

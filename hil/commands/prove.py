@@ -40,7 +40,17 @@ def prove(
             "command continues; default: no limit",
         ),
     ] = None,
-    jobs: Annotated[int | None, typer.Option(min=1, help="Cases diagnosed at once; default: one per core")] = None,
+    workers: Annotated[
+        int | None,
+        typer.Option("--workers", "--jobs", min=1, help="Processes, each with its share of the cores; default: cores"),
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            "--scheduler",
+            help="Diagnose on a dask.distributed cluster, as tcp://10.0.0.1:8786; needs hil-servo[cluster]",
+        ),
+    ] = None,
     show: Annotated[
         str | None, typer.Option("--show", help="Print the published tables of a run, as 20261206, and exit")
     ] = None,
@@ -75,7 +85,8 @@ def prove(
     try:
         with progress() as tell:
             limit = inf if hours is None else hours
-            scores = run(folder, planned, seed, jobs or os.cpu_count() or 1, out.print, tell, plant, tiers, limit)
+            jobs = workers or len(os.sched_getaffinity(0))
+            scores = run(folder, planned, seed, jobs, out.print, tell, plant, tiers, limit, scheduler)
             tell("writing the report", None)
             write_proof(scores, score_others(folder, scores), folder)
     finally:

@@ -86,10 +86,9 @@ def _writable(folder: Path, installed: Path) -> bool:
         folder.parent.mkdir(parents=True, exist_ok=True)
         if not folder.exists():
             part = folder.with_name(f".{folder.name}.{os.getpid()}.part")
-            if installed.is_dir():  # not writable, as in an image that another user built
-                shutil.copytree(installed, part)
-            else:
-                part.mkdir()
+            part.mkdir()
+            with suppress(OSError):  # none there, or one that another process compiles just now
+                shutil.copytree(installed, part, dirs_exist_ok=True)
             with suppress(OSError):  # another process was first
                 part.rename(folder)
             shutil.rmtree(part, ignore_errors=True)

@@ -30,7 +30,9 @@ from hil.identification.residuals import Residuals
 from hil.identification.terms import Term
 
 Output = TypeVar("Output")
-POOL = ThreadPoolExecutor(os.cpu_count() or 1)
+# HIL_THREADS: where the cores that this process may use are not its own, as on a cluster
+THREADS = int(os.environ.get("HIL_THREADS", 0)) or len(os.sched_getaffinity(0))
+POOL = ThreadPoolExecutor(THREADS)
 
 _FIRST_DAMPING = 1e-3  # relative to diag(J)^2: for a moderately good start (Madsen, Nielsen and Tingleff 2004)
 _LEAST_GAIN = 1e-6  # relative to the cost: a step that predicts or gains less ends the fit; far below any evidence
@@ -294,5 +296,5 @@ def _step(
 
 def in_parallel(jobs: Sequence[Callable[[], Output]]) -> list[Output]:
     """Run jobs in parallel; results in order."""
-    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+    with ThreadPoolExecutor(THREADS) as pool:
         return list(pool.map(lambda job: job(), jobs))

@@ -38,7 +38,7 @@ def test_another_numba_python_or_processor_compiles_again(capsys: pytest.Capture
 
 @pytest.mark.long
 def test_nothing_is_left_to_compile(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """An empty cache: warm-up fills it, and neither motion over the bus, comparison nor diagnosis adds a kernel."""
+    """An empty cache: warm-up fills it, and no command adds a kernel."""
     for package in ("hil", "drivers"):
         shutil.copytree(ROOT / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__"))
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kernels"))
@@ -64,6 +64,7 @@ def test_nothing_is_left_to_compile(tmp_path: Path, monkeypatch: pytest.MonkeyPa
         ("run", str(PROFILE), "--virtual", "--out", "virtual"),
         ("compare", f"virtual/{PROFILE.stem}.parquet", "--fit", "--out", "compared"),
         ("diagnose", f"virtual/{PROFILE.stem}.parquet", "--out", "diagnosed"),
+        ("paper", "--out", "paper"),
     ):
         assert SAID not in command(*arguments).stderr
         assert {path.name for path in kernels() - compiled} == set(), arguments[0]

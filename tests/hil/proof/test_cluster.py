@@ -167,6 +167,23 @@ def test_a_case_goes_on_elsewhere_when_its_worker_is_killed(
     assert (client.returncode, sorted(said.split())) == (0, [case.name for case in PLANNED]), errors
 
 
+@pytest.mark.long
+def test_the_same_again_goes_on_when_a_process_is_killed(sealed: Path, tmp_path: Path) -> None:
+    answers = tmp_path / "answers"
+    client = blind(sealed, answers, "--jobs", "1")
+    wait_for(lambda: len(answered(answers)) == 1, 10 * DEADLINE_S)  # and the next one is at work
+    children = [int(pid) for pid in Path(f"/proc/{client.pid}/task/{client.pid}/children").read_text().split()]
+    (worker,) = [pid for pid in children if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()]
+    os.kill(worker, signal.SIGKILL)
+    said, errors = client.communicate()
+    assert (client.returncode, len(said.split())) == (1, 1)
+    assert "a process was ended from outside, perhaps for want of memory; run the same again to go on" in errors
+    client = blind(sealed, answers, "--jobs", "1")
+    again, errors = client.communicate()
+    assert client.returncode == 0, errors
+    assert sorted(said.split() + again.split()) == [case.name for case in PLANNED]
+
+
 def test_failures_are_answers_on_a_cluster_too(sealed: Path, tmp_path: Path, start: Callable[[], Cluster]) -> None:
     """Cases that cannot be diagnosed, so that the way there and back is quick."""
     for name in ("one", "two"):

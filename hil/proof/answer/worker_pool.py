@@ -67,7 +67,8 @@ def cluster(address: str) -> Iterator[Workers]:
     """Connect to the scheduler of a dask.distributed cluster, whose workers may come and go.
 
     A case whose worker is lost goes to another one. Raises InputError if no scheduler answers, HilError if
-    dask.distributed is not installed, if the scheduler is lost, or if a case ended several workers.
+    dask.distributed is not installed, if the scheduler is lost, if a worker has no room for a case, or if a case ended
+    several workers.
     """
     try:
         from distributed import Client, KilledWorker
@@ -87,8 +88,11 @@ def cluster(address: str) -> Iterator[Workers]:
             yield Workers(client.get_executor(pure=False), lambda: len(client.nthreads()))
         except KilledWorker as error:
             raise HilError(f"a case ended several workers, perhaps for want of memory: {error}") from None
-        except (OSError, CancelledError):
-            raise HilError(f"{address}: the scheduler is lost; start it and run the same again to go on") from None
+        except (OSError, CancelledError) as error:
+            raise HilError(
+                f"{address}: the scheduler is lost, or a worker cannot write ({type(error).__name__}: {error}); "
+                "mend that and run the same again to go on"
+            ) from None
 
 
 def completed(

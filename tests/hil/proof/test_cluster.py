@@ -229,9 +229,7 @@ def test_no_scheduler_and_a_lost_scheduler_are_told(start: Callable[[], Cluster]
         assert client.stdout.readline() == "connected\n"
         end(running.scheduler)
         said, errors = client.communicate(timeout=2 * DEADLINE_S)
-    assert said == (f"HilError {running.address}: the scheduler is lost; start it and run the same again to go on\n"), (
-        errors
-    )
+    assert said.startswith(f"HilError {running.address}: the scheduler is lost, or a worker cannot write ("), errors
 
 
 def test_a_proof_with_all_answers_needs_no_cluster(sealed: Path, tmp_path: Path) -> None:

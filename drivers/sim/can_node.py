@@ -20,6 +20,8 @@ EDS_FOLDER: Final = Path(__file__).parent.parent / "eds"
 _EMCY: Final = struct.Struct("<HB5s")
 _HISTORY: Final = key_of(Index.ERROR_HISTORY)
 HEARTBEAT_ERROR: Final = 0x8130  # EMCY: heartbeat consumer time-out, CiA 301 table 26
+# Keys of the heartbeat times, computed once.
+_PRODUCER_TIME, _CONSUMER_TIME = key_of(Index.PRODUCER_HEARTBEAT_TIME), key_of(Index.CONSUMER_HEARTBEAT_TIME, 1)
 
 
 class NmtState(IntEnum):
@@ -116,7 +118,7 @@ class SimulatedDevice:
             self._consumed = dict.fromkeys(self._consumed, now_s + self._consumer_time_s())
             self._heartbeat_due_s = now_s
         self._last_s = now_s
-        period_s = self.dictionary.number(Index.PRODUCER_HEARTBEAT_TIME) / 1000
+        period_s = self.values[_PRODUCER_TIME] / 1000
         if period_s and now_s >= self._heartbeat_due_s:
             self._send(0x700 + self.node_id, bytes([self.nmt_state]), now_s)
             self._heartbeat_due_s = max(self._heartbeat_due_s + period_s, now_s)
@@ -131,13 +133,13 @@ class SimulatedDevice:
 
     def _schedule(self, now_s: float) -> None:
         due = [*self._consumed.values()]
-        if self.dictionary.number(Index.PRODUCER_HEARTBEAT_TIME):
+        if self.values[_PRODUCER_TIME]:
             due.append(self._heartbeat_due_s)
         self._last_s = now_s
         self._timer_s = min(due, default=float("inf"))
 
     def _consumer_time_s(self) -> float:
-        return (self.dictionary.number(Index.CONSUMER_HEARTBEAT_TIME, 1) & 0xFFFF) / 1000
+        return float(self.values[_CONSUMER_TIME] & 0xFFFF) / 1000
 
     def _on_consumer_written(self, index: int, subindex: int, value: int) -> None:
         old = self.dictionary.number(Index.CONSUMER_HEARTBEAT_TIME, 1) >> 16 & 0x7F
@@ -154,8 +156,9 @@ class SimulatedDevice:
         self._heartbeat_due_s = self._timer_s = self._last_s
 
     def _on_heartbeat(self, can_id: int, data: bytes, now_s: float) -> None:
-        self._consumed[can_id - 0x700] = now_s + self._consumer_time_s()
-        self._schedule(now_s)
+        deadline_s = now_s + self._consumer_time_s()
+        self._consumed[can_id - 0x700] = deadline_s
+        self._timer_s = min(self._timer_s, deadline_s)  # too early is harmless: `tick` finds nothing due
 
     # -- SDO, SYNC, EMCY --------------------------------------------------------------------------------------------
 

@@ -1,1 +1,1 @@
-"""Benchmarks of the loop, the simulation and the diagnosis on this machine; run by `hil bench`, never by tests."""
+"""Benchmarks of the loop, the simulation and the diagnosis on this machine, for `hil bench`."""

@@ -6,16 +6,21 @@ included; on a python-can bus it is excluded, since real devices serve their end
 """
 
 import tempfile
+from dataclasses import replace
 from time import perf_counter_ns
 
+import can
+
+from drivers.bus import BusConfig, open_bus
 from hil.benchmarks.axis import moves, trajectory, twenty_modes
-from hil.benchmarks.figure import Figure, percentile
+from hil.benchmarks.figure import Figure, Reference, ReferenceKind, percentile
 from hil.loop.clock import VirtualClock
 from hil.loop.devices import Rig
 from hil.loop.session import Session, make_cycle
 from hil.recording.writer import Recorder
 
 LOOPS = 4
+ALONE_CYCLES = 5000  # of frames without a loop; their median is steady to some per cent
 
 
 class StandingAxis:
@@ -81,15 +86,53 @@ def whole_cycle(interface: str) -> tuple[list[float], list[float]]:
     return durations, devices
 
 
+def frames_alone() -> tuple[float, float]:
+    """Median times [s] in which python-can alone carries the frames of a cycle on its virtual bus: what the loop's end
+    takes to send SYNC and RPDO and to receive two TPDOs, and both ends together."""
+    config = BusConfig("virtual", "hil-bench-frames")
+    sync = can.Message(arbitration_id=0x080, is_extended_id=False)
+    pdo = can.Message(arbitration_id=0x205, data=bytes(8), is_extended_id=False)
+    near_s: list[float] = []
+    both_s: list[float] = []
+    with open_bus(config) as near, open_bus(config) as far:
+        for _ in range(ALONE_CYCLES):
+            start_ns = perf_counter_ns()
+            far.send(pdo)
+            far.send(pdo)
+            near_ns = perf_counter_ns()
+            near.send(sync)
+            while near.recv(0.0) is not None:
+                pass
+            near.send(pdo)
+            far_ns = perf_counter_ns()
+            while far.recv(0.0) is not None:
+                pass
+            near_s.append(1e-9 * (far_ns - near_ns))
+            both_s.append(1e-9 * (perf_counter_ns() - start_ns))
+    return percentile(near_s, 0.5), percentile(both_s, 0.5)
+
+
 def figures() -> list[Figure]:
     """Cycle times on the in-process bus and through python-can."""
     inside, _ = whole_cycle("inprocess")
     outside, devices = whole_cycle("virtual")
+    both = [sum(pair) for pair in zip(outside, devices, strict=True)]
+    near, ends = (Reference("frames alone", ReferenceKind.LIMIT, 1e6 * seconds) for seconds in frames_alone())
     detail = f"{len(inside)} cycles, twin of 20 modes, simulated devices included"
     apart = f"twin of 20 modes; without the {1e6 * percentile(devices, 0.5):.0f} us of the simulated devices"
+    bus = "whole cycle, python-can virtual bus"
+
+    def figure(name: str, label: str, seconds: list[float], part: float, target: float | None, how: str) -> Figure:
+        quantile = f", p{100 * part:.0f}"
+        return Figure(name + quantile, label + quantile, 1e6 * percentile(seconds, part), "us", target, True, how)
+
     return [
-        Figure("whole cycle, in-process bus, p50", 1e6 * percentile(inside, 0.5), "us", 10.0, True, detail),
-        Figure("whole cycle, in-process bus, p99", 1e6 * percentile(inside, 0.99), "us", 50.0, True, detail),
-        Figure("whole cycle, python-can virtual bus, p50", 1e6 * percentile(outside, 0.5), "us", 40.0, True, apart),
-        Figure("whole cycle, python-can virtual bus, p99", 1e6 * percentile(outside, 0.99), "us", None, True, apart),
+        figure("whole cycle, in-process bus", "cycle, in-process", inside, 0.5, 10.0, detail),
+        figure("whole cycle, in-process bus", "cycle, in-process", inside, 0.99, 50.0, detail),
+        replace(figure(bus, "cycle, python-can", outside, 0.5, 40.0, apart), beside=(near,)),
+        figure(bus, "cycle, python-can", outside, 0.99, None, apart),
+        replace(
+            figure(f"{bus}, devices included", "cycle + devices", both, 0.5, None, "both ends of the python-can bus"),
+            beside=(ends,),
+        ),
     ]

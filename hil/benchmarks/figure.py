@@ -3,20 +3,42 @@
 import timeit
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from enum import StrEnum
+from typing import NamedTuple
 
 import numpy as np
 
 
-@dataclass(frozen=True)
-class Figure:
-    """One figure with its target: an upper bound if `at_most`, else a lower one, None for a mere comparison."""
+class ReferenceKind(StrEnum):
+    """PEER: the same task done by another tool. LIMIT: a part of the task alone, which no code around it undercuts."""
+
+    PEER = "peer"
+    LIMIT = "limit"
+
+
+class Reference(NamedTuple):
+    """What a figure is measured beside, in the same run and unit."""
 
     name: str
+    kind: ReferenceKind
+    value: float
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One figure with its target, an upper bound if `at_most`, else a lower one; None for a mere comparison.
+
+    `at_most` also says that a smaller value is better. label: short name in tables. detail: how it was measured.
+    """
+
+    name: str
+    label: str
     value: float
     unit: str
     target: float | None = None
     at_most: bool = False
     detail: str = ""
+    beside: tuple[Reference, ...] = ()
 
     @property
     def met(self) -> bool | None:
@@ -24,6 +46,10 @@ class Figure:
         if self.target is None:
             return None
         return self.value <= self.target if self.at_most else self.value >= self.target
+
+    def times_as_fast(self, other: float) -> float:
+        """How many times as fast this figure is as `other`, a value of the same unit."""
+        return other / self.value if self.at_most else self.value / other
 
 
 def percentile(values: Sequence[float], part: float) -> float:

@@ -5,7 +5,7 @@ loops in continuous time and friction as Fc tanh(v / vs), as is usual there; MuJ
 constraint (`frictionloss`) and the loops at their periods. Each is optional and measured only if installed.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import fields, replace
 from math import tanh
 from typing import Any
@@ -15,7 +15,7 @@ import numpy as np
 from hil.arrays import FloatArray
 from hil.bench.axis_models import TwoMass
 from hil.benchmarks.axis import trajectory, two_mass
-from hil.benchmarks.figure import Figure, best_of
+from hil.benchmarks.figure import Figure, Reference, ReferenceKind, best_of
 from hil.control import cascade as law
 from hil.motion.trajectory import Trajectory
 
@@ -128,41 +128,39 @@ def mujoco(axis: PeerAxis, motion: Trajectory) -> FloatArray:
 
 PEERS: tuple[tuple[str, _Peer], ...] = (
     ("scipy solve_ivp", solve_ivp),
-    ("python-control input_output_response", python_control),
+    ("python-control", python_control),
     ("MuJoCo", mujoco),
 )
 
 
-def figures() -> Iterator[Figure]:
-    """Speed of the twin and of each peer that is installed, and how much faster the twin is."""
+def figures() -> list[Figure]:
+    """Speed of the twin beside that of each peer that is installed."""
     axis, motion = PeerAxis(), _first_second(trajectory(two_mass().gains.period_s))
-    real = "x real time"
 
     def simulate() -> FloatArray:
         return axis.twin.simulate(motion.position_m, motion.velocity_m_s).table_position_m
 
-    table = simulate()
-    own = motion.duration_s / best_of(simulate, 20)
-    yield Figure("two-mass axis with friction: twin", own, real, detail="exact modes, dry friction, sampled loops")
+    table, beside, notes = simulate(), [], []
     for name, peer in PEERS:
         try:
             answer = peer(axis, motion)
         except ModuleNotFoundError as error:
-            yield Figure(
-                f"two-mass axis with friction: {name}",
-                float("nan"),
-                real,
-                detail=f"not measured: {error.name} is not installed (make peers)",
-            )
+            notes.append(f"{name} not measured: {error.name} is not installed (make peers)")
             continue
-        speed = motion.duration_s / best_of(lambda peer=peer: peer(axis, motion), 2)  # type: ignore[misc]
+        took_s = best_of(lambda peer=peer: peer(axis, motion), 2)  # type: ignore[misc]
+        beside.append(Reference(name, ReferenceKind.PEER, motion.duration_s / took_s))
         apart_m = float(np.sqrt(np.mean((answer - table) ** 2)))
-        yield Figure(
-            f"two-mass axis with friction: {name}",
-            speed,
-            real,
-            detail=f"twin {own / speed:.0f} x as fast; table {1e6 * apart_m:.2f} um rms from the twin's",
+        notes.append(f"{name} {1e6 * apart_m:.2f} um rms from the twin's table")
+    return [
+        Figure(
+            "two-mass axis with friction: twin",
+            "twin, 2 masses",
+            motion.duration_s / best_of(simulate, 20),
+            "x real time",
+            detail="; ".join(("exact modes, dry friction, sampled loops", *notes)),
+            beside=tuple(beside),
         )
+    ]
 
 
 def _first_second(motion: Trajectory) -> Trajectory:

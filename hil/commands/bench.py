@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -16,53 +16,55 @@ if TYPE_CHECKING:
 
 def bench(
     file: Annotated[Path, typer.Option("--out", help="JSON file for the figures.")] = Path("runs/bench.json"),
+    against: Annotated[
+        Path | None, typer.Option(help="--out file of an earlier run; its figures stand beside the new ones.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the figures as JSON instead of tables.")] = False,
 ) -> None:
-    """Measure loop, simulated bench and twin on this machine, and compare them with other simulators."""
+    """Measure loop, simulated bench, twin and a diagnosis on this machine, beside other tools and its limits."""
+    from hil.benchmarks import diagnosis_stages, summary
     from hil.commands.warm_up import compile_kernels
     from hil.files.output import write_json
     from hil.loop.realtime import machine_state, measure_jitter, now_text, real_time
 
+    earlier = None if against is None else summary.read_earlier(against)
     compile_kernels()
     with progress() as tell, real_time() as grants:
         figures = list(_figures(tell))
         tell("jitter of an empty loop", None)
         jitter = measure_jitter(0.001, 5.0)
-    table(
-        ("figure", "measured", "target", "met", "how"),
-        [
-            (
-                figure.name,
-                _number(figure.value, figure.unit),
-                _target(figure),
-                {True: "yes", False: "no", None: ""}[figure.met],
-                figure.detail,
-            )
-            for figure in figures
-        ],
-    )
-    machine = machine_state()
-    granted = [grant.setting for grant in grants if not grant.refused]
-    refused = [f"{grant.setting} ({grant.refused})" for grant in grants if grant.refused]
-    out.print(f"\nempty 1 kHz loop, lateness: {jitter.text}")
-    out.print("machine: " + ", ".join(f"{name} {value}" for name, value in machine.items()), markup=False)
-    out.print(f"granted: {', '.join(granted)}; refused: {', '.join(refused) or 'nothing'}", markup=False)
+    with progress() as tell:  # with all cores and an ordinary priority, as a diagnosis has
+        tell("stages of a diagnosis", None)
+        figures += diagnosis_stages.figures()
+    data: dict[str, Any] = {
+        "schema_version": 1,
+        "time": now_text(),
+        "machine": machine_state(),
+        "granted": [grant.setting for grant in grants if not grant.refused],
+        "refused": [f"{grant.setting} ({grant.refused})" for grant in grants if grant.refused],
+        "jitter": vars(jitter),
+        "figures": summary.as_data(figures),
+    }
+    if earlier is not None:
+        data["against"] = {"file": str(against), "figures": summary.against(figures, earlier)}
     file.parent.mkdir(parents=True, exist_ok=True)
-    write_json(
-        file,
-        {
-            "schema_version": 1,
-            "time": now_text(),
-            "machine": machine,
-            "granted": granted,
-            "refused": refused,
-            "jitter": vars(jitter),
-            "figures": [
-                vars(figure) | {"met": figure.met, "value": None if figure.value != figure.value else figure.value}
-                for figure in figures
-            ],
-        },
+    write_json(file, data)
+    if as_json:
+        out.print(file.read_text(encoding="utf-8"), markup=False, end="")
+        return
+    table(summary.HEADERS, summary.rows(figures))
+    out.print("\n" + "\n".join(summary.notes(figures)), markup=False)
+    if earlier is not None:
+        out.print(f"\nAgainst {against} (ratio above 1: faster now)\n", markup=False)
+        table(summary.AGAINST_HEADERS, summary.against_rows(data["against"]["figures"]))
+    granted, refused = ", ".join(data["granted"]), ", ".join(data["refused"]) or "nothing"
+    texts = (
+        f"empty 1 kHz loop, lateness: {jitter.text}",
+        "machine: " + ", ".join(f"{name} {value}" for name, value in data["machine"].items()),
+        f"granted: {granted}; refused: {refused}",
     )
-    out.print(f"\nFigures: {file}")
+    out.print("\n" + "\n".join(summary.wrapped(text) for text in texts), markup=False)
+    out.print(f"\nFigures: {file}", markup=False)
 
 
 def _figures(tell: Progress) -> Iterator[Figure]:
@@ -75,15 +77,3 @@ def _figures(tell: Progress) -> Iterator[Figure]:
     ):
         tell(what, None)
         yield from measure()
-
-
-def _number(value: float, unit: str) -> str:
-    if value != value:
-        return "-"
-    return f"{value:,.0f} {unit}".replace(",", " ") if value >= 100.0 else f"{value:.1f} {unit}"
-
-
-def _target(figure: Figure) -> str:
-    if figure.target is None:
-        return ""
-    return f"{'≤' if figure.at_most else '≥'} {_number(figure.target, figure.unit)}"

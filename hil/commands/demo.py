@@ -111,7 +111,7 @@ def _say(result: Result, truth: SimulationSection, believed: Bench) -> None:
     from hil.diagnosis.wording import title
     from hil.quantities import digits, quantity, unit_of
     from hil.twin.library import BY_ID
-    from hil.twin.mechanism import Role
+    from hil.twin.parameter import Role
 
     (hidden,) = truth.effects
     found = next((finding for finding in result.missing if finding.effect == hidden.effect), None)

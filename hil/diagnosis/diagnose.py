@@ -26,6 +26,7 @@ from hil.identification.dataset import Dataset, prepare_dataset
 from hil.identification.estimator import Fit, FitStatus
 from hil.identification.measured import Measured
 from hil.identification.noise_floor import FLOOR
+from hil.identification.parallel import one_blas_thread
 from hil.quantities import digits, quantity
 from hil.recording.recording import Recording
 
@@ -95,6 +96,7 @@ class Diagnosis:
         return channel_residuals(fit.hypothesis, data, mode)[data.runs.index(run)]
 
 
+@one_blas_thread
 def diagnose(
     train: Sequence[Recording], validate: Sequence[Recording], bench: Bench, progress: Progress = lambda text: None
 ) -> Diagnosis:

@@ -23,9 +23,10 @@ from hil.diagnosis.verdict.findings import rivals_of
 from hil.diagnosis.verdict.judge import not_testable
 from hil.diagnosis.wording import title
 from hil.identification.dataset import Dataset
-from hil.identification.estimator import Estimator, Fit, in_parallel
+from hil.identification.estimator import Estimator, Fit
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.measured import Measured
+from hil.identification.parallel import in_parallel
 from hil.identification.terms import SAME, ambiguous, compatible
 from hil.motion.profile import Profile
 from hil.motion.trajectory import Trajectory, plan

@@ -7,7 +7,7 @@ from hil.diagnosis.result import Location
 from hil.identification.terms import Term
 from hil.quantities import digits, quantity
 from hil.twin.library import BY_ID
-from hil.twin.mechanism import Role
+from hil.twin.parameter import Role
 
 
 def title(effect: str) -> str:

@@ -4,19 +4,17 @@
 
     step s:  min |J s + r|^2 + mu |diag(J) s|^2   with x + s inside the bounds;  mu after Nielsen (1999)
 
-The Jacobian J is computed by forward differences, one simulation per parameter, on all cores. While steps gain what the
+The Jacobian J is computed by forward differences, one simulation with the steps of a search per parameter, on all
+cores. While steps gain what the
 linear model predicts, J is updated along the step instead (Broyden 1965; Madsen, Nielsen and Tingleff 2004, sec. 3.5);
 a converged fit ends with a new J. The step is computed from J^T J: with 1e5 rows and ten parameters a decomposition of
 J, as in scipy's solvers, takes longer than the simulations.
 """
 
-import os
-from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property
-from typing import TypeVar
 
 import numpy as np
 from scipy.optimize import lsq_linear
@@ -26,13 +24,9 @@ from hil.bench.bench_file import Bench
 from hil.identification.dataset import TORQUE_ACCURACY, Dataset
 from hil.identification.hypothesis import EDGE_STEP_S, Hypothesis
 from hil.identification.noise_floor import FLOOR, noise_ratios
+from hil.identification.parallel import POOL
 from hil.identification.residuals import Residuals
 from hil.identification.terms import Term
-
-Output = TypeVar("Output")
-# HIL_THREADS: where the cores that this process may use are not its own, as on a cluster
-THREADS = int(os.environ.get("HIL_THREADS", 0)) or len(os.sched_getaffinity(0))
-POOL = ThreadPoolExecutor(THREADS)
 
 _FIRST_DAMPING = 1e-3  # relative to diag(J)^2: for a moderately good start (Madsen, Nielsen and Tingleff 2004)
 _LEAST_GAIN = 1e-6  # relative to the cost: a step that predicts or gains less ends the fit; far below any evidence
@@ -137,10 +131,8 @@ class Fit:
         return self._elsewhere[data]
 
     def with_accuracy(self, torque_accuracy: float) -> "Fit":
-        """Evaluate the hypothesis, not fitted, with another weight of the motor channel."""
-        estimator = replace(self.estimator, torque_accuracy=torque_accuracy)
-        residuals = self.residuals.weighted_by(torque_accuracy)
-        return Fit(self.hypothesis, residuals, np.zeros((residuals.vector.size, 0)), estimator)
+        """Evaluate the hypothesis, not fitted, with another weight of the motor channel and the twin's own steps."""
+        return replace(self.estimator, torque_accuracy=torque_accuracy, fast=False).evaluate(self.hypothesis)
 
     def refit(self, evaluations: int, *, soft: float = 0.0, slopes: FloatArray | None = None) -> "Fit":
         """Continue the fit with the same settings."""
@@ -152,17 +144,19 @@ class Estimator:
     """Fits hypotheses to a data set.
 
     `edge_step_s` is the forward-difference step for the edge of a window, `torque_accuracy` the torque resolved by the
-    motor channel over the noise of the torque channel. `closed` selects residuals in closed loop.
+    motor channel over the noise of the torque channel. `closed` selects residuals in closed loop,
+    `fast` those with the internal steps of a search.
     """
 
     data: Dataset
     edge_step_s: float = EDGE_STEP_S
     torque_accuracy: float = TORQUE_ACCURACY
     closed: bool = False
+    fast: bool = False
 
     def residuals(self, hypothesis: Hypothesis) -> Residuals:
         """Residuals of a hypothesis, weighted by these settings."""
-        return hypothesis.residuals(self.data, self.closed).weighted_by(self.torque_accuracy)
+        return hypothesis.residuals(self.data, self.closed, self.fast).weighted_by(self.torque_accuracy)
 
     def evaluate(self, hypothesis: Hypothesis) -> Fit:
         """Evaluate a hypothesis without fitting it."""
@@ -178,7 +172,8 @@ class Estimator:
 
         The first columns are `held` (m, k) if given.
         """
-        base, x = self.residuals(hypothesis).vector, hypothesis.x
+        search, x = replace(self, fast=True), hypothesis.x
+        base = search.residuals(hypothesis).vector
         steps, high = self.steps(hypothesis), hypothesis.bounds[1]
         known = 0 if held is None else held.shape[1]
         slopes = np.empty((base.size, x.size), order="F")
@@ -189,7 +184,7 @@ class Estimator:
             step = -steps[index] if x[index] + steps[index] > high[index] else steps[index]
             moved = x.copy()
             moved[index] += step
-            slopes[:, index] = (self.residuals(hypothesis.moved(moved)).vector - base) / step
+            slopes[:, index] = (search.residuals(hypothesis.moved(moved)).vector - base) / step
 
         list(POOL.map(column, range(known, x.size)))
         return slopes
@@ -292,9 +287,3 @@ def _step(
         method="bvls",
     )
     return np.asarray(np.clip(found.x / scale, low, high), dtype=np.float64)
-
-
-def in_parallel(jobs: Sequence[Callable[[], Output]]) -> list[Output]:
-    """Run jobs in parallel; results in order."""
-    with ThreadPoolExecutor(THREADS) as pool:
-        return list(pool.map(lambda job: job(), jobs))

@@ -10,6 +10,7 @@ from hil.identification.dataset import Dataset
 from hil.identification.estimator import Estimator, Fit, FitStatus
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.inference import standard_errors
+from hil.identification.parallel import one_blas_thread
 
 SOFT = 30.0  # residual [noise] above which the loss of a first fit is linear: outliers do not dominate the first steps
 MOST_STEPS = 50  # evaluations of a fit to convergence; a fit that needs more is reported as not converged
@@ -40,6 +41,7 @@ class FitResult:
         return self.status is not FitStatus.OUT_OF_STEPS
 
 
+@one_blas_thread
 def fit_nominal_parameters(data: Dataset, evaluations: int = _SECOND) -> Fit:
     """Fit the nominal parameters alone, first with a robust loss."""
     return Estimator(data).fit(Hypothesis(data.bench), soft=SOFT, evaluations=_FIRST).refit(evaluations)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from itertools import combinations, count
 
 from hil.twin.library import BY_ID, LIBRARY
-from hil.twin.mechanism import Role
+from hil.twin.parameter import Role
 from hil.twin.physics import Active
 
 Key = tuple[str, int, int]

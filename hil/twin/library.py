@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 from hil.compiled.kernel_cache import provide_kernel_cache
-from hil.twin.mechanism import Mechanism, Role
+from hil.twin.mechanism import Mechanism
 from hil.twin.mechanisms import (
     asymmetric_friction,
     backlash,
@@ -39,6 +39,7 @@ from hil.twin.mechanisms import (
     transport_delay,
     velocity_filter_lag,
 )
+from hil.twin.parameter import Role
 
 LIBRARY: tuple[Mechanism, ...] = (
     transport_delay.MECHANISM,

@@ -14,6 +14,7 @@ from enum import StrEnum
 from itertools import product
 from typing import Any, NamedTuple
 
+from hil.twin.parameter import Parameter, Role, default_starts, default_typical
 from hil.twin.scene import AxisFacts, Scene
 
 PARAMETERS = 8  # the most parameters a mechanism may have
@@ -69,50 +70,6 @@ class Moment(NamedTuple):
     viscous_speed: float  # of the motor, at which viscous friction equals Coulomb friction; 0: there is none
 
 
-class Dimension(StrEnum):
-    """Dimension of a parameter; gives its unit on rotary and on linear axes."""
-
-    TORQUE = "N m"
-    MOTOR_SPEED = "rad/s"
-    MOTOR_STIFFNESS = "N m/rad"
-    MOTOR_DRAG = "N m s^2/rad^2"
-    INVERSE_TORQUE_SQUARED = "1/(N m)^2"
-    ANGLE = "rad"
-    LENGTH = "m"
-    TIME = "s"
-    FORCE = "N"
-    STIFFNESS = "N/m"
-    FREQUENCY = "Hz"
-    RATIO = "1"
-    PER_LENGTH = "1/m"
-    COUNT = "1/rev"
-
-    def unit(self, linear: bool) -> str:
-        """SI unit on a rotary or on a linear axis."""
-        return _LINEAR_UNITS.get(self, self.value) if linear else self.value
-
-
-_LINEAR_UNITS = {
-    Dimension.TORQUE: "N",
-    Dimension.MOTOR_SPEED: "m/s",
-    Dimension.MOTOR_STIFFNESS: "N/m",
-    Dimension.MOTOR_DRAG: "N s^2/m^2",
-    Dimension.INVERSE_TORQUE_SQUARED: "1/N^2",
-}
-
-
-class Role(StrEnum):
-    """Role of a parameter in a search."""
-
-    STRENGTH = "strength"  # size of the effect
-    PHASE = "phase"  # angle at which the effect begins
-    PERIOD = "period"  # along the travel
-    ORDER = "order"  # cycles per revolution of the motor
-    FREQUENCY = "frequency"  # over time
-    EDGE = "edge"  # start or end of a window of time
-    SHAPE = "shape"  # any other
-
-
 class Picture(StrEnum):
     """Figure of the report that shows a mechanism."""
 
@@ -132,18 +89,7 @@ class Picture(StrEnum):
 
 
 Points = Sequence[tuple[float, ...]]
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """Parameter of a mechanism: name with unit, dimension, physical bounds, default (None: required) and role."""
-
-    name: str
-    dimension: Dimension
-    low: float
-    high: float
-    default: float | None = None
-    role: Role = Role.SHAPE
+_NO_SIZE = 1e-6  # strength over a typical defect: above rounding of a fit that ends at zero, far below any sensor
 
 
 @dataclass(frozen=True)
@@ -230,71 +176,23 @@ class Mechanism:
     def start_points(self, variant: int, scene: Scene) -> list[tuple[float, ...]]:
         """Parameter values (points of `names`) at which a search for a variant begins, within bounds."""
         given = self.variants[variant].starts or self.starts
-        points = given(scene) if given else product(*(_start_values(p, scene) for p in self.parameters))
+        points = given(scene) if given else product(*(default_starts(p, scene) for p in self.parameters))
         return [self._inside(point) for point in points]
 
     def typical_values(self, axis: AxisFacts) -> tuple[float, ...]:
         """Values that an engineer would call a defect."""
-        return self.typical(axis) if self.typical else self._inside([_typical_value(p, axis) for p in self.parameters])
+        return self.typical(axis) if self.typical else self._inside([default_typical(p, axis) for p in self.parameters])
 
     def is_valid(self, values: Sequence[float], variant: int, axis: AxisFacts) -> bool:
-        """Check that the name applies at these values, and that the sensors can show it."""
-        return self.valid is None or self.valid(values, variant, axis)
+        """Check that the effect has a size, that its name applies, and that the sensors can show it."""
+        return self._has_size(values, axis) and (self.valid is None or self.valid(values, variant, axis))
+
+    def _has_size(self, values: Sequence[float], axis: AxisFacts) -> bool:
+        """Check that a strength is off the bound at which there is no effect."""
+        sizes = self.indices(Role.STRENGTH)
+        size = max(abs(values[i] - max(self.parameters[i].low, 0.0)) for i in sizes if i < len(values))
+        typical = self.typical_values(axis)
+        return not self.neutral_at_zero or size > _NO_SIZE * max(abs(typical[i]) for i in sizes if i < len(typical))
 
     def _inside(self, values: Sequence[float]) -> tuple[float, ...]:
         return tuple(min(max(value, p.low), p.high) for value, p in zip(values, self.parameters, strict=True))
-
-
-def _start_values(parameter: Parameter, scene: Scene) -> list[float]:
-    """Default starting values of a parameter: small but visible."""
-    by_role = {
-        Role.PHASE: [0.0],
-        Role.ORDER: scene.orders,
-        Role.PERIOD: scene.friction_periods,
-        Role.EDGE: [scene.window[0]],
-    }
-    if parameter.role in by_role:
-        return by_role[parameter.role]
-    scales = _Scales(
-        0.05 * scene.coulomb, 0.1 * scene.peak_speed, scene.stretch, scene.ratio, scene.travel_m, scene.duration_s
-    )
-    return [scales.of(parameter.dimension)]
-
-
-def _typical_value(parameter: Parameter, axis: AxisFacts) -> float:
-    """Default of a value that is a defect: a fifth of friction, some micrometres."""
-    by_role = {Role.PHASE: 0.0, Role.ORDER: 6.0, Role.PERIOD: 0.1, Role.EDGE: 0.5 * axis.duration_s}
-    if parameter.role in by_role:
-        return by_role[parameter.role]
-    scales = _Scales(0.2 * axis.friction, 0.1 / axis.ratio, 3e-6, axis.ratio, 0.1, axis.duration_s)
-    return scales.of(parameter.dimension)
-
-
-class _Scales(NamedTuple):
-    """Scales of an axis, in motor units, from which defaults of all dimensions follow."""
-
-    torque: float
-    speed: float
-    length_m: float
-    ratio_m: float
-    travel_m: float
-    duration_s: float
-
-    def of(self, dimension: Dimension) -> float:
-        """Scale of a dimension."""
-        return {
-            Dimension.TORQUE: self.torque,
-            Dimension.MOTOR_SPEED: self.speed,
-            Dimension.MOTOR_STIFFNESS: self.torque * self.ratio_m / self.length_m,
-            Dimension.MOTOR_DRAG: self.torque / self.speed**2,
-            Dimension.INVERSE_TORQUE_SQUARED: 1e-4 / self.torque**2,
-            Dimension.ANGLE: 1e-4,
-            Dimension.LENGTH: self.length_m,
-            Dimension.TIME: 0.02 * self.duration_s,
-            Dimension.FORCE: self.torque / self.ratio_m,
-            Dimension.STIFFNESS: self.torque / self.ratio_m / self.travel_m,
-            Dimension.FREQUENCY: 40.0,
-            Dimension.RATIO: 0.05,
-            Dimension.PER_LENGTH: 0.1 / self.travel_m,
-            Dimension.COUNT: 6.0,
-        }[dimension]

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from copy import deepcopy
 from itertools import pairwise
 
 import can
 import pytest
 
-from drivers.bus import BusConfig, BusState, CanPort, PumpedPort, PythonCanPort, open_bus
+from drivers.bus import BusConfig, BusState, CanPort, DataFrame, PumpedPort, PythonCanPort, open_bus
 from drivers.inprocess import AsBusABC, InProcessBus
 from drivers.modelled_bus import Fault, FaultKind, ModelledBus, frame_bits
 from drivers.port import BusError
@@ -262,3 +263,11 @@ def test_the_modelled_bus_is_deterministic() -> None:
     assert len(first) == 200
     assert first == run()
     assert all(a[2] <= b[2] for a, b in pairwise(first))
+
+
+def test_the_copy_of_a_frame_equals_it_and_shares_no_data() -> None:
+    frame = DataFrame(arbitration_id=0x181, data=b"\1\2", is_extended_id=False)
+    copied = deepcopy(frame)
+    assert copied.equals(frame, timestamp_delta=None)
+    copied.data[0] = 9
+    assert bytes(frame.data) == b"\1\2"

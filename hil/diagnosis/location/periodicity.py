@@ -17,7 +17,7 @@ from hil.diagnosis.location.residual_energy import Energy
 from hil.diagnosis.search.disturbance import harmonic_share
 from hil.identification.terms import Term
 from hil.twin.library import BY_ID
-from hil.twin.mechanism import Role
+from hil.twin.parameter import Role
 
 CLAIMED = 0.25  # least share of the energy in one harmonic: a line that dominates the residual
 APART = 1.5  # least ratio of that share to that of the next domain

@@ -20,7 +20,8 @@ from hil.identification.dataset import inertia
 from hil.identification.measured import Measured
 from hil.identification.terms import Term, free_slot
 from hil.twin.library import BY_ID, LIBRARY
-from hil.twin.mechanism import Dimension, Mechanism, Role
+from hil.twin.mechanism import Mechanism
+from hil.twin.parameter import Dimension, Role
 from hil.twin.scene import AxisFacts, Scene
 
 

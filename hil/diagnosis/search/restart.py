@@ -14,16 +14,17 @@ from functools import partial
 
 from hil.diagnosis.search.initial_values import claimable, stretches
 from hil.diagnosis.search.score_test import screen_library
-from hil.diagnosis.search.successive_halving import LONG, SEARCH_ACCURACY, owner_points, race
+from hil.diagnosis.search.successive_halving import LONG, SEARCH_ACCURACY, SECOND, owner_points, race
 from hil.identification.dataset import TORQUE_ACCURACY
-from hil.identification.estimator import Fit, in_parallel
+from hil.identification.estimator import Fit
 from hil.identification.hypothesis import LAST_EDGE_STEP_S
 from hil.identification.nominal_fit import SOFT
+from hil.identification.parallel import in_parallel
 from hil.identification.terms import Term, compatible
 from hil.twin.library import LIBRARY
 
 _EFFECT, _STARTS = next((mechanism.id, mechanism.hidden_starts) for mechanism in LIBRARY if mechanism.hidden_starts)
-_FIRST = 20  # evaluations of a first fit: it starts farther from its minimum than those of a race
+_FIRST, _SECOND = 8, 20  # evaluations: a fit starts farther from its minimum than those of a race
 _NARROWEST_M = 1e-6  # least first gap, if the deflection between motor and table is negligible
 
 
@@ -49,11 +50,13 @@ def unbent(base: Fit) -> Fit:
     """Fit the base with preload loss from the springs of the bench file."""
     widest_m = max(stretches(base.data.runs, base.bench.axis.ratio_m_rad)[1], _NARROWEST_M)
     owner = base.hypothesis.moved(owner_points(base)[-1])
-    search = replace(base.estimator, torque_accuracy=SEARCH_ACCURACY)
+    search = replace(base.estimator, torque_accuracy=SEARCH_ACCURACY, fast=True)
     starts = [owner.with_term(Term(_EFFECT, 0, (share * widest_m, *rest))) for share, *rest in _STARTS]
-    best = min(
-        in_parallel([partial(search.fit, start, soft=SOFT, evaluations=_FIRST) for start in starts]),
-        key=lambda found: found.cost,
-    )
+    held = search.jacobian(owner)
+    first = [partial(search.fit, start, soft=SOFT, evaluations=_FIRST, held=held) for start in starts]
+    best = min(in_parallel(first), key=lambda found: found.cost).refit(_SECOND, soft=SOFT)
+    if best.cost > search.evaluate(base.hypothesis).cost:  # worse than without the term
+        return best.with_accuracy(TORQUE_ACCURACY)
     last = replace(search, torque_accuracy=TORQUE_ACCURACY, edge_step_s=LAST_EDGE_STEP_S)
-    return last.fit(best.hypothesis, evaluations=LONG)
+    found = last.fit(best.hypothesis, evaluations=LONG)
+    return replace(last, fast=False).fit(found.hypothesis, evaluations=SECOND, slopes=found.jacobian)

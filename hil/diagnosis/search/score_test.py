@@ -15,9 +15,10 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.diagnosis.search.initial_values import StartPoint, scene, starts
-from hil.identification.estimator import POOL, Fit
+from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.inference import whitened, whitening
+from hil.identification.parallel import POOL
 from hil.identification.terms import Term, compatible, free_slot, repeats
 from hil.twin.library import BY_ID
 
@@ -122,10 +123,12 @@ def screen(base: Fit, points: Sequence[StartPoint]) -> list[Candidate]:
     sensitive to a small cause beside a large one.
     """
     views = [_view(base, False), _view(base, True)]
+    search = replace(base.estimator, fast=True)
+    unchanged = search.residuals(base.hypothesis).vector
 
     def direction(start: StartPoint, values: tuple[float, ...]) -> FloatArray:
         changed = base.hypothesis.with_term(Term(start.effect, start.variant, values))
-        return base.estimator.residuals(changed).vector - base.residuals.vector
+        return search.residuals(changed).vector - unchanged
 
     def candidate(start: StartPoint) -> Candidate:
         directions = [direction(start, values) for values in _directions(start)]

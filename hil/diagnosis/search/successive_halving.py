@@ -14,9 +14,10 @@ from hil.bench.bench_file import Bench
 from hil.diagnosis.search.initial_values import likenesses
 from hil.diagnosis.search.score_test import Candidate, offered
 from hil.identification.dataset import TORQUE_ACCURACY, inertia
-from hil.identification.estimator import POOL, Estimator, Fit, in_parallel, soft_cost
+from hil.identification.estimator import Estimator, Fit, soft_cost
 from hil.identification.hypothesis import LAST_EDGE_STEP_S, TRUST
 from hil.identification.nominal_fit import SOFT
+from hil.identification.parallel import POOL, in_parallel
 from hil.identification.terms import compatible
 from hil.twin.library import BY_ID
 
@@ -24,7 +25,7 @@ from hil.twin.library import BY_ID
 SEARCH_ACCURACY = 0.2
 # Halving: 8 candidates get a first fit, 4 a second, 3 are converged; more of them only extend the search.
 _STARTED, _CONTINUED, _FINISHED = 8, 4, 3
-_FIRST, _SECOND = 6, 4  # evaluations of the first fit (with the derivatives of the base) and of the second
+_FIRST, SECOND = 6, 4  # evaluations of the first fit (with the derivatives of the base) and of the second
 LONG = 25  # evaluations of a last fit
 # A second fit is converged if its cost is below _BEATEN times that of the converged leader or _LEVEL times that of the
 # leader's second fit, and its gain above the share _BEHIND of the leader's: unconverged fits may be far from their end.
@@ -78,7 +79,7 @@ class _Race:
     @cached_property
     def search(self) -> Estimator:
         """The estimator of the first fits."""
-        return replace(self.base.estimator, torque_accuracy=SEARCH_ACCURACY)
+        return replace(self.base.estimator, torque_accuracy=SEARCH_ACCURACY, fast=True)
 
     @cached_property
     def owner(self) -> list[FloatArray]:
@@ -147,7 +148,7 @@ class _Race:
         return min((self._best_start(candidate, x) for x in self.owner), key=_soft)
 
     def _second_fit(self, fit: Fit) -> Fit:
-        return fit.refit(_SECOND, soft=SOFT, slopes=fit.jacobian)
+        return fit.refit(SECOND, soft=SOFT, slopes=fit.jacobian)
 
     def _followers(self, leader: Fit, before: Fit, others: Sequence[Fit]) -> list[Fit]:
         """Evaluate the second fits, and converge those with a cost near that of the leader.
@@ -168,7 +169,7 @@ class _Race:
     def _from_owner(self, fit: Fit) -> Fit:
         """Fit the same mechanism from the parameters of the bench with its own derivatives."""
         candidate = next(one for one in self.candidates if one.term.effect == fit.terms[-1].effect)
-        again = self._owner_start(candidate).refit(_SECOND, soft=SOFT)
+        again = self._owner_start(candidate).refit(SECOND, soft=SOFT)
         return _finish(again) if self._gain(again) > 0.0 else again
 
     def _variants(self, fit: Fit) -> list[Fit]:
@@ -197,7 +198,7 @@ def _finish(fit: Fit) -> Fit:
         fit = _edges_moved(fit.refit(LONG, slopes=fit.jacobian))
     last = replace(fit.estimator, edge_step_s=LAST_EDGE_STEP_S)
     fit = last.fit(fit.hypothesis, evaluations=LONG, slopes=fit.jacobian)
-    return replace(last, torque_accuracy=TORQUE_ACCURACY).fit(fit.hypothesis, evaluations=_SECOND)
+    return replace(last, torque_accuracy=TORQUE_ACCURACY, fast=False).fit(fit.hypothesis, evaluations=SECOND)
 
 
 def _edges_moved(fit: Fit) -> Fit:

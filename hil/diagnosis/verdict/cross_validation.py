@@ -13,9 +13,10 @@ import numpy as np
 
 from hil.diagnosis.search.forward_selection import TIED, claimed
 from hil.identification.dataset import Dataset
-from hil.identification.estimator import Fit, in_parallel
+from hil.identification.estimator import Fit
 from hil.identification.inference import against
 from hil.identification.noise_floor import REPEATS, unrepeated
+from hil.identification.parallel import in_parallel
 from hil.identification.terms import Term
 
 

@@ -22,7 +22,7 @@ from hil.identification.inference import standard_errors
 from hil.identification.terms import FRICTION, LOAD, SAME, Key, Term, ambiguous
 from hil.quantities import digits, unit_of
 from hil.twin.library import BY_ID, LIBRARY
-from hil.twin.mechanism import Dimension, Role
+from hil.twin.parameter import Dimension, Role
 
 
 def renamed(found: Fit) -> Fit:

@@ -14,6 +14,7 @@ evidence that a finding needs:
 
 import math
 from collections.abc import Collection
+from dataclasses import replace
 
 import numpy as np
 
@@ -22,9 +23,10 @@ from hil.diagnosis.search.forward_selection import MATERIAL, MOST, NEEDED
 from hil.diagnosis.search.initial_values import axis_facts
 from hil.diagnosis.verdict.cross_validation import explained_share
 from hil.identification.dataset import Dataset
-from hil.identification.estimator import POOL, Fit
+from hil.identification.estimator import Fit
 from hil.identification.inference import against
 from hil.identification.noise_floor import FLOOR
+from hil.identification.parallel import POOL
 from hil.identification.terms import Term
 from hil.twin.library import BY_ID, LIBRARY
 
@@ -97,11 +99,13 @@ def not_testable(found: Fit, asked: Collection[str] = tuple(BY_ID), margin: floa
     present = {term.effect for term in found.terms} | {entry.effect for entry in bench.mechanisms}
     axis = axis_facts(bench, found.data.runs)
     nuisance, _ = np.linalg.qr(found.jacobian[:, : hypothesis.nominal_count])
+    search = replace(found.estimator, fast=True)
+    unchanged = search.residuals(hypothesis).vector
     enough = margin * max(NEEDED, MATERIAL * found.rows)
 
     def visible(effect: str, variant: int) -> bool:
         changed = hypothesis.with_term(Term(effect, variant, BY_ID[effect].typical_values(axis)))
-        change = found.estimator.residuals(changed).vector - found.residuals.vector
+        change = search.residuals(changed).vector - unchanged
         change -= nuisance @ (nuisance.T @ change)
         return float(change @ change) > enough
 

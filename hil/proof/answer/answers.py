@@ -12,7 +12,7 @@ from typing import Any
 from hil.errors import HilError
 from hil.proof.answer.blind import DIAGNOSIS, ERROR, answered
 from hil.twin.library import names_of
-from hil.twin.mechanism import Role
+from hil.twin.parameter import Role
 
 FAILED, ABSENT = "error", "no_answer"  # verdicts beside those of a diagnosis
 

@@ -12,7 +12,7 @@ from drivers.sim.effects import CATALOGUE, Effect
 from hil.proof.draw.axes import DrawnAxis
 from hil.proof.draw.axis_kinds import Rng, any_phase, any_sign, log_uniform
 from hil.twin.library import BY_ID
-from hil.twin.mechanism import Role
+from hil.twin.parameter import Role
 
 FormAndParameters = tuple[str, dict[str, float]]
 LIBRARY: tuple[str, ...] = tuple(CATALOGUE)

@@ -26,7 +26,7 @@ from hil.proof.draw.tiers import RECIPES
 from hil.proof.draw.unknown_effects import NOVEL
 from hil.recording.recording import Recording, write_parquet
 from hil.twin.library import names_of
-from hil.twin.mechanism import Role
+from hil.twin.parameter import Role
 
 TIERS = tuple(RECIPES)
 BALANCED = {"single": LIBRARY, "ladder": LIBRARY, "pair": LIBRARY, "masked": LIBRARY, "novel": NOVEL}

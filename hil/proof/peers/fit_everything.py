@@ -17,8 +17,9 @@ from hil.arrays import FloatArray
 from hil.diagnosis.search.forward_selection import MATERIAL
 from hil.diagnosis.search.initial_values import StartPoint, starts
 from hil.diagnosis.search.score_test import Candidate, screen_library
-from hil.identification.estimator import POOL, Fit
+from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
+from hil.identification.parallel import POOL
 from hil.identification.terms import Term
 from hil.proof.peers.case import PeerCase
 from hil.twin.library import BY_ID

@@ -10,7 +10,7 @@ from hil.proof.answer.answers import ABSENT, FAILED, Answer, Named
 from hil.proof.draw.expected import same_law
 from hil.proof.draw.generator import Concealed, Truth
 from hil.twin.library import names_of
-from hil.twin.mechanism import Role
+from hil.twin.parameter import Role
 
 NORMAL_90 = 1.645  # standard errors to either side of a 90 % interval
 ABOVE_FLOOR = 1.0  # smallest size, in units of noise, of an effect above the noise floor

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from hil.arrays import FloatArray
-from hil.twin.mechanism import Block, Dimension, Mechanism, Parameter, Role, Stage, Variant
+from hil.twin.mechanism import Block, Mechanism, Stage, Variant
+from hil.twin.parameter import Dimension, Parameter, Role
 
 Channels = tuple[FloatArray, ...]  # motor position, table position, torque command, torque
 

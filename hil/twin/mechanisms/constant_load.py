@@ -5,7 +5,8 @@ A positive load pulls the axis in the negative direction: it takes a positive mo
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Row, Stage, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, Stage, Variant
+from hil.twin.parameter import Dimension, Parameter, Role
 
 
 @njit

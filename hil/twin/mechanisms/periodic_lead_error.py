@@ -7,7 +7,8 @@ import math
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Row, Stage, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, Stage, Variant
+from hil.twin.parameter import Dimension, Parameter, Role
 
 
 @njit

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from hil.arrays import FloatArray
-from hil.twin.mechanism import Block, Dimension, Mechanism, Parameter, Picture, Role, Stage, Variant
+from hil.twin.mechanism import Block, Mechanism, Picture, Stage, Variant
+from hil.twin.parameter import Dimension, Parameter, Role
 from hil.twin.scene import AxisFacts
 from hil.twin.structure.chain import Chain
 from hil.twin.structure.frequency import modal_damping

@@ -4,7 +4,8 @@ import math
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Role, Row, Stage, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Row, Stage, Variant
+from hil.twin.parameter import Dimension, Parameter, Role
 
 
 @njit

@@ -2,7 +2,8 @@
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Row, Stage, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, Stage, Variant
+from hil.twin.parameter import Dimension, Parameter, Role
 
 
 @njit

@@ -4,7 +4,8 @@ import math
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Moment, Parameter, Picture, Role, Row, Stage, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, Stage, Variant
+from hil.twin.parameter import Dimension, Parameter, Role
 
 _OLDEST = 14  # age in ticks of the oldest command kept: 12 ticks of delay, a fraction, and its step
 _STARTED = 15  # memory[_STARTED] is 0 until the first command has come

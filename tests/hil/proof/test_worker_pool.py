@@ -34,7 +34,7 @@ import os
 from hil.proof.answer.worker_pool import completed, local
 
 def threads(_):
-    from hil.identification.estimator import POOL, THREADS
+    from hil.identification.parallel import POOL, THREADS
     return THREADS, POOL._max_workers
 
 if __name__ == "__main__":

@@ -12,7 +12,9 @@ from numba import float64, typeof
 
 from hil.twin import mechanisms
 from hil.twin.library import BY_ID, LIBRARY
-from hil.twin.mechanism import PARAMETERS, WIDTH, Block, Dimension, Moment, Stage
+from hil.twin.mechanism import PARAMETERS, WIDTH, Block, Mechanism, Moment, Stage
+from hil.twin.parameter import Dimension, Role
+from hil.twin.scene import AxisFacts
 from hil.twin.structure.chain import two_mass
 
 # The interface: id, block, and the parameters that a diagnosis reports by these names
@@ -177,3 +179,13 @@ def test_finite_within_bounds_and_at_zero(mechanism, data, at, value) -> None:
         out = mechanism.variants[variant].contribution(value, at._replace(within_s=within_s), values, memory)
         assert np.isfinite(out)
     assert np.isfinite(memory).all()
+
+
+@pytest.mark.parametrize("mechanism", [m for m in LIBRARY if m.neutral_at_zero], ids=lambda m: m.id)
+def test_no_name_applies_to_a_strength_at_the_bound_without_effect(mechanism: Mechanism) -> None:
+    axis = AxisFacts(0.3, 1e-3, 1.0, 3.0, 1e-9, 10.0)
+    typical = list(mechanism.complete(mechanism.typical_values(axis)))
+    for index in mechanism.indices(Role.STRENGTH):
+        typical[index] = max(mechanism.parameters[index].low, 0.0) + 2e-20
+    assert not mechanism.is_valid(typical, 0, axis)
+    assert any(mechanism.is_valid(mechanism.typical_values(axis), form, axis) for form in range(len(mechanism.forms)))

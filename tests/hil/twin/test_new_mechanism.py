@@ -13,7 +13,8 @@ SUPPORT = Path(__file__).parents[2] / "support"
 MECHANISM = """
 from numba import njit
 
-from hil.twin.mechanism import Block, Dimension, Mechanism, Parameter, Role, Stage, Variant
+from hil.twin.mechanism import Block, Mechanism, Stage, Variant
+from hil.twin.parameter import Dimension, Parameter, Role
 
 
 @njit

@@ -132,6 +132,9 @@ def explain(data: Dataset, progress: Progress = lambda text: None, deadline_s: f
         best, needed = _pruned(best, nominal)
         # to convergence: the residual of an unfinished fit resembles other mechanisms
         base = claimed(best.refit(_ENDED, slopes=best.jacobian))
+        if not base.terms and base.cost < nominal.cost - NEEDED:
+            nominal = base  # the term has only led the nominal parameters out of a local minimum
+            continue
         if effects(base.terms) in tried:
             break  # the term that was added has been removed again
         tried.append(effects(base.terms))
@@ -234,13 +237,14 @@ def _pruned(found: Fit, nominal: Fit) -> tuple[Fit, dict[Key, float]]:
     def ablated(index: int) -> tuple[float, Fit]:
         other = _without(found, index)
         if found.cost > _CLEAR * other.cost:
-            other = other.refit(12, slopes=other.jacobian)
+            other = other.refit(_ENDED, slopes=other.jacobian)
         return against(found, other, filters), other
 
-    while True:
+    while found.terms:
         filters = whitening(found)
         pairs = in_parallel([partial(ablated, index) for index in range(len(found.terms))])
         evidence, rest = min(pairs, key=lambda pair: pair[0])
-        if len(pairs) == 1 or (evidence >= NEEDED and gain(rest, found, nominal) >= MATERIAL * found.rows):
+        if evidence >= NEEDED and gain(rest, found, nominal) >= MATERIAL * found.rows:
             return found, {term.key: value for term, (value, _) in zip(found.terms, pairs, strict=True)}
         found = rest
+    return found, {}

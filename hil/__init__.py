@@ -14,8 +14,12 @@ use (PEP 562), so that `import hil` itself loads neither numpy nor scipy:
 
 from __future__ import annotations
 
+from contextlib import suppress as _suppress
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
+
+from hil.compiled.kernel_cache import provide_kernel_cache as _provide_kernel_cache
+from hil.errors import HilError as _HilError
 
 if TYPE_CHECKING:
     from drivers.port import DriverError
@@ -42,6 +46,9 @@ if TYPE_CHECKING:
     from hil.twin.mechanism import Mechanism
 
 __version__ = "0.1.0"
+
+with _suppress(_HilError):  # raised again when a kernel is needed
+    _provide_kernel_cache()  # before any module imports numba
 
 _MODULE_OF = {
     # verbs
@@ -112,9 +119,7 @@ def __getattr__(name: str) -> Any:
     """Import a public name on first use. Raises AttributeError for a name that is not public."""
     if name not in _MODULE_OF:
         raise AttributeError(f"module 'hil' has no attribute {name!r}")
-    from hil.compiled.kernel_cache import provide_kernel_cache
-
-    provide_kernel_cache()  # before numba is imported
+    _provide_kernel_cache()
     value = getattr(import_module(_MODULE_OF[name]), name)
     globals()[name] = value
     return value

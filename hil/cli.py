@@ -25,6 +25,7 @@ from hil.commands.paper import paper
 from hil.commands.prove import prove
 from hil.commands.run import run
 from hil.commands.validate import validate
+from hil.commands.warm_up import warm_up
 from hil.compiled.kernel_cache import provide_kernel_cache
 from hil.errors import HilError
 
@@ -64,6 +65,7 @@ COMMANDS: tuple[tuple[str, Callable[..., Any]], ...] = (
     ("prove", prove),
     ("validate", validate),
     ("bench", bench),
+    ("warm-up", warm_up),
 )
 for _name, _command in COMMANDS:
     app.command(_name)(_command)

@@ -23,10 +23,12 @@ def bench(
 ) -> None:
     """Measure loop, simulated bench, twin and a diagnosis on this machine, beside other tools and its limits."""
     from hil.benchmarks import diagnosis_stages, summary
+    from hil.commands.warm_up import compile_kernels
     from hil.files.output import write_json
     from hil.loop.realtime import machine_state, measure_jitter, now_text, real_time
 
     earlier = None if against is None else summary.read_earlier(against)
+    compile_kernels()
     with progress() as tell, real_time() as grants:
         figures = list(_figures(tell))
         tell("jitter of an empty loop", None)

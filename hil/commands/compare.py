@@ -17,6 +17,7 @@ def compare(
 ) -> None:
     """Compare a recording with its twin: in closed loop from the same set-points, and block by block."""
     from hil.bench.bench_file import load_bench
+    from hil.commands.warm_up import compile_kernels
     from hil.files.output import default_folder, new_folder
     from hil.identification.compare import compare as compare_recording
     from hil.identification.measured import bench_of
@@ -26,6 +27,7 @@ def compare(
     recording = read_recording(run)
     believed = load_bench(bench) if bench else bench_of(recording)
     folder = folder or default_folder(f"compare-{recording.name}")
+    compile_kernels()
     with new_folder(folder) as part, progress() as tell:
         result = compare_recording(recording, believed, fit=fit, progress=tell)
         tell("writing the report")

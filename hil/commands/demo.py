@@ -30,6 +30,7 @@ def demo(
     """Conceal an effect in the simulated axis, move it over CANopen, compare it with its twin, and find the effect."""
     import secrets
 
+    from hil.commands.warm_up import compile_kernels
     from hil.files.output import default_folder, new_folder
     from hil.loop.simulated_bench import load_simulated
     from hil.proof.draw import demo as concealed
@@ -38,6 +39,7 @@ def demo(
     seed = secrets.randbelow(10_000) if seed is None else seed
     believed = load_simulated("reference")
     bench, truth = concealed.conceal(believed, seed, effect)
+    compile_kernels()
     err.print("A simulated ball-screw axis conceals an effect that neither its twin nor the diagnosis knows.")
     # imported late: these take seconds
     from hil.diagnosis.diagnose import diagnose

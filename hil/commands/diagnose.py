@@ -23,6 +23,8 @@ def diagnose(
             "Default: the last third of each recording.",
         ),
     ] = None,
+    bench: RecordedBench = None,
+    folder: Out = None,
     budget_s: Annotated[
         float | None,
         typer.Option(
@@ -32,11 +34,10 @@ def diagnose(
             help="Time after which the search ends with the best answer so far; the result says what was not tried.",
         ),
     ] = None,
-    bench: RecordedBench = None,
-    folder: Out = None,
 ) -> None:
     """Find physics that the twin lacks: where it acts, which mechanism it is, and whether modelling it helps."""
     from hil.bench.bench_file import load_bench
+    from hil.commands.warm_up import compile_kernels
     from hil.diagnosis.diagnose import diagnose as diagnose_recordings
     from hil.files.output import default_folder, new_folder
     from hil.identification.measured import bench_of
@@ -48,6 +49,7 @@ def diagnose(
     held_out = [read_recording(path) for path in validate or []]
     believed = load_bench(bench) if bench else bench_of(train[0])
     folder = folder or default_folder(f"diagnose-{train[0].name}")
+    compile_kernels()
     with new_folder(folder) as part, progress() as tell:
         diagnosis = diagnose_recordings(train, held_out, believed, tell, math.inf if budget_s is None else budget_s)
         tell("writing the report")

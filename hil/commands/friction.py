@@ -31,6 +31,7 @@ def friction(
     """Identify Coulomb and viscous friction from constant feeds in both directions."""
     from hil.bench.bench_file import load_bench
     from hil.commands.run import named
+    from hil.commands.warm_up import compile_kernels
     from hil.errors import InputError
     from hil.files.output import default_folder, new_folder
     from hil.identification.friction import identify_friction
@@ -49,6 +50,8 @@ def friction(
     if run is None and believed is None:
         raise InputError("friction: --bench is missing; give the bench that --profile runs on")
     folder = folder or default_folder(f"friction-{(run or Path(str(bench))).stem}")
+    if run is None:
+        compile_kernels()
     with new_folder(folder) as part, progress() as tell:
         if run is None:
             assert believed is not None

@@ -46,6 +46,7 @@ def investigate(
     bench. On a real bench each one is shown and must be confirmed.
     """
     from hil.commands.run import named, say
+    from hil.commands.warm_up import compile_kernels
     from hil.diagnosis.wording import title, titles
     from hil.errors import InputError
     from hil.files.output import default_folder, refuse_used
@@ -91,6 +92,7 @@ def investigate(
     def allowed(profile: Profile) -> bool:
         return simulation is not None or yes or _confirmed(profile, loaded.gains.period_s)
 
+    compile_kernels()
     found = investigate_bench(first, proving, loaded, folder, run, allowed, progress, rounds)
     with progress() as tell:
         tell("writing the report")

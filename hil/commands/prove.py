@@ -40,7 +40,17 @@ def prove(
             "command continues; default: no limit",
         ),
     ] = None,
-    jobs: Annotated[int | None, typer.Option(min=1, help="Cases diagnosed at once; default: one per core")] = None,
+    workers: Annotated[
+        int | None,
+        typer.Option("--workers", "--jobs", min=1, help="Processes, each with its share of the cores; default: cores"),
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            "--scheduler",
+            help="Diagnose on a dask.distributed cluster, as tcp://10.0.0.1:8786; needs hil-servo[cluster]",
+        ),
+    ] = None,
     show: Annotated[
         str | None, typer.Option("--show", help="Print the published tables of a run, as 20261206, and exit")
     ] = None,
@@ -50,6 +60,7 @@ def prove(
     import signal
     from math import inf
 
+    from hil.commands.warm_up import compile_kernels
     from hil.errors import InputError
     from hil.proof.draw.plan import PLANTS, plan
     from hil.proof.run import prove as run
@@ -68,12 +79,14 @@ def prove(
     count = whole if full else 40 if cases is None else cases
     planned = plan(count, seed, plant, only or ())
     tiers = [tier for tier in PLANTS[plant] if tier in (only or ())]
+    compile_kernels()
     # ended by a service or kill: like ctrl-C, with all processes that were started
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         with progress() as tell:
             limit = inf if hours is None else hours
-            scores = run(folder, planned, seed, jobs or os.cpu_count() or 1, out.print, tell, plant, tiers, limit)
+            jobs = workers or len(os.sched_getaffinity(0))
+            scores = run(folder, planned, seed, jobs, out.print, tell, plant, tiers, limit, scheduler)
             tell("writing the report", None)
             write_proof(scores, score_others(folder, scores), folder)
     finally:

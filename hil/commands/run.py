@@ -25,6 +25,7 @@ def run(
     folder: Out = None,
 ) -> None:
     """Run a profile on a bench and record it. ctrl-C: controlled stop; again: stop by the drive's ramp."""
+    from hil.commands.warm_up import compile_kernels
     from hil.errors import HilError
     from hil.files.output import default_folder
     from hil.loop.run import run_profile
@@ -35,8 +36,10 @@ def run(
     folder = folder or default_folder(profile.stem)
     loaded = load_simulated(bench)
     with named(bench, profile):
+        wanted = load_profile(profile)
+        compile_kernels()
         result = run_profile(
-            loaded, load_profile(profile), folder, profile.stem, virtual=virtual, force=force, seed=seed,
+            loaded, wanted, folder, profile.stem, virtual=virtual, force=force, seed=seed,
             planned=lambda trajectory: err.print(
                 f"{profile.stem} on {loaded.name}: {trajectory.duration_s:.1f} s of motion ..."))  # fmt: skip
     say(result, virtual)

@@ -1,1 +1,1 @@
-"""Support of compiled kernels: rounding without fused products, cache folder, digest of their sources."""
+"""Support of compiled kernels: rounding without fused products, cache folder."""

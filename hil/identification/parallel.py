@@ -9,12 +9,14 @@ from threadpoolctl import threadpool_limits
 
 Output = TypeVar("Output")
 Function = TypeVar("Function", bound=Callable[..., Any])
-POOL = ThreadPoolExecutor(os.cpu_count() or 1)
+# HIL_THREADS: where the cores that this process may use are not its own, as on a cluster
+THREADS = int(os.environ.get("HIL_THREADS", 0)) or len(os.sched_getaffinity(0))
+POOL = ThreadPoolExecutor(THREADS)
 
 
 def in_parallel(jobs: Sequence[Callable[[], Output]]) -> list[Output]:
     """Run jobs in parallel; results in order. Jobs may use `POOL`."""
-    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+    with ThreadPoolExecutor(THREADS) as pool:
         return list(pool.map(lambda job: job(), jobs))
 
 

@@ -18,7 +18,6 @@ from numba import njit, typeof
 
 from hil.arrays import FloatArray
 from hil.channels import AXIS_CHANNELS, AxisKind
-from hil.compiled.source_digest import source_digest
 from hil.control import cascade
 from hil.motion.trajectory import Trajectory
 from hil.twin.axis import Start, Twin
@@ -157,51 +156,44 @@ def _control(law, position, velocity, motor, table):  # type: ignore[no-untyped-
     return out.torque_n_m, out.velocity_reference_m_s
 
 
-def _build_cycle(digest: str) -> Any:
-    @njit(cache=True, _nrt=False, error_model="numpy")
-    def cycle(tick, first, samples, setpoints, loop):  # type: ignore[no-untyped-def]
-        """Tick `tick` of set-points (n, 4) that begin at tick `first`: completes the row before (torque, cycle time)
-        and fills this one. Returns the set-point for the drive and the limits passed."""
-        assert digest
-        gains, limits, place = loop.law.gains, loop.limits, loop.place
-        index = min(tick - first, setpoints.shape[0] - 1)
-        position, velocity = setpoints[index, 0], setpoints[index, 1]
-        command, reference = _control(loop.law, position, velocity, samples.motor, samples.table)
-        twin_motor, twin_table = _read(*loop.twin)
-        twin_command, _ = _control(loop.twin_law, position, velocity, twin_motor, twin_table)
-        twin_torque = _advance(twin_command, *loop.twin)
-        before, row = loop.rows[(tick + 1) & 1], loop.rows[tick & 1]
-        before[place[Column.TORQUE]] = samples.torque
-        before[place[Column.CYCLE]] = samples.cycle_s
-        row[place[Column.TIME]] = tick * gains.period_s
-        row[place[Column.POSITION_COMMAND]] = position
-        row[place[Column.VELOCITY_COMMAND]] = velocity
-        row[place[Column.ACCELERATION_COMMAND]] = setpoints[index, 2]
-        row[place[Column.SEGMENT]] = setpoints[index, 3]
-        row[place[Column.MOTOR]] = samples.motor
-        row[place[Column.TABLE]] = samples.table
-        row[place[Column.TORQUE_COMMAND]] = command
-        row[place[Column.VELOCITY_REFERENCE]] = reference
-        row[place[Column.TWIN_MOTOR]] = twin_motor
-        row[place[Column.TWIN_TABLE]] = twin_table
-        row[place[Column.TWIN_TORQUE]] = twin_torque
-        row[place[Column.DRIVE_STATE]] = samples.drive_state
-        row[place[Column.ERROR_CODE]] = samples.error_code
-        row[place[Column.LATENESS]] = samples.lateness_s
-        actual = gains.ratio_m_rad * samples.motor
-        passed = 0
-        if abs(position - actual) > limits.following_error_m:
-            passed |= _FOLLOWING_ERROR
-        if not limits.travel_low_m <= actual <= limits.travel_high_m:
-            passed |= _TRAVEL
-        if limits.setpoint == _TO_TORQUE:
-            return command, passed
-        return (reference if limits.setpoint == _TO_VELOCITY else position) / gains.ratio_m_rad, passed
-
-    return cycle
-
-
-compiled_cycle = _build_cycle(source_digest())
+@njit(cache=True, _nrt=False, error_model="numpy")
+def compiled_cycle(tick, first, samples, setpoints, loop):  # type: ignore[no-untyped-def]
+    """Tick `tick` of set-points (n, 4) that begin at tick `first`: completes the row before (torque, cycle time)
+    and fills this one. Returns the set-point for the drive and the limits passed."""
+    gains, limits, place = loop.law.gains, loop.limits, loop.place
+    index = min(tick - first, setpoints.shape[0] - 1)
+    position, velocity = setpoints[index, 0], setpoints[index, 1]
+    command, reference = _control(loop.law, position, velocity, samples.motor, samples.table)
+    twin_motor, twin_table = _read(*loop.twin)
+    twin_command, _ = _control(loop.twin_law, position, velocity, twin_motor, twin_table)
+    twin_torque = _advance(twin_command, *loop.twin)
+    before, row = loop.rows[(tick + 1) & 1], loop.rows[tick & 1]
+    before[place[Column.TORQUE]] = samples.torque
+    before[place[Column.CYCLE]] = samples.cycle_s
+    row[place[Column.TIME]] = tick * gains.period_s
+    row[place[Column.POSITION_COMMAND]] = position
+    row[place[Column.VELOCITY_COMMAND]] = velocity
+    row[place[Column.ACCELERATION_COMMAND]] = setpoints[index, 2]
+    row[place[Column.SEGMENT]] = setpoints[index, 3]
+    row[place[Column.MOTOR]] = samples.motor
+    row[place[Column.TABLE]] = samples.table
+    row[place[Column.TORQUE_COMMAND]] = command
+    row[place[Column.VELOCITY_REFERENCE]] = reference
+    row[place[Column.TWIN_MOTOR]] = twin_motor
+    row[place[Column.TWIN_TABLE]] = twin_table
+    row[place[Column.TWIN_TORQUE]] = twin_torque
+    row[place[Column.DRIVE_STATE]] = samples.drive_state
+    row[place[Column.ERROR_CODE]] = samples.error_code
+    row[place[Column.LATENESS]] = samples.lateness_s
+    actual = gains.ratio_m_rad * samples.motor
+    passed = 0
+    if abs(position - actual) > limits.following_error_m:
+        passed |= _FOLLOWING_ERROR
+    if not limits.travel_low_m <= actual <= limits.travel_high_m:
+        passed |= _TRAVEL
+    if limits.setpoint == _TO_TORQUE:
+        return command, passed
+    return (reference if limits.setpoint == _TO_VELOCITY else position) / gains.ratio_m_rad, passed
 
 
 class Cycle:

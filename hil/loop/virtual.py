@@ -19,7 +19,6 @@ from drivers.sim import kernel
 from drivers.sim.plant import Plant
 from hil.arrays import FloatArray
 from hil.bench.hardware import DriveMode
-from hil.compiled.source_digest import source_digest
 from hil.loop.cycle import Cycle, Samples, compiled_cycle
 from hil.loop.devices import Devices, Rig
 from hil.loop.session import Rows
@@ -61,38 +60,30 @@ class BlockRows(Rows, Protocol):
 _cycle, _advance = compiled_cycle, kernel.advance
 
 
-def _build_ticks(digest: str) -> Any:
-    @njit(cache=True, _nrt=False, error_model="numpy")
-    def ticks(first, count, drive_state, measured, block, setpoints, loop, axis):  # type: ignore[no-untyped-def]
-        """Run ticks first .. first + count - 1 with the set-points of row `tick`; returns False if a limit was passed.
+@njit(cache=True, _nrt=False, error_model="numpy")
+def _ticks(first, count, drive_state, measured, block, setpoints, loop, axis):  # type: ignore[no-untyped-def]
+    """Run ticks first .. first + count - 1 with the set-points of row `tick`; returns False if a limit was passed.
 
-        measured: motor [rad or m], table [m] and torque [N m or N] of the next tick. block[k] becomes the row before
-        tick first + k.
-        """
-        assert digest
-        width, scales, state = block.shape[1], axis.scales, axis.state[0]
-        for k in range(count):
-            tick = first + k
-            samples = Samples(measured[0], measured[1], measured[2], drive_state, 0, 0.0, 0.0)
-            setpoint, passed = _cycle(tick, 0, samples, setpoints, loop)
-            for column in range(width):
-                block[k, column] = loop.rows[(tick + 1) & 1, column]
-            if passed:
-                return False
-            mille = np.rint(setpoint * scales.command_mille_per_n_m)
-            mille = min(max(mille, -scales.max_mille), scales.max_mille)
-            _advance(axis.parameters[0], state, axis.lines, mille * scales.command_n_m_per_mille, axis.steps)
-            measured[0] = np.rint(state.motor_recorded * scales.counts_per_rad) * scales.rad_per_count
-            measured[1] = np.rint(state.table_recorded * scales.counts_per_m) * scales.m_per_count
-            torque = np.rint(state.torque_recorded * scales.mille_per_n_m)
-            measured[2] = min(max(torque, -32768.0), 32767.0) * scales.n_m_per_mille
-        return True
-
-    return ticks
-
-
-# The sources of the simulated axis stamp the types of its records.
-_ticks = _build_ticks(source_digest("loop/cycle.py"))
+    measured: motor [rad or m], table [m] and torque [N m or N] of the next tick. block[k] becomes the row before
+    tick first + k.
+    """
+    width, scales, state = block.shape[1], axis.scales, axis.state[0]
+    for k in range(count):
+        tick = first + k
+        samples = Samples(measured[0], measured[1], measured[2], drive_state, 0, 0.0, 0.0)
+        setpoint, passed = _cycle(tick, 0, samples, setpoints, loop)
+        for column in range(width):
+            block[k, column] = loop.rows[(tick + 1) & 1, column]
+        if passed:
+            return False
+        mille = np.rint(setpoint * scales.command_mille_per_n_m)
+        mille = min(max(mille, -scales.max_mille), scales.max_mille)
+        _advance(axis.parameters[0], state, axis.lines, mille * scales.command_n_m_per_mille, axis.steps)
+        measured[0] = np.rint(state.motor_recorded * scales.counts_per_rad) * scales.rad_per_count
+        measured[1] = np.rint(state.table_recorded * scales.counts_per_m) * scales.m_per_count
+        torque = np.rint(state.torque_recorded * scales.mille_per_n_m)
+        measured[2] = min(max(torque, -32768.0), 32767.0) * scales.n_m_per_mille
+    return True
 
 
 class CompiledTicks:

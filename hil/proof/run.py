@@ -13,9 +13,10 @@ from hil.errors import HilError, InputError
 from hil.proof.answer.answers import read_answers
 from hil.proof.answer.blind import answered
 from hil.proof.answer.follow_up import AGAIN, record_again
+from hil.proof.code import code_sha256
 from hil.proof.draw.plan import PLANTS, Planned
 from hil.proof.score.scores import Scores, score
-from hil.proof.seal import CASES, SEAL, SEALED, code_sha256, draw_cases, read_seal, seal, unseal
+from hil.proof.seal import CASES, SEAL, SEALED, draw_cases, read_seal, seal, unseal
 from hil.report.console import Progress
 
 ANSWERS, PEERS = "answers", "peers"
@@ -33,11 +34,13 @@ def prove(
     plant: str = "simulated",
     only: Sequence[str] = (),
     hours: float = inf,
+    scheduler: str | None = None,
 ) -> Scores:
     """Complete the proof in `folder` on a plant of `plan.PLANTS` and score it; `only`: the tiers it was planned for.
 
-    No diagnosis is begun after `hours`; then the cases up to the first without an answer are scored. Cases lie in mixed
-    order, so these are a fair sample, unlike all cases that were quick.
+    Diagnoses run in `jobs` processes, or on the dask.distributed cluster of a `scheduler`; what knows the truth runs on
+    this machine. No diagnosis is begun after `hours`; then the cases up to the first without an answer are scored.
+    Cases lie in mixed order, so these are a fair sample, unlike all cases that were quick.
 
     Raises InputError if `folder` holds another proof, HilError if sealed files changed or the blind process failed.
     """
@@ -57,7 +60,7 @@ def prove(
         )
     say(f"sealed: SHA-256 {about['truths_sha256']}, {about['cases']} cases, {about['sealed_at']}")
     names, code = [case.name for case in planned], about["code_sha256"]
-    diagnose_blind(folder / CASES, folder / ANSWERS, names, code, jobs, progress, "diagnosing blind", hours)
+    diagnose_blind(folder / CASES, folder / ANSWERS, names, code, jobs, progress, "diagnosing blind", hours, scheduler)
     sealed = unseal(folder)
     truths = {name: sealed[name] for name in takewhile(lambda name: answered(folder / ANSWERS / name), names)}
     if len(truths) < len(names):
@@ -65,7 +68,7 @@ def prove(
     progress("running proposed motions", 0.0)
     again = record_again(folder, folder / ANSWERS, truths, jobs, progress)
     later = folder / AGAIN
-    diagnose_blind(later / CASES, later / ANSWERS, again, code, jobs, progress, "diagnosing again")
+    diagnose_blind(later / CASES, later / ANSWERS, again, code, jobs, progress, "diagnosing again", inf, scheduler)
     progress("scoring", None)
     return score(truths, read_answers(folder / ANSWERS, truths), read_answers(later / ANSWERS, again))
 
@@ -86,6 +89,7 @@ def diagnose_blind(
     progress: Progress,
     task: str = "diagnosing blind",
     hours: float = inf,
+    scheduler: str | None = None,
 ) -> None:
     """Diagnose all cases without an answer in another process, with the code that was sealed; none begins after
     `hours`."""
@@ -100,6 +104,8 @@ def diagnose_blind(
     progress(task, done / len(names))
     blind = [sys.executable, "-W", _UNCLEAN, "-m", "hil.proof.answer.blind", str(cases.resolve())]
     options = [str(answers.resolve()), "--jobs", str(jobs), "--hours", str(hours)]
+    if scheduler is not None:
+        options += ["--scheduler", scheduler]
     with subprocess.Popen([*blind, *options], stdout=subprocess.PIPE, text=True, start_new_session=True) as process:
         try:
             for _ in process.stdout or ():

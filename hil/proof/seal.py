@@ -10,7 +10,6 @@ Files are sealed, not seeds: the linear algebra of another machine may change th
 import hashlib
 import json
 import os
-import platform
 import shutil
 import subprocess
 from collections.abc import Callable, Sequence
@@ -18,13 +17,13 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import replace
 from datetime import UTC, datetime
 from functools import partial
-from importlib.metadata import version
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, TypeVar
 
 from hil.errors import HilError, InputError
 from hil.files.output import write_json
+from hil.proof.code import code_sha256, versions
 from hil.proof.draw.generator import Truth, draw, write
 from hil.proof.draw.mujoco_plant import draw_mujoco
 from hil.proof.draw.plan import Planned
@@ -33,9 +32,6 @@ from hil.report.console import Progress
 CASES, SEALED, SEAL = "cases", "sealed", "seal.json"
 _TRUTHS = f"{SEALED}/truths.json"
 _PACKAGE = Path(__file__).parents[1]
-# Packages that a diagnosis uses, beside the modules at the root.
-_ANSWERING = ("bench", "compiled", "control", "diagnosis", "files", "identification", "motion", "recording", "twin")
-_LIBRARIES = ("hil-servo", "numpy", "scipy", "numba")
 
 _Argument = TypeVar("_Argument")
 
@@ -98,7 +94,7 @@ def seal(folder: Path, planned: Sequence[Planned], command: str, seed: int) -> d
         "sealed_at": f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}",
         **_commit(),
         "code_sha256": code_sha256(),
-        "versions": {"python": platform.python_version(), **{name: version(name) for name in _LIBRARIES}},
+        "versions": versions(),
     }
     write_json(folder / SEAL, about)
     for path in parts:
@@ -142,15 +138,6 @@ def sha256(path: Path) -> str:
     """Return the SHA-256 of a file."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
-
-
-def code_sha256() -> str:
-    """Return the SHA-256 of the code that a diagnosis uses."""
-    digest = hashlib.sha256()
-    packages = (path for part in _ANSWERING for path in (_PACKAGE / part).rglob("*.py"))
-    for path in sorted([*_PACKAGE.glob("*.py"), *packages]):
-        digest.update(path.relative_to(_PACKAGE).as_posix().encode() + b"\0" + path.read_bytes())
-    return digest.hexdigest()
 
 
 def _draw(folder: Path, seed: int, plant: str, case: Planned) -> None:

@@ -7,7 +7,7 @@ import inspect
 import sys
 from pathlib import Path
 
-from hil.compiled.source_digest import add_source
+from hil.compiled.kernel_cache import provide_kernel_cache
 from hil.twin.mechanism import Mechanism
 from hil.twin.mechanisms import (
     asymmetric_friction,
@@ -93,7 +93,7 @@ def register(mechanism: Mechanism) -> None:
     SLOTS = (*SLOTS, *[mechanism] * mechanism.most)
     BY_ID[mechanism.id] = mechanism
     for contribution in {variant.contribution for variant in mechanism.variants}:
-        add_source(Path(inspect.getfile(inspect.unwrap(contribution))))
+        provide_kernel_cache(Path(inspect.getfile(inspect.unwrap(contribution))))
 
 
 def names_of(*roles: Role) -> tuple[str, ...]:

@@ -89,7 +89,7 @@ class Picture(StrEnum):
 
 
 Points = Sequence[tuple[float, ...]]
-_NO_SIZE = 1e-6  # strength over a typical defect: above rounding of a fit that ends at zero, far below any sensor
+_ROUNDING = 1e-15  # of a bound: a fit ends that near to it
 
 
 @dataclass(frozen=True)
@@ -185,14 +185,12 @@ class Mechanism:
 
     def is_valid(self, values: Sequence[float], variant: int, axis: AxisFacts) -> bool:
         """Check that the effect has a size, that its name applies, and that the sensors can show it."""
-        return self._has_size(values, axis) and (self.valid is None or self.valid(values, variant, axis))
+        return self._has_size(values) and (self.valid is None or self.valid(values, variant, axis))
 
-    def _has_size(self, values: Sequence[float], axis: AxisFacts) -> bool:
+    def _has_size(self, values: Sequence[float]) -> bool:
         """Check that a strength is off the bound at which there is no effect."""
-        sizes = self.indices(Role.STRENGTH)
-        size = max(abs(values[i] - max(self.parameters[i].low, 0.0)) for i in sizes if i < len(values))
-        typical = self.typical_values(axis)
-        return not self.neutral_at_zero or size > _NO_SIZE * max(abs(typical[i]) for i in sizes if i < len(typical))
+        sizes = [(v, p) for v, p in zip(values, self.parameters, strict=False) if p.role is Role.STRENGTH]
+        return not self.neutral_at_zero or any(abs(v - max(p.low, 0.0)) > _ROUNDING * p.high for v, p in sizes)
 
     def _inside(self, values: Sequence[float]) -> tuple[float, ...]:
         return tuple(min(max(value, p.low), p.high) for value, p in zip(values, self.parameters, strict=True))

@@ -87,7 +87,7 @@ def test_an_installation_that_cannot_be_written(tmp_path: Path, temporary: bool)
     assert ran.returncode == (0 if temporary else 1), ran.stderr
     assert "Traceback" not in ran.stderr
     if temporary:
-        assert list((tmp_path / "tmp").glob("hil-kernels-*/*/*.nbi"))
+        assert list((tmp_path / "tmp").glob("hil-kernels-*/hil-kernels-*/*/*.nbi"))
     else:
         assert "no folder for compiled kernels is writable" in ran.stderr
 

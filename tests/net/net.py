@@ -245,7 +245,9 @@ def changes(old: dict[str, Any], new: dict[str, Any]) -> list[str]:
         if abs(rms_now - rms) > HELD_OUT_CHANGE * rms or abs(floor_now - floor) > HELD_OUT_CHANGE * floor:
             found.append(f"held out {name}: {rms:.4g} (floor {floor:.4g}) -> {rms_now:.4g} (floor {floor_now:.4g})")
     if set(old.get("not_testable", ())) != set(new.get("not_testable", ())):
-        found.append(f"not testable: {sorted(set(old['not_testable']) ^ set(new['not_testable']))} differ")
+        found.append(
+            f"not testable: {sorted(set(old.get('not_testable', ())) ^ set(new.get('not_testable', ())))} differ"
+        )
     if new["seconds"] > SLOWER * old["seconds"] + 2.0:
         found.append(f"seconds: {old['seconds']} -> {new['seconds']}")
     return found

@@ -9,9 +9,9 @@ from pathlib import Path
 DEADLINE_S = 60.0  # a hang, not a measure of speed
 
 
-def wait_for(condition: Callable[[], bool]) -> None:
-    """Wait until it is true; fails after DEADLINE_S."""
-    end = time.monotonic() + DEADLINE_S
+def wait_for(condition: Callable[[], bool], deadline_s: float = DEADLINE_S) -> None:
+    """Wait until it is true; fails after `deadline_s`."""
+    end = time.monotonic() + deadline_s
     while not condition():
         assert time.monotonic() < end, "waited in vain"
         time.sleep(0.005)

@@ -39,6 +39,8 @@ _CLEAR = 0.7
 # Least energy that a term removes per row, in units of noise^2: 14 % of the noise in rms. The model discrepancy of two
 # simulations of one axis is below that.
 MATERIAL = 0.02
+# Energy above the noise floor per row, in units of noise^2, below which nothing is left to explain: half of MATERIAL.
+_NOTHING = 0.5 * MATERIAL
 # Least share of the energy above the noise that a term removes: many terms of less are a series expansion of another
 # effect.
 WORTH = 0.02
@@ -132,6 +134,9 @@ def explain(data: Dataset, progress: Progress = lambda text: None, deadline_s: f
         best, needed = _pruned(best, nominal)
         # to convergence: the residual of an unfinished fit resembles other mechanisms
         base = claimed(best.refit(_ENDED, slopes=best.jacobian))
+        if not base.terms and base.cost < nominal.cost - NEEDED:
+            nominal = base  # the term has only led the nominal parameters out of a local minimum
+            continue
         if effects(base.terms) in tried:
             break  # the term that was added has been removed again
         tried.append(effects(base.terms))
@@ -159,12 +164,8 @@ def _next_term(
         step("fitting " + ", ".join(one.term.effect for one in promising[:3]))
         found = _claimable(race(base, promising))
     best = _worthwhile(found, base, nominal)
-    if (
-        (best is None or best.cost > _CLEAR * base.cost)
-        and not owner.at_floor
-        and may_hide(base)
-        and not base.estimator.expired
-    ):
+    unfinished = (best is None or best.cost > _CLEAR * base.cost) and not base.estimator.expired
+    if unfinished and not owner.at_floor and base.excess > _NOTHING * base.rows and may_hide(base):
         step("fitting a lost preload from the springs of the bench file")
         found = sorted([*found, unbent(base)], key=lambda other: other.cost)
         best = _worthwhile(found, base, nominal)
@@ -235,13 +236,14 @@ def _pruned(found: Fit, nominal: Fit) -> tuple[Fit, dict[Key, float]]:
     def ablated(index: int) -> tuple[float, Fit]:
         other = _without(found, index)
         if found.cost > _CLEAR * other.cost:
-            other = other.refit(12, slopes=other.jacobian)
+            other = other.refit(_ENDED, slopes=other.jacobian)
         return against(found, other, filters), other
 
-    while True:
+    while found.terms:
         filters = whitening(found)
         pairs = in_parallel([partial(ablated, index) for index in range(len(found.terms))])
         evidence, rest = min(pairs, key=lambda pair: pair[0])
-        if len(pairs) == 1 or (evidence >= NEEDED and gain(rest, found, nominal) >= MATERIAL * found.rows):
+        if evidence >= NEEDED and gain(rest, found, nominal) >= MATERIAL * found.rows:
             return found, {term.key: value for term, (value, _) in zip(found.terms, pairs, strict=True)}
         found = rest
+    return found, {}

@@ -9,7 +9,6 @@ from typing import Any
 
 from numba import njit
 
-from hil.compiled.source_digest import source_digest
 from hil.twin.stepping import stages
 from hil.twin.stepping.contact import COMPILE, Resistance
 from hil.twin.stepping.contact import rigid as _rigid
@@ -83,71 +82,57 @@ def _move_driven(shapes, step, drive, delta):  # type: ignore[no-untyped-def]
     return free
 
 
-def _build_advance(digest: str) -> Any:
-    @njit(**_KERNEL)
-    def advance(command, constants, modes, values, codes, delta, memory):  # type: ignore[no-untyped-def]
-        """Move the axis by one control period under a held torque command; mean measured torque."""
-        assert digest
-        c, own, shapes, coupling = constants[0], memory[0], shapes_of(modes), coupling_of(modes)
-        effects = _Effects(values, codes[0], own.mechanisms)
-        any_active = c.any_active > 0
-        motion = AxisMotion(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+@njit(**_KERNEL)
+def advance(command, constants, modes, values, codes, delta, memory):  # type: ignore[no-untyped-def]
+    """Move the axis by one control period under a held torque command; mean measured torque."""
+    c, own, shapes, coupling = constants[0], memory[0], shapes_of(modes), coupling_of(modes)
+    effects = _Effects(values, codes[0], own.mechanisms)
+    any_active = c.any_active > 0
+    motion = AxisMotion(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    if any_active:
+        motion = _look(shapes, delta)
+        speed = motion.speed
+    else:
+        speed = along(shapes.motor, delta[1])
+    reversing = abs(speed) < c.slow_velocity + 2.0 * abs(speed - own.last_speed)
+    fine = c.always_fine > 0 or (reversing and abs(speed) > RESTING)
+    own.last_speed = speed
+    step, internal = step_of(modes, fine), c.fine if fine else c.coarse
+    steps, gain = internal.number, internal.motor_gain
+    h = c.period / steps
+    resistance = Resistance(c.coulomb, c.viscous, 0.0, 0.0)
+    measured = 0.0
+    for j in range(steps):
+        made, guide = command, 0.0
         if any_active:
-            motion = _look(shapes, delta)
-            speed = motion.speed
+            middle = motion.position + 0.5 * h * motion.speed
+            table_m = (motion.table + 0.5 * h * motion.table_speed) * c.ratio
+            at = moment(c, own.clock + j * h, j * h, h, middle, motion.speed, table_m)
+            made = _current(command, at, effects)
+            drive = _motor_torque(_torque(made, at, effects), at, effects)
+            push = _table_force(0.0, at, effects) * c.ratio
+            force = _transmit(c, own, shapes, motion, at, effects, delta)
+            free, table_free = _move(shapes, step, c.coupled, coupling, drive, push, force, delta)
+            motor, guide = _friction(c, own, internal, motion, at, effects, free, table_free)
         else:
-            speed = along(shapes.motor, delta[1])
-        reversing = abs(speed) < c.slow_velocity + 2.0 * abs(speed - own.last_speed)
-        fine = c.always_fine > 0 or (reversing and abs(speed) > RESTING)
-        own.last_speed = speed
-        step, internal = step_of(modes, fine), c.fine if fine else c.coarse
-        steps, gain = internal.number, internal.motor_gain
-        h = c.period / steps
-        resistance = Resistance(c.coulomb, c.viscous, 0.0, 0.0)
-        measured = 0.0
-        for j in range(steps):
-            made, guide = command, 0.0
-            if any_active:
-                middle = motion.position + 0.5 * h * motion.speed
-                table_m = (motion.table + 0.5 * h * motion.table_speed) * c.ratio
-                at = moment(c, own.clock + j * h, j * h, h, middle, motion.speed, table_m)
-                made = _current(command, at, effects)
-                drive = _motor_torque(_torque(made, at, effects), at, effects)
-                push = _table_force(0.0, at, effects) * c.ratio
-                force = _transmit(c, own, shapes, motion, at, effects, delta)
-                free, table_free = _move(shapes, step, c.coupled, coupling, drive, push, force, delta)
-                motor, guide = _friction(c, own, internal, motion, at, effects, free, table_free)
-            else:
-                free = _move_driven(shapes, step, command, delta)
-                motor = _rigid(free, gain, resistance)
-            measured += made
-            for i in range(delta.shape[1]):
-                g = shapes.motor[i] * motor + shapes.table[i] * guide
-                delta[0, i] -= step.b1[i] * g
-                delta[1, i] -= step.b2[i] * g
-            if any_active and j + 1 < steps:
-                motion = _look(shapes, delta)
-        own.clock += c.period
-        return measured / steps
-
-    return advance
+            free = _move_driven(shapes, step, command, delta)
+            motor = _rigid(free, gain, resistance)
+        measured += made
+        for i in range(delta.shape[1]):
+            g = shapes.motor[i] * motor + shapes.table[i] * guide
+            delta[0, i] -= step.b1[i] * g
+            delta[1, i] -= step.b2[i] * g
+        if any_active and j + 1 < steps:
+            motion = _look(shapes, delta)
+    own.clock += c.period
+    return measured / steps
 
 
-def _build_read(digest: str) -> Any:
-    @njit(**_KERNEL)
-    def read(constants, modes, values, codes, delta, memory):  # type: ignore[no-untyped-def]
-        """Read the two encoders: motor position (rad, or m) and table position (m)."""
-        assert digest
-        c, own, shapes = constants[0], memory[0], shapes_of(modes)
-        effects = _Effects(values, codes[0], own.mechanisms)
-        position, table = along(shapes.motor, delta[0]), along(shapes.table, delta[0]) * c.ratio
-        at = moment(c, own.clock, 0.0, 0.0, position, 0.0, table)
-        return _motor_reading(position, at, effects), _table_reading(table, at, effects)
-
-    return read
-
-
-# Bound into each kernel, so that numba's cache knows when a source compiled into it has changed.
-_DIGEST = source_digest()
-advance = _build_advance(_DIGEST)
-read = _build_read(_DIGEST)
+@njit(**_KERNEL)
+def read(constants, modes, values, codes, delta, memory):  # type: ignore[no-untyped-def]
+    """Read the two encoders: motor position (rad, or m) and table position (m)."""
+    c, own, shapes = constants[0], memory[0], shapes_of(modes)
+    effects = _Effects(values, codes[0], own.mechanisms)
+    position, table = along(shapes.motor, delta[0]), along(shapes.table, delta[0]) * c.ratio
+    at = moment(c, own.clock, 0.0, 0.0, position, 0.0, table)
+    return _motor_reading(position, at, effects), _table_reading(table, at, effects)

@@ -1,12 +1,11 @@
 """Compiled loops over the ticks of a recording: closed, block by block from measured inputs, and open."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
 from hil.arrays import FloatArray
-from hil.compiled.source_digest import source_digest
 from hil.control import cascade
 from hil.twin.stepping import kernel
 from hil.twin.stepping.contact import COMPILE
@@ -40,120 +39,101 @@ def _correct(impulse, error, period, time_constant, delta):  # type: ignore[no-u
         delta[1, i] += impulse[i] * kick
 
 
-def _build_closed_loop(digest: str) -> Any:
-    @njit(cache=True, nogil=True, **COMPILE)
-    def closed_loop(gains, state, setpoints, misread, measured_table, axis):  # type: ignore[no-untyped-def]
-        """Run controller and axis from tick to tick: motor, table, torque command, torque, each (n,).
+@njit(cache=True, nogil=True, **COMPILE)
+def closed_loop(gains, state, setpoints, misread, measured_table, axis):  # type: ignore[no-untyped-def]
+    """Run controller and axis from tick to tick: motor, table, torque command, torque, each (n,).
 
-        Where `measured_table` (n,) is given (else empty), it holds a table that floats in a gap: its flight cannot be
-        predicted from the commands, and a bounce early or late would stay for good. `misread` (2, n), or (2, 0), is
-        added to the readings of motor and table encoder for the controller.
-        """
-        assert digest
-        constants, modes, values, codes, delta, memory = axis
-        c, own, shapes = constants[0], memory[0], shapes_of(modes)
-        n = setpoints.position_m.size
-        motor, table, command, torque = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
-        datum, told = 0.0, 0
-        for k in range(n):
-            motor[k], table[k] = _read(constants, modes, values, codes, delta, memory)
-            if measured_table.size and own.floating == 0.0:
-                told += 1
-                datum += (measured_table[k] - table[k] - datum) / told
-            seen_motor, seen_table = motor[k], table[k]
-            if misread.size:
-                seen_motor += misread[0, k]
-                seen_table += misread[1, k]
-            inputs = cascade.Inputs(setpoints.position_m[k], setpoints.velocity_m_s[k], seen_motor, seen_table)
-            state, outputs = _control_step(gains, state, inputs)
-            command[k] = outputs.torque_n_m
-            if told > 0 and own.floating > 0.0:
+    Where `measured_table` (n,) is given (else empty), it holds a table that floats in a gap: its flight cannot be
+    predicted from the commands, and a bounce early or late would stay for good. `misread` (2, n), or (2, 0), is
+    added to the readings of motor and table encoder for the controller.
+    """
+    constants, modes, values, codes, delta, memory = axis
+    c, own, shapes = constants[0], memory[0], shapes_of(modes)
+    n = setpoints.position_m.size
+    motor, table, command, torque = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
+    datum, told = 0.0, 0
+    for k in range(n):
+        motor[k], table[k] = _read(constants, modes, values, codes, delta, memory)
+        if measured_table.size and own.floating == 0.0:
+            told += 1
+            datum += (measured_table[k] - table[k] - datum) / told
+        seen_motor, seen_table = motor[k], table[k]
+        if misread.size:
+            seen_motor += misread[0, k]
+            seen_table += misread[1, k]
+        inputs = cascade.Inputs(setpoints.position_m[k], setpoints.velocity_m_s[k], seen_motor, seen_table)
+        state, outputs = _control_step(gains, state, inputs)
+        command[k] = outputs.torque_n_m
+        if told > 0 and own.floating > 0.0:
+            error = (measured_table[k] - datum - table[k]) / c.ratio
+            _correct(shapes.table_impulse, error, c.period, OBSERVER_S, delta)
+        torque[k] = _advance(command[k], constants, modes, values, codes, delta, memory)
+    return motor, table, command, torque
+
+
+@njit(cache=True, nogil=True, **COMPILE)
+def observe(gains, state, setpoints, measured, axis):  # type: ignore[no-untyped-def]
+    """Run each block on measured inputs (a `Response`): motor, table, torque command, torque, each (n,).
+
+    The controller gets the measured positions, the drive the measured command, the axis that torque, and the
+    transmission the measured motor: the twin's motor is corrected by it after each prediction, its table only while
+    it floats in a gap or rests. So a mismatch shows in its own block, at its own place and time, and is then
+    forgotten. The measured table is empty without a linear encoder. Its datum is the mean difference from the twin
+    while the axis moves.
+    """
+    constants, modes, values, codes, delta, memory = axis
+    c, own, shapes = constants[0], memory[0], shapes_of(modes)
+    command, measured_motor, measured_table = (
+        measured.torque_command,
+        measured.motor_position,
+        measured.table_position_m,
+    )
+    n = command.size
+    motor, table, wanted, torque = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
+    seen = measured_motor * c.ratio if measured_table.size == 0 else measured_table
+    datum, settled, moved = 0.0, 0, 0
+    for k in range(n):
+        motor[k], table[k] = _read(constants, modes, values, codes, delta, memory)
+        inputs = cascade.Inputs(setpoints.position_m[k], setpoints.velocity_m_s[k], measured_motor[k], seen[k])
+        state, outputs = _control_step(gains, state, inputs)
+        wanted[k] = outputs.torque_n_m
+        # rounding of recorded set-points accumulates in the integrator: forget it
+        resumed = state.integral_n_m + c.period / INTEGRATOR_S * (command[k] - wanted[k])
+        state = cascade.State(
+            state.tick,
+            state.velocity_reference_m_s,
+            resumed,
+            state.previous_motor_rad,
+            state.previous2_motor_rad,
+            state.filtered_velocity_rad_s,
+        )
+        error = measured_motor[k] - motor[k]
+        _correct(shapes.motor_impulse, error, c.period, c.observer, delta)
+        if measured_table.size:
+            passed = abs(measured_motor[k] - measured_motor[max(k - 1, 0)])
+            free = passed <= c.slow_velocity * c.period or own.floating > 0.0
+            apart = measured_table[k] - table[k] - c.ratio * error
+            if not free:
+                moved += 1
+                datum += (apart - datum) / (moved + min(settled, 1))
+            elif moved == 0 and own.floating == 0.0:
+                # its first rest is the datum until motion gives a better one; not within a gap
+                settled += 1
+                datum += (apart - datum) / settled
+            if free and moved + settled > 0:
                 error = (measured_table[k] - datum - table[k]) / c.ratio
                 _correct(shapes.table_impulse, error, c.period, OBSERVER_S, delta)
-            torque[k] = _advance(command[k], constants, modes, values, codes, delta, memory)
-        return motor, table, command, torque
-
-    return closed_loop
+        torque[k] = _advance(command[k], constants, modes, values, codes, delta, memory)
+    return motor, table, wanted, torque
 
 
-def _build_observe(digest: str) -> Any:
-    @njit(cache=True, nogil=True, **COMPILE)
-    def observe(gains, state, setpoints, measured, axis):  # type: ignore[no-untyped-def]
-        """Run each block on measured inputs (a `Response`): motor, table, torque command, torque, each (n,).
-
-        The controller gets the measured positions, the drive the measured command, the axis that torque, and the
-        transmission the measured motor: the twin's motor is corrected by it after each prediction, its table only while
-        it floats in a gap or rests. So a mismatch shows in its own block, at its own place and time, and is then
-        forgotten. The measured table is empty without a linear encoder. Its datum is the mean difference from the twin
-        while the axis moves.
-        """
-        assert digest
-        constants, modes, values, codes, delta, memory = axis
-        c, own, shapes = constants[0], memory[0], shapes_of(modes)
-        command, measured_motor, measured_table = (
-            measured.torque_command,
-            measured.motor_position,
-            measured.table_position_m,
-        )
-        n = command.size
-        motor, table, wanted, torque = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
-        seen = measured_motor * c.ratio if measured_table.size == 0 else measured_table
-        datum, settled, moved = 0.0, 0, 0
-        for k in range(n):
-            motor[k], table[k] = _read(constants, modes, values, codes, delta, memory)
-            inputs = cascade.Inputs(setpoints.position_m[k], setpoints.velocity_m_s[k], measured_motor[k], seen[k])
-            state, outputs = _control_step(gains, state, inputs)
-            wanted[k] = outputs.torque_n_m
-            # rounding of recorded set-points accumulates in the integrator: forget it
-            resumed = state.integral_n_m + c.period / INTEGRATOR_S * (command[k] - wanted[k])
-            state = cascade.State(
-                state.tick,
-                state.velocity_reference_m_s,
-                resumed,
-                state.previous_motor_rad,
-                state.previous2_motor_rad,
-                state.filtered_velocity_rad_s,
-            )
-            error = measured_motor[k] - motor[k]
-            _correct(shapes.motor_impulse, error, c.period, c.observer, delta)
-            if measured_table.size:
-                passed = abs(measured_motor[k] - measured_motor[max(k - 1, 0)])
-                free = passed <= c.slow_velocity * c.period or own.floating > 0.0
-                apart = measured_table[k] - table[k] - c.ratio * error
-                if not free:
-                    moved += 1
-                    datum += (apart - datum) / (moved + min(settled, 1))
-                elif moved == 0 and own.floating == 0.0:
-                    # its first rest is the datum until motion gives a better one; not within a gap
-                    settled += 1
-                    datum += (apart - datum) / settled
-                if free and moved + settled > 0:
-                    error = (measured_table[k] - datum - table[k]) / c.ratio
-                    _correct(shapes.table_impulse, error, c.period, OBSERVER_S, delta)
-            torque[k] = _advance(command[k], constants, modes, values, codes, delta, memory)
-        return motor, table, wanted, torque
-
-    return observe
-
-
-def _build_open_loop(digest: str) -> Any:
-    @njit(cache=True, nogil=True, **COMPILE)
-    def open_loop(torque_in, axis):  # type: ignore[no-untyped-def]
-        """Drive the axis by a given torque command (n,): motor, table, torque, each (n,)."""
-        assert digest
-        constants, modes, values, codes, delta, memory = axis
-        n = torque_in.size
-        motor, table, torque = np.empty(n), np.empty(n), np.empty(n)
-        for k in range(n):
-            motor[k], table[k] = _read(constants, modes, values, codes, delta, memory)
-            torque[k] = _advance(torque_in[k], constants, modes, values, codes, delta, memory)
-        return motor, table, torque
-
-    return open_loop
-
-
-# Bound into each kernel, so that numba's cache knows when a source compiled into it has changed.
-_DIGEST = source_digest()
-closed_loop = _build_closed_loop(_DIGEST)
-observe = _build_observe(_DIGEST)
-open_loop = _build_open_loop(_DIGEST)
+@njit(cache=True, nogil=True, **COMPILE)
+def open_loop(torque_in, axis):  # type: ignore[no-untyped-def]
+    """Drive the axis by a given torque command (n,): motor, table, torque, each (n,)."""
+    constants, modes, values, codes, delta, memory = axis
+    n = torque_in.size
+    motor, table, torque = np.empty(n), np.empty(n), np.empty(n)
+    for k in range(n):
+        motor[k], table[k] = _read(constants, modes, values, codes, delta, memory)
+        torque[k] = _advance(torque_in[k], constants, modes, values, codes, delta, memory)
+    return motor, table, torque

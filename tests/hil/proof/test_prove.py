@@ -18,6 +18,7 @@ from hil.cli import app
 from hil.errors import HilError, InputError
 from hil.files.output import write_json
 from hil.proof.answer.blind import DIAGNOSIS, ERROR
+from hil.proof.code import code_sha256
 from hil.proof.draw.effects import LIBRARY
 from hil.proof.draw.generator import TIERS
 from hil.proof.draw.plan import Planned, plan
@@ -25,7 +26,7 @@ from hil.proof.run import ANSWERS, diagnose_blind, prove, score_others
 from hil.proof.score.page import write_proof
 from hil.proof.score.scores import Scores, score
 from hil.proof.score.tables import PUBLISHED, published
-from hil.proof.seal import CASES, SEAL, SEALED, code_sha256, draw_cases, read_seal, seal, sha256, unseal
+from hil.proof.seal import CASES, SEAL, SEALED, draw_cases, read_seal, seal, sha256, unseal
 from hil.twin.library import BY_ID
 
 SEED, SMALL = 5, 6
@@ -232,6 +233,7 @@ def test_the_blind_process_imports_nothing_that_knows(tmp_path: Path) -> None:
         "hil.proof.answer",
         "hil.proof.answer.blind",
         "hil.proof.answer.worker_pool",
+        "hil.proof.code",
     }
     assert not {
         name

@@ -29,6 +29,28 @@ if __name__ == "__main__":
     list(side_by_side(work, [Path("one"), Path("two")], 2))
 """
 
+THREADS = """
+import os
+from hil.proof.answer.worker_pool import completed, local
+
+def threads(_):
+    from hil.identification.parallel import POOL, THREADS
+    return THREADS, POOL._max_workers
+
+if __name__ == "__main__":
+    jobs = len(os.sched_getaffinity(0))
+    with local(jobs) as workers:
+        print({threads for _, threads in completed(workers, threads, range(2 * jobs))})
+    with local(1) as workers:
+        print([threads[0] - jobs for _, threads in completed(workers, threads, [0])])
+"""
+
+
+def test_a_process_has_as_many_threads_as_cores(tmp_path: Path) -> None:
+    (tmp_path / "threads.py").write_text(THREADS, encoding="utf-8")
+    ran = subprocess.run([sys.executable, "threads.py"], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert ran.stdout.splitlines() == ["{(1, 1)}", "[0]"], ran.stderr
+
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL, signal.SIGINT])
 def test_workers_end_with_the_process_that_they_work_for(number: signal.Signals, tmp_path: Path) -> None:

@@ -1,0 +1,72 @@
+"""hil warm-up, and the same before the first command that needs compiled kernels."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from hil.report.console import out, progress
+
+_PROFILE = {
+    "schema_version": 1,
+    "limits": {"velocity_m_s": 0.1, "acceleration_m_s2": 1.0, "jerk_m_s3": 100.0},
+    "segments": [
+        {"kind": "dwell", "duration_s": 0.1},
+        {"kind": "sine_squared", "to_m": 0.01, "feed_m_s": 0.05},
+        {"kind": "dwell", "duration_s": 0.1},
+    ],
+}
+
+
+def warm_up() -> None:
+    """Compile all kernels now, so that no later command has to; for images and services."""
+    compile_kernels()
+    out.print(f"All kernels are compiled in {_folder()}", markup=False)
+
+
+def compile_kernels() -> None:
+    """Compile all kernels if they are not compiled yet, with a progress bar; raises HilError without a cache folder."""
+    mark, versions = _folder() / "compiled.txt", _versions()
+    if mark.exists() and mark.read_text(encoding="utf-8") == versions:
+        return
+    with progress() as tell:
+        task = "compiling kernels, once after the installation: about a minute"
+        tell(task, 0.0)
+        # imported late: the kernels are built by the first imports
+        from hil.api import simulate
+        from hil.bench.bench_file import load_bench
+        from hil.control import cascade
+        from hil.motion.profile import Profile
+        from hil.motion.trajectory import plan
+
+        bench = load_bench("reference")
+        motion = plan(Profile.model_validate(_PROFILE), bench.period_s)
+        recording = simulate(bench, motion)
+        tell(task, 0.5)
+        bench.twin().simulate(motion.position_m, motion.velocity_m_s)  # read-only, of which numba makes another kernel
+        tell(task, 0.65)
+        setpoints = (recording["position_command_m"], recording["velocity_command_m_s"])
+        measured = bench.twin().simulate(*setpoints)
+        tell(task, 0.8)
+        bench.twin().observe(*setpoints, measured)
+        tell(task, 0.9)
+        cascade.replay(bench.gains, cascade.init(0.0), *setpoints, measured.motor_position, measured.table_position_m)
+        bench.twin().drive(measured.torque_command)
+        tell(task, 1.0)
+    mark.write_text(versions, encoding="utf-8")
+
+
+def _folder() -> Path:
+    from hil.compiled.kernel_cache import provide_kernel_cache
+
+    return provide_kernel_cache()
+
+
+def _versions() -> str:
+    """All but the sources that numba compares: itself, Python and the processor."""
+    import sys
+    from importlib.metadata import version
+
+    from llvmlite.binding import get_host_cpu_features, get_host_cpu_name
+
+    processor = f"{get_host_cpu_name()} {get_host_cpu_features().flatten()}"
+    return f"numba {version('numba')}, {sys.implementation.cache_tag}, {processor}\n"

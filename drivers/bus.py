@@ -1,7 +1,7 @@
-"""CAN ports: what drives, encoders and simulated nodes send and listen on, and how a real one is opened.
+"""CAN ports of drives, encoders and simulated nodes, and opening of a python-can bus.
 
 Every port, simulated or real, does four things: `listen` to a COB-ID, `send` a frame, `poll` for what has arrived, and
-report its `health`. Time is handed in; nothing here reads a clock. `PythonCanPort` stands on any python-can bus
+report its `health`. The caller passes the time. `PythonCanPort` stands on any python-can bus
 (socketcan, virtual, udp_multicast); the in-process bus of `drivers.inprocess` offers the same without threads.
 
 Error frames are counted and decoded here, since the canopen package drops them and a bus-off would stay invisible.
@@ -168,9 +168,9 @@ class PythonCanPort:
 
 
 class PumpedPort:
-    """A port whose far end lives in this thread: `poll` first lets the simulated nodes serve theirs.
+    """Port of a loop that shares its thread with the simulated nodes: `poll` first polls the ports of the nodes.
 
-    So a loop and its simulated nodes share a python-can bus without a second Python thread, in any time.
+    Loop and nodes need no second Python thread, in virtual and in wall-clock time.
     """
 
     __slots__ = ("_nodes", "_port", "health", "ignore", "listen", "send")

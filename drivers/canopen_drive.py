@@ -1,8 +1,8 @@
-"""A CiA 402 drive as the loop sees it: set up by SDO and read back, then one RPDO and one TPDO a cycle.
+"""Driver of a CiA 402 drive: configured by SDO with read-back, then one RPDO and one TPDO per cycle.
 
 RPDO1 carries controlword and target of the mode, TPDO1 statusword, position and torque; both packed by `struct`.
-Faults are bits of `DriveSample.condition`. A condition that forbids motion sets the goal to QUICK_STOP and stays until
-`reset_fault`; `check` raises it with its text.
+Faults are bits of `DriveSample.condition`. A condition of TRIPPING sets the goal to QUICK_STOP and is kept until
+`reset_fault`; `check` raises it as DriveFault.
 """
 
 from typing import Final
@@ -35,12 +35,12 @@ from drivers.port import Condition, Drive, DriveFault, DriveGoal, DriveSample
 
 __all__ = ["TRIPPING", "CanopenDrive", "DriveInfo", "DriveSettings", "HomingRun", "HomingSettings"]
 
-# Conditions under which the loop must not go on moving the axis.
+# Conditions that stop the axis.
 TRIPPING: Final = (
     Condition.STALE | Condition.HEARTBEAT_LOST | Condition.EMERGENCY | Condition.FAULT | Condition.DISABLED
     | Condition.BUS_OFF | Condition.NOT_OPERATIONAL
 )  # fmt: skip
-# Bound once: looking a member up in its enumeration costs the loop.
+# Bound once: a look-up of an enumeration member takes time in the loop.
 _OK, _ENABLED_STATE, _ENABLED = Condition.OK, DriveState.OPERATION_ENABLED, DriveGoal.ENABLED
 _POWERED: Final = (_ENABLED_STATE, DriveState.QUICK_STOP_ACTIVE, DriveState.FAULT_REACTION_ACTIVE)
 _new = tuple.__new__  # makes a named tuple without its Python-level constructor
@@ -145,7 +145,7 @@ class CanopenDrive(CanopenNode, Drive):
     def command(self, now_s: float, setpoint: float) -> None:
         """Send controlword and set-point: N m (CST), rad/s (CSV), rad (CSP).
 
-        Until the drive reports OPERATION ENABLED the target is where it stands (CSP) or zero: enabling never jumps.
+        Until the drive reports OPERATION ENABLED the target is the present position (CSP) or zero.
         """
         state = STATE_BY_STATUS[self._statusword & 0x7F]
         if state is _ENABLED_STATE and self.goal is _ENABLED:
@@ -201,7 +201,7 @@ class CanopenDrive(CanopenNode, Drive):
 
 
 class HomingRun:
-    """A homing run of a drive in OperationMode.HOMING, tick by tick, to a proven stop on the reference.
+    """Homing of a drive in OperationMode.HOMING, tick by tick, until it is at rest with the reference found.
 
     Call `step` with each sample, then `drive.command(now_s, 0.0)`, until `phase` is DONE or FAILED.
 
@@ -215,7 +215,7 @@ class HomingRun:
         self.phase = HomingPhase.READY
 
     def step(self, sample: DriveSample) -> HomingPhase:
-        """Take one sample in; sets or takes back the start bit of the next controlword."""
+        """Process one sample; set or clear the homing-start bit of the next controlword."""
         last, self._last = self._last, sample
         if last is not None and sample.time_s > last.time_s:
             speed = (sample.motor_position_rad - last.motor_position_rad) / (sample.time_s - last.time_s)

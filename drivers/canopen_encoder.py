@@ -1,4 +1,4 @@
-"""A CiA 406 linear encoder as the loop sees it: step and range read by SDO, then one TPDO after each SYNC."""
+"""Driver of a CiA 406 linear encoder: step and range read by SDO, then one TPDO after each SYNC."""
 
 import math
 from dataclasses import dataclass

@@ -1,7 +1,7 @@
 """The master's part of CANopen in the loop: SYNC, its own heartbeat, NMT commands, polling the bus.
 
 SYNC and heartbeat are sent by the loop itself, never by `send_periodic`: on socketcan that runs in the kernel and
-would go on feeding the drive's watchdog after this process hangs.
+would continue to serve the drive's watchdog if this process hangs.
 """
 
 from typing import Final
@@ -51,7 +51,7 @@ class CanopenMaster:
         """Heartbeat when due, then SYNC."""
         if now_s >= self._heartbeat_due_s:
             self._heartbeat_due_s += self.heartbeat_s
-            if self._heartbeat_due_s <= now_s:  # the loop stood still: no burst to catch up
+            if self._heartbeat_due_s <= now_s:  # after a pause of the loop: do not send the missed heartbeats
                 self._heartbeat_due_s = now_s + self.heartbeat_s
             self._send(self._heartbeat_id, _OPERATIONAL, now_s)
         self.syncs += 1

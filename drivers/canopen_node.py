@@ -1,4 +1,4 @@
-"""A CANopen node as its master sees it: EMCY, heartbeat, missed answers and bus state as `Condition` bits."""
+"""Supervision of a CANopen node by its master: EMCY, heartbeat, missed answers and bus state as `Condition` bits."""
 
 import math
 from typing import Final, Protocol
@@ -41,9 +41,9 @@ class CanopenNode:
         master.port.listen(0x700 + settings.node_id, self._on_heartbeat)
 
     def _begin(self) -> None:
-        """Start anew after a set-up: no answer and no heartbeat yet."""
+        """Reset after a set-up: no answer and no heartbeat yet."""
         self._answered = self._set_up_at = self._master.syncs  # number of the SYNC answered last
-        self._latched = 0  # Condition bits; an int, for a flag's truth is tested in Python code
+        self._latched = 0  # Condition bits; an int: the truth test of an IntFlag runs Python code, which is slow
         self._heartbeat_deadline_s = math.inf  # until the first heartbeat
 
     def _on_tpdo(self, can_id: int, data: bytes, now_s: float) -> None:
@@ -59,7 +59,7 @@ class CanopenNode:
 
     def _on_heartbeat(self, can_id: int, data: bytes, now_s: float) -> None:
         if self._answered == self._set_up_at:
-            return  # the loop does not run yet: another state and another time are in order
+            return  # before the first answered SYNC the node may be in another NMT state
         self._heartbeat_deadline_s = now_s + 3 * self.settings.heartbeat_s
         if len(data) == 1 and data[0] & 0x7F != _OPERATIONAL:
             self._latched |= Condition.NOT_OPERATIONAL  # boot-up (0) included: it lost its configuration

@@ -3,15 +3,15 @@
 One tick of a loop at `now_s` (time = tick x period; nothing here reads a clock, and nothing here blocks):
 
     master.sync(now_s)                      # SYNC: every node latches its position and answers; heartbeat when due
-    master.poll(now_s)                      # take in what has arrived; repeat until the samples are fresh
+    master.poll(now_s)                      # process received frames; repeat until age_cycles is 0
     drive_sample = drive.read(now_s)        # motor position and torque of this SYNC
     encoder_sample = encoder.read(now_s)    # table position of this SYNC
     drive.command(now_s, torque_n_m)        # set-point and controlword; acts until the next command
 
 Before it, once and blocking: `drive.set_up()`, `encoder.set_up()`, `master.start(now_s)`. To arm, set
 `drive.goal = DriveGoal.ENABLED` and go on ticking until `sample.enabled`; to disarm set another goal. The samples carry
-a `condition`: anything but `Condition.OK` names what is wrong, in bits; `drive.check()` and `encoder.check()` raise the
-same as an error with the text a person needs.
+a `condition`, whose bits are faults (none: `Condition.OK`); `drive.check()` and `encoder.check()` raise these faults as
+an error with cause and advice.
 
     DriverError                     what, where, given, allowed, advice
     ├── BusError                    the bus cannot be opened, is closed or off
@@ -49,7 +49,7 @@ __all__ = [
 
 
 class DriverError(Exception):
-    """Root of all driver errors: says what, where, what was given, what is allowed and what to do."""
+    """Base of all driver errors; the message gives place, fault, given and allowed values, and advice."""
 
     def __init__(self, what: str, *, where: str, given: str = "", allowed: str = "", advice: str = "") -> None:
         self.what, self.where, self.given, self.allowed, self.advice = what, where, given, allowed, advice
@@ -83,7 +83,7 @@ class ResponseTimeout(DriverError):
 
 
 class Condition(IntFlag):
-    """Faults of a device as seen from the loop; several bits may be set."""
+    """Faults of a device, detected by the loop; several bits may be set."""
 
     OK = 0
     LATE = 1  # no answer to the last SYNC yet: the sample is one or more cycles old
@@ -109,7 +109,7 @@ class DriveGoal(IntEnum):
 
 
 class DriveSample(NamedTuple):
-    """One answer of the drive to one SYNC. A named tuple: made in a third of a frozen dataclass's time.
+    """One answer of the drive to one SYNC. A named tuple is made three times as fast as a frozen dataclass.
 
     motor_position_rad and torque_n_m (linear drives: m and N) were latched at the SYNC sent at `time_s`; torque is the
     mean since the SYNC before. `age_cycles` = 0 means: belongs to the latest SYNC. `state` is the CiA 402 state number
@@ -139,7 +139,7 @@ class EncoderSample(NamedTuple):
 
 
 class Master(Protocol):
-    """Timing of the devices: starts their cyclic operation and asks all of them for one sample a tick."""
+    """Timing of the devices: starts their cyclic operation and requests one sample per tick from all of them."""
 
     @abstractmethod
     def start(self, now_s: float) -> None:
@@ -152,7 +152,7 @@ class Master(Protocol):
     @property
     @abstractmethod
     def poll(self) -> Callable[..., None]:
-        """Function (now_s, timeout_s = 0) that takes in what has arrived. A property: a bus may bind its own."""
+        """Function (now_s, timeout_s = 0) that processes received frames. A property: a bus supplies its own."""
 
 
 class Drive(Protocol):

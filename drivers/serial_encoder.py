@@ -29,7 +29,7 @@ class SerialSettings:
     step_m: float = 0.5e-6
     reversed: bool = False
     bits: int = 64  # width of the device's counter, for its wrap-around (binary)
-    latency_s: float = 0.0  # from the instant of measuring to the arrival; taken off the time stamp
+    latency_s: float = 0.0  # from the measurement to the arrival; subtracted from the time stamp
     missed_reads_allowed: int = 10  # reads in a row without a new position before it counts as stale
 
 
@@ -66,7 +66,7 @@ class SerialEncoder(Encoder):
         """Do nothing: the line is open and the device sends by itself."""
 
     def read(self, now_s: float) -> EncoderSample:
-        """Take in what has arrived; the newest position, and what is wrong. Never raises, never waits."""
+        """Process received bytes; return the newest position with its fault bits. Never raises, never waits."""
         readings = self._parser.feed(self._receive())
         self._age += 1
         alarm = False
@@ -113,7 +113,7 @@ class SerialEncoder(Encoder):
         self._sequence = reading.sequence
 
     def _receive(self) -> bytes:
-        """All bytes waiting. A vanished line raises with some drivers and reads b"" for ever with others."""
+        """Return all received bytes. After the line is unplugged some drivers raise, others return b"" without end."""
         if self._line_lost:
             return b""
         try:

@@ -43,7 +43,7 @@ class Reading(NamedTuple):
 
 
 class Parser(Protocol):
-    """Bytes in, readings out; counts what it had to throw away."""
+    """Parser from bytes to readings; counts errors and discarded bytes."""
 
     errors: int
     discarded_bytes: int
@@ -63,7 +63,7 @@ def encode_line(position_m: float) -> bytes:
 
 
 class BinaryParser:
-    """errors: frames with a wrong CRC; discarded_bytes: everything that was in no valid frame."""
+    """errors: frames with a wrong CRC; discarded_bytes: bytes outside valid frames."""
 
     def __init__(self) -> None:
         self.errors = 0
@@ -71,7 +71,7 @@ class BinaryParser:
         self._buffer = bytearray()
 
     def feed(self, data: bytes) -> list[Reading]:
-        """Readings completed by these bytes. After a wrong CRC the search goes on one byte later, not one frame."""
+        """Readings completed by these bytes. After a wrong CRC the search continues at the next byte."""
         buffer = self._buffer
         buffer += data
         readings: list[Reading] = []
@@ -99,7 +99,7 @@ class BinaryParser:
 
 
 class AsciiParser:
-    """errors: lines that are no read-out; discarded_bytes: their bytes. The first line may be cut off: not an error."""
+    """errors: lines that are no read-out, except a cut first one. discarded_bytes: theirs."""
 
     def __init__(self) -> None:
         self.errors = 0
@@ -115,7 +115,7 @@ class AsciiParser:
         for line in lines:
             match = _LINE.fullmatch(line)
             if match is None or not self._synchronised:
-                # What precedes the first line feed may be the tail of a number: 12.3456 cut to 2.3456 looks right.
+                # Before the first line feed a number may lack its first digits and still be valid (12.3456 -> 2.3456).
                 self.errors += self._synchronised and bool(line.strip())
                 self.discarded_bytes += len(line) + 1
                 self._synchronised = True

@@ -53,11 +53,10 @@ def simulate(bench: Bench, trajectory: Trajectory, *, seed: int | None = None, n
     names of its channels. Raises FieldError for another period or parameters that cannot be simulated, HilError if the
     axis is stopped before the end, for example by a following error.
     """
-    from hil.bench.hardware import DriveSection, EncoderConnection, SimulationSection
     from hil.loop.clock import VirtualClock
     from hil.loop.devices import Rig
     from hil.loop.session import Session, make_cycle
-    from hil.loop.simulated_bench import make_plant
+    from hil.loop.simulated_bench import make_plant, simulated_copy
     from hil.loop.supervision import Ending
     from hil.loop.virtual import compiled_ticks
     from hil.motion.pieces import MotionLimits
@@ -69,16 +68,7 @@ def simulate(bench: Bench, trajectory: Trajectory, *, seed: int | None = None, n
             f"given a trajectory with {trajectory.period_s:g} s, allowed {bench.period_s:g} s, the period of the bench "
             f"{bench.name}; plan it with bench.period_s",
         )
-    drive = (bench.drive or DriveSection()).model_copy(
-        update={
-            "protocol": "canopen",
-            "interface": "inprocess",
-            "encoder": EncoderConnection(),
-            "eds": None,
-            "serial_number": None,
-        }
-    )
-    bench = bench.model_copy(update={"drive": drive, "simulation": bench.simulation or SimulationSection()})
+    bench = simulated_copy(bench)
     plant = make_plant(bench, seed)
     plant.reset(float(trajectory.position_m[0]))
     # a stop needs limits: the largest set-points of the trajectory, of which those at rest are 0

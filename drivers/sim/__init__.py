@@ -1,1 +1,1 @@
-"""The simulated reality behind the drivers: CANopen nodes, serial line, and the plant they move."""
+"""Simulated devices for the drivers: CANopen nodes, a serial line, and the axis (plant) that they move."""

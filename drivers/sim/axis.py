@@ -1,6 +1,6 @@
-"""Truth about a simulated axis: lumped masses, springs and friction of a ball-screw chain.
+"""True parameters of a simulated axis: lumped masses, springs and friction of a ball-screw chain.
 
-Every coordinate is kept as translation at the table: y = r theta for a rotary one (r = lead / 2 pi),
+Every coordinate is a translation at the table: y = r theta for a rotary one (r = lead / 2 pi),
 hence J becomes J / r^2 [kg] and a torsional stiffness k_t / r^2 [N/m].
 """
 
@@ -19,7 +19,7 @@ MAX_MASSES = 24
 class Spring:
     """Linear spring between masses `first` and `second` (or GROUND).
 
-    `on_screw`: the stiffness depends on where the nut stands (effect position_dependent_stiffness).
+    `on_screw`: the stiffness depends on the position of the nut (effect position_dependent_stiffness).
     """
 
     stiffness_n_m: float
@@ -134,7 +134,7 @@ def two_mass(
     coulomb_torque_n_m: float = 1.1,
     viscous_torque_n_m_s_rad: float = 0.0064,
 ) -> AxisTruth:
-    """Eq. 1 of the source paper: motor and table, one spring between; the nut is that spring."""
+    """Eq. 1 of the source paper: motor and table, joined by one spring, which is the nut."""
     return AxisTruth(
         (motor_mass_kg, table_mass_kg), (), Nut(stiffness_n_m, 0, 1), lead_m,
         coulomb_torque_n_m, viscous_torque_n_m_s_rad, damping_ratio,

@@ -1,8 +1,8 @@
 """A simulated CANopen node (CiA 301): NMT, boot-up, heartbeat both ways, SDO server, EMCY, SYNC-driven PDOs.
 
-What kind of device it is, a subclass says: `process_sync` moves and measures, `process_rpdo` takes commands,
-`communication_lost` reacts to a silent master. Time comes with the frames; the node reads no clock. Its timers run with
-the SYNCs; where none come, somebody calls `tick`.
+A subclass is the device: `process_sync` moves and measures, `process_rpdo` takes commands, `communication_lost` reacts
+to the missing heartbeat of the master. The node reads no clock: each frame carries its time. SYNCs drive its timers; on
+a bus without SYNC the caller calls `tick`.
 """
 
 import struct
@@ -59,7 +59,7 @@ class SimulatedDevice:
         self._heartbeat_due_s = 0.0
         self._timer_s = 0.0
         self._last_s = 0.0
-        self.mute = False  # fault injection: the node computes on but sends nothing
+        self.mute = False  # fault injection: the node continues to compute but sends nothing
         self.dictionary.on_write(Index.CONSUMER_HEARTBEAT_TIME, self._on_consumer_written)
         self.dictionary.on_write(Index.PRODUCER_HEARTBEAT_TIME, self._on_producer_written)
         port.listen(0x000, self._on_nmt)
@@ -73,10 +73,10 @@ class SimulatedDevice:
         """Move and measure: called at every SYNC, before the TPDOs are packed."""
 
     def process_rpdo(self, now_s: float) -> None:
-        """New set-points lie in `values`."""
+        """Take new set-points from `values`, after an RPDO."""
 
     def communication_lost(self, now_s: float) -> None:
-        """A consumed heartbeat timed out."""
+        """React to the time-out of a consumed heartbeat."""
 
     # -- NMT, boot-up, timers ---------------------------------------------------------------------------------------
 
@@ -92,7 +92,7 @@ class SimulatedDevice:
         self.pdo.configure(operational=state is NmtState.OPERATIONAL)
 
     def reset(self, now_s: float) -> None:
-        """Power cycle: dictionary as delivered, boot-up."""
+        """Power cycle: set the dictionary to the defaults of the EDS and boot."""
         self.dictionary.reset(0x1000, 0xFFFF)
         self._boot(now_s)
 
@@ -113,8 +113,8 @@ class SimulatedDevice:
             self._boot(now_s)
 
     def tick(self, now_s: float) -> None:
-        """Heartbeat producer and consumers; cheap when nothing is due."""
-        if now_s < self._last_s:  # the time base was set anew: timers start over
+        """Heartbeat producer and consumers; returns quickly if nothing is due."""
+        if now_s < self._last_s:  # the time base was reset: restart the timers
             self._consumed = dict.fromkeys(self._consumed, now_s + self._consumer_time_s())
             self._heartbeat_due_s = now_s
         self._last_s = now_s
@@ -158,7 +158,7 @@ class SimulatedDevice:
     def _on_heartbeat(self, can_id: int, data: bytes, now_s: float) -> None:
         deadline_s = now_s + self._consumer_time_s()
         self._consumed[can_id - 0x700] = deadline_s
-        self._timer_s = min(self._timer_s, deadline_s)  # too early is harmless: `tick` finds nothing due
+        self._timer_s = min(self._timer_s, deadline_s)  # if this is too early, `tick` finds nothing due
 
     # -- SDO, SYNC, EMCY --------------------------------------------------------------------------------------------
 

@@ -1,4 +1,4 @@
-"""Motion inside a simulated drive: its loops on the plant, stop ramps, homing runs as pure steps."""
+"""Motion inside a simulated drive: its control loops on the plant, stop ramps, and homing step by step."""
 
 import math
 from dataclasses import dataclass, replace
@@ -17,7 +17,7 @@ def ramp(velocity: float, wanted: float, acceleration: float, period_s: float) -
 
 
 class DriveLoops:
-    """servo None: the drive has no loops of its own; whatever it should follow, its motor coasts."""
+    """Control loops and stop ramp of the drive. servo None: no loops; the torque is zero and the motor coasts."""
 
     def __init__(self, plant: PlantLike, servo: ServoLike | None) -> None:
         self._plant, self._servo = plant, servo
@@ -29,13 +29,13 @@ class DriveLoops:
         return self._servo is not None
 
     def start(self, velocity_rad_s: float) -> None:
-        """Begin to follow, from where the motor is and, if it is to stop, from its velocity."""
+        """Reset the loops at the present motor position, and the stop ramp at this velocity."""
         self._velocity_rad_s = velocity_rad_s
         if self._servo is not None:
             self._servo.reset(self._plant.motor_position_rad)
 
     def stop_target(self, deceleration_rad_s2: float, velocity_rad_s: float, period_s: float) -> ServoTarget | None:
-        """Next point of the stop ramp; None when the motor rests, or cannot be braked."""
+        """Next point of the stop ramp; None if the motor is at rest or there is no servo to brake it."""
         self._velocity_rad_s = ramp(self._velocity_rad_s, 0.0, deceleration_rad_s2, period_s)
         resting = self._velocity_rad_s == 0.0 and abs(velocity_rad_s) < _AT_REST_RAD_S
         return None if resting or self._servo is None else ServoTarget(self._velocity_rad_s)
@@ -64,14 +64,14 @@ class HomingMethod(IntEnum):
 
     INDEX_NEGATIVE = 33  # next index pulse in negative direction
     INDEX_POSITIVE = 34  # next index pulse in positive direction
-    CURRENT_POSITION = 37  # where it stands
+    CURRENT_POSITION = 37  # the present position
 
 
 @dataclass(frozen=True, slots=True)
 class Homing:
-    """A homing run; counts as the motor encoder counts them. Index pulses lie at multiples of counts_per_rev.
+    """A homing run in counts of the motor encoder. Index pulses lie at multiples of counts_per_rev.
 
-    attained: the reference is found (bit 12); done: and the axis is at rest (bit 10).
+    attained: the reference is found (bit 12); done: the axis is also at rest (bit 10).
     """
 
     method: HomingMethod
@@ -86,7 +86,7 @@ class Homing:
 
 
 def step_homing(run: Homing, counts: int, previous_counts: int, period_s: float) -> Homing:
-    """One cycle: from the encoder's counts to the velocity to follow. The first cycle reports "in progress"."""
+    """Advance homing by one cycle: encoder counts in, velocity target out. The first cycle reports "in progress"."""
     if run.done:
         return run
     if not run.started:

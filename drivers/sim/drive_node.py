@@ -1,8 +1,8 @@
-"""Simulated servo drive on CANopen: CiA 402 states, CST, CSV, CSP, homing, quick stop, faults; a plant behind it.
+"""Simulated servo drive on CANopen: CiA 402 states, CST, CSV, CSP, homing, quick stop, faults. It moves a plant.
 
-The node keeps no time of its own: each SYNC moves the plant by one period with the torque in force since the SYNC
-before, then the positions and torques of that instant go out. A torque that arrives by an event-driven RPDO after
-SYNC k thus acts from SYNC k to k + 1, one by a synchronous RPDO (type 1) from SYNC k + 1 on, as CiA 301 says.
+The node reads no clock: each SYNC moves the plant by one period with the torque in force since the SYNC before, then
+the node sends the positions and torques of that instant. A torque that arrives by an event-driven RPDO after
+SYNC k thus acts from SYNC k to k + 1, one by a synchronous RPDO (type 1) from SYNC k + 1 on, as CiA 301 requires.
 """
 
 import math
@@ -35,7 +35,7 @@ _ERROR_CODE, _QUICK_STOP_DECELERATION = key_of(Index.ERROR_CODE), key_of(Index.Q
 _FOLLOWING_ERROR, _FOLLOWING_ERROR_WINDOW = key_of(Index.FOLLOWING_ERROR_ACTUAL), key_of(Index.FOLLOWING_ERROR_WINDOW)
 
 _SERVO_MODES = (OperationMode.HOMING, OperationMode.CYCLIC_SYNC_POSITION, OperationMode.CYCLIC_SYNC_VELOCITY)
-_SWITCHED_ON = DriveState.SWITCHED_ON  # bound once: looking a member up costs the loop
+_SWITCHED_ON = DriveState.SWITCHED_ON  # bound once: a look-up of an enumeration member takes time in the loop
 _STOPPING = (DriveState.QUICK_STOP_ACTIVE, DriveState.FAULT_REACTION_ACTIVE)
 _FOLLOWING_ERROR_CODE = 0x8611  # CiA 402-2
 
@@ -152,15 +152,16 @@ class SimulatedDrive(SimulatedDevice):
             self._status(0)
 
     def trip(self, code: int, register: int, now_s: float, *, lasting: bool = False) -> None:
-        """A fault inside the drive: EMCY, stop ramp, FAULT (transitions 13, 14). lasting: a reset does not clear it
-        until `clear_cause`."""
+        """Trip by a fault inside the drive: EMCY, stop ramp, FAULT (transitions 13, 14).
+
+        lasting: a reset clears the fault only after `clear_cause`."""
         self._fault_present = lasting
         self.values[_ERROR_CODE] = code
         self.emergency(code, register, now_s)
         self._react(DriveState.FAULT_REACTION_ACTIVE)
 
     def clear_cause(self) -> None:
-        """The cause of a lasting fault is gone."""
+        """Remove the cause of a lasting fault."""
         self._fault_present = False
 
     def communication_lost(self, now_s: float) -> None:
@@ -237,7 +238,7 @@ class SimulatedDrive(SimulatedDevice):
         values[_POSITION] = ((counts - self._offset_counts + 0x80000000) & 0xFFFFFFFF) - 0x80000000
 
     def _advance_by_loops(self, now_s: float) -> float:
-        """One period under the loops inside the drive: CSV, CSP, homing, stop ramps; mean measured torque [N m]."""
+        """Advance one period under the loops inside the drive: CSV, CSP, homing, stops; mean measured torque [N m]."""
         loops, values = self._loops, self.values
         mode, target = values[_MODE], ServoTarget(0.0)
         if self.state in _STOPPING:
@@ -260,7 +261,7 @@ class SimulatedDrive(SimulatedDevice):
         values = self.values
         moved = _wrap(values[_TARGET_POSITION] - self._last_target)
         self._last_target = values[_TARGET_POSITION]
-        error = _wrap(values[_TARGET_POSITION] - values[_POSITION])  # both wrap: only the difference counts
+        error = _wrap(values[_TARGET_POSITION] - values[_POSITION])  # both wrap; their wrapped difference is the error
         values[_FOLLOWING_ERROR] = error
         if abs(error) > values[_FOLLOWING_ERROR_WINDOW]:
             self.trip(_FOLLOWING_ERROR_CODE, 0x21, now_s)

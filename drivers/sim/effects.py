@@ -1,9 +1,9 @@
-"""Catalogue of what a simulated axis can conceal: ids, parameters, units, allowed ranges, forms.
+"""Catalogue of the effects of a simulated axis: ids, parameters, units, allowed ranges, forms.
 
-CATALOGUE is what the diagnosis has names for, NOVEL what it has not, EFFECTS both.
+CATALOGUE: effects that the library of the diagnosis contains. NOVEL: effects that it lacks. EFFECTS: both.
 
-On a linear axis read N for n_m, m for rad, N s/m for n_m_s_rad; angles of the screw stay angles.
-The equations stand in contact.py (friction, nut), drive_path.py, sensors.py and kernel.py (table).
+On a linear axis n_m means N, rad means m, n_m_s_rad means N s/m; angles of the screw stay angles.
+Equations: contact.py (friction, nut), drive_path.py, sensors.py and kernel.py (table).
 """
 
 from collections.abc import Mapping, Sequence
@@ -147,7 +147,7 @@ EFFECTS: Mapping[str, Definition] = MappingProxyType({**CATALOGUE, **NOVEL})
 
 @dataclass(frozen=True)
 class Effect:
-    """One concealed piece of physics. Raises ValueError for an unknown id, parameter or form, a missing
+    """One effect with its parameters. Raises ValueError for an unknown id, parameter or form, a missing
     parameter, or a value out of range; the message lists what is allowed."""
 
     id: str

@@ -1,4 +1,4 @@
-"""The simulated drive and encoder as a process of their own on a python-can bus, in wall-clock time.
+"""Run the simulated drive and encoder in a separate process on a python-can bus, in wall-clock time.
 
 python -m drivers.sim.node --bus udp_multicast --channel 239.74.163.2
 """
@@ -16,11 +16,11 @@ from drivers.sim.encoder_node import SimulatedEncoder
 from drivers.sim.plant import Plant
 from drivers.sim.servo import DriveServo, Servo
 
-_WAIT_S = 0.005  # longest sleep between two looks at the timers
+_WAIT_S = 0.005  # longest wait between two checks of the timers
 
 
 def serve(port: CanPort, nodes: Sequence[SimulatedDevice], stop: threading.Event) -> None:
-    """Let the nodes on this port answer until `stop` is set."""
+    """Serve the nodes on this port until `stop` is set."""
     start_s = time.monotonic()
     while not stop.is_set():
         port.poll(time.monotonic() - start_s, _WAIT_S)
@@ -29,7 +29,7 @@ def serve(port: CanPort, nodes: Sequence[SimulatedDevice], stop: threading.Event
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Reference axis behind node 5 (drive) and node 6 (linear encoder), until interrupted."""
+    """Simulate the reference axis with a drive (node 5) and a linear encoder (node 6) until interrupted."""
     parser = argparse.ArgumentParser(prog="python -m drivers.sim.node", description=main.__doc__)
     parser.add_argument("--bus", default="udp_multicast", choices=BusConfig.INTERFACES)
     parser.add_argument("--channel", default="239.74.163.2", help="as python-can names it")

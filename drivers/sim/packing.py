@@ -1,4 +1,4 @@
-"""Turns axis, sensors and effects into the parameter record of the kernels."""
+"""Pack axis, sensors and effects into the parameter record of the kernels."""
 
 from collections.abc import Mapping
 from math import pi, sqrt
@@ -32,7 +32,10 @@ LARGEST_PHASE_STEP = 1.5  # omega h; leapfrog is stable below 2, less with dampi
 
 
 def pack(axis: AxisTruth, sensors: Sensors, effects: Mapping[str, Effect], step_s: float) -> NDArray[np.void]:
-    """Array of one PARAMETERS record. Raises ValueError: an effect the axis cannot have, a step too long."""
+    """Return an array of one PARAMETERS record.
+
+    Raises ValueError for an effect that the axis cannot have or a step that is too long.
+    """
     _check_effects(axis, effects)
     packed = one(PARAMETERS)
     p: Any = packed[0]
@@ -149,7 +152,7 @@ def _pack_sensors(p: Any, axis: AxisTruth, sensors: Sensors) -> None:
 
 
 def _pack_bristles(p: Any, axis: AxisTruth, effect: Effect | None) -> float:
-    """Bristle damping of LuGre; returns the bristle stiffness in N/m as translation."""
+    """Set the bristle damping of LuGre; return the bristle stiffness [N/m] as translation at the table."""
     if effect is None:
         return 0.0
     stiffness, given = effect.parameters["stiffness_n_m_rad"], effect.parameters["damping_n_m_s_rad"]
@@ -159,7 +162,7 @@ def _pack_bristles(p: Any, axis: AxisTruth, effect: Effect | None) -> float:
 
 
 def _check_step(p: Any, step_s: float, bristle_stiffness: float) -> None:
-    """Raise ValueError when the fastest mode turns by too much in one step."""
+    """Raise ValueError if the phase of the fastest mode advances by more than LARGEST_PHASE_STEP [rad] per step."""
     count = int(p["masses"])
     stiffness = np.zeros((count, count))
     stiffness[0, 0] = bristle_stiffness

@@ -1,4 +1,4 @@
-"""The simulated reality of a servo axis: axis, sensors and concealed effects, moved in time."""
+"""Simulated servo axis: chain of masses, sensors and effects, advanced in time."""
 
 from collections.abc import Sequence
 from math import ceil, isfinite
@@ -16,11 +16,11 @@ from drivers.sim.sensors import Sensors
 
 
 class Plant:
-    """One axis with its sensors, stepped on internal steps of `step_s`.
+    """One axis with its sensors, integrated in internal steps of `step_s`.
 
     After advance(): motor_position_rad, table_position_m and torque_n_m are what the devices report, torque being the
     mean of the measured current (x nominal torque constant) over that period. A linear axis reports m and N.
-    Raises ValueError when an effect needs what the axis has not, or the step is too long to be stable.
+    Raises ValueError for an effect that the axis cannot have, or a step too long for stability.
     """
 
     motor_position_rad: float
@@ -48,7 +48,7 @@ class Plant:
         self.reset()
 
     def reset(self, position_m: float = 0.0) -> None:
-        """At rest, unloaded, at time 0, where the motor encoder reads `position_m` (as translation at the table)."""
+        """Set the axis to rest without load at time 0; the motor encoder reads `position_m` (table motion)."""
         s, count, nut = self.state[0], len(self.axis.mass_kg), self.axis.nut
         self.state[:] = np.zeros(1, STATE)
         s["random"] = np.random.SeedSequence(self.seed).generate_state(1, np.uint64)[0]

@@ -92,7 +92,7 @@ class ProcessData:
         words = [self._dictionary.number(index, k) for k in range(1, count + 1)]
         return [self._dictionary.item(word >> 16, word >> 8 & 0xFF) for word in words]
 
-    # -- hooks: what CiA 301 lets a master write --------------------------------------------------------------------
+    # -- hooks: writes that CiA 301 allows a master -----------------------------------------------------------------
 
     def _on_communication(self, index: int, subindex: int, value: int) -> None:
         if subindex == 2 and 240 < value < 254:
@@ -120,7 +120,7 @@ class ProcessData:
     # -- in the loop ------------------------------------------------------------------------------------------------
 
     def _taker(self, pdo: _Pdo) -> Listener:
-        """Listener of one RPDO; everything it needs is bound once."""
+        """Return the listener of one RPDO. Its objects are looked up here, not for each frame."""
         update, keys, unpack, size = self._values.update, pdo.keys, pdo.packer.unpack, pdo.packer.size
         received, waits = self._received, pdo.transmission_type <= 240
 
@@ -133,13 +133,13 @@ class ProcessData:
             if waits:
                 pdo.pending = data
                 return
-            update(zip(keys, unpack(data)))  # noqa: B905  as many values as keys, by the packer's making
+            update(zip(keys, unpack(data)))  # noqa: B905  the packer has one value for each key
             received(now_s)
 
         return take
 
     def on_sync(self, now_s: float) -> None:
-        """Synchronous RPDOs act now; the TPDOs that are due go out."""
+        """Apply the synchronous RPDOs, then send the TPDOs that are due."""
         for pdo in self._synchronous:
             if pdo.pending:
                 self._values.update(zip(pdo.keys, pdo.packer.unpack(pdo.pending), strict=True))

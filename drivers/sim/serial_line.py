@@ -1,7 +1,7 @@
-"""A serial encoder behind a pseudo-terminal: a plant's table position as binary frames or ASCII read-outs.
+"""Simulated serial encoder on a pseudo-terminal: table position of a plant as binary frames or ASCII read-outs.
 
-Nothing is sent by itself: `send` puts out the position of this instant, at whatever time the caller keeps. Garbage and
-cut frames can be put on the line, and the line can be taken away.
+The caller sends each position with `send`. For fault injection, `put` sends any bytes (garbage, cut frames) and
+`vanish` removes the line.
 """
 
 import os
@@ -13,7 +13,7 @@ from drivers.serial_frames import encode_frame, encode_line
 
 
 class SimulatedSerialEncoder:
-    """`device` is what a `SerialEncoder` opens."""
+    """Serial encoder on `device`, the path for a `SerialEncoder` to open."""
 
     def __init__(
         self, plant: PlantLike, *, step_m: float = 0.5e-6, format: SerialFormat = SerialFormat.BINARY, bits: int = 64
@@ -44,7 +44,7 @@ class SimulatedSerialEncoder:
         return encode_frame(counts, self._sequence, status, elapsed_us)
 
     def put(self, data: bytes) -> None:
-        """Send any bytes; those that find the line full are lost, as on a real one."""
+        """Send any bytes; they are lost if the buffer of the line is full."""
         try:
             os.write(self._master, data)
         except BlockingIOError:

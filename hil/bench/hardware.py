@@ -24,7 +24,7 @@ class DriveMode(StrEnum):
 
 
 class EncoderConnection(_Model):
-    """How the linear encoder is connected; its resolution stands under `encoders`."""
+    """Connection of the linear encoder; its resolution is in the section `encoders`."""
 
     interface: Literal["canopen", "serial", "none"] = "canopen"
     node_id: NodeId = 6

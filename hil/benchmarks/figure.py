@@ -17,7 +17,7 @@ class ReferenceKind(StrEnum):
 
 
 class Reference(NamedTuple):
-    """What a figure is measured beside, in the same run and unit."""
+    """Reference value of a figure, measured in the same run and unit."""
 
     name: str
     kind: ReferenceKind
@@ -48,7 +48,7 @@ class Figure:
         return self.value <= self.target if self.at_most else self.value >= self.target
 
     def times_as_fast(self, other: float) -> float:
-        """How many times as fast this figure is as `other`, a value of the same unit."""
+        """Return the speed relative to `other`, a value of the same unit: 2 is twice as fast."""
         return other / self.value if self.at_most else self.value / other
 
 

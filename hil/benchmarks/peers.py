@@ -1,4 +1,4 @@
-"""The same two-mass axis with friction under the same cascade in other simulators.
+"""Simulate the two-mass axis with friction and its cascade in other simulators.
 
 The elastic axis of the reference bench over the first second of the moves, in closed loop. Continuous solvers get the
 loops in continuous time and friction as Fc tanh(v / vs), as is usual there; MuJoCo gets dry friction as its own

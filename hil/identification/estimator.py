@@ -35,7 +35,7 @@ _AGREES = 0.25  # largest relative error of the predicted gain at which the Jaco
 
 
 class FitStatus(StrEnum):
-    """How a fit ended."""
+    """Ending of a fit."""
 
     NOT_FITTED = "not_fitted"
     CONVERGED = "converged"

@@ -1,7 +1,7 @@
-"""The simulated bench: the `simulation` section of a bench file as a plant with drive and encoder nodes before it.
+"""Build the simulated bench: the `simulation` section of a bench file as plant, drive node and encoder node.
 
-The only place where the project's own description of an axis meets the simulated reality: parameters are handed
-over, no formula is. Import it where a simulated bench is wanted, never from the diagnosis.
+The only module that passes parameters of a bench file to the simulated axis; they share no formula. The diagnosis must
+not import it.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ from drivers.sim.serial_line import SimulatedSerialEncoder
 from drivers.sim.servo import DriveServo, PositionFeedback, Servo, VelocityEstimate
 from hil.bench.axis_models import Axis, OneMass, Rigid, Rotary, RotaryTwoMass, SerialChain, SevenDofAxis, TwoMass
 from hil.bench.bench_file import Bench, bench_path
-from hil.bench.hardware import DriveSection, SimulationSection
+from hil.bench.hardware import DriveSection, EncoderConnection, SimulationSection
 from hil.errors import FieldError
 from hil.files.yaml_model import load_model
 
-RATED_TORQUE_N_M = 4.0  # of the simulated drive, where the bench does not say
+RATED_TORQUE_N_M = 4.0  # of the simulated drive if the bench gives none
 
 
 class _Simulated(Bench):
-    """A bench whose simulated axis can be built: refuses what drivers.sim would, at its field."""
+    """A bench whose simulated axis can be built; validation names the field that drivers.sim refuses."""
 
     @model_validator(mode="after")
     def _can_be_simulated(self) -> _Simulated:
@@ -48,6 +48,13 @@ def load_simulated(source: str | Path) -> Bench:
     path = bench_path(source)
     bench = load_model(path, _Simulated)
     return bench if bench.name else bench.model_copy(update={"name": path.stem})
+
+
+def simulated_copy(bench: Bench) -> Bench:
+    """Return the bench with a simulated CANopen drive and encoder on an in-process bus, without files of devices."""
+    simulated = {"protocol": "canopen", "interface": "inprocess", "encoder": EncoderConnection()}
+    drive = (bench.drive or DriveSection()).model_copy(update=simulated | {"eds": None, "serial_number": None})
+    return bench.model_copy(update={"drive": drive, "simulation": bench.simulation or SimulationSection()})
 
 
 def make_plant(bench: Bench, seed: int | None = None) -> Plant:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from hil.bench.bench_file import Bench, load_bench
 from hil.identification.dataset import Dataset
@@ -116,3 +117,9 @@ def fitted(hypothesis: Hypothesis, runs: Sequence[Measured] | Dataset, evaluatio
     """A hypothesis fitted to runs."""
     data = runs if isinstance(runs, Dataset) else dataset(runs, hypothesis.bench)
     return Estimator(data).fit(hypothesis, evaluations=evaluations)
+
+
+def rows_of(run: Measured, rows: slice | NDArray[np.bool_]) -> Measured:
+    """Return these rows of a recording, as if nothing else had been recorded."""
+    arrays = {field.name: getattr(run, field.name) for field in fields(run)}
+    return replace(run, **{name: value[rows] for name, value in arrays.items() if isinstance(value, np.ndarray)})

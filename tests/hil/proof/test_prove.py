@@ -1,17 +1,15 @@
-"""The proof as it is run: seal, the blind process, going on after an interruption, and a small proof itself."""
+"""The proof as it is run: seal, the blind process and going on after an interruption."""
 
 from __future__ import annotations
 
-import json
 import shutil
 import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
-import numpy as np
 import pytest
+from proof_folders import answer, data, quiet
 from typer.testing import CliRunner
 
 from hil.cli import app
@@ -19,22 +17,16 @@ from hil.errors import HilError, InputError
 from hil.files.output import write_json
 from hil.proof.answer.blind import DIAGNOSIS, ERROR
 from hil.proof.code import code_sha256
-from hil.proof.draw.effects import LIBRARY
 from hil.proof.draw.generator import TIERS
-from hil.proof.draw.plan import Planned, plan
-from hil.proof.run import ANSWERS, diagnose_blind, prove, score_others
+from hil.proof.draw.plan import Planned
+from hil.proof.run import ANSWERS, prove, score_others
 from hil.proof.score.page import write_proof
-from hil.proof.score.scores import Scores, score
+from hil.proof.score.scores import score
 from hil.proof.score.tables import PUBLISHED, published
 from hil.proof.seal import CASES, SEAL, SEALED, draw_cases, read_seal, seal, sha256, unseal
 from hil.twin.library import BY_ID
 
-SEED, SMALL = 5, 6
 QUICK = (Planned("case_0000", "parameters_only", 3), Planned("case_0001", "null", 8))
-
-
-def quiet(*what: object) -> None:
-    """Nobody listens."""
 
 
 @pytest.fixture(scope="module")
@@ -49,16 +41,6 @@ def sealed(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def copy(sealed: Path, tmp_path: Path) -> Path:
     return Path(shutil.copytree(sealed, tmp_path / "copy"))
-
-
-def data(path: Path) -> Any:
-    return json.loads(path.read_text(encoding="utf-8"))
-
-
-def answer(folder: Path, name: str, **more: Any) -> None:
-    """Put an answer there."""
-    (folder / ANSWERS / name).mkdir(parents=True)
-    write_json(folder / ANSWERS / name / DIAGNOSIS, {"verdict": "no_mismatch", "missing": [], **more})
 
 
 def test_a_seal_holds_the_truth_and_every_file(sealed: Path) -> None:
@@ -241,75 +223,3 @@ def test_the_blind_process_imports_nothing_that_knows(tmp_path: Path) -> None:
         if name.startswith("drivers.sim") or name in ("hil.loop.simulated_bench", "hil.loop.run")
     }
     assert data(tmp_path / "answer" / "empty" / ERROR)["kind"] == "InputError"
-
-
-def test_a_case_that_fails_is_an_answer_and_not_tried_again(tmp_path: Path) -> None:
-    for name in ("one", "two"):
-        (tmp_path / CASES / name).mkdir(parents=True)
-        (tmp_path / CASES / name / "bench.yaml").touch()
-    answer(tmp_path, "two")
-    shares: list[float | None] = []
-    names = ["one", "two"]
-    for _ in range(2):
-        diagnose_blind(
-            tmp_path / CASES, tmp_path / ANSWERS, names, code_sha256(), 2, lambda task, share: shares.append(share)
-        )
-    assert shares == [0.5, 1.0]
-    assert "holdout" in data(tmp_path / ANSWERS / "one" / ERROR)["error"]
-    assert not (tmp_path / ANSWERS / "two" / ERROR).exists()
-
-
-def test_a_small_proof(tmp_path: Path) -> None:
-    """Six cases from the draw to the page, with wide margins: one test, since it takes its time."""
-    folder = tmp_path / "small"
-    ran = CliRunner().invoke(app, ["prove", "--cases", str(SMALL), "--seed", str(SEED), "--out", str(folder)])
-    assert ran.exit_code == 0, ran.output
-    assert data(folder / SEAL)["truths_sha256"] in ran.output
-    assert {"report.html", "proof.md", "scores.json"} <= {path.name for path in folder.iterdir()}
-
-    # sealed before anything was diagnosed, and nothing changed since
-    answers = list((folder / ANSWERS).rglob(DIAGNOSIS))
-    assert len(answers) == len(unseal(folder)) == SMALL
-    assert all(path.stat().st_mtime_ns > (folder / SEAL).stat().st_mtime_ns for path in answers)
-
-    cases = data(folder / "scores.json")["cases"]
-    assert len({case["tier"] for case in cases}) == SMALL
-    concealing = [case for case in cases if case["concealed"]]
-    named = [bool({one["effect"] for one in case["concealed"]} & {one["effect"] for one in case["named"]})
-             for case in concealing]  # fmt: skip
-    assert sum(named) >= len(named) / 2
-    assert sum(bool(case["named"]) for case in cases if not case["concealed"]) <= 1
-
-    # the quickest case alone in another folder, without a truth on the machine's way: the same answer
-    quickest = min(cases, key=lambda case: case["runtime_s"])["name"]
-    shutil.copytree(folder / CASES / quickest, tmp_path / "given" / "x")
-    diagnose_blind(tmp_path / "given", tmp_path / ANSWERS, ["x"], code_sha256(), 1, quiet)
-    first, again = data(folder / ANSWERS / quickest / DIAGNOSIS), data(tmp_path / ANSWERS / "x" / DIAGNOSIS)
-    assert (again["verdict"], [found["effect"] for found in again["missing"]]) == (
-        first["verdict"],
-        [found["effect"] for found in first["missing"]],
-    )
-    for name, correction in first["parameter_corrections"].items():
-        assert again["parameter_corrections"][name]["value"] == pytest.approx(correction["value"], rel=1e-6)
-
-
-@pytest.mark.long
-def test_forty_cases(tmp_path: Path) -> None:
-    """Defaults of hil prove, with wide margins."""
-    planned = plan(40, 1)
-    found: Scores = prove(tmp_path, planned, 1, 2, quiet, quiet)
-    measured = {goal.name: goal.value for goal in found.goals}
-    least = {
-        "detected where above the floor": 0.8,
-        "singles: named first": 0.6,
-        "singles: in the set named first": 0.7,
-        "pairs: at least one named": 0.6,
-        "block right": 0.6,
-        "right where confidence ≥ 0.9": 0.6,
-    }
-    assert {name: measured[name] for name, value in least.items() if (measured[name] or 0.0) < value} == {}
-    most = {"nulls: something named": 0.2, "wrong parameters: something named": 0.2, "parameters, median error": 0.1}
-    assert {name: measured[name] for name, value in most.items() if (measured[name] or 0.0) > value} == {}
-    effects = [case.concealed.effect for case in found.of_tier("single") if case.concealed]
-    assert len(set(effects)) == len(effects) <= len(LIBRARY)
-    assert np.all([case.answer.verdict != "error" for case in found.cases])

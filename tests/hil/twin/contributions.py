@@ -12,6 +12,8 @@ RATIO_M = 0.010 / (2.0 * np.pi)
 AT_REST = Moment(0.0, 0.0, PERIOD_S, PERIOD_S / 10, 0.0, 0.0, 0.0, RATIO_M, viscous_speed=160.0)
 PROPERTY = settings(deadline=None, derandomize=True)  # the first call of each contribution compiles it
 
+phases = st.floats(-2.0 * np.pi, 2.0 * np.pi)
+REVOLUTION = np.arange(144) * 2.0 * np.pi / 144  # even steps over one revolution
 moments = st.builds(
     Moment,
     time_s=st.floats(0.0, 1e4),
@@ -51,3 +53,10 @@ def per_tick(effect, commands, steps, parameters, variant=0):
             at = AT_REST._replace(time_s=tick * PERIOD_S + j * step_s, within_s=j * step_s, step_s=step_s)
             means[tick] += BY_ID[effect].variants[variant].contribution(float(command), at, values, memory) / steps
     return means
+
+
+def along(effect, value, *, variant=0, angles=REVOLUTION, **parameters):
+    """Return the contribution at each angle, shape of `angles`."""
+    return np.array(
+        [call(effect, value, AT_REST._replace(angle_rad=angle), variant=variant, **parameters) for angle in angles]
+    )

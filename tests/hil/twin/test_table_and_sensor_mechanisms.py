@@ -1,0 +1,116 @@
+"""Each mechanism of table and sensors has the property that an engineer would check."""
+
+from math import pi
+
+import numpy as np
+import pytest
+from contributions import AT_REST, PERIOD_S, PROPERTY, REVOLUTION, along, call, moments, phases
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hil.twin.library import BY_ID
+
+# -- table
+
+
+@given(share=st.floats(0.0, 1.0), at=moments)
+@PROPERTY
+def test_table_side_friction_is_a_share(share, at) -> None:
+    assert call("table_side_friction", 0.0, at, share=share) == share
+
+
+@given(
+    force=st.floats(-1e3, 1e3),
+    start=st.floats(0.0, 0.02),
+    length=st.floats(0.0, 0.02),
+    step_s=st.sampled_from([1e-3, 2e-4, 3e-5]),
+)
+@PROPERTY
+def test_external_force_has_the_impulse_of_its_window(force, start, length, step_s) -> None:
+    pushes = [
+        call(
+            "external_force",
+            0.0,
+            AT_REST._replace(time_s=k * step_s, step_s=step_s),
+            force_n=force,
+            start_s=start,
+            end_s=start + length,
+        )
+        for k in range(int(0.045 / step_s))
+    ]
+    assert np.sum(pushes) * step_s == pytest.approx(force * length, abs=1e-9)
+    assert np.abs(pushes).max() <= abs(force) * (1.0 + 1e-12)
+
+
+@given(stiffness=st.floats(0.0, 1e5), rest=st.floats(-1.0, 1.0), offset=st.floats(-1.0, 1.0))
+@PROPERTY
+def test_spring_load_pulls_to_rest(stiffness, rest, offset) -> None:
+    force = call(
+        "spring_load",
+        0.0,
+        AT_REST._replace(table_position_m=rest + offset),
+        stiffness_n_m=stiffness,
+        rest_position_m=rest,
+    )
+    assert force == pytest.approx(-stiffness * offset, abs=1e-6)
+
+
+# -- sensors
+
+
+@given(amplitude=st.floats(0.0, 0.01), phase=phases, value=st.floats(-100.0, 100.0))
+@PROPERTY
+def test_encoder_eccentricity_once_per_revolution(amplitude, phase, value) -> None:
+    error = along("encoder_eccentricity", value, amplitude_rad=amplitude, phase_rad=phase) - value
+    harmonic = np.fft.rfft(error) / REVOLUTION.size
+    np.testing.assert_allclose(2.0 * harmonic[1], amplitude * np.exp(1j * (phase - pi / 2)), atol=1e-11)
+    assert np.abs(np.delete(harmonic, 1)).max() < 1e-11
+
+
+@given(amplitude=st.floats(0.0, 1e-5), period=st.floats(1e-5, 1e-3), phase=phases, position=st.floats(-0.5, 0.5))
+@PROPERTY
+def test_scale_interpolation_error_within_its_signal_period(amplitude, period, phase, position) -> None:
+    quarters = [
+        call(
+            "scale_interpolation_error",
+            x,
+            AT_REST._replace(table_position_m=x),
+            amplitude_m=amplitude,
+            period_m=period,
+            phase_rad=phase,
+        )
+        - x
+        for x in position + period * np.arange(5) / 4.0
+    ]
+    assert np.hypot(quarters[0], quarters[1]) == pytest.approx(amplitude, abs=1e-12)
+    np.testing.assert_allclose(
+        [quarters[2], quarters[3], quarters[4]], [-quarters[0], -quarters[1], quarters[0]], atol=1e-12
+    )
+
+
+@given(delay_s=st.floats(-0.01, 0.01), variant=st.integers(0, 2))
+@PROPERTY
+def test_channel_time_skew_delays_the_one_channel(delay_s, variant) -> None:
+    """A parabola is delayed exactly, the mean torque of a period as that of a command held over it; what precedes and
+    follows the record is held."""
+    time_s = np.arange(100) * PERIOD_S
+    channels = tuple(factor * (1.0 + time_s - 3.0 * time_s**2) for factor in (1.0, 2.0, 3.0, 4.0))
+    skewed = BY_ID["channel_time_skew"].variants[variant].contribution(channels, (delay_s,), PERIOD_S)
+    late = {"table_position": 1, "torque": 3, "motor_position": 0}[BY_ID["channel_time_skew"].forms[variant]]
+    for index, (before, after) in enumerate(zip(channels, skewed, strict=True)):
+        assert after.shape == before.shape
+        if index != late:
+            np.testing.assert_array_equal(after, before)
+    moment = time_s - delay_s
+    exact = (late + 1.0) * (1.0 + moment - 3.0 * moment**2)
+    if late == 3:
+        fine = np.repeat(channels[late], 1000)
+        whole = round(delay_s / PERIOD_S * 1000)
+        exact = np.roll(fine, whole).reshape(-1, 1000).mean(axis=1)
+        np.testing.assert_allclose(skewed[late][12:-12], exact[12:-12], atol=4e-5)
+        return
+    np.testing.assert_allclose(skewed[late][12:-12], exact[12:-12], rtol=1e-12)
+    if delay_s > 2.0 * PERIOD_S:
+        assert skewed[late][0] == pytest.approx(channels[late][0])
+    if delay_s < -2.0 * PERIOD_S:
+        assert skewed[late][-1] == pytest.approx(channels[late][-1])

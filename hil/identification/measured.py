@@ -20,7 +20,7 @@ from hil.channels import AxisKind
 from hil.control import cascade
 from hil.errors import InputError
 from hil.identification.noise import Laps, Noise, estimate_noise, find_laps, moving
-from hil.recording.recording import Recording
+from hil.recording.recording import Recording, check_finite
 from hil.twin.axis import Response, Start
 
 Channels = tuple[FloatArray, FloatArray, FloatArray, FloatArray]  # as control.replay takes them
@@ -87,7 +87,7 @@ class Measured:
 def take(recording: Recording, bench: Bench) -> Measured:
     """Take the channels of a recording that the twin of `bench` needs.
 
-    Raises InputError for another kind of axis or period than the bench, a missing channel, or too few rows.
+    Raises InputError for another kind of axis or period than the bench, a missing channel, NaN, infinity, or too few rows.
     """
     names, gains = recording.axis, bench.gains
     if (recording.kind is AxisKind.LINEAR) != bench.axis.linear:
@@ -152,6 +152,7 @@ def bench_of(recording: Recording) -> Bench:
 
 
 def _column(recording: Recording, name: str) -> FloatArray:
+    check_finite({name: recording[name]}, lambda row: f"{recording.name}: row {row}")  # those in memory are unchecked
     return np.ascontiguousarray(recording[name], dtype=np.float64)
 
 

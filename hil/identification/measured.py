@@ -87,7 +87,7 @@ class Measured:
 def take(recording: Recording, bench: Bench) -> Measured:
     """Take the channels of a recording that the twin of `bench` needs.
 
-    Raises InputError for another kind of axis or period than the bench, a missing channel, NaN, infinity, or too few rows.
+    Raises InputError for another kind of axis or period than the bench, a missing channel, NaN, or too few rows.
     """
     names, gains = recording.axis, bench.gains
     if (recording.kind is AxisKind.LINEAR) != bench.axis.linear:

@@ -82,21 +82,9 @@ def main() -> None:
         if end.code == 130:
             print("stopped by ctrl-C", file=sys.stderr)
         raise
-    except Exception as error:
-        code = _exit_code(error)
-        if code is None:
-            raise
+    except HilError as error:
         print(error, file=sys.stderr)
-        sys.exit(code)
-
-
-def _exit_code(error: Exception) -> int | None:
-    """Exit code of an error raised on purpose; None for a defect."""
-    if isinstance(error, HilError):
-        return error.exit_code
-    from drivers.port import DriverError  # only here: the drivers are not light
-
-    return 1 if isinstance(error, DriverError) else None
+        sys.exit(error.exit_code)
 
 
 if __name__ == "__main__":

@@ -21,7 +21,7 @@ from hil.control import cascade
 from hil.errors import InputError
 from hil.identification.completion import completed, position_is_measured, torque_is_measured
 from hil.identification.noise import Laps, Noise, estimate_noise, find_laps, moving, white_noise
-from hil.recording.recording import Recording
+from hil.recording.recording import Recording, check_finite
 from hil.twin.axis import Response, Start
 
 Channels = tuple[FloatArray, FloatArray, FloatArray, FloatArray]  # as control.replay takes them
@@ -90,7 +90,7 @@ class Measured:
 def take(recording: Recording, bench: Bench) -> Measured:
     """Take the channels of a recording that the twin of `bench` needs; without a control law, complete it first.
 
-    Raises InputError for another kind of axis or period than the bench, a missing channel, or too few rows.
+    Raises InputError for another kind of axis or period than the bench, a missing channel, NaN, or too few rows.
     """
     recording, bench = completed(recording, bench), bench.sampled(recording.period_s)
     names, gains = recording.axis, bench.gains
@@ -168,6 +168,7 @@ def bench_of(recording: Recording) -> Bench:
 
 
 def _column(recording: Recording, name: str) -> FloatArray:
+    check_finite({name: recording[name]}, lambda row: f"{recording.name}: row {row}")  # those in memory are unchecked
     return np.ascontiguousarray(recording[name], dtype=np.float64)
 
 

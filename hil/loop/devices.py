@@ -5,7 +5,8 @@ own connection, which the loop polls in its own thread, because a second thread 
 Another protocol is a subclass of `Devices` and one line in `PROTOCOLS`.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -33,6 +34,15 @@ MODES = {
 _TARGET_BYTES = {DriveMode.CST: 2, DriveMode.CSV: 4, DriveMode.CSP: 4}
 
 
+@contextmanager
+def driver_errors() -> Iterator[None]:
+    """Raise errors of the drivers as HilError; `drivers` may not import `hil`."""
+    try:
+        yield
+    except DriverError as error:
+        raise HilError(str(error)) from error
+
+
 class Devices:
     """Opened devices of a bench behind `drivers.port`; a context manager. Each protocol has a subclass."""
 
@@ -44,12 +54,10 @@ class Devices:
 
     def set_up(self) -> None:
         """Configure the devices, power stage off; blocking. Raises HilError if a device refuses."""
-        try:
+        with driver_errors():
             self.drive.set_up()
             if self.encoder is not None:
                 self.encoder.set_up()
-        except DriverError as error:
-            raise HilError(str(error)) from error
 
     def bus_load(self) -> float:
         """Share of the bus's time used in each period; 0 where the protocol has no limit."""
@@ -74,7 +82,7 @@ class Rig(Devices):
     the connections to a python-can bus, the master's first.
 
     bus: an in-process bus to use instead of opening one (for injecting faults). plant: moved by the simulated devices
-    instead of the bench's axis. Raises FieldError for a bench that cannot be run, HilError when a device cannot be
+    instead of the bench's axis. Raises FieldError for a bench that cannot be run, HilError if a device cannot be
     opened.
     """
 
@@ -90,17 +98,18 @@ class Rig(Devices):
         self.nodes: SimulatedNodes | None = None
         self.encoder = None
         self.ports: list[CanPort] = []
-        try:
-            self.port = self._connect(bus, lambda port: SimulatedNodes(bench, port, seed, plant))
-            self.master = CanopenMaster(
-                self.port, node_id=self.section.master_node_id, heartbeat_s=self.section.heartbeat_s
-            )
-            self.drive = CanopenDrive(self.master, self._drive_settings())
-            if bench.has_table_encoder:
-                self.encoder = self._open_encoder()
-        except DriverError as error:
-            self.close()
-            raise HilError(str(error)) from error
+        with driver_errors():
+            try:
+                self.port = self._connect(bus, lambda port: SimulatedNodes(bench, port, seed, plant))
+                self.master = CanopenMaster(
+                    self.port, node_id=self.section.master_node_id, heartbeat_s=self.section.heartbeat_s
+                )
+                self.drive = CanopenDrive(self.master, self._drive_settings())
+                if bench.has_table_encoder:
+                    self.encoder = self._open_encoder()
+            except DriverError:
+                self.close()
+                raise
 
     def bus_load(self) -> float:
         """Share of the bus's time that SYNC, RPDO, TPDO and encoder take, with the longest bit stuffing."""
@@ -165,7 +174,8 @@ def open_devices(bench: Bench, seed: int | None = None) -> Devices:
     protocol = (bench.drive or DriveSection()).protocol
     if protocol not in PROTOCOLS:
         raise FieldError(("drive", "protocol"), f"given {protocol}, allowed {', '.join(PROTOCOLS)}; correct it")
-    return PROTOCOLS[protocol](bench, seed)
+    with driver_errors():
+        return PROTOCOLS[protocol](bench, seed)
 
 
 def check_runnable(bench: Bench) -> None:

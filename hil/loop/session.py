@@ -22,13 +22,13 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import Protocol
 
-from drivers.port import Condition, DriveGoal, DriverError, DriveSample, EncoderSample
+from drivers.port import Condition, DriveGoal, DriveSample, EncoderSample
 from hil.bench.hardware import DriveMode
 from hil.channels import AxisKind
 from hil.errors import HilError
 from hil.loop.clock import Clock
 from hil.loop.cycle import Cycle, Samples, Setpoint, Watch
-from hil.loop.devices import Devices
+from hil.loop.devices import Devices, driver_errors
 from hil.loop.supervision import Ending, find
 from hil.motion.pieces import MotionLimits
 from hil.motion.trajectory import Trajectory, stop_from
@@ -121,17 +121,16 @@ class Session:
     def run(self) -> Outcome:
         """Arm, run, stop, disarm. Raises HilError when the drive cannot be armed or a device fails in the loop;
         the drive is commanded to stop before any exception leaves."""
-        try:
-            self._clock.start()
-            self._master.start(0.0)
-            sample, seen = self._arm()
-            rows = self._loop(sample, seen)
-            self._disarm()
-        except BaseException as error:
-            self._abandon()
-            if isinstance(error, DriverError):
-                raise HilError(str(error)) from error
-            raise
+        with driver_errors():
+            try:
+                self._clock.start()
+                self._master.start(0.0)
+                sample, seen = self._arm()
+                rows = self._loop(sample, seen)
+                self._disarm()
+            except BaseException:
+                self._abandon()
+                raise
         return Outcome(self._ending, self._reason, rows, tuple(self._lateness_s))
 
     # -- one tick -------------------------------------------------------------------------------------------------

@@ -221,6 +221,8 @@ class Recorder:
 
 def _reserve(folder: Path, name: str) -> Path:
     """Create the empty stream file: the first of NAME.arrows, NAME_2.arrows ... without a Parquet file."""
+    if not name or "/" in name or "\0" in name:
+        raise InputError(f"recorder: name: given {name!r}, allowed a file name without folder; the folder is separate")
     try:
         folder.mkdir(parents=True, exist_ok=True)
         number = 1

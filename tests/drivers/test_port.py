@@ -10,9 +10,9 @@ import pytest
 from ascii_drive import AsciiDevices, AsciiDrive
 from bench_runs import MOVE, ScriptedClock, bench_with
 
-from drivers.port import DriveGoal
+from drivers.port import BusError, DriveGoal
 from hil.bench.bench_file import Bench
-from hil.errors import FieldError
+from hil.errors import FieldError, HilError
 from hil.loop import devices
 from hil.loop.run import run_profile
 from hil.loop.session import Outcome, Session, make_cycle
@@ -80,6 +80,15 @@ def test_a_bench_file_chooses_the_protocol_by_its_registration(tmp_path: Path, m
     recording, (by_hand_outcome, by_hand, _) = read_recording(ran.recording), session(tmp_path / "by_hand")
     assert ran.outcome.rows == by_hand_outcome.rows
     assert np.array_equal(recording["torque_n_m"], by_hand["torque_n_m"])
+
+
+def test_a_driver_error_while_opening_any_protocol_is_a_hil_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(bench: object, seed: object) -> devices.Devices:
+        raise BusError("cannot be opened", where="serial line /dev/absent")
+
+    monkeypatch.setitem(devices.PROTOCOLS, "ascii", broken)
+    with pytest.raises(HilError, match="serial line /dev/absent: cannot be opened"):
+        devices.open_devices(ascii_bench())
 
 
 def test_the_second_protocol_is_written_in_less_than_80_lines_of_drive() -> None:

@@ -229,6 +229,15 @@ def test_what_a_run_refuses_names_file_and_line(folder: Path) -> None:
     assert "--seed" in refused(folder, "run", jog, "--virtual", "--seed", "-1")
 
 
+def test_a_bench_name_with_square_brackets_is_printed_as_it_is(folder: Path) -> None:
+    data = yaml.safe_load((folder / "bench.yaml").read_text()) | {"name": "[/]"}
+    (folder / "brackets.yaml").write_text(yaml.safe_dump(data))
+    jog = str(SWEEP.with_name("jog.yaml"))
+    ran = hil(folder, "run", jog, "--bench", "brackets.yaml", "--virtual", "--out", "brackets")
+    assert ran.returncode == 0, ran.stderr
+    assert "jog on [/]:" in ran.stderr
+
+
 def test_wrong_usage_is_2(folder: Path) -> None:
     assert "No such command" in refused(folder, "measure")
     assert process(folder, "measure").returncode == 2

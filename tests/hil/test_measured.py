@@ -2,10 +2,22 @@
 
 import numpy as np
 import pytest
+from diagnosis_runs import bench, recorded
 
+from hil.errors import InputError
+from hil.identification.measured import take
 from hil.identification.noise import _jitter_s, white_noise
 
 PERIOD_S = 1e-3
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_a_recording_in_memory_with_nan_or_infinity_is_refused(value: float) -> None:
+    owner = bench()
+    recording = recorded(owner)
+    recording["table_position_m"][500] = value
+    with pytest.raises(InputError, match=f"row 500: table_position_m: given {value}, allowed a finite number"):
+        take(recording, owner)
 
 
 VELOCITY = np.repeat([0.0, 40.0, 0.0, -40.0, 0.0], 2000)

@@ -43,6 +43,13 @@ def test_the_loop_s_side_is_light() -> None:
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
+@pytest.mark.parametrize("name", ["", "../run", "a\0"])
+def test_a_name_that_is_no_file_name_is_refused(tmp_path: Path, name: str) -> None:
+    with pytest.raises(InputError, match="recorder: name: given"):
+        recorder(tmp_path / "in", name)
+    assert not list(tmp_path.iterdir())
+
+
 def test_every_row_arrives_through_a_ring_much_smaller_than_the_run(tmp_path: Path) -> None:
     with recorder(tmp_path, lossless=True, ring_rows=64) as run:
         for k in range(5000):

@@ -202,7 +202,7 @@ class _Composer:
             if length is not None:
                 factor = abs(relations[length].factor) * UNITS[self.units[length]][1] / UNITS[motor][1]
                 self.draft.lead_m, self.draft.lead_how = (
-                    _lead(2.0 * pi * factor),
+                    float(f"{usual_lead(2.0 * pi * factor):.6g}"),
                     f"travel of {length} per turn of {roles.motor}",
                 )
             else:
@@ -329,10 +329,10 @@ class _Composer:
         return f"{what}; {self.roles.how[column]}" if column in self.roles.how else what
 
 
-def _lead(value_m: float) -> float:
+def usual_lead(value_m: float) -> float:
     """Lead with the digits of a usual one if it is that to 0.2 %: following errors and lead errors are below."""
     usual = next((lead for lead in _LEADS_M if abs(value_m / lead - 1.0) < 2e-3), None)
-    return usual if usual is not None else float(f"{value_m:.6g}")
+    return usual if usual is not None else value_m
 
 
 def _mixed_up(ratio: float) -> str:

@@ -38,12 +38,12 @@ def estimate_noise(
     period_s: float,
 ) -> Noise:
     """Estimate sensor noise from channels (n,) in motor units, at least that of counting: count / sqrt(12)."""
-    motor_noise, table_noise = max(_white(motor), bench.motor_count / np.sqrt(12.0)), 0.0
+    motor_noise, table_noise = max(white_noise(motor), bench.motor_count / np.sqrt(12.0)), 0.0
     if table.size and bench.encoders.table is not None:
         ratio_m = bench.axis.ratio_m_rad
         counting = np.hypot(bench.encoders.table.resolution_m, ratio_m * bench.motor_count) / np.sqrt(12.0)
-        table_noise = max(_white(table - ratio_m * motor), float(counting))
-    of_torque = _white(torque) if np.array_equal(command, torque) else _coloured(torque - command)
+        table_noise = max(white_noise(table - ratio_m * motor), float(counting))
+    of_torque = white_noise(torque) if np.array_equal(command, torque) else _coloured(torque - command)
     return Noise(motor_noise, table_noise, of_torque, _jitter_s(motor, velocity, motor_noise, period_s))
 
 
@@ -53,7 +53,7 @@ def moving(velocity: FloatArray) -> NDArray[np.bool_]:
     return np.asarray(speed > 1e-3 * np.max(speed, initial=0.0))
 
 
-def _white(signal: FloatArray) -> float:
+def white_noise(signal: FloatArray) -> float:
     """White noise of a smooth signal (n,) from its fourth differences, which have the variance 70 sigma^2.
 
     The median over blocks excludes events such as reversals.

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hil.identification.noise import _jitter_s, _white
+from hil.identification.noise import _jitter_s, white_noise
 
 PERIOD_S = 1e-3
 
@@ -44,8 +44,8 @@ def test_a_count_that_flickers_at_rest_is_no_jitter() -> None:
 
 def test_noise_without_jitter_has_none() -> None:
     motor = position(1e-5, 0.0)
-    assert _white(motor) == pytest.approx(1e-5, rel=0.05)
-    assert _jitter_s(motor, VELOCITY, _white(motor), PERIOD_S) == 0.0
+    assert white_noise(motor) == pytest.approx(1e-5, rel=0.05)
+    assert _jitter_s(motor, VELOCITY, white_noise(motor), PERIOD_S) == 0.0
 
 
 @pytest.mark.parametrize("motor", [np.zeros(5000), np.zeros(3)])

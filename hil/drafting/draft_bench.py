@@ -1,0 +1,242 @@
+"""Draft a bench file from a recording: kind of axis, masses, friction, lead, gains, encoders, each with its error."""
+
+from dataclasses import dataclass, field
+from functools import cache
+from math import pi, sqrt
+
+from hil.bench.bench_file import Bench
+from hil.channels import AxisKind
+from hil.drafting.draft_map import ROTARY_LEAD_M, usual_lead
+from hil.drafting.estimate import Estimate
+from hil.drafting.loop_values import REPLAYED, LoopValues, loop_values
+from hil.drafting.plant_values import PlantValues, TransmissionValues, plant_values, transmission_values
+from hil.drafting.relations import proportional
+from hil.drafting.sensor_values import count_of, is_decimal, noise_of, torque_delay_s
+from hil.errors import InputError
+from hil.identification.friction import identify_friction
+from hil.quantities import digits
+from hil.recording.recording import Recording
+
+_FINEST_M, _COARSEST_M = 1e-12, 1e-3  # resolution of a second encoder that a bench file takes
+_STEPS_PER_NOISE = sqrt(12.0)  # a count of q has noise of q / sqrt(12)
+
+
+@dataclass(frozen=True)
+class BenchValue:
+    """A key of the bench file with its value and the comment beside it."""
+
+    key: str
+    value: float | int | str
+    comment: str
+
+
+@dataclass
+class BenchDraft:
+    """Sections of a drafted bench file; `notes` is what the recording tells beside them, `unsure` what to check."""
+
+    name: str
+    kind: AxisKind
+    model: str
+    axis: list[BenchValue] = field(default_factory=list)
+    control: list[BenchValue] = field(default_factory=list)  # empty: unknown
+    control_why: str = ""
+    motor_encoder: BenchValue | None = None
+    table_encoder: BenchValue | None = None
+    notes: list[str] = field(default_factory=list)
+    unsure: list[str] = field(default_factory=list)
+
+
+@cache
+def control_may_be_unknown() -> bool:
+    """True if the bench model takes `control: unknown`."""
+    axis = {"mass_kg": 1.0, "coulomb_force_n": 0.0, "viscous_force_n_s_m": 0.0}
+    try:
+        Bench.model_validate(axis | {"control": "unknown"})
+    except ValueError:
+        return False
+    return True
+
+
+def draft_bench(recording: Recording) -> BenchDraft:
+    """Draft the bench of the axis of a recording.
+
+    Raises InputError if masses and friction cannot be told: no torque, one direction, too short, a wrong sign.
+    """
+    plant, transmission = plant_values(recording), transmission_values(recording)
+    if recording.kind is AxisKind.LINEAR:
+        draft = BenchDraft(recording.name, recording.kind, "one_mass")
+        ratio = 1.0
+        _linear(draft, plant)
+    else:
+        lead = _lead(recording, transmission)
+        ratio = lead.value / (2.0 * pi)
+        model = "two_mass" if transmission is not None and _elastic(transmission) else "rigid"
+        draft = BenchDraft(recording.name, recording.kind, model)
+        _rotary(draft, plant, transmission, lead)
+    _control(draft, recording, loop_values(recording, ratio))
+    _encoders(draft, recording, ratio)
+    _notes(draft, recording, plant, transmission)
+    return draft
+
+
+def _lead(recording: Recording, transmission: TransmissionValues | None) -> Estimate:
+    names = recording.axis
+    if transmission is not None:
+        measured = transmission.ratio.scaled(2.0 * pi)
+    elif names.position_command in recording.columns:
+        relation = proportional(recording[names.position_command], recording[names.motor_position])
+        measured = Estimate(2.0 * pi * relation.factor, 0.0, "set-points over the motor's encoder")
+    else:
+        return Estimate(ROTARY_LEAD_M, 0.0, "a rotary axis: one metre stands for one revolution")
+    if abs(measured.value / ROTARY_LEAD_M - 1.0) < 0.02:
+        return Estimate(ROTARY_LEAD_M, 0.0, f"a rotary axis: one metre stands for one revolution; {measured.how}")
+    lead = usual_lead(measured.value)
+    how = measured.how if lead == measured.value else f"{measured.how} ({1e3 * measured.value:.6g} mm measured)"
+    return Estimate(lead, measured.std_error, how)
+
+
+def _elastic(transmission: TransmissionValues) -> bool:
+    return transmission.compliance_s2.significant and transmission.compliance_s2.value < 0.0
+
+
+def _linear(draft: BenchDraft, plant: PlantValues) -> None:
+    draft.axis += [
+        _value("mass_kg", plant.inertia, "kg"),
+        _friction("coulomb_force_n", plant.coulomb, "N"),
+        _friction("viscous_force_n_s_m", plant.viscous, "N s/m"),
+    ]
+
+
+def _rotary(draft: BenchDraft, plant: PlantValues, transmission: TransmissionValues | None, lead: Estimate) -> None:
+    ratio = lead.value / (2.0 * pi)
+    mass = plant.inertia.scaled(1.0 / ratio**2)
+    inertia = f"inertia {digits(plant.inertia.value)} kg m^2 at the motor"
+    draft.axis.append(BenchValue("lead_m", lead.value, f"m per revolution, {lead}"))
+    if draft.model == "two_mass" and transmission is not None:
+        half = mass.scaled(0.5)
+        draft.axis += [
+            BenchValue("motor_mass_kg", half.value, f"kg, half of {digits(mass.value)} {mass}: the split is not told"),
+            BenchValue("table_mass_kg", half.value, f"kg, the other half; {inertia}"),
+        ]
+        stretch = transmission.compliance_s2
+        stiffness = Estimate(half.value / -stretch.value, half.value / stretch.value**2 * stretch.std_error)
+        draft.axis.append(
+            _value("stiffness_n_m", stiffness, "N/m", "deflection over acceleration, for this split of the masses")
+        )
+        draft.unsure.append("motor_mass_kg, table_mass_kg, stiffness_n_m: only the sum of the masses and table mass over stiffness are told")
+    else:
+        draft.axis.append(_value("mass_kg", mass, "kg", inertia))
+    draft.axis += [
+        _friction("coulomb_torque_n_m", plant.coulomb, "N m"),
+        _friction("viscous_torque_n_m_s_rad", plant.viscous, "N m s/rad"),
+    ]
+
+
+def _value(key: str, estimate: Estimate, unit: str, more: str = "") -> BenchValue:
+    return BenchValue(key, estimate.value, f"{unit}, {estimate}" + (f"; {more}" if more else ""))
+
+
+def _friction(key: str, estimate: Estimate, unit: str) -> BenchValue:
+    if estimate.value > 0.0:
+        sure = "" if estimate.significant else "; not identifiable from this motion"
+        return BenchValue(key, estimate.value, f"{unit}, {estimate}{sure}")
+    return BenchValue(key, 0.0, f"{unit}, {estimate.value:.3g} {estimate}: below 0, not identifiable from this motion")
+
+
+def _control(draft: BenchDraft, recording: Recording, loop: LoopValues | None) -> None:
+    if loop is None or loop.left > REPLAYED:
+        draft.control_why = (
+            "no set-points are recorded, or no gains reproduce the torque command"
+            if loop is None
+            else f"the best cascaded law leaves {100 * loop.left:.0f} % of the torque command"
+        )
+        if not control_may_be_unknown():
+            raise InputError(f"{recording.name}: the control law cannot be told ({draft.control_why}); record the set-points")
+        return
+    linear = recording.kind is AxisKind.LINEAR
+    kv, feedforward, kp, time_s = loop.errors
+    how = f"the replayed law leaves {100 * loop.left:.2g} % of the torque command"
+    period_s = recording.period_s
+    draft.control = [
+        BenchValue("position_gain_1_s", loop.position_gain_1_s, f"1/s, +-{kv:.2g}; {how}"),
+        BenchValue("velocity_feedforward", loop.velocity_feedforward, f"1 is 100 %, +-{feedforward:.2g}"),
+        BenchValue("position_period_s", float(f"{loop.position_ticks * period_s:.9g}"), f"s, of 1 to 8 rows {loop.position_ticks} fits best"),
+        BenchValue(
+            "velocity_gain_n_s_m" if linear else "velocity_gain_n_m_s_rad",
+            loop.velocity_gain,
+            f"{'N s/m' if linear else 'N m s/rad'}, +-{kp:.2g}",
+        ),
+    ]
+    if loop.integral_time_s is not None:
+        draft.control.append(BenchValue("velocity_integral_time_s", loop.integral_time_s, f"s, +-{time_s:.2g}"))
+    draft.control += [
+        BenchValue("velocity_period_s", float(f"{period_s:.9g}"), "s, the period of the recording"),
+        BenchValue("velocity_estimate", loop.velocity_estimate, "the better of the two"),
+    ]
+
+
+def _encoders(draft: BenchDraft, recording: Recording, ratio: float) -> None:
+    names = recording.axis
+    motor = recording[names.motor_position]
+    step, noise = count_of(motor), noise_of(recording, names.motor_position)
+    how = "step of the positions" if step is not None else f"no step is seen; from the noise of {noise:.2g}"
+    step = step or max(noise * _STEPS_PER_NOISE, 1e-12)
+    if recording.kind is AxisKind.LINEAR:
+        draft.motor_encoder = BenchValue("resolution_m", float(f"{step:.4g}"), f"m, {how}{_printed(step)}")
+    else:
+        counts = max(round(2.0 * pi / step), 1)
+        power = round(2 ** round(_log2(counts)))
+        counts = power if abs(counts / power - 1.0) < 0.002 else counts
+        draft.motor_encoder = BenchValue("counts_per_rev", counts, f"{how}{_printed(step)}")
+    if names.table_position in recording.columns and recording.kind is AxisKind.ROTARY:
+        table = recording[names.table_position]
+        step, noise = count_of(table), noise_of(recording, names.table_position)
+        how = "step of the positions" if step is not None else f"no step is seen; from the noise of {noise:.2g} m"
+        step = min(max(step or noise * _STEPS_PER_NOISE, _FINEST_M), _COARSEST_M)
+        draft.table_encoder = BenchValue("resolution_m", float(f"{step:.4g}"), f"m, {how}{_printed(step)}")
+    del ratio
+
+
+def _log2(value: float) -> float:
+    from math import log2
+
+    return log2(value)
+
+
+def _printed(step: float) -> str:
+    return " (perhaps the last digit of the file)" if is_decimal(step) else ""
+
+
+def _notes(
+    draft: BenchDraft, recording: Recording, plant: PlantValues, transmission: TransmissionValues | None
+) -> None:
+    names, linear = recording.axis, recording.kind is AxisKind.LINEAR
+    effort, noise_unit = ("force", "N") if linear else ("torque", "N m")
+    notes = draft.notes
+    notes.append(f"inertia and friction leave {100 * plant.left:.2g} % of the {effort} (share of its standard deviation)")
+    sure = "" if plant.offset.significant else ", not distinguishable from 0"
+    notes.append(f"constant {effort} {plant.offset.value:.3g} {noise_unit} +-{plant.offset.std_error:.2g}{sure}: a load, or friction that differs by direction")
+    if plant.gravity is not None:
+        notes.append(f"{effort} over the angle (gravity) {plant.gravity.value:.3g} N m +-{plant.gravity.std_error:.2g}: not in this bench")
+        draft.unsure.append("the axis has a load that follows the sine of its angle (gravity); this bench has none")
+    notes.append(f"noise of {names.torque}: {noise_of(recording, names.torque):.3g} {noise_unit} rms")
+    notes.append(f"noise of {names.motor_position}: {noise_of(recording, names.motor_position):.3g} {'m' if linear else 'rad'} rms")
+    delay_s = torque_delay_s(recording)
+    if delay_s is not None:
+        notes.append(f"{names.torque} follows {names.torque_command} after {1e3 * delay_s:.3g} ms (to half a row)")
+    if transmission is not None:
+        late = transmission.delay_s
+        if late.significant:
+            notes.append(f"second encoder {'late' if late.value > 0 else 'early'} by {1e3 * abs(late.value):.3g} ms +-{1e3 * late.std_error:.2g}, from its difference over the velocity")
+            draft.unsure.append(f"the second encoder is {'late' if late.value > 0 else 'early'} by {1e3 * abs(late.value):.3g} ms; the bench has no key for it")
+        if transmission.friction_m.significant:
+            notes.append(f"second encoder differs by {2e6 * abs(transmission.friction_m.value):.3g} um between directions: lost motion, or friction over stiffness")
+        notes.append(f"ratio, delay and stretch leave {1e6 * transmission.left_m:.3g} um rms of the second encoder")
+    try:
+        feeds = identify_friction(recording)
+    except InputError:
+        return
+    notes.append(
+        f"friction from {len(feeds.points)} constant feeds: Coulomb {feeds.coulomb:.4g} +-{feeds.coulomb_std_error:.2g}, "
+        f"viscous {feeds.viscous:.4g} +-{feeds.viscous_std_error:.2g}, offset {feeds.offset:.3g} +-{feeds.offset_std_error:.2g}"
+    )

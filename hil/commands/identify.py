@@ -9,9 +9,7 @@ from hil.report.console import err, out, table
 
 
 def identify(
-    run: Annotated[
-        Path, typer.Argument(help="Recording of the axis: .parquet, .arrows or .csv.", show_default=False)
-    ],
+    run: Annotated[Path, typer.Argument(help="Recording of the axis: .parquet, .arrows or .csv.", show_default=False)],
     target: Annotated[
         Path | None,
         typer.Option("--out", help="Bench file to write. Default: the name of the recording, in this folder."),
@@ -40,10 +38,10 @@ def identify(
     load_bench(target)
     values = [*draft.axis, *draft.control]
     rows = [
-        (one.key, f"{one.value:.6g}" if isinstance(one.value, float) else str(one.value), one.comment) for one in values
+        (one.key, f"{one.value:.6g}" if isinstance(one.value, float) else str(one.value), one.error) for one in values
     ]
     rows += [] if draft.control else [("control", "unknown", draft.control_why)]
-    table(("", "value", "unit, standard error, how"), rows)
+    table(("", "value", "unit, standard error"), rows)
     for note in draft.notes:
         out.print(f"  {note}", markup=False)
     for note in draft.unsure:

@@ -23,14 +23,16 @@ def bench_text(draft: BenchDraft) -> str:
     if draft.table_encoder is not None:
         lines += ["  table:", f"    {_line(draft.table_encoder)}"]
     else:
-        lines += ["  table: null   # no second encoder is recorded" if draft.kind is AxisKind.ROTARY else "  table: null"]
+        lines += [
+            "  table: null   # no second encoder is recorded" if draft.kind is AxisKind.ROTARY else "  table: null"
+        ]
     lines += ["# Told by the recording beside these keys:", *(f"#   {note}" for note in draft.notes)]
     return "\n".join(lines) + "\n"
 
 
 def _line(value: BenchValue) -> str:
     shown = f"{value.value:.6g}" if isinstance(value.value, float) else str(value.value)
-    return f"{value.key}: {shown}   # {value.comment}"
+    return f"{value.key}: {shown}   # {'; '.join(filter(None, (value.error, value.how)))}"
 
 
 def _name(text: str) -> str:

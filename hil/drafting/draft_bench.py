@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 from functools import cache
-from math import pi, sqrt
+from math import log2, pi, sqrt
 
 from hil.bench.bench_file import Bench
 from hil.channels import AxisKind
@@ -23,11 +23,12 @@ _STEPS_PER_NOISE = sqrt(12.0)  # a count of q has noise of q / sqrt(12)
 
 @dataclass(frozen=True)
 class BenchValue:
-    """A key of the bench file with its value and the comment beside it."""
+    """A key of the bench file with its value, its unit and error, and how it was found."""
 
     key: str
     value: float | int | str
-    comment: str
+    error: str
+    how: str = ""
 
 
 @dataclass
@@ -74,7 +75,7 @@ def draft_bench(recording: Recording) -> BenchDraft:
         draft = BenchDraft(recording.name, recording.kind, model)
         _rotary(draft, plant, transmission, lead)
     _control(draft, recording, loop_values(recording, ratio))
-    _encoders(draft, recording, ratio)
+    _encoders(draft, recording)
     _notes(draft, recording, plant, transmission)
     return draft
 
@@ -111,19 +112,26 @@ def _rotary(draft: BenchDraft, plant: PlantValues, transmission: TransmissionVal
     ratio = lead.value / (2.0 * pi)
     mass = plant.inertia.scaled(1.0 / ratio**2)
     inertia = f"inertia {digits(plant.inertia.value)} kg m^2 at the motor"
-    draft.axis.append(BenchValue("lead_m", lead.value, f"m per revolution, {lead}"))
+    draft.axis.append(BenchValue("lead_m", lead.value, f"m per revolution, {_error(lead)}", lead.how))
     if draft.model == "two_mass" and transmission is not None:
         half = mass.scaled(0.5)
         draft.axis += [
-            BenchValue("motor_mass_kg", half.value, f"kg, half of {digits(mass.value)} {mass}: the split is not told"),
-            BenchValue("table_mass_kg", half.value, f"kg, the other half; {inertia}"),
+            BenchValue(
+                "motor_mass_kg",
+                half.value,
+                f"kg, {_error(half)}",
+                f"half of {digits(mass.value)} kg: the split is not told; {mass.how}",
+            ),
+            BenchValue("table_mass_kg", half.value, f"kg, {_error(half)}", f"the other half; {inertia}"),
         ]
         stretch = transmission.compliance_s2
         stiffness = Estimate(half.value / -stretch.value, half.value / stretch.value**2 * stretch.std_error)
         draft.axis.append(
             _value("stiffness_n_m", stiffness, "N/m", "deflection over acceleration, for this split of the masses")
         )
-        draft.unsure.append("motor_mass_kg, table_mass_kg, stiffness_n_m: only the sum of the masses and table mass over stiffness are told")
+        draft.unsure.append(
+            "motor_mass_kg, table_mass_kg, stiffness_n_m: only the sum of the masses and table mass over stiffness are told"
+        )
     else:
         draft.axis.append(_value("mass_kg", mass, "kg", inertia))
     draft.axis += [
@@ -132,15 +140,20 @@ def _rotary(draft: BenchDraft, plant: PlantValues, transmission: TransmissionVal
     ]
 
 
+def _error(estimate: Estimate) -> str:
+    return f"+-{estimate.std_error:.2g}"
+
+
 def _value(key: str, estimate: Estimate, unit: str, more: str = "") -> BenchValue:
-    return BenchValue(key, estimate.value, f"{unit}, {estimate}" + (f"; {more}" if more else ""))
+    return BenchValue(key, estimate.value, f"{unit}, {_error(estimate)}", "; ".join(filter(None, (estimate.how, more))))
 
 
 def _friction(key: str, estimate: Estimate, unit: str) -> BenchValue:
     if estimate.value > 0.0:
-        sure = "" if estimate.significant else "; not identifiable from this motion"
-        return BenchValue(key, estimate.value, f"{unit}, {estimate}{sure}")
-    return BenchValue(key, 0.0, f"{unit}, {estimate.value:.3g} {estimate}: below 0, not identifiable from this motion")
+        sure = "" if estimate.significant else "not identifiable from this motion; "
+        return BenchValue(key, estimate.value, f"{unit}, {_error(estimate)}", sure + estimate.how)
+    how = f"not identifiable from this motion: {estimate.value:.3g} is below 0; {estimate.how}"
+    return BenchValue(key, 0.0, f"{unit}, {_error(estimate)}", how)
 
 
 def _control(draft: BenchDraft, recording: Recording, loop: LoopValues | None) -> None:
@@ -151,16 +164,23 @@ def _control(draft: BenchDraft, recording: Recording, loop: LoopValues | None) -
             else f"the best cascaded law leaves {100 * loop.left:.0f} % of the torque command"
         )
         if not control_may_be_unknown():
-            raise InputError(f"{recording.name}: the control law cannot be told ({draft.control_why}); record the set-points")
+            raise InputError(
+                f"{recording.name}: the control law cannot be told ({draft.control_why}); record the set-points"
+            )
         return
     linear = recording.kind is AxisKind.LINEAR
     kv, feedforward, kp, time_s = loop.errors
     how = f"the replayed law leaves {100 * loop.left:.2g} % of the torque command"
     period_s = recording.period_s
     draft.control = [
-        BenchValue("position_gain_1_s", loop.position_gain_1_s, f"1/s, +-{kv:.2g}; {how}"),
+        BenchValue("position_gain_1_s", loop.position_gain_1_s, f"1/s, +-{kv:.2g}", how),
         BenchValue("velocity_feedforward", loop.velocity_feedforward, f"1 is 100 %, +-{feedforward:.2g}"),
-        BenchValue("position_period_s", float(f"{loop.position_ticks * period_s:.9g}"), f"s, of 1 to 8 rows {loop.position_ticks} fits best"),
+        BenchValue(
+            "position_period_s",
+            float(f"{loop.position_ticks * period_s:.9g}"),
+            "s",
+            f"of 1, 2, 4 and 8 rows {loop.position_ticks} fits best",
+        ),
         BenchValue(
             "velocity_gain_n_s_m" if linear else "velocity_gain_n_m_s_rad",
             loop.velocity_gain,
@@ -170,37 +190,30 @@ def _control(draft: BenchDraft, recording: Recording, loop: LoopValues | None) -
     if loop.integral_time_s is not None:
         draft.control.append(BenchValue("velocity_integral_time_s", loop.integral_time_s, f"s, +-{time_s:.2g}"))
     draft.control += [
-        BenchValue("velocity_period_s", float(f"{period_s:.9g}"), "s, the period of the recording"),
-        BenchValue("velocity_estimate", loop.velocity_estimate, "the better of the two"),
+        BenchValue("velocity_period_s", float(f"{period_s:.9g}"), "s", "the period of the recording"),
+        BenchValue("velocity_estimate", loop.velocity_estimate, "", "the better of the two"),
     ]
 
 
-def _encoders(draft: BenchDraft, recording: Recording, ratio: float) -> None:
+def _encoders(draft: BenchDraft, recording: Recording) -> None:
     names = recording.axis
     motor = recording[names.motor_position]
     step, noise = count_of(motor), noise_of(recording, names.motor_position)
     how = "step of the positions" if step is not None else f"no step is seen; from the noise of {noise:.2g}"
     step = step or max(noise * _STEPS_PER_NOISE, 1e-12)
     if recording.kind is AxisKind.LINEAR:
-        draft.motor_encoder = BenchValue("resolution_m", float(f"{step:.4g}"), f"m, {how}{_printed(step)}")
+        draft.motor_encoder = BenchValue("resolution_m", float(f"{step:.4g}"), "m", how + _printed(step))
     else:
         counts = max(round(2.0 * pi / step), 1)
-        power = round(2 ** round(_log2(counts)))
+        power = round(2 ** round(log2(counts)))
         counts = power if abs(counts / power - 1.0) < 0.002 else counts
-        draft.motor_encoder = BenchValue("counts_per_rev", counts, f"{how}{_printed(step)}")
+        draft.motor_encoder = BenchValue("counts_per_rev", counts, "", how + _printed(step))
     if names.table_position in recording.columns and recording.kind is AxisKind.ROTARY:
         table = recording[names.table_position]
         step, noise = count_of(table), noise_of(recording, names.table_position)
         how = "step of the positions" if step is not None else f"no step is seen; from the noise of {noise:.2g} m"
         step = min(max(step or noise * _STEPS_PER_NOISE, _FINEST_M), _COARSEST_M)
-        draft.table_encoder = BenchValue("resolution_m", float(f"{step:.4g}"), f"m, {how}{_printed(step)}")
-    del ratio
-
-
-def _log2(value: float) -> float:
-    from math import log2
-
-    return log2(value)
+        draft.table_encoder = BenchValue("resolution_m", float(f"{step:.4g}"), "m", how + _printed(step))
 
 
 def _printed(step: float) -> str:
@@ -213,24 +226,38 @@ def _notes(
     names, linear = recording.axis, recording.kind is AxisKind.LINEAR
     effort, noise_unit = ("force", "N") if linear else ("torque", "N m")
     notes = draft.notes
-    notes.append(f"inertia and friction leave {100 * plant.left:.2g} % of the {effort} (share of its standard deviation)")
+    notes.append(
+        f"inertia and friction leave {100 * plant.left:.2g} % of the {effort} (share of its standard deviation)"
+    )
     sure = "" if plant.offset.significant else ", not distinguishable from 0"
-    notes.append(f"constant {effort} {plant.offset.value:.3g} {noise_unit} +-{plant.offset.std_error:.2g}{sure}: a load, or friction that differs by direction")
+    notes.append(
+        f"constant {effort} {plant.offset.value:.3g} {noise_unit} +-{plant.offset.std_error:.2g}{sure}: a load, or friction that differs by direction"
+    )
     if plant.gravity is not None:
-        notes.append(f"{effort} over the angle (gravity) {plant.gravity.value:.3g} N m +-{plant.gravity.std_error:.2g}: not in this bench")
+        notes.append(
+            f"{effort} over the angle (gravity) {plant.gravity.value:.3g} N m +-{plant.gravity.std_error:.2g}: not in this bench"
+        )
         draft.unsure.append("the axis has a load that follows the sine of its angle (gravity); this bench has none")
     notes.append(f"noise of {names.torque}: {noise_of(recording, names.torque):.3g} {noise_unit} rms")
-    notes.append(f"noise of {names.motor_position}: {noise_of(recording, names.motor_position):.3g} {'m' if linear else 'rad'} rms")
+    notes.append(
+        f"noise of {names.motor_position}: {noise_of(recording, names.motor_position):.3g} {'m' if linear else 'rad'} rms"
+    )
     delay_s = torque_delay_s(recording)
     if delay_s is not None:
         notes.append(f"{names.torque} follows {names.torque_command} after {1e3 * delay_s:.3g} ms (to half a row)")
     if transmission is not None:
         late = transmission.delay_s
         if late.significant:
-            notes.append(f"second encoder {'late' if late.value > 0 else 'early'} by {1e3 * abs(late.value):.3g} ms +-{1e3 * late.std_error:.2g}, from its difference over the velocity")
-            draft.unsure.append(f"the second encoder is {'late' if late.value > 0 else 'early'} by {1e3 * abs(late.value):.3g} ms; the bench has no key for it")
+            notes.append(
+                f"second encoder {'late' if late.value > 0 else 'early'} by {1e3 * abs(late.value):.3g} ms +-{1e3 * late.std_error:.2g}, from its difference over the velocity"
+            )
+            draft.unsure.append(
+                f"the second encoder is {'late' if late.value > 0 else 'early'} by {1e3 * abs(late.value):.3g} ms; the bench has no key for it"
+            )
         if transmission.friction_m.significant:
-            notes.append(f"second encoder differs by {2e6 * abs(transmission.friction_m.value):.3g} um between directions: lost motion, or friction over stiffness")
+            notes.append(
+                f"second encoder differs by {2e6 * abs(transmission.friction_m.value):.3g} um between directions: lost motion, or friction over stiffness"
+            )
         notes.append(f"ratio, delay and stretch leave {1e6 * transmission.left_m:.3g} um rms of the second encoder")
     try:
         feeds = identify_friction(recording)

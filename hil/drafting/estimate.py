@@ -1,4 +1,4 @@
-"""Least squares with standard errors that count what the model leaves, and the text of such values."""
+"""Least squares with standard errors that count what the model leaves."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -27,9 +27,6 @@ class Estimate:
     def scaled(self, factor: float) -> "Estimate":
         """The estimate in another unit."""
         return Estimate(factor * self.value, abs(factor) * self.std_error, self.how)
-
-    def __str__(self) -> str:
-        return f"+-{self.std_error:.2g}" + (f" {self.how}" if self.how else "")
 
 
 @dataclass(frozen=True)

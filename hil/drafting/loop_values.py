@@ -111,7 +111,8 @@ def _initial(loop: _Loop) -> list[Start4]:
         found.append((proportional[0].value / kp, max(proportional[1].value / kp, 0.0), kp, 0.0))
     summed = np.cumsum(error) * loop.period_s
     c_e, c_v, c_speed, c_sum, _, _ = (
-        one.value for one in fit_blocks([error, feed, speed, summed, loop.motor - loop.motor[0], ones], loop.command).estimates
+        one.value
+        for one in fit_blocks([error, feed, speed, summed, loop.motor - loop.motor[0], ones], loop.command).estimates
     )
     kp = -c_speed
     if kp > 0.0:
@@ -124,9 +125,7 @@ def _initial(loop: _Loop) -> list[Start4]:
     return [one for one in found if one[0] > 0.0]
 
 
-def _left(
-    loop: _Loop, values: Start4, ticks: int, phase: int, estimate: str
-) -> FloatArray:
+def _left(loop: _Loop, values: Start4, ticks: int, phase: int, estimate: str) -> FloatArray:
     """Torque command less that of the replayed law, without its mean: the state of the integrator is not known."""
     kv, feedforward, kp, integral = values
     gains = cascade.make_gains(
@@ -174,11 +173,11 @@ def _refined(loop: _Loop, start: Start4, ticks: int, phase: int, estimate: str, 
     inverse = np.linalg.pinv(fit.jac.T @ fit.jac)
     errors[free] = np.sqrt(variance * np.diag(inverse)) * scale[free]
     kv, feedforward, kp, integral = (float(one) for one in values)
-    time_s = kp / integral if integral > 0.0 else None
+    time_s = kp / integral if integral > 0.0 and kp > 0.0 else None
     if time_s is not None and time_s > _NO_INTEGRAL:
         time_s = None
-    error_time = 0.0 if time_s is None else time_s * float(np.hypot(errors[3] / integral, errors[2] / kp))
+    error_time = 0.0 if time_s is None else float(time_s * np.hypot(errors[3] / integral, errors[2] / max(kp, 1e-300)))
     return LoopValues(
-        kv, feedforward, kp, time_s, (errors[0], errors[1], errors[2], error_time), ticks, estimate,
+        kv, feedforward, kp, time_s, (float(errors[0]), float(errors[1]), float(errors[2]), error_time), ticks, estimate,
         float(np.std(residual) / np.std(loop.command)), phase,
     )  # fmt: skip

@@ -1,7 +1,7 @@
 """Inertia, friction, load and transmission of an axis from its recording.
 
-    T = J a + D v + Tc sign(v) + T0 (+ G1 sin q + G2 cos q)      at the motor
-    x = r q + c - r tau v - (m_t / k) a - (F_t / k) sign(v)      second encoder against the motor's
+T = J a + D v + Tc sign(v) + T0 (+ G1 sin q + G2 cos q)      at the motor
+x = r q + c - r tau v - (m_t / k) a - (F_t / k) sign(v)      second encoder against the motor's
 """
 
 from dataclasses import dataclass

@@ -136,10 +136,12 @@ def fit_nominal(recordings: Recording | Sequence[Recording], bench: Bench) -> Fi
     Returns the fitted bench, its parameters with standard errors, and whether the fit converged. Raises InputError if
     recording and bench do not belong together, HilError if no parameters give a finite response.
     """
+    from hil.identification.completion import reduced
     from hil.identification.dataset import prepare_dataset
     from hil.identification.measured import take
     from hil.identification.nominal_fit import fit_nominal as fit
 
+    bench = reduced(bench, _sequence(recordings))
     return fit(prepare_dataset([take(recording, bench) for recording in _sequence(recordings)], bench))
 
 

@@ -5,6 +5,7 @@ motor side is in rad and N m; a linear axis (one mass, newtons and metres) has `
 `force_n` and `force_command_n` in their place. One line here is all that a new channel needs.
 """
 
+from collections.abc import Container
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -14,6 +15,11 @@ class AxisKind(StrEnum):
 
     ROTARY = "rotary"
     LINEAR = "linear"
+
+    @classmethod
+    def of(cls, names: Container[str]) -> "AxisKind":
+        """The kind of axis that channels of these names describe."""
+        return cls.LINEAR if "motor_position_m" in names or "motor_velocity_m_s" in names else cls.ROTARY
 
 
 @dataclass(frozen=True)
@@ -33,6 +39,8 @@ _TABLE = (
     Channel("acceleration_command_m_s2", "m/s^2", "acceleration set-point of the table", "away from home"),
     Channel("motor_position_rad", "rad", "motor encoder", "table moves away from home"),
     Channel("motor_position_m", "m", "motor encoder of a linear axis", "away from home"),
+    Channel("motor_velocity_rad_s", "rad/s", "velocity of the motor", "table moves away from home"),
+    Channel("motor_velocity_m_s", "m/s", "velocity of the motor of a linear axis", "away from home"),
     Channel("table_position_m", "m", "linear encoder", "away from home"),
     Channel(
         "torque_command_n_m",
@@ -76,6 +84,7 @@ class AxisChannels:
     motor_position: str
     torque_command: str
     torque: str
+    motor_velocity: str
     table_position: str = "table_position_m"
     position_command: str = "position_command_m"
     velocity_command: str = "velocity_command_m_s"
@@ -87,6 +96,6 @@ class AxisChannels:
 
 
 AXIS_CHANNELS: dict[AxisKind, AxisChannels] = {
-    AxisKind.ROTARY: AxisChannels("motor_position_rad", "torque_command_n_m", "torque_n_m"),
-    AxisKind.LINEAR: AxisChannels("motor_position_m", "force_command_n", "force_n"),
+    AxisKind.ROTARY: AxisChannels("motor_position_rad", "torque_command_n_m", "torque_n_m", "motor_velocity_rad_s"),
+    AxisKind.LINEAR: AxisChannels("motor_position_m", "force_command_n", "force_n", "motor_velocity_m_s"),
 }

@@ -36,17 +36,11 @@ class _Model(BaseModel):
 _FRICTION = ("coulomb_torque_n_m", "viscous_torque_n_m_s_rad")
 
 
-class _Rotary(_Model):
-    """An axis driven by a motor and a screw; friction is given at the motor."""
+class _Driven(_Model):
+    """An axis driven by a rotary motor; friction is given at the motor."""
 
-    lead_m: Lead = Field(description="travel of the table per motor revolution [m]")
     coulomb_torque_n_m: NotNegative = Field(description="Coulomb friction at the motor [N m]")
     viscous_torque_n_m_s_rad: NotNegative = Field(description="viscous friction at the motor [N m s/rad]")
-
-    @property
-    def ratio_m_rad(self) -> float:
-        """Table travel per radian of the motor, r = lead / 2 pi."""
-        return self.lead_m / (2.0 * pi)
 
     @property
     def linear(self) -> bool:
@@ -60,6 +54,33 @@ class _Rotary(_Model):
     def physics(self) -> Physics:
         """The nominal physics of the twin."""
         return Physics(self.chain(), self.coulomb_torque_n_m, self.viscous_torque_n_m_s_rad)
+
+
+class _Rotary(_Driven):
+    """A motor and a screw that moves a table."""
+
+    lead_m: Lead = Field(description="travel of the table per motor revolution [m]")
+
+    @property
+    def ratio_m_rad(self) -> float:
+        """Table travel per radian of the motor, r = lead / 2 pi."""
+        return self.lead_m / (2.0 * pi)
+
+
+class _Turning(_Driven):
+    """A motor and a load that turns: positions of the "table" are angles of the load, 1 m stands for 1 rad."""
+
+    gear_ratio: Positive = Field(1.0, description="motor revolutions per revolution of the load")
+
+    @property
+    def lead_m(self) -> float:
+        """Angle of the load per motor revolution [rad], in place of a lead."""
+        return 2.0 * pi / self.gear_ratio
+
+    @property
+    def ratio_m_rad(self) -> float:
+        """Angle of the load per radian of the motor [rad/rad]."""
+        return 1.0 / self.gear_ratio
 
 
 class TwoMass(_Rotary):
@@ -182,7 +203,43 @@ class OneMass(_Model):
         )
 
 
-Axis = Annotated[TwoMass | SevenDofAxis | SerialChain | Rigid | OneMass, Field(discriminator="model")]
+class Rotary(_Turning):
+    """A rotary axis of one inertia."""
+
+    MASSES: ClassVar[tuple[str, ...]] = ("inertia_kg_m2",)
+    SPRINGS: ClassVar[tuple[str, ...]] = ()
+    NOMINAL: ClassVar[tuple[str, ...]] = (*MASSES, *SPRINGS, *_FRICTION)
+    model: Literal["rotary"] = "rotary"
+    inertia_kg_m2: Positive = Field(description="all inertia at the motor [kg m^2]")
+
+    def chain(self) -> Chain:
+        """One inertia."""
+        return one_mass(self.inertia_kg_m2 / self.ratio_m_rad**2, self.lead_m)
+
+
+class RotaryTwoMass(_Turning):
+    """A motor and a load that turns, with a gear and a spring between them."""
+
+    MASSES: ClassVar[tuple[str, ...]] = ("motor_inertia_kg_m2", "load_inertia_kg_m2")
+    SPRINGS: ClassVar[tuple[str, ...]] = ("stiffness_n_m_rad", "damping_ratio")
+    NOMINAL: ClassVar[tuple[str, ...]] = (*MASSES, *SPRINGS, *_FRICTION)
+    model: Literal["rotary_two_mass"] = "rotary_two_mass"
+    motor_inertia_kg_m2: Positive = Field(description="motor and gear at the motor [kg m^2]")
+    load_inertia_kg_m2: Positive = Field(description="load at its own shaft [kg m^2]")
+    stiffness_n_m_rad: Positive = Field(description="gear and shaft at the load [N m/rad]")
+    damping_ratio: Damping = 0.03
+
+    def chain(self) -> Chain:
+        """The 2-dof chain, reduced to the motor."""
+        square = self.ratio_m_rad**2
+        inertias = (self.motor_inertia_kg_m2, self.load_inertia_kg_m2 * square)
+        names = ("motor", "table")
+        return serial_chain(inertias, [self.stiffness_n_m_rad * square], self.damping_ratio, self.lead_m, names=names)
+
+
+Axis = Annotated[
+    TwoMass | SevenDofAxis | SerialChain | Rigid | OneMass | Rotary | RotaryTwoMass, Field(discriminator="model")
+]
 
 
 def model_of(keys: set[str]) -> str:
@@ -191,6 +248,10 @@ def model_of(keys: set[str]) -> str:
         return "one_mass"
     if "inertias_kg_m2" in keys:
         return "serial_chain"
+    if "load_inertia_kg_m2" in keys:
+        return "rotary_two_mass"
+    if "inertia_kg_m2" in keys:
+        return "rotary"
     if keys & {"motor_inertia_kg_m2", "nut_stiffness_n_m"}:
         return "seven_dof"
     return "rigid" if "mass_kg" in keys else "two_mass"

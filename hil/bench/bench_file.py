@@ -1,6 +1,7 @@
 """Bench files: the axis as its owner describes it, control, encoders, drive, and mechanisms found by a diagnosis.
 
-An axis file (the keys of `axis` at the top level, and `control`) is a bench too: the rest has defaults.
+An axis file (the keys of `axis` at the top level, and `control`) is a bench too: the rest has defaults. Without
+`control`, or with `control: unknown`, the plant alone is judged (`hil.bench.control_section`).
 `load_bench` raises errors with file, line and field.
 """
 
@@ -11,7 +12,8 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from hil.bench.axis_models import Axis, NotNegative, OneMass, Positive, _Model, model_of
+from hil.bench.axis_models import Axis, OneMass, _Model, model_of
+from hil.bench.control_section import Control, ControlSection, UnknownControl, with_law
 from hil.bench.hardware import DriveSection, SimulationSection
 from hil.control import cascade as law
 from hil.errors import FieldError, InputError
@@ -20,79 +22,8 @@ from hil.twin.axis import Twin
 from hil.twin.library import BY_ID
 from hil.twin.physics import Active
 
-_MA_PER_RPM = 1e-3 * 60.0 / (2.0 * math.pi)  # mA/rpm in A s/rad
-
-
-# a period in milliseconds and a resolution in micrometres are refused
-Period = Annotated[float, Field(gt=0.0, le=0.1, allow_inf_nan=False, description="[s]")]
+# a resolution in micrometres is refused
 Resolution = Annotated[float, Field(gt=0.0, le=1e-3, allow_inf_nan=False, description="table travel per count [m]")]
-
-
-class Control(_Model):
-    """The control law of `hil.control.cascade`, gains in SI or in the units of the source."""
-
-    position_gain_1_s: Positive = Field(description="Kv [1/s]")
-    velocity_feedforward: NotNegative = Field(1.0, description="1 is 100 %")
-    position_period_s: Period = 0.004
-    velocity_gain_n_m_s_rad: Positive | None = Field(None, description="Kp [N m s/rad]; or the next two")
-    velocity_gain_n_s_m: Positive | None = Field(None, description="Kp of a linear axis [N s/m]")
-    velocity_gain_ma_rpm: Positive | None = Field(None, description="Kp [mA/rpm], with torque_constant_n_m_a")
-    torque_constant_n_m_a: Positive | None = Field(None, description="Kt [N m/A]")
-    velocity_integral_time_s: Positive | None = Field(None, description="Ti [s]; absent: a P velocity loop")
-    velocity_integral_time_ms: Positive | None = Field(None, description="Ti [ms]")
-    velocity_period_s: Period = 0.001
-    torque_limit_n_m: Positive | None = None
-    force_limit_n: Positive | None = None
-    position_feedback: Literal["motor", "table"] = "motor"
-    velocity_estimate: Literal["backward_difference", "two_sample_mean"] = "backward_difference"
-    velocity_filter_time_constant_s: NotNegative = 0.0
-
-    @model_validator(mode="after")
-    def _one_gain(self) -> Self:
-        given = [self.velocity_gain_n_m_s_rad, self.velocity_gain_n_s_m, self.velocity_gain_ma_rpm]
-        if sum(value is not None for value in given) != 1:
-            raise FieldError(
-                ("velocity_gain_n_m_s_rad",),
-                "give the velocity gain once: velocity_gain_n_m_s_rad, "
-                "velocity_gain_n_s_m (linear axis) or velocity_gain_ma_rpm",
-            )
-        if self.velocity_gain_ma_rpm is not None and self.torque_constant_n_m_a is None:
-            raise FieldError(
-                ("torque_constant_n_m_a",), "given nothing, allowed a value in N m/A: velocity_gain_ma_rpm needs it"
-            )
-        if self.velocity_integral_time_s is not None and self.velocity_integral_time_ms is not None:
-            raise FieldError(("velocity_integral_time_ms",), "given twice; remove it or velocity_integral_time_s")
-        ticks = round(self.position_period_s / self.velocity_period_s)
-        if ticks < 1 or abs(ticks * self.velocity_period_s - self.position_period_s) > 1e-9:
-            raise FieldError(
-                ("position_period_s",),
-                f"given {self.position_period_s}, allowed a whole multiple of "
-                f"velocity_period_s = {self.velocity_period_s}",
-            )
-        return self
-
-    def gains(self, ratio_m_rad: float) -> law.Gains:
-        """Return the constants of the control law for an axis with this ratio [m/rad]."""
-        if self.velocity_gain_ma_rpm is not None and self.torque_constant_n_m_a is not None:
-            gain = self.velocity_gain_ma_rpm * _MA_PER_RPM * self.torque_constant_n_m_a
-        else:
-            gain = self.velocity_gain_n_m_s_rad or self.velocity_gain_n_s_m or 0.0
-        integral = self.velocity_integral_time_s
-        if self.velocity_integral_time_ms is not None:
-            integral = 1e-3 * self.velocity_integral_time_ms
-        return law.make_gains(
-            position_gain_1_s=self.position_gain_1_s,
-            velocity_gain_n_m_s_rad=gain,
-            ratio_m_rad=ratio_m_rad,
-            velocity_feedforward=self.velocity_feedforward,
-            velocity_integral_time_s=integral,
-            velocity_period_s=self.velocity_period_s,
-            position_period_s=self.position_period_s,
-            torque_limit_n_m=self.torque_limit_n_m or self.force_limit_n or law.INFINITE,
-            position_from_table=self.position_feedback == "table",
-            two_sample_mean=self.velocity_estimate == "two_sample_mean",
-            velocity_filter_time_constant_s=self.velocity_filter_time_constant_s,
-        )
 
 
 class MechanismEntry(_Model):
@@ -179,7 +110,7 @@ class Bench(_Model):
     name: str = ""
     description: str = ""
     axis: Axis
-    control: Control
+    control: ControlSection = UnknownControl(law="unknown")
     encoders: Encoders = Encoders()
     mechanisms: tuple[MechanismEntry, ...] = ()
     drive: DriveSection | None = None
@@ -196,6 +127,7 @@ class Bench(_Model):
             data["axis"] = {key: data.pop(key) for key in list(data) if key not in _SECTIONS}
         if isinstance(data["axis"], dict) and "model" not in data["axis"]:
             data["axis"] = {"model": model_of(set(data["axis"])), **data["axis"]}
+        data["control"] = with_law(data.get("control"))
         # from here on pydantic takes it for Python's own data, where strictly only a tuple is one
         return _tuples(data)
 
@@ -227,7 +159,29 @@ class Bench(_Model):
     @property
     def period_s(self) -> float:
         """Period of the velocity loop [s]: one row of a recording, one set-point of a trajectory."""
-        return self.control.velocity_period_s
+        return self.gains.period_s
+
+    @property
+    def law_known(self) -> bool:
+        """True if the control law is known, so that closed loop and controller can be simulated."""
+        return not isinstance(self.control, UnknownControl)
+
+    @property
+    def known_control(self) -> Control:
+        """The control law. Raises FieldError if it is unknown."""
+        if isinstance(self.control, UnknownControl):
+            raise FieldError(
+                ("control",),
+                "given no control law, allowed one: without it an axis can be diagnosed (hil diagnose), but not run or "
+                "simulated in closed loop; add the section `control`",
+            )
+        return self.control
+
+    def sampled(self, period_s: float) -> "Bench":
+        """The bench with the period of a recording [s], if its control law is unknown and gives no period."""
+        if not isinstance(self.control, UnknownControl) or self.control.velocity_period_s is not None:
+            return self
+        return self.model_copy(update={"control": self.control.model_copy(update={"velocity_period_s": period_s})})
 
     def twin(self) -> Twin:
         """The twin of this bench, with its mechanisms."""

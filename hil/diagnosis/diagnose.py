@@ -19,12 +19,14 @@ from hil.diagnosis.result import ChannelFit, Location, Mode, NextExperiment, Res
 from hil.diagnosis.search.forward_selection import Explanation, explain
 from hil.diagnosis.split import same, split
 from hil.diagnosis.time_left import with_time_left
+from hil.diagnosis.untold import untold
 from hil.diagnosis.verdict.cross_validation import CrossValidation, cross_validate, explained_share
 from hil.diagnosis.verdict.findings import corrections, diagnosed_bench, findings, form_of, renamed
 from hil.diagnosis.verdict.fit_table import channel_names, channel_residuals, fit_table
 from hil.diagnosis.verdict.judge import judge, not_testable
 from hil.diagnosis.wording import title, titles, where_in_short
 from hil.errors import InputError
+from hil.identification.completion import completed, reduced
 from hil.identification.dataset import Dataset, prepare_dataset
 from hil.identification.estimator import Fit, FitStatus
 from hil.identification.measured import Measured
@@ -118,6 +120,8 @@ def diagnose(
     begin = time.monotonic()
     progress = with_time_left(progress, begin, budget_s)
     progress("checking the recordings")
+    bench = reduced(bench, [*train, *validate])
+    train, validate = ([completed(run, bench) for run in runs] for runs in (train, validate))
     notes = []
     if not validate:
         train, validate = split(train)
@@ -153,10 +157,11 @@ def diagnose(
     progress("designing the next experiment")
     # with findings only their rivals are in question; without, the cause may be a mechanism that the motion cannot show
     experiment = None
-    if not explanation.stopped_at:
+    if bench.law_known and not explanation.stopped_at:
         experiment = separating(explanation, proof.final, held_out) if named else showing(nominal, hidden, held_out)
     notes += [*_notes(table, proof, forms, verdict, explanation), *_ended(final)]
     notes += [experiment.note] if experiment else []
+    notes += [] if bench.law_known else untold(data)
     notes += [_stopped(explanation, budget_s)] if explanation.stopped_at else []
     result = Result(
         verdict=verdict,
@@ -252,7 +257,7 @@ def _notes(
             "response of the axis to it. Random disturbances of the axis therefore count as mismatch."
         )
     blocks = [name for name, entry in table.items() if entry.mode is Mode.BLOCKS]
-    if blocks:
+    if blocks and explanation.nominal.bench.law_known:
         notes.append(
             f"Figures of {', '.join(blocks)} are block by block, with measured inputs: in closed loop the twin "
             "deviates from the recording by more than the noise although every block is at its floor (chaotic loop)."

@@ -16,6 +16,7 @@ from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
 from hil.channels import AXIS_CHANNELS
 from hil.errors import InputError
+from hil.identification.completion import completed, torque_is_measured
 from hil.identification.measured import Measured, take
 from hil.quantities import digits, misread_factors
 from hil.recording.recording import Recording
@@ -48,6 +49,7 @@ def prepare(recordings: Sequence[Recording], bench: Bench) -> list[Measured]:
     """
     if not recordings:
         raise InputError("given no recording, allowed one or more; give the recordings to diagnose")
+    recordings = [completed(recording, bench) for recording in recordings]
     found = [problem for recording in recordings for problem in _raw_problems(recording, bench)]
     if found:
         raise InputError("\n".join(found))
@@ -66,12 +68,18 @@ def _raw_problems(recording: Recording, bench: Bench) -> Iterator[str]:
             "record a motion there and back"
         )
     names = AXIS_CHANNELS[recording.kind]
-    for name in (names.position_command, names.velocity_command, names.motor_position, names.torque):
+    needed = (names.position_command, names.velocity_command, names.motor_position, names.torque)
+    for name in needed if bench.law_known else ():
         if name not in recording.columns:
             yield (
                 f"{recording.name}: {name} is not recorded, allowed are recordings with it; "
                 f"record it (there are {', '.join(recording.columns)})"
             )
+    if not torque_is_measured(recording) and not bench.has_table_encoder:
+        yield (
+            f"{recording.name}: neither {names.torque}, {names.torque_command} nor {names.table_position} is recorded, "
+            "allowed are recordings with one of them beside the motor: motion alone has no cause; record one"
+        )
 
 
 def _problems(run: Measured, bench: Bench) -> Iterator[str]:
@@ -105,22 +113,24 @@ def _problems(run: Measured, bench: Bench) -> Iterator[str]:
         )
         return
     found = [
-        *_position_problems(run, ratio, names.motor_position, names.table_position),
+        *_position_problems(run, bench, names.motor_position, names.table_position),
         *_set_point_problems(run, names.velocity_command),
     ]
     yield from found
-    yield from _saturation(run, bench, moving)
-    if not found:  # the check of the torque needs a valid measured motion
+    if bench.law_known:  # else the saturated rows obey the plant like the others
+        yield from _saturation(run, bench, moving)
+    if not found and "torque" not in run.unseen:  # the check of the torque needs a valid measured motion
         yield from _torque_problems(run, bench)
 
 
-def _position_problems(run: Measured, ratio: float, motor: str, table: str) -> Iterator[str]:
+def _position_problems(run: Measured, bench: Bench, motor: str, table: str) -> Iterator[str]:
+    ratio = bench.axis.ratio_m_rad
     slope = _factor_between(run.position_command_m, ratio * run.motor)
     resting = ~run.moving
     away_m = float(np.median((run.position_command_m - ratio * run.motor)[resting])) if resting.any() else 0.0
     if abs(slope - 1.0) > SLOPE_TOLERANCE:
         yield f"{motor}: {_factor(slope, _POSITION_UNITS, 'the set-points')}"
-    elif abs(away_m) > max(_AWAY * float(np.ptp(run.position_command_m)), _AWAY_M):
+    elif bench.law_known and abs(away_m) > max(_AWAY * float(np.ptp(run.position_command_m)), _AWAY_M):
         yield (
             f"{motor}: lies {1e3 * away_m:.4g} mm behind the set-points at rest: the zeros differ; "
             "correct the offset in the import map"

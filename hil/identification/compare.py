@@ -143,6 +143,7 @@ def compare(
     With `fit` the nominal parameters are fitted to the recording first. `progress` gets the name of each step. Raises
     InputError if recording and bench do not belong together, HilError if the fit fails or the twin is unstable.
     """
+    _ = bench.known_control  # raises: a comparison simulates the closed loop
     measured = take(recording, bench)
     data, fitted = prepare_dataset([measured], bench), None
     if fit:

@@ -75,10 +75,12 @@ def prepare_dataset(runs: Sequence[Measured], bench: Bench) -> Dataset:
     """Build the data set of recordings.
 
     With the observer's time constant the noise of the motor encoder makes as much observed torque as the noise of the
-    torque channel, within the bounds of the observer.
+    torque channel, within the bounds of the observer. Without a torque the fastest one moves the motor as measured.
     """
     wanted = max(np.sqrt(run.noise.motor * inertia(bench) / (TORQUE_ACCURACY * run.noise.torque)) for run in runs)
-    observer_s = float(np.clip(wanted, FASTEST_OBSERVER_TICKS * runs[0].period_s, SLOWEST_OBSERVER_S))
+    fastest_s = FASTEST_OBSERVER_TICKS * runs[0].period_s
+    wanted = fastest_s if any("motor" in run.unseen for run in runs) else wanted
+    observer_s = float(np.clip(wanted, fastest_s, max(SLOWEST_OBSERVER_S, fastest_s)))
     return Dataset(tuple(runs), bench, observer_s, max(float(np.ptp(run.position_command_m)) for run in runs))
 
 
@@ -95,13 +97,15 @@ def scales(
 
     A torque d that the twin misses moves its motor by d tau^2 / J before the correction takes hold, with tau the
     observer's time constant: the motor counts from the torque that the torque channel can still see. White noise e
-    of its encoder comes back through the observer as (1 - z^-1)^2 / (1 - a z^-1)^2 e, a = 1 - T / tau.
+    of its encoder comes back through the observer as (1 - z^-1)^2 / (1 - a z^-1)^2 e, a = 1 - T / tau. That of a
+    velocity v, whose trapezoidal sum is the position, comes back as (1 - z^-2) / 2 / (1 - a z^-1)^2 T v.
     """
     seen = torque_accuracy * run.noise.torque * observer_s**2 / inertia(bench)
     a = 1.0 - run.period_s / observer_s
     impulse = np.zeros(round(20.0 * observer_s / run.period_s) + 3)
     impulse[0] = 1.0
-    passed = lfilter([1.0, -2.0, 1.0], [1.0, -2.0 * a, a * a], impulse)
+    numerator = [0.5, 0.0, -0.5] if run.integrated else [1.0, -2.0, 1.0]
+    passed = lfilter(numerator, [1.0, -2.0 * a, a * a], impulse)
     rows = run.motor.shape
     table, torque = (np.broadcast_to(noise, rows) for noise in (run.noise.table_m, run.noise.torque))
     if run.table_m.size:

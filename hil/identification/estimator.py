@@ -5,10 +5,9 @@
     step s:  min |J s + r|^2 + mu |diag(J) s|^2   with x + s inside the bounds;  mu after Nielsen (1999)
 
 The Jacobian J is computed by forward differences, one simulation with the steps of a search per parameter, on all
-cores. While steps gain what the
-linear model predicts, J is updated along the step instead (Broyden 1965; Madsen, Nielsen and Tingleff 2004, sec. 3.5);
-a converged fit ends with a new J. The step is computed from J^T J: with 1e5 rows and ten parameters a decomposition of
-J, as in scipy's solvers, takes longer than the simulations.
+cores. While steps gain what the linear model predicts, J is updated along the step instead (Broyden 1965; Madsen,
+Nielsen and Tingleff 2004, sec. 3.5); a converged fit ends with a new J. The step is computed from J^T J: with 1e5 rows
+and ten parameters a decomposition of J, as in scipy's solvers, takes longer than the simulations.
 """
 
 import math
@@ -150,9 +149,8 @@ class Estimator:
     """Fits hypotheses to a data set.
 
     `edge_step_s` is the forward-difference step for the edge of a window, `torque_accuracy` the torque resolved by the
-    motor channel over the noise of the torque channel. `closed` selects residuals in closed loop,
-    `fast` those with the internal steps of a search. After `deadline_s` of the
-    monotonic clock fits take no more steps.
+    motor channel over the noise of the torque channel. `closed` selects residuals in closed loop, `fast` those with the
+    internal steps of a search. After `deadline_s` of the monotonic clock fits take no more steps.
     """
 
     data: Dataset

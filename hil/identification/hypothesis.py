@@ -245,17 +245,18 @@ class Hypothesis:
         return Twin(bench.axis.physics(), bench.gains, active + added, None, coarse_s, fine_s, observer_s)
 
     def respond(self, run: Measured) -> Response:
-        """Response of the twin in closed loop to the set-points of a run."""
+        """Response of the twin in closed loop to the set-points of a run. Raises FieldError without a control law."""
+        _ = self.bench.known_control  # raises
         return self.twin().simulate(run.position_command_m, run.velocity_command_m_s, run.start, run.table_m)
 
     def blocks(self, run: Measured, observer_s: float, fast: bool = False) -> dict[str, FloatArray]:
-        """Measured less twin with each block fed measured inputs, per channel (n,)."""
+        """Measured less twin with each block fed measured inputs, per channel (n,); 0 for channels that are unseen."""
         twin = self.twin(observer_s, fast)
         measured = twin.undelayed(run.response)
         predicted = twin.observe(run.position_command_m, run.velocity_command_m_s, measured, run.start)
         found = differences(measured, predicted, self.bench, run.judged)
         found["command"] = measured.torque_command - predicted.torque_command
-        return found
+        return found | {name: np.zeros(run.motor.size) for name in run.unseen}
 
     def residuals(self, data: Dataset, closed: bool = False, fast: bool = False) -> Residuals:
         """Residuals on a data set, block by block or in closed loop; `fast`: with the steps of a search."""

@@ -7,7 +7,7 @@ commands best. Rows before the first such tick are omitted, since their velocity
 A drive in CSP gets positions only: its velocity feed-forward is their difference from SYNC to SYNC.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -19,7 +19,8 @@ from hil.bench.hardware import DriveMode
 from hil.channels import AxisKind
 from hil.control import cascade
 from hil.errors import InputError
-from hil.identification.noise import Laps, Noise, estimate_noise, find_laps, moving
+from hil.identification.completion import completed, position_is_measured, torque_is_measured
+from hil.identification.noise import Laps, Noise, estimate_noise, find_laps, moving, white_noise
 from hil.recording.recording import Recording
 from hil.twin.axis import Response, Start
 
@@ -47,6 +48,8 @@ class Measured:
     start: Start
     noise: Noise
     left_out: int = 0  # rows of the recording before the first tick of the position loop
+    unseen: frozenset[str] = frozenset()  # channels of the twin whose input or output is unknown: their residual is 0
+    integrated: bool = False  # the motor position is the sum of its measured velocity
 
     @property
     def time_s(self) -> FloatArray:
@@ -85,10 +88,11 @@ class Measured:
 
 
 def take(recording: Recording, bench: Bench) -> Measured:
-    """Take the channels of a recording that the twin of `bench` needs.
+    """Take the channels of a recording that the twin of `bench` needs; without a control law, complete it first.
 
     Raises InputError for another kind of axis or period than the bench, a missing channel, or too few rows.
     """
+    recording, bench = completed(recording, bench), bench.sampled(recording.period_s)
     names, gains = recording.axis, bench.gains
     if (recording.kind is AxisKind.LINEAR) != bench.axis.linear:
         raise InputError(
@@ -122,10 +126,14 @@ def take(recording: Recording, bench: Bench) -> Measured:
         # the linear encoder closes the position loop: the datum of the motor encoder is arbitrary
         motor = motor + float(np.mean(table - gains.ratio_m_rad * motor)) / gains.ratio_m_rad
     feedback = table if table.size else gains.ratio_m_rad * motor
-    first = _first_tick(gains, (position, velocity, motor, feedback), command)
+    first = _first_tick(gains, (position, velocity, motor, feedback), command) if bench.law_known else 0
     position, velocity, motor, feedback, table, command, torque = (
         values[first:] for values in (position, velocity, motor, feedback, table, command, torque)
     )
+    noise = estimate_noise(bench, velocity, motor, table, command, torque, recording.period_s)
+    integrated = not position_is_measured(recording)
+    if integrated:
+        noise = replace(noise, motor=recording.period_s * white_noise(_column(recording, names.motor_velocity)))
     return Measured(
         recording.name,
         recording.kind,
@@ -138,9 +146,17 @@ def take(recording: Recording, bench: Bench) -> Measured:
         torque,
         bool(np.array_equal(command, torque)),
         _start(gains, (position, velocity, motor, feedback), command),
-        estimate_noise(bench, velocity, motor, table, command, torque, recording.period_s),
+        noise,
         first,
+        _unseen(recording, bench),
+        integrated,
     )
+
+
+def _unseen(recording: Recording, bench: Bench) -> frozenset[str]:
+    if bench.law_known:
+        return frozenset()
+    return frozenset({"command"} if torque_is_measured(recording) else {"command", "torque", "motor"})
 
 
 def bench_of(recording: Recording) -> Bench:

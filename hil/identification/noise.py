@@ -18,6 +18,8 @@ from hil.bench.bench_file import Bench
 class Noise:
     """Standard deviation of the white noise of a sensor: motor [rad or m], table [m], torque [N m or N].
 
+    `motor` is the noise of its travel per period if its velocity was recorded in place of its position.
+
     `table_m` is that of table position less r x motor position, 0 without a linear encoder. `jitter_s` is that of the
     sampling instants of the encoders: its position error is proportional to the speed and equal for both.
     """

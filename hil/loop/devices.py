@@ -171,6 +171,7 @@ def open_devices(bench: Bench, seed: int | None = None) -> Devices:
 def check_runnable(bench: Bench) -> None:
     """Raise FieldError at the field for which a bench cannot be run over CANopen."""
     section = bench.drive or DriveSection()
+    _ = bench.known_control  # raises
     if bench.drive is None and bench.simulation is None:
         raise FieldError(
             ("drive",),

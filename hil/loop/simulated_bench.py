@@ -24,7 +24,7 @@ from drivers.sim.plant import Plant
 from drivers.sim.sensors import Sensors
 from drivers.sim.serial_line import SimulatedSerialEncoder
 from drivers.sim.servo import DriveServo, PositionFeedback, Servo, VelocityEstimate
-from hil.bench.axis_models import Axis, OneMass, Rigid, SerialChain, SevenDofAxis, TwoMass
+from hil.bench.axis_models import Axis, OneMass, Rigid, Rotary, RotaryTwoMass, SerialChain, SevenDofAxis, TwoMass
 from hil.bench.bench_file import Bench, bench_path
 from hil.bench.hardware import DriveSection, SimulationSection
 from hil.errors import FieldError
@@ -128,6 +128,16 @@ def _true_axis(believed: Axis, simulation: SimulationSection) -> AxisTruth:
     }
     if isinstance(axis, Rigid):
         return AxisTruth((axis.mass_kg,), (), None, **friction)
+    if isinstance(axis, Rotary):
+        return AxisTruth((axis.inertia_kg_m2 / axis.ratio_m_rad**2,), (), None, **friction)
+    if isinstance(axis, RotaryTwoMass):
+        return truth.two_mass(
+            motor_mass_kg=axis.motor_inertia_kg_m2 / axis.ratio_m_rad**2,
+            table_mass_kg=axis.load_inertia_kg_m2,
+            stiffness_n_m=axis.stiffness_n_m_rad,
+            damping_ratio=axis.damping_ratio,
+            **friction,
+        )
     if isinstance(axis, TwoMass):
         return truth.two_mass(
             motor_mass_kg=axis.motor_mass_kg,
@@ -166,7 +176,7 @@ def _seven_dof(axis: SevenDofAxis, friction: dict[str, Any]) -> AxisTruth:
 
 def _servo(bench: Bench) -> DriveServo:
     """Loops inside the simulated drive, for CSV, CSP and stops: the law of the bench on the motor encoder."""
-    gains, control = bench.gains, bench.control
+    control, gains = bench.known_control, bench.gains
     integral = gains.integral_gain_n_m_rad
     servo = Servo(
         position_gain_1_s=gains.position_gain_1_s, velocity_feedforward=gains.velocity_feedforward,

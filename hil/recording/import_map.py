@@ -118,8 +118,7 @@ class RecordingMap(_Strict):
     @property
     def axis(self) -> AxisChannels:
         """Names of the channels of this kind of axis."""
-        linear = "motor_position_m" in self.channels
-        return AXIS_CHANNELS[AxisKind.LINEAR if linear else AxisKind.ROTARY]
+        return AXIS_CHANNELS[AxisKind.of(self.channels)]
 
     @model_validator(mode="after")
     def _is_complete(self) -> Self:
@@ -142,9 +141,16 @@ class RecordingMap(_Strict):
                     f"given {source.unit!r}, allowed {', '.join(allowed)}{lead}; correct the unit",
                 )
         axis = self.axis
-        for name in (axis.position_command, axis.motor_position):
-            if name not in self.channels:
-                raise FieldError(("channels",), f"{name} is missing (motor_position_m on a linear axis); add it")
-        if not {axis.torque, axis.torque_command} & set(self.channels):
-            raise FieldError(("channels",), f"{axis.torque} and {axis.torque_command} are missing; add one")
+        if not {axis.motor_position, axis.motor_velocity} & set(self.channels):
+            raise FieldError(
+                ("channels",),
+                f"{axis.motor_position} is missing, and {axis.motor_velocity} too (motor_position_m, "
+                "motor_velocity_m_s on a linear axis); add one",
+            )
+        if not {axis.torque, axis.torque_command, axis.table_position} & set(self.channels):
+            raise FieldError(
+                ("channels",),
+                f"{axis.torque} and {axis.torque_command} are missing; add one, or {axis.table_position} to tell the "
+                "transmission alone",
+            )
         return self

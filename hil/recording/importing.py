@@ -97,11 +97,11 @@ def _resampled(columns: dict[str, FloatArray], rate_hz: float, place: Callable[[
 def _derive(columns: dict[str, FloatArray], axis: AxisChannels, period_s: float) -> dict[str, str]:
     """Add the channels that follow from others; return how each was derived."""
     derived = {}
-    if axis.velocity_command not in columns:
+    if axis.velocity_command not in columns and axis.position_command in columns:
         columns[axis.velocity_command] = np.gradient(columns[axis.position_command], period_s)
         derived[axis.velocity_command] = f"central differences of {axis.position_command}"
     for name, other in ((axis.torque, axis.torque_command), (axis.torque_command, axis.torque)):
-        if name not in columns:
+        if name not in columns and other in columns:
             columns[name] = columns[other].copy()
             derived[name] = f"copy of {other}, the only one recorded"
     return derived

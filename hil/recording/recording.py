@@ -61,8 +61,8 @@ class Recording:
 
     @property
     def kind(self) -> AxisKind:
-        """Rotary or linear, as the name of the motor encoder's channel says."""
-        return AxisKind.LINEAR if "motor_position_m" in self.columns else AxisKind.ROTARY
+        """Rotary or linear, as the name of the motor's position or velocity says."""
+        return AxisKind.of(self.columns)
 
     @property
     def axis(self) -> AxisChannels:
@@ -91,8 +91,8 @@ def read_recording(path: str | Path) -> Recording:
 
     An Arrow stream that was cut off is read to its last complete batch; `metadata["recovered"]` then says
     so. Columns that the channel table does not know are left out and listed in `metadata["unknown_columns"]`.
-    Raises InputError with file, row and column: no such file, not this format, a required channel missing
-    (time, set-points, motor encoder, torque or force), NaN or infinity, text, a clock that
+    Raises InputError with file, row and column: no such file, not this format, a required channel missing (time,
+    position or velocity of the motor, torque, its command or the table's position), NaN or infinity, text, a clock that
     repeats, runs back or is irregular.
     """
     path = Path(path)
@@ -254,10 +254,12 @@ def _from_table(path: Path, table: pa.Table, notes: dict[str, Any]) -> Recording
 
 def _known(path: Path, names: tuple[str, ...]) -> list[str]:
     """The channels among the columns of a file, with those that every recording needs."""
-    kind = AxisKind.LINEAR if "motor_position_m" in names else AxisKind.ROTARY
+    kind = AxisKind.of(names)
     axis = AXIS_CHANNELS[kind]
-    required = ("time_s", axis.position_command, axis.velocity_command, axis.motor_position, axis.torque)
-    missing = [name for name in required if name not in names]
+    missing = ["time_s"] if "time_s" not in names else []
+    # one of each: position or velocity of the motor; what moves it, or else the table that it moves
+    alternatives = (axis.motor_position, axis.motor_velocity), (axis.torque, axis.torque_command, axis.table_position)
+    missing += [group[0] for group in alternatives if not set(group) & set(names)]
     if missing:
         linear = " (a linear axis has motor_position_m and force_n)" if kind is AxisKind.ROTARY else ""
         raise InputError(

@@ -38,7 +38,7 @@ def acting(found: Fit) -> tuple[str, str] | None:
     """Block and element if the reaction torque isolates the table or the linear encoder, else None."""
     fitted, runs = found.bench, found.data.runs
     chain = fitted.axis.physics().chain
-    if len(chain.names) < 2 or not all(run.table_m.size for run in runs):
+    if len(chain.names) < 2 or not all(run.table_m.size and "motor" not in run.unseen for run in runs):
         return None
     stiffness, table_inertia = stiffness_between(chain), float(chain.inertia_kg_m2[chain.table, chain.table])
     observer_s, felt, off, moved = found.data.observer_s, list[FloatArray](), list[FloatArray](), list[FloatArray]()

@@ -27,7 +27,7 @@ REVERSAL_S, STEEPEST_S = 0.4, 0.05  # shown before and after: a reversal with it
 
 
 def friction_over_speed(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:
-    """Draw motor torque - J a over speed, measured and simulated from the same set-points, beside the friction laws."""
+    """Draw motor torque - J a over speed, measured and of the twin, beside the friction laws."""
     final = diagnosis.final
     to_m_min = 60.0 * diagnosis.owner.axis.ratio_m_rad
     fastest = max(float(np.abs(view.torque.velocity).max()) for view in views)
@@ -35,11 +35,7 @@ def friction_over_speed(diagnosis: Diagnosis, views: Sequence[View]) -> Captione
     figure = Figure(figsize=(10.0, 5.6), layout="constrained")
     axis = figure.subplots()
     measured = [_friction_of(final, view.run, view.run.motor, view.run.torque) for view in views]
-    responses = [final.hypothesis.respond(view.run) for view in views]
-    simulated = [
-        _friction_of(final, view.run, response.motor_position, response.torque)
-        for view, response in zip(views, responses, strict=True)
-    ]
+    simulated = [_friction_of(final, view.run, *_answer(final, view)) for view in views]
     for sign, marker, colour, dash, name in (
         (1.0, "^", MEASURED, "-", "positive"),
         (-1.0, "v", DEVIATION, "--", "negative"),
@@ -63,11 +59,23 @@ def friction_over_speed(diagnosis: Diagnosis, views: Sequence[View]) -> Captione
     unit = "N" if diagnosis.owner.axis.linear else "N m"
     style_axis(axis, f"friction [{unit}]", "speed of the table [m/min]", "Friction over speed")
     axis.legend(frameon=False, ncols=2)
+    how = "simulated from the same set-points" if final.bench.law_known else "held on the measured motion"
     return Captioned(
         figure,
         "Motor torque - inertia × acceleration where the acceleration is small: median and quartiles of the samples in "
-        "each range of speed. The twin with the findings is simulated from the same set-points and evaluated alike.",
+        f"each range of speed. The twin with the findings is {how} and evaluated alike.",
     )
+
+
+def _answer(final: Fit, view: View) -> tuple[FloatArray, FloatArray]:
+    """Motor position and torque (n,) of the twin: in closed loop, else that of the measured motion.
+
+    Without a control law the torque is the measured one with the disturbance that the twin lacks.
+    """
+    if not final.bench.law_known:
+        return view.run.motor, view.run.torque + view.torque.torque - view.torque_modelled.torque
+    response = final.hypothesis.respond(view.run)
+    return response.motor_position, response.torque
 
 
 def _friction_of(final: Fit, run: Measured, motor: FloatArray, torque: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -114,7 +114,7 @@ def explain(data: Dataset, progress: Progress = lambda text: None, deadline_s: f
         step(f"screening the library beside {len(base.terms)} terms")
         if stopped_at:
             break
-        candidates = [one for one in screen_library(base) if claimable(one.term, base.bench)]
+        candidates = [one for one in screen_library(base) if claimable(one.term, base.bench, data.runs)]
         first = first or candidates
         found, best = _next_term(base, owner, nominal, candidates, step)
         fitted = {fit.terms[-1].effect for fit in found if not base.estimator.expired}
@@ -179,7 +179,7 @@ def _next_term(
 
 
 def _claimable(found: Sequence[Fit]) -> list[Fit]:
-    return [other for other in found if claimable(other.terms[-1], other.bench)]
+    return [other for other in found if claimable(other.terms[-1], other.bench, other.data.runs)]
 
 
 def _worthwhile(found: Sequence[Fit], base: Fit, nominal: Fit) -> Fit | None:
@@ -224,7 +224,8 @@ def _without(found: Fit, index: int) -> Fit:
 def claimed(found: Fit) -> Fit:
     """Remove the terms whose values are not valid for their mechanism."""
     while True:
-        lost = next((index for index, term in enumerate(found.terms) if not claimable(term, found.bench)), None)
+        terms, bench, runs = found.terms, found.bench, found.data.runs
+        lost = next((index for index, term in enumerate(terms) if not claimable(term, bench, runs)), None)
         if lost is None:
             return found
         rest = _without(found, lost)

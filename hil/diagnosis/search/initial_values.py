@@ -20,7 +20,7 @@ from hil.identification.dataset import inertia
 from hil.identification.measured import Measured
 from hil.identification.terms import Term, free_slot
 from hil.twin.library import BY_ID, LIBRARY
-from hil.twin.mechanism import Mechanism
+from hil.twin.mechanism import Block, Mechanism
 from hil.twin.parameter import Dimension, Role
 from hil.twin.scene import AxisFacts, Scene
 
@@ -184,6 +184,14 @@ def _other(mechanism: Mechanism, value: float, lead_m: float) -> float:
     return value if mechanism.indices(Role.ORDER) else lead_m / value
 
 
-def claimable(term: Term, bench: Bench) -> bool:
+_BLOCK_OF = {"command": Block.CONTROLLER, "torque": Block.DRIVE, "motor": Block.MOTOR_SIDE}
+
+
+def judged(effect: str, runs: Sequence[Measured]) -> bool:
+    """True if input and output of the block of a mechanism are known in the recordings."""
+    return not any(BY_ID[effect].block is _BLOCK_OF[channel] for run in runs for channel in run.unseen)
+
+
+def claimable(term: Term, bench: Bench, runs: Sequence[Measured] = ()) -> bool:
     """True if the values are valid for the mechanism of a term, and the sensors can show it."""
-    return BY_ID[term.effect].is_valid(term.values, term.variant, axis_facts(bench))
+    return judged(term.effect, runs) and BY_ID[term.effect].is_valid(term.values, term.variant, axis_facts(bench, runs))

@@ -32,7 +32,7 @@ def from_owner(base: Fit) -> list[Fit]:
     """Fit the first candidates at the nominal parameters of the bench file, best first."""
     # not fitted, so without a Jacobian: the score test has no projection
     owner = base.estimator.evaluate(base.hypothesis.moved(owner_points(base)[-1]))
-    promising = [one for one in screen_library(owner) if claimable(one.term, owner.bench)]
+    promising = [one for one in screen_library(owner) if claimable(one.term, owner.bench, owner.data.runs)]
     return race(owner, promising) if promising else []
 
 

@@ -35,7 +35,7 @@ def renamed(found: Fit) -> Fit:
         return found
 
     def called(term: Term, fitted: Term) -> Term:
-        rather = term.effect == LOAD and claimable(replace(fitted, effect=FRICTION), found.bench)
+        rather = term.effect == LOAD and claimable(replace(fitted, effect=FRICTION), found.bench, found.data.runs)
         return replace(term, effect=FRICTION) if rather else term
 
     return replace(found, hypothesis=replace(hypothesis, terms=tuple(map(called, hypothesis.terms, found.terms))))
@@ -51,7 +51,7 @@ def findings(
     """Make a finding of each term that is not part of another (`forms`), the one with most energy first."""
     deviations = standard_errors(final)
     left = math.sqrt(max(final.on(data).worst_ratio for data in (final.data, held_out) if data.runs))
-    bench, terms = final.bench, final.terms
+    bench, terms, runs = final.bench, final.terms, final.data.runs
     result = []
     for index, (term, ablation) in enumerate(zip(terms, ablations, strict=True)):
         if index in forms:
@@ -60,7 +60,9 @@ def findings(
         rivals = rivals_of(explanation, term)
         tied = [rival.fit.terms[-1].effect for rival in rivals if rival.tied]
         if ambiguous(term):
-            tied += [name for name in SAME if name != term.effect and claimable(replace(term, effect=name), bench)]
+            tied += [
+                name for name in SAME if name != term.effect and claimable(replace(term, effect=name), bench, runs)
+            ]
         margin = min(
             (rival.evidence for rival in rivals if rival.fit.terms[-1].effect not in tied),
             default=explanation.needed.get(_key(explanation, term), math.inf),
@@ -89,11 +91,16 @@ def findings(
 
 
 def corrections(owner: Bench, found: Fit) -> dict[str, Correction]:
-    """Nominal parameters of the bench file and as fitted."""
+    """Nominal parameters of the bench file and as fitted; without a torque only the damping of the transmission.
+
+    Motion alone gives the ratio of stiffness and mass, and nothing of the motor side.
+    """
     deviations = standard_errors(found)
+    told = ("damping_ratio",) if any("motor" in run.unseen for run in found.data.runs) else owner.axis.NOMINAL
     return {
         name: Correction(nominal=float(getattr(owner.axis, name)), value=value, std=std, unit=unit_of(name))
         for name, value, std in zip(owner.axis.NOMINAL, found.hypothesis.values, deviations, strict=False)
+        if name in told
     }
 
 

@@ -1,8 +1,9 @@
 """Residuals before and after, by channel, on training and on held-out recordings, beside the noise floor.
 
-Figures are in closed loop unless the loop is chaotic: with stick-slip or play two recordings of the same axis diverge,
-and a twin at the noise floor in every block deviates from the recording. Then the figures are block by block, with
-measured inputs. The same holds for the motor position if its encoder resolves the motion caused by the torque noise.
+Figures are in closed loop unless the control law is unknown or the loop is chaotic: with stick-slip or play two
+recordings of the same axis diverge, and a twin at the noise floor in every block deviates from the recording. Then the
+figures are block by block, with measured inputs. The same holds for the motor position if its encoder resolves the
+motion caused by the torque noise.
 """
 
 import math
@@ -109,19 +110,26 @@ def fit_table(owner: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> dict[s
     train = final.data
     sets = [data for data in (train, held_out) if data.runs]
     laps = any(data.laps for data in sets)
-    noise = {run: noise_response(final.hypothesis, run) for data in sets for run in data.runs}
+    law_known = final.bench.law_known
+    modes = (Mode.CLOSED_LOOP, Mode.BLOCKS) if law_known else (Mode.BLOCKS,)
+    noise = {run: noise_response(final.hypothesis, run) if law_known else {} for data in sets for run in data.runs}
     result = {}
     for channel, recorded in channel_names(final.bench, train.runs[0]).items():
-        if channel == "command":
+        shown = train.runs[0]
+        if channel == "command" or channel in shown.unseen:
+            continue
+        if channel == "torque" and not law_known and shown.torque_is_command:  # the twin was given it
             continue
         figures = {
             mode: [table.figures(data, held_out if data is train else train) for data in sets]
-            for mode in (Mode.CLOSED_LOOP, Mode.BLOCKS)
+            for mode in modes
             for table in [_ChannelTable(owner.hypothesis, nominal.hypothesis, final.hypothesis, noise, channel, mode)]
         }
-        closed, block = (max(one.after_rms / one.noise_floor_rms for one in figures[mode]) for mode in figures)
-        chaotic = closed > STRAYS >= block and not train.runs[0].torque_is_command
-        mode = Mode.BLOCKS if chaotic else Mode.CLOSED_LOOP
+        mode = modes[0]
+        if law_known:
+            closed, block = (max(one.after_rms / one.noise_floor_rms for one in figures[mode]) for mode in figures)
+            chaotic = closed > STRAYS >= block and not train.runs[0].torque_is_command
+            mode = Mode.BLOCKS if chaotic else Mode.CLOSED_LOOP
         result[recorded] = ChannelFit(
             unit=CHANNELS[recorded].unit,
             mode=mode,

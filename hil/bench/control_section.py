@@ -1,0 +1,137 @@
+"""Control section of a bench file: the law of `hil.control.cascade` with its gains, or that it is not known.
+
+Without a known law the plant is judged alone: measured torque in, measured motion out.
+"""
+
+import math
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, model_validator
+
+from hil.bench.axis_models import NotNegative, Positive, _Model
+from hil.control.cascade import INFINITE, Gains, make_gains
+from hil.errors import FieldError
+
+_MA_PER_RPM = 1e-3 * 60.0 / (2.0 * math.pi)  # mA/rpm in A s/rad
+UNKNOWN = "unknown"
+
+# a period in milliseconds is refused
+Period = Annotated[float, Field(gt=0.0, le=0.1, allow_inf_nan=False, description="[s]")]
+
+
+class Control(_Model):
+    """The control law of `hil.control.cascade`, gains in SI or in the units of the source."""
+
+    law: Literal["cascade"] = "cascade"
+    position_gain_1_s: Positive = Field(description="Kv [1/s]")
+    velocity_feedforward: NotNegative = Field(1.0, description="1 is 100 %")
+    position_period_s: Period = 0.004
+    velocity_gain_n_m_s_rad: Positive | None = Field(None, description="Kp [N m s/rad]; or the next two")
+    velocity_gain_n_s_m: Positive | None = Field(None, description="Kp of a linear axis [N s/m]")
+    velocity_gain_ma_rpm: Positive | None = Field(None, description="Kp [mA/rpm], with torque_constant_n_m_a")
+    torque_constant_n_m_a: Positive | None = Field(None, description="Kt [N m/A]")
+    velocity_integral_time_s: Positive | None = Field(None, description="Ti [s]; absent: a P velocity loop")
+    velocity_integral_time_ms: Positive | None = Field(None, description="Ti [ms]")
+    velocity_period_s: Period = 0.001
+    torque_limit_n_m: Positive | None = None
+    force_limit_n: Positive | None = None
+    position_feedback: Literal["motor", "table"] = "motor"
+    velocity_estimate: Literal["backward_difference", "two_sample_mean"] = "backward_difference"
+    velocity_filter_time_constant_s: NotNegative = 0.0
+
+    @model_validator(mode="after")
+    def _one_gain(self) -> Self:
+        given = [self.velocity_gain_n_m_s_rad, self.velocity_gain_n_s_m, self.velocity_gain_ma_rpm]
+        if sum(value is not None for value in given) != 1:
+            raise FieldError(
+                ("velocity_gain_n_m_s_rad",),
+                "give the velocity gain once: velocity_gain_n_m_s_rad, "
+                "velocity_gain_n_s_m (linear axis) or velocity_gain_ma_rpm",
+            )
+        if self.velocity_gain_ma_rpm is not None and self.torque_constant_n_m_a is None:
+            raise FieldError(
+                ("torque_constant_n_m_a",), "given nothing, allowed a value in N m/A: velocity_gain_ma_rpm needs it"
+            )
+        if self.velocity_integral_time_s is not None and self.velocity_integral_time_ms is not None:
+            raise FieldError(("velocity_integral_time_ms",), "given twice; remove it or velocity_integral_time_s")
+        ticks = round(self.position_period_s / self.velocity_period_s)
+        if ticks < 1 or abs(ticks * self.velocity_period_s - self.position_period_s) > 1e-9:
+            raise FieldError(
+                ("position_period_s",),
+                f"given {self.position_period_s}, allowed a whole multiple of "
+                f"velocity_period_s = {self.velocity_period_s}",
+            )
+        return self
+
+    def gains(self, ratio_m_rad: float) -> Gains:
+        """Return the constants of the control law for an axis with this ratio [m/rad]."""
+        if self.velocity_gain_ma_rpm is not None and self.torque_constant_n_m_a is not None:
+            gain = self.velocity_gain_ma_rpm * _MA_PER_RPM * self.torque_constant_n_m_a
+        else:
+            gain = self.velocity_gain_n_m_s_rad or self.velocity_gain_n_s_m or 0.0
+        integral = self.velocity_integral_time_s
+        if self.velocity_integral_time_ms is not None:
+            integral = 1e-3 * self.velocity_integral_time_ms
+        return make_gains(
+            position_gain_1_s=self.position_gain_1_s,
+            velocity_gain_n_m_s_rad=gain,
+            ratio_m_rad=ratio_m_rad,
+            velocity_feedforward=self.velocity_feedforward,
+            velocity_integral_time_s=integral,
+            velocity_period_s=self.velocity_period_s,
+            position_period_s=self.position_period_s,
+            torque_limit_n_m=self.torque_limit_n_m or self.force_limit_n or INFINITE,
+            position_from_table=self.position_feedback == "table",
+            two_sample_mean=self.velocity_estimate == "two_sample_mean",
+            velocity_filter_time_constant_s=self.velocity_filter_time_constant_s,
+        )
+
+
+class UnknownControl(_Model):
+    """A control law that is not known. It is not simulated, and no mismatch is assigned to it."""
+
+    law: Literal["unknown"]
+    velocity_period_s: Period | None = None  # absent: the period of the recording
+    position_feedback: Literal["motor", "table"] = "motor"
+    torque_limit_n_m: Positive | None = None
+    force_limit_n: Positive | None = None
+
+    def gains(self, ratio_m_rad: float) -> Gains:
+        """Return period, ratio and limit, with gains of 0: a controller that commands nothing.
+
+        Raises FieldError without a period.
+        """
+        if self.velocity_period_s is None:
+            raise FieldError(
+                ("control", "velocity_period_s"), "given nothing, allowed a value in s; a recording gives it"
+            )
+        return make_gains(
+            position_gain_1_s=0.0,
+            velocity_gain_n_m_s_rad=0.0,
+            ratio_m_rad=ratio_m_rad,
+            velocity_period_s=self.velocity_period_s,
+            position_period_s=self.velocity_period_s,
+            torque_limit_n_m=self.torque_limit_n_m or self.force_limit_n or INFINITE,
+            position_from_table=self.position_feedback == "table",
+        )
+
+
+ControlSection = Annotated[Control | UnknownControl, Field(discriminator="law")]
+
+
+def with_law(given: Any) -> Any:
+    """Add the key `law` to a control section: unknown if the section, or a value in it, is absent or `unknown`.
+
+    Of a law that is known in part the keys of `UnknownControl` are kept. Raises FieldError for a key that neither has.
+    """
+    if given is None or given == UNKNOWN:
+        return {"law": UNKNOWN}
+    if not isinstance(given, dict) or UNKNOWN not in given.values():
+        return {"law": "cascade", **given} if isinstance(given, dict) else given
+    for key in given:
+        if key not in Control.model_fields:
+            raise FieldError(
+                ("control", key), f"given an unknown key, allowed one of {', '.join(Control.model_fields)}; remove it"
+            )
+    kept = {key: value for key, value in given.items() if key in UnknownControl.model_fields and value != UNKNOWN}
+    return {**kept, "law": UNKNOWN}

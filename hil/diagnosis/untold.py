@@ -1,0 +1,50 @@
+"""Notes on what a diagnosis without a control law or a channel cannot tell, and what would tell it."""
+
+from hil.bench.bench_file import Bench
+from hil.channels import AXIS_CHANNELS
+from hil.diagnosis.wording import titles
+from hil.identification.dataset import Dataset
+from hil.identification.measured import Measured
+from hil.twin.library import LIBRARY
+from hil.twin.mechanism import Block
+
+
+def untold(data: Dataset) -> list[str]:
+    """Notes for recordings of a bench whose control law is unknown."""
+    run, bench = data.runs[0], data.bench
+    controller = titles([mechanism.id for mechanism in LIBRARY if mechanism.block is Block.CONTROLLER])
+    return [
+        "The control law is unknown: the plant was judged alone, block by block, from measured torque to measured "
+        "motion. There is no figure in closed loop and no next experiment, and no mismatch was assigned to the "
+        f"controller. {controller.capitalize()} cannot be tested: describe the law under `control` of the bench file, "
+        "and record the set-points.",
+        *_of_torque(run),
+        *_of_encoders(run, bench),
+    ]
+
+
+def _of_torque(run: Measured) -> list[str]:
+    names = AXIS_CHANNELS[run.kind]
+    if "torque" in run.unseen:
+        return [
+            f"No torque is recorded: only the transmission was judged, from {names.motor_position} to "
+            f"{names.table_position}. Friction and loads of the motor side and the drive cannot be told, and of masses "
+            f"and stiffness only their ratio; record {names.torque} or {names.torque_command}."
+        ]
+    if run.torque_is_command:
+        return [
+            f"Only one of {names.torque} and {names.torque_command} is recorded: an effect of the drive shows only as "
+            "wrong motion. Record both to tell drive and motor apart."
+        ]
+    return []
+
+
+def _of_encoders(run: Measured, bench: Bench) -> list[str]:
+    if bench.has_table_encoder:
+        return []
+    hidden = titles([mechanism.id for mechanism in LIBRARY if mechanism.needs_table])
+    names = AXIS_CHANNELS[run.kind]
+    return [
+        f"Only one position is recorded: {hidden} cannot be tested; record both {names.motor_position} and "
+        f"{names.table_position}."
+    ]

@@ -1,10 +1,8 @@
 """Draft a bench file from a recording: kind of axis, masses, friction, lead, gains, encoders, each with its error."""
 
 from dataclasses import dataclass, field
-from functools import cache
 from math import log2, pi, sqrt
 
-from hil.bench.bench_file import Bench
 from hil.channels import AxisKind
 from hil.drafting.draft_map import ROTARY_LEAD_M, usual_lead
 from hil.drafting.estimate import Estimate
@@ -18,6 +16,8 @@ from hil.quantities import digits
 from hil.recording.recording import Recording
 
 _FINEST_M, _COARSEST_M = 1e-12, 1e-3  # resolution of a second encoder that a bench file takes
+LONGEST_LEAD_M = 1.0  # that a bench file takes; a load that turns as far as its motor, 1 m for 1 rad, has 6.3
+DIRECT = 0.02  # deviation from equal angles of motor and load up to which there is no gear
 _STEPS_PER_NOISE = sqrt(12.0)  # a count of q has noise of q / sqrt(12)
 
 
@@ -47,17 +47,6 @@ class BenchDraft:
     unsure: list[str] = field(default_factory=list)
 
 
-@cache
-def control_may_be_unknown() -> bool:
-    """True if the bench model takes `control: unknown`."""
-    axis = {"mass_kg": 1.0, "coulomb_force_n": 0.0, "viscous_force_n_s_m": 0.0}
-    try:
-        Bench.model_validate(axis | {"control": "unknown"})
-    except ValueError:
-        return False
-    return True
-
-
 def draft_bench(recording: Recording) -> BenchDraft:
     """Draft the bench of the axis of a recording.
 
@@ -71,9 +60,16 @@ def draft_bench(recording: Recording) -> BenchDraft:
     else:
         lead = _lead(recording, transmission)
         ratio = lead.value / (2.0 * pi)
-        model = "two_mass" if transmission is not None and _elastic(transmission) else "rigid"
+        elastic = transmission if transmission is not None and _elastic(transmission) else None
+        turns = recording.metadata.get("lead_m") == ROTARY_LEAD_M or lead.value > LONGEST_LEAD_M
+        model = {(True, True): "rotary_two_mass", (True, False): "rotary", (False, True): "two_mass"}.get(
+            (turns, elastic is not None), "rigid"
+        )
         draft = BenchDraft(recording.name, recording.kind, model)
-        _rotary(draft, plant, transmission, lead)
+        if turns:
+            _turning(draft, plant, elastic, lead)
+        else:
+            _screw(draft, plant, elastic, lead)
     _control(draft, recording, loop_values(recording, ratio))
     _encoders(draft, recording)
     _notes(draft, recording, plant, transmission)
@@ -81,6 +77,7 @@ def draft_bench(recording: Recording) -> BenchDraft:
 
 
 def _lead(recording: Recording, transmission: TransmissionValues | None) -> Estimate:
+    """Travel per motor revolution; on a rotary axis that of the load in rad."""
     names = recording.axis
     if transmission is not None:
         measured = transmission.ratio.scaled(2.0 * pi)
@@ -88,9 +85,9 @@ def _lead(recording: Recording, transmission: TransmissionValues | None) -> Esti
         relation = proportional(recording[names.position_command], recording[names.motor_position])
         measured = Estimate(2.0 * pi * relation.factor, 0.0, "set-points over the motor's encoder")
     else:
-        return Estimate(ROTARY_LEAD_M, 0.0, "a rotary axis: one metre stands for one revolution")
-    if abs(measured.value / ROTARY_LEAD_M - 1.0) < 0.02:
-        return Estimate(ROTARY_LEAD_M, 0.0, f"a rotary axis: one metre stands for one revolution; {measured.how}")
+        return Estimate(ROTARY_LEAD_M, 0.0, "one encoder and no set-points: no ratio is told")
+    if abs(measured.value / ROTARY_LEAD_M - 1.0) < DIRECT:
+        return Estimate(ROTARY_LEAD_M, measured.std_error, f"direct; {measured.how}")
     lead = usual_lead(measured.value)
     how = measured.how if lead == measured.value else f"{measured.how} ({1e3 * measured.value:.6g} mm measured)"
     return Estimate(lead, measured.std_error, how)
@@ -108,36 +105,54 @@ def _linear(draft: BenchDraft, plant: PlantValues) -> None:
     ]
 
 
-def _rotary(draft: BenchDraft, plant: PlantValues, transmission: TransmissionValues | None, lead: Estimate) -> None:
-    ratio = lead.value / (2.0 * pi)
-    mass = plant.inertia.scaled(1.0 / ratio**2)
+def _screw(draft: BenchDraft, plant: PlantValues, elastic: TransmissionValues | None, lead: Estimate) -> None:
+    mass = plant.inertia.scaled((2.0 * pi / lead.value) ** 2)
     inertia = f"inertia {digits(plant.inertia.value)} kg m^2 at the motor"
     draft.axis.append(BenchValue("lead_m", lead.value, f"m per revolution, {_error(lead)}", lead.how))
-    if draft.model == "two_mass" and transmission is not None:
+    if elastic is None:
+        draft.axis.append(_value("mass_kg", mass, "kg", inertia))
+    else:
         half = mass.scaled(0.5)
         draft.axis += [
-            BenchValue(
-                "motor_mass_kg",
-                half.value,
-                f"kg, {_error(half)}",
-                f"half of {digits(mass.value)} kg: the split is not told; {mass.how}",
-            ),
-            BenchValue("table_mass_kg", half.value, f"kg, {_error(half)}", f"the other half; {inertia}"),
+            _value("motor_mass_kg", half, "kg", f"half of {digits(mass.value)} kg: the split is not told"),
+            _value("table_mass_kg", half, "kg", f"the other half; {inertia}"),
+            _value("stiffness_n_m", _stiffness(half, elastic), "N/m", "deflection over acceleration, for this split"),
         ]
-        stretch = transmission.compliance_s2
-        stiffness = Estimate(half.value / -stretch.value, half.value / stretch.value**2 * stretch.std_error)
-        draft.axis.append(
-            _value("stiffness_n_m", stiffness, "N/m", "deflection over acceleration, for this split of the masses")
-        )
         draft.unsure.append(
-            "motor_mass_kg, table_mass_kg, stiffness_n_m: only the sum of the masses and table mass over stiffness are told"
+            "motor_mass_kg, table_mass_kg, stiffness_n_m: told are the sum of the masses and table mass over stiffness"
         )
+    _rotary_friction(draft, plant)
+
+
+def _turning(draft: BenchDraft, plant: PlantValues, elastic: TransmissionValues | None, lead: Estimate) -> None:
+    gear = Estimate(ROTARY_LEAD_M / lead.value, ROTARY_LEAD_M / lead.value**2 * lead.std_error, lead.how)
+    draft.axis.append(_value("gear_ratio", gear, "motor per load"))
+    if elastic is None:
+        draft.axis.append(_value("inertia_kg_m2", plant.inertia, "kg m^2 at the motor"))
     else:
-        draft.axis.append(_value("mass_kg", mass, "kg", inertia))
+        motor = plant.inertia.scaled(0.5)
+        load = motor.scaled(gear.value**2)
+        draft.axis += [
+            _value("motor_inertia_kg_m2", motor, "kg m^2 at the motor", "half of the sum: the split is not told"),
+            _value("load_inertia_kg_m2", load, "kg m^2 at the load", "the other half"),
+            _value("stiffness_n_m_rad", _stiffness(load, elastic), "N m/rad", "deflection over acceleration"),
+        ]
+        draft.unsure.append(
+            "motor_inertia_kg_m2, load_inertia_kg_m2, stiffness_n_m_rad: told are the sum of the inertias at the motor and load inertia over stiffness"
+        )
+    _rotary_friction(draft, plant)
+
+
+def _rotary_friction(draft: BenchDraft, plant: PlantValues) -> None:
     draft.axis += [
         _friction("coulomb_torque_n_m", plant.coulomb, "N m"),
         _friction("viscous_torque_n_m_s_rad", plant.viscous, "N m s/rad"),
     ]
+
+
+def _stiffness(mass: Estimate, elastic: TransmissionValues) -> Estimate:
+    stretch = elastic.compliance_s2
+    return Estimate(mass.value / -stretch.value, mass.value / stretch.value**2 * stretch.std_error)
 
 
 def _error(estimate: Estimate) -> str:
@@ -163,10 +178,6 @@ def _control(draft: BenchDraft, recording: Recording, loop: LoopValues | None) -
             if loop is None
             else f"the best cascaded law leaves {100 * loop.left:.0f} % of the torque command"
         )
-        if not control_may_be_unknown():
-            raise InputError(
-                f"{recording.name}: the control law cannot be told ({draft.control_why}); record the set-points"
-            )
         return
     linear = recording.kind is AxisKind.LINEAR
     kv, feedforward, kp, time_s = loop.errors
@@ -226,6 +237,8 @@ def _notes(
     names, linear = recording.axis, recording.kind is AxisKind.LINEAR
     effort, noise_unit = ("force", "N") if linear else ("torque", "N m")
     notes = draft.notes
+    if not plant.inertia.significant:
+        draft.unsure.append("the inertia is not identifiable from this motion: record moves with more acceleration")
     notes.append(
         f"inertia and friction leave {100 * plant.left:.2g} % of the {effort} (share of its standard deviation)"
     )

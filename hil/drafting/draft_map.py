@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from hil.arrays import FloatArray
-from hil.channels import AXIS_CHANNELS, CHANNELS, AxisKind
+from hil.channels import AXIS_CHANNELS, AxisKind
 from hil.drafting.clock import Clock, find_clock
 from hil.drafting.column_names import Label, label
 from hil.drafting.foreign_table import ForeignTable, read_table
@@ -18,7 +18,7 @@ from hil.drafting.unit_choice import MATCH, UnitChoice, is_length, misfit, posit
 from hil.errors import InputError
 from hil.quantities import UNITS
 
-ROTARY_LEAD_M = 1.0  # a rotary axis has no lead: with this one a metre stands for one revolution
+ROTARY_LEAD_M = 2.0 * pi  # of a rotary axis: one metre of its load stands for one radian
 _COUNTS = tuple(
     float(n * k) for n in (1, 4) for k in (500, 1000, 1024, 2000, 2048, 2500, 4096, 5000, 8192, 10000)
 ) + tuple(2.0**power for power in range(12, 25))
@@ -131,7 +131,7 @@ class _Composer:
             self._velocity_only()
             return
         moved = motion(self.live[roles.motor], self.period_s)
-        self._units_of_positions(moved)
+        self._units_of_positions()
         self.kind = AxisKind.LINEAR if is_length(self.units[roles.motor]) else AxisKind.ROTARY
         names = AXIS_CHANNELS[self.kind]
         self._positions(names.motor_position)
@@ -148,7 +148,7 @@ class _Composer:
         if choice.note:
             self.draft.unsure.append(choice.note)
 
-    def _units_of_positions(self, moved: Motion) -> None:
+    def _units_of_positions(self) -> None:
         roles, labels, live = self.roles, self.labels, self.live
         positions = [name for name in (roles.command, roles.table, roles.motor) if name]
         prefers = self._prefers_length(positions)
@@ -163,8 +163,7 @@ class _Composer:
                 if one.quantity == "velocity" and one.unit and name in live and not one.command:
                     relation = proportional(motion(live[column], self.period_s).velocity, live[name])
                     if relation.share > SAME_POSITION:
-                        hints.append((relation.factor, UNITS[one.unit][0].removesuffix("/s")))
-                        hints[-1] = (relation.factor / UNITS[one.unit][1], hints[-1][1])
+                        hints.append((relation.factor / UNITS[one.unit][1], UNITS[one.unit][0].removesuffix("/s")))
             self._choose(column, position_unit(column, live[column], labels[column].unit, hints, prefers))
 
     def _prefers_length(self, positions: list[str]) -> bool | None:
@@ -207,7 +206,7 @@ class _Composer:
                 )
             else:
                 self.draft.lead_m = ROTARY_LEAD_M
-                self.draft.lead_how = "a rotary axis: one metre stands for one revolution"
+                self.draft.lead_how = "a rotary axis: one metre of the load stands for one radian"
         if self.motor_sign < 0:
             entry["sign"] = -1
         self.draft.channels.append(DraftedChannel(channel, entry, self._how(roles.motor, "the motor's encoder")))
@@ -239,14 +238,11 @@ class _Composer:
                     f"{motor}: one of the two units is wrong ({mixed}?); correct it in the header of the file, or write a map"
                 )
             if abs(ratio - 1.0) > 2.0 * MATCH and share > 0.9:
-                entry["scale"] = float(f"{1.0 / ratio:.8g}")
                 self.draft.unsure.append(
-                    f"{name}: moves {ratio:.6g} times as far as {self.roles.motor}; taken for the ratio of a gear"
+                    f"{name}: moves {ratio:.6g} times as far as {self.roles.motor}: a gear, or a wrong unit"
                 )
-        if unit == "counts":
-            reference = 2.0 * pi if motor == "rad" else 1.0
-            entry |= {"unit": motor, "scale": float(f"{1.0 / abs(factor) * 1.0:.8g}")}
-            del reference
+        if unit == "counts":  # of the motor's encoder, as in the set-points of a drive
+            entry |= {"unit": motor, "scale": float(f"{1.0 / abs(factor):.8g}")}
         self.draft.channels.append(DraftedChannel(channel, entry, self._how(name, what)))
 
     def _counts(self, length: str | None, factor: float | None) -> dict[str, object]:
@@ -287,8 +283,6 @@ class _Composer:
         of_command = next(one.entry for one in self.draft.channels if one.channel == "position_command_m")
         sign = int(np.sign(relation.factor)) * int(str(of_command.get("sign", 1)))
         entry: dict[str, object] = {"column": name, "unit": choice.unit}
-        if "scale" in of_command:
-            entry["scale"] = of_command["scale"]
         if sign < 0:
             entry["sign"] = -1
         self.draft.channels.append(DraftedChannel("velocity_command_m_s", entry, f"the derivative of {command}"))
@@ -311,14 +305,10 @@ class _Composer:
         """A recording with velocity in place of position."""
         name = self.roles.motor_velocity
         assert name is not None
-        if "motor_velocity_rad_s" not in CHANNELS:
-            raise InputError(
-                f"{self.draft.table.path}: {name} is a velocity, and no position is found; record the position"
-            )
         choice = velocity_unit(name, self.labels[name].unit, 1.0, "rad")
         self._choose(name, choice)
         self.kind = AxisKind.LINEAR if is_length(choice.unit) else AxisKind.ROTARY
-        channel = "motor_velocity_m_s" if self.kind is AxisKind.LINEAR else "motor_velocity_rad_s"
+        channel = AXIS_CHANNELS[self.kind].motor_velocity
         self.draft.channels.append(
             DraftedChannel(channel, {"column": name, "unit": choice.unit}, self._how(name, "no position is recorded"))
         )

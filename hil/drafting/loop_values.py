@@ -14,7 +14,6 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from hil.arrays import FloatArray
-from hil.bench.bench_file import Control
 from hil.control import cascade
 from hil.drafting.estimate import fit_blocks
 from hil.recording.recording import Recording

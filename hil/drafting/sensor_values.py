@@ -20,7 +20,7 @@ def count_of(values: FloatArray) -> float | None:
     differences = differences[differences > 1e-12 * np.ptp(values)]
     if differences.size < 100:
         return None
-    step = float(np.quantile(differences, 0.001))
+    step = float(differences.min())
     for _ in range(5):  # the smallest difference has the largest error of printed digits
         few = differences[differences < _FEW * step]
         whole = np.maximum(np.round(few / step), 1.0)

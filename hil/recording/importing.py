@@ -55,6 +55,7 @@ def import_recording(source: str | Path, map_path: str | Path) -> Recording:
         "source_sha256": _sha256(source),
         "map": map_path.name,
         "about": the_map.about,
+        "lead_m": the_map.lead_m,
         "channels": origins,
         "derived": derived,
         "clock": _describe_clock(columns["time_s"], period_s),

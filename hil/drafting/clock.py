@@ -112,7 +112,7 @@ def _of_column(table: ForeignTable, column: str, told: Label) -> Clock:
     steps = np.diff(stamps)
     typical = float(np.median(steps))
     repeats, back = float(np.mean(steps == 0.0)), float(np.mean(steps < 0.0))
-    if back > 0.0 or typical <= 0.0:
+    if back > 0.0 or stamps[-1] == stamps[0]:
         _refuse_order(where, stamps, steps)
     unsure = []
     if repeats > REPEATS:

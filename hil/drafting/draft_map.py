@@ -93,6 +93,7 @@ def _used(roles: Roles) -> tuple[str | None, ...]:
         roles.motor_velocity,
         roles.table,
         roles.command,
+        roles.unfollowed,
         roles.velocity_command,
         roles.effort,
         roles.effort_command,

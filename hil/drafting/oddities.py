@@ -9,6 +9,8 @@ from hil.drafting.relations import NO_SPREAD, driven, motion, proportional
 from hil.drafting.roles import Roles
 from hil.errors import InputError
 
+JUMP = 0.2  # of the travel in one row: no axis moves so far between two samples
+SUDDEN = 20.0  # times the change of the rows around: a fast motion is fast for more than one row
 TOLD = 0.8  # share of the torque that the motion of each half must explain before its sign is judged
 
 
@@ -18,12 +20,13 @@ def refuse_damage(
     """Check the columns that are used: `raw` as in the file, `even` on a regular clock. Raises InputError."""
     for name, values in raw.items():
         _refuse_missing(path, name, values)
-    for name in (roles.motor, roles.table, roles.command):
+    command = roles.command or roles.unfollowed
+    for name in (roles.motor, roles.table, command):
         if name is not None:
-            _refuse_jumps(path, name, raw[name])
+            _refuse_jumps(path, name, raw[name], steps=name == command)
     if roles.motor is None:
         return
-    for name in (roles.table, roles.command):
+    for name in (roles.table, command):
         if name is not None:
             _refuse_turned(path, name, even[name], roles.motor, even[roles.motor])
     for name in (roles.effort, roles.effort_command):
@@ -52,29 +55,32 @@ def _refuse_missing(path: Path, name: str, values: FloatArray) -> None:
     )
 
 
-def _refuse_jumps(path: Path, name: str, values: FloatArray) -> None:
-    """Refuse wraps (a jump of the whole range) and spikes (one row away from both neighbours)."""
-    steps = np.diff(values)
-    size = np.abs(steps)
-    span = float(np.ptp(values))
-    largest = int(np.argmax(size))
-    usual = float(np.quantile(size, 0.99))
-    if size[largest] < 0.2 * span or size[largest] < 20.0 * usual:
+def _refuse_jumps(path: Path, name: str, values: FloatArray, steps: bool) -> None:
+    """Refuse wraps (a jump of the whole range) and spikes (one row away from both neighbours).
+
+    `steps` are allowed in a set-point.
+    """
+    change = np.diff(values)
+    size = np.abs(change)
+    around = np.maximum(np.r_[0.0, 0.0, size[:-2]], np.r_[size[2:], 0.0, 0.0])
+    jumps = np.flatnonzero((size > JUMP * np.ptp(values)) & (size > SUDDEN * around))
+    if not jumps.size:
         return
-    row = largest + 2
-    back = largest + 1 < steps.size and abs(steps[largest + 1] + steps[largest]) < 0.2 * size[largest]
-    if back:
+    row = int(jumps[0])
+    told = f"{path}: {name} jumps from {values[row]:.6g} to {values[row + 1]:.6g} in row {row + 2} of the numbers"
+    if row + 1 < change.size and abs(change[row + 1] + change[row]) < 0.2 * size[row]:
         raise InputError(
-            f"{path}: {name} jumps from {values[largest]:.6g} to {values[largest + 1]:.6g} in row {row} of the numbers and back: "
-            "a spike or a placeholder for a missing value; correct the row or cut before it"
+            f"{told} and back: a spike or a placeholder for a missing value; correct the row or cut before it"
         )
-    wraps = size[largest] > 0.9 * span
+    if steps:
+        return
+    wraps = size[row] > 0.9 * np.ptp(values)
     raise InputError(
-        f"{path}: {name} jumps from {values[largest]:.6g} to {values[largest + 1]:.6g} in row {row} of the numbers"
+        told
         + (
             ": it wraps at its range; export it unwrapped"
             if wraps
-            else ": rows are missing, or another recording follows; cut there"
+            else ": rows are missing, or another recording follows; cut the file there"
         )
     )
 

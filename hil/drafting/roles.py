@@ -27,6 +27,7 @@ class Roles:
     table: str | None = None
     command: str | None = None
     velocity_command: str | None = None
+    unfollowed: str | None = None  # a set-point that the motion does not follow
     effort: str | None = None
     effort_command: str | None = None
     axis: str = ""
@@ -204,6 +205,7 @@ def _positions(live: dict[str, FloatArray], labels: dict[str, Label], names: lis
         for name in commands:
             roles.left_out[name] = "another set-point"
         if shares[best] < FOLLOWED:
+            roles.unfollowed = best
             roles.left_out[best] = f"a set-point that {roles.motor} does not follow (share {shares[best]:.2f})"
             roles.unsure.append(f"{best}: {roles.motor} does not follow it (share {shares[best]:.2f}); it is not used")
         else:

@@ -17,7 +17,8 @@ def import_(
         str | None,
         typer.Option(
             "--map",
-            help="Map of columns and units (YAML), or name of a shipped map: emps. Default: a map is drafted from the file "
+            help="Map of columns and units (YAML), or name of a shipped map: emps. Default: a map is drafted from "
+            "the file "
             "and written beside the result.",
             show_default=False,
         ),

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hil.arrays import FloatArray
-from hil.drafting.column_names import Label, Quantity
+from hil.drafting.column_names import Label, Quantity, label
 from hil.drafting.foreign_table import ForeignTable
 from hil.errors import InputError
 from hil.quantities import UNITS
@@ -64,8 +64,6 @@ def find_clock(table: ForeignTable, labels: dict[str, Label], rate_hz: float | N
 
 
 def _says_time(remark: str) -> bool:
-    from hil.drafting.column_names import label
-
     return label(remark.split(":")[0]).quantity is Quantity.TIME
 
 
@@ -181,7 +179,8 @@ def _refuse_order(where: str, stamps: FloatArray, steps: FloatArray) -> None:
         )
     if regular and backward > max(3, stamps.size // 100):
         raise InputError(
-            f"{where}: the rows are out of order, in {backward} places time runs back; sort the file by {where.rsplit(': ', 1)[-1]}"
+            f"{where}: the rows are out of order, in {backward} places time runs back; sort the file by "
+            f"{where.rsplit(': ', 1)[-1]}"
         )
     raise InputError(
         f"{where}: time runs back at row {row} of the numbers, from {stamps[row - 2]:g} to {stamps[row - 1]:g}: two "
@@ -198,6 +197,7 @@ def _refuse_two_rates(where: str, steps: FloatArray, factor: float) -> None:
     if max(first, last) > 1.5 * min(first, last):
         row = int(np.flatnonzero(np.abs(steps - first) > 0.25 * abs(last - first))[0]) + 1
         raise InputError(
-            f"{where}: two sampling rates in one file, steps of {first * factor:.4g} s first and {last * factor:.4g} s at "
+            f"{where}: two sampling rates in one file, steps of {first * factor:.4g} s first and "
+            f"{last * factor:.4g} s at "
             f"the end (from about row {row} of the numbers on); cut the file there and import the parts"
         )

@@ -26,15 +26,21 @@ _QUANTITIES = {
     Quantity.OTHER: "error err deviation schleppfehler schleppabstand regelabweichung abweichung erreur ecart lag "
     "feedforward ff compensation vorsteuerung anticipation temperature temperatur status state zustand etat flag "
     "mode lateness segment cycle index sample counter zaehler compteur deflection diff difference limit twin",
-    Quantity.VELOCITY: "velocity velocities vel speed spd omega w v n qd dq qdot qp dqdt xd dx xdot geschwindigkeit geschw "
+    Quantity.VELOCITY: "velocity velocities vel speed spd omega w v n qd dq qdot qp dqdt xd dx xdot "
+    "geschwindigkeit geschw "
     "drehzahl winkelgeschwindigkeit vitesse vit rpm feedrate",
     Quantity.ACCELERATION: "acceleration accel acc qdd ddq qddot beschleunigung acceleration",
-    Quantity.EFFORT: "torque trq tq tau moment drehmoment mom md couple cpl current cur curr strom courant intensite amp i iq iqs "
+    Quantity.EFFORT: "torque trq tq tau moment drehmoment mom md couple cpl current cur curr strom courant "
+    "intensite amp i iq iqs "
     "isq force kraft effort f voltage volt spannung tension u pwm duty",
-    Quantity.POSITION: "position positions pos posn angle ang winkel theta phi q x y z lage weg hub stroke displacement displ "
+    Quantity.POSITION: "position positions pos posn angle ang winkel theta phi q x y z lage weg hub stroke "
+    "displacement displ "
     "encoder enc geber codeur course deplacement distance travel",
 }
-_COMMAND = "command commanded cmd set setpoint setp ref reference target desired des demand soll sollwert consigne cons sp goal"
+_COMMAND = (
+    "command commanded cmd set setpoint setp ref reference target desired des demand soll sollwert consigne cons sp "
+    "goal"
+)
 _MEASURED = "actual act ist istwert measured meas measure feedback fbk fb real reel mesure mesuree mes response"
 _MOTOR = "motor mot moteur rotor antrieb drive primary"
 _TABLE = (
@@ -124,7 +130,6 @@ def _split_suffix(token: str) -> list[str]:
 
 
 def _any(words: list[str], known: str) -> bool:
-    for one in known.split():
-        if one in words or (len(one) >= LEAST_WITHIN and any(one in word for word in words)):
-            return True
-    return False
+    return any(
+        one in words or (len(one) >= LEAST_WITHIN and any(one in word for word in words)) for one in known.split()
+    )

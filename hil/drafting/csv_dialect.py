@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 
+from hil.drafting.units import unit_named
 from hil.errors import InputError
 from hil.recording.import_map import CsvOptions
 
@@ -34,7 +35,8 @@ def find_dialect(path: Path) -> CsvDialect:
     delimiter, point, width, first = _layout(path, lines)
     comments = tuple(_COMMENT.sub("", line) for line in lines[:first] if _COMMENT.match(line))
     above = [index for index in range(first) if lines[index].strip()]
-    unit_row, header = (), None
+    unit_row: tuple[str, ...] = ()
+    header = None
     for index in reversed(above[-4:]):
         fields = _fields(_COMMENT.sub("", lines[index]), delimiter)
         if len(fields) not in (width, width - 1) or not any(fields):
@@ -111,7 +113,8 @@ def _layout(path: Path, lines: list[str]) -> tuple[str, str, int, int]:
                 best = score
     if best is None or best[0] < 0.3:
         raise InputError(
-            f"{path}: has no rows of numbers in two columns or more; give a text file with a header and rows of numbers "
+            f"{path}: has no rows of numbers in two columns or more; give a text file with a header and rows of "
+            "numbers "
             "separated by comma, semicolon, tab or blank"
         )
     _, _, delimiter, point, width = best
@@ -146,8 +149,6 @@ def _is_number(field: str, point: str) -> bool:
 
 def _units(fields: list[str]) -> bool:
     """True for a row of units: short words, of which some are units."""
-    from hil.drafting.units import unit_named
-
     return all(_UNIT.fullmatch(field) for field in fields) and sum(
         unit_named(field.strip("[]() ")) is not None or field in ("-", "[-]", "[]") for field in fields
     ) >= max(1, len(fields) / 2)

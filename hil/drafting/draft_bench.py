@@ -4,14 +4,13 @@ from dataclasses import dataclass, field
 from math import log2, pi, sqrt
 
 from hil.channels import AxisKind
-from hil.drafting.draft_map import ROTARY_LEAD_M, usual_lead
+from hil.drafting.bench_notes import told
 from hil.drafting.estimate import Estimate
 from hil.drafting.loop_values import REPLAYED, LoopValues, loop_values
 from hil.drafting.plant_values import PlantValues, TransmissionValues, plant_values, transmission_values
 from hil.drafting.relations import proportional
-from hil.drafting.sensor_values import count_of, is_decimal, noise_of, torque_delay_s
-from hil.errors import InputError
-from hil.identification.friction import identify_friction
+from hil.drafting.sensor_values import count_of, is_decimal, noise_of
+from hil.drafting.usual_values import ROTARY_LEAD_M, usual_lead
 from hil.quantities import digits
 from hil.recording.recording import Recording
 
@@ -72,7 +71,9 @@ def draft_bench(recording: Recording) -> BenchDraft:
             _screw(draft, plant, elastic, lead)
     _control(draft, recording, loop_values(recording, ratio))
     _encoders(draft, recording)
-    _notes(draft, recording, plant, transmission)
+    notes, unsure = told(recording, plant, transmission)
+    draft.notes += notes
+    draft.unsure += unsure
     return draft
 
 
@@ -138,7 +139,8 @@ def _turning(draft: BenchDraft, plant: PlantValues, elastic: TransmissionValues 
             _value("stiffness_n_m_rad", _stiffness(load, elastic), "N m/rad", "deflection over acceleration"),
         ]
         draft.unsure.append(
-            "motor_inertia_kg_m2, load_inertia_kg_m2, stiffness_n_m_rad: told are the sum of the inertias at the motor and load inertia over stiffness"
+            "motor_inertia_kg_m2, load_inertia_kg_m2, stiffness_n_m_rad: told are the sum of the inertias at the "
+            "motor and load inertia over stiffness"
         )
     _rotary_friction(draft, plant)
 
@@ -229,54 +231,3 @@ def _encoders(draft: BenchDraft, recording: Recording) -> None:
 
 def _printed(step: float) -> str:
     return " (perhaps the last digit of the file)" if is_decimal(step) else ""
-
-
-def _notes(
-    draft: BenchDraft, recording: Recording, plant: PlantValues, transmission: TransmissionValues | None
-) -> None:
-    names, linear = recording.axis, recording.kind is AxisKind.LINEAR
-    effort, noise_unit = ("force", "N") if linear else ("torque", "N m")
-    notes = draft.notes
-    if not plant.inertia.significant:
-        draft.unsure.append("the inertia is not identifiable from this motion: record moves with more acceleration")
-    notes.append(
-        f"inertia and friction leave {100 * plant.left:.2g} % of the {effort} (share of its standard deviation)"
-    )
-    sure = "" if plant.offset.significant else ", not distinguishable from 0"
-    notes.append(
-        f"constant {effort} {plant.offset.value:.3g} {noise_unit} +-{plant.offset.std_error:.2g}{sure}: a load, or friction that differs by direction"
-    )
-    if plant.gravity is not None:
-        notes.append(
-            f"{effort} over the angle (gravity) {plant.gravity.value:.3g} N m +-{plant.gravity.std_error:.2g}: not in this bench"
-        )
-        draft.unsure.append("the axis has a load that follows the sine of its angle (gravity); this bench has none")
-    notes.append(f"noise of {names.torque}: {noise_of(recording, names.torque):.3g} {noise_unit} rms")
-    notes.append(
-        f"noise of {names.motor_position}: {noise_of(recording, names.motor_position):.3g} {'m' if linear else 'rad'} rms"
-    )
-    delay_s = torque_delay_s(recording)
-    if delay_s is not None:
-        notes.append(f"{names.torque} follows {names.torque_command} after {1e3 * delay_s:.3g} ms (to half a row)")
-    if transmission is not None:
-        late = transmission.delay_s
-        if late.significant:
-            notes.append(
-                f"second encoder {'late' if late.value > 0 else 'early'} by {1e3 * abs(late.value):.3g} ms +-{1e3 * late.std_error:.2g}, from its difference over the velocity"
-            )
-            draft.unsure.append(
-                f"the second encoder is {'late' if late.value > 0 else 'early'} by {1e3 * abs(late.value):.3g} ms; the bench has no key for it"
-            )
-        if transmission.friction_m.significant:
-            notes.append(
-                f"second encoder differs by {2e6 * abs(transmission.friction_m.value):.3g} um between directions: lost motion, or friction over stiffness"
-            )
-        notes.append(f"ratio, delay and stretch leave {1e6 * transmission.left_m:.3g} um rms of the second encoder")
-    try:
-        feeds = identify_friction(recording)
-    except InputError:
-        return
-    notes.append(
-        f"friction from {len(feeds.points)} constant feeds: Coulomb {feeds.coulomb:.4g} +-{feeds.coulomb_std_error:.2g}, "
-        f"viscous {feeds.viscous:.4g} +-{feeds.viscous_std_error:.2g}, offset {feeds.offset:.3g} +-{feeds.offset_std_error:.2g}"
-    )

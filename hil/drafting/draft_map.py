@@ -1,6 +1,5 @@
 """Draft the map of a foreign file: its clock, and unit, sign and scale of each channel with how it was found."""
 
-from dataclasses import dataclass, field
 from math import pi
 from pathlib import Path
 
@@ -10,59 +9,16 @@ from hil.arrays import FloatArray
 from hil.channels import AXIS_CHANNELS, AxisKind
 from hil.drafting.clock import Clock, find_clock
 from hil.drafting.column_names import Label, label
-from hil.drafting.foreign_table import ForeignTable, read_table
+from hil.drafting.effort import effort_entry
+from hil.drafting.foreign_table import read_table
+from hil.drafting.map_draft import DraftedChannel, MapDraft
 from hil.drafting.oddities import refuse_damage
 from hil.drafting.relations import Motion, derivative_of, driven, motion, proportional
 from hil.drafting.roles import SAME_POSITION, Roles, find_roles
 from hil.drafting.unit_choice import MATCH, UnitChoice, is_length, misfit, position_unit, velocity_unit
+from hil.drafting.usual_values import COUNTS, LEADS_M, ROTARY_LEAD_M, mixed_up, usual_lead
 from hil.errors import InputError
 from hil.quantities import UNITS
-
-ROTARY_LEAD_M = 2.0 * pi  # of a rotary axis: one metre of its load stands for one radian
-_COUNTS = tuple(
-    float(n * k) for n in (1, 4) for k in (500, 1000, 1024, 2000, 2048, 2500, 4096, 5000, 8192, 10000)
-) + tuple(2.0**power for power in range(12, 25))
-_LEADS_M = (0.010, 0.005, 0.020, 0.004, 0.016, 0.0025, 0.002, 0.025, 0.040, 0.008, 0.012, 0.032, 0.001)
-
-
-@dataclass(frozen=True)
-class DraftedChannel:
-    """Entry of a channel: its keys in the order of the file, and how it was found."""
-
-    channel: str
-    entry: dict[str, object]
-    how: str
-
-
-@dataclass
-class MapDraft:
-    """A drafted map: `unsure` is what the user should check, `left_out` the other columns with the reason."""
-
-    table: ForeignTable
-    clock: Clock
-    channels: list[DraftedChannel] = field(default_factory=list)
-    lead_m: float | None = None
-    lead_how: str = ""
-    unsure: list[str] = field(default_factory=list)
-    left_out: dict[str, str] = field(default_factory=dict)
-
-    def content(self) -> dict[str, object]:
-        """The map as its file holds it."""
-        clock = self.clock
-        content: dict[str, object] = {"about": f"{self.table.path.name}, map drafted from the file itself"}
-        if clock.column is not None:
-            content["time"] = {"column": clock.column, "unit": clock.unit}
-        else:
-            content["sample_rate_hz"] = clock.rate_hz
-        if clock.resample_hz is not None:
-            content["resample_hz"] = clock.resample_hz
-        options = self.table.csv.model_dump(exclude_defaults=True)
-        if options:
-            content["csv"] = {k: list(v) if isinstance(v, tuple) else v for k, v in options.items()}
-        if self.lead_m is not None:
-            content["lead_m"] = self.lead_m
-        content["channels"] = {one.channel: one.entry for one in self.channels}
-        return content
 
 
 def draft_map(path: Path, rate_hz: float | None = None, axis: str | None = None) -> MapDraft:
@@ -140,7 +96,8 @@ class _Composer:
         self._efforts(moved)
         if not (roles.effort or roles.effort_command or roles.table):
             raise InputError(
-                f"{self.draft.table.path}: beside the position {roles.motor} no torque, force, current, voltage or second "
+                f"{self.draft.table.path}: beside the position {roles.motor} no torque, force, current, voltage or "
+                "second "
                 "encoder is found; record one of them, or write its column into a map: hil import FILE --map MAP.yaml"
             )
 
@@ -232,11 +189,13 @@ class _Composer:
         if share >= 0.5 and "counts" not in (unit, self.units[str(self.roles.motor)]):
             same = UNITS[unit][0] == UNITS[motor][0]
             ratio = misfit(factor, unit, motor) if same else 1.0
-            mixed = _mixed_up(ratio)
+            mixed = mixed_up(ratio)
             if mixed:
                 raise InputError(
-                    f"{self.draft.table.path}: {name} in {unit} moves {ratio:.4g} times as far as {self.roles.motor} in "
-                    f"{motor}: one of the two units is wrong ({mixed}?); correct it in the header of the file, or write a map"
+                    f"{self.draft.table.path}: {name} in {unit} moves {ratio:.4g} times as far as "
+                    f"{self.roles.motor} in "
+                    f"{motor}: one of the two units is wrong ({mixed}?); correct it in the header of the file, or "
+                    "write a map"
                 )
             if abs(ratio - 1.0) > 2.0 * MATCH and share > 0.9:
                 self.draft.unsure.append(
@@ -250,20 +209,22 @@ class _Composer:
         """Counts per revolution or metre of the motor's encoder."""
         if length is None or factor is None:
             raise InputError(
-                f"{self.draft.table.path}: {self.roles.motor} is in counts, and no other column tells their size; write "
+                f"{self.draft.table.path}: {self.roles.motor} is in counts, and no other column tells their size; "
+                "write "
                 "counts_per_rev (or counts_per_m) into a map: hil import FILE --map MAP.yaml"
             )
         per_m = 1.0 / (abs(factor) * UNITS[self.units[length]][1])
         effort = self.roles.effort or self.roles.effort_command
         if effort and self.labels[effort].unit in ("N", "kN"):
             return {"counts_per_m": float(f"{per_m:.8g}")}
-        fits = [(counts, lead) for lead in _LEADS_M for counts in _COUNTS if abs(counts / (lead * per_m) - 1.0) < 0.003]
+        fits = [(counts, lead) for lead in LEADS_M for counts in COUNTS if abs(counts / (lead * per_m) - 1.0) < 0.003]
         if not fits:
             return {"counts_per_m": float(f"{per_m:.8g}")}
         counts, lead = fits[0]
         self.draft.lead_m, self.draft.lead_how = lead, f"from the counts per metre of {length}, with usual leads"
         self.draft.unsure.append(
-            f"{self.roles.motor}: {per_m:.6g} counts per m; {counts:g} per revolution and a lead of {1e3 * lead:g} mm are "
+            f"{self.roles.motor}: {per_m:.6g} counts per m; {counts:g} per revolution and a lead of {1e3 * lead:g} "
+            "mm are "
             "taken, another pair with the same ratio fits as well"
         )
         return {"counts_per_rev": counts}
@@ -289,8 +250,6 @@ class _Composer:
         self.draft.channels.append(DraftedChannel("velocity_command_m_s", entry, f"the derivative of {command}"))
 
     def _efforts(self, moved: Motion) -> None:
-        from hil.drafting.effort import effort_entry
-
         names = AXIS_CHANNELS[self.kind]
         for column, channel in ((self.roles.effort, names.torque), (self.roles.effort_command, names.torque_command)):
             if column is not None:
@@ -318,20 +277,3 @@ class _Composer:
 
     def _how(self, column: str, what: str) -> str:
         return f"{what}; {self.roles.how[column]}" if column in self.roles.how else what
-
-
-def usual_lead(value_m: float) -> float:
-    """Lead with the digits of a usual one if it is that to 0.2 %: following errors and lead errors are below."""
-    usual = next((lead for lead in _LEADS_M if abs(value_m / lead - 1.0) < 2e-3), None)
-    return usual if usual is not None else value_m
-
-
-def _mixed_up(ratio: float) -> str:
-    """Pair of units that are confused if positions differ by `ratio`; empty for none."""
-    for value, pair in (
-        (1e3, "m or mm"), (1e6, "m or um"), (180.0 / pi, "rad or deg"), (360.0, "deg or revolutions"),
-        (2.0 * pi, "rad or revolutions"), (25.4, "in or mm"),
-    ):  # fmt: skip
-        if any(abs(ratio / one - 1.0) < MATCH for one in (value, 1.0 / value)):
-            return pair
-    return ""

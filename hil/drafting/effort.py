@@ -28,7 +28,8 @@ def effort_entry(
     sign = _sign(cause.coefficients, moved) * motor_sign
     if cause.share < CAUSED:
         notes.append(
-            f"{told.column}: inertia and friction of the motion explain only {100 * max(cause.share, 0.0):.0f} % of it; check that "
+            f"{told.column}: inertia and friction of the motion explain only {100 * max(cause.share, 0.0):.0f} % "
+            "of it; check that "
             "it drives this axis"
         )
     elif sign < 0:
@@ -88,7 +89,8 @@ def _unit(told: Label, kind: AxisKind, scalars: dict[str, float]) -> tuple[dict[
     elif kind is AxisKind.LINEAR and unit in ("N m", "mN m"):
         entry |= {"unit": "N", "scale": 1e-3 if unit == "mN m" else 1.0}
         notes.append(
-            f"{told.column}: is in {unit}, the position in a length; 1 N per N m is taken: set scale to 2 pi / lead to get N"
+            f"{told.column}: is in {unit}, the position in a length; 1 N per N m is taken: set scale to 2 pi / "
+            "lead to get N"
         )
     elif kind is AxisKind.ROTARY and unit in ("N", "kN"):
         entry |= {"unit": "N m", "scale": 1e3 if unit == "kN" else 1.0}

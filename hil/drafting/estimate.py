@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -47,7 +48,7 @@ def fit_blocks(regressors: Sequence[FloatArray], measured: FloatArray, how: Sequ
     fit = solve(columns, measured)
     edges = np.linspace(0, measured.size, BLOCKS + 1).astype(int)
     without = []
-    for first, end in zip(edges[:-1], edges[1:], strict=True):
+    for first, end in pairwise(edges):
         kept = np.r_[0:first, end : measured.size]
         if np.linalg.matrix_rank(columns[kept]) == columns.shape[1]:
             without.append(solve(columns[kept], measured[kept]).values)

@@ -61,7 +61,8 @@ def read_table(path: Path) -> ForeignTable:
     rows = max((values.size for values in table.columns.values()), default=0)
     if len(table.columns) < 2 or rows < 3:
         raise InputError(
-            f"{path}: given {len(table.columns)} columns of numbers with {rows} rows, allowed two columns and three rows "
+            f"{path}: given {len(table.columns)} columns of numbers with {rows} rows, allowed two columns and "
+            "three rows "
             "or more; give a file with the channels of a motion"
         )
     return table
@@ -126,7 +127,8 @@ def _mat(path: Path) -> ForeignTable:
     remarks = [f"{name}: neither a number, a vector nor a matrix with a column per channel" for name in others]
     if not columns:
         raise InputError(
-            f"{path}: holds no vector of numbers (there are {', '.join(others) or 'no variables'}), allowed a vector per "
+            f"{path}: holds no vector of numbers (there are {', '.join(others) or 'no variables'}), allowed a "
+            "vector per "
             "channel or a matrix with a column per channel; save the vectors themselves, not a structure"
         )
     return _equal_length(ForeignTable(path, columns, {}, scalars, CsvOptions(), None, tuple(remarks)))
@@ -159,7 +161,8 @@ def _json(path: Path) -> ForeignTable:
             columns[name] = content.numbers(path, name)
         else:
             remarks.append(
-                f"{name}: values such as {next(v for v in values if isinstance(v, str | bool | list | dict))!r}, no numbers"
+                f"{name}: values such as {next(v for v in values if isinstance(v, str | bool | list | dict))!r}, "
+                "no numbers"
             )
     return _equal_length(
         ForeignTable(path, columns, content.units, content.scalars, CsvOptions(), None, tuple(remarks))

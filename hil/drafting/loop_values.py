@@ -176,7 +176,8 @@ def _refined(loop: _Loop, start: Start4, ticks: int, phase: int, estimate: str, 
     if time_s is not None and time_s > _NO_INTEGRAL:
         time_s = None
     error_time = 0.0 if time_s is None else float(time_s * np.hypot(errors[3] / integral, errors[2] / max(kp, 1e-300)))
+    error_kv, error_feedforward, error_kp, _ = (float(one) for one in errors)
     return LoopValues(
-        kv, feedforward, kp, time_s, (float(errors[0]), float(errors[1]), float(errors[2]), error_time), ticks, estimate,
+        kv, feedforward, kp, time_s, (error_kv, error_feedforward, error_kp, error_time), ticks, estimate,
         float(np.std(residual) / np.std(loop.command)), phase,
     )  # fmt: skip

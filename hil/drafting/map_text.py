@@ -4,7 +4,7 @@ import json
 import re
 
 from hil.channels import CHANNELS
-from hil.drafting.draft_map import MapDraft
+from hil.drafting.map_draft import MapDraft
 
 _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_\[\]]*")
 _RESERVED = {"true", "false", "null", "yes", "no", "on", "off"}

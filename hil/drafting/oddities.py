@@ -5,10 +5,11 @@ from pathlib import Path
 import numpy as np
 
 from hil.arrays import FloatArray
-from hil.drafting.relations import NO_SPREAD, driven, motion, proportional
+from hil.drafting.relations import NO_SPREAD, driven, motion, proportional, roughness
 from hil.drafting.roles import Roles
 from hil.errors import InputError
 
+NO_ORDER = 1.0  # roughness from which rows have no order: 1.4 for white noise, below 0.3 for a motion
 JUMP = 0.2  # of the travel in one row: no axis moves so far between two samples
 SUDDEN = 20.0  # times the change of the rows around: a fast motion is fast for more than one row
 TOLD = 0.8  # share of the torque that the motion of each half must explain before its sign is judged
@@ -20,18 +21,21 @@ def refuse_damage(
     """Check the columns that are used: `raw` as in the file, `even` on a regular clock. Raises InputError."""
     for name, values in raw.items():
         _refuse_missing(path, name, values)
+    if roles.motor is not None and roughness(even[roles.motor]) > NO_ORDER:
+        raise InputError(
+            f"{path}: {roles.motor} jumps from row to row as if the rows were shuffled; sort the rows by time, or "
+            "export "
+            "the recording again"
+        )
     command = roles.command or roles.unfollowed
-    for name in (roles.motor, roles.table, command):
-        if name is not None:
-            _refuse_jumps(path, name, raw[name], steps=name == command)
+    for position in filter(None, (roles.motor, roles.table, command)):
+        _refuse_jumps(path, position, raw[position], steps=position == command)
     if roles.motor is None:
         return
-    for name in (roles.table, command):
-        if name is not None:
-            _refuse_turned(path, name, even[name], roles.motor, even[roles.motor])
-    for name in (roles.effort, roles.effort_command):
-        if name is not None:
-            _refuse_turned_effort(path, name, even[name], roles.motor, even[roles.motor], period_s)
+    for position in filter(None, (roles.table, command)):
+        _refuse_turned(path, position, even[position], roles.motor, even[roles.motor])
+    for effort in filter(None, (roles.effort, roles.effort_command)):
+        _refuse_turned_effort(path, effort, even[effort], roles.motor, even[roles.motor], period_s)
 
 
 def _refuse_missing(path: Path, name: str, values: FloatArray) -> None:
@@ -91,7 +95,8 @@ def _refuse_turned(path: Path, name: str, values: FloatArray, motor: str, positi
     first, last = (proportional(values[part], position[part]) for part in (slice(None, half), slice(half, None)))
     if min(first.share, last.share) > 0.9 and first.factor * last.factor < 0.0:
         raise InputError(
-            f"{path}: {name} follows {motor} in one half of the file and its negative in the other: a sign was turned within "
+            f"{path}: {name} follows {motor} in one half of the file and its negative in the other: a sign was "
+            "turned within "
             "the recording; cut the file there"
         )
 
@@ -112,6 +117,7 @@ def _refuse_turned_effort(
         and driven(turned, motion(position, period_s), period_s).share > both.share + 0.5
     ):
         raise InputError(
-            f"{path}: {name} accelerates {motor} forwards in one half of the file and backwards in the other: a sign was "
+            f"{path}: {name} accelerates {motor} forwards in one half of the file and backwards in the other: a "
+            "sign was "
             "turned within the recording; cut the file there"
         )

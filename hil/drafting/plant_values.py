@@ -51,7 +51,8 @@ def plant_values(recording: Recording) -> PlantValues:
     names = recording.axis
     if names.torque not in recording.columns:
         raise InputError(
-            f"{recording.name}: {names.torque} is not recorded, and without torque no mass and no friction can be told; "
+            f"{recording.name}: {names.torque} is not recorded, and without torque no mass and no friction can be "
+            "told; "
             "record torque, current or voltage"
         )
     rate_hz = 1.0 / recording.period_s
@@ -61,14 +62,16 @@ def plant_values(recording: Recording) -> PlantValues:
             fits.append((_fit(recording, cutoff_hz), cutoff_hz))
     if not fits:
         raise InputError(
-            f"{recording.name}: given {rate_hz:.3g} rows per second, allowed {CUTOFFS_HZ[-1] / MOST_OF_RATE:g} or more; "
+            f"{recording.name}: given {rate_hz:.3g} rows per second, allowed {CUTOFFS_HZ[-1] / MOST_OF_RATE:g} or "
+            "more; "
             "record at a higher rate"
         )
     (fit, gravity), cutoff_hz = min(fits, key=lambda one: one[0][0].left)
     inertia, viscous, coulomb, offset = fit.estimates[:4]
     if inertia.value <= 0.0:
         raise InputError(
-            f"{recording.name}: the inertia comes out as {inertia.value:.3g} +- {inertia.std_error:.2g}, allowed above 0; "
+            f"{recording.name}: the inertia comes out as {inertia.value:.3g} +- {inertia.std_error:.2g}, allowed "
+            "above 0; "
             "the torque has the wrong sign, or the motion does not separate inertia from a spring or gravity: record "
             "moves of different accelerations"
         )

@@ -87,7 +87,8 @@ def direction(velocity: FloatArray) -> FloatArray:
 
 
 def roughness(values: FloatArray) -> float:
-    """Change from row to row over the deviation, of the middle row: 1.4 for rows without order, far less for a motion."""
+    """Change from row to row over the deviation, of the middle row: 1.4 for rows without order, far less for a "
+    "motion."""
     spread = float(np.median(np.abs(values - np.median(values))))
     return float(np.median(np.abs(np.diff(values)))) / spread if spread > 0.0 else 0.0
 
@@ -105,7 +106,7 @@ def lead_rows(values: FloatArray, other: FloatArray, most: int) -> int:
 
     def agreement(shift: int) -> float:
         first, second = (a[: a.size - shift], b[shift:]) if shift >= 0 else (a[-shift:], b[: b.size + shift])
-        return float(first @ second) / first.size
+        return float(first @ second) / float(first.size)
 
     return max(range(-most, most + 1), key=agreement)
 

@@ -10,11 +10,12 @@ from hil.drafting.relations import Motion, derivative_of, driven, motion, noise,
 from hil.errors import InputError
 
 SAME_POSITION = 0.98  # share from which a column is another reading of a position: following errors are below 5 %
+QUIET = 0.3  # of the noise of the measured position: a set-point is computed and has none but rounding
 FOLLOWED = 0.5  # share of a set-point that a controlled motion follows: less is another axis or no loop
 IS_DERIVATIVE = 0.9  # share from which a column is the velocity of another: counting and filters leave a few per cent
 IS_DRIVEN = 0.4  # share of an unnamed effort that one mass with friction explains: gravity and springs may be more
 SAME_COLUMN = 1e-6  # of the travel: a copy in another unit deviates by printed digits, a second sensor by more
-NO_ORDER = 1.0  # roughness from which rows have no order: 1.4 for white noise, below 0.3 for a motion
+SMOOTH = 0.3  # roughness of a motion; rows without order have 1.4
 _UNIT_RANK = ("N m", "mN m", "N", "kN", "A", "mA", "%", "permille", None, "V", "mV")
 
 
@@ -41,7 +42,7 @@ def find_roles(
 ) -> Roles:
     """Find the columns of one axis among `columns` (n,) without the clock, finite, on a regular clock.
 
-    `axis` is the number of the axis in the names. Raises InputError: no motion, rows without order, columns interchanged.
+    `axis` is the number of the axis in the names. Raises InputError: no motion, columns interchanged.
     """
     roles = Roles()
     labels = _of_one_axis(where, dict(labels), columns, roles, axis)
@@ -55,11 +56,6 @@ def find_roles(
     for name in of[Quantity.OTHER] + of[Quantity.ACCELERATION]:
         roles.left_out.setdefault(name, f"{labels[name].quantity} by its name, not needed")
     _positions(live, labels, of[Quantity.POSITION], roles)
-    if roles.motor is not None and roughness(live[roles.motor]) > NO_ORDER:
-        raise InputError(
-            f"{where}: {roles.motor} jumps from row to row as if the rows were shuffled; sort the rows by time, or export "
-            "the recording again"
-        )
     moved = motion(live[roles.motor], period_s) if roles.motor else None
     _velocities(where, live, labels, of[Quantity.VELOCITY], moved, period_s, roles)
     _efforts(live, labels, of[Quantity.EFFORT], roles)
@@ -71,7 +67,8 @@ def _refuse_frozen(where: str, frozen: list[str], columns: dict[str, FloatArray]
     if roles.motor is None and roles.motor_velocity is None:
         told = f"; constant are {', '.join(frozen)}" if frozen else ""
         raise InputError(
-            f"{where}: no column is the measured position of the axis (columns: {', '.join(columns)}{told}); record it, or "
+            f"{where}: no column is the measured position of the axis (columns: {', '.join(columns)}{told}); "
+            "record it, or "
             "write its column into a map: hil import FILE --map MAP.yaml"
         )
 
@@ -122,7 +119,7 @@ def _with_quantities(
         roles.unsure.append(f"{name}: its name says nothing; {how}")
 
     if not positions:
-        smooth = [name for name in unnamed if roughness(live[name]) < 0.3 * NO_ORDER]
+        smooth = [name for name in unnamed if roughness(live[name]) < SMOOTH]
         scores = {name: _as_position(name, live, period_s) for name in smooth}
         best = max(scores, key=lambda name: scores[name], default=None)
         if best is None or scores[best] < IS_DRIVEN:
@@ -177,8 +174,8 @@ def _positions(live: dict[str, FloatArray], labels: dict[str, Label], names: lis
         plain = [name for name in measured if not (labels[name].motor or labels[name].table or labels[name].measured)]
         others = [name for name in measured if name not in plain] or measured
         for name in plain:
-            rest = [noise(live[one]) for one in others if one != name]
-            if rest and noise(live[name]) < 0.3 * min(rest):
+            noises = [noise(live[one]) for one in others if one != name]
+            if noises and noise(live[name]) < QUIET * min(noises):
                 commands = [name]
                 measured.remove(name)
                 roles.unsure.append(f"{name}: taken for the set-point, because it has less noise than {others[-1]}")
@@ -232,7 +229,7 @@ def _velocities(
     roles.velocity_command = commands[0] if commands else None
     if moved is None or roles.motor is None:
         near = [name for name in measured if not labels[name].table]
-        roles.motor_velocity = (near or measured or [None])[0]
+        roles.motor_velocity = next(iter(near or measured), None)
         return
     for name in measured:
         share = derivative_of(live[name], moved, period_s).share
@@ -240,7 +237,8 @@ def _velocities(
             inverse = derivative_of(live[roles.motor], motion(live[name], period_s), period_s).share
             if inverse > IS_DERIVATIVE:
                 raise InputError(
-                    f"{where}: {roles.motor} is the derivative of {name}: position and velocity are interchanged; correct the "
+                    f"{where}: {roles.motor} is the derivative of {name}: position and velocity are interchanged; "
+                    "correct the "
                     "names of the columns"
                 )
             roles.unsure.append(

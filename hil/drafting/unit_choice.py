@@ -59,10 +59,8 @@ def position_unit(
 
 
 def _by_size(column: str, travel: float, length: bool, why: str) -> UnitChoice:
-    if length:
-        unit = "m" if travel < _LONGEST_M else "mm"
-    else:
-        unit = "rad" if travel < _MOST_RAD else "deg"
+    small, large, most = ("m", "mm", _LONGEST_M) if length else ("rad", "deg", _MOST_RAD)
+    unit = small if travel < most else large
     return UnitChoice(unit, f"{column}: {why}; {unit} is taken for a travel of {travel:.4g}")
 
 

@@ -17,6 +17,8 @@ import numpy as np
 from hil.arrays import FloatArray
 from hil.errors import InputError
 
+_NAME_KEYS, _VALUE_KEYS = ("name", "channel", "id"), ("values", "data", "samples")  # of an object per channel
+
 
 @dataclass(frozen=True)
 class JsonContent:
@@ -53,22 +55,20 @@ def read_json(path: Path) -> JsonContent:
     return JsonContent(lists, scalars, units)
 
 
+def _first(row: dict[str, Any], keys: tuple[str, ...], kind: type) -> Any:
+    """The first value under one of `keys` that is of a kind; None without one."""
+    return next((row[key] for key in keys if isinstance(row.get(key), kind)), None)
+
+
 def _collect(data: Any, lists: dict[str, list[Any]], scalars: dict[str, float], units: dict[str, str]) -> None:
     if isinstance(data, list) and data and all(isinstance(row, dict) for row in data):
-        names = [
-            next((key for key in ("name", "channel", "id") if isinstance(row.get(key), str)), None) for row in data
-        ]
-        values = [
-            next((key for key in ("values", "data", "samples") if isinstance(row.get(key), list)), None) for row in data
-        ]
-        if all(names) and all(values):  # an object per channel
-            for row, name, value in zip(data, names, values, strict=True):
-                lists[row[name]] = row[value]
-                if isinstance(row.get("unit"), str):
-                    units[row[name]] = row["unit"]
+        channels = [(_first(row, _NAME_KEYS, str), _first(row, _VALUE_KEYS, list), row.get("unit")) for row in data]
+        if all(name is not None and values is not None for name, values, _ in channels):  # an object per channel
+            lists.update({name: values for name, values, _ in channels})
+            units.update({name: unit for name, _, unit in channels if isinstance(unit, str)})
         else:  # a record per row
-            for name in dict.fromkeys(key for row in data for key in row):
-                lists[name] = [row.get(name) for row in data]
+            for key in dict.fromkeys(key for row in data for key in row):
+                lists[key] = [row.get(key) for row in data]
     elif isinstance(data, dict):
         names, rows = data.get("columns"), data.get("data", data.get("rows"))
         if isinstance(names, list) and isinstance(rows, list) and all(isinstance(row, list) for row in rows):

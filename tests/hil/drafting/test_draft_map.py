@@ -11,7 +11,8 @@ import pytest
 from foreign_axis import LEAD_M, axis, csv_text, renamed, write
 
 from hil.commands.import_ import import_
-from hil.drafting.draft_map import MapDraft, draft_map
+from hil.drafting.draft_map import draft_map
+from hil.drafting.map_draft import MapDraft
 from hil.recording.recording import Recording, read_recording
 
 AXIS = axis()

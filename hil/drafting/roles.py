@@ -165,7 +165,10 @@ def _positions(live: dict[str, FloatArray], labels: dict[str, Label], names: lis
     names = list(names)
     for name in names[1:]:
         first = next((one for one in names[: names.index(name)] if _copies(live[one], live[name])), None)
-        if first is not None and labels[name].command == labels[first].command:
+        if first is not None and (labels[name].command, labels[name].table) == (
+            labels[first].command,
+            labels[first].table,
+        ):
             roles.left_out[name] = f"a copy of {first}"
             names.remove(name)
     commands = [name for name in names if labels[name].command]

@@ -9,7 +9,7 @@ from hil.recording.recording import Recording
 
 _WHOLE = 0.05  # deviation from a whole number of steps up to which a difference is counted
 _COUNTED = 0.9  # share of the differences that must be whole numbers of steps
-_FEW = 20  # steps: the size of a difference of more is too sensitive to that of the step
+_STEPS = (20, 60, 200, 600)  # largest differences that are counted, in steps
 MOST_LEAD_ROWS = 50  # of a command before the measured torque: tens of ms
 DIGITS = 1e-6  # relative deviation from a power of ten below which a step is that of printed digits
 
@@ -21,11 +21,11 @@ def count_of(values: FloatArray) -> float | None:
     if differences.size < 100:
         return None
     step = float(differences.min())
-    for _ in range(5):  # the smallest difference has the largest error of printed digits
-        few = differences[differences < _FEW * step]
+    # the smallest difference has the largest error of printed digits: ever larger ones sharpen the step
+    for most in _STEPS:
+        few = differences[differences < most * step]
         whole = np.maximum(np.round(few / step), 1.0)
         step = float((few @ whole) / (whole @ whole))
-    few = differences[differences < _FEW * step]
     good = np.abs(few / step - np.round(few / step)) < _WHOLE
     return step if few.size > 50 and good.mean() > _COUNTED else None
 

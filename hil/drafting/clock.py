@@ -29,7 +29,7 @@ _PERIOD_NAMES = ("ts", "dt", "te", "ta", "period", "sample_time", "sampling_time
 
 
 @dataclass(frozen=True, eq=False)
-class Clock:
+class StampClock:
     """A column with its unit, or a rate [Hz]; `time_s` (n,) from 0; `resample_hz` if its steps are irregular."""
 
     time_s: FloatArray
@@ -41,7 +41,7 @@ class Clock:
     unsure: tuple[str, ...] = ()
 
 
-def find_clock(table: ForeignTable, labels: dict[str, Label], rate_hz: float | None) -> Clock:
+def find_clock(table: ForeignTable, labels: dict[str, Label], rate_hz: float | None) -> StampClock:
     """Find the clock. `rate_hz` is what the user says; it counts more than stamps.
 
     Raises InputError: no clock, stamps that run back or repeat, rows in a wrong order, two rates, a gap.
@@ -67,8 +67,8 @@ def _says_time(remark: str) -> bool:
     return label(remark.split(":")[0]).quantity is Quantity.TIME
 
 
-def _of_rate(rows: int, rate_hz: float, how: str) -> Clock:
-    return Clock(np.arange(rows) / rate_hz, None, "s", rate_hz, None, how)
+def _of_rate(rows: int, rate_hz: float, how: str) -> StampClock:
+    return StampClock(np.arange(rows) / rate_hz, None, "s", rate_hz, None, how)
 
 
 def _written_rate(table: ForeignTable) -> tuple[float, str] | None:
@@ -99,7 +99,7 @@ def _growing(values: FloatArray) -> float:
     return float(np.mean(np.diff(values) > 0))
 
 
-def _of_column(table: ForeignTable, column: str, told: Label) -> Clock:
+def _of_column(table: ForeignTable, column: str, told: Label) -> StampClock:
     stamps = table.columns[column]
     where = f"{table.path}: {column}"
     bad = np.flatnonzero(~np.isfinite(stamps))
@@ -120,7 +120,7 @@ def _of_column(table: ForeignTable, column: str, told: Label) -> Clock:
             f"clock: {100 * repeats:.0f} % of the stamps in {column!r} repeat (too few digits); "
             f"equal steps at {rate:.6g} Hz are taken instead"
         )
-        return Clock(
+        return StampClock(
             np.arange(stamps.size) / rate, None, "s", float(f"{rate:.6g}"), None, f"mean of {column}", tuple(unsure)
         )
     if repeats > 0.0:
@@ -148,7 +148,7 @@ def _of_column(table: ForeignTable, column: str, told: Label) -> Clock:
             f"{typical * factor:.4g} s; the channels are interpolated to {resample:g} Hz"
         )
     how = "by its name" if told.quantity is Quantity.TIME else "grows by equal steps"
-    return Clock((stamps - stamps[0]) * factor, column, unit, None, resample, how, tuple(unsure))
+    return StampClock((stamps - stamps[0]) * factor, column, unit, None, resample, how, tuple(unsure))
 
 
 def _unit(told: Label, step: float) -> tuple[str, str]:

@@ -7,13 +7,13 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.channels import AXIS_CHANNELS, AxisKind
-from hil.drafting.clock import Clock, find_clock
+from hil.drafting.clock import StampClock, find_clock
 from hil.drafting.column_names import Label, label
 from hil.drafting.effort import effort_entry
 from hil.drafting.foreign_table import read_table
 from hil.drafting.map_draft import DraftedChannel, MapDraft
 from hil.drafting.oddities import refuse_damage
-from hil.drafting.relations import Motion, derivative_of, driven, motion, proportional
+from hil.drafting.relations import MotionColumns, derivative_of, driven, motion, proportional
 from hil.drafting.roles import SAME_POSITION, Roles, find_roles
 from hil.drafting.unit_choice import MATCH, UnitChoice, is_length, misfit, position_unit, velocity_unit
 from hil.drafting.usual_values import COUNTS, LEADS_M, ROTARY_LEAD_M, mixed_up, usual_lead
@@ -56,7 +56,7 @@ def _used(roles: Roles) -> tuple[str | None, ...]:
     )
 
 
-def _even(columns: dict[str, FloatArray], clock: Clock) -> tuple[dict[str, FloatArray], float]:
+def _even(columns: dict[str, FloatArray], clock: StampClock) -> tuple[dict[str, FloatArray], float]:
     """Columns on a regular clock without missing values, for the relations only."""
     time_s = clock.time_s
     period_s = float(np.median(np.diff(time_s)))
@@ -249,7 +249,7 @@ class _Composer:
             entry["sign"] = -1
         self.draft.channels.append(DraftedChannel("velocity_command_m_s", entry, f"the derivative of {command}"))
 
-    def _efforts(self, moved: Motion) -> None:
+    def _efforts(self, moved: MotionColumns) -> None:
         names = AXIS_CHANNELS[self.kind]
         for column, channel in ((self.roles.effort, names.torque), (self.roles.effort_command, names.torque_command)):
             if column is not None:

@@ -5,7 +5,7 @@ import numpy as np
 from hil.arrays import FloatArray
 from hil.channels import AxisKind
 from hil.drafting.column_names import Label
-from hil.drafting.relations import Drive, Motion
+from hil.drafting.relations import EffortCause, MotionColumns
 
 CAUSED = 0.3  # share of an effort explained by its motion from which its sign can be judged
 PART = 0.1  # of the effort: the inertia's part must exceed it, else the sign of friction decides
@@ -16,8 +16,8 @@ def effort_entry(
     told: Label,
     kind: AxisKind,
     scalars: dict[str, float],
-    cause: Drive,
-    moved: Motion,
+    cause: EffortCause,
+    moved: MotionColumns,
     motor_sign: int,
 ) -> tuple[dict[str, object], list[str]]:
     """Entry of the map, and notes on what is unsure.
@@ -38,7 +38,7 @@ def effort_entry(
     return entry, notes
 
 
-def _sign(coefficients: FloatArray, moved: Motion) -> int:
+def _sign(coefficients: FloatArray, moved: MotionColumns) -> int:
     inertia, viscous, coulomb = coefficients[:3]
     parts = np.array(
         [

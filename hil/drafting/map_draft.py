@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from hil.drafting.clock import Clock
+from hil.drafting.clock import StampClock
 from hil.drafting.foreign_table import ForeignTable
 
 
@@ -20,7 +20,7 @@ class MapDraft:
     """A drafted map: `unsure` is what the user should check, `left_out` the other columns with the reason."""
 
     table: ForeignTable
-    clock: Clock
+    clock: StampClock
     channels: list[DraftedChannel] = field(default_factory=list)
     lead_m: float | None = None
     lead_how: str = ""

@@ -11,6 +11,7 @@ from hil.errors import InputError
 
 NO_ORDER = 1.0  # roughness from which rows have no order: 1.4 for white noise, below 0.3 for a motion
 JUMP = 0.2  # of the travel in one row: no axis moves so far between two samples
+FEW_VALUES = 20  # counts of an encoder at rest, where each count is a jump
 SUDDEN = 20.0  # times the change of the rows around: a fast motion is fast for more than one row
 TOLD = 0.8  # share of the torque that the motion of each half must explain before its sign is judged
 
@@ -67,6 +68,8 @@ def _refuse_jumps(path: Path, name: str, values: FloatArray, steps: bool) -> Non
     change = np.diff(values)
     size = np.abs(change)
     around = np.maximum(np.r_[0.0, 0.0, size[:-2]], np.r_[size[2:], 0.0, 0.0])
+    if np.unique(values).size < FEW_VALUES:
+        return
     jumps = np.flatnonzero((size > JUMP * np.ptp(values)) & (size > SUDDEN * around))
     if not jumps.size:
         return

@@ -7,16 +7,19 @@ x = r q + c - r tau v - (m_t / k) a - (F_t / k) sign(v)      second encoder agai
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.signal import butter, filtfilt
 
 from hil.arrays import FloatArray
 from hil.channels import AxisKind
 from hil.drafting.estimate import BlockFit, Estimate, fit_blocks
 from hil.drafting.relations import direction, motion, smoothed
 from hil.errors import InputError
-from hil.identification.inverse_dynamics import CUT_AT_START, inverse_dynamics_columns
+from hil.identification.inverse_dynamics import CORNER, CUT_AT_START, inverse_dynamics_columns
+from hil.identification.noise import white_noise
 from hil.recording.recording import Recording
 
-CUTOFFS_HZ = (100.0, 50.0, 25.0, 12.0, 6.0)  # of the position filter; the one that leaves least is taken
+CUTOFFS_HZ = (100.0, 50.0, 25.0, 12.0, 6.0)  # of the position filter
+NOISE_SHARE = 0.02  # of noise in the acceleration: it makes the inertia too small by this share
 MOST_OF_RATE = 0.2  # of the sampling rate: the filter must end well below half of it
 LEAST_ROWS = 80  # after decimation: eight per block of the error estimate
 GRAVITY_GAIN = 0.85  # of what is left without gravity: it is reported if it leaves less
@@ -56,17 +59,16 @@ def plant_values(recording: Recording) -> PlantValues:
             "record torque, current or voltage"
         )
     rate_hz = 1.0 / recording.period_s
-    fits = []
-    for cutoff_hz in CUTOFFS_HZ:
-        if cutoff_hz <= MOST_OF_RATE * rate_hz:
-            fits.append((_fit(recording, cutoff_hz), cutoff_hz))
-    if not fits:
+    allowed = [cutoff_hz for cutoff_hz in CUTOFFS_HZ if cutoff_hz <= MOST_OF_RATE * rate_hz]
+    if not allowed:
         raise InputError(
             f"{recording.name}: given {rate_hz:.3g} rows per second, allowed {CUTOFFS_HZ[-1] / MOST_OF_RATE:g} or "
             "more; "
             "record at a higher rate"
         )
-    (fit, gravity), cutoff_hz = min(fits, key=lambda one: one[0][0].left)
+    # the highest that noise allows: a lower one cuts acceleration, so that the inertia comes out too large
+    cutoff_hz = next((one for one in allowed if _noise_share(recording, one) < NOISE_SHARE), allowed[-1])
+    fit, gravity = _fit(recording, cutoff_hz)
     inertia, viscous, coulomb, offset = fit.estimates[:4]
     if inertia.value <= 0.0:
         raise InputError(
@@ -78,10 +80,23 @@ def plant_values(recording: Recording) -> PlantValues:
     return PlantValues(inertia, viscous, coulomb, offset, fit.left, gravity, cutoff_hz)
 
 
+def _noise_share(recording: Recording, cutoff_hz: float) -> float:
+    """Share of white position noise in the variance of the acceleration below `cutoff_hz`.
+
+    var = 2 T sigma^2 (2 pi)^4 fc^5 / 5 for white noise sigma at the period T.
+    """
+    position, period_s = recording[recording.axis.motor_position], recording.period_s
+    noise = 2.0 * period_s * white_noise(position) ** 2 * (2.0 * np.pi) ** 4 * cutoff_hz**5 / 5.0
+    filtered = filtfilt(*butter(4, 2.0 * cutoff_hz * period_s), position)
+    total = float(np.var(np.diff(filtered, 2))) / period_s**4
+    return float(noise) / total if total > 0.0 else np.inf
+
+
 def _fit(recording: Recording, cutoff_hz: float) -> tuple[BlockFit, Estimate | None]:
     """Fit without gravity, and with it on a rotary axis where it leaves clearly less."""
-    # the same bandwidth for every cutoff, so that what is left can be compared
-    decimation = max(2, round(1.0 / (recording.period_s * 100.0)))
+    # the filter of the decimation, alike for torque and motion, ends where that of the position does, at 40 Hz or below
+    rate_hz = 1.0 / recording.period_s
+    decimation = max(2, round(0.5 * CORNER * rate_hz / cutoff_hz), round(rate_hz / 100.0))
     rows = (len(recording) - CUT_AT_START) // decimation
     if rows < LEAST_ROWS:
         raise InputError(

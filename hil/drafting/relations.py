@@ -18,7 +18,7 @@ NO_SPREAD = 0.01  # of the travel: a part of a recording with less motion tells 
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class MotionColumns:
     """Smoothed position and its derivatives (n,) in units of the column."""
 
     position: FloatArray
@@ -39,11 +39,11 @@ def smoothed(values: FloatArray, period_s: float) -> FloatArray:
     return np.asarray(savgol_filter(values, _window(values, period_s), 2), dtype=np.float64)
 
 
-def motion(position: FloatArray, period_s: float) -> Motion:
+def motion(position: FloatArray, period_s: float) -> MotionColumns:
     """Position with derivatives from parabolas over `SMOOTH_S`."""
     window = _window(position, period_s)
     parts = (savgol_filter(position, window, 2, deriv=order, delta=period_s) for order in (0, 1, 2))
-    return Motion(*(np.asarray(part, dtype=np.float64) for part in parts))
+    return MotionColumns(*(np.asarray(part, dtype=np.float64) for part in parts))
 
 
 def proportional(values: FloatArray, other: FloatArray) -> Relation:
@@ -56,20 +56,20 @@ def proportional(values: FloatArray, other: FloatArray) -> Relation:
     return Relation(factor, float(x @ y) ** 2 / (power * total))
 
 
-def derivative_of(values: FloatArray, moved: Motion, period_s: float) -> Relation:
+def derivative_of(values: FloatArray, moved: MotionColumns, period_s: float) -> Relation:
     """How far a column (n,) is the velocity of a motion."""
     return proportional(smoothed(values, period_s), moved.velocity)
 
 
 @dataclass(frozen=True, eq=False)
-class Drive:
+class EffortCause:
     """Share of an effort that a motion explains, and the coefficients J, D, F, w, c (5,)."""
 
     share: float
     coefficients: FloatArray
 
 
-def driven(values: FloatArray, moved: Motion, period_s: float) -> Drive:
+def driven(values: FloatArray, moved: MotionColumns, period_s: float) -> EffortCause:
     """Fit an effort (n,) by inertia, friction and load of a motion."""
     effort = smoothed(values, period_s)
     columns = (moved.acceleration, moved.velocity, direction(moved.velocity), moved.position, np.ones_like(effort))
@@ -78,7 +78,7 @@ def driven(values: FloatArray, moved: Motion, period_s: float) -> Drive:
     solution = np.linalg.lstsq(matrix, effort, rcond=None)[0]
     left = effort - matrix @ solution
     total = float(np.var(effort))
-    return Drive(1.0 - float(np.var(left)) / total if total > 0.0 else 0.0, np.asarray(solution / scales))
+    return EffortCause(1.0 - float(np.var(left)) / total if total > 0.0 else 0.0, np.asarray(solution / scales))
 
 
 def direction(velocity: FloatArray) -> FloatArray:

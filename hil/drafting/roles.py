@@ -6,7 +6,16 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.drafting.column_names import Label, Quantity
-from hil.drafting.relations import Motion, derivative_of, driven, motion, noise, proportional, roughness, smoothed
+from hil.drafting.relations import (
+    MotionColumns,
+    derivative_of,
+    driven,
+    motion,
+    noise,
+    proportional,
+    roughness,
+    smoothed,
+)
 from hil.errors import InputError
 
 SAME_POSITION = 0.98  # share from which a column is another reading of a position: following errors are below 5 %
@@ -156,7 +165,7 @@ def _as_position(name: str, live: dict[str, FloatArray], period_s: float) -> flo
     return total - 0.01 * noise(live[name])
 
 
-def _accelerates(values: FloatArray, moved: Motion, period_s: float) -> bool:
+def _accelerates(values: FloatArray, moved: MotionColumns, period_s: float) -> bool:
     return proportional(smoothed(values, period_s), moved.acceleration).share > IS_DERIVATIVE
 
 
@@ -223,7 +232,7 @@ def _velocities(
     live: dict[str, FloatArray],
     labels: dict[str, Label],
     names: list[str],
-    moved: Motion | None,
+    moved: MotionColumns | None,
     period_s: float,
     roles: Roles,
 ) -> None:

@@ -125,3 +125,16 @@ def _recording(columns: dict[str, np.ndarray]) -> Recording:
     channels = {names[name]: values for name, values in columns.items() if name in names}
     channels["table_position_m"] = 1e-3 * channels["table_position_m"]
     return Recording("log", channels, 1e-3)
+
+
+def test_a_load_over_the_angle_is_said() -> None:
+    angle = AXIS["angle"] / 20.0
+    torque = AXIS["torque"] + 0.5 * np.sin(angle)
+    plain, loaded = (
+        draft_bench(Recording("log", {"time_s": AXIS["t"], "motor_position_rad": angle, "torque_n_m": one}, 1e-3))
+        for one in (AXIS["torque"], torque)
+    )
+    assert not any("gravity" in note for note in plain.unsure)
+    assert any("gravity" in note for note in loaded.unsure)
+    note = next(note for note in loaded.notes if "gravity" in note)
+    assert float(note.split("(gravity) ")[1].split(" N m")[0]) == pytest.approx(0.5, rel=0.05)

@@ -13,6 +13,7 @@ from hil.recording.importing import GAP_STEPS
 from hil.recording.recording import CLOCK_TOLERANCE
 
 SLOWEST_HZ, FASTEST_HZ = 5.0, 2e5  # of recordings of an axis: outside lies a wrong unit of the stamps
+LEAST_STEPS = 200  # from which a tenth has a typical step in spite of jitter
 REPEATS = 0.02  # share of repeated stamps from which they have too few digits, and are no duplicate rows
 _RATE_NAMES = (
     "fs",
@@ -190,7 +191,7 @@ def _refuse_order(where: str, stamps: FloatArray, steps: FloatArray) -> None:
 
 def _refuse_two_rates(where: str, steps: FloatArray, factor: float) -> None:
     """Refuse a clock whose step changes for good: two recordings of different rate in one file."""
-    if steps.size < 40:
+    if steps.size < LEAST_STEPS:
         return
     tenth = steps.size // 10
     first, last = float(np.median(steps[:tenth])), float(np.median(steps[-tenth:]))

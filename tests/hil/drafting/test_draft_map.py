@@ -52,6 +52,7 @@ def test_each_format_is_imported_without_a_map(tmp_path: Path, ending: str) -> N
         ("\t", True, "", ""),
         ("|", False, "", ""),
         (" ", False, "", ""),
+        ("   ", False, "", ""),
         (",", False, "# recorded on Monday\n# drive 3\n", ""),
         (";", True, "Messung 7\nAntrieb X\n\n", ""),
         (",", False, "", "s,mm,rad,Nm\n"),

@@ -23,6 +23,8 @@ def diagnose(
             "Default: the last third of each recording.",
         ),
     ] = None,
+    bench: RecordedBench = None,
+    folder: Out = None,
     budget_s: Annotated[
         float | None,
         typer.Option(
@@ -32,8 +34,6 @@ def diagnose(
             help="Time after which the search ends with the best answer so far; the result says what was not tried.",
         ),
     ] = None,
-    bench: RecordedBench = None,
-    folder: Out = None,
 ) -> None:
     """Find physics that the twin lacks: where it acts, which mechanism it is, and whether modelling it helps."""
     from hil.bench.bench_file import load_bench

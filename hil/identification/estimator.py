@@ -4,10 +4,10 @@
 
     step s:  min |J s + r|^2 + mu |diag(J) s|^2   with x + s inside the bounds;  mu after Nielsen (1999)
 
-The Jacobian J is computed by forward differences, one simulation with the steps of a search per parameter, on all
-cores. While steps gain what the linear model predicts, J is updated along the step instead (Broyden 1965; Madsen,
-Nielsen and Tingleff 2004, sec. 3.5); a converged fit ends with a new J. The step is computed from J^T J: with 1e5 rows
-and ten parameters a decomposition of J, as in scipy's solvers, takes longer than the simulations.
+The Jacobian J is computed by forward differences, one simulation per parameter, on all cores. While steps gain what the
+linear model predicts, J is updated along the step instead (Broyden 1965; Madsen, Nielsen and Tingleff 2004, sec. 3.5);
+a converged fit ends with a new J. The step is computed from J^T J: with 1e5 rows and ten parameters a decomposition of
+J, as in scipy's solvers, takes longer than the simulations.
 """
 
 import math
@@ -18,12 +18,12 @@ from enum import StrEnum
 from functools import cached_property
 
 import numpy as np
-from scipy.optimize import lsq_linear
 
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
 from hil.identification.dataset import TORQUE_ACCURACY, Dataset
 from hil.identification.hypothesis import EDGE_STEP_S, Hypothesis
+from hil.identification.levenberg_marquardt import broyden, damped_step, robust_loss
 from hil.identification.noise_floor import FLOOR, noise_ratios
 from hil.identification.parallel import POOL
 from hil.identification.residuals import Residuals
@@ -149,8 +149,9 @@ class Estimator:
     """Fits hypotheses to a data set.
 
     `edge_step_s` is the forward-difference step for the edge of a window, `torque_accuracy` the torque resolved by the
-    motor channel over the noise of the torque channel. `closed` selects residuals in closed loop, `fast` those with the
-    internal steps of a search. After `deadline_s` of the monotonic clock fits take no more steps.
+    motor channel over the noise of the torque channel. `closed` selects residuals in closed loop,
+    `fast` those with the internal steps of a search. After `deadline_s` of the
+    monotonic clock fits take no more steps.
     """
 
     data: Dataset
@@ -183,8 +184,7 @@ class Estimator:
 
         The first columns are `held` (m, k) if given.
         """
-        search, x = replace(self, fast=True), hypothesis.x
-        base = search.residuals(hypothesis).vector
+        base, x = self.residuals(hypothesis).vector, hypothesis.x
         steps, high = self.steps(hypothesis), hypothesis.bounds[1]
         known = 0 if held is None else held.shape[1]
         slopes = np.empty((base.size, x.size), order="F")
@@ -195,7 +195,7 @@ class Estimator:
             step = -steps[index] if x[index] + steps[index] > high[index] else steps[index]
             moved = x.copy()
             moved[index] += step
-            slopes[:, index] = (search.residuals(hypothesis.moved(moved)).vector - base) / step
+            slopes[:, index] = (self.residuals(hypothesis.moved(moved)).vector - base) / step
 
         list(POOL.map(column, range(known, x.size)))
         return slopes
@@ -225,12 +225,12 @@ class Estimator:
         size = np.zeros(at.x.size)
         used, converged = 1, False
         while used < evaluations and not self.expired:
-            loss, weights = _loss(residuals.vector, soft)
+            loss, weights = robust_loss(residuals.vector, soft)
             weighted = slopes if weights is None else slopes * weights[:, None]
             normal = weighted.T @ weighted
             descent = weighted.T @ (residuals.vector if weights is None else residuals.vector * weights)
             size = np.maximum(size, np.sqrt(np.diag(normal)))
-            step = _step(normal, descent, damping, size, low - at.x, high - at.x)
+            step = damped_step(normal, descent, damping, size, low - at.x, high - at.x)
             promised = -float(step @ (2.0 * descent + normal @ step))
             if promised <= _LEAST_GAIN * loss:
                 if fresh:
@@ -241,10 +241,10 @@ class Estimator:
             moved = at.moved(at.x + step)
             there = self.residuals(moved)
             used += 1
-            gained = loss - _loss(there.vector, soft)[0]
+            gained = loss - robust_loss(there.vector, soft)[0]
             if gained > 0.0:
                 fresh = held is not None or abs(gained / promised - 1.0) > _AGREES
-                slopes = slopes if fresh else _corrected(slopes, there.vector - residuals.vector, step, size)
+                slopes = slopes if fresh else broyden(slopes, there.vector - residuals.vector, step, size)
                 at, residuals = moved, there
                 damping *= max(1.0 / 3.0, 1.0 - (2.0 * gained / promised - 1.0) ** 3)
                 growth = 2.0
@@ -257,44 +257,3 @@ class Estimator:
                     converged = True
                     break
         return Fit(at, residuals, slopes, self, converged)
-
-
-def _corrected(slopes: FloatArray, change: FloatArray, step: FloatArray, size: FloatArray) -> FloatArray:
-    """Broyden update of the Jacobian by the change (m,) of the residuals over a step, parameters weighted by `size`."""
-    along = size**2 * step
-    return np.asarray(slopes + np.outer((change - slopes @ step) / float(step @ along), along), dtype=np.float64)
-
-
-def soft_cost(residuals: FloatArray, soft: float) -> float:
-    """Sum of rho over residuals (m,); see `_loss`."""
-    return _loss(residuals, soft)[0]
-
-
-def _loss(residuals: FloatArray, soft: float) -> tuple[float, FloatArray | None]:
-    """Sum of rho, and the weights sqrt(rho') of the rows; rho(z) = 2 soft^2 (sqrt(1 + z / soft^2) - 1)."""
-    if not soft:
-        return float(residuals @ residuals), None
-    root = np.sqrt(1.0 + (residuals / soft) ** 2)
-    return float(2.0 * soft**2 * np.sum(root - 1.0)), np.asarray(1.0 / np.sqrt(root), dtype=np.float64)
-
-
-def _step(
-    normal: FloatArray, descent: FloatArray, damping: float, size: FloatArray, low: FloatArray, high: FloatArray
-) -> FloatArray:
-    """The damped step of the module's equation, between `low` and `high`."""
-    scale = np.where(size > 0.0, size, 1.0)
-    damped = normal / np.outer(scale, scale) + damping * np.eye(scale.size)
-    values, vectors = np.linalg.eigh(damped)
-    root = vectors * np.sqrt(np.maximum(values, 1e-14 * values[-1]))
-    target = np.linalg.solve(root, -descent / scale)
-    free = np.linalg.solve(root.T, target)
-    if np.all(free > low * scale) and np.all(free < high * scale):
-        return np.asarray(free / scale, dtype=np.float64)
-    wide = np.maximum(high - low, 1e-12)
-    found = lsq_linear(
-        root.T,
-        target,
-        (np.minimum(low, 0.0) * scale - 1e-12 * wide * scale, np.maximum(high, 0.0) * scale + 1e-12 * wide * scale),
-        method="bvls",
-    )
-    return np.asarray(np.clip(found.x / scale, low, high), dtype=np.float64)

@@ -39,6 +39,8 @@ _CLEAR = 0.7
 # Least energy that a term removes per row, in units of noise^2: 14 % of the noise in rms. The model discrepancy of two
 # simulations of one axis is below that.
 MATERIAL = 0.02
+# Energy above the noise floor per row, in units of noise^2, below which nothing is left to explain: half of MATERIAL.
+_NOTHING = 0.5 * MATERIAL
 # Least share of the energy above the noise that a term removes: many terms of less are a series expansion of another
 # effect.
 WORTH = 0.02
@@ -162,12 +164,8 @@ def _next_term(
         step("fitting " + ", ".join(one.term.effect for one in promising[:3]))
         found = _claimable(race(base, promising))
     best = _worthwhile(found, base, nominal)
-    if (
-        (best is None or best.cost > _CLEAR * base.cost)
-        and not owner.at_floor
-        and may_hide(base)
-        and not base.estimator.expired
-    ):
+    unfinished = (best is None or best.cost > _CLEAR * base.cost) and not base.estimator.expired
+    if unfinished and not owner.at_floor and base.excess > _NOTHING * base.rows and may_hide(base):
         step("fitting a lost preload from the springs of the bench file")
         found = sorted([*found, unbent(base)], key=lambda other: other.cost)
         best = _worthwhile(found, base, nominal)

@@ -14,7 +14,7 @@ from functools import partial
 
 from hil.diagnosis.search.initial_values import claimable, stretches
 from hil.diagnosis.search.score_test import screen_library
-from hil.diagnosis.search.successive_halving import LONG, SEARCH_ACCURACY, SECOND, owner_points, race
+from hil.diagnosis.search.successive_halving import LONG, SEARCH_ACCURACY, owner_points, race
 from hil.identification.dataset import TORQUE_ACCURACY
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import LAST_EDGE_STEP_S
@@ -54,9 +54,10 @@ def unbent(base: Fit) -> Fit:
     starts = [owner.with_term(Term(_EFFECT, 0, (share * widest_m, *rest))) for share, *rest in _STARTS]
     held = search.jacobian(owner)
     first = [partial(search.fit, start, soft=SOFT, evaluations=_FIRST, held=held) for start in starts]
-    best = min(in_parallel(first), key=lambda found: found.cost).refit(_SECOND, soft=SOFT)
-    if best.cost > search.evaluate(base.hypothesis).cost:  # worse than without the term
+    best = min(in_parallel(first), key=lambda found: found.cost)
+    full = replace(search, fast=False)  # small gaps need the steps of the twin
+    best = full.fit(best.hypothesis, soft=SOFT, evaluations=_SECOND)
+    if best.cost > full.evaluate(base.hypothesis).cost:  # worse than without the term
         return best.with_accuracy(TORQUE_ACCURACY)
-    last = replace(search, torque_accuracy=TORQUE_ACCURACY, edge_step_s=LAST_EDGE_STEP_S)
-    found = last.fit(best.hypothesis, evaluations=LONG)
-    return replace(last, fast=False).fit(found.hypothesis, evaluations=SECOND, slopes=found.jacobian)
+    last = replace(full, torque_accuracy=TORQUE_ACCURACY, edge_step_s=LAST_EDGE_STEP_S)
+    return last.fit(best.hypothesis, evaluations=LONG)

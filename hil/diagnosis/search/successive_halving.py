@@ -14,8 +14,9 @@ from hil.bench.bench_file import Bench
 from hil.diagnosis.search.initial_values import likenesses
 from hil.diagnosis.search.score_test import Candidate, offered
 from hil.identification.dataset import TORQUE_ACCURACY, inertia
-from hil.identification.estimator import Estimator, Fit, soft_cost
-from hil.identification.hypothesis import LAST_EDGE_STEP_S, TRUST
+from hil.identification.estimator import Estimator, Fit
+from hil.identification.hypothesis import LAST_EDGE_STEP_S, TRUST, Hypothesis
+from hil.identification.levenberg_marquardt import robust_loss
 from hil.identification.nominal_fit import SOFT
 from hil.identification.parallel import POOL, in_parallel
 from hil.identification.terms import compatible
@@ -177,7 +178,7 @@ class _Race:
         """Fit the other variants of the last term from its values."""
         last, rebased = fit.terms[-1], fit.hypothesis.rebased
         others = [replace(last, variant=v) for v in range(len(BY_ID[last.effect].variants)) if v != last.variant]
-        return in_parallel([partial(fit.estimator.fit, rebased.replaced(-1, term)) for term in others])
+        return in_parallel([partial(_fit_fast_first, fit.estimator, rebased.replaced(-1, term)) for term in others])
 
     def _equivalents(self, fit: Fit) -> list[Fit]:
         """Fit the mechanisms that may have the same effect as the last term on this motion."""
@@ -186,11 +187,19 @@ class _Race:
         for alike in likenesses(terms, fit.bench):
             if offered(alike[0], self.base.hypothesis, terms[:-1]):
                 begun = in_parallel([partial(fit.estimator.evaluate, rebased.replaced(-1, term)) for term in alike])
-                jobs.append(partial(fit.estimator.fit, min(begun, key=lambda other: other.cost).hypothesis))
+                jobs.append(
+                    partial(_fit_fast_first, fit.estimator, min(begun, key=lambda other: other.cost).hypothesis)
+                )
         return in_parallel(jobs)
 
     def _gain(self, fit: Fit) -> float:
         return self.base.cost - fit.cost
+
+
+def _fit_fast_first(last: Estimator, hypothesis: Hypothesis) -> Fit:
+    """Converge with the steps of a search, then with those of the twin."""
+    found = replace(last, fast=True).fit(hypothesis)
+    return last.fit(found.hypothesis, evaluations=SECOND, slopes=found.jacobian)
 
 
 def _finish(fit: Fit) -> Fit:
@@ -215,7 +224,7 @@ def _edges_moved(fit: Fit) -> Fit:
 
 
 def _soft(fit: Fit) -> float:
-    return soft_cost(fit.residuals.vector, SOFT)
+    return robust_loss(fit.residuals.vector, SOFT)[0]
 
 
 def _unique(fits: Sequence[Fit]) -> list[Fit]:

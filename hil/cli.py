@@ -19,6 +19,7 @@ from hil.commands.compare import compare
 from hil.commands.demo import demo
 from hil.commands.diagnose import diagnose
 from hil.commands.friction import friction
+from hil.commands.identify import identify
 from hil.commands.import_ import import_
 from hil.commands.investigate import investigate
 from hil.commands.paper import paper
@@ -57,6 +58,7 @@ COMMANDS: tuple[tuple[str, Callable[..., Any]], ...] = (
     ("demo", demo),
     ("run", run),
     ("import", import_),
+    ("identify", identify),
     ("compare", compare),
     ("diagnose", diagnose),
     ("investigate", investigate),

@@ -5,28 +5,48 @@ from typing import Annotated
 
 import typer
 
-from hil.report.console import out
+from hil.report.console import err, out
 
 
 def import_(
-    source: Annotated[Path, typer.Argument(help="Foreign recording: .csv, .mat or .parquet.", show_default=False)],
-    map_file: Annotated[
-        str,
-        typer.Option(
-            "--map", help="Map of columns and units (YAML), or name of a shipped map: emps.", show_default=False
-        ),
+    source: Annotated[
+        Path,
+        typer.Argument(help="Foreign recording: .csv, .txt, .mat, .parquet or .json.", show_default=False),
     ],
+    map_file: Annotated[
+        str | None,
+        typer.Option(
+            "--map",
+            help="Map of columns and units (YAML), or name of a shipped map: emps. Default: a map is drafted from "
+            "the file "
+            "and written beside the result.",
+            show_default=False,
+        ),
+    ] = None,
     target: Annotated[
         Path | None,
         typer.Option("--out", help="Parquet file to write. Default: the name of the source, in this folder."),
     ] = None,
+    rate_hz: Annotated[
+        float | None,
+        typer.Option("--rate", min=0.1, help="Rows per second, for a file without time stamps.", show_default=False),
+    ] = None,
+    axis: Annotated[
+        str | None,
+        typer.Option(help="Number of the axis in the column names, if the file holds several.", show_default=False),
+    ] = None,
 ) -> None:
-    """Convert a foreign recording to Parquet by a map of its columns, units and signs."""
+    """Convert a foreign recording to Parquet by a map of its columns, units and signs, or draft this map."""
+    from hil.errors import InputError
     from hil.recording.importing import import_recording
     from hil.recording.recording import write_parquet
 
-    recording = import_recording(source, map_file)
     target = target or Path(f"{source.stem}.parquet")
+    if map_file is None:
+        map_file = str(_drafted(source, target, rate_hz, axis))
+    elif rate_hz is not None or axis is not None:
+        raise InputError("import: given --map and --rate or --axis, allowed only without a map; write it into the map")
+    recording = import_recording(source, map_file)
     write_parquet(recording, target)
     out.print(f"{len(recording)} rows, {recording.metadata['clock']}")
     for channel, origin in recording.metadata["channels"].items():
@@ -37,3 +57,25 @@ def import_(
     for channel, how in recording.metadata["derived"].items():
         out.print(f"  {channel}: {how}")
     out.print(f"Recording: {target}")
+
+
+def _drafted(source: Path, target: Path, rate_hz: float | None, axis: str | None) -> Path:
+    """Draft a map beside the recording to write; return its path."""
+    from hil.drafting.draft_map import draft_map
+    from hil.drafting.map_text import map_text
+    from hil.errors import InputError
+
+    path = target.with_name(f"{target.stem}-map.yaml")
+    if path.exists():
+        raise InputError(f"{path}: the map exists and is not overwritten; import with --map {path}, or remove it")
+    draft = draft_map(source, rate_hz, axis)
+    try:
+        path.write_text(map_text(draft), encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error}); choose a folder with rights and space") from None
+    out.print(f"Map: {path}")
+    if draft.unsure:
+        err.print("Please check in the map:")
+        for note in draft.unsure:
+            err.print(f"  - {note}", markup=False)
+    return path

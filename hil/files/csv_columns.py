@@ -22,7 +22,10 @@ from hil.errors import InputError
 
 @dataclass(frozen=True)
 class CsvFormat:
-    """Format of a CSV file: `skip_lines` above the header, `skip_rows` between header and data."""
+    """Format of a CSV file: `skip_lines` above the header, `skip_rows` between header and data.
+
+    The delimiter " " stands for one or more blanks.
+    """
 
     delimiter: str = ","
     decimal_point: str = "."
@@ -65,7 +68,7 @@ def read_columns(path: Path, wanted: Collection[str], form: CsvFormat = PLAIN) -
     lines_above = line_of_row(path, 0, form) - 1
     try:
         table = pacsv.read_csv(
-            path,
+            _with_single_blanks(path, form) if form.delimiter == " " else path,
             read_options=pacsv.ReadOptions(
                 column_names=list(names), skip_rows=lines_above, encoding=form.encoding, use_threads=False
             ),
@@ -109,9 +112,18 @@ def _opened(path: Path, form: CsvFormat) -> TextIO:
         ) from None
 
 
+def _with_single_blanks(path: Path, form: CsvFormat) -> pa.BufferReader:
+    with _opened(path, form) as file:
+        text = "\n".join(" ".join(line.split()) for line in file)
+    return pa.BufferReader(text.encode(form.encoding))
+
+
 def _rows(path: Path, file: TextIO, form: CsvFormat) -> Iterator[tuple[int, list[str]]]:
     """Line number and fields of each line that is not blank, from the header on."""
-    reader = csv.reader(islice(file, form.skip_lines, None), delimiter=form.delimiter)
+    lines: Iterator[str] = islice(file, form.skip_lines, None)
+    if form.delimiter == " ":
+        lines = (" ".join(line.split()) for line in lines)
+    reader = csv.reader(lines, delimiter=form.delimiter)
     try:
         for fields in reader:
             if fields:

@@ -79,6 +79,19 @@ def fit_inverse_dynamics(
             f"{recording.name}: given {len(recording)} rows, allowed "
             f"{CUT_AT_START + 100 * decimation} or more; give a longer recording"
         )
+    columns, force = inverse_dynamics_columns(recording, cutoff_hz, decimation, cut_at_end)
+    fit = solve(columns, force)
+    figures = np.concatenate([fit.values, fit.std_errors, [fit.relative_error]])
+    return InverseDynamics(recording.kind, *figures.tolist())
+
+
+def inverse_dynamics_columns(
+    recording: Recording, cutoff_hz: float, decimation: int, cut_at_end: int = 0
+) -> tuple[FloatArray, FloatArray]:
+    """Regressors (n, 4) for inertia, viscous, Coulomb and offset, and torque or force (n,), filtered and decimated.
+
+    Raises InputError if the record does not move both ways.
+    """
     position, force = recording[recording.axis.motor_position], recording[recording.axis.torque]
     butterworth = butter(BUTTERWORTH_ORDER, 2 * cutoff_hz * recording.period_s)
     velocity = np.gradient(_forwards_and_backwards(butterworth, position), recording.period_s)
@@ -93,9 +106,7 @@ def fit_inverse_dynamics(
     settled = slice(CUT_AT_START, len(recording) - cut_at_end)
     columns = (acceleration, velocity, np.sign(velocity), np.ones_like(velocity))
     regressors = np.column_stack([_decimate(column[settled], decimation) for column in columns])
-    fit = solve(regressors, _decimate(force[settled], decimation))
-    figures = np.concatenate([fit.values, fit.std_errors, [fit.relative_error]])
-    return InverseDynamics(recording.kind, *figures.tolist())
+    return regressors, _decimate(force[settled], decimation)
 
 
 def _forwards_and_backwards(coefficients: tuple[FloatArray, FloatArray], values: FloatArray) -> FloatArray:

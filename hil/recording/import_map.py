@@ -108,6 +108,9 @@ class RecordingMap(_Strict):
     about: str = Field(description="what is imported and where it comes from")
     time: TimeColumn | None = Field(default=None, description="column of time stamps")
     sample_rate_hz: PositiveFloat | None = Field(default=None, description="instead of a column of time stamps")
+    resample_hz: PositiveFloat | None = Field(
+        default=None, description="rate to which stamps with uneven steps are interpolated"
+    )
     csv: CsvOptions = Field(default=CsvOptions(), description="how a CSV file is written")
     lead_m: PositiveFloat | None = Field(default=None, description="lead of the screw, to convert angle and length")
     channels: dict[str, ChannelSource] = Field(description="channel name -> where it comes from")

@@ -1,0 +1,70 @@
+"""What a recording tells of its axis beside the keys of a bench file: load, noise, delays, friction at constant "
+"feeds."""
+
+from hil.channels import AxisKind
+from hil.drafting.plant_values import PlantValues, TransmissionValues
+from hil.drafting.sensor_values import noise_of, torque_delay_s
+from hil.errors import InputError
+from hil.identification.friction import identify_friction
+from hil.recording.recording import Recording
+
+
+def told(
+    recording: Recording, plant: PlantValues, transmission: TransmissionValues | None
+) -> tuple[list[str], list[str]]:
+    """Notes on what the recording tells, and those that the user should check."""
+    notes, unsure = list[str](), list[str]()
+    names, linear = recording.axis, recording.kind is AxisKind.LINEAR
+    effort, noise_unit = ("force", "N") if linear else ("torque", "N m")
+    if not plant.inertia.significant:
+        unsure.append("the inertia is not identifiable from this motion: record moves with more acceleration")
+    notes.append(
+        f"inertia and friction leave {100 * plant.left:.2g} % of the {effort} (share of its standard deviation)"
+    )
+    sure = "" if plant.offset.significant else ", not distinguishable from 0"
+    notes.append(
+        f"constant {effort} {plant.offset.value:.3g} {noise_unit} +-{plant.offset.std_error:.2g}{sure}: a load, or "
+        "friction that differs by direction"
+    )
+    if plant.gravity is not None:
+        notes.append(
+            f"{effort} over the angle (gravity) {plant.gravity.value:.3g} N m +-{plant.gravity.std_error:.2g}: not "
+            "in this bench"
+        )
+        unsure.append("the axis has a load that follows the sine of its angle (gravity); this bench has none")
+    notes.append(f"noise of {names.torque}: {noise_of(recording, names.torque):.3g} {noise_unit} rms")
+    notes.append(
+        f"noise of {names.motor_position}: {noise_of(recording, names.motor_position):.3g} "
+        f"{'m' if linear else 'rad'} rms"
+    )
+    delay_s = torque_delay_s(recording)
+    if delay_s is not None:
+        notes.append(f"{names.torque} follows {names.torque_command} after {1e3 * delay_s:.3g} ms (to half a row)")
+    if transmission is not None:
+        late = transmission.delay_s
+        if late.significant:
+            notes.append(
+                f"second encoder {'late' if late.value > 0 else 'early'} by {1e3 * abs(late.value):.3g} ms "
+                f"+-{1e3 * late.std_error:.2g}, from its difference over the velocity"
+            )
+            unsure.append(
+                f"the second encoder is {'late' if late.value > 0 else 'early'} by {1e3 * abs(late.value):.3g} ms; "
+                "the bench has no key for it"
+            )
+        if transmission.friction_m.significant:
+            notes.append(
+                f"second encoder differs by {2e6 * abs(transmission.friction_m.value):.3g} um between directions: "
+                "lost motion, or friction over stiffness"
+            )
+        notes.append(f"ratio, delay and stretch leave {1e6 * transmission.left_m:.3g} um rms of the second encoder")
+    try:
+        feeds = identify_friction(recording)
+    except InputError:
+        return notes, unsure
+    notes.append(
+        f"friction from {len(feeds.points)} constant feeds: Coulomb {feeds.coulomb:.4g} "
+        f"+-{feeds.coulomb_std_error:.2g}, "
+        f"viscous {feeds.viscous:.4g} +-{feeds.viscous_std_error:.2g}, offset {feeds.offset:.3g} "
+        f"+-{feeds.offset_std_error:.2g}"
+    )
+    return notes, unsure

@@ -1,0 +1,39 @@
+"""Write a drafted bench as YAML, each value with its error and how it was found."""
+
+from hil.channels import AxisKind
+from hil.drafting.draft_bench import BenchDraft, BenchValue
+
+
+def bench_text(draft: BenchDraft) -> str:
+    """The bench as text of a YAML file."""
+    lines = [
+        f"# Bench of {draft.name}, drafted by hil identify from the recording alone.",
+        "# +- is a standard error that counts what the model leaves. Replace what you know better.",
+    ]
+    lines += [f"# Please check: {note}" for note in draft.unsure]
+    lines += ["schema_version: 1", f"name: {_name(draft.name)}", "axis:", f"  model: {draft.model}"]
+    lines += [f"  {_line(value)}" for value in draft.axis]
+    if draft.control:
+        lines += ["control:", *(f"  {_line(value)}" for value in draft.control)]
+    else:
+        lines += [f"control: unknown   # {draft.control_why}"]
+    lines += ["encoders:"]
+    if draft.motor_encoder is not None:
+        lines += ["  motor:", f"    {_line(draft.motor_encoder)}"]
+    if draft.table_encoder is not None:
+        lines += ["  table:", f"    {_line(draft.table_encoder)}"]
+    else:
+        lines += [
+            "  table: null   # no second encoder is recorded" if draft.kind is AxisKind.ROTARY else "  table: null"
+        ]
+    lines += ["# Told by the recording beside these keys:", *(f"#   {note}" for note in draft.notes)]
+    return "\n".join(lines) + "\n"
+
+
+def _line(value: BenchValue) -> str:
+    shown = f"{value.value:.6g}" if isinstance(value.value, float) else str(value.value)
+    return f"{value.key}: {shown}   # {'; '.join(filter(None, (value.error, value.how)))}"
+
+
+def _name(text: str) -> str:
+    return '"' + text.replace("\\", "_").replace('"', "_") + '"'

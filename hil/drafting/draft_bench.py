@@ -1,0 +1,233 @@
+"""Draft a bench file from a recording: kind of axis, masses, friction, lead, gains, encoders, each with its error."""
+
+from dataclasses import dataclass, field
+from math import log2, pi, sqrt
+
+from hil.channels import AxisKind
+from hil.drafting.bench_notes import told
+from hil.drafting.estimate import Estimate
+from hil.drafting.loop_values import REPLAYED, LoopValues, loop_values
+from hil.drafting.plant_values import PlantValues, TransmissionValues, plant_values, transmission_values
+from hil.drafting.relations import proportional
+from hil.drafting.sensor_values import count_of, is_decimal, noise_of
+from hil.drafting.usual_values import ROTARY_LEAD_M, usual_lead
+from hil.quantities import digits
+from hil.recording.recording import Recording
+
+_FINEST_M, _COARSEST_M = 1e-12, 1e-3  # resolution of a second encoder that a bench file takes
+LONGEST_LEAD_M = 1.0  # that a bench file takes; a load that turns as far as its motor, 1 m for 1 rad, has 6.3
+DIRECT = 0.02  # deviation from equal angles of motor and load up to which there is no gear
+_STEPS_PER_NOISE = sqrt(12.0)  # a count of q has noise of q / sqrt(12)
+
+
+@dataclass(frozen=True)
+class BenchValue:
+    """A key of the bench file with its value, its unit and error, and how it was found."""
+
+    key: str
+    value: float | int | str
+    error: str
+    how: str = ""
+
+
+@dataclass
+class BenchDraft:
+    """Sections of a drafted bench file; `notes` is what the recording tells beside them, `unsure` what to check."""
+
+    name: str
+    kind: AxisKind
+    model: str
+    axis: list[BenchValue] = field(default_factory=list)
+    control: list[BenchValue] = field(default_factory=list)  # empty: unknown
+    control_why: str = ""
+    motor_encoder: BenchValue | None = None
+    table_encoder: BenchValue | None = None
+    notes: list[str] = field(default_factory=list)
+    unsure: list[str] = field(default_factory=list)
+
+
+def draft_bench(recording: Recording) -> BenchDraft:
+    """Draft the bench of the axis of a recording.
+
+    Raises InputError if masses and friction cannot be told: no torque, one direction, too short, a wrong sign.
+    """
+    plant, transmission = plant_values(recording), transmission_values(recording)
+    if recording.kind is AxisKind.LINEAR:
+        draft = BenchDraft(recording.name, recording.kind, "one_mass")
+        ratio = 1.0
+        _linear(draft, plant)
+    else:
+        lead = _lead(recording, transmission)
+        ratio = lead.value / (2.0 * pi)
+        elastic = transmission if transmission is not None and _elastic(transmission) else None
+        turns = recording.metadata.get("lead_m") == ROTARY_LEAD_M or lead.value > LONGEST_LEAD_M
+        model = {(True, True): "rotary_two_mass", (True, False): "rotary", (False, True): "two_mass"}.get(
+            (turns, elastic is not None), "rigid"
+        )
+        draft = BenchDraft(recording.name, recording.kind, model)
+        if turns:
+            _turning(draft, plant, elastic, lead)
+        else:
+            _screw(draft, plant, elastic, lead)
+    _control(draft, recording, loop_values(recording, ratio))
+    _encoders(draft, recording)
+    notes, unsure = told(recording, plant, transmission)
+    draft.notes += notes
+    draft.unsure += unsure
+    return draft
+
+
+def _lead(recording: Recording, transmission: TransmissionValues | None) -> Estimate:
+    """Travel per motor revolution; on a rotary axis that of the load in rad."""
+    names = recording.axis
+    if transmission is not None:
+        measured = transmission.ratio.scaled(2.0 * pi)
+    elif names.position_command in recording.columns:
+        relation = proportional(recording[names.position_command], recording[names.motor_position])
+        measured = Estimate(2.0 * pi * relation.factor, 0.0, "set-points over the motor's encoder")
+    else:
+        return Estimate(ROTARY_LEAD_M, 0.0, "one encoder and no set-points: no ratio is told")
+    if abs(measured.value / ROTARY_LEAD_M - 1.0) < DIRECT:
+        return Estimate(ROTARY_LEAD_M, measured.std_error, f"direct; {measured.how}")
+    lead = usual_lead(measured.value)
+    how = measured.how if lead == measured.value else f"{measured.how} ({1e3 * measured.value:.6g} mm measured)"
+    return Estimate(lead, measured.std_error, how)
+
+
+def _elastic(transmission: TransmissionValues) -> bool:
+    return transmission.compliance_s2.significant and transmission.compliance_s2.value < 0.0
+
+
+def _linear(draft: BenchDraft, plant: PlantValues) -> None:
+    draft.axis += [
+        _value("mass_kg", plant.inertia, "kg"),
+        _friction("coulomb_force_n", plant.coulomb, "N"),
+        _friction("viscous_force_n_s_m", plant.viscous, "N s/m"),
+    ]
+
+
+def _screw(draft: BenchDraft, plant: PlantValues, elastic: TransmissionValues | None, lead: Estimate) -> None:
+    mass = plant.inertia.scaled((2.0 * pi / lead.value) ** 2)
+    inertia = f"inertia {digits(plant.inertia.value)} kg m^2 at the motor"
+    draft.axis.append(BenchValue("lead_m", lead.value, f"m per revolution, {_error(lead)}", lead.how))
+    if elastic is None:
+        draft.axis.append(_value("mass_kg", mass, "kg", inertia))
+    else:
+        half = mass.scaled(0.5)
+        draft.axis += [
+            _value("motor_mass_kg", half, "kg", f"half of {digits(mass.value)} kg: the split is not told"),
+            _value("table_mass_kg", half, "kg", f"the other half; {inertia}"),
+            _value("stiffness_n_m", _stiffness(half, elastic), "N/m", "deflection over acceleration, for this split"),
+        ]
+        draft.unsure.append(
+            "motor_mass_kg, table_mass_kg, stiffness_n_m: told are the sum of the masses and table mass over stiffness"
+        )
+    _rotary_friction(draft, plant)
+
+
+def _turning(draft: BenchDraft, plant: PlantValues, elastic: TransmissionValues | None, lead: Estimate) -> None:
+    gear = Estimate(ROTARY_LEAD_M / lead.value, ROTARY_LEAD_M / lead.value**2 * lead.std_error, lead.how)
+    draft.axis.append(_value("gear_ratio", gear, "motor per load"))
+    if elastic is None:
+        draft.axis.append(_value("inertia_kg_m2", plant.inertia, "kg m^2 at the motor"))
+    else:
+        motor = plant.inertia.scaled(0.5)
+        load = motor.scaled(gear.value**2)
+        draft.axis += [
+            _value("motor_inertia_kg_m2", motor, "kg m^2 at the motor", "half of the sum: the split is not told"),
+            _value("load_inertia_kg_m2", load, "kg m^2 at the load", "the other half"),
+            _value("stiffness_n_m_rad", _stiffness(load, elastic), "N m/rad", "deflection over acceleration"),
+        ]
+        draft.unsure.append(
+            "motor_inertia_kg_m2, load_inertia_kg_m2, stiffness_n_m_rad: told are the sum of the inertias at the "
+            "motor and load inertia over stiffness"
+        )
+    _rotary_friction(draft, plant)
+
+
+def _rotary_friction(draft: BenchDraft, plant: PlantValues) -> None:
+    draft.axis += [
+        _friction("coulomb_torque_n_m", plant.coulomb, "N m"),
+        _friction("viscous_torque_n_m_s_rad", plant.viscous, "N m s/rad"),
+    ]
+
+
+def _stiffness(mass: Estimate, elastic: TransmissionValues) -> Estimate:
+    stretch = elastic.compliance_s2
+    return Estimate(mass.value / -stretch.value, mass.value / stretch.value**2 * stretch.std_error)
+
+
+def _error(estimate: Estimate) -> str:
+    return f"+-{estimate.std_error:.2g}"
+
+
+def _value(key: str, estimate: Estimate, unit: str, more: str = "") -> BenchValue:
+    return BenchValue(key, estimate.value, f"{unit}, {_error(estimate)}", "; ".join(filter(None, (estimate.how, more))))
+
+
+def _friction(key: str, estimate: Estimate, unit: str) -> BenchValue:
+    if estimate.value > 0.0:
+        sure = "" if estimate.significant else "not identifiable from this motion; "
+        return BenchValue(key, estimate.value, f"{unit}, {_error(estimate)}", sure + estimate.how)
+    how = f"not identifiable from this motion: {estimate.value:.3g} is below 0; {estimate.how}"
+    return BenchValue(key, 0.0, f"{unit}, {_error(estimate)}", how)
+
+
+def _control(draft: BenchDraft, recording: Recording, loop: LoopValues | None) -> None:
+    if loop is None or loop.left > REPLAYED:
+        draft.control_why = (
+            "no set-points are recorded, or no gains reproduce the torque command"
+            if loop is None
+            else f"the best cascaded law leaves {100 * loop.left:.0f} % of the torque command"
+        )
+        return
+    linear = recording.kind is AxisKind.LINEAR
+    kv, feedforward, kp, time_s = loop.errors
+    how = f"the replayed law leaves {100 * loop.left:.2g} % of the torque command"
+    period_s = recording.period_s
+    draft.control = [
+        BenchValue("position_gain_1_s", loop.position_gain_1_s, f"1/s, +-{kv:.2g}", how),
+        BenchValue("velocity_feedforward", loop.velocity_feedforward, f"1 is 100 %, +-{feedforward:.2g}"),
+        BenchValue(
+            "position_period_s",
+            float(f"{loop.position_ticks * period_s:.9g}"),
+            "s",
+            f"of 1, 2, 4 and 8 rows {loop.position_ticks} fits best",
+        ),
+        BenchValue(
+            "velocity_gain_n_s_m" if linear else "velocity_gain_n_m_s_rad",
+            loop.velocity_gain,
+            f"{'N s/m' if linear else 'N m s/rad'}, +-{kp:.2g}",
+        ),
+    ]
+    if loop.integral_time_s is not None:
+        draft.control.append(BenchValue("velocity_integral_time_s", loop.integral_time_s, f"s, +-{time_s:.2g}"))
+    draft.control += [
+        BenchValue("velocity_period_s", float(f"{period_s:.9g}"), "s", "the period of the recording"),
+        BenchValue("velocity_estimate", loop.velocity_estimate, "", "the better of the two"),
+    ]
+
+
+def _encoders(draft: BenchDraft, recording: Recording) -> None:
+    names = recording.axis
+    motor = recording[names.motor_position]
+    step, noise = count_of(motor), noise_of(recording, names.motor_position)
+    how = "step of the positions" if step is not None else f"no step is seen; from the noise of {noise:.2g}"
+    step = step or max(noise * _STEPS_PER_NOISE, 1e-12)
+    if recording.kind is AxisKind.LINEAR:
+        draft.motor_encoder = BenchValue("resolution_m", float(f"{step:.4g}"), "m", how + _printed(step))
+    else:
+        counts = max(round(2.0 * pi / step), 1)
+        power = round(2 ** round(log2(counts)))
+        counts = power if abs(counts / power - 1.0) < 0.002 else counts
+        draft.motor_encoder = BenchValue("counts_per_rev", counts, "", how + _printed(step))
+    if names.table_position in recording.columns and recording.kind is AxisKind.ROTARY:
+        table = recording[names.table_position]
+        step, noise = count_of(table), noise_of(recording, names.table_position)
+        how = "step of the positions" if step is not None else f"no step is seen; from the noise of {noise:.2g} m"
+        step = min(max(step or noise * _STEPS_PER_NOISE, _FINEST_M), _COARSEST_M)
+        draft.table_encoder = BenchValue("resolution_m", float(f"{step:.4g}"), "m", how + _printed(step))
+
+
+def _printed(step: float) -> str:
+    return " (perhaps the last digit of the file)" if is_decimal(step) else ""

@@ -1,0 +1,279 @@
+"""Draft the map of a foreign file: its clock, and unit, sign and scale of each channel with how it was found."""
+
+from math import pi
+from pathlib import Path
+
+import numpy as np
+
+from hil.arrays import FloatArray
+from hil.channels import AXIS_CHANNELS, AxisKind
+from hil.drafting.clock import StampClock, find_clock
+from hil.drafting.column_names import Label, label
+from hil.drafting.effort import effort_entry
+from hil.drafting.foreign_table import read_table
+from hil.drafting.map_draft import DraftedChannel, MapDraft
+from hil.drafting.oddities import refuse_damage
+from hil.drafting.relations import MotionColumns, derivative_of, driven, motion, proportional
+from hil.drafting.roles import SAME_POSITION, Roles, find_roles
+from hil.drafting.unit_choice import MATCH, UnitChoice, is_length, misfit, position_unit, velocity_unit
+from hil.drafting.usual_values import COUNTS, LEADS_M, ROTARY_LEAD_M, mixed_up, usual_lead
+from hil.errors import InputError
+from hil.quantities import UNITS
+
+
+def draft_map(path: Path, rate_hz: float | None = None, axis: str | None = None) -> MapDraft:
+    """Draft the map of `path`; `rate_hz` and `axis` are what the user says beside the file.
+
+    Raises InputError: a damaged file, no clock, no motion, no column that goes with it, contradicting columns.
+    """
+    table = read_table(path)
+    labels = {name: label(name, table.units.get(name, "")) for name in table.columns}
+    clock = find_clock(table, labels, rate_hz)
+    columns = {name: values for name, values in table.columns.items() if name != clock.column}
+    even, period_s = _even(columns, clock)
+    roles = find_roles(str(path), even, labels, period_s, axis)
+    used = [name for name in _used(roles) if name]
+    refuse_damage(path, {name: columns[name] for name in used}, {name: even[name] for name in used}, roles, period_s)
+    draft = MapDraft(table, clock, unsure=[*clock.unsure, *roles.unsure], left_out=dict(roles.left_out))
+    draft.left_out |= {remark.split(": ", 1)[0]: remark.split(": ", 1)[1] for remark in table.remarks}
+    draft.unsure += [
+        f"{one.column}: its unit is not known" for one in labels.values() if one.odd_unit and one.column in used
+    ]
+    _Composer(draft, labels, roles, even, period_s).compose()
+    return draft
+
+
+def _used(roles: Roles) -> tuple[str | None, ...]:
+    return (
+        roles.motor,
+        roles.motor_velocity,
+        roles.table,
+        roles.command,
+        roles.unfollowed,
+        roles.velocity_command,
+        roles.effort,
+        roles.effort_command,
+    )
+
+
+def _even(columns: dict[str, FloatArray], clock: StampClock) -> tuple[dict[str, FloatArray], float]:
+    """Columns on a regular clock without missing values, for the relations only."""
+    time_s = clock.time_s
+    period_s = float(np.median(np.diff(time_s)))
+    grid = (
+        np.arange(time_s.size) * period_s if clock.resample_hz is None else np.arange(time_s[0], time_s[-1], period_s)
+    )
+    even = {}
+    for name, values in columns.items():
+        good = np.isfinite(values)
+        if good.any():
+            even[name] = np.interp(grid, time_s[good], values[good])
+    return even, period_s
+
+
+class _Composer:
+    """Fills a draft with the channels of the roles."""
+
+    def __init__(
+        self, draft: MapDraft, labels: dict[str, Label], roles: Roles, live: dict[str, FloatArray], period_s: float
+    ) -> None:
+        self.draft, self.labels, self.roles, self.live, self.period_s = draft, labels, roles, live, period_s
+        self.units: dict[str, str] = {}
+        self.kind = AxisKind.ROTARY
+        self.motor_sign = 1
+
+    def compose(self) -> None:
+        roles = self.roles
+        if roles.motor is None:
+            self._velocity_only()
+            return
+        moved = motion(self.live[roles.motor], self.period_s)
+        self._units_of_positions()
+        self.kind = AxisKind.LINEAR if is_length(self.units[roles.motor]) else AxisKind.ROTARY
+        names = AXIS_CHANNELS[self.kind]
+        self._positions(names.motor_position)
+        self._velocity_command()
+        self._efforts(moved)
+        if not (roles.effort or roles.effort_command or roles.table):
+            raise InputError(
+                f"{self.draft.table.path}: beside the position {roles.motor} no torque, force, current, voltage or "
+                "second "
+                "encoder is found; record one of them, or write its column into a map: hil import FILE --map MAP.yaml"
+            )
+
+    def _choose(self, column: str, choice: UnitChoice) -> None:
+        self.units[column] = choice.unit
+        if choice.note:
+            self.draft.unsure.append(choice.note)
+
+    def _units_of_positions(self) -> None:
+        roles, labels, live = self.roles, self.labels, self.live
+        positions = [name for name in (roles.command, roles.table, roles.motor) if name]
+        prefers = self._prefers_length(positions)
+        # columns with a unit first: they are the hints for the others
+        for column in sorted(positions, key=lambda name: labels[name].unit is None):
+            hints = [
+                (proportional(live[column], live[other]).factor, self.units[other])
+                for other in positions
+                if other in self.units and proportional(live[column], live[other]).share > SAME_POSITION
+            ]
+            for name, one in labels.items():
+                if one.quantity == "velocity" and one.unit and name in live and not one.command:
+                    relation = proportional(motion(live[column], self.period_s).velocity, live[name])
+                    if relation.share > SAME_POSITION:
+                        hints.append((relation.factor / UNITS[one.unit][1], UNITS[one.unit][0].removesuffix("/s")))
+            self._choose(column, position_unit(column, live[column], labels[column].unit, hints, prefers))
+
+    def _prefers_length(self, positions: list[str]) -> bool | None:
+        effort = self.roles.effort or self.roles.effort_command
+        if effort and self.labels[effort].unit in ("N", "kN"):
+            return True
+        words = " ".join(positions).lower()
+        if any(word in words for word in ("angle", "winkel", "theta", "phi", "rot")):
+            return False
+        if any(word in words for word in ("weg", "hub", "stroke", "course", "displ", "linear")):
+            return True
+        if effort and self.labels[effort].unit in ("N m", "mN m"):
+            return False
+        return None
+
+    def _positions(self, channel: str) -> None:
+        roles, live = self.roles, self.live
+        assert roles.motor is not None
+        motor = self.units[roles.motor]
+        entry: dict[str, object] = {"column": roles.motor, "unit": motor}
+        far = [name for name in (roles.table, roles.command) if name]
+        relations = {name: proportional(live[name], live[roles.motor]) for name in far}
+        trusted = [name for name in far if relations[name].share > 0.9]
+        reference = roles.command if roles.command in trusted else (trusted[0] if trusted else None)
+        if reference and relations[reference].factor < 0.0:
+            self.motor_sign = -1
+            self.draft.unsure.append(f"{roles.motor}: falls while {reference} grows; its sign is turned")
+        length = next((name for name in trusted if is_length(self.units[name])), None)
+        if motor == "counts":
+            entry |= self._counts(length, relations[length].factor if length else None)
+            motor = "rad" if "counts_per_rev" in entry else "m"
+            self.kind = AxisKind.ROTARY if motor == "rad" else AxisKind.LINEAR
+            channel = AXIS_CHANNELS[self.kind].motor_position
+        elif self.kind is AxisKind.ROTARY:
+            if length is not None:
+                factor = abs(relations[length].factor) * UNITS[self.units[length]][1] / UNITS[motor][1]
+                self.draft.lead_m, self.draft.lead_how = (
+                    float(f"{usual_lead(2.0 * pi * factor):.6g}"),
+                    f"travel of {length} per turn of {roles.motor}",
+                )
+            else:
+                self.draft.lead_m = ROTARY_LEAD_M
+                self.draft.lead_how = "a rotary axis: one metre of the load stands for one radian"
+        if self.motor_sign < 0:
+            entry["sign"] = -1
+        self.draft.channels.append(DraftedChannel(channel, entry, self._how(roles.motor, "the motor's encoder")))
+        for name, target, what in (
+            (roles.table, "table_position_m", "the second encoder"),
+            (roles.command, "position_command_m", "the set-point"),
+        ):
+            if name is not None:
+                self._far(name, target, what, relations[name].factor * self.motor_sign, relations[name].share, motor)
+
+    def _far(self, name: str, channel: str, what: str, factor: float, share: float, motor: str) -> None:
+        """Set-point or second encoder: check sign and scale against the motor."""
+        unit = self.units[name]
+        entry: dict[str, object] = {"column": name, "unit": unit}
+        if share < 0.5:
+            self.draft.unsure.append(
+                f"{name}: does not follow {self.roles.motor} (share {share:.2f}); check that it is {what}"
+            )
+        elif factor < 0.0:
+            entry["sign"] = -1
+            self.draft.unsure.append(f"{name}: falls while {self.roles.motor} grows; its sign is turned")
+        if share >= 0.5 and "counts" not in (unit, self.units[str(self.roles.motor)]):
+            same = UNITS[unit][0] == UNITS[motor][0]
+            ratio = misfit(factor, unit, motor) if same else 1.0
+            mixed = mixed_up(ratio)
+            if mixed:
+                raise InputError(
+                    f"{self.draft.table.path}: {name} in {unit} moves {ratio:.4g} times as far as "
+                    f"{self.roles.motor} in "
+                    f"{motor}: one of the two units is wrong ({mixed}?); correct it in the header of the file, or "
+                    "write a map"
+                )
+            if abs(ratio - 1.0) > 2.0 * MATCH and share > 0.9:
+                self.draft.unsure.append(
+                    f"{name}: moves {ratio:.6g} times as far as {self.roles.motor}: a gear, or a wrong unit"
+                )
+        if unit == "counts":  # of the motor's encoder, as in the set-points of a drive
+            entry |= {"unit": motor, "scale": float(f"{1.0 / abs(factor):.8g}")}
+        self.draft.channels.append(DraftedChannel(channel, entry, self._how(name, what)))
+
+    def _counts(self, length: str | None, factor: float | None) -> dict[str, object]:
+        """Counts per revolution or metre of the motor's encoder."""
+        if length is None or factor is None:
+            raise InputError(
+                f"{self.draft.table.path}: {self.roles.motor} is in counts, and no other column tells their size; "
+                "write "
+                "counts_per_rev (or counts_per_m) into a map: hil import FILE --map MAP.yaml"
+            )
+        per_m = 1.0 / (abs(factor) * UNITS[self.units[length]][1])
+        effort = self.roles.effort or self.roles.effort_command
+        if effort and self.labels[effort].unit in ("N", "kN"):
+            return {"counts_per_m": float(f"{per_m:.8g}")}
+        fits = [(counts, lead) for lead in LEADS_M for counts in COUNTS if abs(counts / (lead * per_m) - 1.0) < 0.003]
+        if not fits:
+            return {"counts_per_m": float(f"{per_m:.8g}")}
+        counts, lead = fits[0]
+        self.draft.lead_m, self.draft.lead_how = lead, f"from the counts per metre of {length}, with usual leads"
+        self.draft.unsure.append(
+            f"{self.roles.motor}: {per_m:.6g} counts per m; {counts:g} per revolution and a lead of {1e3 * lead:g} "
+            "mm are "
+            "taken, another pair with the same ratio fits as well"
+        )
+        return {"counts_per_rev": counts}
+
+    def _velocity_command(self) -> None:
+        name = self.roles.velocity_command
+        command = self.roles.command
+        if name is None or command is None:
+            if name is not None:
+                self.draft.left_out[name] = "a velocity set-point without a position set-point"
+            return
+        relation = derivative_of(self.live[name], motion(self.live[command], self.period_s), self.period_s)
+        if relation.share < 0.9:
+            self.draft.left_out[name] = f"no derivative of {command} (share {relation.share:.2f})"
+            return
+        choice = velocity_unit(name, self.labels[name].unit, relation.factor, self.units[command])
+        self._choose(name, choice)
+        of_command = next(one.entry for one in self.draft.channels if one.channel == "position_command_m")
+        sign = int(np.sign(relation.factor)) * int(str(of_command.get("sign", 1)))
+        entry: dict[str, object] = {"column": name, "unit": choice.unit}
+        if sign < 0:
+            entry["sign"] = -1
+        self.draft.channels.append(DraftedChannel("velocity_command_m_s", entry, f"the derivative of {command}"))
+
+    def _efforts(self, moved: MotionColumns) -> None:
+        names = AXIS_CHANNELS[self.kind]
+        for column, channel in ((self.roles.effort, names.torque), (self.roles.effort_command, names.torque_command)):
+            if column is not None:
+                cause = driven(self.live[column], moved, self.period_s)
+                entry, notes = effort_entry(
+                    self.labels[column], self.kind, self.draft.table.scalars, cause, moved, self.motor_sign
+                )
+                self.draft.unsure += notes
+                how = self._how(column, f"inertia and friction explain {100 * max(cause.share, 0):.0f} % of it")
+                self.draft.channels.append(DraftedChannel(channel, entry, how))
+
+    def _velocity_only(self) -> None:
+        """A recording with velocity in place of position."""
+        name = self.roles.motor_velocity
+        assert name is not None
+        choice = velocity_unit(name, self.labels[name].unit, 1.0, "rad")
+        self._choose(name, choice)
+        self.kind = AxisKind.LINEAR if is_length(choice.unit) else AxisKind.ROTARY
+        channel = AXIS_CHANNELS[self.kind].motor_velocity
+        self.draft.channels.append(
+            DraftedChannel(channel, {"column": name, "unit": choice.unit}, self._how(name, "no position is recorded"))
+        )
+        position = np.cumsum(self.live[name]) * self.period_s
+        self._efforts(motion(position, self.period_s))
+
+    def _how(self, column: str, what: str) -> str:
+        return f"{what}; {self.roles.how[column]}" if column in self.roles.how else what

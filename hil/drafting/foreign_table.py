@@ -1,0 +1,186 @@
+"""Read all columns of numbers of a foreign file, without a map.
+
+What is no number becomes NaN here; the import by the drafted map then reads the wanted columns strictly and names line
+and column of what is wrong.
+"""
+
+import csv
+import re
+from collections import Counter
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from hil.arrays import FloatArray
+from hil.drafting.csv_dialect import find_dialect, number_of
+from hil.errors import InputError
+from hil.files import json_columns
+from hil.recording.foreign_files import ENDINGS, TEXT_ENDINGS, load_mat
+from hil.recording.import_map import CsvOptions
+
+MOST_ROWS = 200_000  # read of a text file for the draft: minutes of a recording
+WIDEST = 64  # columns of a matrix in a .mat file: a wider one is no table of channels
+_RATE = re.compile(
+    r"(?:sample|sampling|abtast|échantillonnage|echantillonnage)\D{0,20}?([\d.,]+)\s*(k?hz|ms|us|µs|s)\b", re.IGNORECASE
+)
+_PER_S = {"hz": 1.0, "khz": 1e3}
+_SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6}
+
+
+@dataclass(frozen=True, eq=False)
+class ForeignTable:
+    """Columns of equal length, NaN where a field is no number; units and scalars as the file gives them."""
+
+    path: Path
+    columns: dict[str, FloatArray]
+    units: dict[str, str]
+    scalars: dict[str, float]
+    csv: CsvOptions
+    rate_hz: float | None = None  # written in a comment
+    remarks: tuple[str, ...] = ()
+
+
+def read_table(path: Path) -> ForeignTable:
+    """Read `path`. Raises InputError: no such file, empty, damaged, binary, another format, no columns of numbers."""
+    if not path.is_file():
+        raise InputError(f"{path}: there is no such file; give the path of a recording: {ENDINGS}")
+    if path.stat().st_size == 0:
+        raise InputError(f"{path}: the file is empty; give a file with rows of numbers")
+    ending = path.suffix.lower()
+    readers = {".mat": _mat, ".parquet": _parquet, ".json": _json} | dict.fromkeys(TEXT_ENDINGS, _text)
+    if ending not in readers:
+        raise InputError(
+            f"{path}: the ending {path.suffix!r} cannot be imported, allowed {ENDINGS}; "
+            "export the recording to one of them"
+        )
+    table = readers[ending](path)
+    rows = max((values.size for values in table.columns.values()), default=0)
+    if len(table.columns) < 2 or rows < 3:
+        raise InputError(
+            f"{path}: given {len(table.columns)} columns of numbers with {rows} rows, allowed two columns and "
+            "three rows "
+            "or more; give a file with the channels of a motion"
+        )
+    return table
+
+
+def _text(path: Path) -> ForeignTable:
+    dialect = find_dialect(path)
+    options = dialect.options
+    encoding = "utf-8-sig" if options.encoding == "utf-8" else options.encoding
+    rows: list[list[str]] = []
+    with path.open(encoding=encoding, errors="replace", newline="") as file:
+        below = islice(file, options.skip_lines, None)
+        lines = (
+            (" ".join(line.split()) for line in below)
+            if options.delimiter == " "
+            else (line.replace("\0", "") for line in below)
+        )
+        skip = (options.column_names is None) + options.skip_rows
+        try:
+            reader = (row for row in csv.reader(lines, delimiter=options.delimiter) if row)
+            rows = list(islice(reader, skip, skip + MOST_ROWS))
+        except csv.Error as error:
+            raise InputError(f"{path}: is not text of a CSV file ({error}); give a CSV file") from None
+    width = len(dialect.names)
+    columns, remarks = {}, []
+    for index, name in enumerate(dialect.names):
+        fields = [row[index] if index < len(row) else "" for row in rows]
+        values = np.array([number_of(field, options.decimal_point) for field in fields])
+        if np.isfinite(values).mean() > 0.01:
+            columns[name] = values
+        elif name.strip():
+            remarks.append(f"{name.strip()}: text such as {next((f for f in fields if f.strip()), '')!r}, no numbers")
+    del width
+    units = {name: unit.strip("[]() ") for name, unit in zip(dialect.names, dialect.units, strict=True) if unit}
+    return ForeignTable(path, columns, units, {}, options, _rate_of(dialect.comments), tuple(remarks))
+
+
+def _rate_of(comments: tuple[str, ...]) -> float | None:
+    for comment in comments:
+        match = _RATE.search(comment)
+        if match:
+            value, unit = number_of(match[1].rstrip(".,"), "," if "," in match[1] else "."), match[2].lower()
+            if value > 0:
+                return value * _PER_S[unit] if unit in _PER_S else 1.0 / (value * _SECONDS[unit])
+    return None
+
+
+def _mat(path: Path) -> ForeignTable:
+    columns, scalars, others = dict[str, FloatArray](), dict[str, float](), []
+    for name, variable in load_mat(path).items():
+        values = np.asarray(variable)
+        if values.dtype.kind not in "fiub":
+            others.append(name)
+        elif values.size == 1:
+            scalars[name] = float(values.reshape(-1)[0])
+        elif values.size == max(values.shape):
+            columns[name] = values.reshape(-1).astype(np.float64)
+        elif values.ndim == 2 and values.shape[1] <= WIDEST and values.shape[0] > values.shape[1]:
+            columns |= {f"{name}[{index}]": values[:, index].astype(np.float64) for index in range(values.shape[1])}
+        else:
+            others.append(name)
+    remarks = [f"{name}: neither a number, a vector nor a matrix with a column per channel" for name in others]
+    if not columns:
+        raise InputError(
+            f"{path}: holds no vector of numbers (there are {', '.join(others) or 'no variables'}), allowed a "
+            "vector per "
+            "channel or a matrix with a column per channel; save the vectors themselves, not a structure"
+        )
+    return _equal_length(ForeignTable(path, columns, {}, scalars, CsvOptions(), None, tuple(remarks)))
+
+
+def _parquet(path: Path) -> ForeignTable:
+    try:
+        table = pq.read_table(path)
+    except (pa.ArrowException, OSError) as error:
+        raise InputError(
+            f"{path}: is no readable Parquet file ({str(error).splitlines()[0]}); it is cut or damaged"
+        ) from None
+    columns, units, remarks = {}, {}, []
+    for field in table.schema:
+        if pa.types.is_floating(field.type) or pa.types.is_integer(field.type):
+            columns[field.name] = table.column(field.name).to_numpy().astype(np.float64)
+            unit = (field.metadata or {}).get(b"unit")
+            if unit:
+                units[field.name] = unit.decode(errors="replace")
+        else:
+            remarks.append(f"{field.name}: {field.type} values, no numbers; convert the column to use it")
+    return ForeignTable(path, columns, units, {}, CsvOptions(), None, tuple(remarks))
+
+
+def _json(path: Path) -> ForeignTable:
+    content = json_columns.read_json(path)
+    columns, remarks = {}, []
+    for name, values in content.lists.items():
+        if all(value is None or (isinstance(value, int | float) and not isinstance(value, bool)) for value in values):
+            columns[name] = content.numbers(path, name)
+        else:
+            remarks.append(
+                f"{name}: values such as {next(v for v in values if isinstance(v, str | bool | list | dict))!r}, "
+                "no numbers"
+            )
+    return _equal_length(
+        ForeignTable(path, columns, content.units, content.scalars, CsvOptions(), None, tuple(remarks))
+    )
+
+
+def _equal_length(table: ForeignTable) -> ForeignTable:
+    """Keep the columns of the length that most have."""
+    if not table.columns:
+        return table
+    lengths = Counter(values.size for values in table.columns.values() if values.size > 2)
+    rows = max(lengths, key=lambda size: (lengths[size], size), default=0)
+    kept = {name: values for name, values in table.columns.items() if values.size == rows}
+    remarks = [
+        f"{name}: {values.size} rows, the other columns have {rows}: another rate, or cut"
+        for name, values in table.columns.items()
+        if values.size != rows
+    ]
+    return ForeignTable(
+        table.path, kept, table.units, table.scalars, table.csv, table.rate_hz, (*table.remarks, *remarks)
+    )

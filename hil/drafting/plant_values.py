@@ -1,0 +1,140 @@
+"""Inertia, friction, load and transmission of an axis from its recording.
+
+T = J a + D v + Tc sign(v) + T0 (+ G1 sin q + G2 cos q)      at the motor
+x = r q + c - r tau v - (m_t / k) a - (F_t / k) sign(v)      second encoder against the motor's
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import butter, filtfilt
+
+from hil.arrays import FloatArray
+from hil.channels import AxisKind
+from hil.drafting.estimate import BlockFit, Estimate, fit_blocks
+from hil.drafting.relations import direction, motion, smoothed
+from hil.errors import InputError
+from hil.identification.inverse_dynamics import CORNER, CUT_AT_START, inverse_dynamics_columns
+from hil.identification.noise import white_noise
+from hil.recording.recording import Recording
+
+CUTOFFS_HZ = (100.0, 50.0, 25.0, 12.0, 6.0)  # of the position filter
+NOISE_SHARE = 0.02  # of noise in the acceleration: it makes the inertia too small by this share
+MOST_OF_RATE = 0.2  # of the sampling rate: the filter must end well below half of it
+LEAST_ROWS = 80  # after decimation: eight per block of the error estimate
+GRAVITY_GAIN = 0.85  # of what is left without gravity: it is reported if it leaves less
+
+
+@dataclass(frozen=True)
+class PlantValues:
+    """Estimates at the motor: kg m^2, N m s/rad, N m (linear axis kg, N s/m, N); `left` is a share of the torque."""
+
+    inertia: Estimate
+    viscous: Estimate
+    coulomb: Estimate
+    offset: Estimate
+    left: float
+    gravity: Estimate | None
+    cutoff_hz: float
+
+
+@dataclass(frozen=True)
+class TransmissionValues:
+    """Second encoder against the motor's: ratio [m/rad], delay [s], -m_t / k [s^2], lost motion [m], rms left [m]."""
+
+    ratio: Estimate
+    delay_s: Estimate
+    compliance_s2: Estimate
+    friction_m: Estimate
+    left_m: float
+
+
+def plant_values(recording: Recording) -> PlantValues:
+    """Fit torque over motion. Raises InputError: too short, motion in one direction, no torque, no positive inertia."""
+    names = recording.axis
+    if names.torque not in recording.columns:
+        raise InputError(
+            f"{recording.name}: {names.torque} is not recorded, and without torque no mass and no friction can be "
+            "told; "
+            "record torque, current or voltage"
+        )
+    rate_hz = 1.0 / recording.period_s
+    allowed = [cutoff_hz for cutoff_hz in CUTOFFS_HZ if cutoff_hz <= MOST_OF_RATE * rate_hz]
+    if not allowed:
+        raise InputError(
+            f"{recording.name}: given {rate_hz:.3g} rows per second, allowed {CUTOFFS_HZ[-1] / MOST_OF_RATE:g} or "
+            "more; "
+            "record at a higher rate"
+        )
+    # the highest that noise allows: a lower one cuts acceleration, so that the inertia comes out too large
+    cutoff_hz = next((one for one in allowed if _noise_share(recording, one) < NOISE_SHARE), allowed[-1])
+    fit, gravity = _fit(recording, cutoff_hz)
+    inertia, viscous, coulomb, offset = fit.estimates[:4]
+    if inertia.value <= 0.0:
+        raise InputError(
+            f"{recording.name}: the inertia comes out as {inertia.value:.3g} +- {inertia.std_error:.2g}, allowed "
+            "above 0; "
+            "the torque has the wrong sign, or the motion does not separate inertia from a spring or gravity: record "
+            "moves of different accelerations"
+        )
+    return PlantValues(inertia, viscous, coulomb, offset, fit.left, gravity, cutoff_hz)
+
+
+def _noise_share(recording: Recording, cutoff_hz: float) -> float:
+    """Share of white position noise in the variance of the acceleration below `cutoff_hz`.
+
+    var = 2 T sigma^2 (2 pi)^4 fc^5 / 5 for white noise sigma at the period T.
+    """
+    position, period_s = recording[recording.axis.motor_position], recording.period_s
+    noise = 2.0 * period_s * white_noise(position) ** 2 * (2.0 * np.pi) ** 4 * cutoff_hz**5 / 5.0
+    filtered = filtfilt(*butter(4, 2.0 * cutoff_hz * period_s), position)
+    total = float(np.var(np.diff(filtered, 2))) / period_s**4
+    return float(noise) / total if total > 0.0 else np.inf
+
+
+def _fit(recording: Recording, cutoff_hz: float) -> tuple[BlockFit, Estimate | None]:
+    """Fit without gravity, and with it on a rotary axis where it leaves clearly less."""
+    # the filter of the decimation, alike for torque and motion, ends where that of the position does, at 40 Hz or below
+    rate_hz = 1.0 / recording.period_s
+    decimation = max(2, round(0.5 * CORNER * rate_hz / cutoff_hz), round(rate_hz / 100.0))
+    rows = (len(recording) - CUT_AT_START) // decimation
+    if rows < LEAST_ROWS:
+        raise InputError(
+            f"{recording.name}: given {len(recording)} rows, allowed {CUT_AT_START + LEAST_ROWS * decimation} or more; "
+            "give a longer recording"
+        )
+    columns, torque = inverse_dynamics_columns(recording, cutoff_hz, decimation)
+    how = f"least squares of torque over motion, position filtered at {cutoff_hz:g} Hz"
+    plain = fit_blocks(list(columns.T), torque, [how] * 4)
+    position = recording[recording.axis.motor_position]
+    if recording.kind is AxisKind.LINEAR or np.ptp(position) < 0.5 or np.ptp(position) > 50.0:
+        return plain, None
+    angle = position[CUT_AT_START:]
+    angle = angle[(angle.size - 1) % decimation :: decimation]
+    more = fit_blocks([*columns.T, np.sin(angle), np.cos(angle)], torque, [*[f"{how}, with gravity"] * 4, "", ""])
+    if more.left > GRAVITY_GAIN * plain.left:
+        return plain, None
+    sine, cosine = more.estimates[4:]
+    size = float(np.hypot(sine.value, cosine.value))
+    return more, Estimate(size, float(np.hypot(sine.std_error, cosine.std_error)))
+
+
+def transmission_values(recording: Recording) -> TransmissionValues | None:
+    """Fit the second encoder over the motor's; None without one."""
+    names = recording.axis
+    if names.table_position not in recording.columns:
+        return None
+    period_s = recording.period_s
+    moved = motion(recording[names.motor_position], period_s)
+    table = smoothed(recording[names.table_position], period_s)
+    edge = slice(CUT_AT_START, -CUT_AT_START)
+    parts = (moved.position, moved.velocity, moved.acceleration, direction(moved.velocity))
+    columns: list[FloatArray] = [*(part[edge] for part in parts), np.ones(table[edge].size)]
+    fit = fit_blocks(columns, table[edge], ["second encoder over the motor's"] * 5)
+    ratio, velocity, acceleration, friction, _ = fit.estimates
+    delay = velocity.scaled(-1.0 / ratio.value)
+    # a pure delay adds r tau^2 / 2 to the factor of the acceleration
+    straight = Estimate(
+        acceleration.value - 0.5 * ratio.value * delay.value**2, acceleration.std_error, acceleration.how
+    ).scaled(1.0 / ratio.value)
+    return TransmissionValues(ratio, delay, straight, friction, fit.left * float(np.std(table[edge])))

@@ -1,0 +1,52 @@
+"""Resolution and noise of the recorded channels, and the delay between torque command and torque."""
+
+import numpy as np
+
+from hil.arrays import FloatArray
+from hil.drafting.relations import lead_rows
+from hil.identification.noise import white_noise
+from hil.recording.recording import Recording
+
+_WHOLE = 0.05  # deviation from a whole number of steps up to which a difference is counted
+_COUNTED = 0.9  # share of the differences that must be whole numbers of steps
+_STEPS = (20, 60, 200, 600)  # largest differences that are counted, in steps
+MOST_LEAD_ROWS = 50  # of a command before the measured torque: tens of ms
+DIGITS = 1e-6  # relative deviation from a power of ten below which a step is that of printed digits
+
+
+def count_of(values: FloatArray) -> float | None:
+    """Step of a quantised channel (n,) in its unit; None where differences are no multiples of one step."""
+    differences = np.abs(np.diff(values))
+    differences = differences[differences > 1e-12 * np.ptp(values)]
+    if differences.size < 100:
+        return None
+    step = float(differences.min())
+    # the smallest difference has the largest error of printed digits: ever larger ones sharpen the step
+    for most in _STEPS:
+        few = differences[differences < most * step]
+        whole = np.maximum(np.round(few / step), 1.0)
+        step = float((few @ whole) / (whole @ whole))
+    good = np.abs(few / step - np.round(few / step)) < _WHOLE
+    return step if few.size > 50 and good.mean() > _COUNTED else None
+
+
+def is_decimal(step: float) -> bool:
+    """True for a power of ten: the last digit of the file rather than a count of the encoder."""
+    power = np.log10(step)
+    return bool(abs(power - np.round(power)) < DIGITS / np.log(10.0))
+
+
+def noise_of(recording: Recording, channel: str) -> float:
+    """Standard deviation of the white noise of a channel in its unit."""
+    return white_noise(recording[channel])
+
+
+def torque_delay_s(recording: Recording) -> float | None:
+    """Delay of the measured torque against its command [s]; None if only one of them was recorded."""
+    names = recording.axis
+    if names.torque not in recording.columns or names.torque_command not in recording.columns:
+        return None
+    torque, command = recording[names.torque], recording[names.torque_command]
+    if np.array_equal(torque, command):
+        return None
+    return lead_rows(command, torque, MOST_LEAD_ROWS) * recording.period_s

@@ -1,0 +1,86 @@
+"""Read columns of numbers from a JSON file, in the forms that tools write:
+
+{"t": [0, 1], "x": [0.1, 0.2], "rate": 1000}         lists by name, scalars beside them
+{"signals": {"t": [...]}, "units": {"t": "s"}}       the same one level deeper, with units
+[{"t": 0, "x": 0.1}, {"t": 1, "x": 0.2}]             a record per row
+{"columns": ["t", "x"], "data": [[0, 0.1], ...]}     a table
+[{"name": "x", "unit": "mm", "values": [...]}, ...]  an object per channel
+"""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hil.arrays import FloatArray
+from hil.errors import InputError
+
+_NAME_KEYS, _VALUE_KEYS = ("name", "channel", "id"), ("values", "data", "samples")  # of an object per channel
+
+
+@dataclass(frozen=True)
+class JsonContent:
+    """Lists of values, scalars and units of a JSON file, by name."""
+
+    lists: dict[str, list[Any]]
+    scalars: dict[str, float]
+    units: dict[str, str]
+
+    def numbers(self, path: Path, name: str) -> FloatArray:
+        """The list `name` as numbers (n,), null as NaN. Raises InputError: no such list, or no numbers."""
+        if name not in self.lists:
+            raise InputError(f"{path}: column {name!r} is missing; the file has {', '.join(self.lists)}")
+        for row, value in enumerate(self.lists[name]):
+            if value is not None and (isinstance(value, bool) or not isinstance(value, int | float)):
+                raise InputError(
+                    f"{path}: row {row + 1}: {name}: given {value!r}, allowed a finite number; correct the value"
+                )
+        return np.array([np.nan if value is None else value for value in self.lists[name]], dtype=np.float64)
+
+
+def read_json(path: Path) -> JsonContent:
+    """Read `path`. Raises InputError: no JSON, or no lists in it."""
+    try:
+        data = json.loads(path.read_bytes())
+    except (OSError, ValueError, RecursionError) as error:
+        raise InputError(f"{path}: is no readable JSON file ({error}); it is cut or damaged") from None
+    lists, scalars, units = dict[str, list[Any]](), dict[str, float](), dict[str, str]()
+    _collect(data, lists, scalars, units)
+    if not lists:
+        raise InputError(
+            f"{path}: holds no list of numbers, allowed lists by name or a record per row; export the channels as lists"
+        )
+    return JsonContent(lists, scalars, units)
+
+
+def _first(row: dict[str, Any], keys: tuple[str, ...], kind: type) -> Any:
+    """The first value under one of `keys` that is of a kind; None without one."""
+    return next((row[key] for key in keys if isinstance(row.get(key), kind)), None)
+
+
+def _collect(data: Any, lists: dict[str, list[Any]], scalars: dict[str, float], units: dict[str, str]) -> None:
+    if isinstance(data, list) and data and all(isinstance(row, dict) for row in data):
+        channels = [(_first(row, _NAME_KEYS, str), _first(row, _VALUE_KEYS, list), row.get("unit")) for row in data]
+        if all(name is not None and values is not None for name, values, _ in channels):  # an object per channel
+            lists.update({name: values for name, values, _ in channels})
+            units.update({name: unit for name, _, unit in channels if isinstance(unit, str)})
+        else:  # a record per row
+            for key in dict.fromkeys(key for row in data for key in row):
+                lists[key] = [row.get(key) for row in data]
+    elif isinstance(data, dict):
+        names, rows = data.get("columns"), data.get("data", data.get("rows"))
+        if isinstance(names, list) and isinstance(rows, list) and all(isinstance(row, list) for row in rows):
+            for index, name in enumerate(names):
+                lists[str(name)] = [row[index] if index < len(row) else None for row in rows]
+            data = {key: value for key, value in data.items() if key not in ("columns", "data", "rows")}
+        for name, value in data.items():
+            if isinstance(value, list) and value and not isinstance(value[0], dict | list):
+                lists[name] = value
+            elif isinstance(value, int | float) and not isinstance(value, bool):
+                scalars[name] = float(value)
+            elif isinstance(value, dict) and value and all(isinstance(unit, str) for unit in value.values()):
+                units.update(value)
+            elif isinstance(value, dict | list):
+                _collect(value, lists, scalars, units)

@@ -1,0 +1,146 @@
+"""Read columns of a foreign file by name: CSV, MATLAB .mat to version 7, Parquet, JSON. No map is known here."""
+
+import re
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from hil.arrays import FloatArray
+from hil.errors import InputError
+from hil.files import csv_columns, json_columns
+from hil.recording.recording import check_finite
+
+TEXT_ENDINGS = (".csv", ".txt", ".tsv", ".dat", ".asc")
+ENDINGS = f".csv, .mat, .parquet, .json, {', '.join(TEXT_ENDINGS[1:])}"
+
+
+@dataclass(frozen=True)
+class Foreign:
+    """Finite columns of equal length, by name; `place` gives the place of row i (from 0) in the file."""
+
+    columns: dict[str, FloatArray]
+    scalars: dict[str, float]
+    place: Callable[[int], str]
+
+
+def read_foreign(
+    path: Path, wanted: Collection[str], wanted_scalars: Collection[str], form: csv_columns.CsvFormat
+) -> Foreign:
+    """The columns `wanted` and, from a .mat file, the scalars.
+
+    Raises InputError with file, row and column: no such file or format, a missing column, text, NaN or
+    infinity, columns of different length.
+    """
+    if not path.is_file():
+        raise InputError(f"{path}: there is no such file; give the path of a recording: {ENDINGS}")
+    wanted = tuple(dict.fromkeys(wanted))
+    ending = path.suffix.lower()
+    if wanted_scalars and ending != ".mat":
+        raise InputError(
+            f"{path}: the map takes {', '.join(wanted_scalars)} from the file by name, allowed with "
+            ".mat files only; write the number into the map"
+        )
+    if ending in TEXT_ENDINGS:
+        return Foreign(
+            csv_columns.read_columns(path, wanted, form),
+            {},
+            lambda row: f"{path}:{csv_columns.line_of_row(path, row, form)}",
+        )
+    if ending == ".mat":
+        variables = load_mat(path)
+        columns = {name: _mat_column(path, variables, name) for name in wanted}
+        scalars = {name: _mat_scalar(path, variables, name) for name in wanted_scalars}
+    elif ending == ".parquet":
+        columns, scalars = _parquet_columns(path, wanted), {}
+    elif ending == ".json":
+        content = json_columns.read_json(path)
+        columns, scalars = {name: content.numbers(path, name) for name in wanted}, {}
+    else:
+        raise InputError(
+            f"{path}: the ending {path.suffix!r} cannot be imported, allowed {ENDINGS}; "
+            "export the recording to one of them"
+        )
+    _check(path, columns)
+    return Foreign(columns, scalars, lambda row: f"{path}: row {row + 1}")
+
+
+def load_mat(path: Path) -> dict[str, Any]:
+    from scipy.io import loadmat
+
+    try:
+        return {name: value for name, value in loadmat(path).items() if not name.startswith("__")}
+    except NotImplementedError:
+        raise InputError(
+            f"{path}: is a .mat file of version 7.3 (HDF5), allowed up to version 7; "
+            "save it in MATLAB with: save(NAME, '-v7')"
+        ) from None
+    except Exception as error:  # scipy raises many kinds for a damaged file
+        raise InputError(f"{path}: is no readable .mat file ({error}); it is cut or damaged") from None
+
+
+def _mat_column(path: Path, variables: dict[str, Any], name: str) -> FloatArray:
+    match = re.fullmatch(r"(\w+)\[(\d+)\]", name)
+    values = _mat_variable(path, variables, match[1] if match else name)
+    if match and values.ndim == 2 and int(match[2]) < values.shape[1]:
+        return np.ascontiguousarray(values[:, int(match[2])])
+    if not match and values.size == max(values.shape, default=0):
+        return values.reshape(-1)
+    raise InputError(
+        f"{path}: {name}: the variable has the shape {' x '.join(map(str, values.shape))}, allowed a "
+        f"vector, or NAME[i] for column i (from 0) of a matrix; correct the map"
+    )
+
+
+def _mat_scalar(path: Path, variables: dict[str, Any], name: str) -> float:
+    values = _mat_variable(path, variables, name)
+    if values.size != 1 or not np.isfinite(values).all():
+        raise InputError(
+            f"{path}: {name}: given {values.size} values, allowed one finite number; write the number into the map"
+        )
+    return float(values.reshape(-1)[0])
+
+
+def _mat_variable(path: Path, variables: dict[str, Any], name: str) -> FloatArray:
+    if name not in variables:
+        raise InputError(f"{path}: column {name!r} is missing; the file has {', '.join(variables)}")
+    values = np.asarray(variables[name])
+    if values.dtype.kind not in "fiub":
+        raise InputError(
+            f"{path}: {name}: given values of the type {values.dtype}, allowed real numbers; "
+            "save the vector itself, not a structure or a text"
+        )
+    return values.astype(np.float64)
+
+
+def _parquet_columns(path: Path, wanted: tuple[str, ...]) -> dict[str, FloatArray]:
+    try:
+        names = pq.read_schema(path).names
+        missing = [name for name in wanted if name not in names]
+        if missing:
+            raise InputError(f"{path}: column {missing[0]!r} is missing; the file has {', '.join(names)}")
+        table = pq.read_table(path, columns=list(wanted))
+    except (pa.ArrowException, OSError) as error:
+        raise InputError(
+            f"{path}: is no readable Parquet file ({str(error).splitlines()[0]}); it is cut or damaged"
+        ) from None
+    for name in wanted:
+        kind = table.schema.field(name).type
+        if not (pa.types.is_floating(kind) or pa.types.is_integer(kind)):
+            raise InputError(f"{path}: {name}: given {kind} values, allowed numbers; convert the column")
+    return {name: table.column(name).to_numpy().astype(np.float64) for name in wanted}
+
+
+def _check(path: Path, columns: dict[str, FloatArray]) -> None:
+    first, *others = columns.items()
+    for name, values in others:
+        if values.size != first[1].size:
+            raise InputError(
+                f"{path}: {name}: given {values.size} rows, {first[0]} has {first[1].size}; "
+                "all columns must be equally long"
+            )
+    check_finite(columns, lambda row: f"{path}: row {row + 1}")

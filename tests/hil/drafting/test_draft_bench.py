@@ -1,0 +1,140 @@
+"""A bench file is drafted from a recording alone and gives back the axis that the recording was made of."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from foreign_axis import COULOMB_N_M, INERTIA_KG_M2, LEAD_M, VISCOUS_N_M_S_RAD, axis, renamed, write
+from own_recordings import CLEAN
+
+import hil
+from hil.bench.bench_file import load_bench
+from hil.bench.control_section import Control, UnknownControl
+from hil.commands.identify import identify
+from hil.commands.import_ import import_
+from hil.drafting.bench_text import bench_text
+from hil.drafting.draft_bench import draft_bench
+from hil.drafting.sensor_values import count_of
+from hil.errors import InputError
+from hil.recording.recording import Recording
+
+AXIS = axis(rows=8000)
+SCREW = renamed(AXIS, t="time_s", x_act="table_position_mm", angle="motor_angle_rad", torque="torque_Nm")
+
+
+def drafted(tmp_path: Path, columns: dict[str, np.ndarray]) -> Path:
+    import_(write(tmp_path / "log.csv", columns), None, tmp_path / "log.parquet", None, None)
+    identify(tmp_path / "log.parquet", tmp_path / "axis.yaml")
+    return tmp_path / "axis.yaml"
+
+
+def test_the_axis_of_a_simulated_recording_is_found_with_its_law(tmp_path: Path) -> None:
+    known, target = hil.load_bench("reference"), tmp_path / "axis.yaml"
+    identify(CLEAN, target)
+    bench = load_bench(target)
+    assert bench.axis.model == "two_mass"
+    assert bench.axis.lead_m == pytest.approx(0.010, rel=1e-4)
+    assert bench.axis.motor_mass_kg + bench.axis.table_mass_kg == pytest.approx(335.0 + 384.0, rel=0.05)
+    assert bench.axis.coulomb_torque_n_m == pytest.approx(known.axis.coulomb_torque_n_m, rel=0.05)  # type: ignore[union-attr]
+    assert bench.axis.viscous_torque_n_m_s_rad == pytest.approx(0.0064, rel=0.2)
+    assert isinstance(bench.control, Control)
+    gains, true = bench.gains, known.gains
+    assert gains.position_gain_1_s == pytest.approx(true.position_gain_1_s, rel=0.02)
+    assert gains.velocity_gain_n_m_s_rad == pytest.approx(true.velocity_gain_n_m_s_rad, rel=0.02)
+    assert gains.integral_gain_n_m_rad == pytest.approx(true.integral_gain_n_m_rad, rel=0.05)
+    assert gains.position_ticks == true.position_ticks
+    assert bench.encoders.motor.counts_per_rev == 2**20
+    assert bench.encoders.table is not None
+    assert bench.encoders.table.resolution_m == pytest.approx(0.5e-6, rel=1e-3)
+
+
+def test_each_value_stands_within_its_error_and_beside_it_how_it_was_found(tmp_path: Path) -> None:
+    path = drafted(tmp_path, SCREW)
+    bench, text = load_bench(path), path.read_text()
+    ratio = LEAD_M / (2 * np.pi)
+    assert bench.axis.model == "rigid"
+    assert bench.axis.mass_kg == pytest.approx(INERTIA_KG_M2 / ratio**2, rel=0.02)
+    assert bench.axis.coulomb_torque_n_m == pytest.approx(COULOMB_N_M, rel=0.05)
+    assert bench.axis.viscous_torque_n_m_s_rad == pytest.approx(VISCOUS_N_M_S_RAD, rel=0.1)
+    assert isinstance(bench.control, UnknownControl)
+    for key in ("lead_m", "mass_kg", "coulomb_torque_n_m", "viscous_torque_n_m_s_rad"):
+        line = next(line for line in text.splitlines() if line.strip().startswith(key))
+        assert "+-" in line
+        assert "over" in line
+
+
+def test_one_encoder_and_torque_make_a_rotary_axis(tmp_path: Path) -> None:
+    bench = load_bench(drafted(tmp_path, renamed(AXIS, t="time_s", angle="motor_angle_rad", torque="torque_Nm")))
+    assert bench.axis.model == "rotary"
+    assert bench.axis.inertia_kg_m2 == pytest.approx(INERTIA_KG_M2, rel=0.02)
+    assert bench.encoders.motor.counts_per_rev == 2**17
+
+
+def test_a_gear_follows_from_two_angles(tmp_path: Path) -> None:
+    columns = {"time_s": AXIS["t"], "motor_angle_rad": AXIS["angle"], "load_angle_rad": AXIS["angle"] / 50.0}
+    bench = load_bench(drafted(tmp_path, columns | {"torque_Nm": AXIS["torque"]}))
+    assert bench.axis.model == "rotary"
+    assert bench.axis.gear_ratio == pytest.approx(50.0, rel=1e-3)
+
+
+def test_a_late_second_encoder_is_said(tmp_path: Path) -> None:
+    late = np.interp(AXIS["t"] - 0.003, AXIS["t"], AXIS["x_act"])
+    draft = draft_bench(_recording(AXIS | {"x_act": late}))
+    note = next(note for note in draft.notes if "late" in note)
+    assert float(note.split(" by ")[1].split(" ms")[0]) == pytest.approx(3.0, rel=0.05)
+    assert tmp_path.exists()
+
+
+def test_the_step_of_a_quantised_channel_is_found_and_none_in_a_smooth_one() -> None:
+    smooth = np.cumsum(np.random.default_rng(5).normal(size=5000))
+    assert count_of(smooth) is None
+    assert count_of(np.round(smooth / 0.037) * 0.037) == pytest.approx(0.037, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"torque": -AXIS["torque"]}, "wrong sign"),
+        ({"angle": np.abs(AXIS["t"]) * 10.0}, "one direction"),
+        ({"torque": None}, "not recorded"),
+    ],
+)
+def test_what_cannot_be_told_is_refused(change: dict[str, np.ndarray | None], says: str) -> None:
+    with pytest.raises(InputError, match=says):
+        draft_bench(_recording({name: values for name, values in (AXIS | change).items() if values is not None}))
+
+
+def test_a_bench_file_is_not_overwritten(tmp_path: Path) -> None:
+    target = tmp_path / "axis.yaml"
+    target.write_text("mine")
+    with pytest.raises(InputError, match="not overwritten"):
+        identify(CLEAN, target)
+    assert target.read_text() == "mine"
+
+
+def test_the_text_is_a_bench_file_with_comments() -> None:
+    text = bench_text(draft_bench(_recording(AXIS)))
+    assert text.startswith("# Bench of log")
+    assert "control: unknown   # " in text
+
+
+def _recording(columns: dict[str, np.ndarray]) -> Recording:
+    names = {"t": "time_s", "angle": "motor_position_rad", "x_act": "table_position_m", "torque": "torque_n_m"}
+    channels = {names[name]: values for name, values in columns.items() if name in names}
+    channels["table_position_m"] = 1e-3 * channels["table_position_m"]
+    return Recording("log", channels, 1e-3)
+
+
+def test_a_load_over_the_angle_is_said() -> None:
+    angle = AXIS["angle"] / 20.0
+    torque = AXIS["torque"] + 0.5 * np.sin(angle)
+    plain, loaded = (
+        draft_bench(Recording("log", {"time_s": AXIS["t"], "motor_position_rad": angle, "torque_n_m": one}, 1e-3))
+        for one in (AXIS["torque"], torque)
+    )
+    assert not any("gravity" in note for note in plain.unsure)
+    assert any("gravity" in note for note in loaded.unsure)
+    note = next(note for note in loaded.notes if "gravity" in note)
+    assert float(note.split("(gravity) ")[1].split(" N m")[0]) == pytest.approx(0.5, rel=0.05)

@@ -1,0 +1,196 @@
+"""A map is drafted from the file alone: dialects, languages, units, roles and signs of a known axis."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from foreign_axis import LEAD_M, axis, csv_text, renamed, write
+
+from hil.commands.import_ import import_
+from hil.drafting.draft_map import draft_map
+from hil.drafting.map_draft import MapDraft
+from hil.recording.recording import Recording, read_recording
+
+AXIS = axis()
+NAMES = {"t": "time_s", "x_set": "position_setpoint_mm", "angle": "motor_angle_rad", "torque": "torque_Nm"}
+ENGLISH = renamed(AXIS, **NAMES)
+
+
+def imported(path: Path) -> Recording:
+    target = path.with_suffix(".out.parquet")
+    import_(path, None, target, None, None)
+    return read_recording(target)
+
+
+def channels(draft: MapDraft) -> dict[str, Any]:
+    return {one.channel: one.entry for one in draft.channels}
+
+
+def check(recording: Recording) -> None:
+    """The known axis in SI: motor in rad, set-point in m, torque in N m."""
+    np.testing.assert_allclose(recording["motor_position_rad"], AXIS["angle"], atol=1e-5)
+    np.testing.assert_allclose(recording["position_command_m"], 1e-3 * AXIS["x_set"], atol=1e-8)
+    np.testing.assert_allclose(recording["torque_n_m"], AXIS["torque"], atol=1e-5)
+
+
+@pytest.mark.parametrize("ending", ["csv", "mat", "parquet", "json"])
+def test_each_format_is_imported_without_a_map(tmp_path: Path, ending: str) -> None:
+    check(imported(write(tmp_path / f"log.{ending}", ENGLISH)))
+
+
+@pytest.mark.parametrize(
+    ("delimiter", "comma", "above", "below"),
+    [
+        (",", False, "", ""),
+        (";", False, "", ""),
+        (";", True, "", ""),
+        ("\t", False, "", ""),
+        ("\t", True, "", ""),
+        ("|", False, "", ""),
+        (" ", False, "", ""),
+        ("   ", False, "", ""),
+        (",", False, "# recorded on Monday\n# drive 3\n", ""),
+        (";", True, "Messung 7\nAntrieb X\n\n", ""),
+        (",", False, "", "s,mm,rad,Nm\n"),
+        (";", True, "", "[s];[mm];[rad];[Nm]\n"),
+        (",", False, "%", ""),
+    ],
+)
+def test_each_dialect_is_read(tmp_path: Path, delimiter: str, comma: bool, above: str, below: str) -> None:
+    path = tmp_path / "log.csv"
+    names = dict(zip(NAMES, ("time", "position_setpoint", "motor_angle", "torque"), strict=True)) if below else NAMES
+    path.write_text(csv_text(renamed(AXIS, **names), delimiter, comma, above, below))
+    check(imported(path))
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "cp1252", "utf-16"])
+def test_each_encoding_is_read(tmp_path: Path, encoding: str) -> None:
+    path = tmp_path / "log.csv"
+    columns = renamed(
+        AXIS | {"angle": np.rad2deg(AXIS["angle"])},
+        t="Zeit [s]",
+        x_set="Sollposition [mm]",
+        angle="Winkel Motor [°]",
+        torque="Moment [Nm]",
+    )
+    path.write_bytes(csv_text(columns, ";", comma=True).encode(encoding))
+    check(imported(path))
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("Zeit [ms]", "Lagesollwert [mm]", "Motorlage Istwert [rad]", "Drehmoment [Nm]"),
+        ("t/ms", "x_soll/mm", "phi_ist/rad", "M_ist/Nm"),
+        ("Temps (ms)", "Consigne position (mm)", "Position moteur (rad)", "Couple (Nm)"),
+        ("timestamp_ms", "RefPosition [mm]", "ActPosition [rad]", "ActTorque [Nm]"),
+        ("time in ms", "target position in mm", "motor position in rad", "motor torque in Nm"),
+    ],
+)
+def test_names_in_three_languages_give_the_channels(tmp_path: Path, names: tuple[str, ...]) -> None:
+    columns = renamed(AXIS | {"t": 1e3 * AXIS["t"]}, **dict(zip(NAMES, names, strict=True)))
+    check(imported(write(tmp_path / "log.csv", columns)))
+
+
+def test_columns_without_telling_names_are_told_by_their_relations(tmp_path: Path) -> None:
+    columns = renamed(AXIS, t="c1", x_act="c2", torque="c3")
+    draft = draft_map(write(tmp_path / "log.csv", columns))
+    assert draft.clock.column == "c1"
+    assert channels(draft)["motor_position_m"]["column"] == "c2"
+    assert channels(draft)["force_n"]["column"] == "c3"
+    assert len([note for note in draft.unsure if "its name says nothing" in note]) == 2
+
+
+def test_a_velocity_is_recognised_as_the_derivative(tmp_path: Path) -> None:
+    columns = renamed(AXIS, t="c1", angle="c2", speed="c3", torque="c4")
+    draft = draft_map(write(tmp_path / "log.csv", columns))
+    assert "velocity" in draft.left_out["c3"]
+    assert next(iter(channels(draft).values()))["column"] == "c2"
+
+
+def test_a_unit_follows_from_a_velocity_with_a_unit(tmp_path: Path) -> None:
+    changed = AXIS | {"angle": np.rad2deg(AXIS["angle"]), "speed": AXIS["speed"] * 60 / (2 * np.pi)}
+    columns = renamed(changed, t="time_s", angle="motor_position", speed="speed [rpm]", torque="torque [Nm]")
+    assert channels(draft_map(write(tmp_path / "log.csv", columns)))["motor_position_rad"]["unit"] == "deg"
+
+
+def test_the_lead_follows_from_two_encoders(tmp_path: Path) -> None:
+    columns = renamed(AXIS, t="time_s", x_act="table_position_mm", angle="motor_angle_rad", torque="torque_Nm")
+    draft = draft_map(write(tmp_path / "log.csv", columns))
+    assert draft.lead_m == pytest.approx(LEAD_M, rel=1e-3)
+    assert {"motor_position_rad", "table_position_m", "torque_n_m"} == set(channels(draft))
+
+
+@pytest.mark.parametrize(("column", "channel"), [("torque", "torque_n_m"), ("x_set", "position_command_m")])
+def test_a_turned_sign_is_turned_back_and_named(tmp_path: Path, column: str, channel: str) -> None:
+    path = write(tmp_path / "log.csv", renamed(AXIS | {column: -AXIS[column]}, **NAMES))
+    draft, recording = draft_map(path), imported(path)
+    assert any("sign" in note for note in draft.unsure)
+    axis_sign = np.sign(np.corrcoef(recording["motor_position_rad"], recording["position_command_m"])[0, 1])
+    assert axis_sign == 1.0
+    acceleration = np.gradient(np.gradient(recording["motor_position_rad"]))
+    smooth = np.convolve(acceleration, np.ones(51) / 51, "same")
+    assert np.corrcoef(smooth[100:-100], recording["torque_n_m"][100:-100])[0, 1] > 0.2, channel
+
+
+@pytest.mark.parametrize(
+    ("name", "word"),
+    [("i_q [A]", "per A"), ("Spannung [V]", "per V"), ("Drehmoment [%]", "rated"), ("torque", "no unit")],
+)
+def test_what_the_file_does_not_tell_is_named(tmp_path: Path, name: str, word: str) -> None:
+    columns = renamed(AXIS, **(NAMES | {"torque": name}))
+    path = write(tmp_path / "log.csv", columns)
+    assert any(word in note for note in draft_map(path).unsure)
+    assert len(imported(path)) == len(AXIS["t"])
+
+
+def test_of_several_axes_one_is_taken_and_the_others_are_named(tmp_path: Path) -> None:
+    both = {"time_s": AXIS["t"]}
+    for number, factor in (("1", 1.0), ("2", 0.5)):
+        both |= {f"position{number}_rad": factor * AXIS["angle"], f"torque{number}_n_m": AXIS["torque"]}
+    path = write(tmp_path / "log.csv", both)
+    assert channels(draft_map(path))["motor_position_rad"]["column"] == "position1_rad"
+    assert any("--axis 2" in note for note in draft_map(path).unsure)
+    assert channels(draft_map(path, axis="2"))["motor_position_rad"]["column"] == "position2_rad"
+
+
+def test_uneven_stamps_are_interpolated_and_said(tmp_path: Path) -> None:
+    random = np.random.default_rng(2)
+    uneven = AXIS["t"] + random.uniform(0.0, 4e-4, AXIS["t"].size)
+    columns = {name: np.interp(uneven, AXIS["t"], values) for name, values in AXIS.items()} | {"t": uneven}
+    path = write(tmp_path / "log.csv", renamed(columns, **NAMES))
+    assert draft_map(path).clock.resample_hz == pytest.approx(1000.0, rel=0.02)
+    assert imported(path).period_s == pytest.approx(1e-3, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        lambda c: {"signals": {k: v.tolist() for k, v in c.items() if k != "t"}, "fs": 1000.0},
+        lambda c: [{k: float(v[i]) for k, v in c.items()} for i in range(len(AXIS["t"]))],
+        lambda c: {"columns": list(c), "data": np.column_stack(list(c.values())).tolist()},
+        lambda c: [{"name": k, "values": v.tolist()} for k, v in c.items()],
+    ],
+)
+def test_json_in_the_forms_that_tools_write(tmp_path: Path, content: Any) -> None:
+    path = tmp_path / "log.json"
+    path.write_text(json.dumps(content(ENGLISH)))
+    check(imported(path))
+
+
+def test_a_rate_is_taken_from_a_comment_or_the_user(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    columns = renamed(AXIS, **{k: v for k, v in NAMES.items() if k != "t"})
+    path.write_text(csv_text(columns, above="# sampling rate: 2 kHz\n"))
+    assert draft_map(path).clock.rate_hz == 2000.0
+    assert draft_map(path, rate_hz=500.0).clock.rate_hz == 500.0
+
+
+def test_a_wrong_unit_of_the_stamps_is_corrected_and_named(tmp_path: Path) -> None:
+    draft = draft_map(write(tmp_path / "log.csv", renamed(AXIS, **(NAMES | {"t": "time [ms]"}))))
+    assert draft.clock.unit == "s"
+    assert any("no rate of a recording" in note for note in draft.unsure)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hil.arrays import FloatArray
-from hil.errors import FieldError, HilError
+from hil.errors import FieldError, HilError, InputError
 
 if TYPE_CHECKING:
     from hil.bench.bench_file import Bench
@@ -53,11 +53,10 @@ def simulate(bench: Bench, trajectory: Trajectory, *, seed: int | None = None, n
     names of its channels. Raises FieldError for another period or parameters that cannot be simulated, HilError if the
     axis is stopped before the end, for example by a following error.
     """
-    from hil.bench.hardware import DriveSection, EncoderConnection, SimulationSection
     from hil.loop.clock import VirtualClock
     from hil.loop.devices import Rig
     from hil.loop.session import Session, make_cycle
-    from hil.loop.simulated_bench import make_plant
+    from hil.loop.simulated_bench import make_plant, simulated_copy
     from hil.loop.supervision import Ending
     from hil.loop.virtual import compiled_ticks
     from hil.motion.pieces import MotionLimits
@@ -69,16 +68,7 @@ def simulate(bench: Bench, trajectory: Trajectory, *, seed: int | None = None, n
             f"given a trajectory with {trajectory.period_s:g} s, allowed {bench.period_s:g} s, the period of the bench "
             f"{bench.name}; plan it with bench.period_s",
         )
-    drive = (bench.drive or DriveSection()).model_copy(
-        update={
-            "protocol": "canopen",
-            "interface": "inprocess",
-            "encoder": EncoderConnection(),
-            "eds": None,
-            "serial_number": None,
-        }
-    )
-    bench = bench.model_copy(update={"drive": drive, "simulation": bench.simulation or SimulationSection()})
+    bench = simulated_copy(bench)
     plant = make_plant(bench, seed)
     plant.reset(float(trajectory.position_m[0]))
     # a stop needs limits: the largest set-points of the trajectory, of which those at rest are 0
@@ -113,8 +103,8 @@ def run(
     although jitter or bus load exceed the budget of the bench. seed: of the noise of simulated sensors.
 
     Returns the recording, one row per tick of the velocity loop. Raises FieldError for a profile that the bench does
-    not allow, NotPunctual (a HilError) for an exceeded budget, DriverError for a device that cannot be set up,
-    HilError if the run stopped before its end; the recording up to there stays in `folder`.
+    not allow, NotPunctual (a HilError) for an exceeded budget, HilError for a device that cannot be set
+    up and for a run that stopped before its end; the recording up to there stays in `folder`.
     """
     from hil.loop.run import run_profile
     from hil.recording.recording import read_recording
@@ -140,7 +130,10 @@ def fit_nominal(recordings: Recording | Sequence[Recording], bench: Bench) -> Fi
     from hil.identification.measured import take
     from hil.identification.nominal_fit import fit_nominal as fit
 
-    return fit(prepare_dataset([take(recording, bench) for recording in _sequence(recordings)], bench))
+    runs = [take(recording, bench) for recording in _sequence(recordings)]
+    if not runs:
+        raise InputError("recordings: given none, allowed one or more; give the recordings to fit to")
+    return fit(prepare_dataset(runs, bench))
 
 
 def diagnose(

@@ -6,6 +6,7 @@ ctrl-C. An expected error is one message on stderr; a Python traceback means a d
 
 from __future__ import annotations
 
+import errno
 import os
 import sys
 from collections.abc import Callable
@@ -73,6 +74,7 @@ for _name, _command in COMMANDS:
 
 def main() -> None:
     """Entry point: runs the command line, turns errors into a message and an exit code."""
+    _open_standard_streams()
     try:
         # commands spread their work over the cores themselves; threads of the linear algebra would slow them down
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -82,21 +84,23 @@ def main() -> None:
         if end.code == 130:
             print("stopped by ctrl-C", file=sys.stderr)
         raise
-    except Exception as error:
-        code = _exit_code(error)
-        if code is None:
-            raise
+    except HilError as error:
         print(error, file=sys.stderr)
-        sys.exit(code)
+        sys.exit(error.exit_code)
+    except OSError as error:
+        if error.errno != errno.ENOSPC:
+            raise
+        print(f"{error.filename or 'output'}: no space left on the device; make room", file=sys.stderr)
+        sys.exit(1)
 
 
-def _exit_code(error: Exception) -> int | None:
-    """Exit code of an error raised on purpose; None for a defect."""
-    if isinstance(error, HilError):
-        return error.exit_code
-    from drivers.port import DriverError  # only here: the drivers are not light
-
-    return 1 if isinstance(error, DriverError) else None
+def _open_standard_streams() -> None:
+    """Open /dev/null for each closed one of stdin, stdout and stderr, so that no other file gets its number."""
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)
 
 
 if __name__ == "__main__":

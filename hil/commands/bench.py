@@ -50,12 +50,12 @@ def bench(
     file.parent.mkdir(parents=True, exist_ok=True)
     write_json(file, data)
     if as_json:
-        out.print(file.read_text(encoding="utf-8"), markup=False, end="")
+        out.print(file.read_text(encoding="utf-8"), end="")
         return
     table(summary.HEADERS, summary.rows(figures))
-    out.print("\n" + "\n".join(summary.notes(figures)), markup=False)
+    out.print("\n" + "\n".join(summary.notes(figures)))
     if earlier is not None:
-        out.print(f"\nAgainst {against} (ratio above 1: faster now)\n", markup=False)
+        out.print(f"\nAgainst {against} (ratio above 1: faster now)\n")
         table(summary.AGAINST_HEADERS, summary.against_rows(data["against"]["figures"]))
     granted, refused = ", ".join(data["granted"]), ", ".join(data["refused"]) or "nothing"
     texts = (
@@ -63,8 +63,8 @@ def bench(
         "machine: " + ", ".join(f"{name} {value}" for name, value in data["machine"].items()),
         f"granted: {granted}; refused: {refused}",
     )
-    out.print("\n" + "\n".join(summary.wrapped(text) for text in texts), markup=False)
-    out.print(f"\nFigures: {file}", markup=False)
+    out.print("\n" + "\n".join(summary.wrapped(text) for text in texts))
+    out.print(f"\nFigures: {file}")
 
 
 def _figures(tell: Progress) -> Iterator[Figure]:

@@ -59,7 +59,7 @@ def demo(
             diagnosis = diagnose([learn], [prove], believed, lambda text: tell(text, None))
             tell("writing the report", None)
             write_diagnosis(diagnosis, part)
-    out.print(f"[bold]Diagnosis[/bold]: {diagnosis.result.statement}\n")
+    out.print(f"[bold]Diagnosis[/bold]: {diagnosis.result.statement}\n", markup=True)
     _say(diagnosis.result, truth, believed)
     out.print(
         f"\nThe same again: hil demo --seed {seed}"
@@ -143,7 +143,8 @@ def _say(result: Result, truth: SimulationSection, believed: Bench) -> None:
     table((title(hidden.effect), "bench file", "concealed", "found", "standard error"), rows)
     names = " and ".join(title(finding.effect) for finding in result.missing) or title(result.verdict)
     out.print(
-        f"\nConcealed: [bold]{title(hidden.effect)}[/bold]; found: [bold]{names}[/bold]. {_judged(result, hidden)}"
+        f"\nConcealed: [bold]{title(hidden.effect)}[/bold]; found: [bold]{names}[/bold]. {_judged(result, hidden)}",
+        markup=True,
     )
 
 

@@ -33,8 +33,7 @@ def import_(
         out.print(
             f"  {channel} = {origin['factor']:.9g} x {origin['column']}"
             + (f" + {origin['offset']:g}" if origin["offset"] else ""),
-            markup=False,
         )
     for channel, how in recording.metadata["derived"].items():
-        out.print(f"  {channel}: {how}", markup=False)
+        out.print(f"  {channel}: {how}")
     out.print(f"Recording: {target}")

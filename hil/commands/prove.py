@@ -69,7 +69,7 @@ def prove(
     from hil.proof.score.tables import HEADERS, goal_row, published
 
     if show is not None:
-        out.print(published(show), markup=False)
+        out.print(published(show))
         return
     if folder is None:
         raise InputError("--out: not given, allowed a folder for cases, answers and scores; or --show NAME")

@@ -66,7 +66,7 @@ def named(bench: str, profile: Path) -> Iterator[None]:
 def say(result: RunResult, virtual: bool) -> None:
     """Print notes, lateness and file of a run."""
     for note in (*result.notes, *result.doubts):
-        err.print(f"note: {note}", markup=False)
+        err.print(f"note: {note}")
     if not virtual:
         out.print(f"lateness of the ticks: {result.jitter.text}")
-    out.print(f"{result.outcome.rows} rows: {result.recording}", markup=False)
+    out.print(f"{result.outcome.rows} rows: {result.recording}")

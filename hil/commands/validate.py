@@ -17,7 +17,7 @@ def validate(
     problems = []
     for path in files:
         try:
-            out.print(f"{path}: {_checked(path)}", markup=False)
+            out.print(f"{path}: {_checked(path)}")
         except InputError as error:
             problems.append(str(error))
     if problems:

@@ -20,7 +20,7 @@ _PROFILE = {
 def warm_up() -> None:
     """Compile all kernels now, so that no later command has to; for images and services."""
     compile_kernels()
-    out.print(f"All kernels are compiled in {_folder()}", markup=False)
+    out.print(f"All kernels are compiled in {_folder()}")
 
 
 def compile_kernels() -> None:

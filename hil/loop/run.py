@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 
 from hil.bench.bench_file import Bench
-from hil.bench.hardware import DriveSection, EncoderConnection, SimulationSection
+from hil.bench.hardware import DriveSection
 from hil.errors import FieldError
 from hil.loop.clock import Clock, VirtualClock, WallClock
 from hil.loop.devices import Devices, Rig, open_devices
 from hil.loop.realtime import Jitter, NotPunctual, check_punctual, measure_jitter, now_text, real_time, report
 from hil.loop.session import Outcome, Session, make_cycle
-from hil.loop.simulated_bench import make_plant
+from hil.loop.simulated_bench import make_plant, simulated_copy
 from hil.loop.supervision import Ending
 from hil.loop.virtual import compiled_ticks
 from hil.motion.profile import Profile
@@ -199,18 +199,9 @@ class _NoRows:
 
 
 def rehearse(bench: Bench, trajectory: Trajectory, profile: Profile) -> None:
-    """Arm, begin and stop the run in virtual time on a simulated copy of the bench, so that all is compiled and at hand
-    before the real one."""
-    section = (bench.drive or DriveSection()).model_copy(
-        update={
-            "protocol": "canopen",
-            "interface": "inprocess",
-            "encoder": EncoderConnection(),
-            "eds": None,
-            "serial_number": None,
-        }
-    )
-    copy = bench.model_copy(update={"drive": section, "simulation": bench.simulation or SimulationSection()})
+    """Arm, begin and stop the run in virtual time on a simulated copy of the bench, so that everything is compiled and
+    in memory before the real one."""
+    copy = simulated_copy(bench)
     plant = make_plant(copy)
     plant.reset(float(trajectory.position_m[0]))
     with Rig(copy, plant=plant) as rig:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Any
+from typing import Any, SupportsIndex
 
 from pydantic import ValidationError, model_validator
 
@@ -26,7 +26,7 @@ from drivers.sim.serial_line import SimulatedSerialEncoder
 from drivers.sim.servo import DriveServo, PositionFeedback, Servo, VelocityEstimate
 from hil.bench.axis_models import Axis, OneMass, Rigid, SerialChain, SevenDofAxis, TwoMass
 from hil.bench.bench_file import Bench, bench_path
-from hil.bench.hardware import DriveSection, SimulationSection
+from hil.bench.hardware import DriveSection, EncoderConnection, SimulationSection
 from hil.errors import FieldError
 from hil.files.yaml_model import load_model
 
@@ -50,9 +50,21 @@ def load_simulated(source: str | Path) -> Bench:
     return bench if bench.name else bench.model_copy(update={"name": path.stem})
 
 
+def simulated_copy(bench: Bench) -> Bench:
+    """Return the bench with a simulated drive and encoder on an in-process CANopen bus, without real devices."""
+    devices: dict[str, Any] = {
+        "protocol": "canopen", "interface": "inprocess", "encoder": EncoderConnection(), "eds": None,
+        "serial_number": None}  # fmt: skip
+    drive = (bench.drive or DriveSection()).model_copy(update=devices)
+    return bench.model_copy(update={"drive": drive, "simulation": bench.simulation or SimulationSection()})
+
+
 def make_plant(bench: Bench, seed: int | None = None) -> Plant:
     """Build the simulated axis at rest at 0. Raises FieldError at an invalid field."""
     simulation = bench.simulation or SimulationSection()
+    seed = simulation.seed if seed is None else seed
+    if not isinstance(seed, SupportsIndex) or seed.__index__() < 0:
+        raise FieldError(("simulation", "seed"), f"given {seed!r}, allowed a whole number, 0 or more; correct it")
     axis = _true_axis(bench.axis, simulation)
     effects = []
     for number, entry in enumerate(simulation.effects):
@@ -73,7 +85,7 @@ def make_plant(bench: Bench, seed: int | None = None) -> Plant:
     except (TypeError, ValueError) as error:
         raise FieldError(("simulation", "sensors"), f"given {simulation.sensors}: {error}") from None
     try:
-        return Plant(axis, sensors, effects, simulation.seed if seed is None else seed, simulation.step_s)
+        return Plant(axis, sensors, effects, seed, simulation.step_s)
     except ValueError as error:
         raise FieldError(("simulation",), str(error)) from None
 

@@ -221,6 +221,8 @@ class Recorder:
 
 def _reserve(folder: Path, name: str) -> Path:
     """Create the empty stream file: the first of NAME.arrows, NAME_2.arrows ... without a Parquet file."""
+    if not name or Path(name).name != name or "\0" in name:
+        raise InputError(f"name: given {name!r}, allowed a file name without folder and ending; correct it")
     try:
         folder.mkdir(parents=True, exist_ok=True)
         number = 1

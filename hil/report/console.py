@@ -7,8 +7,9 @@ from typing import Protocol
 from rich.console import Console
 from rich.table import Table
 
-out = Console(highlight=False, soft_wrap=True)
-err = Console(stderr=True, highlight=False, soft_wrap=True)
+# markup=False: names of files and benches may hold square brackets
+out = Console(markup=False, highlight=False, soft_wrap=True)
+err = Console(stderr=True, markup=False, highlight=False, soft_wrap=True)
 
 
 class Progress(Protocol):
@@ -33,7 +34,9 @@ def progress() -> Iterator[Progress]:
     from rich.progress import BarColumn, TaskID, TextColumn, TimeElapsedColumn
     from rich.progress import Progress as Bars
 
-    with Bars(TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), console=err, transient=True) as bars:
+    with Bars(
+        TextColumn("{task.description}", markup=False), BarColumn(), TimeElapsedColumn(), console=err, transient=True
+    ) as bars:
         tasks: dict[str, TaskID] = {}
 
         def update(task: str, share: float | None = None) -> None:

@@ -1,7 +1,7 @@
-"""CAN ports: what drives, encoders and simulated nodes send and listen on, and how a real one is opened.
+"""CAN ports: connections of drives, encoders and simulated nodes to a bus, and opening of real ones.
 
 Every port, simulated or real, does four things: `listen` to a COB-ID, `send` a frame, `poll` for what has arrived, and
-report its `health`. Time is handed in; nothing here reads a clock. `PythonCanPort` stands on any python-can bus
+report its `health`. Time is an argument; nothing reads a clock. `PythonCanPort` stands on any python-can bus
 (socketcan, virtual, udp_multicast); the in-process bus of `drivers.inprocess` offers the same without threads.
 
 Error frames are counted and decoded here, since the canopen package drops them and a bus-off would stay invisible.
@@ -39,7 +39,7 @@ class BusHealth:
 
 
 class CanPort(Protocol):
-    """One connection to a CAN bus."""
+    """Connection to a CAN bus."""
 
     health: BusHealth
 
@@ -168,9 +168,9 @@ class PythonCanPort:
 
 
 class PumpedPort:
-    """A port whose far end lives in this thread: `poll` first lets the simulated nodes serve theirs.
+    """Port of a loop with simulated nodes on the same bus and thread: `poll` first polls the ports of the nodes.
 
-    So a loop and its simulated nodes share a python-can bus without a second Python thread, in any time.
+    The nodes need no second Python thread, in wall-clock and in virtual time.
     """
 
     __slots__ = ("_nodes", "_port", "health", "ignore", "listen", "send")

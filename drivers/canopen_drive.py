@@ -1,4 +1,4 @@
-"""A CiA 402 drive as the loop sees it: set up by SDO and read back, then one RPDO and one TPDO a cycle.
+"""Remote CiA 402 drive: set up by SDO with read-back, then one RPDO and one TPDO a cycle.
 
 RPDO1 carries controlword and target of the mode, TPDO1 statusword, position and torque; both packed by `struct`.
 Faults are bits of `DriveSample.condition`. A condition that forbids motion sets the goal to QUICK_STOP and stays until
@@ -40,14 +40,14 @@ TRIPPING: Final = (
     Condition.STALE | Condition.HEARTBEAT_LOST | Condition.EMERGENCY | Condition.FAULT | Condition.DISABLED
     | Condition.BUS_OFF | Condition.NOT_OPERATIONAL
 )  # fmt: skip
-# Bound once: looking a member up in its enumeration costs the loop.
+# Bound once: the look-up of an enumeration member takes time in each cycle.
 _OK, _ENABLED_STATE, _ENABLED = Condition.OK, DriveState.OPERATION_ENABLED, DriveGoal.ENABLED
 _POWERED: Final = (_ENABLED_STATE, DriveState.QUICK_STOP_ACTIVE, DriveState.FAULT_REACTION_ACTIVE)
-_new = tuple.__new__  # makes a named tuple without its Python-level constructor
+_new = tuple.__new__  # makes a named tuple without the call of its Python constructor
 
 
 class CanopenDrive(CanopenNode, Drive):
-    """One CiA 402 drive on a master's bus."""
+    """CiA 402 drive on the bus of a master."""
 
     settings: DriveSettings
 
@@ -62,7 +62,7 @@ class CanopenDrive(CanopenNode, Drive):
         self._take_mode(settings.mode)
         self._rad_per_count = self._n_m_per_mille = self._target_per_unit = 0.0
         self._statusword = 0
-        self._raw_counts = 0  # as the drive counts, wrapping
+        self._raw_counts = 0  # as read from the drive, wraps
         self._counts = 0  # unwrapped
         self._torque = 0
         self._controlword = 0
@@ -76,7 +76,7 @@ class CanopenDrive(CanopenNode, Drive):
         self._holds_position = TARGET[mode].index == TARGET[OperationMode.CYCLIC_SYNC_POSITION].index
 
     def set_up(self, settings: DriveSettings | None = None) -> None:
-        """Identity, units, mode, limits, watchdogs, PDOs; blocking, switches the power stage off.
+        """Check identity and units, set mode, limits, watchdogs and PDOs; blocking, switches the power stage off.
 
         With other settings: the same node in another mode, as from homing to CST; `master.start` again afterwards.
         Raises ResponseTimeout, IdentityError or ConfigurationError; nothing moves in either case.
@@ -145,7 +145,7 @@ class CanopenDrive(CanopenNode, Drive):
     def command(self, now_s: float, setpoint: float) -> None:
         """Send controlword and set-point: N m (CST), rad/s (CSV), rad (CSP).
 
-        Until the drive reports OPERATION ENABLED the target is where it stands (CSP) or zero: enabling never jumps.
+        Until the drive reports OPERATION ENABLED the target is the present position (CSP) or zero: no jump.
         """
         state = STATE_BY_STATUS[self._statusword & 0x7F]
         if state is _ENABLED_STATE and self.goal is _ENABLED:
@@ -166,7 +166,7 @@ class CanopenDrive(CanopenNode, Drive):
         self._send(self._rpdo_id, self._pack(controlword, target), now_s)
 
     def _fit(self, target: int) -> int:
-        """Positions wrap as the drive counts them; torques and velocities are limited."""
+        """Wrap a position to INTEGER32; limit a torque or velocity to its range."""
         if self._holds_position:
             return ((target + 0x80000000) & 0xFFFFFFFF) - 0x80000000
         return saturate(target, self._target_bits)
@@ -201,7 +201,7 @@ class CanopenDrive(CanopenNode, Drive):
 
 
 class HomingRun:
-    """A homing run of a drive in OperationMode.HOMING, tick by tick, to a proven stop on the reference.
+    """A homing run of a drive in OperationMode.HOMING, tick by tick, to a checked stop on the reference.
 
     Call `step` with each sample, then `drive.command(now_s, 0.0)`, until `phase` is DONE or FAILED.
 

@@ -1,7 +1,7 @@
 """The master's part of CANopen in the loop: SYNC, its own heartbeat, NMT commands, polling the bus.
 
 SYNC and heartbeat are sent by the loop itself, never by `send_periodic`: on socketcan that runs in the kernel and
-would go on feeding the drive's watchdog after this process hangs.
+would continue to trigger the drive's watchdog after this process hangs.
 """
 
 from typing import Final
@@ -42,7 +42,7 @@ class CanopenMaster:
         self.port.send(0x000, bytes([command, node_id]), self.network.time_s if now_s is None else now_s)
 
     def start(self, now_s: float) -> None:
-        """All nodes operational; first heartbeat. From here on call `sync` every period."""
+        """Set all nodes operational and send the first heartbeat; from now on call `sync` every period."""
         self.nmt(NMT_START, now_s=now_s)
         self._heartbeat_due_s = now_s + self.heartbeat_s
         self._send(self._heartbeat_id, _OPERATIONAL, now_s)
@@ -51,7 +51,7 @@ class CanopenMaster:
         """Heartbeat when due, then SYNC."""
         if now_s >= self._heartbeat_due_s:
             self._heartbeat_due_s += self.heartbeat_s
-            if self._heartbeat_due_s <= now_s:  # the loop stood still: no burst to catch up
+            if self._heartbeat_due_s <= now_s:  # after an interruption of the loop missed heartbeats are not sent
                 self._heartbeat_due_s = now_s + self.heartbeat_s
             self._send(self._heartbeat_id, _OPERATIONAL, now_s)
         self.syncs += 1

@@ -1,4 +1,4 @@
-"""A CANopen node as its master sees it: EMCY, heartbeat, missed answers and bus state as `Condition` bits."""
+"""Remote CANopen node: reports EMCY, heartbeat, missed answers and bus state as `Condition` bits."""
 
 import math
 from typing import Final, Protocol
@@ -41,9 +41,9 @@ class CanopenNode:
         master.port.listen(0x700 + settings.node_id, self._on_heartbeat)
 
     def _begin(self) -> None:
-        """Start anew after a set-up: no answer and no heartbeat yet."""
+        """Reset to the state after a set-up: no answer and no heartbeat yet."""
         self._answered = self._set_up_at = self._master.syncs  # number of the SYNC answered last
-        self._latched = 0  # Condition bits; an int, for a flag's truth is tested in Python code
+        self._latched = 0  # Condition bits as an int: the truth test of a flag is slower
         self._heartbeat_deadline_s = math.inf  # until the first heartbeat
 
     def _on_tpdo(self, can_id: int, data: bytes, now_s: float) -> None:
@@ -59,13 +59,13 @@ class CanopenNode:
 
     def _on_heartbeat(self, can_id: int, data: bytes, now_s: float) -> None:
         if self._answered == self._set_up_at:
-            return  # the loop does not run yet: another state and another time are in order
+            return  # before the first answer another NMT state and another heartbeat time are allowed
         self._heartbeat_deadline_s = now_s + 3 * self.settings.heartbeat_s
         if len(data) == 1 and data[0] & 0x7F != _OPERATIONAL:
             self._latched |= Condition.NOT_OPERATIONAL  # boot-up (0) included: it lost its configuration
 
     def _node_condition(self, age: int, now_s: float) -> Condition:
-        """Latched conditions, age of the sample in SYNCs, heartbeat and bus."""
+        """Return the fault bits: latched ones, age of the sample in SYNCs, heartbeat, bus."""
         condition = Condition(self._latched)
         if age:
             condition |= Condition.LATE

@@ -1,9 +1,9 @@
 """Port between the loop and its devices: abstract drive, encoder and master, their samples and errors.
 
-One tick of a loop at `now_s` (time = tick x period; nothing here reads a clock, and nothing here blocks):
+One tick of a loop at `now_s` (time = tick x period; nothing reads a clock or blocks):
 
     master.sync(now_s)                      # SYNC: every node latches its position and answers; heartbeat when due
-    master.poll(now_s)                      # take in what has arrived; repeat until the samples are fresh
+    master.poll(now_s)                      # receive; repeat until both samples belong to this SYNC
     drive_sample = drive.read(now_s)        # motor position and torque of this SYNC
     encoder_sample = encoder.read(now_s)    # table position of this SYNC
     drive.command(now_s, torque_n_m)        # set-point and controlword; acts until the next command
@@ -11,7 +11,7 @@ One tick of a loop at `now_s` (time = tick x period; nothing here reads a clock,
 Before it, once and blocking: `drive.set_up()`, `encoder.set_up()`, `master.start(now_s)`. To arm, set
 `drive.goal = DriveGoal.ENABLED` and go on ticking until `sample.enabled`; to disarm set another goal. The samples carry
 a `condition`: anything but `Condition.OK` names what is wrong, in bits; `drive.check()` and `encoder.check()` raise the
-same as an error with the text a person needs.
+same as an error with its cause and advice.
 
     DriverError                     what, where, given, allowed, advice
     ├── BusError                    the bus cannot be opened, is closed or off
@@ -71,7 +71,7 @@ class IdentityError(ConfigurationError):
 
 
 class DriveFault(DriverError):
-    """The drive tripped."""
+    """The drive has stopped because of a fault."""
 
 
 class EncoderError(DriverError):
@@ -83,7 +83,7 @@ class ResponseTimeout(DriverError):
 
 
 class Condition(IntFlag):
-    """Faults of a device as seen from the loop; several bits may be set."""
+    """Faults of a device, as bits; several may be set."""
 
     OK = 0
     LATE = 1  # no answer to the last SYNC yet: the sample is one or more cycles old
@@ -109,7 +109,7 @@ class DriveGoal(IntEnum):
 
 
 class DriveSample(NamedTuple):
-    """One answer of the drive to one SYNC. A named tuple: made in a third of a frozen dataclass's time.
+    """Answer of the drive to a SYNC. A named tuple takes a third of the time of a frozen dataclass.
 
     motor_position_rad and torque_n_m (linear drives: m and N) were latched at the SYNC sent at `time_s`; torque is the
     mean since the SYNC before. `age_cycles` = 0 means: belongs to the latest SYNC. `state` is the CiA 402 state number
@@ -128,7 +128,7 @@ class DriveSample(NamedTuple):
 
 
 class EncoderSample(NamedTuple):
-    """One position of a linear encoder, unwrapped, in metres; `time_s` is the instant it was latched (CANopen) or
+    """Position of a linear encoder, unwrapped, in metres; `time_s` is the instant it was latched (CANopen) or
     received (serial line); `age_cycles` as in `DriveSample` (serial line: reads without a new frame)."""
 
     time_s: float
@@ -139,7 +139,7 @@ class EncoderSample(NamedTuple):
 
 
 class Master(Protocol):
-    """Timing of the devices: starts their cyclic operation and asks all of them for one sample a tick."""
+    """Timing of the devices: starts their cyclic operation and requests a sample of each at every tick."""
 
     @abstractmethod
     def start(self, now_s: float) -> None:
@@ -152,11 +152,11 @@ class Master(Protocol):
     @property
     @abstractmethod
     def poll(self) -> Callable[..., None]:
-        """Function (now_s, timeout_s = 0) that takes in what has arrived. A property: a bus may bind its own."""
+        """Function (now_s, timeout_s = 0) that receives the waiting frames. A property: a bus may return its own function."""
 
 
 class Drive(Protocol):
-    """One axis behind a drive. `command` takes N m (CST), rad/s (CSV) or rad (CSP), linear axes N, m/s, m.
+    """Drive of an axis. `command` takes N m (CST), rad/s (CSV) or rad (CSP), linear axes N, m/s, m.
 
     Implementations name this class as their base, so that mypy and the interpreter refuse an incomplete one.
     """
@@ -192,7 +192,7 @@ class Drive(Protocol):
 
 
 class Encoder(Protocol):
-    """One linear encoder. Implementations name this class as their base, as for `Drive`."""
+    """Linear encoder. Implementations name this class as their base, as for `Drive`."""
 
     @abstractmethod
     def set_up(self) -> None:

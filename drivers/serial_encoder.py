@@ -29,12 +29,12 @@ class SerialSettings:
     step_m: float = 0.5e-6
     reversed: bool = False
     bits: int = 64  # width of the device's counter, for its wrap-around (binary)
-    latency_s: float = 0.0  # from the instant of measuring to the arrival; taken off the time stamp
+    latency_s: float = 0.0  # from measurement to arrival; subtracted from the time stamp
     missed_reads_allowed: int = 10  # reads in a row without a new position before it counts as stale
 
 
 class SerialEncoder(Encoder):
-    """Implements `drivers.port.Encoder`. EncoderError if the device cannot be opened."""
+    """Linear encoder on a serial line. Raises EncoderError if the device cannot be opened."""
 
     def __init__(self, settings: SerialSettings) -> None:
         self.settings = settings
@@ -59,14 +59,14 @@ class SerialEncoder(Encoder):
 
     @property
     def checksum_errors(self) -> int:
-        """Frames or lines thrown away since the line was opened."""
+        """Number of invalid frames or lines since the line was opened."""
         return self._parser.errors
 
     def set_up(self) -> None:
         """Do nothing: the line is open and the device sends by itself."""
 
     def read(self, now_s: float) -> EncoderSample:
-        """Take in what has arrived; the newest position, and what is wrong. Never raises, never waits."""
+        """Receive; return the newest position and the fault bits. Never raises, never waits."""
         readings = self._parser.feed(self._receive())
         self._age += 1
         alarm = False
@@ -113,7 +113,7 @@ class SerialEncoder(Encoder):
         self._sequence = reading.sequence
 
     def _receive(self) -> bytes:
-        """All bytes waiting. A vanished line raises with some drivers and reads b"" for ever with others."""
+        """Return the received bytes. Of a removed device, read() raises or returns b"", by its driver."""
         if self._line_lost:
             return b""
         try:

@@ -33,7 +33,7 @@ def crc16(data: bytes) -> int:
 
 
 class Reading(NamedTuple):
-    """One position. counts: None from a read-out; position_m: None from a binary frame (its step is not in it)."""
+    """A position. counts: None from a read-out; position_m: None from a binary frame (its step is not in it)."""
 
     counts: int | None
     position_m: float | None
@@ -43,7 +43,7 @@ class Reading(NamedTuple):
 
 
 class Parser(Protocol):
-    """Bytes in, readings out; counts what it had to throw away."""
+    """Converts bytes to readings; counts invalid frames and discarded bytes."""
 
     errors: int
     discarded_bytes: int
@@ -52,18 +52,18 @@ class Parser(Protocol):
 
 
 def encode_frame(counts: int, sequence: int, status: int = 0, elapsed_us: int = 0xFFFF) -> bytes:
-    """A binary frame."""
+    """Return a binary frame."""
     body = _BODY.pack(sequence & 0xFF, status, counts, elapsed_us)
     return MARK + body + crc16(body).to_bytes(2, "little")
 
 
 def encode_line(position_m: float) -> bytes:
-    """An ASCII read-out in mm with 0.1 um."""
+    """Return an ASCII read-out in mm with 0.1 um."""
     return f"{position_m * 1e3:+011.4f} mm\r\n".encode()
 
 
 class BinaryParser:
-    """errors: frames with a wrong CRC; discarded_bytes: everything that was in no valid frame."""
+    """Parser of binary frames. errors: frames with a wrong CRC; discarded_bytes: bytes outside of valid frames."""
 
     def __init__(self) -> None:
         self.errors = 0
@@ -71,7 +71,7 @@ class BinaryParser:
         self._buffer = bytearray()
 
     def feed(self, data: bytes) -> list[Reading]:
-        """Readings completed by these bytes. After a wrong CRC the search goes on one byte later, not one frame."""
+        """Return the readings completed by these bytes. After a wrong CRC the search continues at the next byte."""
         buffer = self._buffer
         buffer += data
         readings: list[Reading] = []
@@ -99,7 +99,7 @@ class BinaryParser:
 
 
 class AsciiParser:
-    """errors: lines that are no read-out; discarded_bytes: their bytes. The first line may be cut off: not an error."""
+    """Parser of read-outs. errors: other lines; discarded_bytes: their bytes. A cut first line is not an error."""
 
     def __init__(self) -> None:
         self.errors = 0
@@ -108,14 +108,14 @@ class AsciiParser:
         self._synchronised = False
 
     def feed(self, data: bytes) -> list[Reading]:
-        """Readings completed by these bytes."""
+        """Return the readings completed by these bytes."""
         self._buffer += data
         *lines, rest = self._buffer.split(b"\n")
         readings: list[Reading] = []
         for line in lines:
             match = _LINE.fullmatch(line)
             if match is None or not self._synchronised:
-                # What precedes the first line feed may be the tail of a number: 12.3456 cut to 2.3456 looks right.
+                # What precedes the first line feed may be the end of a number: 12.3456 cut to 2.3456 is valid.
                 self.errors += self._synchronised and bool(line.strip())
                 self.discarded_bytes += len(line) + 1
                 self._synchronised = True

@@ -1,1 +1,1 @@
-"""The simulated reality behind the drivers: CANopen nodes, serial line, and the plant they move."""
+"""Simulated devices (CANopen nodes, serial line) and the simulated axis that they move and measure."""

@@ -1,4 +1,4 @@
-"""Truth about a simulated axis: lumped masses, springs and friction of a ball-screw chain.
+"""True parameters of a simulated axis: lumped masses, springs and friction of a ball-screw chain.
 
 Every coordinate is kept as translation at the table: y = r theta for a rotary one (r = lead / 2 pi),
 hence J becomes J / r^2 [kg] and a torsional stiffness k_t / r^2 [N/m].
@@ -19,7 +19,7 @@ MAX_MASSES = 24
 class Spring:
     """Linear spring between masses `first` and `second` (or GROUND).
 
-    `on_screw`: the stiffness depends on where the nut stands (effect position_dependent_stiffness).
+    `on_screw`: the stiffness depends on the position of the nut (effect position_dependent_stiffness).
     """
 
     stiffness_n_m: float

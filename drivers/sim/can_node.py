@@ -1,8 +1,8 @@
 """A simulated CANopen node (CiA 301): NMT, boot-up, heartbeat both ways, SDO server, EMCY, SYNC-driven PDOs.
 
-What kind of device it is, a subclass says: `process_sync` moves and measures, `process_rpdo` takes commands,
-`communication_lost` reacts to a silent master. Time comes with the frames; the node reads no clock. Its timers run with
-the SYNCs; where none come, somebody calls `tick`.
+A subclass implements the device: `process_sync` moves and measures, `process_rpdo` takes commands,
+`communication_lost` reacts to a missing heartbeat of the master. Time is that of the frames; the node reads no clock.
+Its timers are checked at each SYNC; without SYNCs the caller must call `tick`.
 """
 
 import struct
@@ -44,7 +44,7 @@ class NmtCommand(IntEnum):
 
 
 class SimulatedDevice:
-    """One node on one port. ValueError for a node-ID outside 1..127."""
+    """A simulated node on one port. Raises ValueError for a node-ID outside 1..127."""
 
     def __init__(self, port: CanPort, eds: Path, node_id: int) -> None:
         if not 1 <= node_id <= 127:
@@ -59,7 +59,7 @@ class SimulatedDevice:
         self._heartbeat_due_s = 0.0
         self._timer_s = 0.0
         self._last_s = 0.0
-        self.mute = False  # fault injection: the node computes on but sends nothing
+        self.mute = False  # fault injection: the node keeps running but sends nothing
         self.dictionary.on_write(Index.CONSUMER_HEARTBEAT_TIME, self._on_consumer_written)
         self.dictionary.on_write(Index.PRODUCER_HEARTBEAT_TIME, self._on_producer_written)
         port.listen(0x000, self._on_nmt)
@@ -67,16 +67,16 @@ class SimulatedDevice:
         port.listen(0x600 + node_id, self._on_sdo)
         self._boot(0.0)
 
-    # -- what a subclass adds ---------------------------------------------------------------------------------------
+    # -- implemented by subclasses ----------------------------------------------------------------------------------
 
     def process_sync(self, now_s: float) -> None:
         """Move and measure: called at every SYNC, before the TPDOs are packed."""
 
     def process_rpdo(self, now_s: float) -> None:
-        """New set-points lie in `values`."""
+        """Use the set-points that an RPDO wrote to `values`."""
 
     def communication_lost(self, now_s: float) -> None:
-        """A consumed heartbeat timed out."""
+        """React to a time-out of a consumed heartbeat."""
 
     # -- NMT, boot-up, timers ---------------------------------------------------------------------------------------
 
@@ -92,7 +92,7 @@ class SimulatedDevice:
         self.pdo.configure(operational=state is NmtState.OPERATIONAL)
 
     def reset(self, now_s: float) -> None:
-        """Power cycle: dictionary as delivered, boot-up."""
+        """Repeat a power cycle: default values of the dictionary, then boot-up."""
         self.dictionary.reset(0x1000, 0xFFFF)
         self._boot(now_s)
 
@@ -113,8 +113,8 @@ class SimulatedDevice:
             self._boot(now_s)
 
     def tick(self, now_s: float) -> None:
-        """Heartbeat producer and consumers; cheap when nothing is due."""
-        if now_s < self._last_s:  # the time base was set anew: timers start over
+        """Send the heartbeat if it is due, and check the consumed heartbeats for time-outs."""
+        if now_s < self._last_s:  # the time base was reset: restart the timers
             self._consumed = dict.fromkeys(self._consumed, now_s + self._consumer_time_s())
             self._heartbeat_due_s = now_s
         self._last_s = now_s

@@ -1,4 +1,4 @@
-"""State machine of CiA 402 as the drive runs it: which state a controlword leads to, and the statusword of a state."""
+"""State machine of CiA 402 inside the drive: next state for a controlword, and statusword of each state."""
 
 from typing import Final
 

@@ -6,8 +6,8 @@ from enum import IntEnum
 
 from drivers.port import PlantLike, ServoLike, ServoTarget
 
-_LOOP_PERIOD_S = 0.001  # of the servo, where the SYNC is slower
-_AT_REST_RAD_S = 0.5  # a stop ramp has ended
+_LOOP_PERIOD_S = 0.001  # of the servo, if the SYNC period is longer
+_AT_REST_RAD_S = 0.5  # below it a stop ramp ends: 5 rpm
 
 
 def ramp(velocity: float, wanted: float, acceleration: float, period_s: float) -> float:
@@ -17,7 +17,7 @@ def ramp(velocity: float, wanted: float, acceleration: float, period_s: float) -
 
 
 class DriveLoops:
-    """servo None: the drive has no loops of its own; whatever it should follow, its motor coasts."""
+    """Loops of the drive on the plant. servo None: the drive has no loops, and its motor coasts at any target."""
 
     def __init__(self, plant: PlantLike, servo: ServoLike | None) -> None:
         self._plant, self._servo = plant, servo
@@ -29,13 +29,13 @@ class DriveLoops:
         return self._servo is not None
 
     def start(self, velocity_rad_s: float) -> None:
-        """Begin to follow, from where the motor is and, if it is to stop, from its velocity."""
+        """Start the loops at the present motor position, and the stop ramp at this velocity."""
         self._velocity_rad_s = velocity_rad_s
         if self._servo is not None:
             self._servo.reset(self._plant.motor_position_rad)
 
     def stop_target(self, deceleration_rad_s2: float, velocity_rad_s: float, period_s: float) -> ServoTarget | None:
-        """Next point of the stop ramp; None when the motor rests, or cannot be braked."""
+        """Return the next point of the stop ramp; None if the motor is at rest or the drive has no loops."""
         self._velocity_rad_s = ramp(self._velocity_rad_s, 0.0, deceleration_rad_s2, period_s)
         resting = self._velocity_rad_s == 0.0 and abs(velocity_rad_s) < _AT_REST_RAD_S
         return None if resting or self._servo is None else ServoTarget(self._velocity_rad_s)
@@ -64,7 +64,7 @@ class HomingMethod(IntEnum):
 
     INDEX_NEGATIVE = 33  # next index pulse in negative direction
     INDEX_POSITIVE = 34  # next index pulse in positive direction
-    CURRENT_POSITION = 37  # where it stands
+    CURRENT_POSITION = 37  # the present position
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +86,7 @@ class Homing:
 
 
 def step_homing(run: Homing, counts: int, previous_counts: int, period_s: float) -> Homing:
-    """One cycle: from the encoder's counts to the velocity to follow. The first cycle reports "in progress"."""
+    """Run one cycle: compute the velocity command from the encoder counts. The first cycle reports "in progress"."""
     if run.done:
         return run
     if not run.started:

@@ -1,7 +1,7 @@
-"""Simulated servo drive on CANopen: CiA 402 states, CST, CSV, CSP, homing, quick stop, faults; a plant behind it.
+"""Simulated servo drive on CANopen: CiA 402 states, CST, CSV, CSP, homing, quick stop, and faults, moving a plant.
 
-The node keeps no time of its own: each SYNC moves the plant by one period with the torque in force since the SYNC
-before, then the positions and torques of that instant go out. A torque that arrives by an event-driven RPDO after
+The node has no clock: each SYNC moves the plant by one period with the torque that acted since the previous SYNC, then
+the positions and torques of that instant are sent. A torque that arrives by an event-driven RPDO after
 SYNC k thus acts from SYNC k to k + 1, one by a synchronous RPDO (type 1) from SYNC k + 1 on, as CiA 301 says.
 """
 
@@ -35,13 +35,13 @@ _ERROR_CODE, _QUICK_STOP_DECELERATION = key_of(Index.ERROR_CODE), key_of(Index.Q
 _FOLLOWING_ERROR, _FOLLOWING_ERROR_WINDOW = key_of(Index.FOLLOWING_ERROR_ACTUAL), key_of(Index.FOLLOWING_ERROR_WINDOW)
 
 _SERVO_MODES = (OperationMode.HOMING, OperationMode.CYCLIC_SYNC_POSITION, OperationMode.CYCLIC_SYNC_VELOCITY)
-_SWITCHED_ON = DriveState.SWITCHED_ON  # bound once: looking a member up costs the loop
+_SWITCHED_ON = DriveState.SWITCHED_ON  # bound once: the look-up of an enumeration member takes time in each cycle
 _STOPPING = (DriveState.QUICK_STOP_ACTIVE, DriveState.FAULT_REACTION_ACTIVE)
 _FOLLOWING_ERROR_CODE = 0x8611  # CiA 402-2
 
 
 class SimulatedDrive(SimulatedDevice):
-    """The drive node. `servo`: loops inside the drive; without them only CST is accepted and a stop is coasting.
+    """The drive node. `servo`: loops inside the drive; without them the drive accepts only CST and coasts to a stop.
 
     Positions in increments of 0x608F, torques in 1/1000 of `rated_torque_n_m` (0x6076, mN m): it sets the resolution of
     set-point and measurement. Linear axes: metres for radians, newtons for newton metres, travel_per_rev in m.
@@ -152,19 +152,19 @@ class SimulatedDrive(SimulatedDevice):
             self._status(0)
 
     def trip(self, code: int, register: int, now_s: float, *, lasting: bool = False) -> None:
-        """A fault inside the drive: EMCY, stop ramp, FAULT (transitions 13, 14). lasting: a reset does not clear it
-        until `clear_cause`."""
+        """Inject a fault: EMCY, stop ramp, FAULT (transitions 13, 14). lasting: a reset clears it only after
+        `clear_cause`."""
         self._fault_present = lasting
         self.values[_ERROR_CODE] = code
         self.emergency(code, register, now_s)
         self._react(DriveState.FAULT_REACTION_ACTIVE)
 
     def clear_cause(self) -> None:
-        """The cause of a lasting fault is gone."""
+        """Remove the cause of a lasting fault."""
         self._fault_present = False
 
     def communication_lost(self, now_s: float) -> None:
-        """Abort connection option code 0x6007: 0 nothing, 1 fault, 2 disable voltage, 3 quick stop."""
+        """React by the abort connection option code 0x6007: 0 nothing, 1 fault, 2 disable voltage, 3 quick stop."""
         option = self.dictionary.number(Index.ABORT_CONNECTION_OPTION)
         if option == 1:
             self.values[_ERROR_CODE] = self.dictionary.number(Index.ERROR_HISTORY, 1)
@@ -229,7 +229,7 @@ class SimulatedDrive(SimulatedDevice):
         self._measure(round(plant.motor_position_rad * self._counts_per_rad))
 
     def _measure(self, counts: int) -> None:
-        """Position with the wrap-around of an INTEGER32, velocity as its difference."""
+        """Store position, wrapped to INTEGER32, and velocity as its difference."""
         moved = counts - self._counts
         self._last_counts, self._counts = self._counts, counts
         values = self.values
@@ -237,7 +237,7 @@ class SimulatedDrive(SimulatedDevice):
         values[_POSITION] = ((counts - self._offset_counts + 0x80000000) & 0xFFFFFFFF) - 0x80000000
 
     def _advance_by_loops(self, now_s: float) -> float:
-        """One period under the loops inside the drive: CSV, CSP, homing, stop ramps; mean measured torque [N m]."""
+        """Move one period under the loops of the drive: CSV, CSP, homing, stop ramps; mean measured torque [N m]."""
         loops, values = self._loops, self.values
         mode, target = values[_MODE], ServoTarget(0.0)
         if self.state in _STOPPING:

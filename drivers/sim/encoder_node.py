@@ -2,7 +2,7 @@
 
     value = (+-counts + offset) wrapped into the measuring range,   counts = table position / measuring step
 
-On a bus it must stand behind the drive node, which moves the plant at the SYNC.
+Connect it to the bus after the drive node, which moves the plant at the SYNC.
 """
 
 from pathlib import Path
@@ -69,7 +69,7 @@ class SimulatedEncoder(SimulatedDevice):
         self.process_sync(self._last_s)
 
     def _set_range(self, counts: int) -> None:
-        """Modulus of the value, and how far it reaches below zero: INTEGER32 without a range, else 0..range - 1."""
+        """Return modulus and negative range of the value: INTEGER32 without a range, else 0..range - 1."""
         self._modulus, self._half = (counts, 0) if counts else (1 << 32, 1 << 31)
 
     def _on_preset(self, index: int, subindex: int, value: int) -> None:
@@ -77,16 +77,16 @@ class SimulatedEncoder(SimulatedDevice):
 
     def process_sync(self, now_s: float) -> None:
         values = self.values
-        if not values[_ALARMS]:  # a blind head repeats its last position
+        if not values[_ALARMS]:  # without a scale signal the last position is repeated
             counts = round(self.plant.table_position_m * self._counts_per_m) + self._offset
             values[_POSITION] = (counts + self._half) % self._modulus - self._half
 
     def raise_alarm(self, now_s: float) -> None:
-        """The reading head loses the scale."""
+        """Raise the position error alarm: the reading head does not see the scale."""
         self.values[_ALARMS] = _POSITION_ERROR
         self.emergency(_SENSOR_FAULT, 0x21, now_s)
 
     def clear_alarm(self, now_s: float) -> None:
-        """The scale is read again."""
+        """Clear the position error alarm."""
         self.values[_ALARMS] = 0
         self.emergency(0, 0, now_s)

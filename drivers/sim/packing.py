@@ -1,4 +1,4 @@
-"""Turns axis, sensors and effects into the parameter record of the kernels."""
+"""Pack axis, sensors and effects into the parameter record of the kernels."""
 
 from collections.abc import Mapping
 from math import pi, sqrt
@@ -32,7 +32,7 @@ LARGEST_PHASE_STEP = 1.5  # omega h; leapfrog is stable below 2, less with dampi
 
 
 def pack(axis: AxisTruth, sensors: Sensors, effects: Mapping[str, Effect], step_s: float) -> NDArray[np.void]:
-    """Array of one PARAMETERS record. Raises ValueError: an effect the axis cannot have, a step too long."""
+    """Array of one PARAMETERS record. Raises ValueError: an effect that the axis cannot have, too long a step."""
     _check_effects(axis, effects)
     packed = one(PARAMETERS)
     p: Any = packed[0]
@@ -112,8 +112,8 @@ def _pack_chain(p: Any, axis: AxisTruth, mode: Effect | None) -> None:
 def _split_damping(axis: AxisTruth) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
     """C = C_rest + c w w^T with C_rest s = 0, s the motor side of the nut moving as one (1 there, 0 behind).
 
-    c = s^T C s, w = C s / c: the damper of the nut, which vanishes in the play; C_rest stays and does not resist
-    the two sides moving apart. For two masses C_rest = 0.
+    c = s^T C s, w = C s / c: the damper of the nut, which is zero within the play; C_rest acts always, without force
+    on the relative motion of the two sides. For two masses C_rest = 0.
     """
     count = len(axis.mass_kg)
     rate = np.zeros(PARAMETERS["nut_rate"].shape[0])
@@ -159,7 +159,7 @@ def _pack_bristles(p: Any, axis: AxisTruth, effect: Effect | None) -> float:
 
 
 def _check_step(p: Any, step_s: float, bristle_stiffness: float) -> None:
-    """Raise ValueError when the fastest mode turns by too much in one step."""
+    """Raise ValueError if omega h of the fastest mode exceeds LARGEST_PHASE_STEP."""
     count = int(p["masses"])
     stiffness = np.zeros((count, count))
     stiffness[0, 0] = bristle_stiffness

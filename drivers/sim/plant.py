@@ -1,4 +1,4 @@
-"""The simulated reality of a servo axis: axis, sensors and concealed effects, moved in time."""
+"""Simulated servo axis with sensors and concealed effects, stepped in time."""
 
 from collections.abc import Sequence
 from math import ceil, isfinite
@@ -16,11 +16,11 @@ from drivers.sim.sensors import Sensors
 
 
 class Plant:
-    """One axis with its sensors, stepped on internal steps of `step_s`.
+    """An axis with its sensors, stepped on internal steps of `step_s`.
 
     After advance(): motor_position_rad, table_position_m and torque_n_m are what the devices report, torque being the
     mean of the measured current (x nominal torque constant) over that period. A linear axis reports m and N.
-    Raises ValueError when an effect needs what the axis has not, or the step is too long to be stable.
+    Raises ValueError if the axis lacks a part that an effect needs, or if the step is too long to be stable.
     """
 
     motor_position_rad: float
@@ -48,7 +48,7 @@ class Plant:
         self.reset()
 
     def reset(self, position_m: float = 0.0) -> None:
-        """At rest, unloaded, at time 0, where the motor encoder reads `position_m` (as translation at the table)."""
+        """Set the axis to rest, unloaded, at time 0, with the motor encoder at `position_m` (at the table)."""
         s, count, nut = self.state[0], len(self.axis.mass_kg), self.axis.nut
         self.state[:] = np.zeros(1, STATE)
         s["random"] = np.random.SeedSequence(self.seed).generate_state(1, np.uint64)[0]
@@ -74,7 +74,7 @@ class Plant:
         )
 
     def steps_in(self, period_s: float) -> int:
-        """Internal steps in a period. Raises ValueError when it is no whole number of them."""
+        """Return the internal steps in a period. Raises ValueError if that is no whole number."""
         steps = round(period_s / self.step_s)
         if steps < 1 or abs(steps * self.step_s - period_s) > 1e-6 * self.step_s:
             raise ValueError(f"period_s: must be a whole multiple of step_s {self.step_s:g}, got {period_s!r}")

@@ -30,7 +30,7 @@ class _Pdo:
 
 
 class ProcessData:
-    """Takes RPDOs into the dictionary's values and sends TPDOs from them.
+    """Unpacks RPDOs into the values of the dictionary and packs TPDOs from them.
 
     received(now_s): called after an RPDO was taken in; emergency(code, register, now_s): CiA 301 length errors.
     """
@@ -92,7 +92,7 @@ class ProcessData:
         words = [self._dictionary.number(index, k) for k in range(1, count + 1)]
         return [self._dictionary.item(word >> 16, word >> 8 & 0xFF) for word in words]
 
-    # -- hooks: what CiA 301 lets a master write --------------------------------------------------------------------
+    # -- hooks: checks of CiA 301 on what is written ---------------------------------------------------------------
 
     def _on_communication(self, index: int, subindex: int, value: int) -> None:
         if subindex == 2 and 240 < value < 254:
@@ -101,7 +101,7 @@ class ProcessData:
         self.configure(operational=self._operational)
 
     def _on_mapping(self, index: int, subindex: int, value: int) -> None:
-        """The mapping changes only while the PDO is invalid; entries only while their number is 0."""
+        """Accept a mapping only while the PDO is invalid, an entry only while the number of entries is 0."""
         if not self._dictionary.number(index - 0x200, 1) & PDO_INVALID:
             raise SdoAbort(AbortCode.NOT_IN_THIS_STATE)
         if subindex == 0:
@@ -120,7 +120,7 @@ class ProcessData:
     # -- in the loop ------------------------------------------------------------------------------------------------
 
     def _taker(self, pdo: _Pdo) -> Listener:
-        """Listener of one RPDO; everything it needs is bound once."""
+        """Return the listener of an RPDO."""
         update, keys, unpack, size = self._values.update, pdo.keys, pdo.packer.unpack, pdo.packer.size
         received, waits = self._received, pdo.transmission_type <= 240
 
@@ -133,13 +133,13 @@ class ProcessData:
             if waits:
                 pdo.pending = data
                 return
-            update(zip(keys, unpack(data)))  # noqa: B905  as many values as keys, by the packer's making
+            update(zip(keys, unpack(data)))  # noqa: B905  the packer gives as many values as keys
             received(now_s)
 
         return take
 
     def on_sync(self, now_s: float) -> None:
-        """Synchronous RPDOs act now; the TPDOs that are due go out."""
+        """Apply synchronous RPDOs; send the TPDOs that are due."""
         for pdo in self._synchronous:
             if pdo.pending:
                 self._values.update(zip(pdo.keys, pdo.packer.unpack(pdo.pending), strict=True))

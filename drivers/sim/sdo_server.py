@@ -31,7 +31,7 @@ class AbortCode(IntEnum):
 
 
 class SdoAbort(Exception):
-    """The server refuses; `code` goes to the client."""
+    """Refusal of an SDO; `code` is sent to the client."""
 
     def __init__(self, code: AbortCode) -> None:
         super().__init__(code.name)
@@ -48,7 +48,7 @@ class SdoServer:
         self._toggle = 0
 
     def answer(self, request: bytes) -> bytes | None:
-        """Response to one request frame; None where CiA 301 demands silence (client's abort, malformed frame)."""
+        """Response to one request frame; None where CiA 301 forbids an answer (client's abort, malformed frame)."""
         if len(request) != 8:
             return None
         command = request[0]

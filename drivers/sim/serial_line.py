@@ -1,7 +1,7 @@
 """A serial encoder behind a pseudo-terminal: a plant's table position as binary frames or ASCII read-outs.
 
-Nothing is sent by itself: `send` puts out the position of this instant, at whatever time the caller keeps. Garbage and
-cut frames can be put on the line, and the line can be taken away.
+Each call of `send` sends the present position; nothing is sent without a call. Damaged and cut frames can be sent, and
+the line can be closed.
 """
 
 import os
@@ -13,7 +13,7 @@ from drivers.serial_frames import encode_frame, encode_line
 
 
 class SimulatedSerialEncoder:
-    """`device` is what a `SerialEncoder` opens."""
+    """Simulated serial encoder; `device` is the path that a `SerialEncoder` opens."""
 
     def __init__(
         self, plant: PlantLike, *, step_m: float = 0.5e-6, format: SerialFormat = SerialFormat.BINARY, bits: int = 64
@@ -28,7 +28,7 @@ class SimulatedSerialEncoder:
         self.device = os.ttyname(self._slave)
 
     def send(self, now_s: float, *, status: int = 0) -> None:
-        """One frame; status other than 0: position not valid."""
+        """Send a frame; status other than 0: position not valid."""
         self.put(self.frame(now_s, status))
 
     def frame(self, now_s: float, status: int = 0) -> bytes:
@@ -44,7 +44,7 @@ class SimulatedSerialEncoder:
         return encode_frame(counts, self._sequence, status, elapsed_us)
 
     def put(self, data: bytes) -> None:
-        """Send any bytes; those that find the line full are lost, as on a real one."""
+        """Send any bytes; they are lost if the buffer of the line is full."""
         try:
             os.write(self._master, data)
         except BlockingIOError:

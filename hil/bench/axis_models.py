@@ -90,7 +90,7 @@ class Rigid(_Rotary):
     mass_kg: Positive = Field(description="all moving mass and inertia at the table [kg]")
 
     def chain(self) -> Chain:
-        """One mass."""
+        """The chain of one mass."""
         return one_mass(self.mass_kg, self.lead_m)
 
 

@@ -16,7 +16,7 @@ Share = Annotated[float, Field(gt=0.0, le=1.0)]
 
 
 class DriveMode(StrEnum):
-    """Which loops run here: both (CST), the position loop (CSV), none (CSP)."""
+    """Mode of the drive: both loops run in this program (CST), only the position loop (CSV), or none (CSP)."""
 
     CST = "cst"
     CSV = "csv"
@@ -24,7 +24,7 @@ class DriveMode(StrEnum):
 
 
 class EncoderConnection(_Model):
-    """How the linear encoder is connected; its resolution stands under `encoders`."""
+    """Connection of the linear encoder; its resolution stands under `encoders`."""
 
     interface: Literal["canopen", "serial", "none"] = "canopen"
     node_id: NodeId = 6
@@ -89,7 +89,7 @@ class DriveSection(_Model):
 
 
 class SimulatedEffect(_Model):
-    """One effect that the simulated axis conceals: ids, forms and parameters as drivers/sim/effects.py lists them."""
+    """A concealed effect of the simulated axis: ids, forms and parameters as drivers/sim/effects.py lists them."""
 
     effect: str
     form: str = ""

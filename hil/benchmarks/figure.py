@@ -10,14 +10,14 @@ import numpy as np
 
 
 class ReferenceKind(StrEnum):
-    """PEER: the same task done by another tool. LIMIT: a part of the task alone, which no code around it undercuts."""
+    """PEER: the same task done by another tool. LIMIT: a necessary part of the task alone, a lower bound."""
 
     PEER = "peer"
     LIMIT = "limit"
 
 
 class Reference(NamedTuple):
-    """What a figure is measured beside, in the same run and unit."""
+    """Reference of a figure, measured in the same run and unit."""
 
     name: str
     kind: ReferenceKind
@@ -26,7 +26,7 @@ class Reference(NamedTuple):
 
 @dataclass(frozen=True)
 class Figure:
-    """One figure with its target, an upper bound if `at_most`, else a lower one; None for a mere comparison.
+    """A figure with its target, an upper bound if `at_most`, else a lower one; None for a mere comparison.
 
     `at_most` also says that a smaller value is better. label: short name in tables. detail: how it was measured.
     """
@@ -48,7 +48,7 @@ class Figure:
         return self.value <= self.target if self.at_most else self.value >= self.target
 
     def times_as_fast(self, other: float) -> float:
-        """How many times as fast this figure is as `other`, a value of the same unit."""
+        """Return the speed of this figure relative to `other`, a value of the same unit."""
         return other / self.value if self.at_most else self.value / other
 
 

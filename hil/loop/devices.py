@@ -1,7 +1,7 @@
-"""The devices of a bench, opened: bus, drive, linear encoder; simulated where the bench has a `simulation` section.
+"""Opened devices of a bench: bus, drive, linear encoder; simulated if the bench has a `simulation` section.
 
 On the in-process bus a SYNC returns when every node has answered. On a python-can bus the simulated nodes have their
-own connection and are served by the loop's own polling, so that no second thread disturbs it; real devices answer
+own connection and are polled by the loop, so that no second thread delays it; real devices answer
 by themselves. Another protocol is a subclass of `Devices` and one line in `PROTOCOLS`.
 """
 
@@ -120,7 +120,9 @@ class Rig(Devices):
     def _connect(self, bus: InProcessBus | None, simulate: Callable[[CanPort], SimulatedNodes]) -> CanPort:
         if self.section.interface == "inprocess":
             bus = bus or InProcessBus()
-            self.nodes = simulate(bus.port())  # before the master: they boot unheard
+            self.nodes = simulate(
+                bus.port()
+            )  # before the master connects, which so does not receive their boot-up messages
             return bus.port()
         config = BusConfig(self.section.interface, self.section.channel, self.section.bitrate)
         port = PythonCanPort(open_bus(config))

@@ -1,7 +1,7 @@
 """Request real-time conditions for this process, report the granted ones, and measure the jitter.
 
-Linux, without a module outside the standard library. Nothing here is needed for the loop to run: each setting is tried,
-and what was refused (mostly for want of rights) is reported with its reason.
+Linux, without a module outside the standard library. The loop runs without these settings too: each is tried, and a
+refused one (mostly for lack of rights) is reported with its reason.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class NotPunctual(HilError):
 
 @dataclass(frozen=True)
 class Grant:
-    """One setting: what was asked for, and why it was refused ("" if granted)."""
+    """A requested setting, and the reason of its refusal ("" if granted)."""
 
     setting: str
     refused: str = ""
@@ -68,10 +68,10 @@ class Jitter:
 
 @contextmanager
 def real_time(cpu: int | None = None, priority: int = PRIORITY) -> Iterator[tuple[Grant, ...]]:
-    """Ask for real-time conditions; gives what was granted, and takes all back that can be at the end.
+    """Request real-time conditions; yields the result of each request, and restores the former settings at the end.
 
     cpu: the core to run on; None: the last one this process may use (interrupts mostly go to the first).
-    Compile and allocate before entering: the garbage collector stands still inside.
+    Compile and allocate before entering: the garbage collector is off inside.
     """
     before = os.sched_getaffinity(0)
     policy, parameters = os.sched_getscheduler(0), os.sched_getparam(0)
@@ -102,7 +102,7 @@ def real_time(cpu: int | None = None, priority: int = PRIORITY) -> Iterator[tupl
 
 
 def measure_jitter(period_s: float, duration_s: float = 0.5, clock: WallClock | None = None) -> Jitter:
-    """Lateness of an empty loop."""
+    """Measure the lateness of an empty loop."""
     clock = clock or WallClock(period_s)
     clock.start()
     return Jitter.of([clock.wait(tick) for tick in range(1, max(2, round(duration_s / period_s)) + 1)], period_s)
@@ -139,7 +139,7 @@ def check_punctual(jitter: Jitter, p99_limit_s: float) -> None:
 
 
 def report(grants: tuple[Grant, ...], jitter: Jitter) -> dict[str, Any]:
-    """Grants, jitter before arming and machine, as a recording keeps them."""
+    """Grants, jitter before arming and machine, as stored in a recording."""
     return {
         "granted": [grant.setting for grant in grants if not grant.refused],
         "refused": {grant.setting: grant.refused for grant in grants if grant.refused},

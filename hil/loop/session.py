@@ -1,4 +1,4 @@
-"""The loop: profile -> controller -> drive -> encoders -> recorder, with the live twin beside, tick by tick.
+"""The loop: profile -> controller -> drive -> encoders -> recorder, with the live twin, tick by tick.
 
     ARM        the drive is led to OPERATION ENABLED; until then its target is zero or where it stands
     RUN        set-points of the trajectory, which begins where the axis stands
@@ -35,7 +35,7 @@ from hil.motion.trajectory import Trajectory, stop_from
 
 ARM_TIMEOUT_S = 2.0
 SETTLE_S = 0.1  # hold after a controlled stop
-QUICK_STOP_LIMIT_S = 2.0  # the longest a quick stop is waited for
+QUICK_STOP_LIMIT_S = 2.0  # longest wait for the end of a quick stop
 AFTERMATH_S = 0.1  # recorded after the power stage is off
 DISARM_TIMEOUT_S = 0.2
 STOP_SEGMENT = -1  # in the recording: set-points of a stop
@@ -44,7 +44,7 @@ _SETPOINTS = {DriveMode.CST: Setpoint.TORQUE, DriveMode.CSV: Setpoint.VELOCITY, 
 
 
 class LoopPhase(IntEnum):
-    """LoopPhase of the loop."""
+    """Phase of a run."""
 
     RUN = 0
     STOP = 1
@@ -80,7 +80,7 @@ class FastForward(Protocol):
 
 
 class Session:
-    """One run on an opened rig. The rig is set up and stands; `trajectory` begins where it stands.
+    """A run on an opened rig that is set up and at rest; `trajectory` begins at its position.
 
     fast_forward: runs the uneventful ticks after arming; None: every tick goes over the bus. `ask_stop` may be called
     from a signal handler.
@@ -215,7 +215,7 @@ class Session:
         drive.command(self._now_s, setpoint)
         return tick + 1
 
-    # -- when something is wrong ----------------------------------------------------------------------------------
+    # -- faults and stops ----------------------------------------------------------------------------------
 
     def _supervise(self, tick: int, sample: DriveSample, seen: EncoderSample, passed: int) -> Trajectory | None:
         """Change the phase if required; return the stop that begins at this tick, if any."""
@@ -225,7 +225,7 @@ class Session:
             return None
         stopping = self._phase is LoopPhase.STOP
         findings = find(self._rig, seen, passed, self._lateness_s[-1], self._stops_asked, stopping=stopping)
-        # an axis that is being stopped already: only what prevents that matters
+        # during a controlled stop only faults that require the ramp of the drive are considered
         found = next((finding for finding in findings if finding.quick or not stopping), None)
         if found is None:
             return None

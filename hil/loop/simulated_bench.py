@@ -91,7 +91,7 @@ def make_plant(bench: Bench, seed: int | None = None) -> Plant:
 
 
 class SimulatedNodes:
-    """Drive and encoder of a bench on one port with a plant behind them; the encoder hears a SYNC after the drive."""
+    """Drive and encoder of a bench on one port and their plant; the encoder receives a SYNC after the drive."""
 
     def __init__(self, bench: Bench, port: CanPort, seed: int | None = None, plant: PlantLike | None = None) -> None:
         section = bench.drive or DriveSection()

@@ -14,7 +14,7 @@ _ENCODER_LOST = (Condition.STALE | Condition.HEARTBEAT_LOST | Condition.BUS_OFF 
 
 
 class Ending(StrEnum):
-    """Why a run ended."""
+    """Reason of the end of a run."""
 
     COMPLETE = "complete"
     INTERRUPTED = "interrupted"

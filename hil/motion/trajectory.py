@@ -32,7 +32,7 @@ SAMPLES_PER_PERIOD_MIN = 4  # of an excitation; fewer are no sine any more
 
 
 class SegmentRun(NamedTuple):
-    """One executed segment: its place in the profile, how often that ran before, and when [s]."""
+    """An executed segment: its place in the profile, the number of its earlier executions, begin and end [s]."""
 
     name: str
     kind: str
@@ -111,7 +111,7 @@ def plan(profile: Profile, period_s: float, start_m: float | None = None) -> Tra
     too fast for the period.
     """
     _check_period(period_s)
-    if start_m is not None and not abs(start_m) <= MAX_POSITION_M:
+    if start_m is not None and abs(start_m) > MAX_POSITION_M:
         raise FieldError(("start_m",), f"given {start_m}, allowed -{MAX_POSITION_M:g} to {MAX_POSITION_M:g} m")
     timed: list[tuple[float, str, str, int, Move]] = []
     notes: list[str] = []

@@ -143,7 +143,7 @@ def check_columns(columns: Mapping[str, FloatArray], place: Callable[[int], str]
     if time_s.size < 3:
         raise InputError(f"{place(0)}: time_s: given {time_s.size} rows, allowed 3 or more; give a longer recording")
     steps = np.diff(time_s)
-    # rounded to 1 ps: the mean of printed stamps is a period with float dust on it
+    # rounded to 1 ps: the mean of printed stamps is a period with rounding errors
     period_s = round(float(np.median(steps)), 12)
     bad = np.flatnonzero(steps <= 0.0)
     if bad.size:

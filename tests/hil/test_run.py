@@ -113,14 +113,14 @@ def test_what_cannot_be_run_is_refused_and_leaves_nothing(tmp_path: Path, change
 
 def test_real_bench_is_never_run_in_virtual_time(tmp_path: Path) -> None:
     data = bench_with().model_dump() | {"simulation": None}
-    data["drive"] |= {"interface": "socketcan", "channel": "nobody0"}  # nothing that could be opened
+    data["drive"] |= {"interface": "socketcan", "channel": "absent0"}  # nothing that could be opened
     with pytest.raises(FieldError, match="real bench in virtual time"):
         run_profile(Bench.model_validate(data), MOVE, tmp_path, "run", virtual=True)
 
 
 def test_a_drive_that_does_not_answer(tmp_path: Path) -> None:
     data = bench_with().model_dump() | {"simulation": None}
-    data["drive"] |= {"interface": "virtual", "channel": "nobody"}
+    data["drive"] |= {"interface": "virtual", "channel": "unused"}
     with pytest.raises(HilError, match="no SDO answer"):
         run_profile(Bench.model_validate(data), MOVE, tmp_path, "run")
 

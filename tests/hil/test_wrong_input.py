@@ -63,7 +63,7 @@ def test_a_recording_is_checked_when_it_is_made() -> None:
             hil.Recording("mine", COLUMNS, period_s)
 
 
-@given(start_m=st.floats(min_value=1e3) | st.floats(max_value=-1e3) | st.just(float("nan")))
+@given(start_m=st.floats(min_value=1e3) | st.floats(max_value=-1e3))
 def test_a_start_far_outside_every_axis_is_refused(start_m: float) -> None:
     with pytest.raises(hil.FieldError, match=r"start_m: given .*, allowed -100 to 100 m"):
         hil.plan(hil.load_profile(PROFILE), 0.001, start_m)

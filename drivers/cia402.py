@@ -1,7 +1,7 @@
 """CiA 402 drive state machine, pure and non-blocking (IEC 61800-7-201, CiA 402-2).
 
-Statusword -> state, (state, goal) -> controlword, homing. Nothing waits, sends or reads a clock: the caller feeds one
-statusword per cycle and sends the controlword it gets back.
+Statusword -> state, (state, goal) -> controlword, homing. Nothing waits, sends or reads a clock: the caller gives one
+statusword per cycle and sends the returned controlword.
 """
 
 from enum import IntEnum, IntFlag

@@ -152,7 +152,7 @@ class Master(Protocol):
     @property
     @abstractmethod
     def poll(self) -> Callable[..., None]:
-        """Function (now_s, timeout_s = 0) that receives the waiting frames. A property: a bus may return its own function."""
+        """Function (now_s, timeout_s = 0) that receives waiting frames. A property: a bus may return its own."""
 
 
 class Drive(Protocol):

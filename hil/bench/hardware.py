@@ -1,5 +1,5 @@
-"""The hardware sections of a bench file: `drive` (bus, drive, encoder, limits) and `simulation` (what a simulated bench
-really is). Plain data: `hil.loop.devices` makes the devices of it, `hil.loop.simulated_bench` the simulated ones."""
+"""The hardware sections of a bench file: `drive` (bus, drive, encoder, limits) and `simulation` (true parameters and
+effects). Plain data: `hil.loop.devices` makes the devices of it, `hil.loop.simulated_bench` the simulated ones."""
 
 from __future__ import annotations
 

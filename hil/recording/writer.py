@@ -37,8 +37,8 @@ def run_metadata(
 ) -> dict[str, Any]:
     """Collect the metadata that repeat a run: bench and profile in full, seed, command line, versions, computer.
 
-    `start_time` is an ISO 8601 text; in virtual time the caller gives what is to stand there, for nothing
-    here reads a clock. All values must be such as JSON holds.
+    `start_time` is an ISO 8601 text; in virtual time the caller gives another text, since
+    nothing here reads a clock. All values must be such as JSON holds.
     """
     return {
         "bench": bench,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from diagnosis_runs import bench, changed, dataset, evaluated, fitted, recorded
+from diagnosis_runs import bench, changed, dataset, evaluated, fitted, recorded, rows_of
 
 from hil.diagnosis.result import Verdict
 from hil.diagnosis.search.forward_selection import Explanation, RivalFit
@@ -146,25 +146,7 @@ def test_a_term_that_held_out_recordings_do_not_show_may_stay() -> None:
     late = Term("external_force", 0, (200.0, 1.0, 1.3))
     train = runs(late)
     held_out = [take(recorded(OWNER), OWNER)]
-    short = [
-        Measured(
-            **{
-                **vars(run),
-                **{
-                    name: getattr(run, name)[:900]
-                    for name in (
-                        "position_command_m",
-                        "velocity_command_m_s",
-                        "motor",
-                        "table_m",
-                        "torque_command",
-                        "torque",
-                    )
-                },
-            }
-        )
-        for run in held_out
-    ]
+    short = [rows_of(run, slice(900)) for run in held_out]
     proof = cross_validate(believed(train), believed(train, late), dataset(short, OWNER))
     assert not proof.dropped
     assert not proof.ablations[0].shown

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from diagnosis_runs import bench, evaluated, recorded
+from diagnosis_runs import bench, evaluated, recorded, rows_of
 from numpy.typing import NDArray
 
 from hil.diagnosis.location.locate import _range, locate, phase_shares, phases, windows
@@ -77,22 +77,7 @@ def test_an_angle_locked_error_is_told_from_a_time_locked_one() -> None:
 def test_at_a_single_speed_nothing_is_claimed() -> None:
     run = take(recorded(OWNER), OWNER)
     rows = np.abs(np.abs(run.velocity_command_m_s) - 0.25) < 0.01
-    one = Measured(
-        **{
-            **vars(run),
-            **{
-                name: getattr(run, name)[rows]
-                for name in (
-                    "position_command_m",
-                    "velocity_command_m_s",
-                    "motor",
-                    "table_m",
-                    "torque_command",
-                    "torque",
-                )
-            },
-        }
-    )
+    one = rows_of(run, rows)
     seen = [Energy(one, np.zeros(one.motor.size), {"motor": np.sin(one.motor * 3.0)})]
     assert lock(seen, "motor", OWNER, ()).order_per_rev is None
 

@@ -15,7 +15,7 @@ from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.inference import standard_errors
-from hil.identification.measured import Measured, take
+from hil.identification.measured import take
 from hil.identification.noise_floor import FLOOR
 from hil.identification.nominal_fit import fit_nominal_parameters
 from hil.identification.terms import Term

@@ -18,7 +18,7 @@ _OPERATIONAL: Final = b"\x05"
 
 
 class CanopenMaster:
-    """One master on one port; drives and encoders of the bus share it.
+    """CANopen master on a port; drives and encoders of the bus share it.
 
     node_id: of the master, for its heartbeat. heartbeat_s: its period; consumers are set to three of them.
     """

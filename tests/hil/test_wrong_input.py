@@ -1,5 +1,6 @@
 """Wrong input of commands and public functions: one sentence that names the input, never a traceback."""
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -72,6 +73,14 @@ def test_a_start_far_outside_every_axis_is_refused(start_m: float) -> None:
 def test_a_period_with_too_many_set_points_is_refused() -> None:
     with pytest.raises(hil.FieldError, match=r"period_s: given 1e-300 s .* allowed up to 2e"):
         hil.plan(hil.load_profile(PROFILE), 1e-300)
+
+
+def test_limits_that_ruckig_cannot_solve_are_named_in_one_line(tmp_path: Path) -> None:
+    text, count = re.subn(r"jerk_m_s3: [^,}\n]+", "jerk_m_s3: 1e-300", PROFILE.read_text(), count=1)
+    assert count == 1
+    (tmp_path / "slow.yaml").write_text(text)
+    with pytest.raises(hil.InputError, match=r"^[^\n]*slow.yaml:[^\n]* 1e-300 m/s\^3\), allowed [^\n]*\Z"):
+        hil.load_profile(tmp_path / "slow.yaml")
 
 
 @pytest.mark.parametrize("seed", [-1, 1.5, "x"])

@@ -1,1 +1,1 @@
-"""Hardware of the bench (CANopen drive, encoders, buses) and its simulation; knows nothing of `hil`."""
+"""Hardware of the bench (CANopen drive, encoders, buses) and its simulation; imports nothing of `hil`."""

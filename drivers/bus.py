@@ -39,7 +39,7 @@ class BusHealth:
 
 
 class CanPort(Protocol):
-    """One connection to a CAN bus."""
+    """Connection to a CAN bus."""
 
     health: BusHealth
 

@@ -43,11 +43,11 @@ TRIPPING: Final = (
 # Bound once: a look-up of an enumeration member takes time in the loop.
 _OK, _ENABLED_STATE, _ENABLED = Condition.OK, DriveState.OPERATION_ENABLED, DriveGoal.ENABLED
 _POWERED: Final = (_ENABLED_STATE, DriveState.QUICK_STOP_ACTIVE, DriveState.FAULT_REACTION_ACTIVE)
-_new = tuple.__new__  # makes a named tuple without its Python-level constructor
+_new = tuple.__new__  # makes a named tuple without the call of its Python constructor
 
 
 class CanopenDrive(CanopenNode, Drive):
-    """One CiA 402 drive on a master's bus."""
+    """CiA 402 drive on the bus of a master."""
 
     settings: DriveSettings
 
@@ -62,7 +62,7 @@ class CanopenDrive(CanopenNode, Drive):
         self._take_mode(settings.mode)
         self._rad_per_count = self._n_m_per_mille = self._target_per_unit = 0.0
         self._statusword = 0
-        self._raw_counts = 0  # as the drive counts, wrapping
+        self._raw_counts = 0  # as read from the drive, wraps
         self._counts = 0  # unwrapped
         self._torque = 0
         self._controlword = 0
@@ -76,7 +76,7 @@ class CanopenDrive(CanopenNode, Drive):
         self._holds_position = TARGET[mode].index == TARGET[OperationMode.CYCLIC_SYNC_POSITION].index
 
     def set_up(self, settings: DriveSettings | None = None) -> None:
-        """Identity, units, mode, limits, watchdogs, PDOs; blocking, switches the power stage off.
+        """Check identity and units, set mode, limits, watchdogs and PDOs; blocking, switches the power stage off.
 
         With other settings: the same node in another mode, as from homing to CST; `master.start` again afterwards.
         Raises ResponseTimeout, IdentityError or ConfigurationError; nothing moves in either case.
@@ -166,7 +166,7 @@ class CanopenDrive(CanopenNode, Drive):
         self._send(self._rpdo_id, self._pack(controlword, target), now_s)
 
     def _fit(self, target: int) -> int:
-        """Positions wrap as the drive counts them; torques and velocities are limited."""
+        """Wrap a position to INTEGER32; limit a torque or velocity to its range."""
         if self._holds_position:
             return ((target + 0x80000000) & 0xFFFFFFFF) - 0x80000000
         return saturate(target, self._target_bits)

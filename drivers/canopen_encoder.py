@@ -35,7 +35,7 @@ class EncoderSettings:
 
 
 class CanopenEncoder(CanopenNode, Encoder):
-    """One encoder on a master's bus."""
+    """CiA 406 encoder on the bus of a master."""
 
     settings: EncoderSettings
 
@@ -88,7 +88,7 @@ class CanopenEncoder(CanopenNode, Encoder):
         self._sample_time_s = self._master.sync_time_s
 
     def _latch(self, emergency: Emergency) -> None:
-        # A reset ends the alarm by itself: an encoder has nothing to acknowledge.
+        # An EMCY with error code 0 ends the alarm; an encoder needs no acknowledgement.
         self._latched = self._latched | Condition.ALARM if emergency.active else self._latched & ~Condition.ALARM
 
     def read(self, now_s: float) -> EncoderSample:

@@ -18,7 +18,7 @@ _OPERATIONAL: Final = b"\x05"
 
 
 class CanopenMaster:
-    """One master on one port; drives and encoders of the bus share it.
+    """CANopen master on a port; drives and encoders of the bus share it.
 
     node_id: of the master, for its heartbeat. heartbeat_s: its period; consumers are set to three of them.
     """
@@ -42,7 +42,7 @@ class CanopenMaster:
         self.port.send(0x000, bytes([command, node_id]), self.network.time_s if now_s is None else now_s)
 
     def start(self, now_s: float) -> None:
-        """All nodes operational; first heartbeat. From here on call `sync` every period."""
+        """Set all nodes operational and send the first heartbeat; from now on call `sync` every period."""
         self.nmt(NMT_START, now_s=now_s)
         self._heartbeat_due_s = now_s + self.heartbeat_s
         self._send(self._heartbeat_id, _OPERATIONAL, now_s)

@@ -65,7 +65,7 @@ class CanopenNode:
             self._latched |= Condition.NOT_OPERATIONAL  # boot-up (0) included: it lost its configuration
 
     def _node_condition(self, age: int, now_s: float) -> Condition:
-        """Latched conditions, age of the sample in SYNCs, heartbeat and bus."""
+        """Return the fault bits: latched ones, age of the sample in SYNCs, heartbeat, bus."""
         condition = Condition(self._latched)
         if age:
             condition |= Condition.LATE

@@ -1,7 +1,7 @@
 """CiA 402 drive state machine, pure and non-blocking (IEC 61800-7-201, CiA 402-2).
 
-Statusword -> state, (state, goal) -> controlword, homing. Nothing here waits, sends or keeps time: the caller feeds one
-statusword per cycle and sends the controlword it gets back.
+Statusword -> state, (state, goal) -> controlword, homing. Nothing waits, sends or reads a clock: the caller gives one
+statusword per cycle and sends the returned controlword.
 """
 
 from enum import IntEnum, IntFlag
@@ -146,7 +146,7 @@ class HomingPhase(IntEnum):
 
 
 def next_homing_phase(phase: HomingPhase, statusword: int, speed: float, standstill_speed: float) -> HomingPhase:
-    """One cycle of homing; speed and standstill_speed in the same unit, measured by the caller.
+    """Compute a cycle of homing; speed and standstill_speed in the same unit, measured by the caller.
 
     "Attained" alone is not sufficient: it may be left over from an earlier run, or set while the axis still moves. DONE
     takes bit 12 seen low since the start, then bits 10 and 12 set, bit 13 not set, and |speed| <= standstill_speed.

@@ -2,7 +2,7 @@
 
 from typing import Final, NamedTuple
 
-# The most exact entry wins: whole code, then upper byte, then upper nibble.
+# The most specific entry is used: whole code, then upper byte, then upper nibble.
 _CODES: Final = {
     0x2310: "continuous over-current", 0x2320: "short circuit or earth leakage", 0x3110: "mains over-voltage",
     0x3120: "mains under-voltage", 0x3210: "DC link over-voltage", 0x3220: "DC link under-voltage",
@@ -32,7 +32,7 @@ _REGISTER: Final = ("generic", "current", "voltage", "temperature", "communicati
 
 
 class Emergency(NamedTuple):
-    """One EMCY. code 0x00xx: errors reset. Devices that send fewer than 8 bytes have an empty `detail`."""
+    """An EMCY. code 0x00xx: errors reset. Devices that send fewer than 8 bytes have an empty `detail`."""
 
     time_s: float
     code: int

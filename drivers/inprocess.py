@@ -30,7 +30,7 @@ class _Routes(dict[int, tuple[Listener, ...]]):
 
 
 class InProcessPort:
-    """One connection to an `InProcessBus`."""
+    """Connection to an `InProcessBus`."""
 
     __slots__ = ("_all", "_bus", "_listeners", "_routes", "health")
 
@@ -54,7 +54,7 @@ class InProcessPort:
         return self._listeners.get(can_id, []) + self._all
 
     def forget_routes(self) -> None:
-        """Listeners changed somewhere on the bus."""
+        """Clear the routes after a change of listeners on the bus."""
         self._routes.clear()
 
     def send(self, can_id: int, data: bytes, now_s: float) -> None:
@@ -92,7 +92,7 @@ class InProcessBus:
         return tuple(heard for port in self._ports if port is not but for heard in port.listeners(can_id))
 
     def forget_routes(self) -> None:
-        """Listeners changed."""
+        """Clear the routes of all ports."""
         for port in self._ports:
             port.forget_routes()
 

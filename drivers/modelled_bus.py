@@ -75,7 +75,7 @@ class _Frame:
 
 
 class ModelledPort(InProcessPort):
-    """One connection to a `ModelledBus`."""
+    """Connection to a `ModelledBus`."""
 
     __slots__ = ("_model", "_transmit_errors")
 
@@ -97,7 +97,7 @@ class ModelledPort(InProcessPort):
         return [] if self.health.state is BusState.OFF else super().listeners(can_id)
 
     def recover(self) -> None:
-        """Back on the bus after bus-off, as after 128 x 11 recessive bits."""
+        """Return to the bus after bus-off, as after 128 x 11 recessive bits."""
         self._transmit_errors = 0
         self._set_state(BusState.ACTIVE)
 

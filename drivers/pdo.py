@@ -18,7 +18,7 @@ _CODES: Final = {(8, False): "B", (16, False): "H", (32, False): "I", (64, False
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One mapped object. As UNSIGNED32: index (16) | sub-index (8) | length in bits (8)."""
+    """A mapped object. As UNSIGNED32: index (16) | sub-index (8) | length in bits (8)."""
 
     index: int
     subindex: int

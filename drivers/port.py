@@ -1,6 +1,6 @@
 """Port between the loop and its devices: abstract drive, encoder and master, their samples and errors.
 
-One tick of a loop at `now_s` (time = tick x period; nothing here reads a clock, and nothing here blocks):
+One tick of a loop at `now_s` (time = tick x period; nothing reads a clock or blocks):
 
     master.sync(now_s)                      # SYNC: every node latches its position and answers; heartbeat when due
     master.poll(now_s)                      # process received frames; repeat until age_cycles is 0
@@ -71,7 +71,7 @@ class IdentityError(ConfigurationError):
 
 
 class DriveFault(DriverError):
-    """The drive tripped."""
+    """The drive has stopped because of a fault."""
 
 
 class EncoderError(DriverError):
@@ -128,7 +128,7 @@ class DriveSample(NamedTuple):
 
 
 class EncoderSample(NamedTuple):
-    """One position of a linear encoder, unwrapped, in metres; `time_s` is the instant it was latched (CANopen) or
+    """Position of a linear encoder, unwrapped, in metres; `time_s` is the instant it was latched (CANopen) or
     received (serial line); `age_cycles` as in `DriveSample` (serial line: reads without a new frame)."""
 
     time_s: float
@@ -156,7 +156,7 @@ class Master(Protocol):
 
 
 class Drive(Protocol):
-    """One axis behind a drive. `command` takes N m (CST), rad/s (CSV) or rad (CSP), linear axes N, m/s, m.
+    """Drive of an axis. `command` takes N m (CST), rad/s (CSV) or rad (CSP), linear axes N, m/s, m.
 
     Implementations name this class as their base, so that mypy and the interpreter refuse an incomplete one.
     """
@@ -192,7 +192,7 @@ class Drive(Protocol):
 
 
 class Encoder(Protocol):
-    """One linear encoder. Implementations name this class as their base, as for `Drive`."""
+    """Linear encoder. Implementations name this class as their base, as for `Drive`."""
 
     @abstractmethod
     def set_up(self) -> None:

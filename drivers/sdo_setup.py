@@ -165,7 +165,7 @@ class DeviceSetup:
         self.write(communication, 1, cob_id | flags)
 
     def disable_pdos(self) -> None:
-        """All PDOs the EDS knows: invalid, so that nothing unexpected moves or loads the bus."""
+        """Set all PDOs of the EDS invalid, so that none acts on the drive or loads the bus unintended."""
         first = (Index.RPDO_COMMUNICATION, Index.TPDO_COMMUNICATION)
         for index in (communication + k for communication in first for k in range(4)):
             if self.has(index, 1):

@@ -34,7 +34,7 @@ class SerialSettings:
 
 
 class SerialEncoder(Encoder):
-    """Implements `drivers.port.Encoder`. EncoderError if the device cannot be opened."""
+    """Linear encoder on a serial line. Raises EncoderError if the device cannot be opened."""
 
     def __init__(self, settings: SerialSettings) -> None:
         self.settings = settings
@@ -59,7 +59,7 @@ class SerialEncoder(Encoder):
 
     @property
     def checksum_errors(self) -> int:
-        """Frames or lines thrown away since the line was opened."""
+        """Number of invalid frames or lines since the line was opened."""
         return self._parser.errors
 
     def set_up(self) -> None:

@@ -33,7 +33,7 @@ def crc16(data: bytes) -> int:
 
 
 class Reading(NamedTuple):
-    """One position. counts: None from a read-out; position_m: None from a binary frame (its step is not in it)."""
+    """A position. counts: None from a read-out; position_m: None from a binary frame (its step is not in it)."""
 
     counts: int | None
     position_m: float | None
@@ -52,13 +52,13 @@ class Parser(Protocol):
 
 
 def encode_frame(counts: int, sequence: int, status: int = 0, elapsed_us: int = 0xFFFF) -> bytes:
-    """A binary frame."""
+    """Return a binary frame."""
     body = _BODY.pack(sequence & 0xFF, status, counts, elapsed_us)
     return MARK + body + crc16(body).to_bytes(2, "little")
 
 
 def encode_line(position_m: float) -> bytes:
-    """An ASCII read-out in mm with 0.1 um."""
+    """Return an ASCII read-out in mm with 0.1 um."""
     return f"{position_m * 1e3:+011.4f} mm\r\n".encode()
 
 
@@ -108,7 +108,7 @@ class AsciiParser:
         self._synchronised = False
 
     def feed(self, data: bytes) -> list[Reading]:
-        """Readings completed by these bytes."""
+        """Return the readings completed by these bytes."""
         self._buffer += data
         *lines, rest = self._buffer.split(b"\n")
         readings: list[Reading] = []

@@ -22,7 +22,6 @@ from hil.compiled.kernel_cache import provide_kernel_cache as _provide_kernel_ca
 from hil.errors import HilError as _HilError
 
 if TYPE_CHECKING:
-    from drivers.port import DriverError
     from hil.api import (
         design_experiment,
         diagnose,
@@ -80,7 +79,6 @@ _MODULE_OF = {
     "HilError": "hil.errors",
     "InputError": "hil.errors",
     "FieldError": "hil.errors",
-    "DriverError": "drivers.port",
 }
 
 __all__ = [  # noqa: RUF022  (in the order of use, as in the documentation)
@@ -110,7 +108,6 @@ __all__ = [  # noqa: RUF022  (in the order of use, as in the documentation)
     "HilError",
     "InputError",
     "FieldError",
-    "DriverError",
     "__version__",
 ]
 

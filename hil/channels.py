@@ -24,7 +24,7 @@ class AxisKind(StrEnum):
 
 @dataclass(frozen=True)
 class Channel:
-    """One column: its name, SI unit ("1" without dimension), meaning, and what a positive value says."""
+    """A column: its name, SI unit ("1" without dimension), meaning, and the meaning of a positive value."""
 
     name: str
     unit: str

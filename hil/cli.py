@@ -6,6 +6,7 @@ ctrl-C. An expected error is one message on stderr; a Python traceback means a d
 
 from __future__ import annotations
 
+import errno
 import os
 import sys
 from collections.abc import Callable
@@ -75,6 +76,7 @@ for _name, _command in COMMANDS:
 
 def main() -> None:
     """Entry point: runs the command line, turns errors into a message and an exit code."""
+    _open_standard_streams()
     try:
         # commands spread their work over the cores themselves; threads of the linear algebra would slow them down
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

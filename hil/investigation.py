@@ -8,7 +8,7 @@ from pathlib import Path
 from hil.bench.bench_file import Bench
 from hil.diagnosis.diagnose import NEXT_EXPERIMENT, Diagnosis, diagnose
 from hil.diagnosis.wording import titles
-from hil.errors import HilError
+from hil.errors import HilError, InputError
 from hil.files.output import write_json
 from hil.loop.run import RunResult
 from hil.motion.profile import Profile, write_profile
@@ -61,6 +61,8 @@ def investigate(
     profile on the bench; `allowed` decides whether a designed one may be run. Raises HilError if a run stops early,
     InputError for recordings that cannot be diagnosed.
     """
+    if rounds < 1:
+        raise InputError(f"rounds: given {rounds}, allowed 1 or more")
     train: list[Recording] = []
     proving: list[Recording] = []
     found: list[Round] = []

@@ -1,6 +1,6 @@
 """Numbers with units: value to text, unit of a name, factor of a unit to SI.
 
-Values are SI throughout the project; this is the one place that knows other units, for reading foreign recordings and
+Values are SI throughout the project; other units are used only here, for reading foreign recordings and
 for showing values on pages, in pictures and in messages.
 """
 

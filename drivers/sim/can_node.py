@@ -44,7 +44,7 @@ class NmtCommand(IntEnum):
 
 
 class SimulatedDevice:
-    """One node on one port. ValueError for a node-ID outside 1..127."""
+    """A simulated node on one port. Raises ValueError for a node-ID outside 1..127."""
 
     def __init__(self, port: CanPort, eds: Path, node_id: int) -> None:
         if not 1 <= node_id <= 127:
@@ -67,7 +67,7 @@ class SimulatedDevice:
         port.listen(0x600 + node_id, self._on_sdo)
         self._boot(0.0)
 
-    # -- what a subclass adds ---------------------------------------------------------------------------------------
+    # -- implemented by subclasses ----------------------------------------------------------------------------------
 
     def process_sync(self, now_s: float) -> None:
         """Move and measure: called at every SYNC, before the TPDOs are packed."""

@@ -57,7 +57,7 @@ def bell(u: float) -> float:
 
 @njit(cache=True)
 def wander(u: float, phase_rad: float) -> float:
-    """Four sines of incommensurate periods and unrelated phases, rms 1: between -2.83 and 2.83, never the same."""
+    """Four sines of incommensurate periods and unrelated phases, rms 1: between -2.83 and 2.83, not periodic."""
     total: float = 0.0
     for k in range(4):
         total += sin(2.0 * pi * WANDER_RATES[k] * u + (k + 1) * (k + 1) * phase_rad)

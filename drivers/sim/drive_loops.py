@@ -6,8 +6,8 @@ from enum import IntEnum
 
 from drivers.port import PlantLike, ServoLike, ServoTarget
 
-_LOOP_PERIOD_S = 0.001  # of the servo, where the SYNC is slower
-_AT_REST_RAD_S = 0.5  # a stop ramp has ended
+_LOOP_PERIOD_S = 0.001  # of the servo, if the SYNC period is longer
+_AT_REST_RAD_S = 0.5  # below it a stop ramp ends: 5 rpm
 
 
 def ramp(velocity: float, wanted: float, acceleration: float, period_s: float) -> float:

@@ -41,7 +41,7 @@ _FOLLOWING_ERROR_CODE = 0x8611  # CiA 402-2
 
 
 class SimulatedDrive(SimulatedDevice):
-    """The drive node. `servo`: loops inside the drive; without them only CST is accepted and a stop is coasting.
+    """The drive node. `servo`: loops inside the drive; without them the drive accepts only CST and coasts to a stop.
 
     Positions in increments of 0x608F, torques in 1/1000 of `rated_torque_n_m` (0x6076, mN m): it sets the resolution of
     set-point and measurement. Linear axes: metres for radians, newtons for newton metres, travel_per_rev in m.
@@ -165,7 +165,7 @@ class SimulatedDrive(SimulatedDevice):
         self._fault_present = False
 
     def communication_lost(self, now_s: float) -> None:
-        """Abort connection option code 0x6007: 0 nothing, 1 fault, 2 disable voltage, 3 quick stop."""
+        """React by the abort connection option code 0x6007: 0 nothing, 1 fault, 2 disable voltage, 3 quick stop."""
         option = self.dictionary.number(Index.ABORT_CONNECTION_OPTION)
         if option == 1:
             self.values[_ERROR_CODE] = self.dictionary.number(Index.ERROR_HISTORY, 1)
@@ -230,7 +230,7 @@ class SimulatedDrive(SimulatedDevice):
         self._measure(round(plant.motor_position_rad * self._counts_per_rad))
 
     def _measure(self, counts: int) -> None:
-        """Position with the wrap-around of an INTEGER32, velocity as its difference."""
+        """Store position, wrapped to INTEGER32, and velocity as its difference."""
         moved = counts - self._counts
         self._last_counts, self._counts = self._counts, counts
         values = self.values

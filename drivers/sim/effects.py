@@ -14,7 +14,7 @@ from types import MappingProxyType
 
 @dataclass(frozen=True)
 class ParameterRange:
-    """Allowed range [low, high] and, where it may be left out, its default."""
+    """Allowed range [low, high] and, if it is optional, its default."""
 
     low: float = -inf
     high: float = inf
@@ -37,7 +37,7 @@ _PHASE = ParameterRange()
 _PHASE_0 = ParameterRange(default=0.0)
 _OFF = ParameterRange(default=0.0)
 _DELAY = ParameterRange(low=0.0, high=0.1)
-_DRIVE_FORMS = ("visible", "hidden")  # hidden: the measured current does not show it
+_DRIVE_FORMS = ("visible", "hidden")  # hidden: absent from the measured current
 
 CATALOGUE: Mapping[str, Definition] = MappingProxyType({
     # motor side

@@ -169,7 +169,7 @@ def advance(p: Any, s: Any, lines: Any, command: float, steps: int) -> None:
 
 @njit(cache=True)
 def begin(p: np.ndarray, s: np.ndarray, lines: np.ndarray) -> None:
-    """Fill the line of a late position channel with what it reads at the start, and sample."""
+    """Fill the delay line of a late position channel with its reading at the start, and sample."""
     if p[0].channel_time_skew.form == 0:
         lines[CHANNEL_LINE, :] = table_truth(p[0], s[0])
     elif p[0].channel_time_skew.form == 1:

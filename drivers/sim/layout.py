@@ -20,8 +20,8 @@ SPRING_ROWS = MAX_MASSES
 LINES = 2  # delay lines: torque command, recorded channel
 COMMAND_LINE, CHANNEL_LINE = 0, 1
 
-# A compiled kernel's cache knows its own file only, not the files it calls. With the sources' checksum in the
-# name of a field the records change their type with every edit, and stale kernels are never called.
+# numba's cache of a kernel notices changes of its own file only, not of the files it calls. The checksum of the sources
+# in the name of a field changes the type of the records with every edit, so that no old kernel is used.
 _KERNELS = ("contact", "drive_path", "kernel", "layout", "reality", "sensors", "servo")
 _SOURCES = [Path(__file__).with_name(f"{name}.py") for name in _KERNELS]
 _STAMP = f"sources_{crc32(b''.join(path.read_bytes() for path in _SOURCES)):08x}"
@@ -48,7 +48,7 @@ PARAMETERS = np.dtype(
         ("spring_on_screw", np.int64, (SPRING_ROWS,)),
         ("spring_stiffness", np.float64, (SPRING_ROWS,)),
         ("spring_damping", np.float64, (SPRING_ROWS,)),
-        ("damping", np.float64, (MAX_MASSES, MAX_MASSES)),  # what is not in the nut and the springs
+        ("damping", np.float64, (MAX_MASSES, MAX_MASSES)),  # without that of the nut and the springs
     ]
     + [
         (effect, np.dtype([("on", np.int64), ("form", np.int64)] + [(p, np.float64) for p in entry.parameters]))
@@ -67,9 +67,9 @@ STATE = np.dtype(
         ("bristle", np.float64, (2, GMS_ELEMENTS)),  # motor side, table side
         ("lag_current", np.float64),
         ("lag_torque", np.float64),
-        ("torque", np.float64),  # what acted during the last step
+        ("torque", np.float64),  # mean of the last step
         ("torque_noise", np.float64),
-        ("motor_seen", np.float64),  # motor encoder as the control loop sees it
+        ("motor_seen", np.float64),  # reading of the motor encoder in the control loop
         ("table_seen", np.float64),
         ("motor_recorded", np.float64),
         ("table_recorded", np.float64),

@@ -115,8 +115,8 @@ def _pack_chain(p: Any, axis: AxisTruth, mode: Effect | None) -> None:
 def _split_damping(axis: AxisTruth) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
     """C = C_rest + c w w^T with C_rest s = 0, s the motor side of the nut moving as one (1 there, 0 behind).
 
-    c = s^T C s, w = C s / c: the damper of the nut, which vanishes in the play; C_rest stays and does not resist
-    the two sides moving apart. For two masses C_rest = 0.
+    c = s^T C s, w = C s / c: the damper of the nut, which is zero within the play; C_rest acts always, without force
+    on the relative motion of the two sides. For two masses C_rest = 0.
     """
     count = len(axis.mass_kg)
     rate = np.zeros(PARAMETERS["nut_rate"].shape[0])

@@ -74,7 +74,7 @@ class Plant:
         )
 
     def steps_in(self, period_s: float) -> int:
-        """Internal steps in a period. Raises ValueError when it is no whole number of them."""
+        """Return the internal steps in a period. Raises ValueError if that is no whole number."""
         steps = round(period_s / self.step_s)
         if steps < 1 or abs(steps * self.step_s - period_s) > 1e-6 * self.step_s:
             raise ValueError(f"period_s: must be a whole multiple of step_s {self.step_s:g}, got {period_s!r}")

@@ -30,7 +30,7 @@ class _Pdo:
 
 
 class ProcessData:
-    """Takes RPDOs into the dictionary's values and sends TPDOs from them.
+    """Unpacks RPDOs into the values of the dictionary and packs TPDOs from them.
 
     received(now_s): called after an RPDO was taken in; emergency(code, register, now_s): CiA 301 length errors.
     """
@@ -101,7 +101,7 @@ class ProcessData:
         self.configure(operational=self._operational)
 
     def _on_mapping(self, index: int, subindex: int, value: int) -> None:
-        """The mapping changes only while the PDO is invalid; entries only while their number is 0."""
+        """Accept a mapping only while the PDO is invalid, an entry only while the number of entries is 0."""
         if not self._dictionary.number(index - 0x200, 1) & PDO_INVALID:
             raise SdoAbort(AbortCode.NOT_IN_THIS_STATE)
         if subindex == 0:

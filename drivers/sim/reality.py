@@ -1,4 +1,4 @@
-"""Recordings of the simulated reality under its servo: the whole closed loop in one compiled call."""
+"""Recordings of the simulated axis under its servo: the closed loop in one compiled call."""
 
 from collections.abc import Sequence
 from dataclasses import replace

@@ -12,7 +12,7 @@ from drivers.sim.layout import CHANNEL_LINE, delayed
 
 @dataclass(frozen=True)
 class Sensors:
-    """Defaults are the reference axis. A resolution or noise of 0 means none.
+    """Settings of the sensors; defaults are the reference axis. A resolution or noise of 0 means none.
 
     motor_counts_per_rev: counts per screw revolution (on a linear axis per lead_m of travel).
     motor_offset_rad: turn-on offset of the motor encoder, in the unit of its channel.

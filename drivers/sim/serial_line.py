@@ -28,7 +28,7 @@ class SimulatedSerialEncoder:
         self.device = os.ttyname(self._slave)
 
     def send(self, now_s: float, *, status: int = 0) -> None:
-        """One frame; status other than 0: position not valid."""
+        """Send a frame; status other than 0: position not valid."""
         self.put(self.frame(now_s, status))
 
     def frame(self, now_s: float, status: int = 0) -> bytes:

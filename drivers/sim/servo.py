@@ -30,7 +30,7 @@ class VelocityEstimate(StrEnum):
 
 
 class PositionFeedback(StrEnum):
-    """Which encoder the position loop closes on."""
+    """Encoder of the position loop."""
 
     MOTOR = "motor"
     TABLE = "table"
@@ -101,7 +101,7 @@ def pack_servo(servo: Servo, ratio_m_rad: float, period_s: float) -> NDArray[np.
 
 @njit(cache=True)
 def start_servo(s: Any, motor_position: float) -> None:
-    """At rest at this motor position, integrator empty."""
+    """Set the state to rest at this motor position, with the integrator at zero."""
     s.tick = 0
     s.previous = s.before_previous = motor_position
     s.velocity = s.reference = s.integral = 0.0
@@ -109,7 +109,7 @@ def start_servo(s: Any, motor_position: float) -> None:
 
 @njit(cache=True)
 def position_loop(c: Any, s: Any, command_m: float, command_m_s: float, motor_position: float, table_m: float) -> float:
-    """v_ref [m/s], new on every position_every-th tick and held between."""
+    """Return v_ref [m/s], computed every position_every-th tick and held between."""
     if s.tick % c.position_every == 0:
         feedback = table_m if c.table_feedback else c.ratio * motor_position
         s.reference = c.position_gain * (command_m - feedback) + c.feedforward * command_m_s
@@ -159,7 +159,7 @@ class DriveServo:
         self._period_s = 1e-3
 
     def reset(self, motor_position_rad: float) -> None:
-        """At rest at this motor position."""
+        """Set the state to rest at this motor position."""
         start_servo(self._state[0], motor_position_rad)
 
     def torque(self, target: ServoTarget, motor_position_rad: float, period_s: float) -> float:

@@ -1,1 +1,1 @@
-"""Bench files: what the owner knows of axis, control, encoders and drive."""
+"""Bench files: description of axis, control, encoders and drive by the owner."""

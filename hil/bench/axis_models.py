@@ -22,10 +22,11 @@ from hil.twin.structure.chain import (
     two_mass,
 )
 
-Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+# 1e15: above every SI value of an axis; squares and products of such values stay finite
+Positive = Annotated[float, Field(gt=0.0, le=1e15, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 # up to a metre: a lead in millimetres is refused
-Lead = Annotated[float, Field(gt=0.0, le=1.0, allow_inf_nan=False)]
+Lead = Annotated[float, Field(ge=1e-5, le=1.0, allow_inf_nan=False)]
 Damping = Annotated[float, Field(ge=0.0, lt=1.0, description="modal damping ratio of the elastic modes")]
 
 
@@ -110,7 +111,7 @@ class Rigid(_Rotary):
     mass_kg: Positive = Field(description="all moving mass and inertia at the table [kg]")
 
     def chain(self) -> Chain:
-        """One mass."""
+        """The chain of one mass."""
         return one_mass(self.mass_kg, self.lead_m)
 
 

@@ -71,7 +71,7 @@ class MechanismEntry(_Model):
 class MotorEncoder(_Model):
     """Motor encoder."""
 
-    counts_per_rev: Annotated[int, Field(gt=0)] = 2**20
+    counts_per_rev: Annotated[int, Field(gt=0, lt=2**32)] = 2**20  # UNSIGNED32 in CiA 402, object 0x608F
     resolution_m: Annotated[float | None, Field(gt=0.0, description="count of a linear axis [m]")] = None
     direction: Literal[1, -1] = 1
 

@@ -1,5 +1,5 @@
-"""The hardware sections of a bench file: `drive` (bus, drive, encoder, limits) and `simulation` (what a simulated bench
-really is). Plain data: `hil.loop.devices` makes the devices of it, `hil.loop.simulated_bench` the simulated ones."""
+"""The hardware sections of a bench file: `drive` (bus, drive, encoder, limits) and `simulation` (true parameters and
+effects). Plain data: `hil.loop.devices` makes the devices of it, `hil.loop.simulated_bench` the simulated ones."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Share = Annotated[float, Field(gt=0.0, le=1.0)]
 
 
 class DriveMode(StrEnum):
-    """Which loops run here: both (CST), the position loop (CSV), none (CSP)."""
+    """Mode of the drive: both loops run in this program (CST), only the position loop (CSV), or none (CSP)."""
 
     CST = "cst"
     CSV = "csv"
@@ -89,7 +89,7 @@ class DriveSection(_Model):
 
 
 class SimulatedEffect(_Model):
-    """One effect that the simulated axis conceals: ids, forms and parameters as drivers/sim/effects.py lists them."""
+    """A concealed effect of the simulated axis: ids, forms and parameters as drivers/sim/effects.py lists them."""
 
     effect: str
     form: str = ""

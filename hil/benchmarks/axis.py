@@ -52,7 +52,7 @@ def twenty_modes(interface: str = "inprocess") -> Bench:
             "coulomb_torque_n_m": 1.1,
             "viscous_torque_n_m_s_rad": 0.0064,
         },
-        # nothing of the loop depends on where the axis really is: it stands still, and that is no fault here
+        # the axis stands still; the loop takes the same time, and the deviation is no fault in a benchmark
         "drive": DriveSection(interface=interface, following_error_m=10.0).model_dump(),
         "simulation": SimulationSection().model_dump(),
     }

@@ -10,7 +10,7 @@ import numpy as np
 
 
 class ReferenceKind(StrEnum):
-    """PEER: the same task done by another tool. LIMIT: a part of the task alone, which no code around it undercuts."""
+    """PEER: the same task done by another tool. LIMIT: a necessary part of the task alone, a lower bound."""
 
     PEER = "peer"
     LIMIT = "limit"
@@ -26,7 +26,7 @@ class Reference(NamedTuple):
 
 @dataclass(frozen=True)
 class Figure:
-    """One figure with its target, an upper bound if `at_most`, else a lower one; None for a mere comparison.
+    """A figure with its target, an upper bound if `at_most`, else a lower one; None for a mere comparison.
 
     `at_most` also says that a smaller value is better. label: short name in tables. detail: how it was measured.
     """

@@ -62,7 +62,7 @@ def _folder() -> Path:
 
 
 def _versions() -> str:
-    """All but the sources that numba compares: itself, Python and the processor."""
+    """Return what a kernel depends on beside its sources: numba, Python and the processor."""
     import sys
     from importlib.metadata import version
 

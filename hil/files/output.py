@@ -33,8 +33,10 @@ def refuse_used(folder: Path) -> None:
 def new_folder(folder: Path) -> Iterator[Path]:
     """A folder to fill, which becomes `folder` when the block ends without an exception, else vanishes.
 
-    Raises InputError where `folder` holds something already or cannot be made.
+    Raises InputError where `folder` holds something already, is the working folder, or cannot be made.
     """
+    if not folder.name:
+        raise InputError(f"{folder}: given the working folder or the root, allowed a new folder; name one as --out")
     part = folder.with_name(f".{folder.name}.{os.getpid()}.part")
     try:
         refuse_used(folder)

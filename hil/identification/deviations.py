@@ -39,7 +39,7 @@ _DRIVE = (Stage.CURRENT, Stage.CHANNEL)
 
 @dataclass(frozen=True, eq=False)
 class Deviation:
-    """One channel (n,), measured and simulated, evaluated over the rows `judged`."""
+    """A channel (n,), measured and simulated, evaluated over the rows `judged`."""
 
     name: str
     label: str

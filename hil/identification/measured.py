@@ -33,7 +33,7 @@ _FITTED_ROWS = 11  # motor positions fitted by a parabola for the first velocity
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """One recording ready to be compared, channels (n,) in motor units: rad and N m, or m and N."""
+    """A recording prepared for the comparison, channels (n,) in motor units: rad and N m, or m and N."""
 
     name: str
     kind: AxisKind

@@ -146,7 +146,7 @@ _FOLLOWING_ERROR, _TRAVEL = int(Limit.FOLLOWING_ERROR), int(Limit.TRAVEL)
 
 @njit(_nrt=False, error_model="numpy")  # no references counted: see hil.twin.stepping.kernel
 def _control(law, position, velocity, motor, table):  # type: ignore[no-untyped-def]
-    """One step of `hil.control.cascade`, the state kept in an array."""
+    """Compute a step of `hil.control.cascade`, the state kept in an array."""
     state = law.state
     before = cascade.State(int(state[0]), state[1], state[2], state[3], state[4], state[5])
     after, out = _step(law.gains, before, cascade.Inputs(position, velocity, motor, table))

@@ -31,7 +31,7 @@ class NotPunctual(HilError):
 
 @dataclass(frozen=True)
 class Grant:
-    """One setting: what was asked for, and why it was refused ("" if granted)."""
+    """A requested setting, and the reason of its refusal ("" if granted)."""
 
     setting: str
     refused: str = ""

@@ -1,4 +1,4 @@
-"""One run of a profile on a bench: open, set up, prepare for real time, arm, move, record."""
+"""Run a profile on a bench: open, set up, prepare for real time, arm, move, record."""
 
 import contextlib
 import signal

@@ -1,4 +1,4 @@
-"""The loop: profile -> controller -> drive -> encoders -> recorder, with the live twin beside, tick by tick.
+"""The loop: profile -> controller -> drive -> encoders -> recorder, with the live twin, tick by tick.
 
     ARM        the drive goes to OPERATION ENABLED; until then its target is zero (CSP: its present position)
     RUN        set-points of the trajectory, which begins at the position of the axis
@@ -214,7 +214,7 @@ class Session:
         drive.command(self._now_s, setpoint)
         return tick + 1
 
-    # -- when something is wrong ----------------------------------------------------------------------------------
+    # -- faults and stops ----------------------------------------------------------------------------------
 
     def _supervise(self, tick: int, sample: DriveSample, seen: EncoderSample, passed: int) -> Trajectory | None:
         """Change the phase if required; return the stop that begins at this tick, if any."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Any
+from typing import Any, SupportsIndex
 
 from pydantic import ValidationError, model_validator
 
@@ -60,6 +60,9 @@ def simulated_copy(bench: Bench) -> Bench:
 def make_plant(bench: Bench, seed: int | None = None) -> Plant:
     """Build the simulated axis at rest at 0. Raises FieldError at an invalid field."""
     simulation = bench.simulation or SimulationSection()
+    seed = simulation.seed if seed is None else seed
+    if not isinstance(seed, SupportsIndex) or seed.__index__() < 0:
+        raise FieldError(("simulation", "seed"), f"given {seed!r}, allowed a whole number, 0 or more; correct it")
     axis = _true_axis(bench.axis, simulation)
     effects = []
     for number, entry in enumerate(simulation.effects):
@@ -80,13 +83,13 @@ def make_plant(bench: Bench, seed: int | None = None) -> Plant:
     except (TypeError, ValueError) as error:
         raise FieldError(("simulation", "sensors"), f"given {simulation.sensors}: {error}") from None
     try:
-        return Plant(axis, sensors, effects, simulation.seed if seed is None else seed, simulation.step_s)
+        return Plant(axis, sensors, effects, seed, simulation.step_s)
     except ValueError as error:
         raise FieldError(("simulation",), str(error)) from None
 
 
 class SimulatedNodes:
-    """Drive and encoder of a bench on one port with a plant behind them; the encoder hears a SYNC after the drive."""
+    """Drive and encoder of a bench on one port and their plant; the encoder receives a SYNC after the drive."""
 
     def __init__(self, bench: Bench, port: CanPort, seed: int | None = None, plant: PlantLike | None = None) -> None:
         section = bench.drive or DriveSection()

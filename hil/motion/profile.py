@@ -33,7 +33,7 @@ class Limits(Part):
 
 
 class Run(NamedTuple):
-    """One executed segment: where it stands in the file, how often it ran before, and its move."""
+    """An executed segment: its place in the file, the number of its earlier executions, and its move."""
 
     field: FieldPath
     kind: str

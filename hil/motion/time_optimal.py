@@ -24,7 +24,7 @@ class _Unsolved(HilError):
 
 
 class MotionState(NamedTuple):
-    """MotionState in which a motion starts."""
+    """State in which a motion starts."""
 
     position_m: float
     velocity_m_s: float = 0.0
@@ -100,14 +100,19 @@ def _order(state: MotionState, limits: MotionLimits) -> ruckig.InputParameter:
     return order
 
 
+def _unsolved(order: ruckig.InputParameter) -> _Unsolved:
+    limits = f"{order.max_velocity[0]:g} m/s, {order.max_acceleration[0]:g} m/s^2, {order.max_jerk[0]:g} m/s^3"
+    return _Unsolved(f"ruckig finds no trajectory within {limits}")
+
+
 def _solve(order: ruckig.InputParameter) -> tuple[Cubic, ...]:
     trajectory = ruckig.Trajectory(1)
     try:
         result = ruckig.Ruckig(1).calculate(order, trajectory)
-    except ruckig.RuckigError as error:
-        raise _Unsolved(f"ruckig finds no trajectory: {error}") from None
+    except ruckig.RuckigError:
+        raise _unsolved(order) from None
     if result not in (ruckig.Result.Working, ruckig.Result.Finished):
-        raise _Unsolved(f"ruckig finds no trajectory ({result.name}) for {order}")
+        raise _unsolved(order)
     profile = trajectory.profiles[0][0]
     return tuple(
         Cubic(t, _phase(t, v, a, j), p, v, a, j)

@@ -26,11 +26,13 @@ if TYPE_CHECKING:
 __all__ = ["SegmentRun", "Trajectory", "plan", "replan", "stop_from", "time_optimal_duration_s"]
 
 APPROACH = "approach to start"
+MAX_POSITION_M = 100.0  # as in a profile
+MAX_SET_POINTS = 2e7  # five hours at 1 ms; their arrays take 1 GB
 SAMPLES_PER_PERIOD_MIN = 4  # of an excitation; fewer are no sine any more
 
 
 class SegmentRun(NamedTuple):
-    """One executed segment: its place in the profile, how often that ran before, and when [s]."""
+    """An executed segment: its place in the profile, the number of its earlier executions, begin and end [s]."""
 
     name: str
     kind: str
@@ -104,10 +106,13 @@ def plan(profile: Profile, period_s: float, start_m: float | None = None) -> Tra
     start_m: present position of the axis [m]; if it is not profile.start_m, a time-optimal approach comes first.
     Each segment begins at a multiple of profile.grid_s after the approach.
 
-    Raises FieldError (an InputError): a period that is not positive, a start outside the travel, an excitation
+    Raises FieldError (an InputError): a period that is not positive or gives too many set-points, a start
+    beyond +-100 m or outside the travel, an excitation
     too fast for the period.
     """
     _check_period(period_s)
+    if start_m is not None and abs(start_m) > MAX_POSITION_M:
+        raise FieldError(("start_m",), f"given {start_m}, allowed -{MAX_POSITION_M:g} to {MAX_POSITION_M:g} m")
     timed: list[tuple[float, str, str, int, Move]] = []
     notes: list[str] = []
     slot = 0
@@ -175,6 +180,9 @@ def _sampled(
     moves: Sequence[Move], runs: tuple[SegmentRun, ...], period_s: float, notes: tuple[str, ...]
 ) -> Trajectory:
     """Every piece evaluated at the ticks that fall into it; rest after a move until the next one starts."""
+    if runs[-1].end_s > MAX_SET_POINTS * period_s:
+        raise FieldError(("period_s",), f"given {period_s:g} s for {runs[-1].end_s:g} s of motion, allowed up to "
+                                        f"{MAX_SET_POINTS:g} set-points; lengthen the period")  # fmt: skip
     count = _first_tick(runs[-1].end_s / period_s) + 1
     time_s: Array = np.arange(count, dtype=np.float64) * period_s
     motion = Motion(*(np.zeros(count) for _ in range(4)))

@@ -1,1 +1,1 @@
-"""The proof: effects concealed in a simulated axis, recordings of it, and what a diagnosis makes of them."""
+"""The proof: effects concealed in a simulated axis, its recordings, and their blind diagnosis."""

@@ -7,6 +7,7 @@ channel table for exchange. Other files are read by `hil.recording.importing`.
 from __future__ import annotations
 
 import json
+import math
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 
 METADATA_KEY = b"hil"  # of the schema: the metadata as JSON
 CLOCK_TOLERANCE = 0.01  # of the period: what a step of a regular clock may deviate
+LARGEST = 1e12  # above every SI value of a channel, and of a clock in microseconds per day
 _STREAM_END = b"\xff\xff\xff\xff\x00\x00\x00\x00"  # Arrow IPC: the end-of-stream marker
 _FORMATS = ".parquet, .arrows (a run that was not closed) or .csv"
 
@@ -35,13 +37,22 @@ _FORMATS = ".parquet, .arrows (a run that was not closed) or .csv"
 class Recording:
     """A run: columns of equal length (names and units of `hil.channels`), one row per period.
 
-    `metadata` holds what JSON can: bench, profile, versions, seed, and remarks of the reader.
+    `metadata` holds what JSON can: bench, profile, versions, seed, and remarks of the reader. Raises InputError for
+    columns of different length, NaN, infinity, and a period that is not positive.
     """
 
     name: str
     columns: dict[str, FloatArray]
     period_s: float
     metadata: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.period_s < math.inf:
+            raise InputError(f"{self.name}: period_s: given {self.period_s}, allowed a positive number [s]")
+        lengths = {name: len(values) for name, values in self.columns.items()}
+        if len(set(lengths.values())) != 1:
+            raise InputError(f"{self.name}: columns: given the lengths {lengths}, allowed one length for all")
+        check_finite(self.columns, lambda row: f"{self.name}: row {row}")
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values())))
@@ -108,13 +119,16 @@ def read_recording(path: str | Path) -> Recording:
 
 
 def check_finite(columns: Mapping[str, FloatArray], place: Callable[[int], str]) -> None:
-    """Raise InputError at the first NaN or infinity; `place` gives the place of row i (from 0), such as "file:line"."""
+    """Raise InputError at the first NaN, infinity or number beyond LARGEST.
+
+    `place` gives the place of row i (from 0), such as "file:line".
+    """
     for name, values in columns.items():
-        bad = np.flatnonzero(~np.isfinite(values))
+        bad = np.flatnonzero(~(np.abs(values) <= LARGEST))
         if bad.size:
             row = int(bad[0])
             raise InputError(
-                f"{place(row)}: {name}: given {values[row]}, allowed a finite number; "
+                f"{place(row)}: {name}: given {values[row]}, allowed a finite number up to {LARGEST:g}; "
                 "correct the value or cut the recording before it"
             )
 
@@ -129,7 +143,7 @@ def check_columns(columns: Mapping[str, FloatArray], place: Callable[[int], str]
     if time_s.size < 3:
         raise InputError(f"{place(0)}: time_s: given {time_s.size} rows, allowed 3 or more; give a longer recording")
     steps = np.diff(time_s)
-    # rounded to 1 ps: the mean of printed stamps is a period with float dust on it
+    # rounded to 1 ps: the mean of printed stamps is a period with rounding errors
     period_s = round(float(np.median(steps)), 12)
     bad = np.flatnonzero(steps <= 0.0)
     if bad.size:

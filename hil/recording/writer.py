@@ -37,8 +37,8 @@ def run_metadata(
 ) -> dict[str, Any]:
     """Collect the metadata that repeat a run: bench and profile in full, seed, command line, versions, computer.
 
-    `start_time` is an ISO 8601 text; in virtual time the caller gives what is to stand there, for nothing
-    here reads a clock. All values must be such as JSON holds.
+    `start_time` is an ISO 8601 text; in virtual time the caller gives another text, since
+    nothing here reads a clock. All values must be such as JSON holds.
     """
     return {
         "bench": bench,
@@ -86,7 +86,7 @@ class Recorder:
         size = HEADER_BYTES + ring_rows * self._row_bytes
         memory_fd = os.memfd_create("hil-recorder")
         try:
-            os.posix_fallocate(memory_fd, 0, size)  # a lack of memory shows here, not as SIGBUS in the loop
+            os.posix_fallocate(memory_fd, 0, size)  # lack of memory raises here, instead of SIGBUS in the loop
             self._memory = mmap.mmap(memory_fd, size)
             self._counters = memoryview(self._memory)[:HEADER_BYTES].cast("q")
             self._head = 0
@@ -136,7 +136,7 @@ class Recorder:
         if head >= self._limit and not self._make_room():
             return
         self._pack_into(self._memory, HEADER_BYTES + head % self._ring_rows * self._row_bytes, *row)
-        # the counter after the row: the writer must not see a row that is not there yet
+        # counter last: the writer reads only complete rows
         self._head = self._counters[RECORDED] = head + 1
 
     def record_block(self, rows: Any) -> None:
@@ -183,13 +183,13 @@ class Recorder:
             self._limit = self.rows_on_disk + self._ring_rows
             while self._lossless and self._head >= self._limit:
                 if self._process.poll() is not None:
-                    self._ask({})  # raises with the writer's last words
+                    self._ask({})  # raises with the error of the writer
                 time.sleep(0.001)
                 self._limit = self.rows_on_disk + self._ring_rows
             if self._head < self._limit:
                 return True
         self.rows_lost += 1
-        self._limit = self._head  # rows after a gap would pretend that there is none
+        self._limit = self._head  # rows after a gap would hide the gap
         return False
 
     def _end_process(self) -> None:
@@ -201,7 +201,7 @@ class Recorder:
         self._process.wait()
 
     def _ask(self, message: Mapping[str, Any]) -> Any:
-        """Send the writer a line and return the answer in its line. Raises HilError with its last words."""
+        """Send the writer a line and return the answer in its line. Raises HilError with its error."""
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         with contextlib.suppress(BrokenPipeError):  # it died; why stands in its answer

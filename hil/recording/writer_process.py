@@ -1,7 +1,7 @@
 """The process that writes what a loop records; started by `hil.recording.writer`, which describes the whole.
 
 It reads its task and the end of the run as lines of JSON from standard input and answers each with one line.
-When the loop dies without a word it writes the rows that are still in the ring and leaves the stream
+If the process of the loop ends without a message, it writes the rows that are still in the ring and leaves the stream
 without its end marker, by which a reader knows.
 """
 

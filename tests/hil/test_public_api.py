@@ -49,7 +49,7 @@ NOUNS = [
     "Diagnosis",
     "Verdict",
 ]
-ERRORS = ["HilError", "InputError", "FieldError", "DriverError"]
+ERRORS = ["HilError", "InputError", "FieldError"]
 MOVE = hil.Profile.model_validate(
     {
         "schema_version": 1,
@@ -110,7 +110,7 @@ def test_a_public_name_is_what_it_is_called_and_comes_from_this_project(name: st
         assert all(isinstance(mechanism, hil.Mechanism) for mechanism in value)
         return
     assert value.__name__ == name
-    assert value.__module__.startswith("drivers." if name == "DriverError" else "hil.")
+    assert value.__module__.startswith("hil.")
 
 
 @pytest.mark.parametrize("name", [*VERBS, *NOUNS[:6], *NOUNS[7:], *ERRORS])

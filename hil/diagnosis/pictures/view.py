@@ -38,7 +38,7 @@ class Captioned(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """One run beside the final twin with one term switched off."""
+    """A run beside the final twin with one term switched off."""
 
     term: Term
     run: Measured

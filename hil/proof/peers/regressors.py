@@ -27,7 +27,7 @@ _DEPENDENT = 1e-6  # share of a term outside the span of the others below which 
 
 @dataclass(frozen=True, eq=False)
 class Equation:
-    """One equation over rows (n,), the nominal axis projected out of it: target (n,) and terms (n, m).
+    """An equation over rows (n,), the nominal axis projected out of it: target (n,) and terms (n, m).
 
     effects[j]: what a positive and what a negative coefficient of term j may come from. `noise`: of the target.
     """

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hil.arrays import FloatArray
-from hil.errors import FieldError, HilError, InputError
+from hil.errors import FieldError, HilError
 
 if TYPE_CHECKING:
     from hil.bench.bench_file import Bench

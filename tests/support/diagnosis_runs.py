@@ -95,12 +95,6 @@ def changed(recording: Recording, **columns: object) -> Recording:
     return replace(recording, columns=new)
 
 
-def rows_of(run: Measured, rows: slice | np.ndarray) -> Measured:
-    """Return some rows of a prepared recording."""
-    names = ("position_command_m", "velocity_command_m_s", "motor", "table_m", "torque_command", "torque")
-    return Measured(**{**vars(run), **{name: getattr(run, name)[rows] for name in names}})
-
-
 def rig(folder: str) -> Path:
     """A folder of rig recordings beside the repository."""
     if not (RIG / folder).is_dir():

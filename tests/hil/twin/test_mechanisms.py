@@ -1,6 +1,6 @@
 """Each mechanism of drive and motor side has the property that an engineer would check."""
 
-from math import pi
+from math import e, pi
 
 import numpy as np
 import pytest

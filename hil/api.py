@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hil.arrays import FloatArray
-from hil.errors import FieldError, HilError
+from hil.errors import FieldError, HilError, InputError
 
 if TYPE_CHECKING:
     from hil.bench.bench_file import Bench
@@ -131,8 +131,11 @@ def fit_nominal(recordings: Recording | Sequence[Recording], bench: Bench) -> Fi
     from hil.identification.measured import take
     from hil.identification.nominal_fit import fit_nominal as fit
 
-    bench = reduced(bench, _sequence(recordings))
-    return fit(prepare_dataset([take(recording, bench) for recording in _sequence(recordings)], bench))
+    given = _sequence(recordings)
+    if not given:
+        raise InputError("recordings: given none, allowed one or more; give the recordings to fit to")
+    bench = reduced(bench, given)
+    return fit(prepare_dataset([take(recording, bench) for recording in given], bench))
 
 
 def diagnose(

@@ -69,7 +69,7 @@ def test_a_drive_in_another_process_runs_in_wall_clock_time(nodes: subprocess.Po
     torques = []
     for _ in range(100):
         master.sync(time.monotonic() - start_s)
-        deadline_s = time.monotonic() + 2.0
+        deadline_s = time.monotonic() + 30.0
         while True:
             now_s = time.monotonic() - start_s
             master.poll(now_s, 0.005)

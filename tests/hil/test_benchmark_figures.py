@@ -91,7 +91,11 @@ def test_stages_sum_their_steps_in_order() -> None:
 
 def test_every_step_of_the_diagnosis_belongs_to_a_stage() -> None:
     folder = Path(__file__).parents[2] / "hil" / "diagnosis"
-    steps = [step for path in folder.rglob("*.py") for step in re.findall(r'progress\(f?"([^"]+)"', path.read_text())]
+    steps = [
+        step
+        for path in folder.rglob("*.py")
+        for step in re.findall(r'(?:progress|step)\(f?"([^"]+)"', path.read_text())
+    ]
     assert len(steps) > 8
     assert [step for step in steps if not step.startswith(tuple(STAGES))] == []
 

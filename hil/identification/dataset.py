@@ -8,6 +8,7 @@ from scipy.signal import lfilter
 
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
+from hil.errors import InputError
 from hil.identification.measured import Measured
 from hil.identification.noise import Laps
 
@@ -76,7 +77,13 @@ def prepare_dataset(runs: Sequence[Measured], bench: Bench) -> Dataset:
 
     With the observer's time constant the noise of the motor encoder makes as much observed torque as the noise of the
     torque channel, within the bounds of the observer. Without a torque the fastest one moves the motor as measured.
+    Raises InputError for a torque that is 0 throughout.
     """
+    for run in runs:
+        if run.noise.torque <= 0.0 and "motor" not in run.unseen:
+            raise InputError(
+                f"{run.name}: torque: given 0 throughout, allowed a recorded torque; leave the channel out"
+            )
     wanted = max(np.sqrt(run.noise.motor * inertia(bench) / (TORQUE_ACCURACY * run.noise.torque)) for run in runs)
     fastest_s = FASTEST_OBSERVER_TICKS * runs[0].period_s
     wanted = fastest_s if any("motor" in run.unseen for run in runs) else wanted

@@ -13,6 +13,8 @@ from scipy.signal import correlate, find_peaks
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
 
+_DIGITS = 1e-7  # of the largest value: rounding of a recording in single precision, the least noise of a torque
+
 
 @dataclass(frozen=True)
 class Noise:
@@ -46,6 +48,7 @@ def estimate_noise(
         counting = np.hypot(bench.encoders.table.resolution_m, ratio_m * bench.motor_count) / np.sqrt(12.0)
         table_noise = max(white_noise(table - ratio_m * motor), float(counting))
     of_torque = white_noise(torque) if np.array_equal(command, torque) else _coloured(torque - command)
+    of_torque = max(of_torque, _DIGITS * float(np.max(np.abs(torque), initial=0.0)))
     return Noise(motor_noise, table_noise, of_torque, _jitter_s(motor, velocity, motor_noise, period_s))
 
 

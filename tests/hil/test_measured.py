@@ -1,10 +1,13 @@
 """Noise and timing of the sensors are estimated from a recording alone."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from diagnosis_runs import bench, recorded
 
 from hil.errors import InputError
+from hil.identification.dataset import prepare_dataset
 from hil.identification.measured import take
 from hil.identification.noise import _jitter_s, white_noise
 
@@ -70,3 +73,14 @@ def test_a_ramp_of_the_motor_is_no_jitter() -> None:
     velocity = np.repeat(np.linspace(0.0, 40.0, 2000), 4)
     motor = np.cumsum(velocity) * PERIOD_S
     assert _jitter_s(motor, velocity, 1e-9, PERIOD_S) == 0.0
+
+
+def test_a_torque_without_noise_has_that_of_its_digits_and_one_of_zero_is_refused() -> None:
+    quiet = recorded(bench(), torque_noise_n_m=0.0)
+    measured = take(quiet, bench())
+    assert measured.noise.torque > 0.0
+    prepare_dataset([measured], bench())
+    zero = replace(quiet, columns={**quiet.columns, "torque_n_m": 0.0 * quiet["torque_n_m"]})
+    zero.columns["torque_command_n_m"] = zero["torque_n_m"]
+    with pytest.raises(InputError, match="torque: given 0 throughout"):
+        prepare_dataset([take(zero, bench())], bench())

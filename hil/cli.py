@@ -81,7 +81,11 @@ def main() -> None:
         # commands spread their work over the cores themselves; threads of the linear algebra would slow them down
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
         provide_kernel_cache()
-        app()
+        try:
+            app()
+        finally:
+            if sys.stdout:
+                sys.stdout.flush()  # a full disk shows here, not when the interpreter ends
     except SystemExit as end:
         if end.code == 130:
             print("stopped by ctrl-C", file=sys.stderr)
@@ -90,9 +94,11 @@ def main() -> None:
         print(error, file=sys.stderr)
         sys.exit(error.exit_code)
     except OSError as error:
-        if error.errno != errno.ENOSPC:
+        if error.errno not in (errno.ENOSPC, errno.EPIPE):
             raise
-        print(f"{error.filename or 'output'}: no space left on the device; make room", file=sys.stderr)
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what is buffered cannot be written
+        if error.errno == errno.ENOSPC:
+            print(f"{error.filename or 'output'}: no space left on the device; make room", file=sys.stderr)
         sys.exit(1)
 
 

@@ -109,7 +109,9 @@ class FitFigures(_Part):
     before_rms: NotNegative = Field(description="nominal parameters refitted, no new physics")
     after_rms: NotNegative = Field(description="with corrected parameters and the physics found")
     noise_floor_rms: NotNegative
-    owner_rms: NotNegative = Field(description="parameters of the bench file")
+    owner_rms: NotNegative | None = Field(
+        description="parameters of the bench file; null if the twin is unstable with them"
+    )
 
 
 class ChannelFit(_Part):

@@ -52,18 +52,24 @@ def fit_nominal_parameters(data: Dataset, evaluations: int = _SECOND, deadline_s
     )
 
 
+def require_finite(found: Fit) -> None:
+    """Raise HilError if residuals of a fit are not finite: the twin, or its observer, is unstable."""
+    if not all(np.isfinite(values).all() for channels in found.residuals.channels for values in channels.values()):
+        raise HilError(
+            f"the fit of {', '.join(found.bench.axis.NOMINAL)} has no finite result: the twin of this axis is unstable "
+            f"at a period of {found.data.runs[0].period_s:g} s; check masses, stiffness, units and signs, or give a "
+            "recording with more motion"
+        )
+
+
 def fit_nominal(data: Dataset) -> FitResult:
     """Fit the nominal parameters of a bench to convergence, within a factor of three of the bench file.
 
     Raises HilError if the residuals are not finite.
     """
     found = fit_nominal_parameters(data, MOST_STEPS)
+    require_finite(found)
     axis = data.bench.axis
-    if not all(np.isfinite(values).all() for channels in found.residuals.channels for values in channels.values()):
-        raise HilError(
-            f"the fit of {', '.join(axis.NOMINAL)} has no finite result; check units and signs of the "
-            "recording, or give one with more motion"
-        )
     parameters = tuple(
         FittedParameter(name, float(getattr(axis, name)), value, error)
         for name, value, error in zip(axis.NOMINAL, found.hypothesis.values, standard_errors(found), strict=True)

@@ -39,7 +39,7 @@ class Residuals:
     def over_noise(self, run: int) -> dict[str, FloatArray]:
         """Residuals (n,) of all rows of a run in units of noise."""
         scale = self.data.noise[run]
-        return {name: values / scale[name] for name, values in self.channels[run].items()}
+        return {name: _bounded(values, scale[name]) for name, values in self.channels[run].items()}
 
     @cached_property
     def vector(self) -> FloatArray:
@@ -69,9 +69,13 @@ class Residuals:
         for run, scale, channels in zip(self.data.runs, scales, self.channels, strict=True):
             rows = run.judged
             for name, values in channels.items():
-                with np.errstate(over="ignore"):  # a hypothesis may be unstable
-                    weighted = np.nan_to_num(values[rows] / scale[name][rows], nan=_LOST)
-                yield name, np.clip(weighted, -_LOST, _LOST)
+                yield name, _bounded(values[rows], scale[name][rows])
+
+
+def _bounded(values: FloatArray, scale: FloatArray) -> FloatArray:
+    """Values (n,) over their scale, finite also for an unstable hypothesis."""
+    with np.errstate(over="ignore"):
+        return np.clip(np.nan_to_num(values / scale, nan=_LOST), -_LOST, _LOST)
 
 
 def datum_m(measured: Response, simulated: Response, ratio_m: float, judged: slice) -> float:

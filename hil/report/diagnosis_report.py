@@ -179,4 +179,4 @@ def _figures(found: FitFigures, unit: str) -> list[Number]:
     """Cells of a channel's rms values, and the last over the noise floor."""
     values = (found.owner_rms, found.before_rms, found.after_rms, found.noise_floor_rms)
     over_floor = digits(found.after_rms / found.noise_floor_rms) if found.noise_floor_rms > 0.0 else "–"
-    return [*(Number(quantity(value, unit)) for value in values), Number(over_floor)]
+    return [*(Number("unstable" if value is None else quantity(value, unit)) for value in values), Number(over_floor)]

@@ -21,7 +21,7 @@ from hil.identification.estimator import Fit
 from hil.identification.hypothesis import LAST_EDGE_STEP_S, effects
 from hil.identification.inference import against, whitening
 from hil.identification.noise_floor import REPEATS, unrepeated
-from hil.identification.nominal_fit import fit_nominal_parameters
+from hil.identification.nominal_fit import fit_nominal_parameters, require_finite
 from hil.identification.parallel import in_parallel
 from hil.identification.terms import FRICTION, Key, Term
 from hil.twin.library import BY_ID
@@ -96,7 +96,8 @@ class Explanation:
 def explain(data: Dataset, progress: Progress = lambda text: None, deadline_s: float = math.inf) -> Explanation:
     """Search for the mechanisms that the twin of a bench lacks on the recordings of a data set.
 
-    After `deadline_s` of the monotonic clock the search ends with the best explanation so far.
+    After `deadline_s` of the monotonic clock the search ends with the best explanation so far. Raises HilError if the
+    twin of the axis is unstable.
     """
     stopped_at = ""
 
@@ -109,6 +110,7 @@ def explain(data: Dataset, progress: Progress = lambda text: None, deadline_s: f
 
     step("refitting the nominal parameters")
     base = fit_nominal_parameters(data, deadline_s=deadline_s)
+    require_finite(base)
     owner, nominal = base.estimator.evaluate(base.hypothesis.owner), base
     rivals, needed, first = dict[Key, list[RivalFit]](), dict[Key, float](), list[Candidate]()
     tried, fitted = [effects(())], set[str]()

@@ -49,6 +49,9 @@ def channel_residuals(hypothesis: Hypothesis, data: Dataset, mode: Mode) -> tupl
     )
 
 
+_DIVERGED = 1e9  # residual over the noise floor from which a twin is unstable: its size says nothing
+
+
 @dataclass(frozen=True, eq=False)
 class _ChannelTable:
     """Figures of one channel in one mode for the three hypotheses."""
@@ -66,11 +69,13 @@ class _ChannelTable:
         lapped = [rms for rms, repeated in own if repeated] or [
             rms for rms, repeated in self._floors(other) if repeated
         ]
+        white = float(np.sqrt(np.mean(np.square(lapped or [rms for rms, _ in own]))))
+        owner = self._rms(self.owner, data)
         return FitFigures(
             before_rms=self._rms(self.nominal, data),
             after_rms=self._rms(self.final, data),
-            noise_floor_rms=float(np.sqrt(np.mean(np.square(lapped or [rms for rms, _ in own])))),
-            owner_rms=self._rms(self.owner, data),
+            noise_floor_rms=white,
+            owner_rms=owner if owner < _DIVERGED * white else None,
         )
 
     def _of(self, hypothesis: Hypothesis, data: Dataset) -> list[FloatArray]:

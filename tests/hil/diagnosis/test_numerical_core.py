@@ -9,10 +9,12 @@ from scipy.signal import lfilter
 from hil.arrays import FloatArray
 from hil.diagnosis.search.initial_values import StartPoint
 from hil.diagnosis.search.score_test import screen
+from hil.errors import HilError
 from hil.identification.estimator import Estimator, Fit, FitStatus
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.inference import against
 from hil.identification.measured import take
+from hil.identification.nominal_fit import require_finite
 from hil.identification.residuals import Residuals
 from hil.identification.terms import Term
 
@@ -93,3 +95,15 @@ def test_another_scale_of_the_coordinates_changes_no_residual() -> None:
     np.testing.assert_allclose(moved.rebased.residuals(data).vector, moved.residuals(data).vector, atol=1e-6)
     assert moved.without(0).values == pytest.approx([*moved.values[: moved.nominal_count], moved.values[-1]])
     assert moved.with_term(Term("backlash", 0, (3e-6,))).without(2).values == moved.values
+
+
+def test_an_unstable_twin_is_refused_in_one_sentence_and_its_weighted_residuals_stay_finite() -> None:
+    data = dataset([take(recorded(OWNER), OWNER)], OWNER)
+    residuals = Residuals(data, ({"torque": np.full(data.runs[0].motor.size, np.nan)},))
+    found = Fit(Hypothesis(OWNER), residuals, np.zeros((data.rows, 0)), Estimator(data))
+    with pytest.raises(
+        HilError, match=r"has no finite result: the twin of this axis is unstable at a period of 0\.001 s"
+    ):
+        require_finite(found)
+    assert np.isfinite(residuals.vector).all()
+    assert np.isfinite(residuals.over_noise(0)["torque"]).all()

@@ -217,6 +217,8 @@ def statement(result: Result) -> str:
         return f"No physics is missing; parameters of the bench file are wrong: {changes}."
     if result.verdict is Verdict.NO_MISMATCH:
         return "The twin reproduces these recordings to within their noise."
+    if result.time_budget:
+        return f"The time budget ended before a mechanism was found: {result.unexplained.description}"
     return f"The mismatch is not explained by any mechanism of the library: {result.unexplained.description}"
 
 

@@ -101,9 +101,7 @@ def test_an_unstable_twin_is_refused_in_one_sentence_and_its_weighted_residuals_
     data = dataset([take(recorded(OWNER), OWNER)], OWNER)
     residuals = Residuals(data, ({"torque": np.full(data.runs[0].motor.size, np.nan)},))
     found = Fit(Hypothesis(OWNER), residuals, np.zeros((data.rows, 0)), Estimator(data))
-    with pytest.raises(
-        HilError, match=r"has no finite result: the twin of this axis is unstable at a period of 0\.001 s"
-    ):
+    with pytest.raises(HilError, match=r"twin of this axis is unstable at a period of 0\.001 s"):
         require_finite(found)
     assert np.isfinite(residuals.vector).all()
     assert np.isfinite(residuals.over_noise(0)["torque"]).all()

@@ -20,9 +20,9 @@ PASSED = {
 
 
 def with_time_left(progress: Callable[[str], None], begin_s: float, budget_s: float) -> Callable[[str], None]:
-    """Add the estimated time left to each step that `progress` gets; at most what is left of the budget.
+    """Return a receiver of steps that adds the estimated time left to each text and passes it on to `progress`.
 
-    `begin_s` is the begin of the diagnosis on the monotonic clock.
+    The time is at most the rest of the budget. `begin_s` is the begin of the diagnosis on the monotonic clock.
     """
 
     def tell(step: str) -> None:

@@ -1,5 +1,4 @@
-"""What a recording tells of its axis beside the keys of a bench file: load, noise, delays, friction at constant "
-"feeds."""
+"""Comments of a drafted bench on values that its keys cannot hold: load, noise, delays, friction at constant feeds."""
 
 from hil.channels import AxisKind
 from hil.drafting.plant_values import PlantValues, TransmissionValues

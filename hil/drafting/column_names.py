@@ -1,4 +1,4 @@
-"""What the name of a column says, in English, German and French: quantity, set-point or measured, motor or table."""
+"""Reads the name of a column in English, German or French: quantity, set-point or measured, motor or table."""
 
 import re
 import unicodedata
@@ -62,7 +62,7 @@ LEAST_WITHIN = 4  # letters of a word that is looked for within a token: shorter
 
 @dataclass(frozen=True)
 class Label:
-    """What a name says; `unit` is one of a map or None, `odd_unit` is True if a unit stands there that is not known."""
+    """Meaning of a column's name. `unit` is None if the name gives none; `odd_unit`: it gives an unknown one."""
 
     column: str
     quantity: Quantity

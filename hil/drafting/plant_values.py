@@ -22,7 +22,9 @@ CUTOFFS_HZ = (100.0, 50.0, 25.0, 12.0, 6.0)  # of the position filter
 NOISE_SHARE = 0.02  # of noise in the acceleration: it makes the inertia too small by this share
 MOST_OF_RATE = 0.2  # of the sampling rate: the filter must end well below half of it
 LEAST_ROWS = 80  # after decimation: eight per block of the error estimate
-GRAVITY_GAIN = 0.85  # of what is left without gravity: it is reported if it leaves less
+# Residual with gravity over that without, up to which gravity is reported: on LEAST_ROWS white rows two parameters
+# without effect remove 1 %.
+GRAVITY_GAIN = 0.85
 
 
 @dataclass(frozen=True)

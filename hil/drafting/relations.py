@@ -57,7 +57,7 @@ def proportional(values: FloatArray, other: FloatArray) -> Relation:
 
 
 def derivative_of(values: FloatArray, moved: MotionColumns, period_s: float) -> Relation:
-    """How far a column (n,) is the velocity of a motion."""
+    """Fit a column (n,) as a multiple of the velocity of a motion."""
     return proportional(smoothed(values, period_s), moved.velocity)
 
 

@@ -30,7 +30,7 @@ _UNIT_RANK = ("N m", "mN m", "N", "kN", "A", "mA", "%", "permille", None, "V", "
 
 @dataclass
 class Roles:
-    """Columns by role, None where there is none; notes on what is left out, and what is unsure."""
+    """Name of the column of each role (None: not recorded), and notes on ignored columns and uncertain choices."""
 
     motor: str | None = None
     motor_velocity: str | None = None

@@ -89,7 +89,7 @@ class Picture(StrEnum):
 
 
 Points = Sequence[tuple[float, ...]]
-_ROUNDING = 1e-15  # of a bound: a fit ends that near to it
+_ROUNDING = 1e-15  # of the upper bound: rounding of a fit that ends at the lower one
 
 
 @dataclass(frozen=True)

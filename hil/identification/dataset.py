@@ -1,7 +1,7 @@
 """Recordings of one axis prepared for a fit: observer, noise and model discrepancy of each residual."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.signal import lfilter
@@ -11,6 +11,7 @@ from hil.bench.bench_file import Bench
 from hil.errors import InputError
 from hil.identification.measured import Measured
 from hil.identification.noise import Laps
+from hil.twin.axis import Response, Start
 
 # Torque resolved by the motor channel over the noise of the torque channel. A fine encoder resolves less, but there lie
 # details below the material size too: friction at zero speed, the side force of a lead error.
@@ -23,6 +24,8 @@ DISCREPANCY = 0.005
 # start converges; below two ticks the sampled observer is unstable on an elastic axis. Slow: a coarse encoder still
 # resolves the torque.
 FASTEST_OBSERVER_TICKS, FASTEST_OBSERVER_S, SLOWEST_OBSERVER_S = 2.0, 0.002, 0.008
+
+_REMEMBERED_S = 0.3  # of an impulse: elastic modes of a machine axis have decayed
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,9 +121,38 @@ def scales(
     if run.table_m.size:
         deflection_m = run.table_m - bench.axis.ratio_m_rad * run.motor
         table = np.hypot(table, discrepancy * (deflection_m - np.median(deflection_m)))
-    return {
+    found = {
         "motor": np.hypot(run.motor_noise * np.linalg.norm(passed), seen),
         "table": table,
         "torque": torque,
-        "command": torque,
+        "command": np.hypot(torque, run.noise.command),
     }
+    if run.sampled:
+        for name, response in impulse_responses(run, bench, observer_s).items():
+            found[name] = np.sqrt(found[name] ** 2 + np.convolve(run.torque_gap**2, response**2)[: rows[0]])
+    return found
+
+
+def impulse_responses(run: Measured, bench: Bench, observer_s: float) -> dict[str, FloatArray]:
+    """Change of the block residuals (m,) from the tick on at which the torque is 1 more than recorded for one tick.
+
+    It is that of the axis of the bench without friction, in motion.
+    """
+    twin = bench.twin()
+    twin = replace(
+        twin, physics=replace(twin.physics, coulomb_n_m=0.0, viscous_n_m_s_rad=0.0), active=(), observer_s=observer_s
+    )
+    ticks = round(_REMEMBERED_S / run.period_s) + 3
+    ratio, speed = bench.axis.ratio_m_rad, float(np.max(np.abs(np.diff(run.motor)), initial=1e-9)) / run.period_s
+    motor = speed * run.period_s * np.arange(ticks)
+    command = np.zeros(ticks)
+    measured = Response(motor, ratio * motor if run.table_m.size else np.empty(0), command, command)
+    start = Start(velocity_m_s=ratio * speed)
+    still = np.zeros(ticks)
+    quiet = twin.observe(still, still, measured, start)
+    kicked = twin.observe(still, still, measured._replace(torque_command=np.eye(1, ticks, 1)[0]), start)
+    moved = kicked.motor_position - quiet.motor_position
+    found = {"motor": moved[1:]}
+    if run.table_m.size:
+        found["table"] = (kicked.table_position_m - quiet.table_position_m - ratio * moved)[1:]
+    return found

@@ -19,7 +19,7 @@ from hil.bench.hardware import DriveMode
 from hil.channels import AxisKind
 from hil.control import cascade
 from hil.errors import InputError
-from hil.identification.completion import completed, position_is_measured, torque_is_measured
+from hil.identification.completion import completed, position_is_measured, rows_are_ticks, torque_is_measured
 from hil.identification.noise import Laps, Noise, estimate_noise, find_laps, moving, white_noise
 from hil.recording.recording import Recording, check_finite
 from hil.twin.axis import Response, Start
@@ -50,6 +50,15 @@ class Measured:
     left_out: int = 0  # rows of the recording before the first tick of the position loop
     unseen: frozenset[str] = frozenset()  # channels of the twin whose input or output is unknown: their residual is 0
     integrated: bool = False  # the motor position is the sum of its measured velocity
+    sampled: bool = False  # the rows are samples of the torque, which changes between them
+
+    @cached_property
+    def torque_gap(self) -> FloatArray:
+        """Standard deviation (n,) of the mean torque from a row to the next one, given samples of it at both.
+
+        The torque changes between them at a time that is not known: the mean is uniform between both values.
+        """
+        return np.asarray(np.abs(np.diff(self.torque_command, append=self.torque_command[-1])) / np.sqrt(12.0))
 
     @property
     def time_s(self) -> FloatArray:
@@ -150,6 +159,7 @@ def take(recording: Recording, bench: Bench) -> Measured:
         first,
         _unseen(recording, bench),
         integrated,
+        not bench.law_known and torque_is_measured(recording) and not rows_are_ticks(recording),
     )
 
 

@@ -12,7 +12,9 @@ from scipy.signal import correlate, find_peaks
 
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
+from hil.identification.quantum import count_of
 
+_COARSER = 1.5  # factor of a recorded step over the count of the bench: one count, seen with noise, is below
 _DIGITS = 1e-7  # of the largest value: rounding of a recording in single precision, the least noise of a torque
 
 
@@ -20,7 +22,8 @@ _DIGITS = 1e-7  # of the largest value: rounding of a recording in single precis
 class Noise:
     """Standard deviation of the white noise of a sensor: motor [rad or m], table [m], torque [N m or N].
 
-    `motor` is the noise of its travel per period if its velocity was recorded in place of its position.
+    `motor` is the noise of its travel per period if its velocity was recorded in place of its position. `command` is
+    that of a replayed command where the control loop saw finer positions than were recorded.
 
     `table_m` is that of table position less r x motor position, 0 without a linear encoder. `jitter_s` is that of the
     sampling instants of the encoders: its position error is proportional to the speed and equal for both.
@@ -30,6 +33,7 @@ class Noise:
     table_m: float
     torque: float
     jitter_s: float = 0.0
+    command: float = 0.0
 
 
 def estimate_noise(
@@ -41,15 +45,25 @@ def estimate_noise(
     torque: FloatArray,
     period_s: float,
 ) -> Noise:
-    """Estimate sensor noise from channels (n,) in motor units, at least that of counting: count / sqrt(12)."""
-    motor_noise, table_noise = max(white_noise(motor), bench.motor_count / np.sqrt(12.0)), 0.0
+    """Estimate sensor noise from channels (n,) in motor units, at least that of counting: count / sqrt(12).
+
+    The count is that of the bench, or that of the recording if it is coarser.
+    """
+    count = _count(motor, bench.motor_count)
+    motor_noise, table_noise = max(white_noise(motor), count / np.sqrt(12.0)), 0.0
     if table.size and bench.encoders.table is not None:
         ratio_m = bench.axis.ratio_m_rad
-        counting = np.hypot(bench.encoders.table.resolution_m, ratio_m * bench.motor_count) / np.sqrt(12.0)
+        counting = np.hypot(_count(table, bench.encoders.table.resolution_m), ratio_m * count) / np.sqrt(12.0)
         table_noise = max(white_noise(table - ratio_m * motor), float(counting))
     of_torque = white_noise(torque) if np.array_equal(command, torque) else _coloured(torque - command)
     of_torque = max(of_torque, _DIGITS * float(np.max(np.abs(torque), initial=0.0)))
     return Noise(motor_noise, table_noise, of_torque, _jitter_s(motor, velocity, motor_noise, period_s))
+
+
+def _count(values: FloatArray, of_bench: float) -> float:
+    """Count of a channel (n,): that of the bench, or the step of the values if it is clearly coarser."""
+    step = count_of(values) or 0.0
+    return step if step > _COARSER * of_bench else of_bench
 
 
 def moving(velocity: FloatArray) -> NDArray[np.bool_]:

@@ -158,6 +158,19 @@ class Twin:
         # lateness of an input is taken back, that of the answer is simulated
         return self._recorded(Response(*channels), lambda variant: variant.name == _ANSWER)
 
+    def command(
+        self,
+        position_command_m: FloatArray,
+        velocity_command_m_s: FloatArray,
+        measured: Response,
+        start: Start = _AT_REST,
+    ) -> FloatArray:
+        """Torque command (n,) of the controller alone, fed measured inputs as in `observe`."""
+        setpoints = loops.Setpoints(position_command_m, velocity_command_m_s)
+        return np.asarray(
+            loops.replay_law(self.loop_gains, self._controller(start), setpoints, Response(*measured)), dtype=np.float64
+        )
+
     def undelayed(self, measured: Response) -> Response:
         """Undo the lateness that active mechanisms give to measured inputs."""
 

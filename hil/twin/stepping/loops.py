@@ -71,6 +71,36 @@ def closed_loop(gains, state, setpoints, misread, measured_table, axis):  # type
     return motor, table, command, torque
 
 
+@njit(**COMPILE)
+def _follow(gains, state, inputs, command, period):  # type: ignore[no-untyped-def]
+    """Compute one tick of the controller on recorded inputs, and let its integrator follow the recorded `command`:
+    rounding of recorded set-points accumulates in it."""
+    state, outputs = _control_step(gains, state, inputs)
+    wanted = outputs.torque_n_m
+    resumed = state.integral_n_m + period / INTEGRATOR_S * (command - wanted)
+    state = cascade.State(
+        state.tick,
+        state.velocity_reference_m_s,
+        resumed,
+        state.previous_motor_rad,
+        state.previous2_motor_rad,
+        state.filtered_velocity_rad_s,
+    )
+    return state, wanted
+
+
+@njit(cache=True, nogil=True, **COMPILE)
+def replay_law(gains, state, setpoints, measured):  # type: ignore[no-untyped-def]
+    """Run the controller alone on measured inputs (a `Response`), as `observe` does: torque command (n,)."""
+    command, motor, table = measured.torque_command, measured.motor_position, measured.table_position_m
+    seen = motor * gains.ratio_m_rad if table.size == 0 else table
+    wanted = np.empty(command.size)
+    for k in range(command.size):
+        inputs = cascade.Inputs(setpoints.position_m[k], setpoints.velocity_m_s[k], motor[k], seen[k])
+        state, wanted[k] = _follow(gains, state, inputs, command[k], gains.period_s)
+    return wanted
+
+
 @njit(cache=True, nogil=True, **COMPILE)
 def observe(gains, state, setpoints, measured, axis):  # type: ignore[no-untyped-def]
     """Run each block on measured inputs (a `Response`): motor, table, torque command, torque, each (n,).
@@ -95,18 +125,7 @@ def observe(gains, state, setpoints, measured, axis):  # type: ignore[no-untyped
     for k in range(n):
         motor[k], table[k] = _read(constants, modes, values, codes, delta, memory)
         inputs = cascade.Inputs(setpoints.position_m[k], setpoints.velocity_m_s[k], measured_motor[k], seen[k])
-        state, outputs = _control_step(gains, state, inputs)
-        wanted[k] = outputs.torque_n_m
-        # rounding of recorded set-points accumulates in the integrator: forget it
-        resumed = state.integral_n_m + c.period / INTEGRATOR_S * (command[k] - wanted[k])
-        state = cascade.State(
-            state.tick,
-            state.velocity_reference_m_s,
-            resumed,
-            state.previous_motor_rad,
-            state.previous2_motor_rad,
-            state.filtered_velocity_rad_s,
-        )
+        state, wanted[k] = _follow(gains, state, inputs, command[k], c.period)
         error = measured_motor[k] - motor[k]
         _correct(shapes.motor_impulse, error, c.period, c.observer, delta)
         if measured_table.size:

@@ -96,7 +96,7 @@ class Control(_Model):
         return "position_gain_1_s", "velocity_feedforward", velocity, integral
 
     def with_gains(self, gains: Gains) -> Self:
-        """The section with the position gain, feed-forward, velocity gain and integral time of `gains`, in its units."""
+        """The section with position gain, feed-forward, velocity gain and integral time of `gains`, in its units."""
         before = self.gains(gains.ratio_m_rad)
         position, feedforward, velocity, integral = self.gain_names
         factor = gains.velocity_gain_n_m_s_rad / before.velocity_gain_n_m_s_rad

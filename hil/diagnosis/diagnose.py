@@ -217,7 +217,10 @@ def statement(result: Result) -> str:
 def _unexplained(
     before: Fit, final: Fit, held_out: Dataset, location: Location | None, verdict: Verdict, of_law: str
 ) -> Unexplained:
-    """Unexplained share of the energy above the floor, and the channels above their noise; `of_law`: what the law leaves."""
+    """Unexplained share of the energy above the floor, and the channels above their noise.
+
+    `of_law` tells how far the control law is from the commands, if it was set aside for that.
+    """
     evidence = held_out if held_out.runs else final.data
     share = 0.0 if verdict is Verdict.NO_MISMATCH else 1.0 - explained_share(before.on(evidence), final.on(evidence))
     worst: dict[str, float] = {}

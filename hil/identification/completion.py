@@ -76,8 +76,9 @@ def completed(recording: Recording, bench: Bench) -> Recording:
 def reduced(bench: Bench, recordings: Sequence[Recording]) -> Bench:
     """The part of a bench without a control law that recordings can judge.
 
-    It has the period of the recordings, the delay of the torque as a parameter unless rows are ticks, and no table encoder unless all have both positions: the sum of a velocity
-    drifts, so that it cannot be compared with the table.
+    It has the period of the recordings, and the delay of the torque is estimated unless rows are ticks. It has no table
+    encoder unless all recordings have both positions: the sum of a velocity drifts, so that it cannot be compared with
+    the table.
     """
     if bench.law_known or not recordings:
         return bench

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
 from scipy.signal import lfilter
 
 from hil.arrays import FloatArray
@@ -25,6 +26,7 @@ DISCREPANCY = 0.005
 # resolves the torque.
 FASTEST_OBSERVER_TICKS, FASTEST_OBSERVER_S, SLOWEST_OBSERVER_S = 2.0, 0.002, 0.008
 
+_NEAR_ROWS = 21  # within which a motor that is not at rest passes more than a step
 _REMEMBERED_S = 0.3  # of an impulse: elastic modes of a machine axis have decayed
 
 
@@ -127,10 +129,36 @@ def scales(
         "torque": torque,
         "command": np.hypot(torque, run.noise.command),
     }
-    if run.sampled:
+    unknown = unknown_torque(run, bench, observer_s)
+    if unknown.any():
         for name, response in impulse_responses(run, bench, observer_s).items():
-            found[name] = np.sqrt(found[name] ** 2 + np.convolve(run.torque_gap**2, response**2)[: rows[0]])
+            found[name] = np.sqrt(found[name] ** 2 + np.convolve(unknown**2, response**2)[: rows[0]])
     return found
+
+
+def unknown_torque(run: Measured, bench: Bench, observer_s: float) -> FloatArray:
+    """Standard deviation (n,) of the torque that a recording leaves open [motor unit]; 0 in a complete one.
+
+    Between samples of a torque it is `Measured.torque_gap`. The sign of Coulomb friction is not known in a sample next
+    to which the direction of motion is another one, nor, where positions are coarser than the counts of the bench,
+    while the motor passes less than a step in the observer's time constant.
+    """
+    found, unsure = np.zeros(run.motor.size), np.zeros(run.motor.size, dtype=bool)
+    count = np.sqrt(12.0) * run.noise.motor
+    if run.sampled:
+        found = run.torque_gap
+        direction = np.sign(np.diff(run.motor, append=run.motor[-1]))
+        turning = np.diff(direction, prepend=direction[0]) != 0.0
+        unsure |= maximum_filter1d(turning, 3)
+    if run.noise.coarse:
+        ticks = max(round(observer_s / run.period_s), 1)
+        passed = np.abs(np.convolve(np.gradient(run.motor), np.ones(ticks), mode="same"))
+        unsure |= passed < count
+    if unsure.any():
+        moved = maximum_filter1d(run.motor, _NEAR_ROWS) - minimum_filter1d(run.motor, _NEAR_ROWS)
+        unsure &= moved > 1.5 * count  # not at rest
+        found = np.hypot(found, np.where(unsure, bench.axis.physics().coulomb_n_m, 0.0))
+    return np.asarray(found, dtype=np.float64)
 
 
 def impulse_responses(run: Measured, bench: Bench, observer_s: float) -> dict[str, FloatArray]:
@@ -144,9 +172,10 @@ def impulse_responses(run: Measured, bench: Bench, observer_s: float) -> dict[st
     )
     ticks = round(_REMEMBERED_S / run.period_s) + 3
     ratio, speed = bench.axis.ratio_m_rad, float(np.max(np.abs(np.diff(run.motor)), initial=1e-9)) / run.period_s
-    motor = speed * run.period_s * np.arange(ticks)
+    motor = speed * run.period_s * np.arange(ticks, dtype=np.float64)
     command = np.zeros(ticks)
-    measured = Response(motor, ratio * motor if run.table_m.size else np.empty(0), command, command)
+    table = ratio * motor if run.table_m.size else np.zeros(0)
+    measured = Response(motor, table, command, command)
     start = Start(velocity_m_s=ratio * speed)
     still = np.zeros(ticks)
     quiet = twin.observe(still, still, measured, start)

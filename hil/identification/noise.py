@@ -23,7 +23,8 @@ class Noise:
     """Standard deviation of the white noise of a sensor: motor [rad or m], table [m], torque [N m or N].
 
     `motor` is the noise of its travel per period if its velocity was recorded in place of its position. `command` is
-    that of a replayed command where the control loop saw finer positions than were recorded.
+    that of a replayed command where the control loop saw finer positions than were recorded. `coarse`: the recorded
+    steps of the motor position are coarser than the counts of the bench.
 
     `table_m` is that of table position less r x motor position, 0 without a linear encoder. `jitter_s` is that of the
     sampling instants of the encoders: its position error is proportional to the speed and equal for both.
@@ -34,6 +35,7 @@ class Noise:
     torque: float
     jitter_s: float = 0.0
     command: float = 0.0
+    coarse: bool = False
 
 
 def estimate_noise(
@@ -57,7 +59,8 @@ def estimate_noise(
         table_noise = max(white_noise(table - ratio_m * motor), float(counting))
     of_torque = white_noise(torque) if np.array_equal(command, torque) else _coloured(torque - command)
     of_torque = max(of_torque, _DIGITS * float(np.max(np.abs(torque), initial=0.0)))
-    return Noise(motor_noise, table_noise, of_torque, _jitter_s(motor, velocity, motor_noise, period_s))
+    jitter_s = _jitter_s(motor, velocity, motor_noise, period_s)
+    return Noise(motor_noise, table_noise, of_torque, jitter_s, coarse=count > bench.motor_count)
 
 
 def _count(values: FloatArray, of_bench: float) -> float:

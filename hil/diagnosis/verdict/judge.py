@@ -44,7 +44,13 @@ def judge(owner: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> Verdict:
         evidence = held_out if held_out.runs else final.data
         left = 1.0 - explained_share(nominal.on(evidence), final.on(evidence))
         above = max(final.on(data).worst_ratio for data in (final.data, held_out) if data.runs)
-        if names_stand(left, above) or (final.at_floor and (left <= MOST or above <= FLOOR)):
+        # a recording that leaves inputs open has leftovers of its own
+        open_inputs = any(run.sampled or run.noise.coarse for run in (*final.data.runs, *held_out.runs))
+        if (
+            names_stand(left, above)
+            or (open_inputs and left <= MOST)
+            or (final.at_floor and (left <= MOST or above <= FLOOR))
+        ):
             return Verdict.MISSING_PHYSICS
     if not nominal.at_floor:
         return Verdict.UNEXPLAINED

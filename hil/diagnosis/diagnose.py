@@ -160,7 +160,7 @@ def diagnose(
         parameter_corrections=law.corrections | ({} if of_plant is Verdict.NO_MISMATCH else corrections(bench, final)),
         fit=table,
         not_testable=hidden,
-        unexplained=_unexplained(before, final, held_out, location, of_plant, law.mismatch),
+        unexplained=_unexplained(before, final, held_out, location, of_plant),
         next_experiment=NextExperiment(profile=NEXT_EXPERIMENT, separates=experiment.separates)
         if experiment and experiment.profile
         else None,
@@ -172,7 +172,8 @@ def diagnose(
         notes=tuple(notes),
         runtime_s=time.monotonic() - begin,
     )
-    result = result.model_copy(update={"statement": statement(result)})
+    told = statement(result.model_copy(update={"verdict": of_plant}))
+    result = result.model_copy(update={"statement": f"{law.advice} {told}".strip()})
     after = bench if of_plant is Verdict.NO_MISMATCH else diagnosed_bench(bench, final)
     if not bench.law_known:  # what was set aside stays in the file
         after = after.model_copy(update={"control": believed.control})
@@ -215,12 +216,9 @@ def statement(result: Result) -> str:
 
 
 def _unexplained(
-    before: Fit, final: Fit, held_out: Dataset, location: Location | None, verdict: Verdict, of_law: str
+    before: Fit, final: Fit, held_out: Dataset, location: Location | None, verdict: Verdict
 ) -> Unexplained:
-    """Unexplained share of the energy above the floor, and the channels above their noise.
-
-    `of_law` tells how far the control law is from the commands, if it was set aside for that.
-    """
+    """Unexplained share of the energy above the floor, and the channels above their noise."""
     evidence = held_out if held_out.runs else final.data
     share = 0.0 if verdict is Verdict.NO_MISMATCH else 1.0 - explained_share(before.on(evidence), final.on(evidence))
     worst: dict[str, float] = {}
@@ -231,12 +229,7 @@ def _unexplained(
                 worst[names[name]] = max(worst.get(names[name], 0.0), ratio)
     above = {name: float(np.sqrt(ratio)) for name, ratio in worst.items() if ratio > FLOOR}
     if not above:
-        at_floor = (
-            "Every channel of the plant is at its noise floor." if of_law else "Every channel is at its noise floor."
-        )
-        return Unexplained(
-            share=share, description=f"{of_law[:1].upper()}{of_law[1:]}. {at_floor}" if of_law else at_floor
-        )
+        return Unexplained(share=share, description="Every channel is at its noise floor.")
     text = ", ".join(f"{name} at {digits(above[name])} × noise rms" for name in sorted(above, key=lambda n: -above[n]))
     if verdict is Verdict.UNEXPLAINED and location is not None:
         text += f"; {where_in_short(location)}"

@@ -41,15 +41,16 @@ _MATERIAL = 1e-3  # relative change of a gain that is worth a correction: settin
 class LawCheck:
     """Bench whose control law may be used, corrections of its gains, and notes.
 
-    `command_noise` is the noise of the replayed command of each run beyond that of the torque. `mismatch` tells how far
-    the law of the bench is from the commands, empty unless it was set aside for that.
+    `command_noise` is the noise of the replayed command of each run beyond that of the torque. `advice` is what the
+    owner should check, empty if nothing; `mismatch`: the law was set aside because no gains reproduce the commands.
     """
 
     bench: Bench
     corrections: dict[str, Correction] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     command_noise: tuple[float, ...] = ()
-    mismatch: str = ""
+    advice: str = ""
+    mismatch: bool = False
     resampled: bool = False  # the rows are not the ticks of the velocity loop
 
     def marked(self, recording: Recording) -> Recording:
@@ -122,11 +123,12 @@ def check_law(runs: Sequence[Measured], bench: Bench) -> LawCheck:
     best = min(tried, key=lambda one: one.bic(rows))
     if best.left <= REPLAYED:
         return _accepted(bench, best)
-    text = (
-        f"the control law of the bench leaves {100.0 * given.left:.0f} % of the torque command (rms), with the best "
-        f"gains ({_gains(bench, best)}) {100.0 * best.left:.0f} %"
+    why = (
+        f"it leaves {100.0 * given.left:.0f} % of the torque command (rms), with the best gains ({_gains(bench, best)}) "
+        f"{100.0 * best.left:.0f} %"
     )
-    return replace(_set_aside(bench, text), mismatch=text)
+    advice = f"Check the controller's settings: the control law of the bench is not that of the recording, {why}."
+    return replace(_set_aside(bench, why), advice=advice, mismatch=True)
 
 
 def _candidates(runs: Sequence[Measured], bench: Bench) -> list[tuple[tuple[Term, ...], bool]]:
@@ -166,11 +168,13 @@ def _accepted(bench: Bench, found: LawFit) -> LawCheck:
     text = ", ".join(
         f"{name} {digits(entry.value, 4)} instead of {digits(entry.nominal, 4)}" for name, entry in corrections.items()
     )
-    note = (
-        f"Check the controller's settings: the torque commands follow the control law with {text}. The diagnosis uses "
-        "these gains."
+    advice = f"Check the controller's settings: the torque commands follow the control law with {text}."
+    return LawCheck(
+        bench.model_copy(update={"control": learnt}),
+        corrections,
+        (f"{advice} The twin uses these gains.",),
+        advice=advice,
     )
-    return LawCheck(bench.model_copy(update={"control": learnt}), corrections, (note,))
 
 
 def _set_aside(bench: Bench, why: str) -> LawCheck:

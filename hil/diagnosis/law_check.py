@@ -124,8 +124,8 @@ def check_law(runs: Sequence[Measured], bench: Bench) -> LawCheck:
     if best.left <= REPLAYED:
         return _accepted(bench, best)
     why = (
-        f"it leaves {100.0 * given.left:.0f} % of the torque command (rms), with the best gains ({_gains(bench, best)}) "
-        f"{100.0 * best.left:.0f} %"
+        f"it leaves {100.0 * given.left:.0f} % of the torque command (rms), with the best gains "
+        f"({_gains(bench, best)}) {100.0 * best.left:.0f} %"
     )
     advice = f"Check the controller's settings: the control law of the bench is not that of the recording, {why}."
     return replace(_set_aside(bench, why), advice=advice, mismatch=True)

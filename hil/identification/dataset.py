@@ -129,36 +129,28 @@ def scales(
         "torque": torque,
         "command": np.hypot(torque, run.noise.command),
     }
-    unknown = unknown_torque(run, bench, observer_s)
-    if unknown.any():
+    if run.sampled:
+        unknown = unknown_torque(run, bench)
         for name, response in impulse_responses(run, bench, observer_s).items():
             found[name] = np.sqrt(found[name] ** 2 + np.convolve(unknown**2, response**2)[: rows[0]])
+    if run.noise.coarse:
+        held = bench.axis.physics().coulomb_n_m * observer_s**2 / inertia(bench)
+        found["motor"] = np.hypot(found["motor"], np.where(run.creeping, held, 0.0))
     return found
 
 
-def unknown_torque(run: Measured, bench: Bench, observer_s: float) -> FloatArray:
-    """Standard deviation (n,) of the torque that a recording leaves open [motor unit]; 0 in a complete one.
+def unknown_torque(run: Measured, bench: Bench) -> FloatArray:
+    """Standard deviation (n,) of the torque from row to row that samples of it leave open [motor unit].
 
-    Between samples of a torque it is `Measured.torque_gap`. The sign of Coulomb friction is not known in a sample next
-    to which the direction of motion is another one, nor, where positions are coarser than the counts of the bench,
-    while the motor passes less than a step in the observer's time constant.
+    It is `Measured.torque_gap`, and that of Coulomb friction, whose sign is not known where the direction of motion
+    changes between neighbouring rows.
     """
-    found, unsure = np.zeros(run.motor.size), np.zeros(run.motor.size, dtype=bool)
-    count = np.sqrt(12.0) * run.noise.motor
-    if run.sampled:
-        found = run.torque_gap
-        direction = np.sign(np.diff(run.motor, append=run.motor[-1]))
-        turning = np.diff(direction, prepend=direction[0]) != 0.0
-        unsure |= maximum_filter1d(turning, 3)
-    if run.noise.coarse:
-        ticks = max(round(observer_s / run.period_s), 1)
-        passed = np.abs(np.convolve(np.gradient(run.motor), np.ones(ticks), mode="same"))
-        unsure |= passed < count
-    if unsure.any():
-        moved = maximum_filter1d(run.motor, _NEAR_ROWS) - minimum_filter1d(run.motor, _NEAR_ROWS)
-        unsure &= moved > 1.5 * count  # not at rest
-        found = np.hypot(found, np.where(unsure, bench.axis.physics().coulomb_n_m, 0.0))
-    return np.asarray(found, dtype=np.float64)
+    direction = np.sign(np.diff(run.motor, append=run.motor[-1]))
+    turning = maximum_filter1d(np.diff(direction, prepend=direction[0]) != 0.0, 3)
+    step = np.sqrt(12.0) * run.noise.motor
+    moved = maximum_filter1d(run.motor, _NEAR_ROWS) - minimum_filter1d(run.motor, _NEAR_ROWS)
+    unsure = turning & (moved > 1.5 * step)  # not at rest
+    return np.asarray(np.hypot(run.torque_gap, np.where(unsure, bench.axis.physics().coulomb_n_m, 0.0)))
 
 
 def impulse_responses(run: Measured, bench: Bench, observer_s: float) -> dict[str, FloatArray]:

@@ -274,7 +274,8 @@ class Hypothesis:
             periods = (self.resolved.bench.torque_delay_s or 0.0) / run.period_s
             command, torque = (delayed_mean(values, periods) for values in (measured.torque_command, measured.torque))
             measured = measured._replace(torque_command=command, torque=torque)
-        predicted = twin.observe(run.position_command_m, run.velocity_command_m_s, measured, run.start)
+        resting = run.creeping if run.noise.coarse else None
+        predicted = twin.observe(run.position_command_m, run.velocity_command_m_s, measured, run.start, resting)
         found = differences(measured, predicted, self.bench, run.judged)
         found["command"] = measured.torque_command - predicted.torque_command
         return found | {name: np.zeros(run.motor.size) for name in run.unseen}

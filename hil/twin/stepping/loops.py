@@ -102,14 +102,14 @@ def replay_law(gains, state, setpoints, measured):  # type: ignore[no-untyped-de
 
 
 @njit(cache=True, nogil=True, **COMPILE)
-def observe(gains, state, setpoints, measured, axis):  # type: ignore[no-untyped-def]
+def observe(gains, state, setpoints, measured, resting, axis):  # type: ignore[no-untyped-def]
     """Run each block on measured inputs (a `Response`): motor, table, torque command, torque, each (n,).
 
     The controller gets the measured positions, the drive the measured command, the axis that torque, and the
     transmission the measured motor: the twin's motor is corrected by it after each prediction, its table only while
     it floats in a gap or rests. So a mismatch shows in its own block, at its own place and time, and is then
-    forgotten. The measured table is empty without a linear encoder. Its datum is the mean difference from the twin
-    while the axis moves.
+    forgotten. `resting` (n,) marks the rows at which the motor rests. The measured table is empty without a linear
+    encoder. Its datum is the mean difference from the twin while the axis moves.
     """
     constants, modes, values, codes, delta, memory = axis
     c, own, shapes = constants[0], memory[0], shapes_of(modes)
@@ -129,8 +129,7 @@ def observe(gains, state, setpoints, measured, axis):  # type: ignore[no-untyped
         error = measured_motor[k] - motor[k]
         _correct(shapes.motor_impulse, error, c.period, c.observer, delta)
         if measured_table.size:
-            passed = abs(measured_motor[k] - measured_motor[max(k - 1, 0)])
-            free = passed <= c.slow_velocity * c.period or own.floating > 0.0
+            free = resting[k] or own.floating > 0.0
             apart = measured_table[k] - table[k] - c.ratio * error
             if not free:
                 moved += 1

@@ -161,7 +161,7 @@ def _fitted(law: _Law, twin: Twin, runs: Sequence[Measured], cuts: Sequence[int]
     if y.size:
         rows = sum(part.size / correlation_time(part) for part in found)
         variance = float(np.sum(fit.fun**2)) / max(rows - law.count, 1.0) * rows / fit.fun.size
-        errors = np.sqrt(variance * np.diag(np.linalg.pinv(fit.jac.T @ fit.jac)))
+        errors = np.sqrt(variance * np.maximum(np.diag(np.linalg.pinv(fit.jac.T @ fit.jac)), 0.0))
     of_gains = tuple(float(one) for one in errors[:4]) if law.free else (0.0, 0.0, 0.0, 0.0)
     commands = np.concatenate(
         [run.torque_command[run.judged] - np.mean(run.torque_command[run.judged]) for run in runs]

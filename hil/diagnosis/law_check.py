@@ -32,6 +32,10 @@ from hil.twin.mechanism import Stage
 # Share of the torque command (rms) up to which a law that is not at the noise floor is that of the recording: gains
 # and structure leave tens of per cent if they are wrong, mechanisms on the controller's inputs a few.
 REPLAYED = 0.05
+_COARSE = (
+    "The positions are recorded with coarser steps than the control loop saw: the control law reproduces the commands "
+    "to the noise that these steps make, and was not tested further."
+)
 _SAME_PERIOD = 0.01  # relative: stamps are printed with few digits
 _SURE = 3.0  # standard errors from which a gain differs from that of the bench
 _MATERIAL = 1e-3  # relative change of a gain that is worth a correction: settings have three digits
@@ -41,14 +45,15 @@ _MATERIAL = 1e-3  # relative change of a gain that is worth a correction: settin
 class LawCheck:
     """Bench whose control law may be used, corrections of its gains, and notes.
 
-    `command_noise` is the noise of the replayed command of each run beyond that of the torque. `advice` is what the
+    `coarse`: the law is right to the noise that the recorded positions make in a replay, and cannot be tested further.
+    `advice` is what the
     owner should check, empty if nothing; `mismatch`: the law was set aside because no gains reproduce the commands.
     """
 
     bench: Bench
     corrections: dict[str, Correction] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
-    command_noise: tuple[float, ...] = ()
+    coarse: bool = False
     advice: str = ""
     mismatch: bool = False
     resampled: bool = False  # the rows are not the ticks of the velocity loop
@@ -67,12 +72,11 @@ class LawCheck:
             return Verdict.PARAMETER_ERROR
         return of_plant
 
-    def weighted(self, runs: Sequence[Measured]) -> list[Measured]:
-        """The runs, with the noise of the replayed command (the largest one found, as the gains are the same)."""
-        if not self.command_noise:
+    def judged(self, runs: Sequence[Measured]) -> list[Measured]:
+        """The runs, without the command of the controller if they are too coarse to test it."""
+        if not self.coarse:
             return list(runs)
-        more = max(self.command_noise)
-        return [replace(run, noise=replace(run.noise, command=more)) for run in runs]
+        return [replace(run, unseen=run.unseen | {"command"}) for run in runs]
 
 
 def replayable(bench: Bench, recordings: Sequence[Recording]) -> LawCheck:
@@ -118,7 +122,8 @@ def check_law(runs: Sequence[Measured], bench: Bench) -> LawCheck:
         relative = [np.hypot(1.0, more / run.noise.torque) ** 2 for more, run in zip(noise, runs, strict=True)]
         parts = zip(found.parts, relative, strict=True)
         if max(float(part @ part) / part.size / allowed for part, allowed in parts) <= FLOOR:
-            return replace(_accepted(bench, found), command_noise=noise)
+            law = _accepted(bench, found)
+            return replace(law, coarse=True, notes=(*law.notes, _COARSE))
     rows = min(one.independent_rows for one in tried)
     best = min(tried, key=lambda one: one.bic(rows))
     if best.left <= REPLAYED:

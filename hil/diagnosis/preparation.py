@@ -50,6 +50,6 @@ def prepare_diagnosis(train: Sequence[Recording], validate: Sequence[Recording],
         if law.bench is not judged:
             judged = reduced(law.bench, runs)
             prepared = prepare(runs, judged)
-    prepared = law.weighted(prepared)
+    prepared = law.judged(prepared)
     data = prepare_dataset(prepared[: len(train)], judged)
     return Prepared(data, data.over(prepared[len(train) :]), judged, law, (*notes, *law.notes))

@@ -127,7 +127,7 @@ def scales(
         "motor": np.hypot(run.motor_noise * np.linalg.norm(passed), seen),
         "table": table,
         "torque": torque,
-        "command": np.hypot(torque, run.noise.command),
+        "command": torque,
     }
     if run.sampled:
         unknown = unknown_torque(run, bench)

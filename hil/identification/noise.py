@@ -22,9 +22,8 @@ _DIGITS = 1e-7  # of the largest value: rounding of a recording in single precis
 class Noise:
     """Standard deviation of the white noise of a sensor: motor [rad or m], table [m], torque [N m or N].
 
-    `motor` is the noise of its travel per period if its velocity was recorded in place of its position. `command` is
-    that of a replayed command where the control loop saw finer positions than were recorded. `coarse`: the recorded
-    steps of the motor position are coarser than the counts of the bench.
+    `motor` is the noise of its travel per period if its velocity was recorded in place of its position. `coarse`: the
+    recorded steps of the motor position are coarser than the counts of the bench.
 
     `table_m` is that of table position less r x motor position, 0 without a linear encoder. `jitter_s` is that of the
     sampling instants of the encoders: its position error is proportional to the speed and equal for both.
@@ -34,7 +33,6 @@ class Noise:
     table_m: float
     torque: float
     jitter_s: float = 0.0
-    command: float = 0.0
     coarse: bool = False
 
 
@@ -126,6 +124,7 @@ _LAGS = 6  # strongest peaks of the correlation that are tried: each row counts 
 _NEAR = 30  # rows about a peak of the correlation that are searched: the shrinking overlap shifts a peak by a few
 _SAME_M = 2e-6  # set-points closer than this are the same: printed ones are rounded to 1 µm
 _SETTLED_S = 0.3  # set-points must have been equal for this time: friction and play depend on the past
+_LAP_ROWS = 500  # of a block: longer than the response of an axis, shorter than a lap
 _ENOUGH_S = 1.0  # least repeated motion: 1000 rows at 1 kHz give the floor to a few per cent
 
 
@@ -137,9 +136,18 @@ class Laps:
     again: Rows
     lag_s: float  # the lag with the most rows
 
-    def noise(self, residual: FloatArray) -> float:
+    def difference(self, residual: FloatArray) -> float:
         """Standard deviation of the non-repeating part of a residual (n,)."""
         return float(np.sqrt(np.mean((residual[self.first] - residual[self.again]) ** 2) / 2.0))
+
+    def noise(self, residual: FloatArray) -> float:
+        """Standard deviation of the part of a residual (n,) that neither repeats nor has structure in time.
+
+        A push in one lap does not repeat either, but is no noise: the median over blocks of rows leaves it out.
+        """
+        squares = (residual[self.first] - residual[self.again]) ** 2 / 2.0
+        blocks = squares[: squares.size // _LAP_ROWS * _LAP_ROWS].reshape(-1, _LAP_ROWS).mean(axis=1)
+        return min(float(np.sqrt(np.median(blocks))), self.difference(residual)) if blocks.size else 0.0
 
 
 def find_laps(position: FloatArray, velocity: FloatArray, period_s: float) -> Laps | None:

@@ -10,10 +10,14 @@ from hil.control import cascade
 from hil.twin.stepping import kernel
 from hil.twin.stepping.contact import COMPILE
 from hil.twin.stepping.records import shapes_of
+from hil.twin.stepping.transmission import along
 
 # Time constant of the observer that holds a floating table: long against a 2 ms table-encoder count at creep,
 # short against a flight through the gap (tens of ms).
 OBSERVER_S = 0.008
+# Least time constant of any observer in ticks: the sampled error of a rigid body decays by 3/4 per tick with 2, grows
+# with 1.
+LEAST_TICKS = 2.0
 # Time constant with which the replayed integrator follows the recorded command: slow against every filter or delay.
 INTEGRATOR_S = 0.1
 
@@ -31,12 +35,13 @@ class Setpoints(NamedTuple):
 @njit(**COMPILE)
 def _correct(impulse, error, period, time_constant, delta):  # type: ignore[no-untyped-def]
     """Correct the state of one side of the transmission by the error of its position [motor units]: a Luenberger
-    observer. The side moves as one body: a motor alone would wind up its coupling."""
+    observer. The side moves as one body: a motor alone would wind up its coupling. Return the shift of that side."""
     shift = 2.0 * period / time_constant * error
     kick = period / time_constant**2 * error
     for i in range(delta.shape[1]):
         delta[0, i] += impulse[i] * shift
         delta[1, i] += impulse[i] * kick
+    return shift
 
 
 @njit(cache=True, nogil=True, **COMPILE)
@@ -66,7 +71,7 @@ def closed_loop(gains, state, setpoints, misread, measured_table, axis):  # type
         command[k] = outputs.torque_n_m
         if told > 0 and own.floating > 0.0:
             error = (measured_table[k] - datum - table[k]) / c.ratio
-            _correct(shapes.table_impulse, error, c.period, OBSERVER_S, delta)
+            _correct(shapes.table_impulse, error, c.period, max(OBSERVER_S, LEAST_TICKS * c.period), delta)
         torque[k] = _advance(command[k], constants, modes, values, codes, delta, memory)
     return motor, table, command, torque
 
@@ -92,6 +97,8 @@ def observe(gains, state, setpoints, measured, axis):  # type: ignore[no-untyped
     motor, table, wanted, torque = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
     seen = measured_motor * c.ratio if measured_table.size == 0 else measured_table
     datum, settled, moved = 0.0, 0, 0
+    across = along(shapes.table, shapes.motor_impulse)  # 1 for a rigid axis: a shift of the motor moves the table
+    hold = max(OBSERVER_S, LEAST_TICKS * c.period)
     for k in range(n):
         motor[k], table[k] = _read(constants, modes, values, codes, delta, memory)
         inputs = cascade.Inputs(setpoints.position_m[k], setpoints.velocity_m_s[k], measured_motor[k], seen[k])
@@ -108,7 +115,7 @@ def observe(gains, state, setpoints, measured, axis):  # type: ignore[no-untyped
             state.filtered_velocity_rad_s,
         )
         error = measured_motor[k] - motor[k]
-        _correct(shapes.motor_impulse, error, c.period, c.observer, delta)
+        shift = _correct(shapes.motor_impulse, error, c.period, c.observer, delta)
         if measured_table.size:
             passed = abs(measured_motor[k] - measured_motor[max(k - 1, 0)])
             free = passed <= c.slow_velocity * c.period or own.floating > 0.0
@@ -121,8 +128,9 @@ def observe(gains, state, setpoints, measured, axis):  # type: ignore[no-untyped
                 settled += 1
                 datum += (apart - datum) / settled
             if free and moved + settled > 0:
-                error = (measured_table[k] - datum - table[k]) / c.ratio
-                _correct(shapes.table_impulse, error, c.period, OBSERVER_S, delta)
+                # what the motor's correction left: two corrections of one body for one error would overshoot
+                error = (measured_table[k] - datum - table[k]) / c.ratio - across * shift
+                _correct(shapes.table_impulse, error, c.period, hold, delta)
         torque[k] = _advance(command[k], constants, modes, values, codes, delta, memory)
     return motor, table, wanted, torque
 

@@ -264,11 +264,7 @@ def _notes(
             f"Figures of {', '.join(blocks)} are block by block, with measured inputs: in closed loop the twin "
             "deviates from the recording by more than the noise although every block is at its floor (chaotic loop)."
         )
-    notes += [
-        f"{title(ablation.term.effect)} was dropped: it improves the fit to the training recordings, but worsens that "
-        "to held-out recordings or repeated laps."
-        for ablation in proof.dropped
-    ]
+    notes += [f"{title(ablation.term.effect)} was dropped: {ablation.refuted}." for ablation in proof.dropped]
     notes += [
         f"{title(ablation.term.effect)} has no visible effect in the held-out recordings: it is not validated by them."
         for index, ablation in enumerate(proof.ablations)

@@ -106,10 +106,13 @@ _BLOCK_ROWS = 200  # longer than the correlation of residuals: 0.2 s at 1 kHz
 def standard_errors(found: Fit) -> list[float]:
     """Standard error of each physical parameter, robust against coloured residuals (sandwich estimator):
 
-        A^-1 (sum over blocks of g g^T) A^-1,   A = J^T J,   g = J^T r of a block      (Liang and Zeger 1986)
+        A^-1 B A^-1,   A = J^T J
+        B = sum over blocks of g g^T,   g = J^T r of a block                           (Liang and Zeger 1986)
+        B = sum over parts of  s^2 t J^T J,   s: rms of what is left, t: its correlation time in rows
 
-    multiplied by `_WIDENED`. A controller replayed bit-identically leaves no noise; then the error is 1/100 of the step
-    of the forward difference.
+    the larger of both, multiplied by `_WIDENED`. The second holds for residuals that are correlated over more than a
+    block, of which the first sees too few. A controller replayed bit-identically leaves no noise; then the error is
+    1/100 of the step of the forward difference.
     """
     scale = np.linalg.norm(found.jacobian, axis=0)
     scale[scale == 0.0] = 1.0
@@ -118,8 +121,11 @@ def standard_errors(found: Fit) -> list[float]:
     ends = (0, *found.residuals.splits, found.rows)
     starts = np.concatenate([np.arange(begin, end, _BLOCK_ROWS) for begin, end in pairwise(ends)])
     score = np.add.reduceat(slope * found.residuals.vector[:, None], starts, axis=0)
-    covariance = inverse @ (score.T @ score) @ inverse
-    errors = np.sqrt(np.maximum(np.diag(covariance), 0.0)) / scale
+    left = np.zeros_like(inverse)
+    for part, own in zip(found.residuals.parts.values(), np.split(slope, found.residuals.splits), strict=True):
+        left += float(np.mean(part**2)) * correlation_time(part) * (own.T @ own)
+    covariances = (inverse @ middle @ inverse for middle in (score.T @ score, left))
+    errors = np.sqrt(np.maximum.reduce([np.diag(one) for one in covariances] + [np.zeros(scale.size)])) / scale
     hypothesis = found.hypothesis
     steps = found.estimator.steps(hypothesis)
     return [

@@ -8,6 +8,7 @@ with the value of the stage (see `Stage`), the moment (see `Moment`), the parame
 order, and its own WIDTH numbers of state. Units are those of the motor side: rad and N m, or m and N on a linear axis.
 """
 
+import math
 from collections.abc import Callable, MutableSequence, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -133,6 +134,7 @@ class Mechanism:
     valid: Callable[[Sequence[float], int, AxisFacts], bool] | None = None  # (values, variant, axis): name applies
     proportional: bool = True  # the change is proportional to the strength
     neutral_at_zero: bool = True  # without effect where the strength is zero
+    neutral: Callable[[AxisFacts], float] | None = None  # strength without effect, if it is finite and not 0
     needs_table: bool = False  # not observable without a linear encoder
     transient: bool = False  # belongs to one recording: not expected on another motion
     softens: bool = False  # changes the stiffness of a spring of the chain
@@ -184,8 +186,27 @@ class Mechanism:
         return self.typical(axis) if self.typical else self._inside([default_typical(p, axis) for p in self.parameters])
 
     def is_valid(self, values: Sequence[float], variant: int, axis: AxisFacts) -> bool:
-        """Check that the effect has a size, that its name applies, and that the sensors can show it."""
-        return self._has_size(values) and (self.valid is None or self.valid(values, variant, axis))
+        """Check that the effect has a size, that the motion passes a whole wave of it, that its name applies, and that
+        the sensors can show it."""
+        if not self._has_size(values) or self.wavelength_m(values, axis) > axis.travel_m:
+            return False
+        return self.valid is None or self.valid(values, variant, axis)
+
+    def wavelength_m(self, values: Sequence[float], axis: AxisFacts) -> float:
+        """Length along the travel in which the effect repeats [m]; 0 if it is not periodic in position or angle.
+
+        With a phase but no period or order it repeats once per revolution.
+        """
+        period_m = self.named(Role.PERIOD, values)
+        if period_m is not None:
+            return period_m
+        if not self.indices(Role.PHASE):
+            return 0.0
+        return 2.0 * math.pi * axis.ratio / (axis.angle_per_unit * (self.named(Role.ORDER, values) or 1.0))
+
+    def size(self, values: Sequence[float], axis: AxisFacts) -> float:
+        """Distance of the strength from the value without effect, in the unit of the strength."""
+        return abs(values[self.strength] - (self.neutral(axis) if self.neutral else 0.0))
 
     def _has_size(self, values: Sequence[float]) -> bool:
         """Check that a strength is off the bound at which there is no effect."""

@@ -28,6 +28,7 @@ from hil.identification.hypothesis import Hypothesis
 from hil.identification.measured import Measured
 from hil.identification.noise_floor import rms
 from hil.identification.residuals import differences
+from hil.twin.axis import Response
 from hil.twin.library import BY_ID
 from hil.twin.mechanism import Stage
 from hil.twin.stepping.loops import INTEGRATOR_S
@@ -115,7 +116,12 @@ def compare_blocks(hypothesis: Hypothesis, data: Dataset) -> tuple[BlockDeviatio
 
 
 def _mechanics(hypothesis: Hypothesis, run: Measured, observer_s: float) -> dict[str, FloatArray]:
-    """Residuals (n,) of motor and table with the measured torque as input.
+    """Residuals (n,) of motor and table with the measured torque as input."""
+    return differences(*held_on_motor(hypothesis, run, observer_s), hypothesis.bench, run.judged)
+
+
+def held_on_motor(hypothesis: Hypothesis, run: Measured, observer_s: float) -> tuple[Response, Response]:
+    """Measured channels, lateness undone, and those of the twin held on the motor, with the measured torque as input.
 
     Mechanisms of the drive and of the recorded channels are omitted: the measured torque already contains them.
     """
@@ -124,7 +130,7 @@ def _mechanics(hypothesis: Hypothesis, run: Measured, observer_s: float) -> dict
     mechanical = tuple(active for active in twin.active if stage_of(BY_ID[active.effect], active.variant) not in _DRIVE)
     inputs = measured._replace(torque_command=measured.torque)
     held = replace(twin, active=mechanical).observe(run.position_command_m, run.velocity_command_m_s, inputs, run.start)
-    return differences(measured, held, hypothesis.bench, run.judged)
+    return measured, held
 
 
 def low_pass(values: FloatArray, period_s: float) -> FloatArray:

@@ -108,6 +108,7 @@ class Variant:
     starts: Callable[[Scene], Points] | None = None  # if they differ from the mechanism's
     proportional: bool = True  # the change is proportional to the strength
     needs_table: bool = False  # not observable without a linear encoder
+    sign: float = 1.0  # of its strength where its effect is nearly that of the first variant
     form_of: str = ""  # id of a friction law whose form a small contribution corrects
     play: bool = False  # the flanks of the transmission push only: contacts open and close
     slips: bool = False  # the contact is of Maxwell slip elements
@@ -140,6 +141,7 @@ class Mechanism:
     softens: bool = False  # changes the stiffness of a spring of the chain
     most: int = 1  # number that may act at once, with periods or orders of their own
     screw_locked: bool = False  # at one slow speed, a share of Coulomb friction that repeats with the screw
+    first_unless_clear: bool = False  # an earlier variant is named unless a later one leaves clearly less energy
     same_as: str = ""  # id of a less common cause whose first variant is the same torque as this one's
     hidden_starts: tuple[tuple[float, ...], ...] = ()  # starts where refitted springs hide it; the first value is in
     # units of the largest stretch of the transmission

@@ -35,13 +35,12 @@ class Setpoints(NamedTuple):
 @njit(**COMPILE)
 def _correct(impulse, error, period, time_constant, delta):  # type: ignore[no-untyped-def]
     """Correct the state of one side of the transmission by the error of its position [motor units]: a Luenberger
-    observer. The side moves as one body: a motor alone would wind up its coupling. Return the shift of that side."""
+    observer. The side moves as one body: a motor alone would wind up its coupling."""
     shift = 2.0 * period / time_constant * error
     kick = period / time_constant**2 * error
     for i in range(delta.shape[1]):
         delta[0, i] += impulse[i] * shift
         delta[1, i] += impulse[i] * kick
-    return shift
 
 
 @njit(cache=True, nogil=True, **COMPILE)
@@ -97,7 +96,8 @@ def observe(gains, state, setpoints, measured, axis):  # type: ignore[no-untyped
     motor, table, wanted, torque = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
     seen = measured_motor * c.ratio if measured_table.size == 0 else measured_table
     datum, settled, moved = 0.0, 0, 0
-    across = along(shapes.table, shapes.motor_impulse)  # 1 for a rigid axis: a shift of the motor moves the table
+    # a shift of the motor moves the table of a rigid axis with it: the motor alone holds it
+    rigid = along(shapes.table, shapes.motor_impulse) > 0.5
     hold = max(OBSERVER_S, LEAST_TICKS * c.period)
     for k in range(n):
         motor[k], table[k] = _read(constants, modes, values, codes, delta, memory)
@@ -115,7 +115,7 @@ def observe(gains, state, setpoints, measured, axis):  # type: ignore[no-untyped
             state.filtered_velocity_rad_s,
         )
         error = measured_motor[k] - motor[k]
-        shift = _correct(shapes.motor_impulse, error, c.period, c.observer, delta)
+        _correct(shapes.motor_impulse, error, c.period, c.observer, delta)
         if measured_table.size:
             passed = abs(measured_motor[k] - measured_motor[max(k - 1, 0)])
             free = passed <= c.slow_velocity * c.period or own.floating > 0.0
@@ -127,9 +127,8 @@ def observe(gains, state, setpoints, measured, axis):  # type: ignore[no-untyped
                 # its first rest is the datum until motion gives a better one; not within a gap
                 settled += 1
                 datum += (apart - datum) / settled
-            if free and moved + settled > 0:
-                # what the motor's correction left: two corrections of one body for one error would overshoot
-                error = (measured_table[k] - datum - table[k]) / c.ratio - across * shift
+            if free and moved + settled > 0 and not rigid:
+                error = (measured_table[k] - datum - table[k]) / c.ratio
                 _correct(shapes.table_impulse, error, c.period, hold, delta)
         torque[k] = _advance(command[k], constants, modes, values, codes, delta, memory)
     return motor, table, wanted, torque

@@ -35,6 +35,7 @@ from hil.twin.stepping.loops import INTEGRATOR_S
 from hil.twin.stepping.stages import stage_of
 
 LOW_PASS_HZ, LOW_PASS_ORDER = 100.0, 4  # as in the inverse-dynamics identification of EMPS
+MOTOR_BLOCK, TABLE_BLOCK = "motor and load", "transmission and table"
 _DRIVE = (Stage.CURRENT, Stage.CHANNEL)
 
 
@@ -102,7 +103,7 @@ def compare_blocks(hypothesis: Hypothesis, data: Dataset) -> tuple[BlockDeviatio
         blocks.append(BlockDeviation(drive, f"measured {name} command", run.noise.torque))
     held = _mechanics(hypothesis, run, data.observer_s)
     torque = inertia(data.bench) / data.observer_s**2  # torque per innovation
-    motor = Deviation("motor and load", name, unit, run.torque, run.torque + torque * held["motor"], judged)
+    motor = Deviation(MOTOR_BLOCK, name, unit, run.torque, run.torque + torque * held["motor"], judged)
     inputs = f"measured {name}, held on the measured motor position"
     remark = f"deviation: {name} missing in the twin's mechanics, up to {0.5 / np.pi / data.observer_s:.0f} Hz"
     blocks.append(BlockDeviation(motor, inputs, torque * rms(scale["motor"][judged]), remark))
@@ -110,7 +111,7 @@ def compare_blocks(hypothesis: Hypothesis, data: Dataset) -> tuple[BlockDeviatio
         stretch = run.table_m - bench.axis.ratio_m_rad * run.motor
         stretch = stretch - np.mean(stretch[judged])
         label = "table less motor position"
-        table = Deviation("transmission and table", label, "m", stretch, stretch - held["table"], judged)
+        table = Deviation(TABLE_BLOCK, label, "m", stretch, stretch - held["table"], judged)
         blocks.append(BlockDeviation(table, "measured motor position (twin held on it)", run.noise.table_m))
     return tuple(blocks)
 

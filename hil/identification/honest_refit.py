@@ -7,7 +7,8 @@ than the bench file in no channel:
     x = x_bench + t (x_fit - x_bench),   t = 1, 1/2, 1/4, ..., 0
 """
 
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -17,6 +18,7 @@ from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.measured import Measured
+from hil.identification.noise_floor import FLOOR, rms
 from hil.twin.axis import Response
 
 Figures = Mapping[str, float]  # rms of each reported channel; infinite where the twin is unstable
@@ -37,7 +39,7 @@ def never_worse(fit: Fit, figures: Callable[[Hypothesis], Figures], enough: Figu
     def worse(at: Hypothesis) -> bool:
         found = figures(at)
         # "not less or equal" also holds for values that are not a number
-        return any(not found[name] <= max(SAME * before[name], enough.get(name, 0.0)) for name in before)
+        return any(not found.get(name, math.inf) <= max(SAME * before[name], enough.get(name, 0.0)) for name in before)
 
     if not worse(hypothesis):
         return fit
@@ -46,6 +48,39 @@ def never_worse(fit: Fit, figures: Callable[[Hypothesis], Figures], enough: Figu
     at = next((point for point in between if not worse(point)), hypothesis.owner)
     estimator = fit.estimator
     return replace(estimator.evaluate(at), jacobian=estimator.jacobian(at), converged=False)
+
+
+def rms_of_channels(hypothesis: Hypothesis, data: Dataset) -> dict[str, float]:
+    """Residual rms of each channel over all runs, block by block and, with a control law, in closed loop."""
+    bench = hypothesis.bench
+    blocks = hypothesis.residuals(data).channels
+    found = {f"{name}, block": _over_runs([part[name] for part in blocks], data) for name in _names(data)}
+    if not bench.law_known:
+        return found
+    if not holds(hypothesis, data):
+        return found | {f"{name}, closed loop": math.inf for name in _names(data)}
+    closed, ratio = hypothesis.residuals(data, closed=True).channels, bench.axis.ratio_m_rad
+    for name in _names(data):
+        parts = [part[name] + ratio * part["motor"] if name == "table" else part[name] for part in closed]
+        found[f"{name}, closed loop"] = _over_runs(parts, data)
+    return found
+
+
+def rms_at_floor(data: Dataset) -> dict[str, float]:
+    """Residual rms of each channel up to which it is explained, by the names of `rms_of_channels`."""
+    found = {name: FLOOR**0.5 * _over_runs([scale[name] for scale in data.noise], data) for name in _names(data)}
+    return {f"{name}, {mode}": level for name, level in found.items() for mode in ("block", "closed loop")}
+
+
+def _names(data: Dataset) -> list[str]:
+    run = data.runs[0]
+    given = ("motor", "table", "torque") if run.table_m.size else ("motor", "torque")
+    return [name for name in given if name not in run.unseen]
+
+
+def _over_runs(parts: Sequence[FloatArray], data: Dataset) -> float:
+    with np.errstate(over="ignore"):  # the observer of a hypothesis may be unstable too
+        return rms(np.concatenate([part[run.judged] for part, run in zip(parts, data.runs, strict=True)]))
 
 
 def holds(hypothesis: Hypothesis, data: Dataset) -> bool:

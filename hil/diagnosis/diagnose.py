@@ -144,7 +144,8 @@ def diagnose(
     proof = cross_validate(nominal, renamed(explanation.final), held_out)
     verdict = judge(owner, nominal, proof.final, held_out)
     named = verdict is Verdict.MISSING_PHYSICS
-    nominal = reported_refit(nominal)
+    refit = reported_refit(nominal)
+    nominal = refit.fit
     explanation = replace(explanation, nominal=nominal)
     final = {Verdict.MISSING_PHYSICS: proof.final, Verdict.NO_MISMATCH: owner}.get(verdict, nominal)
     # a parameter error is located and measured against the parameters of the bench file
@@ -165,7 +166,7 @@ def diagnose(
         experiment = separating(explanation, proof.final, held_out) if named else showing(nominal, hidden, held_out)
     left = torque_left(owner, nominal, final, held_out)
     notes += [*notes_on(table, proof, forms, verdict, explanation, final), *ended(final), *on_torque(left)]
-    notes += [experiment.note] if experiment else []
+    notes += [note for note in (refit.note, experiment.note if experiment else "") if note]
     notes += [] if bench.law_known else untold(data)
     notes += [stopped(explanation, budget_s)] if explanation.stopped_at else []
     result = Result(

@@ -256,6 +256,8 @@ def _notes(measured: Measured, bench: Bench, fit: FitResult | None, datum: float
         )
     if fit is not None:
         notes.append("The parameters were fitted to this recording: validate the fitted bench on another recording.")
+    if fit is not None and fit.note:
+        notes.append(fit.note)
     stuck = [parameter.name for parameter in fit.parameters if parameter.at_bound] if fit else []
     if stuck:
         notes.append(

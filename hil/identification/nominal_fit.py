@@ -39,6 +39,7 @@ class FitResult:
     bench: Bench
     parameters: tuple[FittedParameter, ...]
     status: FitStatus
+    note: str = ""  # on a fit that was shortened because it would be worse than the bench file
 
     @property
     def converged(self) -> bool:
@@ -74,10 +75,11 @@ def fit_nominal(data: Dataset, figures: Callable[[Hypothesis], Figures] | None =
     """
     found = fit_nominal_parameters(data, MOST_STEPS)
     require_finite(found)
-    found = never_worse(found, figures or partial(rms_of_channels, data=data), rms_at_floor(data))
+    refit = never_worse(found, figures or partial(rms_of_channels, data=data), rms_at_floor(data))
+    found = refit.fit
     axis = data.bench.axis
     parameters = tuple(
         FittedParameter(name, float(getattr(axis, name)), value, error, name in found.at_bound)
         for name, value, error in zip(axis.NOMINAL, found.hypothesis.values, standard_errors(found), strict=True)
     )
-    return FitResult(found.bench, parameters, found.status)
+    return FitResult(found.bench, parameters, found.status, refit.note)

@@ -44,10 +44,8 @@ class Refit(NamedTuple):
         """Sentence on a fit that was shortened; empty for a full one."""
         if not self.worse:
             return ""
-        kept = (
-            f"{100.0 * self.share:g} % of its change was taken" if self.share else "the values of the bench were kept"
-        )
-        return f"The refit would be worse than the bench file in {', '.join(self.worse)}: {kept}."
+        kept = f"{100.0 * self.share:g} % of its change was taken" if self.share else "the bench's values were kept"
+        return f"The refit would be worse than the bench file in {'; '.join(self.worse)}: {kept}."
 
 
 def never_worse(fit: Fit, figures: Callable[[Hypothesis], Figures], enough: Figures) -> Refit:

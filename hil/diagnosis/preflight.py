@@ -245,7 +245,9 @@ def _limit_cycle_hz(run: Measured, level: float) -> float | None:
     phases = 1 + np.count_nonzero(np.diff(motion[motion != 0.0]))
     if swings.size < _SWINGS * phases:
         return None
-    return float(1.0 / (2.0 * run.period_s * np.median(np.diff(swings))))
+    half = float(np.median(np.diff(swings)))
+    # at rest a command may flicker for a while
+    return 1.0 / (2.0 * run.period_s * half) if half * swings.size > SATURATED * np.count_nonzero(run.moving) else None
 
 
 def _slope(over: FloatArray, values: FloatArray) -> float:

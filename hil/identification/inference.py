@@ -13,7 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 from scipy.linalg import solve_toeplitz
-from scipy.signal import correlate, lfilter
+from scipy.signal import correlate, fftconvolve, lfilter
 
 from hil.arrays import FloatArray
 from hil.identification.estimator import Fit
@@ -113,15 +113,24 @@ _LEAST = 0.01  # least standard error in steps of the forward difference, which 
 _BLOCK_ROWS = 200  # longer than the correlation of residuals: 0.2 s at 1 kHz
 
 
+def _with_covariance(part: FloatArray, columns: FloatArray) -> FloatArray:
+    """Columns (n, p) multiplied by the covariance (n, n) of a residual (n,), up to `_SOKAL` correlation times."""
+    lags = min(int(_SOKAL * correlation_time(part)) + 1, part.size)
+    covariance = correlate(part, part, method="fft")[part.size - 1 : part.size - 1 + lags] / part.size
+    covariance = covariance * (1.0 - np.arange(lags) / lags)
+    kernel = np.concatenate([covariance[:0:-1], covariance])
+    return np.asarray(fftconvolve(columns, kernel[:, None], mode="full", axes=0)[lags - 1 :][: part.size])
+
+
 def standard_errors(found: Fit) -> list[float]:
     """Standard error of each physical parameter, robust against coloured residuals (sandwich estimator):
 
         A^-1 B A^-1,   A = J^T J
         B = sum over blocks of g g^T,   g = J^T r of a block                           (Liang and Zeger 1986)
-        B = sum over parts of  s^2 t J^T J,   s: rms of what is left, t: its correlation time in rows
+        B = sum over parts of  J^T C J,   C: covariance of what is left, by its autocorrelation   (Newey and West 1987)
 
     the larger of both, multiplied by `_WIDENED`. The second holds for residuals that are correlated over more than a
-    block, of which the first sees too few. A controller replayed bit-identically leaves no noise; then the error is
+    block. A controller replayed bit-identically leaves no noise; then the error is
     1/100 of the step of the forward difference.
     """
     scale = np.linalg.norm(found.jacobian, axis=0)
@@ -133,7 +142,7 @@ def standard_errors(found: Fit) -> list[float]:
     score = np.add.reduceat(slope * found.residuals.vector[:, None], starts, axis=0)
     left = np.zeros_like(inverse)
     for part, own in zip(found.residuals.parts.values(), np.split(slope, found.residuals.splits), strict=True):
-        left += float(np.mean(part**2)) * correlation_time(part) * (own.T @ own)
+        left += own.T @ _with_covariance(part, own)
     covariances = (inverse @ middle @ inverse for middle in (score.T @ score, left))
     errors = np.sqrt(np.maximum.reduce([np.diag(one) for one in covariances] + [np.zeros(scale.size)])) / scale
     hypothesis = found.hypothesis

@@ -2,13 +2,9 @@
 
     left = rms(T - T_model) / std(T)      over the rows in which the axis slides, up to some 20 Hz
 
-The twin is held on the measured motion by its observer and fed the measured torque. Its innovation e tells the torque d
-that its mechanics lack: with the observer's error x, the modes' exact discretisation A, b and the correction l,
-
-    x' = A (x - l c x) + b d,   e = c x     hence at low frequency  d = e / (c (1 - A (1 - l c))^-1 b)
-
-which is e J / tau^2 for a rigid axis of inertia J and an observer's time constant tau. Nothing is simulated in closed
-loop, where a controller hides what a model lacks. The plain model
+The twin is held on the measured motion by its observer and fed the measured torque. Its innovation e tells the torque
+that its mechanics lack. The scale is that of the twin itself: its innovation is computed a second time, with a constant
+torque added. Nothing is simulated in closed loop, where a controller hides what a model lacks. The plain model
 
     T = J a + D v + Fc sign(v) + T0                    least squares over the measured motion of the training recordings
 
@@ -18,6 +14,7 @@ is what a text book gives. Its residual passes the same filter as the innovation
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -29,11 +26,9 @@ from hil.identification.dataset import Dataset
 from hil.identification.deviations import held_on_motor
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.measured import Measured
-from hil.twin.axis import Twin
-from hil.twin.stepping.records import shapes_of
-from hil.twin.structure.modal import discretise
 
 _SMOOTH_S, _FEWEST = 0.021, 5  # window of the derivatives: passes some 20 Hz; rows of a parabola that averages
+_ADDED = 0.01  # of the torque's standard deviation: far above rounding, and an axis that slides goes on sliding
 _SLIDING = 0.02  # of the top speed in training: below, the friction of an axis that sticks is not told by its motion
 
 
@@ -69,25 +64,21 @@ def left_by_plain(model: PlainModel, data: Dataset) -> float | None:
 
 def left_by_twin(hypothesis: Hypothesis, data: Dataset, slowest: float) -> float | None:
     """Share of the torque's standard deviation that a twin leaves where the motor is faster than `slowest`, or None."""
-    torque = _torque_per_innovation(hypothesis.twin(data.observer_s))
     found = []
     for run in data.runs:
-        measured, held = held_on_motor(hypothesis, run, data.observer_s)
-        found.append(torque * (measured.motor_position - held.motor_position))
+        rows = _sliding(run, slowest)
+        added = _ADDED * float(np.std(run.torque))
+        innovation = _innovation(hypothesis, run, data.observer_s)
+        moved = _innovation(hypothesis, replace(run, torque=run.torque + added), data.observer_s) - innovation
+        scale = float(np.median(moved[rows])) if rows.any() else 0.0
+        found.append(innovation * added / scale if scale else np.full(run.motor.size, np.nan))
     return _share(found, data, slowest)
 
 
-def _torque_per_innovation(twin: Twin) -> float:
-    """Constant torque on the motor that a twin lacks, over the innovation of its observer."""
-    period_s, tau_s, modes = twin.gains.period_s, twin.observer_s, twin.modal
-    step, shapes = discretise(modes, period_s), shapes_of(twin.arrays().modes)
-    moved = np.block([[np.diag(step.a11), np.diag(step.a12)], [np.diag(step.a21), np.diag(step.a22)]])
-    pushed = np.concatenate([step.b1 * shapes.motor, step.b2 * shapes.motor])
-    side = np.asarray(shapes.motor_impulse)
-    correction = np.concatenate([2.0 * period_s / tau_s * side, period_s / tau_s**2 * side])
-    seen = np.concatenate([shapes.motor, np.zeros(side.size)])
-    error = np.linalg.solve(np.eye(seen.size) - moved @ (np.eye(seen.size) - np.outer(correction, seen)), pushed)
-    return 1.0 / float(seen @ error)
+def _innovation(hypothesis: Hypothesis, run: Measured, observer_s: float) -> FloatArray:
+    """Measured less simulated motor position (n,) of a twin held on it."""
+    measured, held = held_on_motor(hypothesis, run, observer_s)
+    return np.asarray(measured.motor_position - held.motor_position, dtype=np.float64)
 
 
 def _share(missing: Sequence[FloatArray], data: Dataset, slowest: float) -> float | None:

@@ -15,7 +15,7 @@ from enum import StrEnum
 from itertools import product
 from typing import Any, NamedTuple
 
-from hil.twin.parameter import Parameter, Role, default_starts, default_typical
+from hil.twin.parameter import Dimension, Parameter, Role, default_starts, default_typical
 from hil.twin.scene import AxisFacts, Scene
 
 PARAMETERS = 8  # the most parameters a mechanism may have
@@ -90,6 +90,7 @@ class Picture(StrEnum):
 
 
 Points = Sequence[tuple[float, ...]]
+_AT_BOUND = 1e-6  # of the upper bound: a fit ends there or far below
 _ROUNDING = 1e-15  # of the upper bound: rounding of a fit that ends at the lower one
 
 
@@ -211,8 +212,13 @@ class Mechanism:
         return abs(values[self.strength] - (self.neutral(axis) if self.neutral else 0.0))
 
     def _has_size(self, values: Sequence[float]) -> bool:
-        """Check that a strength is off the bound at which there is no effect."""
+        """Check that a strength is off the bound at which there is no effect, and off its largest value.
+
+        Shares may be 1; at the bound of another dimension the recordings do not tell the strength.
+        """
         sizes = [(v, p) for v, p in zip(values, self.parameters, strict=False) if p.role is Role.STRENGTH]
+        if any(p.dimension is not Dimension.RATIO and abs(v) >= (1.0 - _AT_BOUND) * p.high for v, p in sizes):
+            return False
         return not self.neutral_at_zero or any(abs(v - max(p.low, 0.0)) > _ROUNDING * p.high for v, p in sizes)
 
     def _inside(self, values: Sequence[float]) -> tuple[float, ...]:

@@ -77,7 +77,8 @@ def _weights(part: FloatArray) -> FloatArray:
 def screen_library(base: Fit) -> list[Candidate]:
     """Make one candidate of each mechanism that is compatible with the terms of the base, best first.
 
-    Only starts whose values are valid for their mechanism are kept.
+    Values that are scaled to the residual must be valid for their mechanism. Where they are not scaled, the starts that
+    are valid are kept.
     """
     hypothesis, terms = base.hypothesis, base.terms
     residuals = hypothesis.residuals(base.data)
@@ -93,12 +94,15 @@ def screen_library(base: Fit) -> list[Candidate]:
 
     def gathered(effect: str, same: Sequence[Candidate]) -> Candidate | None:
         slot = free_slot(effect, terms)
-        begun = (
+        begun = [
             replace(term, slot=slot)
             for term in (same[0].term, *same[0].others, *(other.term for other in same[1:_OTHERS]))
-        )
-        valid = [term for term in begun if claimable(term, base.bench, base.data.runs)]
-        return Candidate(valid[0], same[0].share, tuple(valid[1:])) if valid else None
+        ]
+        if not BY_ID[effect].proportional:
+            begun = [term for term in begun if claimable(term, base.bench, base.data.runs)]
+        if not begun or not claimable(begun[0], base.bench, base.data.runs):
+            return None
+        return Candidate(begun[0], same[0].share, tuple(begun[1:]))
 
     candidates = [gathered(effect, same) for effect, same in best.items()]
     return [candidate for candidate in candidates if candidate is not None]

@@ -153,11 +153,13 @@ def torque_line(left: TorqueLeft) -> str:
 
 
 def _corrections(page: Page, result: Result) -> None:
+    if not result.parameter_corrections and not result.not_identifiable:
+        return
+    page.heading("Parameters of the bench")
     if result.not_identifiable:
         page.text(f"Not identifiable from this motion: {', '.join(result.not_identifiable)}.")
     if not result.parameter_corrections:
         return
-    page.heading("Parameters of the bench")
     page.table(
         ("parameter", "unit", "bench file", "fitted", "standard error", "change"),
         [

@@ -4,7 +4,8 @@
 
 Both hypotheses are fitted to the training recordings, so that the gain has no penalty for parameters. Repeated motion
 is a second test: a term whose effect differs from lap to lap must reduce the measured differences between laps. A term
-also falls if its strength is within its standard error, or if a channel of a training recording is worse with it.
+also falls if its strength is within its standard error, or if a channel of a training recording is worse with it than
+without it or with the bench file.
 """
 
 from dataclasses import dataclass
@@ -81,8 +82,9 @@ class CrossValidation:
 def cross_validate(nominal: Fit, final: Fit, held_out: Dataset) -> CrossValidation:
     """Ablate every term; drop those that held-out recordings or laps refute, the most harmful first."""
     dropped: list[Ablation] = []
+    owner = nominal.estimator.evaluate(nominal.hypothesis.owner)
     while True:
-        ablations = _ablate(nominal, final, held_out)
+        ablations = _ablate(owner, nominal, final, held_out)
         harmful = [ablation for ablation in ablations if ablation.refuted]
         if not harmful:
             return CrossValidation(final, tuple(ablations), tuple(dropped))
@@ -104,7 +106,7 @@ def explained_share(before: Fit, after: Fit) -> float:
     return min(max(1.0 - left / was, 0.0), 1.0) if was > 0.0 else float(left == 0.0)
 
 
-def _ablate(nominal: Fit, final: Fit, held_out: Dataset) -> list[Ablation]:
+def _ablate(owner: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> list[Ablation]:
     rebased = final.hypothesis.rebased
 
     def without(index: int) -> Fit:
@@ -127,7 +129,7 @@ def _ablate(nominal: Fit, final: Fit, held_out: Dataset) -> list[Ablation]:
             unrepeated(other.hypothesis, other.data) / differs if differs > 0.0 else None,
             bool(there and own_held_out and _change(own_held_out, there) > _ACTS * _change(final, other)),
             clear[index],
-            _worse(final, other),
+            _worse(final, other, owner),
         )
 
     return [ablation(index, term, other) for index, (term, other) in enumerate(zip(final.terms, fits, strict=True))]
@@ -153,13 +155,14 @@ def _clear(found: Fit) -> list[bool]:
     return result
 
 
-def _worse(found: Fit, without: Fit) -> tuple[str, ...]:
-    """Channels, as recorded, that are above their noise in a training recording and worse with a term than without."""
+def _worse(found: Fit, without: Fit, owner: Fit) -> tuple[str, ...]:
+    """Channels that are above their noise in a training recording, and worse with a term than without or by the bench
+    file: there the fit pays with this channel for another."""
     names = {
         channel
-        for ratios, others in zip(found.noise_ratios, without.noise_ratios, strict=True)
+        for ratios, *others in zip(found.noise_ratios, without.noise_ratios, owner.noise_ratios, strict=True)
         for channel, ratio in ratios.items()
-        if ratio > max(FLOOR, WORSE * others[channel])
+        if ratio > max(FLOOR, WORSE * min(other[channel] for other in others))
     }
     return tuple(sorted(channel_names(found.bench, found.data.runs[0])[name] for name in names))
 

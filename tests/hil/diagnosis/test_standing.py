@@ -85,6 +85,18 @@ def test_a_term_that_harms_the_training_recordings_is_dropped(train: Dataset) ->
     assert "reproduced worse in motor_position_rad" in dropped.refuted
 
 
+def test_a_term_beside_a_refit_that_is_worse_than_the_bench_file_is_dropped(train: Dataset) -> None:
+    """Twice the Coulomb friction: with the term the motor is no worse than without it, but than the bench file."""
+    plain = Hypothesis(OWNER)
+    names = [coordinate.name for coordinate in plain.coordinates]
+    x = plain.x.copy()
+    x[names.index("coulomb_torque_n_m")] = np.log(2.0)
+    nominal = evaluated(plain.moved(x), train)
+    final = evaluated(nominal.hypothesis.with_term(Term("cogging_torque", 0, (0.01, 6.0, 0.0))), train)
+    (dropped,) = cross_validate(nominal, final, dataset([], OWNER)).dropped
+    assert "motor_position_rad" in dropped.worse
+
+
 def test_a_parameter_at_its_bound_is_no_correction() -> None:
     light = bench(table_mass_kg=384.0 / 5.0)
     data = runs(owner=light)

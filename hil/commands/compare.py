@@ -22,7 +22,7 @@ def compare(
     from hil.identification.compare import compare as compare_recording
     from hil.identification.measured import bench_of
     from hil.recording.recording import read_recording
-    from hil.report.compare_report import rows_of, verdict, write_comparison
+    from hil.report.compare_report import PARAMETER_HEADERS, parameter_rows, rows_of, verdict, write_comparison
 
     recording = read_recording(run)
     believed = load_bench(bench) if bench else bench_of(recording)
@@ -33,4 +33,7 @@ def compare(
         tell("writing the report")
         write_comparison(result, part)
     table(("measured - simulated", "rms", "largest", "relative"), rows_of(result))
+    if result.fit is not None:
+        out.print()
+        table(PARAMETER_HEADERS, parameter_rows(result.fit))
     out.print(f"\n{verdict(result)}\n\nReport: {folder / 'compare.html'}")

@@ -43,7 +43,7 @@ def diagnose(
     from hil.identification.measured import bench_of
     from hil.quantities import quantity
     from hil.recording.recording import read_recording
-    from hil.report.diagnosis_report import write_diagnosis
+    from hil.report.diagnosis_report import torque_line, write_diagnosis
 
     train = [read_recording(path) for path in runs]
     held_out = [read_recording(path) for path in validate or []]
@@ -78,4 +78,8 @@ def diagnose(
         out.print(
             f"\nThe search ended with its time budget before {result.time_budget.stopped_before}: best answer so far."
         )
+    if result.torque_left:
+        out.print(f"\n{torque_line(result.torque_left)}")
+    if result.not_identifiable:
+        out.print(f"Not identifiable from this motion: {', '.join(result.not_identifiable)}; no correction is given.")
     out.print(f"\n{result.statement}\n\nReport: {folder / 'report.html'}")

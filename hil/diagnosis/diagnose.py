@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Container, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -14,19 +14,21 @@ from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
 from hil.diagnosis.experiment import Experiment, separating, showing
 from hil.diagnosis.location.locate import locate
+from hil.diagnosis.notes import at_bound, ended, notes_on, on_torque, stopped
 from hil.diagnosis.preparation import prepare_diagnosis
-from hil.diagnosis.result import ChannelFit, Location, Mode, NextExperiment, Result, TimeBudget, Unexplained, Verdict
+from hil.diagnosis.result import FitFigures, Location, Mode, NextExperiment, Result, TimeBudget, Unexplained, Verdict
 from hil.diagnosis.search.forward_selection import Explanation, explain
 from hil.diagnosis.time_left import with_time_left
 from hil.diagnosis.untold import untold
 from hil.diagnosis.verdict.cross_validation import CrossValidation, cross_validate, explained_share
 from hil.diagnosis.verdict.findings import corrections, diagnosed_bench, findings, form_of, renamed
-from hil.diagnosis.verdict.fit_table import channel_names, channel_residuals, fit_table
+from hil.diagnosis.verdict.fit_table import channel_names, channel_residuals, closed_loop_held, fit_table
 from hil.diagnosis.verdict.judge import judge, not_testable
+from hil.diagnosis.verdict.refit import reported_refit, torque_left
 from hil.diagnosis.wording import title, titles, where_in_short
 from hil.errors import InputError
 from hil.identification.dataset import Dataset
-from hil.identification.estimator import Fit, FitStatus
+from hil.identification.estimator import Fit
 from hil.identification.measured import Measured
 from hil.identification.noise_floor import FLOOR
 from hil.identification.parallel import one_blas_thread
@@ -129,6 +131,9 @@ def diagnose(
     of_plant = judge(owner, nominal, proof.final, held_out)
     verdict = law.verdict(of_plant)
     named = verdict is Verdict.MISSING_PHYSICS
+    refit = reported_refit(nominal)
+    nominal = refit.fit
+    explanation = replace(explanation, nominal=nominal)
     final = {Verdict.MISSING_PHYSICS: proof.final, Verdict.NO_MISMATCH: owner}.get(of_plant, nominal)
     # a parameter error is located and measured against the parameters of the bench file
     before = owner if of_plant is Verdict.PARAMETER_ERROR else nominal
@@ -146,21 +151,24 @@ def diagnose(
     progress("designing the next experiment")
     # with findings only their rivals are in question; without, the cause may be a mechanism that the motion cannot show
     experiment = None
-    if bench.law_known and not explanation.stopped_at:
+    if closed_loop_held(nominal, final, held_out) and not explanation.stopped_at:
         experiment = separating(explanation, proof.final, held_out) if named else showing(nominal, hidden, held_out)
-    notes += [*_notes(table, proof, forms, verdict, explanation), *_ended(final)]
-    notes += [experiment.note] if experiment else []
+    left = torque_left(owner, nominal, final, held_out)
+    notes += [*notes_on(table, proof, forms, verdict, explanation, final), *ended(final), *on_torque(left)]
+    notes += [note for note in (refit.note, experiment.note if experiment else "") if note]
     notes += [] if bench.law_known else untold(data)
-    notes += [_stopped(explanation, budget_s)] if explanation.stopped_at else []
+    notes += [stopped(explanation, budget_s)] if explanation.stopped_at else []
     result = Result(
         verdict=verdict,
         statement="",
         location=location,
         missing=missing,
         parameter_corrections=law.corrections | ({} if of_plant is Verdict.NO_MISMATCH else corrections(bench, final)),
+        not_identifiable=() if of_plant is Verdict.NO_MISMATCH else at_bound(final),
         fit=table,
         not_testable=hidden,
         unexplained=_unexplained(before, final, held_out, location, of_plant),
+        torque_left=left,
         next_experiment=NextExperiment(profile=NEXT_EXPERIMENT, separates=experiment.separates)
         if experiment and experiment.profile
         else None,
@@ -187,15 +195,20 @@ def statement(result: Result) -> str:
         named = " ".join(finding.sentence for finding in result.missing)
         name, entry = max(
             result.fit.items(),
-            key=lambda item: (item[1].mode is Mode.CLOSED_LOOP, item[1].train.before_rms / item[1].train.after_rms),
+            key=lambda item: (item[1].mode is Mode.CLOSED_LOOP, _improvement(item[1].train)),
         )
         found = entry.validate_ or entry.train
         before, after, noise = (
-            quantity(value, entry.unit) for value in (found.before_rms, found.after_rms, found.noise_floor_rms)
+            quantity(value, entry.unit) for value in (found.best_before_rms, found.after_rms, found.noise_floor_rms)
+        )
+        change = (
+            f"decreases from {before} to {after}"
+            if found.after_rms < found.best_before_rms
+            else (f"does not decrease: {after} instead of {before}")
         )
         return (
             f"Missing physics: {named} With it the residual of {name} on {'held-out' if entry.validate_ else 'these'} "
-            f"recordings decreases from {before} to {after} rms; the noise floor is {noise}."
+            f"recordings {change} rms; the noise floor is {noise}."
         )
     if result.verdict is Verdict.PARAMETER_ERROR:
         worst = sorted(
@@ -207,12 +220,18 @@ def statement(result: Result) -> str:
             for name, entry in worst[:3]
             if entry.nominal > 0.0
         )
+        if not changes:
+            return "No physics is missing, but parameters of the bench file are wrong; this motion does not tell them."
         return f"No physics is missing; parameters of the bench file are wrong: {changes}."
     if result.verdict is Verdict.NO_MISMATCH:
         return "The twin reproduces these recordings to within their noise."
     if result.time_budget:
         return f"The time budget ended before a mechanism was found: {result.unexplained.description}"
     return f"The mismatch is not explained by any mechanism of the library: {result.unexplained.description}"
+
+
+def _improvement(found: FitFigures) -> float:
+    return found.best_before_rms / max(found.after_rms, 1e-300)
 
 
 def _unexplained(
@@ -234,59 +253,3 @@ def _unexplained(
     if verdict is Verdict.UNEXPLAINED and location is not None:
         text += f"; {where_in_short(location)}"
     return Unexplained(share=share, description=f"Residuals above the noise, block by block: {text}.")
-
-
-def _notes(
-    table: dict[str, ChannelFit],
-    proof: CrossValidation,
-    forms: Container[int],
-    verdict: Verdict,
-    explanation: Explanation,
-) -> list[str]:
-    notes = []
-    if any(entry.floor_from == "repeated_laps" for entry in table.values()):
-        notes.append("The noise floor is the part of the residuals that does not repeat from lap to lap.")
-    else:
-        notes.append(
-            "No motion repeats: the noise floor is the white noise of the sensors, in closed loop including the "
-            "response of the axis to it. Random disturbances of the axis therefore count as mismatch."
-        )
-    blocks = [name for name, entry in table.items() if entry.mode is Mode.BLOCKS]
-    if blocks and explanation.nominal.bench.law_known:
-        notes.append(
-            f"Figures of {', '.join(blocks)} are block by block, with measured inputs: in closed loop the twin "
-            "deviates from the recording by more than the noise although every block is at its floor (chaotic loop)."
-        )
-    notes += [
-        f"{title(ablation.term.effect)} was dropped: it improves the fit to the training recordings, but worsens that "
-        "to held-out recordings or repeated laps."
-        for ablation in proof.dropped
-    ]
-    notes += [
-        f"{title(ablation.term.effect)} has no visible effect in the held-out recordings: it is not validated by them."
-        for index, ablation in enumerate(proof.ablations)
-        if index not in forms and ablation.gain is not None and not ablation.shown
-    ]
-    if verdict is Verdict.UNEXPLAINED and explanation.terms:
-        tried = ", ".join(title(term.effect) for term in explanation.terms)
-        notes.append(f"The closest mechanisms ({tried}) leave too much of the mismatch unexplained; none is reported.")
-    return notes
-
-
-def _stopped(explanation: Explanation, budget_s: float) -> str:
-    """Note on a search that ended with its time budget."""
-    others = titles(explanation.not_tried) if explanation.not_tried else "no mechanism"
-    return (
-        f"The search ended with its time budget of {digits(budget_s)} s before {explanation.stopped_at}: this is the "
-        f"best explanation so far. Not fitted beside it: {others}. No next experiment was designed."
-    )
-
-
-def _ended(final: Fit) -> list[str]:
-    """Notes on a final fit that did not converge, or converged at a bound of a parameter."""
-    if final.status is FitStatus.OUT_OF_STEPS:
-        return ["The final fit stopped before it converged: its parameters are the best so far."]
-    names = ", ".join(name.split(".")[-1] for name in final.at_bound)
-    if final.status is FitStatus.PARAMETER_AT_BOUND:
-        return [f"In the final fit {names} ended at the bound of the allowed range."]
-    return []

@@ -29,6 +29,7 @@ WRONG_BY = 4.0
 SLOPE_TOLERANCE = 0.2  # of positions against set-points; following errors are below 5 %
 _RELATED = 0.5  # least squared correlation of two channels for a factor between them: half of the variance
 _AWAY, _AWAY_M = 0.01, 1e-3  # largest offset at rest, of the travel and absolute: a closed loop rests far below both
+_SWINGS = 6  # of the command between its limits in a move one way: to speed up and to brake make two
 SATURATED = 0.5  # share of the moving rows at the torque limit: above, most rows do not obey the control law
 _SMOOTH_S = 0.021  # window of the derivatives of the motor position: passes some 20 Hz, averages encoder counts
 
@@ -221,11 +222,32 @@ def _saturation(run: Measured, bench: Bench, moving: NDArray[np.bool_]) -> Itera
     peak = float(np.max(np.abs(run.torque_command)))
     level = limit if math.isfinite(limit) and peak <= 1.01 * limit else peak
     share = float(np.mean(np.abs(run.torque_command[moving]) >= 0.999 * level))
-    if share > SATURATED:
+    hz = _limit_cycle_hz(run, level)
+    if share > SATURATED and hz is not None:
+        yield (
+            f"limit cycle: the control loop oscillates at {digits(hz)} Hz between the limits of its command, "
+            f"{level:.4g} in either direction, in {100.0 * share:.0f} % of the motion, allowed "
+            f"{100.0 * SATURATED:.0f} %; usual causes are a gain that is too high and a delay in the loop; lower the "
+            "velocity gain or find the delay, then record again"
+        )
+    elif share > SATURATED:
         yield (
             f"saturated throughout: the command is at its limit of {level:.4g} in {100.0 * share:.0f} % of the "
             f"motion, allowed {100.0 * SATURATED:.0f} %; the control loop is open there; record a slower motion"
         )
+
+
+def _limit_cycle_hz(run: Measured, level: float) -> float | None:
+    """Frequency at which the command swings from one limit to the other; None if the motion itself makes it swing."""
+    rows = np.flatnonzero(np.abs(run.torque_command) >= 0.999 * level)
+    swings = rows[1:][np.diff(np.sign(run.torque_command[rows])) != 0.0]
+    motion = np.sign(run.velocity_command_m_s)
+    phases = 1 + np.count_nonzero(np.diff(motion[motion != 0.0]))
+    if swings.size < _SWINGS * phases:
+        return None
+    half = float(np.median(np.diff(swings)))
+    # at rest a command may flicker for a while
+    return 1.0 / (2.0 * run.period_s * half) if half * swings.size > SATURATED * np.count_nonzero(run.moving) else None
 
 
 def _slope(over: FloatArray, values: FloatArray) -> float:

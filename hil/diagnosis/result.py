@@ -113,6 +113,11 @@ class FitFigures(_Part):
         description="parameters of the bench file; null if the twin is unstable with them"
     )
 
+    @property
+    def best_before_rms(self) -> float:
+        """The smaller one of bench file and refit, without new physics."""
+        return self.before_rms if self.owner_rms is None else min(self.owner_rms, self.before_rms)
+
 
 class ChannelFit(_Part):
     """Fit of one channel before and after, on training and on held-out recordings."""
@@ -131,6 +136,17 @@ class Unexplained(_Part):
 
     share: Share = Field(description="of the energy above the floor with the refitted nominal twin")
     description: str
+
+
+class TorqueLeft(_Part):
+    """Torque left on held-out recordings, predicted from the measured motion, over its standard deviation."""
+
+    owner: NotNegative | None = Field(description="parameters of the bench file; null where it cannot be computed")
+    refitted: NotNegative | None = Field(description="nominal parameters refitted, no new physics")
+    final: NotNegative | None = Field(description="with corrected parameters and the physics found")
+    plain: NotNegative = Field(
+        description="inertia, viscous and Coulomb friction and offset by least squares over the training recordings"
+    )
 
 
 class NextExperiment(_Part):
@@ -157,9 +173,13 @@ class Result(_Part):
     location: Location | None = Field(description="null without a mismatch")
     missing: tuple[Finding, ...]
     parameter_corrections: dict[str, Correction]
+    not_identifiable: tuple[str, ...] = Field(
+        (), description="nominal parameters whose fit ended at the bound of the allowed range: no correction"
+    )
     fit: dict[str, ChannelFit]
     not_testable: tuple[str, ...] = Field(description="mechanisms this motion cannot show")
     unexplained: Unexplained
+    torque_left: TorqueLeft | None = Field(None, description="null without held-out motion or recorded torque")
     next_experiment: NextExperiment | None = None
     time_budget: TimeBudget | None = Field(None, description="null if the search was completed")
     notes: tuple[str, ...] = ()

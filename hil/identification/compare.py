@@ -2,23 +2,34 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hil.bench.bench_file import Bench
 from hil.bench.hardware import DriveMode
-from hil.errors import HilError, InputError
-from hil.identification.dataset import prepare_dataset
-from hil.identification.deviations import LOW_PASS_HZ, BlockDeviation, Deviation, compare_blocks, motion_channels
+from hil.errors import InputError
+from hil.identification.dataset import Dataset, prepare_dataset
+from hil.identification.deviations import (
+    LOW_PASS_HZ,
+    MOTOR_BLOCK,
+    TABLE_BLOCK,
+    BlockDeviation,
+    Deviation,
+    compare_blocks,
+    motion_channels,
+)
+from hil.identification.honest_refit import rms_of_channels, stays, unstable
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.inverse_dynamics import InverseDynamics, fit_inverse_dynamics
 from hil.identification.measured import SETTLE_S, Measured, take
 from hil.identification.noise_floor import FLOOR, rms
 from hil.identification.nominal_fit import MOST_STEPS, FitResult, fit_nominal
-from hil.identification.residuals import datum_m
+from hil.identification.residuals import datum_m, differences
 from hil.recording.recording import Recording
 
 if TYPE_CHECKING:
@@ -36,7 +47,8 @@ Progress = Callable[[str, float | None], None]  # name of the step, share that i
 class Comparison:
     """Deviations of a recording from the twin of `bench`; with a `fit`, `bench` has the fitted parameters.
 
-    `channels` are in closed loop, the torque last; `blocks` are block by block.
+    `channels` are in closed loop, the torque last; there are none if the twin is unstable there. `blocks` are block by
+    block.
     """
 
     recording: Recording
@@ -49,7 +61,8 @@ class Comparison:
     notes: tuple[str, ...]
 
     def __repr__(self) -> str:
-        width = max(len(channel.name) for channel in self.channels)
+        shown = self.channels or tuple(block.deviation for block in self.blocks)
+        width = max(len(channel.name) for channel in shown)
         lines = [
             f"Comparison of {self.recording.name} with the twin of {self.bench.name}: "
             f"{'explained' if self.explained else 'not explained'} (allowed {EXPLAINED:g} x noise: torque "
@@ -58,18 +71,27 @@ class Comparison:
         ]
         lines += [
             f"  {channel.name:{width}}  {channel.rms:10.3g}  {channel.peak:10.3g}  {100.0 * channel.relative:7.3f} %"
-            for channel in self.channels
+            for channel in shown
         ]
-        return "\n".join(lines)
+        return "\n".join([*lines, *(() if self.held else (f"  {self.notes[0]}",))])
 
     def channel(self, name: str) -> Deviation:
         """The deviation of a channel by its name."""
         return next(channel for channel in self.channels if channel.name == name)
 
     @property
+    def held(self) -> bool:
+        """False if the twin is unstable in closed loop: then all figures are block by block."""
+        return bool(self.channels)
+
+    def _block(self, name: str) -> BlockDeviation | None:
+        return next((block for block in self.blocks if block.deviation.name == name), None)
+
+    @property
     def torque(self) -> Deviation:
         """Deviation of the motor torque, on a linear axis the force."""
-        return self.channels[-1]
+        motor = self._block(MOTOR_BLOCK)
+        return self.channels[-1] if self.held or motor is None else motor.deviation
 
     @property
     def torque_over_noise(self) -> float:
@@ -81,13 +103,16 @@ class Comparison:
         """rms deviation of table less motor position over its noise; 0 without a linear encoder."""
         if not self.measured.table_m.size:
             return 0.0
+        table = self._block(TABLE_BLOCK)
+        if not self.held and table is not None:
+            return table.deviation.rms / max(table.noise, TABLE_ACCURACY_M)
         values = self.channels[0].values - self.channel("motor_position").values
         return rms(values[self.measured.judged]) / max(self.measured.noise.table_m, TABLE_ACCURACY_M)
 
     @property
     def explained(self) -> bool:
-        """True if torque and table less motor position deviate by at most 1.25 x their noise (rms)."""
-        return bool(max(self.torque_over_noise, self.table_over_noise) <= EXPLAINED)
+        """True if torque and table less motor position deviate by at most 1.25 x their noise (rms) in closed loop."""
+        return self.held and bool(max(self.torque_over_noise, self.table_over_noise) <= EXPLAINED)
 
     def plot(self, blocks: bool = False, fastest_move: bool = False) -> Figure:
         """Draw measured, simulated and their deviation over time: the whole axis in closed loop or block by block.
@@ -97,6 +122,7 @@ class Comparison:
         from hil.figures.drawing import over_time
         from hil.identification import figures
 
+        blocks = blocks or not self.held
         what = "fastest move" if fastest_move else "block by block" if blocks else "whole recording"
         panels = figures.block_panels(self) if blocks else figures.motion_panels(self)
         rows = figures.fastest_move(self) if fastest_move else slice(None)
@@ -112,6 +138,7 @@ class Comparison:
             "rows": len(self.recording),
             "period_s": self.recording.period_s,
             "explained": self.explained,
+            "stable_in_closed_loop": self.held,
             "torque_over_noise": self.torque_over_noise,
             "table_over_noise": self.table_over_noise,
             "low_pass_hz": LOW_PASS_HZ,
@@ -141,21 +168,44 @@ def compare(
     """Compare a recording with the twin of a bench.
 
     With `fit` the nominal parameters are fitted to the recording first. `progress` gets the name of each step. Raises
-    InputError if recording and bench do not belong together, HilError if the fit fails or the twin is unstable.
+    InputError if recording and bench do not belong together, HilError if the fit fails. For a twin that is unstable in
+    closed loop there are figures block by block only.
     """
     _ = bench.known_control  # raises: a comparison simulates the closed loop
     measured = take(recording, bench)
     data, fitted = prepare_dataset([measured], bench), None
     if fit:
         progress("fitting", None)
-        fitted = fit_nominal(data)
+        fitted = fit_nominal(data, partial(_figures_of, measured, data))
         bench = fitted.bench
     progress("simulating", None)
+    channels, datum = _closed_loop(measured, bench)
+    progress("block by block", None)
+    blocks = compare_blocks(Hypothesis(bench), data)
+    inverse, remarks = _inverse_dynamics(recording) if bench.axis.linear else (None, [])
+    notes = (*_notes(measured, bench, fitted, datum), *remarks)
+    notes = notes if channels else (unstable(measured), *notes)
+    return Comparison(recording, measured, bench, tuple(channels), blocks, fitted, inverse, notes)
+
+
+def _figures_of(measured: Measured, data: Dataset, hypothesis: Hypothesis) -> dict[str, float]:
+    """Every rms deviation that a comparison with a hypothesis reports; infinite in closed loop if it is unstable."""
+    found = rms_of_channels(hypothesis, data)
+    channels, _ = _closed_loop(measured, hypothesis.resolved.bench)
+    return (
+        found
+        | {name: math.inf for name in ("velocity_m_s", "acceleration_m_s2", "jerk_m_s3")}
+        | {channel.name: channel.rms for channel in channels if channel.name not in ("torque_n_m", "force_n")}
+    )
+
+
+def _closed_loop(measured: Measured, bench: Bench) -> tuple[list[Deviation], float]:
+    """Deviations in closed loop, none if the twin is unstable, and the datum of the linear encoder [m]."""
     response = bench.twin().simulate(
         measured.position_command_m, measured.velocity_command_m_s, measured.start, measured.table_m
     )
-    if not all(np.isfinite(values).all() for values in response):
-        raise HilError(f"{bench.name}: the twin is unstable in closed loop; check the masses and gains of the bench")
+    if not stays(differences(measured.response, response, bench, measured.judged), measured.response, measured.judged):
+        return [], 0.0
     ratio = bench.axis.ratio_m_rad
     datum = datum_m(measured.response, response, ratio, measured.judged)
     # the datum of the encoder that closes the position loop is that of the set-points
@@ -170,11 +220,7 @@ def compare(
         channels = motion_channels(measured, motor_m, simulated_m)
     name, label, unit = ("force_n", "motor force", "N") if linear else ("torque_n_m", "motor torque", "N m")
     channels.append(Deviation(name, label, unit, measured.torque, response.torque, judged))
-    progress("block by block", None)
-    blocks = compare_blocks(Hypothesis(bench), data)
-    inverse, remarks = _inverse_dynamics(recording) if linear else (None, [])
-    notes = (*_notes(measured, bench, fitted, datum), *remarks)
-    return Comparison(recording, measured, bench, tuple(channels), blocks, fitted, inverse, notes)
+    return channels, datum
 
 
 def _inverse_dynamics(recording: Recording) -> tuple[InverseDynamics | None, list[str]]:
@@ -210,6 +256,13 @@ def _notes(measured: Measured, bench: Bench, fit: FitResult | None, datum: float
         )
     if fit is not None:
         notes.append("The parameters were fitted to this recording: validate the fitted bench on another recording.")
+    if fit is not None and fit.note:
+        notes.append(fit.note)
+    stuck = [parameter.name for parameter in fit.parameters if parameter.at_bound] if fit else []
+    if stuck:
+        notes.append(
+            f"{', '.join(stuck)}: not identifiable from this motion, the fit ended at the bound of the allowed range."
+        )
     if fit is not None and not fit.converged:
         notes.append(
             f"The fit was stopped after {MOST_STEPS} steps before it converged: the recording does not determine all "

@@ -13,6 +13,7 @@ from hil.errors import InputError
 from hil.identification.measured import Measured
 from hil.identification.noise import Laps
 from hil.twin.axis import Response, Start
+from hil.twin.stepping.loops import LEAST_TICKS
 
 # Torque resolved by the motor channel over the noise of the torque channel. A fine encoder resolves less, but there lie
 # details below the material size too: friction at zero speed, the side force of a lead error.
@@ -24,7 +25,7 @@ DISCREPANCY = 0.005
 # Bounds of the time constant of the motor's observer. Fast: stick-slip decays within a few ticks, so that even a poor
 # start converges; below two ticks the sampled observer is unstable on an elastic axis. Slow: a coarse encoder still
 # resolves the torque.
-FASTEST_OBSERVER_TICKS, FASTEST_OBSERVER_S, SLOWEST_OBSERVER_S = 2.0, 0.002, 0.008
+FASTEST_OBSERVER_TICKS, FASTEST_OBSERVER_S, SLOWEST_OBSERVER_S = LEAST_TICKS, 0.002, 0.008
 
 _NEAR_ROWS = 21  # within which a motor that is not at rest passes more than a step
 _REMEMBERED_S = 0.3  # of an impulse: elastic modes of a machine axis have decayed

@@ -28,12 +28,14 @@ from hil.identification.hypothesis import Hypothesis
 from hil.identification.measured import Measured
 from hil.identification.noise_floor import rms
 from hil.identification.residuals import differences
+from hil.twin.axis import Response
 from hil.twin.library import BY_ID
 from hil.twin.mechanism import Stage
 from hil.twin.stepping.loops import INTEGRATOR_S
 from hil.twin.stepping.stages import stage_of
 
 LOW_PASS_HZ, LOW_PASS_ORDER = 100.0, 4  # as in the inverse-dynamics identification of EMPS
+MOTOR_BLOCK, TABLE_BLOCK = "motor and load", "transmission and table"
 _DRIVE = (Stage.CURRENT, Stage.CHANNEL)
 
 
@@ -101,7 +103,7 @@ def compare_blocks(hypothesis: Hypothesis, data: Dataset) -> tuple[BlockDeviatio
         blocks.append(BlockDeviation(drive, f"measured {name} command", run.noise.torque))
     held = _mechanics(hypothesis, run, data.observer_s)
     torque = inertia(data.bench) / data.observer_s**2  # torque per innovation
-    motor = Deviation("motor and load", name, unit, run.torque, run.torque + torque * held["motor"], judged)
+    motor = Deviation(MOTOR_BLOCK, name, unit, run.torque, run.torque + torque * held["motor"], judged)
     inputs = f"measured {name}, held on the measured motor position"
     remark = f"deviation: {name} missing in the twin's mechanics, up to {0.5 / np.pi / data.observer_s:.0f} Hz"
     blocks.append(BlockDeviation(motor, inputs, torque * rms(scale["motor"][judged]), remark))
@@ -109,13 +111,18 @@ def compare_blocks(hypothesis: Hypothesis, data: Dataset) -> tuple[BlockDeviatio
         stretch = run.table_m - bench.axis.ratio_m_rad * run.motor
         stretch = stretch - np.mean(stretch[judged])
         label = "table less motor position"
-        table = Deviation("transmission and table", label, "m", stretch, stretch - held["table"], judged)
+        table = Deviation(TABLE_BLOCK, label, "m", stretch, stretch - held["table"], judged)
         blocks.append(BlockDeviation(table, "measured motor position (twin held on it)", run.noise.table_m))
     return tuple(blocks)
 
 
 def _mechanics(hypothesis: Hypothesis, run: Measured, observer_s: float) -> dict[str, FloatArray]:
-    """Residuals (n,) of motor and table with the measured torque as input.
+    """Residuals (n,) of motor and table with the measured torque as input."""
+    return differences(*held_on_motor(hypothesis, run, observer_s), hypothesis.bench, run.judged)
+
+
+def held_on_motor(hypothesis: Hypothesis, run: Measured, observer_s: float) -> tuple[Response, Response]:
+    """Measured channels, lateness undone, and those of the twin held on the motor, with the measured torque as input.
 
     Mechanisms of the drive and of the recorded channels are omitted: the measured torque already contains them.
     """
@@ -124,7 +131,7 @@ def _mechanics(hypothesis: Hypothesis, run: Measured, observer_s: float) -> dict
     mechanical = tuple(active for active in twin.active if stage_of(BY_ID[active.effect], active.variant) not in _DRIVE)
     inputs = measured._replace(torque_command=measured.torque)
     held = replace(twin, active=mechanical).observe(run.position_command_m, run.velocity_command_m_s, inputs, run.start)
-    return differences(measured, held, hypothesis.bench, run.judged)
+    return measured, held
 
 
 def low_pass(values: FloatArray, period_s: float) -> FloatArray:

@@ -13,7 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 from scipy.linalg import solve_toeplitz
-from scipy.signal import correlate, lfilter
+from scipy.signal import correlate, fftconvolve, lfilter
 
 from hil.arrays import FloatArray
 from hil.identification.estimator import Fit
@@ -53,8 +53,7 @@ def against(better: Fit, worse: Fit, filters: Sequence[Filter] | None = None) ->
     differences, and on whitened residuals, sensitive to small fast ones.
     """
     more = better.hypothesis.x.size - worse.hypothesis.x.size
-    rows = effective_samples(better)
-    plain = rows * np.log(worse.cost / better.cost) - more * np.log(rows)
+    plain = by_energy(better, worse)
     white = 0.0
     for taps, a, b in zip(
         whitening(better) if filters is None else filters,
@@ -66,6 +65,17 @@ def against(better: Fit, worse: Fit, filters: Sequence[Filter] | None = None) ->
         left, right = lfilter(taps, [1.0], a), lfilter(taps, [1.0], b)
         white += a.size * np.log((float(right @ right) + blur) / (float(left @ left) + blur))
     return float(max(plain, white - more * np.log(better.rows)))
+
+
+def by_energy(better: Fit, worse: Fit) -> float:
+    """BIC(worse) - BIC(better) on plain residuals with their number of independent rows.
+
+    Of a residual that the model's own faults colour, few rows are independent: two forms of one effect are then told
+    apart only by a clear difference in energy.
+    """
+    rows = effective_samples(better)
+    more = better.hypothesis.x.size - worse.hypothesis.x.size
+    return float(rows * np.log(worse.cost / better.cost) - more * np.log(rows))
 
 
 def correlation_time(residual: FloatArray) -> float:
@@ -103,13 +113,25 @@ _LEAST = 0.01  # least standard error in steps of the forward difference, which 
 _BLOCK_ROWS = 200  # longer than the correlation of residuals: 0.2 s at 1 kHz
 
 
+def _with_covariance(part: FloatArray, columns: FloatArray) -> FloatArray:
+    """Columns (n, p) multiplied by the covariance (n, n) of a residual (n,), up to `_SOKAL` correlation times."""
+    lags = min(int(_SOKAL * correlation_time(part)) + 1, part.size)
+    covariance = correlate(part, part, method="fft")[part.size - 1 : part.size - 1 + lags] / part.size
+    covariance = covariance * (1.0 - np.arange(lags) / lags)
+    kernel = np.concatenate([covariance[:0:-1], covariance])
+    return np.asarray(fftconvolve(columns, kernel[:, None], mode="full", axes=0)[lags - 1 :][: part.size])
+
+
 def standard_errors(found: Fit) -> list[float]:
     """Standard error of each physical parameter, robust against coloured residuals (sandwich estimator):
 
-        A^-1 (sum over blocks of g g^T) A^-1,   A = J^T J,   g = J^T r of a block      (Liang and Zeger 1986)
+        A^-1 B A^-1,   A = J^T J
+        B = sum over blocks of g g^T,   g = J^T r of a block                           (Liang and Zeger 1986)
+        B = sum over parts of  J^T C J,   C: covariance of what is left, by its autocorrelation   (Newey and West 1987)
 
-    multiplied by `_WIDENED`. A controller replayed bit-identically leaves no noise; then the error is 1/100 of the step
-    of the forward difference.
+    the larger of both, multiplied by `_WIDENED`. The second holds for residuals that are correlated over more than a
+    block. A controller replayed bit-identically leaves no noise; then the error is
+    1/100 of the step of the forward difference.
     """
     scale = np.linalg.norm(found.jacobian, axis=0)
     scale[scale == 0.0] = 1.0
@@ -118,8 +140,11 @@ def standard_errors(found: Fit) -> list[float]:
     ends = (0, *found.residuals.splits, found.rows)
     starts = np.concatenate([np.arange(begin, end, _BLOCK_ROWS) for begin, end in pairwise(ends)])
     score = np.add.reduceat(slope * found.residuals.vector[:, None], starts, axis=0)
-    covariance = inverse @ (score.T @ score) @ inverse
-    errors = np.sqrt(np.maximum(np.diag(covariance), 0.0)) / scale
+    left = np.zeros_like(inverse)
+    for part, own in zip(found.residuals.parts.values(), np.split(slope, found.residuals.splits), strict=True):
+        left += own.T @ _with_covariance(part, own)
+    covariances = (inverse @ middle @ inverse for middle in (score.T @ score, left))
+    errors = np.sqrt(np.maximum.reduce([np.diag(one) for one in covariances] + [np.zeros(scale.size)])) / scale
     hypothesis = found.hypothesis
     steps = found.estimator.steps(hypothesis)
     return [

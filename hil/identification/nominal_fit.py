@@ -1,7 +1,9 @@
 """Fit the nominal parameters of an axis to recordings, block by block: the first step of every diagnosis."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -9,6 +11,7 @@ from hil.bench.bench_file import Bench
 from hil.errors import HilError
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Estimator, Fit, FitStatus
+from hil.identification.honest_refit import Figures, never_worse, rms_at_floor, rms_of_channels
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.inference import standard_errors
 from hil.identification.parallel import one_blas_thread
@@ -26,6 +29,7 @@ class FittedParameter:
     nominal: float
     value: float
     standard_error: float
+    at_bound: bool = False  # of the allowed range: not identifiable from this motion
 
 
 @dataclass(frozen=True)
@@ -35,6 +39,7 @@ class FitResult:
     bench: Bench
     parameters: tuple[FittedParameter, ...]
     status: FitStatus
+    note: str = ""  # on a fit that was shortened because it would be worse than the bench file
 
     @property
     def converged(self) -> bool:
@@ -62,16 +67,19 @@ def require_finite(found: Fit) -> None:
         )
 
 
-def fit_nominal(data: Dataset) -> FitResult:
+def fit_nominal(data: Dataset, figures: Callable[[Hypothesis], Figures] | None = None) -> FitResult:
     """Fit the nominal parameters of a bench to convergence, within a factor of three of the bench file.
 
-    Raises HilError if the residuals are not finite.
+    `figures` are those in which the fit must not be worse than the bench file, by default the rms of each channel, see
+    `honest_refit`. Raises HilError if the residuals are not finite.
     """
     found = fit_nominal_parameters(data, MOST_STEPS)
     require_finite(found)
+    refit = never_worse(found, figures or partial(rms_of_channels, data=data), rms_at_floor(data))
+    found = refit.fit
     axis = data.bench.axis
     parameters = tuple(
-        FittedParameter(name, float(getattr(axis, name)), value, error)
+        FittedParameter(name, float(getattr(axis, name)), value, error, name in found.at_bound)
         for name, value, error in zip(axis.NOMINAL, found.hypothesis.values, standard_errors(found), strict=True)
     )
-    return FitResult(found.bench, parameters, found.status)
+    return FitResult(found.bench, parameters, found.status, refit.note)

@@ -16,21 +16,21 @@ from hil.report import plots
 from hil.report.page import Number, Page
 from hil.twin.library import BY_ID
 
+PARAMETER_HEADERS = ("parameter", "bench file", "fitted", "standard error", "change")
+
 
 def write_comparison(result: Comparison, folder: Path) -> None:
     """Write compare.html, overview.png, move.png, blocks.png, compare.json and, after a fit, bench.fitted.yaml."""
     time_s = result.measured.time_s
     page = Page(f"{result.recording.name} against its twin", _lead(result), verdict(result), result.explained)
-    page.heading("Measured and simulated")
-    page.text(
-        "The twin is simulated in closed loop from the set-points of the recording. Deviation: measured - "
-        "simulated; relative: rms of the deviation / rms of the measured channel."
-    )
-    page.table(
-        ("channel", "rms deviation", "largest deviation", "relative"),
-        rows_of(result),
-    )
-    page.plot(plots.over_time(time_s, motion_panels(result)))
+    if result.held:
+        page.heading("Measured and simulated")
+        page.text(
+            "The twin is simulated in closed loop from the set-points of the recording. Deviation: measured - "
+            "simulated; relative: rms of the deviation / rms of the measured channel."
+        )
+        page.table(("channel", "rms deviation", "largest deviation", "relative"), rows_of(result))
+        page.plot(plots.over_time(time_s, motion_panels(result)))
     page.heading("Block by block")
     page.text("The input of each block is the measured one, so that its deviation is not that of another block.")
     page.table(
@@ -60,12 +60,30 @@ def write_comparison(result: Comparison, folder: Path) -> None:
 
 
 def rows_of(result: Comparison) -> list[tuple[str, ...]]:
-    """Rows of the table: channel, rms, largest and relative deviation."""
-    return [(channel.label, *_figures(channel)) for channel in result.channels]
+    """Rows of the table: channel, or block of an unstable twin, with rms, largest and relative deviation."""
+    blocks = ((block.deviation.name, block.deviation) for block in result.blocks)
+    shown = ((channel.label, channel) for channel in result.channels) if result.held else blocks
+    return [(name, *_figures(deviation)) for name, deviation in shown]
+
+
+def parameter_rows(fit: FitResult) -> list[tuple[str, ...]]:
+    """Rows of the table of fitted parameters: name, bench file, fitted, standard error, change."""
+    return [
+        (
+            parameter.name,
+            Number(digits(parameter.nominal, 4)),
+            Number(digits(parameter.value, 5)),
+            Number("at its bound" if parameter.at_bound else digits(parameter.standard_error, 2)),
+            Number(change(parameter.value, parameter.nominal)),
+        )
+        for parameter in fit.parameters
+    ]
 
 
 def verdict(result: Comparison) -> str:
     """Say whether the twin explains the recording and, if not, which block deviates most."""
+    if not result.held:
+        return result.notes[0]
     torque, position = result.torque, result.channels[0]
     figures = (
         f"{torque.label} deviates by {quantity(torque.rms, torque.unit)} rms, "
@@ -120,21 +138,13 @@ def _block_row(block: BlockDeviation) -> tuple[str, ...]:
 def _fit(page: Page, fit: FitResult) -> None:
     page.heading("Fitted parameters")
     page.table(
-        ("parameter", "bench file", "fitted", "standard error", "change"),
-        [
-            (
-                parameter.name,
-                Number(digits(parameter.nominal, 4)),
-                Number(digits(parameter.value, 5)),
-                Number(digits(parameter.standard_error, 2)),
-                Number(change(parameter.value, parameter.nominal)),
-            )
-            for parameter in fit.parameters
-        ],
+        PARAMETER_HEADERS,
+        parameter_rows(fit),
     )
     page.text(
-        "Fitted block by block as in hil diagnose, within a factor of three of the bench file; standard errors are "
-        "robust against coloured residuals. bench.fitted.yaml holds the bench with these values."
+        "Fitted block by block as in hil diagnose, within a factor of three of the bench file, and in no channel worse "
+        "than it. Standard errors count what the model leaves, with its correlation; a parameter at its bound is not "
+        "identifiable from this motion. bench.fitted.yaml holds the bench with these values."
     )
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 from hil.diagnosis.diagnose import NEXT_EXPERIMENT, Diagnosis
 from hil.diagnosis.pictures.findings import finding_figure, term_of
 from hil.diagnosis.pictures.location import residual_panels
-from hil.diagnosis.result import FitFigures, Result, Value, Verdict
+from hil.diagnosis.result import FitFigures, Result, TorqueLeft, Value, Verdict
 from hil.diagnosis.wording import label, title, titles, where
 from hil.figures.drawing import save
 from hil.files.output import write_json
@@ -118,6 +118,8 @@ def _fit(page: Page, diagnosis: Diagnosis, folder: Path) -> None:
     save(diagnosis.plot("residuals"), folder / "residuals.png")
     page.text(f"Measured - twin on {run.name}, before and after; the band is the noise floor (residuals.png).")
     page.plot(plots.over_time(run.time_s, residual_panels(diagnosis, run)))
+    if result.torque_left:
+        page.text(torque_line(result.torque_left))
     kept, dropped = diagnosis.proof.ablations, diagnosis.proof.dropped
     if not dropped and not (result.missing and len(kept) > 1):
         return
@@ -138,10 +140,26 @@ def _fit(page: Page, diagnosis: Diagnosis, folder: Path) -> None:
     )
 
 
+def torque_line(left: TorqueLeft) -> str:
+    """One line: the torque left on held-out motion by each twin, and by the plain model."""
+    shares = {
+        "bench file": left.owner,
+        "refitted": left.refitted,
+        "after": left.final,
+        "plain least squares": left.plain,
+    }
+    given = ", ".join(f"{name} {percent(share)}" for name, share in shares.items() if share is not None)
+    return f"Torque left on held-out motion, of its standard deviation: {given}."
+
+
 def _corrections(page: Page, result: Result) -> None:
-    if not result.parameter_corrections:
+    if not result.parameter_corrections and not result.not_identifiable:
         return
     page.heading("Parameters of the bench")
+    if result.not_identifiable:
+        page.text(f"Not identifiable from this motion: {', '.join(result.not_identifiable)}.")
+    if not result.parameter_corrections:
+        return
     page.table(
         ("parameter", "unit", "bench file", "fitted", "standard error", "change"),
         [

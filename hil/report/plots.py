@@ -38,11 +38,17 @@ def over_time(time_s: FloatArray, panels: Sequence[Panel], heights: Sequence[int
     )
 
 
+def _drawn(values: FloatArray) -> Any:
+    """Values (n,) in single precision; gaps where they are not finite or beyond its range."""
+    inside = np.abs(values) < np.finfo(np.float32).max  # False for values that are not a number
+    return np.where(inside, values, np.nan).astype(np.float32)
+
+
 def _panel(time_s: FloatArray, panel: Panel, shared: Range1d, cursor: CrosshairTool, height: int, last: bool) -> Any:
     factor, unit = panel.shown()
     chosen = thin(tuple(line.values for line in panel.lines), DRAWN_ROWS)
     data = {"time_s": time_s[chosen].astype(np.float32)}
-    data |= {f"y{i}": (line.values[chosen] * factor).astype(np.float32) for i, line in enumerate(panel.lines)}
+    data |= {f"y{i}": _drawn(line.values[chosen] * factor) for i, line in enumerate(panel.lines)}
     source = ColumnDataSource(data)
     plot = figure(
         height=height,

@@ -8,13 +8,14 @@ with the value of the stage (see `Stage`), the moment (see `Moment`), the parame
 order, and its own WIDTH numbers of state. Units are those of the motor side: rad and N m, or m and N on a linear axis.
 """
 
+import math
 from collections.abc import Callable, MutableSequence, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from itertools import product
 from typing import Any, NamedTuple
 
-from hil.twin.parameter import Parameter, Role, default_starts, default_typical
+from hil.twin.parameter import Dimension, Parameter, Role, default_starts, default_typical
 from hil.twin.scene import AxisFacts, Scene
 
 PARAMETERS = 8  # the most parameters a mechanism may have
@@ -89,6 +90,7 @@ class Picture(StrEnum):
 
 
 Points = Sequence[tuple[float, ...]]
+_AT_BOUND = 1e-6  # of the upper bound: a fit ends there or far below
 _ROUNDING = 1e-15  # of the upper bound: rounding of a fit that ends at the lower one
 
 
@@ -107,6 +109,7 @@ class Variant:
     starts: Callable[[Scene], Points] | None = None  # if they differ from the mechanism's
     proportional: bool = True  # the change is proportional to the strength
     needs_table: bool = False  # not observable without a linear encoder
+    sign: float = 1.0  # of its strength where its effect is nearly that of the first variant
     form_of: str = ""  # id of a friction law whose form a small contribution corrects
     play: bool = False  # the flanks of the transmission push only: contacts open and close
     slips: bool = False  # the contact is of Maxwell slip elements
@@ -133,11 +136,13 @@ class Mechanism:
     valid: Callable[[Sequence[float], int, AxisFacts], bool] | None = None  # (values, variant, axis): name applies
     proportional: bool = True  # the change is proportional to the strength
     neutral_at_zero: bool = True  # without effect where the strength is zero
+    neutral: Callable[[AxisFacts], float] | None = None  # strength without effect, if it is finite and not 0
     needs_table: bool = False  # not observable without a linear encoder
     transient: bool = False  # belongs to one recording: not expected on another motion
     softens: bool = False  # changes the stiffness of a spring of the chain
     most: int = 1  # number that may act at once, with periods or orders of their own
     screw_locked: bool = False  # at one slow speed, a share of Coulomb friction that repeats with the screw
+    first_unless_clear: bool = False  # an earlier variant is named unless a later one leaves clearly less energy
     same_as: str = ""  # id of a less common cause whose first variant is the same torque as this one's
     hidden_starts: tuple[tuple[float, ...], ...] = ()  # starts where refitted springs hide it; the first value is in
     # units of the largest stretch of the transmission
@@ -184,12 +189,36 @@ class Mechanism:
         return self.typical(axis) if self.typical else self._inside([default_typical(p, axis) for p in self.parameters])
 
     def is_valid(self, values: Sequence[float], variant: int, axis: AxisFacts) -> bool:
-        """Check that the effect has a size, that its name applies, and that the sensors can show it."""
-        return self._has_size(values) and (self.valid is None or self.valid(values, variant, axis))
+        """Check that the effect has a size, that the motion passes a whole wave of it, that its name applies, and that
+        the sensors can show it."""
+        if not self._has_size(values) or self.wavelength_m(values, axis) > axis.travel_m:
+            return False
+        return self.valid is None or self.valid(values, variant, axis)
+
+    def wavelength_m(self, values: Sequence[float], axis: AxisFacts) -> float:
+        """Length along the travel in which the effect repeats [m]; 0 if it is not periodic in position or angle.
+
+        With a phase but no period or order it repeats once per revolution.
+        """
+        period_m = self.named(Role.PERIOD, values)
+        if period_m is not None:
+            return period_m
+        if not self.indices(Role.PHASE):
+            return 0.0
+        return 2.0 * math.pi * axis.ratio / (axis.angle_per_unit * (self.named(Role.ORDER, values) or 1.0))
+
+    def size(self, values: Sequence[float], axis: AxisFacts) -> float:
+        """Distance of the strength from the value without effect, in the unit of the strength."""
+        return abs(values[self.strength] - (self.neutral(axis) if self.neutral else 0.0))
 
     def _has_size(self, values: Sequence[float]) -> bool:
-        """Check that a strength is off the bound at which there is no effect."""
+        """Check that a strength is off the bound at which there is no effect, and off its largest value.
+
+        Shares may be 1; at the bound of another dimension the recordings do not tell the strength.
+        """
         sizes = [(v, p) for v, p in zip(values, self.parameters, strict=False) if p.role is Role.STRENGTH]
+        if any(p.dimension is not Dimension.RATIO and abs(v) >= (1.0 - _AT_BOUND) * p.high for v, p in sizes):
+            return False
         return not self.neutral_at_zero or any(abs(v - max(p.low, 0.0)) > _ROUNDING * p.high for v, p in sizes)
 
     def _inside(self, values: Sequence[float]) -> tuple[float, ...]:

@@ -1,6 +1,12 @@
 """Facts of an axis and of its recordings that values of a mechanism are scaled by."""
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
+
+
+def _always(level: float) -> float:
+    return math.inf
 
 
 @dataclass(frozen=True)
@@ -13,6 +19,8 @@ class AxisFacts:
     rated_torque: float  # [N m]
     table_count_m: float | None  # resolution of the linear encoder; None without one
     duration_s: float  # of the longest recording
+    travel_m: float = math.inf  # of the longest motion
+    held_s: Callable[[float], float] = _always  # longest time for which |torque command| is at a level or above
 
     @property
     def friction(self) -> float:

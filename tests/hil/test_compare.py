@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -12,7 +13,7 @@ import pytest
 from compare_runs import bench_with, record
 
 from hil.bench.bench_file import Bench, load_bench
-from hil.errors import HilError, InputError
+from hil.errors import InputError
 from hil.identification.compare import Comparison, compare
 from hil.identification.dataset import prepare_dataset
 from hil.identification.deviations import low_pass
@@ -20,7 +21,7 @@ from hil.identification.measured import bench_of, take
 from hil.identification.nominal_fit import fit_nominal
 from hil.recording.importing import import_recording
 from hil.recording.recording import Recording, read_recording
-from hil.report.compare_report import verdict
+from hil.report.compare_report import parameter_rows, rows_of, verdict, write_comparison
 
 SHARED = Path(__file__).parents[2].parent / "shared" / "recordings"
 
@@ -163,12 +164,36 @@ def test_without_a_table_encoder_the_motor_is_compared(run: Recording) -> None:
     assert result.channels[0].name == "motor_position_m"
 
 
-def test_an_unstable_twin_is_said_so(run: Recording) -> None:
+@pytest.mark.parametrize("limit_n_m", [None, 12.0])
+def test_an_unstable_twin_is_said_so_with_figures_of_its_blocks(
+    run: Recording, tmp_path: Path, limit_n_m: float | None
+) -> None:
+    """A limit of the torque bounds the loop: it swings."""
     bench = bench_of(run)
     feather = bench.axis.model_copy(update={"motor_mass_kg": 0.5, "table_mass_kg": 0.5})
-    law = bench.control.model_copy(update={"torque_limit_n_m": None})
-    with pytest.raises(HilError, match="unstable in closed loop"):
-        compare(run, bench.model_copy(update={"axis": feather, "control": law}))
+    law = bench.control.model_copy(update={"torque_limit_n_m": limit_n_m})
+    result = compare(run, bench.model_copy(update={"axis": feather, "control": law}))
+    assert not result.held
+    assert not result.explained
+    assert "in closed loop the twin is unstable" in verdict(result)
+    assert "in closed loop the twin is unstable" in repr(result)
+    write_comparison(result, tmp_path)
+    numbers = json.loads((tmp_path / "compare.json").read_text())  # refuses NaN and infinity
+    assert numbers["channels"] == {}
+    assert not numbers["stable_in_closed_loop"]
+    assert [name for name, _, _, _ in rows_of(result)] == list(numbers["blocks"])
+    assert 0.0 < numbers["blocks"]["motor and load"]["rms"] < 10.0
+
+
+def test_fitted_values_are_printed_with_those_at_a_bound_marked(tmp_path: Path) -> None:
+    """A table five times as heavy as believed: the fit ends at three times."""
+    light = bench_with(axis={"table_mass_kg": 384.0 / 5.0})
+    result = compare(record(tmp_path, bench_with()), light, fit=True)
+    assert result.fit is not None
+    rows = {row[0]: row for row in parameter_rows(result.fit)}
+    assert rows["table_mass_kg"][3] == "at its bound"
+    assert any("table_mass_kg: not identifiable from this motion" in note for note in result.notes)
+    assert rows["motor_mass_kg"][3] != "at its bound"
 
 
 def test_emps_with_its_published_parameters() -> None:

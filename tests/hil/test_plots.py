@@ -6,20 +6,30 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from compare_runs import bench_with, record
 
 from hil.errors import InputError
+from hil.figures.panels import MEASURED, Line, Panel
 from hil.identification.compare import compare
 from hil.identification.measured import bench_of
 from hil.motion.profile import load_profile
 from hil.motion.trajectory import plan
+from hil.report.plots import over_time
 
 PROFILES = Path(__file__).parents[2] / "profiles"
 
 
 def labels(figure: object) -> list[str]:
     return [axis.get_ylabel() for axis in figure.axes]  # type: ignore[attr-defined]
+
+
+def test_values_beyond_single_precision_leave_a_gap_and_no_warning() -> None:
+    values = np.array([0.0, 1e300, -np.inf, np.nan, 2.0])
+    grid = over_time(np.arange(5.0), [Panel("torque", "N m", (Line("measured", values, MEASURED),))])
+    drawn = grid.children[0][0].renderers[0].data_source.data["y0"]
+    assert np.array_equal(np.isfinite(drawn), [True, False, False, False, True])
 
 
 def test_a_trajectory_draws_its_set_points() -> None:

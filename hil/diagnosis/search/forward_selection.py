@@ -118,7 +118,7 @@ def explain(data: Dataset, progress: Progress = lambda text: None, deadline_s: f
         step(f"screening the library beside {len(base.terms)} terms")
         if stopped_at:
             break
-        candidates = [one for one in screen_library(base) if claimable(one.term, base.bench, data.runs)]
+        candidates = screen_library(base)
         first = first or candidates
         found, best = _next_term(base, owner, nominal, candidates, step)
         fitted = {fit.terms[-1].effect for fit in found if not base.estimator.expired}

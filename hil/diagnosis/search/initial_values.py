@@ -8,6 +8,7 @@ varies along the screw have the same effect. After a search found one of these s
 started at strengths with the same torque at creep, where all torque is Coulomb friction.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -54,7 +55,16 @@ def axis_facts(bench: Bench, runs: Sequence[Measured] = ()) -> AxisFacts:
         rated_torque=limit / 3.0 if np.isfinite(limit) else peak,
         table_count_m=table.resolution_m if table is not None else None,
         duration_s=max((run.motor.size * run.period_s for run in runs), default=0.0),
+        travel_m=max((bench.axis.ratio_m_rad * float(np.ptp(run.motor)) for run in runs), default=math.inf),
+        held_s=lambda level: max((_held_s(run, level) for run in runs), default=math.inf),
     )
+
+
+def _held_s(run: Measured, level: float) -> float:
+    """Longest time for which the absolute torque command stays at a level or above [s]."""
+    below = np.flatnonzero(np.abs(run.torque_command) < level)
+    ends = np.concatenate([[-1], below, [run.torque_command.size]])
+    return float(np.max(np.diff(ends)) - 1) * run.period_s
 
 
 def scene(runs: Sequence[Measured], bench: Bench, blocks: Sequence[dict[str, FloatArray]], observer_s: float) -> Scene:

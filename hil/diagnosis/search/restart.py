@@ -12,7 +12,7 @@ With a single spring it is equal to a softer spring.
 from dataclasses import replace
 from functools import partial
 
-from hil.diagnosis.search.initial_values import claimable, stretches
+from hil.diagnosis.search.initial_values import stretches
 from hil.diagnosis.search.score_test import screen_library
 from hil.diagnosis.search.successive_halving import LONG, SEARCH_ACCURACY, owner_points, race
 from hil.identification.dataset import TORQUE_ACCURACY
@@ -32,7 +32,7 @@ def from_owner(base: Fit) -> list[Fit]:
     """Fit the first candidates at the nominal parameters of the bench file, best first."""
     # not fitted, so without a Jacobian: the score test has no projection
     owner = base.estimator.evaluate(base.hypothesis.moved(owner_points(base)[-1]))
-    promising = [one for one in screen_library(owner) if claimable(one.term, owner.bench, owner.data.runs)]
+    promising = screen_library(owner)
     return race(owner, promising) if promising else []
 
 

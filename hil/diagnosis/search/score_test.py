@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hil.arrays import FloatArray
-from hil.diagnosis.search.initial_values import StartPoint, scene, starts
+from hil.diagnosis.search.initial_values import StartPoint, claimable, scene, starts
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.inference import whitened, whitening
@@ -75,7 +75,11 @@ def _weights(part: FloatArray) -> FloatArray:
 
 
 def screen_library(base: Fit) -> list[Candidate]:
-    """Make one candidate of each mechanism that is compatible with the terms of the base, best first."""
+    """Make one candidate of each mechanism that is compatible with the terms of the base, best first.
+
+    Values that are scaled to the residual must be valid for their mechanism. Where they are not scaled, the starts that
+    are valid are kept.
+    """
     hypothesis, terms = base.hypothesis, base.terms
     residuals = hypothesis.residuals(base.data)
     known = scene(base.data.runs, base.bench, residuals.channels, base.data.observer_s)
@@ -88,15 +92,20 @@ def screen_library(base: Fit) -> list[Candidate]:
     for candidate in screen(base, points):
         best.setdefault(candidate.term.effect, []).append(candidate)
 
-    def gathered(effect: str, same: Sequence[Candidate]) -> Candidate:
+    def gathered(effect: str, same: Sequence[Candidate]) -> Candidate | None:
         slot = free_slot(effect, terms)
-        first, *rest = (
+        begun = [
             replace(term, slot=slot)
             for term in (same[0].term, *same[0].others, *(other.term for other in same[1:_OTHERS]))
-        )
-        return Candidate(first, same[0].share, tuple(rest))
+        ]
+        if not BY_ID[effect].proportional:
+            begun = [term for term in begun if claimable(term, base.bench, base.data.runs)]
+        if not begun or not claimable(begun[0], base.bench, base.data.runs):
+            return None
+        return Candidate(begun[0], same[0].share, tuple(begun[1:]))
 
-    return [gathered(effect, same) for effect, same in best.items()]
+    candidates = [gathered(effect, same) for effect, same in best.items()]
+    return [candidate for candidate in candidates if candidate is not None]
 
 
 def offered(new: Term, hypothesis: Hypothesis, terms: Sequence[Term]) -> bool:

@@ -16,10 +16,11 @@ from hil.diagnosis.search.score_test import Candidate, offered
 from hil.identification.dataset import TORQUE_ACCURACY, inertia
 from hil.identification.estimator import Estimator, Fit
 from hil.identification.hypothesis import LAST_EDGE_STEP_S, TRUST, Hypothesis
+from hil.identification.inference import by_energy
 from hil.identification.levenberg_marquardt import robust_loss
 from hil.identification.nominal_fit import SOFT
 from hil.identification.parallel import POOL, in_parallel
-from hil.identification.terms import compatible
+from hil.identification.terms import Term, compatible
 from hil.twin.library import BY_ID
 
 # Torque accuracy of the motor channel in a search: its higher weight makes the cost of stick-slip smoother.
@@ -32,6 +33,7 @@ LONG = 25  # evaluations of a last fit
 # leader's second fit, and its gain above the share _BEHIND of the leader's: unconverged fits may be far from their end.
 _BEATEN, _LEVEL, _BEHIND = 5.0, 1.5, 0.5
 _HOPELESS = 0.02  # share of the residual energy over that of the first candidate: below, a candidate is not fitted
+_CLEARLY = 10.0  # BIC difference between variants of one mechanism: "very strong" (Kass and Raftery 1995)
 _EDGE_SHIFTS_S = np.arange(-15, 16) * 0.005  # tried shifts of an edge: its valley is narrower than a step of the fit
 
 
@@ -110,7 +112,7 @@ class _Race:
         found: dict[str, Fit] = {}
         for fit in results:
             effect = fit.terms[-1].effect
-            if compatible(fit.terms) and (effect not in found or fit.cost < found[effect].cost):
+            if compatible(fit.terms) and (effect not in found or _rather(fit, found[effect])):
                 found[effect] = fit
         return sorted(found.values(), key=lambda fit: fit.cost)
 
@@ -177,7 +179,7 @@ class _Race:
     def _variants(self, fit: Fit) -> list[Fit]:
         """Fit the other variants of the last term from its values."""
         last, rebased = fit.terms[-1], fit.hypothesis.rebased
-        others = [replace(last, variant=v) for v in range(len(BY_ID[last.effect].variants)) if v != last.variant]
+        others = [_as_variant(last, v) for v in range(len(BY_ID[last.effect].variants)) if v != last.variant]
         return in_parallel([partial(_fit_fast_first, fit.estimator, rebased.replaced(-1, term)) for term in others])
 
     def _equivalents(self, fit: Fit) -> list[Fit]:
@@ -221,6 +223,24 @@ def _edges_moved(fit: Fit) -> Fit:
             shifted = [hypothesis.moved(x) for x in np.clip(edges, *hypothesis.bounds)]
             hypothesis = min(POOL.map(fit.estimator.evaluate, shifted), key=lambda other: other.cost).hypothesis
     return fit.estimator.fit(hypothesis, evaluations=LONG)
+
+
+def _as_variant(term: Term, variant: int) -> Term:
+    """The term in another variant, with the sign of the strength that gives nearly the same effect."""
+    mechanism = BY_ID[term.effect]
+    values = list(term.values)
+    values[mechanism.strength] *= mechanism.variants[variant].sign * mechanism.variants[term.variant].sign
+    return replace(term, variant=variant, values=tuple(values))
+
+
+def _rather(fit: Fit, known: Fit) -> bool:
+    """True if a fit is to stand for its mechanism rather than another one of the same mechanism."""
+    mine, other = fit.terms[-1], known.terms[-1]
+    if not BY_ID[mine.effect].first_unless_clear or mine.variant == other.variant:
+        return fit.cost < known.cost
+    if mine.variant < other.variant:
+        return by_energy(known, fit) < _CLEARLY
+    return by_energy(fit, known) >= _CLEARLY
 
 
 def _soft(fit: Fit) -> float:

@@ -3,7 +3,9 @@
     gain = sum over channels and runs of  n log(E_without / E_with),      E: whitened energy, see `inference`
 
 Both hypotheses are fitted to the training recordings, so that the gain has no penalty for parameters. Repeated motion
-is a second test: a term whose effect differs from lap to lap must reduce the measured differences between laps.
+is a second test: a term whose effect differs from lap to lap must reduce the measured differences between laps. A term
+also falls if its strength is within its standard error, or if a channel of a training recording is worse with it than
+without it or with the bench file.
 """
 
 from dataclasses import dataclass
@@ -12,12 +14,21 @@ from functools import partial
 import numpy as np
 
 from hil.diagnosis.search.forward_selection import TIED, claimed
+from hil.diagnosis.search.initial_values import axis_facts
+from hil.diagnosis.verdict.fit_table import channel_names
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
-from hil.identification.inference import against
-from hil.identification.noise_floor import REPEATS, unrepeated
+from hil.identification.inference import against, standard_errors
+from hil.identification.noise_floor import FLOOR, REPEATS, unrepeated
 from hil.identification.parallel import in_parallel
 from hil.identification.terms import Term
+from hil.twin.library import BY_ID
+from hil.twin.parameter import Role
+
+# Growth of the mean square of a channel, 10 % in rms, from which a term harms it: less is a trade between channels
+# within the model discrepancy.
+WORSE = 1.1**2
+_ACTS = 0.1  # least change of the held-out residual per row, over that in training, from which a term acts there
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,7 +37,8 @@ class Ablation:
 
     `train` and `held_out` are the residual energy without the term over that with it, `laps` the same ratio of the part
     that does not repeat from lap to lap. `gain` is the evidence for the term on the held-out recordings. They are None
-    without held-out recordings or laps.
+    without held-out recordings or laps. `acts`: the term changes the held-out residuals as it does those in training.
+    `clear`: its strength is above its standard error. `worse`: channels of training recordings that it harms.
     """
 
     term: Term
@@ -35,11 +47,22 @@ class Ablation:
     held_out: float | None
     gain: float | None
     laps: float | None
+    acts: bool = False
+    clear: bool = True
+    worse: tuple[str, ...] = ()
 
     @property
-    def harms(self) -> bool:
-        """True if held-out recordings or laps refute the term; a motion without its effect does not."""
-        return (self.gain is not None and self.gain < -TIED) or (self.laps is not None and self.laps < REPEATS)
+    def refuted(self) -> str:
+        """Why the term is not named; empty if it stands. Held-out motion without its effect does not refute it."""
+        if self.gain is not None and self.gain < (0.0 if self.acts else -TIED):
+            return "it improves the fit to the training recordings, but worsens that to held-out recordings"
+        if self.laps is not None and self.laps < REPEATS:
+            return "it improves the fit to the training recordings, but worsens that to repeated laps"
+        if not self.clear:
+            return "its strength is below its standard error"
+        if self.worse:
+            return f"with it the training recordings are reproduced worse in {', '.join(self.worse)}"
+        return ""
 
     @property
     def shown(self) -> bool:
@@ -59,9 +82,10 @@ class CrossValidation:
 def cross_validate(nominal: Fit, final: Fit, held_out: Dataset) -> CrossValidation:
     """Ablate every term; drop those that held-out recordings or laps refute, the most harmful first."""
     dropped: list[Ablation] = []
+    owner = nominal.estimator.evaluate(nominal.hypothesis.owner)
     while True:
-        ablations = _ablate(nominal, final, held_out)
-        harmful = [ablation for ablation in ablations if ablation.harms]
+        ablations = _ablate(owner, nominal, final, held_out)
+        harmful = [ablation for ablation in ablations if ablation.refuted]
         if not harmful:
             return CrossValidation(final, tuple(ablations), tuple(dropped))
         worst = min(harmful, key=lambda ablation: ablation.gain or 0.0)
@@ -82,7 +106,7 @@ def explained_share(before: Fit, after: Fit) -> float:
     return min(max(1.0 - left / was, 0.0), 1.0) if was > 0.0 else float(left == 0.0)
 
 
-def _ablate(nominal: Fit, final: Fit, held_out: Dataset) -> list[Ablation]:
+def _ablate(owner: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> list[Ablation]:
     rebased = final.hypothesis.rebased
 
     def without(index: int) -> Fit:
@@ -92,8 +116,9 @@ def _ablate(nominal: Fit, final: Fit, held_out: Dataset) -> list[Ablation]:
     fits = in_parallel([partial(without, index) for index in range(len(final.terms))])
     own, own_held_out = energy(final), final.on(held_out) if held_out.runs else None
     differs = unrepeated(final.hypothesis, final.data)
+    clear = _clear(final)
 
-    def ablation(term: Term, other: Fit) -> Ablation:
+    def ablation(index: int, term: Term, other: Fit) -> Ablation:
         there = other.on(held_out) if held_out.runs else None
         return Ablation(
             term,
@@ -102,9 +127,44 @@ def _ablate(nominal: Fit, final: Fit, held_out: Dataset) -> list[Ablation]:
             energy(there) / energy(own_held_out) if there and own_held_out else None,
             _gain(own_held_out, there) if there and own_held_out else None,
             unrepeated(other.hypothesis, other.data) / differs if differs > 0.0 else None,
+            bool(there and own_held_out and _change(own_held_out, there) > _ACTS * _change(final, other)),
+            clear[index],
+            _worse(final, other, owner),
         )
 
-    return [ablation(term, other) for term, other in zip(final.terms, fits, strict=True)]
+    return [ablation(index, term, other) for index, (term, other) in enumerate(zip(final.terms, fits, strict=True))]
+
+
+def _change(found: Fit, without: Fit) -> float:
+    """Mean squared change of the residuals by a term, in units of noise^2."""
+    change = without.residuals.vector - found.residuals.vector
+    return float(change @ change) / change.size
+
+
+def _clear(found: Fit) -> list[bool]:
+    """For each term, whether one of its strengths differs from no effect by more than its standard error."""
+    if not found.jacobian.size:  # evaluated, not fitted
+        return [True] * len(found.terms)
+    errors, axis = standard_errors(found), axis_facts(found.bench, found.data.runs)
+    result = []
+    for index, term in enumerate(found.terms):
+        mechanism, own = BY_ID[term.effect], errors[found.hypothesis.columns(index)]
+        sizes = {place: abs(term.values[place]) for place in mechanism.indices(Role.STRENGTH)}
+        sizes[mechanism.strength] = mechanism.size(term.values, axis)
+        result.append(any(size > own[place] for place, size in sizes.items()))
+    return result
+
+
+def _worse(found: Fit, without: Fit, owner: Fit) -> tuple[str, ...]:
+    """Channels that are above their noise in a training recording, and worse with a term than without or by the bench
+    file: there the fit pays with this channel for another."""
+    names = {
+        channel
+        for ratios, *others in zip(found.noise_ratios, without.noise_ratios, owner.noise_ratios, strict=True)
+        for channel, ratio in ratios.items()
+        if ratio > max(FLOOR, WORSE * min(other[channel] for other in others))
+    }
+    return tuple(sorted(channel_names(found.bench, found.data.runs[0])[name] for name in names))
 
 
 def _gain(found: Fit, without: Fit) -> float:

@@ -93,14 +93,15 @@ def findings(
 def corrections(owner: Bench, found: Fit) -> dict[str, Correction]:
     """Nominal parameters of the bench file and as fitted; without a torque only the damping of the transmission.
 
-    Motion alone gives the ratio of stiffness and mass, and nothing of the motor side.
+    Motion alone gives the ratio of stiffness and mass, and nothing of the motor side. A parameter that ended at the
+    bound of the allowed range, or was left as it is, has no correction.
     """
     deviations = standard_errors(found)
     told = ("damping_ratio",) if any("motor" in run.unseen for run in found.data.runs) else owner.axis.NOMINAL
     return {
         name: Correction(nominal=float(getattr(owner.axis, name)), value=value, std=std, unit=unit_of(name))
         for name, value, std in zip(owner.axis.NOMINAL, found.hypothesis.values, deviations, strict=False)
-        if name in told
+        if name in told and name not in found.at_bound and not math.isclose(value, getattr(owner.axis, name))
     }
 
 

@@ -3,7 +3,7 @@
 Figures are in closed loop unless the control law is unknown or the loop is chaotic: with stick-slip or play two
 recordings of the same axis diverge, and a twin at the noise floor in every block deviates from the recording. Then the
 figures are block by block, with measured inputs. The same holds for the motor position if its encoder resolves the
-motion caused by the torque noise.
+motion caused by the torque noise, and if the twin does not hold its closed loop.
 """
 
 import math
@@ -17,6 +17,7 @@ from hil.channels import AXIS_CHANNELS, CHANNELS
 from hil.diagnosis.result import ChannelFit, FitFigures, Mode
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
+from hil.identification.honest_refit import holds
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.measured import Measured
 from hil.identification.noise_floor import floor, noise_response, rms, sensor_noise
@@ -49,9 +50,6 @@ def channel_residuals(hypothesis: Hypothesis, data: Dataset, mode: Mode) -> tupl
     )
 
 
-_DIVERGED = 1e9  # residual over the noise floor from which a twin is unstable: its size says nothing
-
-
 @dataclass(frozen=True, eq=False)
 class _ChannelTable:
     """Figures of one channel in one mode for the three hypotheses."""
@@ -70,12 +68,12 @@ class _ChannelTable:
             rms for rms, repeated in self._floors(other) if repeated
         ]
         white = float(np.sqrt(np.mean(np.square(lapped or [rms for rms, _ in own]))))
-        owner = self._rms(self.owner, data)
+        closed = self.mode is Mode.CLOSED_LOOP
         return FitFigures(
             before_rms=self._rms(self.nominal, data),
             after_rms=self._rms(self.final, data),
             noise_floor_rms=white,
-            owner_rms=owner if owner < _DIVERGED * white else None,
+            owner_rms=None if closed and not holds(self.owner, data) else self._rms(self.owner, data),
         )
 
     def _of(self, hypothesis: Hypothesis, data: Dataset) -> list[FloatArray]:
@@ -110,14 +108,21 @@ class _ChannelTable:
         return math.hypot(sensor_noise(run)[self.channel], self.noise[run][self.channel])
 
 
+def closed_loop_held(nominal: Fit, final: Fit, held_out: Dataset) -> bool:
+    """True if the control law is known, and refitted and final twin keep to all recordings in closed loop."""
+    sets = [data for data in (final.data, held_out) if data.runs]
+    return final.bench.law_known and all(holds(fit.hypothesis, data) for fit in (nominal, final) for data in sets)
+
+
 def fit_table(owner: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> dict[str, ChannelFit]:
     """Compute the figures of each recorded channel."""
     train = final.data
     sets = [data for data in (train, held_out) if data.runs]
     laps = any(data.laps for data in sets)
     law_known = final.bench.law_known
-    modes = (Mode.CLOSED_LOOP, Mode.BLOCKS) if law_known else (Mode.BLOCKS,)
-    noise = {run: noise_response(final.hypothesis, run) if law_known else {} for data in sets for run in data.runs}
+    held = closed_loop_held(nominal, final, held_out)
+    modes = (Mode.CLOSED_LOOP, Mode.BLOCKS) if held else (Mode.BLOCKS,)
+    noise = {run: noise_response(final.hypothesis, run) if held else {} for data in sets for run in data.runs}
     result = {}
     for channel, recorded in channel_names(final.bench, train.runs[0]).items():
         shown = train.runs[0]
@@ -131,7 +136,7 @@ def fit_table(owner: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> dict[s
             for table in [_ChannelTable(owner.hypothesis, nominal.hypothesis, final.hypothesis, noise, channel, mode)]
         }
         mode = modes[0]
-        if law_known:
+        if held:
             closed, block = (max(one.after_rms / one.noise_floor_rms for one in figures[mode]) for mode in figures)
             chaotic = closed > STRAYS >= block and not train.runs[0].torque_is_command
             mode = Mode.BLOCKS if chaotic else Mode.CLOSED_LOOP

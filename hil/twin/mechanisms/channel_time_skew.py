@@ -67,8 +67,9 @@ MECHANISM = Mechanism(
     variants=(
         Variant(Stage.CHANNEL, _late_table, "table_position", needs_table=True),
         Variant(Stage.CHANNEL, _late_torque, "torque"),
-        Variant(Stage.CHANNEL, _late_motor, "motor_position"),
+        Variant(Stage.CHANNEL, _late_motor, "motor_position", sign=-1.0),
     ),
+    first_unless_clear=True,  # motor position and torque are the clock unless their relation says otherwise
     starts=lambda s: [(2e-4,)],
     typical=lambda a: (2e-4,),
 )

@@ -64,4 +64,5 @@ MECHANISM = Mechanism(
     proportional=False,
     picture=Picture.FRICTION,
     neutral_at_zero=False,
+    neutral=lambda a: a.coulomb,
 )

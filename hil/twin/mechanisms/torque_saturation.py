@@ -1,14 +1,27 @@
 """Torque saturation: the drive gives less than commanded."""
 
+from collections.abc import Sequence
+
 from numba import njit
 
 from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, Stage, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
+from hil.twin.scene import AxisFacts
 
 
 @njit
 def _limited_torque(value: float, at: Moment, parameters: Row, memory: Row) -> float:
     return min(max(value, -parameters[0]), parameters[0])
+
+
+# A limit is seen as a plateau. Lag and delay of a drive, up to some milliseconds, round a shorter peak of the command
+# as a limit would.
+_PLATEAU_S = 0.02
+
+
+def _valid(values: Sequence[float], variant: int, axis: AxisFacts) -> bool:
+    """Check that the command stayed at the limit long enough for a plateau."""
+    return axis.held_s(values[0]) >= _PLATEAU_S
 
 
 MECHANISM = Mechanism(
@@ -28,4 +41,5 @@ MECHANISM = Mechanism(
     proportional=False,
     picture=Picture.DRIVE_LAW,
     neutral_at_zero=False,
+    valid=_valid,
 )

@@ -10,10 +10,14 @@ from hil.control import cascade
 from hil.twin.stepping import kernel
 from hil.twin.stepping.contact import COMPILE
 from hil.twin.stepping.records import shapes_of
+from hil.twin.stepping.transmission import along
 
 # Time constant of the observer that holds a floating table: long against a 2 ms table-encoder count at creep,
 # short against a flight through the gap (tens of ms).
 OBSERVER_S = 0.008
+# Least time constant of any observer in ticks: the sampled error of a rigid body decays by 3/4 per tick with 2, grows
+# with 1.
+LEAST_TICKS = 2.0
 # Time constant with which the replayed integrator follows the recorded command: slow against every filter or delay.
 INTEGRATOR_S = 0.1
 
@@ -66,7 +70,7 @@ def closed_loop(gains, state, setpoints, misread, measured_table, axis):  # type
         command[k] = outputs.torque_n_m
         if told > 0 and own.floating > 0.0:
             error = (measured_table[k] - datum - table[k]) / c.ratio
-            _correct(shapes.table_impulse, error, c.period, OBSERVER_S, delta)
+            _correct(shapes.table_impulse, error, c.period, max(OBSERVER_S, LEAST_TICKS * c.period), delta)
         torque[k] = _advance(command[k], constants, modes, values, codes, delta, memory)
     return motor, table, command, torque
 
@@ -122,6 +126,9 @@ def observe(gains, state, setpoints, measured, resting, axis):  # type: ignore[n
     motor, table, wanted, torque = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
     seen = measured_motor * c.ratio if measured_table.size == 0 else measured_table
     datum, settled, moved = 0.0, 0, 0
+    # a shift of the motor moves the table of a rigid axis with it: the motor alone holds it
+    rigid = along(shapes.table, shapes.motor_impulse) > 0.5
+    hold = max(OBSERVER_S, LEAST_TICKS * c.period)
     for k in range(n):
         motor[k], table[k] = _read(constants, modes, values, codes, delta, memory)
         inputs = cascade.Inputs(setpoints.position_m[k], setpoints.velocity_m_s[k], measured_motor[k], seen[k])
@@ -138,9 +145,9 @@ def observe(gains, state, setpoints, measured, resting, axis):  # type: ignore[n
                 # its first rest is the datum until motion gives a better one; not within a gap
                 settled += 1
                 datum += (apart - datum) / settled
-            if free and moved + settled > 0:
+            if free and moved + settled > 0 and not rigid:
                 error = (measured_table[k] - datum - table[k]) / c.ratio
-                _correct(shapes.table_impulse, error, c.period, OBSERVER_S, delta)
+                _correct(shapes.table_impulse, error, c.period, hold, delta)
         torque[k] = _advance(command[k], constants, modes, values, codes, delta, memory)
     return motor, table, wanted, torque
 

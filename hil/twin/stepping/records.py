@@ -23,7 +23,8 @@ from hil.twin.structure.chain import Chain
 from hil.twin.structure.modal import Discrete, Modal, discretise
 
 _ROUNDING = 1e-12  # of all damping: below, a whole axis as one side has only rounding of it
-# The step is fine while the motor moves slower than this, or could reverse within two ticks. Alike for a lead of 10 mm.
+# The step is fine while motor or table moves slower than this, or could reverse within two ticks; the axis then rests
+# for the observer of its table. Alike for a lead of 10 mm; SLOW_M_S is in rad/s where the table turns.
 SLOW_RAD_S, SLOW_M_S = 0.02, 32e-6
 
 # An internal step: number per control tick, velocity of the motor or table per unit of torque on the motor or table.
@@ -137,7 +138,7 @@ def pack(
     c["period"], c["ratio"], c["observer"] = gains.period_s, gains.ratio_m_rad, observer_s
     c["angle_per_unit"], c["viscous_speed"] = physics.angle_per_unit, physics.viscous_speed
     c["coulomb"], c["viscous"] = physics.coulomb_n_m, physics.viscous_n_m_s_rad
-    c["slow_velocity"] = SLOW_M_S if physics.linear else SLOW_RAD_S
+    c["slow_velocity"] = SLOW_M_S if physics.linear else min(SLOW_RAD_S, SLOW_M_S / gains.ratio_m_rad)
     c["spring"] = physics.chain.transmission_stiffness_n_m_rad
     c["screw"] = physics.chain.screw_stiffness_n_m_rad
     c["screw_apart"] = not np.array_equal(physics.chain.screw, physics.chain.transmission)

@@ -138,6 +138,15 @@ def test_saturation_throughout(run: Recording) -> None:
     assert "saturated throughout" in refused(changed(run, torque_command_n_m=limit, torque_n_m=limit))
 
 
+@pytest.mark.parametrize(("hz", "half_rows"), [(50.0, 10), (12.5, 40)])
+def test_a_limit_cycle_is_told_with_its_frequency(run: Recording, hz: float, half_rows: int) -> None:
+    limit = OWNER.gains.torque_limit_n_m * np.sign((np.arange(len(run)) // half_rows) % 2 - 0.5)
+    message = refused(changed(run, torque_command_n_m=limit, torque_n_m=limit))
+    assert f"limit cycle: the control loop oscillates at {hz:g} Hz" in message.replace(".0 Hz", " Hz")
+    assert "delay" in message
+    assert "slower" not in message
+
+
 def test_all_reasons_are_given_at_once(run: Recording) -> None:
     message = refused(changed(run, table_position_m=1e3, motor_position_rad=-1.0))
     assert len(message.splitlines()) == 2

@@ -1,0 +1,41 @@
+"""Refit of the nominal parameters as it is reported, and the torque that the twins leave on held-out motion."""
+
+from hil.diagnosis.result import TorqueLeft
+from hil.identification.dataset import Dataset
+from hil.identification.estimator import Fit
+from hil.identification.honest_refit import BLOCK, CLOSED, Refit, never_worse, rms_at_floor, rms_of_channels
+from hil.identification.hypothesis import Hypothesis
+from hil.identification.torque_left import fit_plain, left_by_plain, left_by_twin
+
+
+def reported_refit(nominal: Fit) -> Refit:
+    """The refit, or the point nearest to it that is in no channel of the training recordings worse than the bench file.
+
+    Channels are compared block by block and, if the control law is known, in closed loop. One at its noise floor is not
+    worse. In closed loop one whose block is at its floor is left out: `fit_table` reports the block, and what is left
+    in closed loop is a matter of the control law.
+    """
+    data = nominal.data
+    floors = rms_at_floor(data)
+
+    def figures(hypothesis: Hypothesis) -> dict[str, float]:
+        found = rms_of_channels(hypothesis, data)
+        at_floor = {name for name in found if name.endswith(BLOCK) and found[name] <= floors[name]}
+        return {name: 0.0 if name.replace(CLOSED, BLOCK) in at_floor else value for name, value in found.items()}
+
+    return never_worse(nominal, figures, floors)
+
+
+def torque_left(owner: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> TorqueLeft | None:
+    """Shares of the held-out torque that the twins and the plain model leave; None if that cannot be told."""
+    if not held_out.runs or any("motor" in run.unseen for run in held_out.runs):
+        return None
+    plain = fit_plain(nominal.data)
+    by_plain = None if plain is None else left_by_plain(plain, held_out)
+    if plain is None or by_plain is None:
+        return None
+    of = {
+        name: left_by_twin(fit.hypothesis, held_out, plain.slowest)
+        for name, fit in (("owner", owner), ("refitted", nominal), ("final", final))
+    }
+    return TorqueLeft(plain=by_plain, **of)

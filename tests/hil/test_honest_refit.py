@@ -1,0 +1,90 @@
+"""A refit is in no channel worse than the bench file; the torque left is compared with a plain model."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+import pytest
+from diagnosis_runs import bench, dataset, evaluated, fitted, recorded
+
+from hil.identification.dataset import Dataset
+from hil.identification.honest_refit import holds, never_worse, rms_at_floor, rms_of_channels
+from hil.identification.hypothesis import Hypothesis
+from hil.identification.measured import take
+from hil.identification.nominal_fit import fit_nominal
+from hil.identification.terms import Term
+from hil.identification.torque_left import fit_plain, left_by_plain, left_by_twin
+
+HEAVY = 1.3 * 384.0
+
+
+@pytest.fixture(scope="module")
+def data() -> Dataset:
+    owner = bench(table_mass_kg=HEAVY)
+    return dataset([take(recorded(bench()), owner)], owner)
+
+
+def test_a_fit_that_is_better_everywhere_is_kept(data: Dataset) -> None:
+    found = fitted(Hypothesis(data.bench), data)
+    refit = never_worse(found, partial(rms_of_channels, data=data), rms_at_floor(data))
+    assert refit.fit is found
+    assert refit.note == ""
+
+
+def test_a_fit_that_sacrifices_a_channel_is_shortened_or_left(data: Dataset) -> None:
+    """A point with twice the Coulomb friction: the torque of the closed loop is worse."""
+    found = evaluated(Hypothesis(data.bench), data)
+    names = [coordinate.name for coordinate in found.hypothesis.coordinates]
+    x = found.hypothesis.x.copy()
+    x[names.index("coulomb_torque_n_m")] = np.log(2.0)
+    wrong = evaluated(found.hypothesis.moved(x), data)
+    figures = partial(rms_of_channels, data=data)
+    refit = never_worse(wrong, figures, rms_at_floor(data))
+    assert refit.share < 1.0
+    assert "torque, closed loop" in refit.worse
+    assert "worse than the bench file" in refit.note
+    before, after = figures(wrong.hypothesis.owner), figures(refit.fit.hypothesis)
+    assert all(after[name] <= 1.01 * max(before[name], rms_at_floor(data)[name]) for name in before)
+
+
+@pytest.mark.parametrize("law", [4.0, 1.0])
+def test_the_fit_of_the_command_line_is_never_worse(law: float) -> None:
+    """Also beside a velocity gain that is wrong by a factor of four."""
+    owner = bench(table_mass_kg=HEAVY)
+    gain = law * (owner.known_control.velocity_gain_ma_rpm or 0.0)
+    owner = owner.model_copy(update={"control": owner.control.model_copy(update={"velocity_gain_ma_rpm": gain})})
+    given = dataset([take(recorded(bench()), owner)], owner)
+    result = fit_nominal(given)
+    before, after = (rms_of_channels(Hypothesis(one), given) for one in (owner, result.bench))
+    floors = rms_at_floor(given)
+    assert all(after[name] <= max(1.01 * before[name], floors[name]) for name in before)
+    assert bool(result.note) == (law != 1.0)
+
+
+def test_a_loop_that_swings_between_its_limits_is_not_held(data: Dataset) -> None:
+    assert holds(Hypothesis(bench()), data)
+    light = bench(motor_mass_kg=2.0, table_mass_kg=2.0)
+    assert not holds(Hypothesis(light), data)
+
+
+def test_the_torque_left_is_compared_with_a_plain_model() -> None:
+    """Of a cogging axis the plain model leaves the cogging, the true twin the noise."""
+    owner = bench(table_mass_kg=HEAVY)
+    cogging = Term("cogging_torque", 0, (0.1, 6.0, 0.2))
+    train, held_out = (dataset([take(recorded(bench(), cogging, seed=seed), owner)], owner) for seed in (1, 2))
+    plain = fit_plain(train)
+    assert plain is not None
+    inertia = 719.0 * owner.axis.ratio_m_rad**2
+    assert plain.coefficients[0] == pytest.approx(inertia, rel=0.05)
+    by_plain = left_by_plain(plain, held_out)
+    by_owner, by_truth = (
+        left_by_twin(hypothesis, held_out, plain.slowest)
+        for hypothesis in (Hypothesis(owner), Hypothesis(bench(), (cogging,)))
+    )
+    assert by_plain is not None
+    assert by_owner is not None
+    assert by_truth is not None
+    assert by_truth < 0.2 * by_plain
+    # 115 kg too much: a sixth of the inertia
+    assert by_owner > by_plain

@@ -21,7 +21,8 @@ from hil.control import cascade
 from hil.errors import InputError
 from hil.identification.completion import completed, position_is_measured, rows_are_ticks, torque_is_measured
 from hil.identification.noise import Laps, Noise, estimate_noise, find_laps, moving, white_noise
-from hil.recording.recording import Recording, check_finite
+from hil.recording.recording import Recording
+from hil.recording.stamps import check_finite
 from hil.twin.axis import Response, Start
 
 Channels = tuple[FloatArray, FloatArray, FloatArray, FloatArray]  # as control.replay takes them

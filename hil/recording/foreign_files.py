@@ -3,6 +3,7 @@
 import re
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,15 +14,16 @@ import pyarrow.parquet as pq
 from hil.arrays import FloatArray
 from hil.errors import InputError
 from hil.files import csv_columns, json_columns
-from hil.recording.recording import check_finite
+from hil.files.date_stamps import seconds_of
 
 TEXT_ENDINGS = (".csv", ".txt", ".tsv", ".dat", ".asc")
+FEW_MISSING = 0.05  # share of rows without a value: more is a channel of another rate, or a damaged file
 ENDINGS = f".csv, .mat, .parquet, .json, {', '.join(TEXT_ENDINGS[1:])}"
 
 
 @dataclass(frozen=True)
 class Foreign:
-    """Finite columns of equal length, by name; `place` gives the place of row i (from 0) in the file."""
+    """Columns of equal length, by name, NaN where a value is missing; `place` gives the place of row i (from 0)."""
 
     columns: dict[str, FloatArray]
     scalars: dict[str, float]
@@ -29,16 +31,20 @@ class Foreign:
 
 
 def read_foreign(
-    path: Path, wanted: Collection[str], wanted_scalars: Collection[str], form: csv_columns.CsvFormat
+    path: Path,
+    wanted: Collection[str],
+    wanted_scalars: Collection[str],
+    form: csv_columns.CsvFormat,
+    dates: str | None = None,
 ) -> Foreign:
-    """The columns `wanted` and, from a .mat file, the scalars.
+    """The columns `wanted` and, from a .mat file, the scalars; `dates` is a column of dates, returned in seconds.
 
-    Raises InputError with file, row and column: no such file or format, a missing column, text, NaN or
-    infinity, columns of different length.
+    Raises InputError with file, row and column: no such file or format, a missing column, text, infinity, more missing
+    values than `FEW_MISSING`, columns of different length.
     """
     if not path.is_file():
         raise InputError(f"{path}: there is no such file; give the path of a recording: {ENDINGS}")
-    wanted = tuple(dict.fromkeys(wanted))
+    wanted = tuple(name for name in dict.fromkeys(wanted) if name != dates)
     ending = path.suffix.lower()
     if wanted_scalars and ending != ".mat":
         raise InputError(
@@ -46,27 +52,50 @@ def read_foreign(
             ".mat files only; write the number into the map"
         )
     if ending in TEXT_ENDINGS:
-        return Foreign(
-            csv_columns.read_columns(path, wanted, form),
-            {},
-            lambda row: f"{path}:{csv_columns.line_of_row(path, row, form)}",
-        )
+        columns = csv_columns.read_columns(path, wanted, form, FEW_MISSING)
+        if dates is not None:
+            columns[dates] = seconds_of(csv_columns.read_texts(path, dates, form))
+        place = partial(_line, path, form)
+        _check(path, columns, place)
+        return Foreign(columns, {}, place)
     if ending == ".mat":
         variables = load_mat(path)
         columns = {name: _mat_column(path, variables, name) for name in wanted}
         scalars = {name: _mat_scalar(path, variables, name) for name in wanted_scalars}
     elif ending == ".parquet":
         columns, scalars = _parquet_columns(path, wanted), {}
+        if dates is not None:
+            columns[dates] = parquet_dates(path, dates)
     elif ending == ".json":
         content = json_columns.read_json(path)
         columns, scalars = {name: content.numbers(path, name) for name in wanted}, {}
+        if dates is not None:
+            columns[dates] = seconds_of([str(text) for text in content.lists.get(dates, [])])
     else:
         raise InputError(
             f"{path}: the ending {path.suffix!r} cannot be imported, allowed {ENDINGS}; "
             "export the recording to one of them"
         )
-    _check(path, columns)
-    return Foreign(columns, scalars, lambda row: f"{path}: row {row + 1}")
+    place = partial(_row, path)
+    _check(path, columns, place)
+    return Foreign(columns, scalars, place)
+
+
+def _line(path: Path, form: csv_columns.CsvFormat, row: int) -> str:
+    return f"{path}:{csv_columns.line_of_row(path, row, form)}"
+
+
+def _row(path: Path, row: int) -> str:
+    return f"{path}: row {row + 1}"
+
+
+def parquet_dates(path: Path, name: str) -> FloatArray:
+    """A column of time stamps of a Parquet file in seconds (n,) since midnight before the first."""
+    column = pq.read_table(path, columns=[name]).column(name)
+    if not pa.types.is_timestamp(column.type):
+        return seconds_of([str(text) for text in column.to_pylist()])
+    nanoseconds = column.cast(pa.timestamp("ns", column.type.tz), safe=False).cast(pa.int64()).to_numpy()
+    return np.asarray((nanoseconds - nanoseconds[0]) * 1e-9, dtype=np.float64)
 
 
 def load_mat(path: Path) -> dict[str, Any]:
@@ -135,7 +164,7 @@ def _parquet_columns(path: Path, wanted: tuple[str, ...]) -> dict[str, FloatArra
     return {name: table.column(name).to_numpy().astype(np.float64) for name in wanted}
 
 
-def _check(path: Path, columns: dict[str, FloatArray]) -> None:
+def _check(path: Path, columns: dict[str, FloatArray], place: Callable[[int], str]) -> None:
     first, *others = columns.items()
     for name, values in others:
         if values.size != first[1].size:
@@ -143,4 +172,12 @@ def _check(path: Path, columns: dict[str, FloatArray]) -> None:
                 f"{path}: {name}: given {values.size} rows, {first[0]} has {first[1].size}; "
                 "all columns must be equally long"
             )
-    check_finite(columns, lambda row: f"{path}: row {row + 1}")
+    for name, values in columns.items():
+        missing = np.isnan(values)
+        few = missing.mean() <= FEW_MISSING
+        bad = np.flatnonzero(np.isinf(values) | (missing & ~np.bool_(few)))
+        if bad.size:
+            raise InputError(
+                f"{place(int(bad[0]))}: {name}: given {values[bad[0]]}, allowed a finite number, or none in up to "
+                f"{100.0 * FEW_MISSING:g} % of the rows; correct the values or cut the recording before it"
+            )

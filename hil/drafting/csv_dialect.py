@@ -73,6 +73,12 @@ def number_of(text: str, decimal_point: str) -> float:
     return float(text.replace(",", "."))
 
 
+def is_missing(text: str) -> bool:
+    """True for an empty field or a word for a missing number; not for infinity."""
+    word = text.strip().lower()
+    return word in _WORDS and "inf" not in word
+
+
 def _sample(path: Path) -> tuple[list[str], str]:
     with path.open("rb") as file:
         start = file.read(4096)

@@ -7,18 +7,22 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.channels import AXIS_CHANNELS, AxisKind
-from hil.drafting.clock import StampClock, find_clock
+from hil.drafting.clock import find_clock
 from hil.drafting.column_names import Label, label
 from hil.drafting.effort import effort_entry
+from hil.drafting.even_rows import even_rows, filled_in, find_wraps, with_rate, without_duplicates
 from hil.drafting.foreign_table import read_table
 from hil.drafting.map_draft import DraftedChannel, MapDraft
-from hil.drafting.oddities import refuse_damage
+from hil.drafting.oddities import refuse_damage, refuse_missing
 from hil.drafting.relations import MotionColumns, derivative_of, driven, motion, proportional
 from hil.drafting.roles import SAME_POSITION, Roles, find_roles
 from hil.drafting.unit_choice import MATCH, UnitChoice, is_length, misfit, position_unit, velocity_unit
 from hil.drafting.usual_values import COUNTS, LEADS_M, ROTARY_LEAD_M, mixed_up, usual_lead
 from hil.errors import InputError
 from hil.quantities import UNITS
+from hil.recording.complete_rows import complete_rows
+from hil.recording.held_samples import rows_per_sample
+from hil.recording.wraps import unwrapped
 
 
 def draft_map(path: Path, rate_hz: float | None = None, axis: str | None = None) -> MapDraft:
@@ -26,20 +30,36 @@ def draft_map(path: Path, rate_hz: float | None = None, axis: str | None = None)
 
     Raises InputError: a damaged file, no clock, no motion, no column that goes with it, contradicting columns.
     """
-    table = read_table(path)
+    table, doubled = without_duplicates(read_table(path))
     labels = {name: label(name, table.units.get(name, "")) for name in table.columns}
     clock = find_clock(table, labels, rate_hz)
     columns = {name: values for name, values in table.columns.items() if name != clock.column}
-    even, period_s = _even(columns, clock)
-    roles = find_roles(str(path), even, labels, period_s, axis)
-    used = [name for name in _used(roles) if name]
-    refuse_damage(path, {name: columns[name] for name in used}, {name: even[name] for name in used}, roles, period_s)
-    draft = MapDraft(table, clock, unsure=[*clock.unsure, *roles.unsure], left_out=dict(roles.left_out))
+    wraps = find_wraps(columns, labels)
+    columns |= {name: unwrapped(columns[name], size) for name, size in wraps.items()}
+    filled = {n: filled_in(values, clock.time_s) for n, values in columns.items() if np.isfinite(values).any()}
+    first = even_rows(path, filled, clock.time_s)
+    roles = find_roles(str(path), first.columns, labels, first.period_s, axis)
+    used = {name: columns[name] for name in _used(roles) if name}
+    refuse_missing(path, used, table.texts)
+    # only now is it known which columns must be complete, and which repeat when a sample does
+    ratio = rows_per_sample({name: filled[name] for name in used})
+    complete = complete_rows(used | {"time_s": clock.time_s}, ratio if ratio > 1.0 else None)
+    kept = {name: values[complete.rows] for name, values in filled.items()}
+    even = even_rows(path, kept, complete.columns["time_s"])
+    refuse_damage(path, {name: filled[name] for name in used}, clock.time_s, even.columns, roles, even.period_s)
+    clock = with_rate(clock, even)
+    notes = [*doubled, *clock.unsure, *complete.notes, *even.notes]
+    notes += [f"{name}: wraps at {wraps[name]:g}; it is unwrapped" for name in used if name in wraps]
+    draft = MapDraft(table, clock, unsure=[*notes, *roles.unsure], left_out=dict(roles.left_out))
     draft.left_out |= {remark.split(": ", 1)[0]: remark.split(": ", 1)[1] for remark in table.remarks}
     draft.unsure += [
         f"{one.column}: its unit is not known" for one in labels.values() if one.odd_unit and one.column in used
     ]
-    _Composer(draft, labels, roles, even, period_s).compose()
+    _Composer(draft, labels, roles, even.columns, even.period_s).compose()
+    draft.rows_per_sample = ratio if ratio > 1.0 else None
+    for one in draft.channels:
+        if one.entry["column"] in wraps:
+            one.entry["wraps_at"] = wraps[str(one.entry["column"])]
     return draft
 
 
@@ -54,21 +74,6 @@ def _used(roles: Roles) -> tuple[str | None, ...]:
         roles.effort,
         roles.effort_command,
     )
-
-
-def _even(columns: dict[str, FloatArray], clock: StampClock) -> tuple[dict[str, FloatArray], float]:
-    """Columns on a regular clock without missing values, for the relations only."""
-    time_s = clock.time_s
-    period_s = float(np.median(np.diff(time_s)))
-    grid = (
-        np.arange(time_s.size) * period_s if clock.resample_hz is None else np.arange(time_s[0], time_s[-1], period_s)
-    )
-    even = {}
-    for name, values in columns.items():
-        good = np.isfinite(values)
-        if good.any():
-            even[name] = np.interp(grid, time_s[good], values[good])
-    return even, period_s
 
 
 class _Composer:

@@ -1,4 +1,4 @@
-"""Read stamps that are dates or times of day as seconds: 2024-03-01T12:00:00.001Z, 01.03.2024 12:00:00,001, 12:00:00.001."""
+"""Read stamps that are dates or times of day: 2024-03-01T12:00:00.001Z, 01.03.2024 12:00:00,001, 12:00:00.001."""
 
 import re
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""Leave out rows of a foreign file that hold no new sample: with a missing value, or a repetition of the row before."""
+"""Leave out rows of a foreign file that hold no new sample: with a missing value, or that repeat the row before."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from hil.arrays import FloatArray
 from hil.recording.held_samples import kept_rows
+from hil.recording.stamps import REPEATS
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,13 +21,21 @@ class CompleteRows:
 
 
 def complete_rows(columns: Mapping[str, FloatArray], rows_per_sample: float | None = None) -> CompleteRows:
-    """Leave out rows of columns (n,) with NaN, and repetitions if each sample stands in `rows_per_sample` rows.
+    """Leave out rows of columns (n,) with NaN, duplicates with their stamp, and repetitions if each sample stands in `rows_per_sample` rows.
 
     The clock shows where rows are missing: short stretches are interpolated, others are gaps (`stamps.regular_rows`).
     """
     notes = []
+    same = np.r_[False, np.logical_and.reduce([np.diff(values) == 0.0 for values in columns.values()])]
+    if same.mean() > REPEATS:  # stamps with too few digits
+        same[:] = False
+    if same.any():
+        notes.append(
+            f"duplicate rows: {same.sum()} repeat the row before with its stamp, first row "
+            f"{int(np.argmax(same)) + 1} of the numbers; they are left out"
+        )
     good = np.logical_and.reduce([np.isfinite(values) for values in columns.values()])
-    rows = np.flatnonzero(good)
+    rows = np.flatnonzero(good & ~same)
     if not good.all():
         lacking = ", ".join(name for name, values in columns.items() if not np.isfinite(values).all())
         first = int(np.flatnonzero(~good)[0]) + 1

@@ -31,8 +31,8 @@ def rows_per_sample(columns: Mapping[str, FloatArray]) -> float:
 def kept_rows(columns: Mapping[str, FloatArray], ratio: float) -> NDArray[np.intp]:
     """Rows to keep so that each sample stands once, for `ratio` rows per sample.
 
-    At a whole ratio every so many rows from that at which most samples are new; else each new sample, and at rest, where
-    samples do not differ, one row per `ratio`.
+    At a whole ratio every so many rows from that at which most samples are new; else each new sample, and at rest,
+    where samples do not differ, one row per `ratio`.
     """
     new = _new(columns)
     rows = np.flatnonzero(new & _moving(columns))

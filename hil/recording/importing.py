@@ -8,7 +8,6 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.channels import CHANNELS, AxisChannels
-from hil.errors import InputError
 from hil.files.date_stamps import DAY_S
 from hil.files.yaml_model import load_model
 from hil.recording.complete_rows import complete_rows
@@ -19,7 +18,7 @@ from hil.recording.stamps import RegularRows, regular_rows
 from hil.recording.wraps import unwrapped
 
 EPOCH_S = 1e6  # start of a clock that counts from 1970 or year 0: its large numbers have few digits for the steps
-_SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "d": DAY_S, "date": 1.0}
+SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "d": DAY_S, "date": 1.0}
 MAPS = Path(__file__).parents[1] / "maps"
 
 
@@ -82,7 +81,7 @@ def _find_map(map_path: str | Path) -> Path:
 
 def _time_s(the_map: RecordingMap, raw: dict[str, FloatArray]) -> FloatArray:
     if the_map.time is not None:
-        stamps, factor = raw[the_map.time.column], _SECONDS[the_map.time.unit]
+        stamps, factor = raw[the_map.time.column], SECONDS[the_map.time.unit]
         if abs(factor * stamps[0]) > EPOCH_S:
             stamps = stamps - stamps[0]
         return np.asarray(factor * stamps, dtype=np.float64)

@@ -12,6 +12,7 @@ CLOCK_TOLERANCE = 0.01  # of the period: what a step of a regular clock may devi
 LARGEST = 1e12  # above every SI value of a channel, and of a clock in microseconds per day
 GAP_STEPS = 10.0  # of the clock: above, rows are missing and are not interpolated
 LEAST_ROWS = 50  # of a part: fewer show no motion
+REPEATS = 0.02  # share of repeated stamps from which they have too few digits, and are no duplicate rows
 _TENTHS = 200  # steps from which the median of a tenth is a typical step in spite of jitter
 _TWO_RATES = 1.5  # ratio of typical steps at both ends: more than jitter and drift
 _DROPPED = 1.9  # times the period: a step in which a row is missing, so that rows cannot be counted
@@ -56,9 +57,10 @@ def regular_rows(
 ) -> RegularRows:
     """Cut columns (n,) at gaps of their `time_s` and give each part equal steps.
 
-    Stamps that are regular within 1 % stay as they are. Else either the stamps jitter and the rows do not, or the rows
-    were taken at these times: the one is right in which the channels are smoother. Rows taken at uneven times are
-    interpolated, to `rate_hz` or the mean rate.
+    Stamps that are regular within 1 % stay as they are, single missing rows are interpolated; stamps with too few
+    digits get equal steps. Else either the stamps jitter and the rows do not, or the rows were taken at these times:
+    the one is right in which the channels are smoother. Rows taken at uneven times are interpolated, to `rate_hz` or
+    the mean rate.
 
     `place` as in `check_finite`. Raises InputError: NaN, time that repeats or runs back, two rates, too few rows.
     """
@@ -67,9 +69,11 @@ def regular_rows(
     if time_s.size < 3:
         raise InputError(f"{place(0)}: time_s: given {time_s.size} rows, allowed 3 or more; give a longer recording")
     steps = np.diff(time_s)
-    _refuse_order(time_s, steps, place)
-    typical = float(np.median(steps))
-    _refuse_two_rates(steps, place)
+    few_digits = bool(time_s.size >= LEAST_ROWS and np.mean(steps == 0.0) > REPEATS and steps.max() > 0.0)
+    _refuse_order(time_s, steps, few_digits, place)
+    typical = float(np.median(steps[steps > 0.0]))
+    if not few_digits:
+        _refuse_two_rates(steps, place)
     first = np.r_[0, np.flatnonzero(steps > GAP_STEPS * typical) + 1]
     pieces = [slice(int(a), int(b)) for a, b in zip(first, np.r_[first[1:], time_s.size], strict=True)]
     kept = [piece for piece in pieces if len(pieces) == 1 or piece.stop - piece.start >= LEAST_ROWS]
@@ -87,19 +91,33 @@ def regular_rows(
     if even and rate_hz is None:
         period_s = round(mean_s, 12)
         return _joined([_taken(columns, piece) for piece in kept], time_s[0], period_s, None, notes)
+    if few_digits:
+        period_s = round(mean_s, 12)
+        notes = (*notes, f"clock: stamps repeat (too few digits); equal steps of {period_s:.6g} s are taken")
+        return _joined([_counted(columns, piece, period_s) for piece in kept], time_s[0], period_s, None, notes)
+    missing = np.maximum(np.round(within / typical), 1.0) - 1.0
+    whole = bool(np.all(np.abs(within - (missing + 1.0) * typical) <= CLOCK_TOLERANCE * typical))
     told = f"clock: steps from {within.min():.4g} to {within.max():.4g} s, typically {typical:.4g} s"
-    if rate_hz is None and within.max() < _DROPPED * typical and _counts_better(columns, kept, mean_s):
+    if rate_hz is None and whole:
+        mean_s = float(np.sum(within) / np.sum(missing + 1.0))
+        notes = (
+            *notes,
+            f"clock: {missing.sum():.0f} single rows are missing at a period of {mean_s:.6g} s; they are interpolated",
+        )
+    elif rate_hz is None and within.max() < _DROPPED * typical and _counts_better(columns, kept, mean_s):
         period_s = round(mean_s, 12)
         notes = (*notes, f"{told}: the stamps jitter, the rows do not; equal steps of {period_s:.6g} s are taken")
         return _joined([_counted(columns, piece, period_s) for piece in kept], time_s[0], period_s, None, notes)
-    rate_hz = rate_hz or float(f"{1.0 / mean_s:.4g}")
-    notes = (*notes, f"{told}; the channels are interpolated to {rate_hz:g} Hz")
+    else:
+        mean_s = float(f"{mean_s:.4g}") if rate_hz is None else 1.0 / rate_hz
+        notes = (*notes, f"{told}; the channels are interpolated to {1.0 / mean_s:.6g} Hz")
+    rate_hz = float(f"{1.0 / mean_s:.9g}")
     parts = [_interpolated(columns, piece, rate_hz) for piece in kept]
     return _joined(parts, time_s[0], round(1.0 / rate_hz, 12), rate_hz, notes)
 
 
-def _refuse_order(time_s: FloatArray, steps: FloatArray, place: Callable[[int], str]) -> None:
-    bad = np.flatnonzero(steps <= 0.0)
+def _refuse_order(time_s: FloatArray, steps: FloatArray, few_digits: bool, place: Callable[[int], str]) -> None:
+    bad = np.flatnonzero(steps < 0.0 if few_digits else steps <= 0.0)
     if bad.size:
         row = int(bad[0]) + 1
         what = "runs back" if steps[row - 1] else "repeats (a duplicate row, or stamps with too few digits)"
@@ -129,7 +147,9 @@ def _of_gaps(time_s: FloatArray, pieces: list[slice], kept: list[slice], typical
     if len(pieces) == 1:
         return ()
     gaps = [float(time_s[piece.start] - time_s[piece.start - 1]) for piece in pieces[1:]]
-    sizes = f"a gap of {gaps[0]:.4g} s" if len(gaps) == 1 else f"{len(gaps)} gaps of {min(gaps):.4g} to {max(gaps):.4g} s"
+    sizes = (
+        f"a gap of {gaps[0]:.4g} s" if len(gaps) == 1 else f"{len(gaps)} gaps of {min(gaps):.4g} to {max(gaps):.4g} s"
+    )
     starts = ", ".join(f"{time_s[piece.start] - time_s[0]:.4g}" for piece in kept[:10])
     text = (
         f"clock: {sizes} between steps of {typical:.4g} s, first after row {pieces[1].start} of the numbers: cut into "

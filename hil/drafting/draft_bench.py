@@ -11,6 +11,7 @@ from hil.drafting.plant_values import PlantValues, TransmissionValues, plant_val
 from hil.drafting.relations import proportional
 from hil.drafting.sensor_values import is_decimal, noise_of
 from hil.drafting.usual_values import ROTARY_LEAD_M, usual_lead
+from hil.errors import InputError
 from hil.identification.quantum import count_of
 from hil.quantities import digits
 from hil.recording.recording import Recording
@@ -48,10 +49,22 @@ class BenchDraft:
 
 
 def draft_bench(recording: Recording) -> BenchDraft:
-    """Draft the bench of the axis of a recording.
+    """Draft the bench of the axis of a recording; with gaps in time, from its longest part that tells enough.
 
     Raises InputError if masses and friction cannot be told: no torque, one direction, too short, a wrong sign.
     """
+    parts = sorted(recording.parts(), key=len, reverse=True)
+    for number, part in enumerate(parts if len(parts) > 1 else ()):
+        try:
+            draft = draft_bench(part)
+        except InputError:
+            if number == len(parts) - 1:
+                raise
+            continue
+        draft.name = recording.name
+        seconds = len(part) * part.period_s
+        draft.notes.insert(0, f"found in {part.name}, {seconds:.4g} s long, of {len(parts)} parts between gaps in time")
+        return draft
     plant, transmission = plant_values(recording), transmission_values(recording)
     if recording.kind is AxisKind.LINEAR:
         draft = BenchDraft(recording.name, recording.kind, "one_mass")

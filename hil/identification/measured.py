@@ -100,8 +100,13 @@ class Measured:
 def take(recording: Recording, bench: Bench) -> Measured:
     """Take the channels of a recording that the twin of `bench` needs; without a control law, complete it first.
 
-    Raises InputError for another kind of axis or period than the bench, a missing channel, NaN, or too few rows.
+    Raises InputError for another kind of axis or period than the bench, gaps, a missing channel, NaN, or too few rows.
     """
+    if len(recording.parts()) > 1:
+        raise InputError(
+            f"{recording.name}: given a recording with gaps in time, allowed one without; give one of its "
+            f"{len(recording.parts())} parts: recording.parts()"
+        )
     recording, bench = completed(recording, bench), bench.sampled(recording.period_s)
     names, gains = recording.axis, bench.gains
     if (recording.kind is AxisKind.LINEAR) != bench.axis.linear:

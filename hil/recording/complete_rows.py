@@ -21,9 +21,10 @@ class CompleteRows:
 
 
 def complete_rows(columns: Mapping[str, FloatArray], rows_per_sample: float | None = None) -> CompleteRows:
-    """Leave out rows of columns (n,) with NaN, duplicates with their stamp, and repetitions if each sample stands in `rows_per_sample` rows.
+    """Leave out rows of columns (n,) with NaN, and those that repeat the row before with its stamp.
 
-    The clock shows where rows are missing: short stretches are interpolated, others are gaps (`stamps.regular_rows`).
+    `rows_per_sample`: each sample stands in so many rows, of which one is kept. The clock then shows where rows are
+    missing: single ones are interpolated, long stretches are gaps (`stamps.regular_rows`).
     """
     notes = []
     same = np.r_[False, np.logical_and.reduce([np.diff(values) == 0.0 for values in columns.values()])]

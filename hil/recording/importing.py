@@ -13,7 +13,7 @@ from hil.files.yaml_model import load_model
 from hil.recording.complete_rows import complete_rows
 from hil.recording.foreign_files import read_foreign
 from hil.recording.import_map import RecordingMap
-from hil.recording.recording import CLOCK, Recording, clock_metadata
+from hil.recording.recording import CLOCK_NOTES, Recording, clock_metadata
 from hil.recording.stamps import RegularRows, regular_rows
 from hil.recording.wraps import unwrapped
 
@@ -29,7 +29,7 @@ def import_recording(source: str | Path, map_path: str | Path) -> Recording:
     torque command or vice versa (on a linear axis force). The metadata list them (`derived`) and the source of each
     channel (`channels`).
     Rows without a value are left out; gaps of the clock cut the recording into `Recording.parts`. The metadata say so
-    (`clock`).
+    (`clock_notes`).
     Raises InputError with file, row and column: wrong format, a missing column, text, infinity, many missing values,
     columns of different length, time that runs back.
     """
@@ -68,9 +68,11 @@ def import_recording(source: str | Path, map_path: str | Path) -> Recording:
         "lead_m": the_map.lead_m,
         "channels": origins,
         "derived": derived,
+        "clock": _describe_clock(rows),
     }
     metadata |= clock_metadata(rows)
-    metadata[CLOCK] = "; ".join([_describe_clock(rows), *complete.notes, *rows.notes])
+    if complete.notes or rows.notes:
+        metadata[CLOCK_NOTES] = [*complete.notes, *rows.notes]
     return Recording(source.stem, columns, rows.period_s, metadata)
 
 

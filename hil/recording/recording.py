@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 METADATA_KEY = b"hil"  # of the schema: the metadata as JSON
 PARTS = "parts"  # key of the metadata: row and start_s of each part, if there are gaps between them
-CLOCK = "clock"  # key of the metadata: what was done to the stamps
+CLOCK_NOTES = "clock_notes"  # key of the metadata: what was done to the stamps
 RESAMPLED = "resampled"  # key of the metadata: the rows are not those of the control loop
 _STREAM_END = b"\xff\xff\xff\xff\x00\x00\x00\x00"  # Arrow IPC: the end-of-stream marker
 _FORMATS = ".parquet, .arrows (a run that was not closed) or .csv"
@@ -127,7 +127,7 @@ def read_recording(path: str | Path) -> Recording:
     Raises InputError with file, row and column: no such file, not this format, a required channel missing (time,
     position or velocity of the motor, torque, its command or the table's position), NaN or infinity, text, a clock that
     repeats or runs back, two rates. A clock with gaps gives `parts`, one with uneven steps is made regular
-    (`hil.recording.stamps`); `metadata["clock"]` says so.
+    (`hil.recording.stamps`); `metadata["clock_notes"]` says so.
     """
     path = Path(path)
     readers = {".parquet": _read_parquet, ".arrows": _read_stream, ".csv": _read_csv}
@@ -145,7 +145,7 @@ def clock_metadata(rows: RegularRows) -> dict[str, Any]:
     """Metadata of a clock: its parts if there are several, and what was done to the stamps."""
     parts = {PARTS: [asdict(part) for part in rows.parts]} if len(rows.parts) > 1 else {}
     resampled = {RESAMPLED: True} if rows.rate_hz else {}
-    return parts | resampled | ({CLOCK: "; ".join(rows.notes)} if rows.notes else {})
+    return parts | resampled | ({CLOCK_NOTES: list(rows.notes)} if rows.notes else {})
 
 
 def write_parquet(recording: Recording, path: str | Path) -> None:

@@ -14,15 +14,17 @@ from hil.drafting.even_rows import even_rows, filled_in, find_wraps, with_rate, 
 from hil.drafting.foreign_table import read_table
 from hil.drafting.map_draft import DraftedChannel, MapDraft
 from hil.drafting.oddities import refuse_damage, refuse_missing
-from hil.drafting.relations import MotionColumns, derivative_of, driven, motion, proportional
+from hil.drafting.relations import MotionColumns, derivative_of, driven, lateness_s, motion, proportional
 from hil.drafting.roles import SAME_POSITION, Roles, find_roles
-from hil.drafting.unit_choice import MATCH, UnitChoice, is_length, misfit, position_unit, velocity_unit
-from hil.drafting.usual_values import COUNTS, LEADS_M, ROTARY_LEAD_M, mixed_up, usual_lead
+from hil.drafting.unit_choice import MATCH, UnitChoice, are_counts, is_length, misfit, position_unit, velocity_unit
+from hil.drafting.usual_values import COUNTS, LEADS_M, ROTARY_LEAD_M, mixed_up, screw_units, usual_lead
 from hil.errors import InputError
 from hil.quantities import UNITS
 from hil.recording.complete_rows import complete_rows
 from hil.recording.held_samples import rows_per_sample
 from hil.recording.wraps import unwrapped
+
+LATE_ROWS = 0.5  # by which a set-point may seem late: its rounding and the sampling of the encoder
 
 
 def draft_map(path: Path, rate_hz: float | None = None, axis: str | None = None) -> MapDraft:
@@ -39,13 +41,13 @@ def draft_map(path: Path, rate_hz: float | None = None, axis: str | None = None)
     filled = {n: filled_in(values, clock.time_s) for n, values in columns.items() if np.isfinite(values).any()}
     first = even_rows(path, filled, clock.time_s)
     roles = find_roles(str(path), first.columns, labels, first.period_s, axis)
-    used = {name: columns[name] for name in _used(roles) if name}
+    used = {name: columns[name] for name in roles.used}
     refuse_missing(path, used, table.texts)
     # only now is it known which columns must be complete, and which repeat when a sample does
     ratio = rows_per_sample({name: filled[name] for name in used})
     complete = complete_rows(used | {"time_s": clock.time_s}, ratio if ratio > 1.0 else None)
     kept = {name: values[complete.rows] for name, values in filled.items()}
-    even = even_rows(path, kept, complete.columns["time_s"])
+    even = even_rows(path, kept, complete.columns["time_s"], judged_by=list(used))
     refuse_damage(path, {name: filled[name] for name in used}, clock.time_s, even.columns, roles, even.period_s)
     clock = with_rate(clock, even)
     notes = [*doubled, *clock.unsure, *complete.notes, *even.notes]
@@ -61,19 +63,6 @@ def draft_map(path: Path, rate_hz: float | None = None, axis: str | None = None)
         if one.entry["column"] in wraps:
             one.entry["wraps_at"] = wraps[str(one.entry["column"])]
     return draft
-
-
-def _used(roles: Roles) -> tuple[str | None, ...]:
-    return (
-        roles.motor,
-        roles.motor_velocity,
-        roles.table,
-        roles.command,
-        roles.unfollowed,
-        roles.velocity_command,
-        roles.effort,
-        roles.effort_command,
-    )
 
 
 class _Composer:
@@ -115,8 +104,16 @@ class _Composer:
         roles, labels, live = self.roles, self.labels, self.live
         positions = [name for name in (roles.command, roles.table, roles.motor) if name]
         prefers = self._prefers_length(positions)
+        far, motor = next((name for name in (roles.table, roles.command) if name), None), roles.motor
+        if far and motor and "counts" not in (labels[far].unit, labels[motor].unit) and not are_counts(live[motor]):
+            relation = proportional(live[far], live[motor])
+            told = screw_units(relation.factor, labels[far].unit, labels[motor].unit)
+            if told and relation.share > SAME_POSITION and None in (labels[far].unit, labels[motor].unit):
+                note = f"{far} in {told[0]} and {motor} in {told[1]}: with them the travel per turn is a usual lead"
+                self._choose(far, UnitChoice(told[0], note))
+                self._choose(motor, UnitChoice(told[1]))
         # columns with a unit first: they are the hints for the others
-        for column in sorted(positions, key=lambda name: labels[name].unit is None):
+        for column in sorted(set(positions) - set(self.units), key=lambda name: labels[name].unit is None):
             hints = [
                 (proportional(live[column], live[other]).factor, self.units[other])
                 for other in positions
@@ -205,6 +202,13 @@ class _Composer:
             if abs(ratio - 1.0) > 2.0 * MATCH and share > 0.9:
                 self.draft.unsure.append(
                     f"{name}: moves {ratio:.6g} times as far as {self.roles.motor}: a gear, or a wrong unit"
+                )
+        if channel == "position_command_m" and share > SAME_POSITION:
+            late_s = lateness_s(self.live[name], motion(self.live[str(self.roles.motor)], self.period_s))
+            if late_s > LATE_ROWS * self.period_s:
+                self.draft.unsure.append(
+                    f"{name}: comes {1e3 * late_s:.3g} ms after {self.roles.motor}, a set-point comes before: its stamps "
+                    "are late, or the drive leads it; the control law cannot be judged with it as it is"
                 )
         if unit == "counts":  # of the motor's encoder, as in the set-points of a drive
             entry |= {"unit": motor, "scale": float(f"{1.0 / abs(factor):.8g}")}

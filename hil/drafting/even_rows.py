@@ -1,6 +1,8 @@
 """Prepare the columns of a foreign table for its relations: duplicate rows, wraps, missing values, an even clock."""
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -49,18 +51,27 @@ def filled_in(values: FloatArray, time_s: FloatArray) -> FloatArray:
     return values if good.all() else np.interp(time_s, time_s[good], values[good])
 
 
-def even_rows(path: Path, columns: dict[str, FloatArray], time_s: FloatArray) -> EvenRows:
+def even_rows(
+    path: Path, columns: dict[str, FloatArray], time_s: FloatArray, judged_by: Collection[str] = ()
+) -> EvenRows:
     """Columns (n,) without missing values on an even clock, of the part with most rows.
+
+    `judged_by` are the columns that tell jitter of the stamps from jitter of the rows, by default all.
 
     Raises InputError: two rates, time that repeats or runs back.
     """
     usual = {name: values for name, values in columns.items() if np.max(np.abs(values)) <= LARGEST}
-    rows = regular_rows(usual | {"time_s": time_s}, lambda row: f"{path}: row {row + 1} of the numbers")
+    place = partial(_place, path)
+    rows = regular_rows(usual | {"time_s": time_s}, place, judged_by=[name for name in judged_by if name in usual])
     edges = [*(part.row for part in rows.parts), rows.columns["time_s"].size]
     longest = max(range(len(rows.parts)), key=lambda part: edges[part + 1] - edges[part])
     piece = slice(edges[longest], edges[longest + 1])
     longest_part = {name: values[piece] for name, values in rows.columns.items() if name != "time_s"}
     return EvenRows(longest_part, rows.period_s, rows.rate_hz, rows.notes)
+
+
+def _place(path: Path, row: int) -> str:
+    return f"{path}: row {row + 1} of the numbers"
 
 
 def with_rate(clock: StampClock, rows: EvenRows) -> StampClock:

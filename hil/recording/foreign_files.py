@@ -99,10 +99,16 @@ def parquet_dates(path: Path, name: str) -> FloatArray:
 
 
 def load_mat(path: Path) -> dict[str, Any]:
+    """Variables of a .mat file; fields of structures as NAME.FIELD, signals of Simulink by their label."""
     from scipy.io import loadmat
 
     try:
-        return {name: value for name, value in loadmat(path).items() if not name.startswith("__")}
+        content = loadmat(path, struct_as_record=False, squeeze_me=False)
+        variables: dict[str, Any] = {}
+        for name, value in content.items():
+            if not name.startswith("__"):
+                _flatten(name, value, variables)
+        return variables
     except NotImplementedError:
         raise InputError(
             f"{path}: is a .mat file of version 7.3 (HDF5), allowed up to version 7; "
@@ -112,8 +118,31 @@ def load_mat(path: Path) -> dict[str, Any]:
         raise InputError(f"{path}: is no readable .mat file ({error}); it is cut or damaged") from None
 
 
+def _flatten(name: str, value: Any, into: dict[str, Any]) -> None:
+    """Put a variable into `into`, its fields one by one if it is a structure or an array of structures."""
+    structures = _structures(value)
+    if not structures:
+        into[name] = value
+    for index, one in enumerate(structures):
+        label = "".join(np.asarray(getattr(one, "label", "")).reshape(-1).astype(str))
+        if label and hasattr(one, "values"):  # a signal of Simulink
+            into[f"{name.rpartition('.')[0]}.{label}"] = one.values
+            continue
+        own = name if len(structures) == 1 else f"{name}.{index}"
+        for key in one._fieldnames:
+            _flatten(f"{own}.{key}", getattr(one, key), into)
+
+
+def _structures(value: Any) -> list[Any]:
+    """Structures in a variable, also in cells; none for numbers."""
+    if hasattr(value, "_fieldnames"):
+        return [value]
+    values = np.asarray(value)
+    return [one for item in values.reshape(-1) for one in _structures(item)] if values.dtype == object else []
+
+
 def _mat_column(path: Path, variables: dict[str, Any], name: str) -> FloatArray:
-    match = re.fullmatch(r"(\w+)\[(\d+)\]", name)
+    match = re.fullmatch(r"(.+)\[(\d+)\]", name)
     values = _mat_variable(path, variables, match[1] if match else name)
     if match and values.ndim == 2 and int(match[2]) < values.shape[1]:
         return np.ascontiguousarray(values[:, int(match[2])])

@@ -13,11 +13,13 @@ from hil.files.yaml_model import load_model
 from hil.recording.complete_rows import complete_rows
 from hil.recording.foreign_files import read_foreign
 from hil.recording.import_map import RecordingMap
+from hil.recording.quantum import count_of
 from hil.recording.recording import CLOCK_NOTES, Recording, clock_metadata
 from hil.recording.stamps import RegularRows, regular_rows
 from hil.recording.wraps import unwrapped
 
 EPOCH_S = 1e6  # start of a clock that counts from 1970 or year 0: its large numbers have few digits for the steps
+STEP = "step"  # key of a channel's metadata: step of its values before they are interpolated
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "d": DAY_S, "date": 1.0}
 MAPS = Path(__file__).parents[1] / "maps"
 
@@ -53,6 +55,9 @@ def import_recording(source: str | Path, map_path: str | Path) -> Recording:
             values = unwrapped(values, entry.wraps_at)
         raw[name] = factor * values + entry.offset
         origins[name] = {"column": entry.column, "factor": factor, "offset": entry.offset}
+        step = count_of(raw[name][np.isfinite(raw[name])])
+        if step is not None:
+            origins[name][STEP] = step
     clock = the_map.time.column if the_map.time is not None else "sample_rate_hz"
     complete = complete_rows(raw, the_map.rows_per_sample)
     rows = regular_rows(

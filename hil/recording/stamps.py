@@ -1,6 +1,6 @@
 """Turn the rows of a file into a regular clock: cut them at gaps, even out jitter of the stamps, and say both."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +15,7 @@ LEAST_ROWS = 50  # of a part: fewer show no motion
 REPEATS = 0.02  # share of repeated stamps from which they have too few digits, and are no duplicate rows
 _TENTHS = 200  # steps from which the median of a tenth is a typical step in spite of jitter
 _TWO_RATES = 1.5  # ratio of typical steps at both ends: more than jitter and drift
+_CLEARLY = 1.5  # ratio of mean squares: noise alone gives 1, and the stamps are believed
 _DROPPED = 1.9  # times the period: a step in which a row is missing, so that rows cannot be counted
 
 
@@ -53,14 +54,17 @@ def check_finite(columns: Mapping[str, FloatArray], place: Callable[[int], str])
 
 
 def regular_rows(
-    columns: Mapping[str, FloatArray], place: Callable[[int], str], rate_hz: float | None = None
+    columns: Mapping[str, FloatArray],
+    place: Callable[[int], str],
+    rate_hz: float | None = None,
+    judged_by: Collection[str] = (),
 ) -> RegularRows:
     """Cut columns (n,) at gaps of their `time_s` and give each part equal steps.
 
     Stamps that are regular within 1 % stay as they are, single missing rows are interpolated; stamps with too few
     digits get equal steps. Else either the stamps jitter and the rows do not, or the rows were taken at these times:
     the one is right in which the channels are smoother. Rows taken at uneven times are interpolated, to `rate_hz` or
-    the mean rate.
+    the mean rate. `judged_by` are the columns that decide, by default all.
 
     `place` as in `check_finite`. Raises InputError: NaN, time that repeats or runs back, two rates, too few rows.
     """
@@ -96,6 +100,7 @@ def regular_rows(
         notes = (*notes, f"clock: stamps repeat (too few digits); equal steps of {period_s:.6g} s are taken")
         return _joined([_counted(columns, piece, period_s) for piece in kept], time_s[0], period_s, None, notes)
     missing = np.maximum(np.round(within / typical), 1.0) - 1.0
+    judged = {name: columns[name] for name in judged_by or columns} | {"time_s": time_s}
     whole = bool(np.all(np.abs(within - (missing + 1.0) * typical) <= CLOCK_TOLERANCE * typical))
     told = f"clock: steps from {within.min():.4g} to {within.max():.4g} s, typically {typical:.4g} s"
     if rate_hz is None and whole:
@@ -104,12 +109,14 @@ def regular_rows(
             *notes,
             f"clock: {missing.sum():.0f} single rows are missing at a period of {mean_s:.6g} s; they are interpolated",
         )
-    elif rate_hz is None and within.max() < _DROPPED * typical and _counts_better(columns, kept, mean_s):
+    elif rate_hz is None and within.max() < _DROPPED * typical and _counts_better(judged, kept, mean_s):
         period_s = round(mean_s, 12)
         notes = (*notes, f"{told}: the stamps jitter, the rows do not; equal steps of {period_s:.6g} s are taken")
         return _joined([_counted(columns, piece, period_s) for piece in kept], time_s[0], period_s, None, notes)
     else:
-        mean_s = float(f"{mean_s:.4g}") if rate_hz is None else 1.0 / rate_hz
+        # a step that most rows have is the period of the logger, with delays between
+        most = np.mean(np.abs(within - typical) <= CLOCK_TOLERANCE * typical) > 0.5
+        mean_s = float(f"{typical if most else mean_s:.4g}") if rate_hz is None else 1.0 / rate_hz
         notes = (*notes, f"{told}; the channels are interpolated to {1.0 / mean_s:.6g} Hz")
     rate_hz = float(f"{1.0 / mean_s:.9g}")
     parts = [_interpolated(columns, piece, rate_hz) for piece in kept]
@@ -160,7 +167,7 @@ def _of_gaps(time_s: FloatArray, pieces: list[slice], kept: list[slice], typical
 
 
 def _counts_better(columns: Mapping[str, FloatArray], kept: list[slice], period_s: float) -> bool:
-    """True if channels are smoother over the count of the rows than over their stamps.
+    """True if channels are clearly smoother over the count of the rows than over their stamps.
 
     The error of a cubic through the two rows on each side, of the channel in which both differ most.
     """
@@ -168,17 +175,16 @@ def _counts_better(columns: Mapping[str, FloatArray], kept: list[slice], period_
     for name, values in columns.items():
         if name == "time_s" or np.ptp(values) == 0.0:
             continue
-        by_stamp, by_count = (
-            np.concatenate([_cubic_error(time, values[piece]) for piece, time in times])
-            for times in (
-                [(piece, columns["time_s"][piece]) for piece in kept],
-                [(piece, np.arange(piece.stop - piece.start) * period_s) for piece in kept],
-            )
-        )
-        both = float(np.mean(by_stamp**2)), float(np.mean(by_count**2))
-        if min(both) > 0.0:
-            ratio = max(ratio, np.log(both[0] / both[1]), key=abs)
-    return bool(ratio > 0.0)
+        errors = []
+        for piece in kept:
+            time_s = columns["time_s"][piece]
+            counted = np.arange(time_s.size) * period_s
+            uneven = np.abs(time_s[4:] - time_s[:-4] - 4.0 * period_s) > CLOCK_TOLERANCE * period_s
+            errors.append([_cubic_error(time, values[piece])[uneven] for time in (time_s, counted)])
+        by_stamp, by_count = (float(np.sum(np.concatenate(one) ** 2)) for one in zip(*errors, strict=True))
+        if min(by_stamp, by_count) > 0.0:
+            ratio = max(ratio, float(np.log(by_stamp / by_count)), key=abs)
+    return ratio > np.log(_CLEARLY)
 
 
 def _cubic_error(time: FloatArray, values: FloatArray) -> FloatArray:

@@ -89,12 +89,6 @@ def unequal(path: Path) -> None:
     savemat(path, {**GOOD, "torque_Nm": GOOD["torque_Nm"][::4], "motor_angle_rad": GOOD["motor_angle_rad"][::4]})
 
 
-def structure(path: Path) -> None:
-    from scipy.io import savemat
-
-    savemat(path, {"log": GOOD})
-
-
 def every_fourth(name: str) -> str:
     """Text in which a column has a number in every fourth row only."""
     index = list(NAMES.values()).index(name)
@@ -245,7 +239,6 @@ REFUSED: dict[str, tuple[str, Make, str]] = {
         content(b"MATLAB 7.3 MAT-file" + b" " * 105 + b"\x00\x02IM" + b"\x00" * 512),
         "7.3|no readable",
     ),
-    "a .mat with a structure": ("mat", structure, "no vector of numbers"),
     "a .mat with two rates": ("mat", unequal, "no column|no torque|no position|beside"),
     "a truncated Parquet": ("parquet", cut("parquet", 0.7), "no readable Parquet"),
     "text as Parquet": ("parquet", text(TEXT), "no readable Parquet"),

@@ -47,7 +47,7 @@ def draft_map(path: Path, rate_hz: float | None = None, axis: str | None = None)
     ratio = rows_per_sample({name: filled[name] for name in used})
     complete = complete_rows(used | {"time_s": clock.time_s}, ratio if ratio > 1.0 else None)
     kept = {name: values[complete.rows] for name, values in filled.items()}
-    even = even_rows(path, kept, complete.columns["time_s"], judged_by=list(used))
+    even = even_rows(path, kept, complete.columns["time_s"], judged_by=[n for n in used if n != roles.unfollowed])
     refuse_damage(path, {name: filled[name] for name in used}, clock.time_s, even.columns, roles, even.period_s)
     clock = with_rate(clock, even)
     notes = [*doubled, *clock.unsure, *complete.notes, *even.notes]

@@ -96,7 +96,7 @@ def regular_rows(
         period_s = round(mean_s, 12)
         return _joined([_taken(columns, piece) for piece in kept], time_s[0], period_s, None, notes)
     if few_digits:
-        period_s = round(mean_s, 12)
+        period_s = _slope(time_s, kept)
         notes = (*notes, f"clock: stamps repeat (too few digits); equal steps of {period_s:.6g} s are taken")
         return _joined([_counted(columns, piece, period_s) for piece in kept], time_s[0], period_s, None, notes)
     missing = np.maximum(np.round(within / typical), 1.0) - 1.0
@@ -110,7 +110,7 @@ def regular_rows(
             f"clock: {missing.sum():.0f} single rows are missing at a period of {mean_s:.6g} s; they are interpolated",
         )
     elif rate_hz is None and within.max() < _DROPPED * typical and _counts_better(judged, kept, mean_s):
-        period_s = round(mean_s, 12)
+        period_s = _slope(time_s, kept)
         notes = (*notes, f"{told}: the stamps jitter, the rows do not; equal steps of {period_s:.6g} s are taken")
         return _joined([_counted(columns, piece, period_s) for piece in kept], time_s[0], period_s, None, notes)
     else:
@@ -121,6 +121,16 @@ def regular_rows(
     rate_hz = float(f"{1.0 / mean_s:.9g}")
     parts = [_interpolated(columns, piece, rate_hz) for piece in kept]
     return _joined(parts, time_s[0], round(1.0 / rate_hz, 12), rate_hz, notes)
+
+
+def _slope(time_s: FloatArray, kept: list[slice]) -> float:
+    """Period of counted rows: slope of the stamps over the rows in all parts, rounded to 1 ps."""
+    product, power = 0.0, 0.0
+    for piece in kept:
+        rows = np.arange(piece.stop - piece.start) - 0.5 * (piece.stop - piece.start - 1)
+        product += float(rows @ (time_s[piece] - time_s[piece].mean()))
+        power += float(rows @ rows)
+    return round(product / power, 12)
 
 
 def _refuse_order(time_s: FloatArray, steps: FloatArray, few_digits: bool, place: Callable[[int], str]) -> None:

@@ -6,6 +6,7 @@ from hil.arrays import FloatArray
 
 WHOLE_RANGE = 0.8  # of the spread of the values: a smaller jump is no wrap
 _SUDDEN = 5.0  # times the change of the rows around: a motion changes its speed gradually
+_STRAIGHT = 0.5  # of the path around a wrap in one direction: noise goes to and fro
 _AROUND = 5  # rows before and after, which must run against the jump
 _STAYS = 3  # rows after a wrap without another jump: a spike comes back at once
 _FEW_VALUES = 20  # of a switched signal, whose steps are no wraps
@@ -43,6 +44,8 @@ def wrap_range(values: FloatArray) -> float | None:
         if around.size < _AROUND or np.any(np.abs(change[row + 1 : row + 1 + _STAYS]) > 0.5 * spread):
             continue
         speed = float(np.median(around))
+        if np.abs(around.sum()) < _STRAIGHT * np.abs(around).sum():
+            continue
         backwards += speed * change[row] < 0.0 and abs(change[row]) > _SUDDEN * np.max(np.abs(around))
         ranges.append(abs(float(change[row]) - speed))
     if not ranges or backwards <= 0.5 * len(jumps):

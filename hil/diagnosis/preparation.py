@@ -32,7 +32,7 @@ def prepare_diagnosis(train: Sequence[Recording], validate: Sequence[Recording],
     """
     usable, proof = usable_parts(train, bench, not validate), usable_parts(validate, bench, False)
     notes = (*usable.notes, *proof.notes)
-    train, whole, validate = list(usable.recordings), list(usable.whole), list(proof.recordings)
+    train, whole, validate = list(usable.recordings), list(usable.whole), list(proof.recordings or usable.held_out)
     law = replayable(bench, [*train, *whole, *validate])
     train, whole, validate = ([law.marked(run) for run in runs] for runs in (train, whole, validate))
     judged = reduced(law.bench, [*train, *whole, *validate])

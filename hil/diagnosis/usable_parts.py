@@ -14,17 +14,21 @@ from hil.recording.recording import Recording
 
 @dataclass(frozen=True)
 class UsableParts:
-    """Recordings without gaps; `whole` are those of which no piece can be held out; notes on what was cut."""
+    """Recordings without gaps; `whole` are those of which no piece can be held out; notes on what was cut.
+
+    `held_out` is a part that is held out as a whole, because none can be split.
+    """
 
     recordings: tuple[Recording, ...]
     whole: tuple[Recording, ...]
+    held_out: tuple[Recording, ...]
     notes: tuple[str, ...]
 
 
 def usable_parts(recordings: Sequence[Recording], bench: Bench, to_split: bool) -> UsableParts:
     """Cut recordings at their gaps and keep the parts that can be diagnosed; `to_split`: a third is held out of each.
 
-    A part of which no third can be held out is trained on as a whole, if others can be split. A recording without gaps
+    A part of which no third can be held out is trained on as a whole; if that is all parts, the last is held out. A recording without gaps
     stays as it is. Raises InputError if no part of a recording can be diagnosed, with the reason of the longest.
     """
     kept, whole, notes = list[Recording](), list[Recording](), list[str]()
@@ -49,9 +53,10 @@ def usable_parts(recordings: Sequence[Recording], bench: Bench, to_split: bool) 
             f"{', '.join(f'{part.name} from {part.start_s:.4g} s' for part in usable)}"
         )
         notes += [f"Left out: {reason}" for reason in reasons.values() if reason]
-    if not kept:  # nothing can be held out: the check of the pieces says why
-        return UsableParts(tuple(whole), (), tuple(notes))
-    return UsableParts(tuple(kept), tuple(whole), tuple(notes))
+    if kept or len(whole) < 2:  # of a single part that cannot be split the check of its pieces says why
+        return UsableParts(tuple(kept or whole), tuple(whole if kept else ()), (), tuple(notes))
+    notes.append(f"No part is long enough to hold out a third of it: {whole[-1].name} is held out as a whole.")
+    return UsableParts(tuple(whole[:-1]), (), (whole[-1],), tuple(notes))
 
 
 def _reason(parts: Sequence[Recording], bench: Bench) -> str:

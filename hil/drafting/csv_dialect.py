@@ -81,7 +81,7 @@ def _paired_names(above: list[str], delimiter: str, width: int) -> tuple[str, ..
     for line in above:
         fields = _fields(line, delimiter)
         if len(fields) == width > 2 and width % 2 == 0 and {one.lower() for one in fields[::2]} == {"name"}:
-            return tuple(name for channel in fields[1::2] for name in (f"time of {channel}", channel))
+            return tuple(name for index, channel in enumerate(fields[1::2], 1) for name in (f"time{index}", channel))
     return ()
 
 

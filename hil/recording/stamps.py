@@ -188,13 +188,13 @@ def _counts_better(columns: Mapping[str, FloatArray], kept: list[slice], period_
         errors = []
         for piece in kept:
             time_s = columns["time_s"][piece]
-            counted = np.arange(time_s.size) * period_s
+            counted = np.asarray(np.arange(time_s.size) * period_s, dtype=np.float64)
             uneven = np.abs(time_s[4:] - time_s[:-4] - 4.0 * period_s) > CLOCK_TOLERANCE * period_s
             errors.append([_cubic_error(time, values[piece])[uneven] for time in (time_s, counted)])
         by_stamp, by_count = (float(np.sum(np.concatenate(one) ** 2)) for one in zip(*errors, strict=True))
         if min(by_stamp, by_count) > 0.0:
             ratio = max(ratio, float(np.log(by_stamp / by_count)), key=abs)
-    return ratio > np.log(_CLEARLY)
+    return bool(ratio > np.log(_CLEARLY))
 
 
 def _cubic_error(time: FloatArray, values: FloatArray) -> FloatArray:

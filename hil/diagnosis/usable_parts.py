@@ -28,8 +28,8 @@ class UsableParts:
 def usable_parts(recordings: Sequence[Recording], bench: Bench, to_split: bool) -> UsableParts:
     """Cut recordings at their gaps and keep the parts that can be diagnosed; `to_split`: a third is held out of each.
 
-    A part of which no third can be held out is trained on as a whole; if that is all parts, the last is held out. A recording without gaps
-    stays as it is. Raises InputError if no part of a recording can be diagnosed, with the reason of the longest.
+    A part of which no third can be held out is trained on as a whole; if that is all parts, the last is held out. A
+    recording without gaps stays as it is. Raises InputError if no part of a recording can be diagnosed, with the reason of the longest.
     """
     kept, whole, notes = list[Recording](), list[Recording](), list[str]()
     for recording in recordings:

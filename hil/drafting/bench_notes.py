@@ -21,8 +21,8 @@ def told(
         unsure.append("the inertia is not identifiable from this motion: record moves with more acceleration")
     if plant.left > MUCH_LEFT:
         unsure.append(
-            f"inertia and friction leave {100 * plant.left:.2g} % of the {effort}: something else acts (a flexible load, "
-            "gravity, a late channel), and their values may be off by more than their errors"
+            f"inertia and friction leave {100 * plant.left:.2g} % of the {effort}: something else acts "
+            "(a flexible load, gravity, a late channel), and their values may be off by more than their errors"
         )
     notes.append(
         f"inertia and friction leave {100 * plant.left:.2g} % of the {effort} (share of its standard deviation)"

@@ -77,7 +77,7 @@ def _starts_with_number(line: str, delimiter: str, point: str) -> bool:
 
 
 def _paired_names(above: list[str], delimiter: str, width: int) -> tuple[str, ...]:
-    """Names of a file with a column of time beside each channel: "Name;Position;Name;Torque"; empty for another file."""
+    """Names of a file with a column of time beside each channel: "Name;Position;Name;Torque"; empty for others."""
     for line in above:
         fields = _fields(line, delimiter)
         if len(fields) == width > 2 and width % 2 == 0 and {one.lower() for one in fields[::2]} == {"name"}:

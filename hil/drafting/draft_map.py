@@ -207,8 +207,8 @@ class _Composer:
             late_s = lateness_s(self.live[name], motion(self.live[str(self.roles.motor)], self.period_s))
             if late_s > LATE_ROWS * self.period_s:
                 self.draft.unsure.append(
-                    f"{name}: comes {1e3 * late_s:.3g} ms after {self.roles.motor}, a set-point comes before: its stamps "
-                    "are late, or the drive leads it; the control law cannot be judged with it as it is"
+                    f"{name}: comes {1e3 * late_s:.3g} ms after {self.roles.motor}, a set-point comes before: its "
+                    "stamps are late, or the drive leads it; the control law cannot be judged with it as it is"
                 )
         if unit == "counts":  # of the motor's encoder, as in the set-points of a drive
             entry |= {"unit": motor, "scale": float(f"{1.0 / abs(factor):.8g}")}

@@ -29,7 +29,8 @@ def usable_parts(recordings: Sequence[Recording], bench: Bench, to_split: bool) 
     """Cut recordings at their gaps and keep the parts that can be diagnosed; `to_split`: a third is held out of each.
 
     A part of which no third can be held out is trained on as a whole; if that is all parts, the last is held out. A
-    recording without gaps stays as it is. Raises InputError if no part of a recording can be diagnosed, with the reason of the longest.
+    recording without gaps stays as it is. Raises InputError if no part of a recording can be diagnosed, with the
+    reason of the longest.
     """
     kept, whole, notes = list[Recording](), list[Recording](), list[str]()
     for recording in recordings:

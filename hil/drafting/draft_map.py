@@ -58,6 +58,7 @@ def draft_map(path: Path, rate_hz: float | None = None, axis: str | None = None)
         f"{one.column}: its unit is not known" for one in labels.values() if one.odd_unit and one.column in used
     ]
     _Composer(draft, labels, roles, even.columns, even.period_s).compose()
+    draft.missing = any(np.isnan(values).any() for values in used.values())
     draft.rows_per_sample = ratio if ratio > 1.0 else None
     for one in draft.channels:
         if one.entry["column"] in wraps:

@@ -39,6 +39,8 @@ def map_text(draft: MapDraft) -> str:
         ]
     if draft.rows_per_sample is not None:
         lines += [f"rows_per_sample: {draft.rows_per_sample!r}   # the logger repeated samples: each is kept once"]
+    if draft.missing:
+        lines += ["missing: leave_out          # rows without a value; refuse: do not import such a file"]
     options = content.get("csv")
     if isinstance(options, dict):
         lines += ["csv:                      # how the text file is written"]

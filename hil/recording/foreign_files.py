@@ -36,11 +36,12 @@ def read_foreign(
     wanted_scalars: Collection[str],
     form: csv_columns.CsvFormat,
     dates: str | None = None,
+    missing: float = 0.0,
 ) -> Foreign:
     """The columns `wanted` and, from a .mat file, the scalars; `dates` is a column of dates, returned in seconds.
 
-    Raises InputError with file, row and column: no such file or format, a missing column, text, infinity, more missing
-    values than `FEW_MISSING`, columns of different length.
+    Raises InputError with file, row and column: no such file or format, a missing column, text, infinity, missing values
+    in a larger share of the rows than `missing`, columns of different length.
     """
     if not path.is_file():
         raise InputError(f"{path}: there is no such file; give the path of a recording: {ENDINGS}")
@@ -52,11 +53,11 @@ def read_foreign(
             ".mat files only; write the number into the map"
         )
     if ending in TEXT_ENDINGS:
-        columns = csv_columns.read_columns(path, wanted, form, FEW_MISSING)
+        columns = csv_columns.read_columns(path, wanted, form, missing)
         if dates is not None:
             columns[dates] = seconds_of(csv_columns.read_texts(path, dates, form))
         place = partial(_line, path, form)
-        _check(path, columns, place)
+        _check(path, columns, place, missing)
         return Foreign(columns, {}, place)
     if ending == ".mat":
         variables = load_mat(path)
@@ -77,7 +78,7 @@ def read_foreign(
             "export the recording to one of them"
         )
     place = partial(_row, path)
-    _check(path, columns, place)
+    _check(path, columns, place, missing)
     return Foreign(columns, scalars, place)
 
 
@@ -193,7 +194,7 @@ def _parquet_columns(path: Path, wanted: tuple[str, ...]) -> dict[str, FloatArra
     return {name: table.column(name).to_numpy().astype(np.float64) for name in wanted}
 
 
-def _check(path: Path, columns: dict[str, FloatArray], place: Callable[[int], str]) -> None:
+def _check(path: Path, columns: dict[str, FloatArray], place: Callable[[int], str], share: float) -> None:
     first, *others = columns.items()
     for name, values in others:
         if values.size != first[1].size:
@@ -203,10 +204,11 @@ def _check(path: Path, columns: dict[str, FloatArray], place: Callable[[int], st
             )
     for name, values in columns.items():
         missing = np.isnan(values)
-        few = missing.mean() <= FEW_MISSING
+        few = missing.mean() <= share
         bad = np.flatnonzero(np.isinf(values) | (missing & ~np.bool_(few)))
         if bad.size:
             raise InputError(
-                f"{place(int(bad[0]))}: {name}: given {values[bad[0]]}, allowed a finite number, or none in up to "
-                f"{100.0 * FEW_MISSING:g} % of the rows; correct the values or cut the recording before it"
+                f"{place(int(bad[0]))}: {name}: given {values[bad[0]]}, allowed a finite number"
+                + (f", or none in up to {100.0 * share:g} % of the rows" if share else "")
+                + "; correct the value, cut the recording before it, or write 'missing: leave_out' into the map"
             )

@@ -119,6 +119,10 @@ class RecordingMap(_Strict):
     rows_per_sample: float | None = Field(
         default=None, gt=1.0, description="of a logger that ran faster than the loop: each sample is kept once"
     )
+    missing: Literal["refuse", "leave_out"] = Field(
+        default="refuse",
+        description="rows without a value in up to 5 % of the file: refuse the file, or leave them out",
+    )
     csv: CsvOptions = Field(default=CsvOptions(), description="how a CSV file is written")
     lead_m: PositiveFloat | None = Field(default=None, description="lead of the screw, to convert angle and length")
     channels: dict[str, ChannelSource] = Field(description="channel name -> where it comes from")

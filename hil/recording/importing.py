@@ -11,7 +11,7 @@ from hil.channels import CHANNELS, AxisChannels
 from hil.files.date_stamps import DAY_S
 from hil.files.yaml_model import load_model
 from hil.recording.complete_rows import complete_rows
-from hil.recording.foreign_files import read_foreign
+from hil.recording.foreign_files import FEW_MISSING, read_foreign
 from hil.recording.import_map import RecordingMap
 from hil.recording.quantum import count_of
 from hil.recording.recording import CLOCK_NOTES, Recording, clock_metadata
@@ -30,7 +30,7 @@ def import_recording(source: str | Path, map_path: str | Path) -> Recording:
     Missing channels are derived: velocity_command_m_s by central differences of the position command; torque from
     torque command or vice versa (on a linear axis force). The metadata list them (`derived`) and the source of each
     channel (`channels`).
-    Rows without a value are left out; gaps of the clock cut the recording into `Recording.parts`. The metadata say so
+    Rows without a value are left out if the map says so; gaps of the clock cut the recording into `Recording.parts`. The metadata say so
     (`clock_notes`).
     Raises InputError with file, row and column: wrong format, a missing column, text, infinity, many missing values,
     columns of different length, time that runs back.
@@ -42,7 +42,8 @@ def import_recording(source: str | Path, map_path: str | Path) -> Recording:
         wanted.append(the_map.time.column)
     gains = {entry.gain for entry in the_map.channels.values() if isinstance(entry.gain, str)}
     dates = the_map.time.column if the_map.time is not None and the_map.time.unit == "date" else None
-    foreign = read_foreign(source, wanted, sorted(gains), the_map.csv.format(), dates)
+    few = FEW_MISSING if the_map.missing == "leave_out" else 0.0
+    foreign = read_foreign(source, wanted, sorted(gains), the_map.csv.format(), dates, few)
 
     raw = {"time_s": _time_s(the_map, foreign.columns)}
     origins = {}

@@ -40,8 +40,8 @@ def read_foreign(
 ) -> Foreign:
     """The columns `wanted` and, from a .mat file, the scalars; `dates` is a column of dates, returned in seconds.
 
-    Raises InputError with file, row and column: no such file or format, a missing column, text, infinity, missing values
-    in a larger share of the rows than `missing`, columns of different length.
+    Raises InputError with file, row and column: no such file or format, a missing column, text, infinity, values
+    missing in a larger share of the rows than `missing`, columns of different length.
     """
     if not path.is_file():
         raise InputError(f"{path}: there is no such file; give the path of a recording: {ENDINGS}")

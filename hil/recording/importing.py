@@ -30,8 +30,8 @@ def import_recording(source: str | Path, map_path: str | Path) -> Recording:
     Missing channels are derived: velocity_command_m_s by central differences of the position command; torque from
     torque command or vice versa (on a linear axis force). The metadata list them (`derived`) and the source of each
     channel (`channels`).
-    Rows without a value are left out if the map says so; gaps of the clock cut the recording into `Recording.parts`. The metadata say so
-    (`clock_notes`).
+    Rows without a value are left out if the map says so; gaps of the clock cut the recording into `Recording.parts`.
+    The metadata say so (`clock_notes`).
     Raises InputError with file, row and column: wrong format, a missing column, text, infinity, many missing values,
     columns of different length, time that runs back.
     """

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from hil.commands.options import Out, RecordedBench
+from hil.commands.runs import read_run
 from hil.report.console import out, progress, table
 
 
@@ -42,11 +43,10 @@ def diagnose(
     from hil.files.output import default_folder, new_folder
     from hil.identification.measured import bench_of
     from hil.quantities import quantity
-    from hil.recording.recording import read_recording
     from hil.report.diagnosis_report import torque_line, write_diagnosis
 
-    train = [read_recording(path) for path in runs]
-    held_out = [read_recording(path) for path in validate or []]
+    train = [read_run(path) for path in runs]
+    held_out = [read_run(path) for path in validate or []]
     believed = load_bench(bench) if bench else bench_of(train[0])
     folder = folder or default_folder(f"diagnose-{train[0].name}")
     compile_kernels()

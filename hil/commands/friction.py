@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from hil.commands.options import Out
+from hil.commands.runs import read_run
 from hil.report.console import out, progress, table
 
 if TYPE_CHECKING:
@@ -37,7 +38,6 @@ def friction(
     from hil.identification.friction import identify_friction
     from hil.identification.measured import bench_of
     from hil.loop.simulated_bench import load_simulated
-    from hil.recording.recording import read_recording
     from hil.report.friction_report import rows_of, verdict, write_friction
 
     if (run is None) == (profile is None):
@@ -60,7 +60,7 @@ def friction(
             tell("running the feed sweep")
             with named(bench, profile):
                 run = _run(believed, profile, part, virtual)
-        recording = read_recording(run)
+        recording = read_run(run)
         if believed is None and "bench" in recording.metadata:
             believed = bench_of(recording)
         tell("identifying")

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from hil.commands.runs import read_run
 from hil.report.console import err, out, table
 
 
@@ -21,14 +22,13 @@ def identify(
     from hil.drafting.bench_text import bench_text
     from hil.drafting.draft_bench import draft_bench
     from hil.errors import InputError
-    from hil.recording.recording import read_recording
 
     target = target or Path(f"{run.stem}.yaml")
     if target.exists():
         raise InputError(f"{target}: the file exists and is not overwritten; give another name with --out or remove it")
     if target.suffix not in (".yaml", ".yml"):
         raise InputError(f"{target}: given the ending {target.suffix!r}, allowed .yaml; correct --out")
-    recording = read_recording(run)
+    recording = read_run(run)
     compile_kernels()
     draft = draft_bench(recording)
     try:

@@ -39,9 +39,10 @@ def import_(
     """Convert a foreign recording to Parquet by a map of its columns, units and signs, or draft this map."""
     from hil.errors import InputError
     from hil.recording.importing import import_recording
-    from hil.recording.recording import write_parquet
+    from hil.recording.recording import CLOCK_NOTES, write_parquet
 
     target = target or Path(f"{source.stem}.parquet")
+    drafted = map_file is None
     if map_file is None:
         map_file = str(_drafted(source, target, rate_hz, axis))
     elif rate_hz is not None or axis is not None:
@@ -49,6 +50,9 @@ def import_(
     recording = import_recording(source, map_file)
     write_parquet(recording, target)
     out.print(f"{len(recording)} rows, {recording.metadata['clock']}")
+    if not drafted:  # a draft has said it
+        for note in recording.metadata.get(CLOCK_NOTES, []):
+            err.print(f"  {note}", markup=False)
     for channel, origin in recording.metadata["channels"].items():
         out.print(
             f"  {channel} = {origin['factor']:.9g} x {origin['column']}"

@@ -19,13 +19,12 @@ from hil.bench.bench_file import Bench
 from hil.bench.control_section import without_law
 from hil.diagnosis.result import Correction, Verdict
 from hil.diagnosis.search.initial_values import axis_facts
-from hil.identification.completion import RESAMPLED
 from hil.identification.control_law import LawFit, counting_noise, fit_law
 from hil.identification.measured import Measured
 from hil.identification.noise_floor import FLOOR
 from hil.identification.terms import Term
 from hil.quantities import digits, unit_of
-from hil.recording.recording import Recording
+from hil.recording.recording import RESAMPLED, Recording
 from hil.twin.library import LIBRARY
 from hil.twin.mechanism import Stage
 

@@ -7,6 +7,7 @@ from hil.bench.bench_file import Bench
 from hil.diagnosis.law_check import LawCheck, check_law, replayable
 from hil.diagnosis.preflight import prepare
 from hil.diagnosis.split import same, split
+from hil.diagnosis.usable_parts import usable_parts
 from hil.errors import InputError
 from hil.identification.completion import completed, reduced
 from hil.identification.dataset import Dataset, prepare_dataset
@@ -25,18 +26,24 @@ class Prepared:
 
 
 def prepare_diagnosis(train: Sequence[Recording], validate: Sequence[Recording], bench: Bench) -> Prepared:
-    """Prepare recordings; without `validate` the last third of each is held out.
+    """Prepare recordings, cut at their gaps; without `validate` the last third of each is held out.
 
     Raises InputError with all reasons if the recordings cannot be diagnosed.
     """
-    notes: tuple[str, ...] = ()
-    law = replayable(bench, [*train, *validate])
-    train, validate = ([law.marked(run) for run in runs] for runs in (train, validate))
-    judged = reduced(law.bench, [*train, *validate])
-    train, validate = ([completed(run, judged) for run in runs] for runs in (train, validate))
+    usable, proof = usable_parts(train, bench, not validate), usable_parts(validate, bench, False)
+    notes = (*usable.notes, *proof.notes)
+    train, whole, validate = list(usable.recordings), list(usable.whole), list(proof.recordings or usable.held_out)
+    law = replayable(bench, [*train, *whole, *validate])
+    train, whole, validate = ([law.marked(run) for run in runs] for runs in (train, whole, validate))
+    judged = reduced(law.bench, [*train, *whole, *validate])
+    train, whole, validate = ([completed(run, judged) for run in runs] for runs in (train, whole, validate))
     if not validate:
         train, validate = split(train)
-        notes = ("No held-out recording was given: the last third of each recording is used for validation.",)
+        train += whole
+        notes = (
+            *notes,
+            "No held-out recording was given: the last third of each recording is used for validation.",
+        )
     twice = [held.name for held in validate for run in train if same(held, run)]
     if twice:
         raise InputError(

@@ -7,6 +7,8 @@ from hil.errors import InputError
 from hil.identification.friction import identify_friction
 from hil.recording.recording import Recording
 
+MUCH_LEFT = 0.3  # share of the torque from which what is left is as large as a usual friction
+
 
 def told(
     recording: Recording, plant: PlantValues, transmission: TransmissionValues | None
@@ -17,6 +19,11 @@ def told(
     effort, noise_unit = ("force", "N") if linear else ("torque", "N m")
     if not plant.inertia.significant:
         unsure.append("the inertia is not identifiable from this motion: record moves with more acceleration")
+    if plant.left > MUCH_LEFT:
+        unsure.append(
+            f"inertia and friction leave {100 * plant.left:.2g} % of the {effort}: something else acts "
+            "(a flexible load, gravity, a late channel), and their values may be off by more than their errors"
+        )
     notes.append(
         f"inertia and friction leave {100 * plant.left:.2g} % of the {effort} (share of its standard deviation)"
     )

@@ -8,13 +8,10 @@ from hil.arrays import FloatArray
 from hil.drafting.column_names import Label, Quantity, label
 from hil.drafting.foreign_table import ForeignTable
 from hil.errors import InputError
-from hil.quantities import UNITS
-from hil.recording.importing import GAP_STEPS
-from hil.recording.recording import CLOCK_TOLERANCE
+from hil.recording.importing import SECONDS
+from hil.recording.stamps import GAP_STEPS, REPEATS
 
 SLOWEST_HZ, FASTEST_HZ = 5.0, 2e5  # of recordings of an axis: outside lies a wrong unit of the stamps
-LEAST_STEPS = 200  # from which a tenth has a typical step in spite of jitter
-REPEATS = 0.02  # share of repeated stamps from which they have too few digits, and are no duplicate rows
 _RATE_NAMES = (
     "fs",
     "rate",
@@ -45,7 +42,7 @@ class StampClock:
 def find_clock(table: ForeignTable, labels: dict[str, Label], rate_hz: float | None) -> StampClock:
     """Find the clock. `rate_hz` is what the user says; it counts more than stamps.
 
-    Raises InputError: no clock, stamps that run back or repeat, rows in a wrong order, two rates, a gap.
+    Raises InputError: no clock, stamps that run back or repeat, rows in a wrong order.
     """
     rows = len(next(iter(table.columns.values())))
     if rate_hz is not None:
@@ -84,7 +81,7 @@ def _written_rate(table: ForeignTable) -> tuple[float, str] | None:
 
 def _column(table: ForeignTable, labels: dict[str, Label]) -> str | None:
     """The column named as time; else the first that grows by nearly equal steps."""
-    named = [name for name in table.columns if labels[name].quantity is Quantity.TIME]
+    named = [name for name in table.columns if labels[name].quantity is Quantity.TIME or name in table.dates]
     if named:
         return max(named, key=lambda name: _growing(table.columns[name]))
     for name, values in table.columns.items():
@@ -114,9 +111,10 @@ def _of_column(table: ForeignTable, column: str, told: Label) -> StampClock:
     if back > 0.0 or stamps[-1] == stamps[0]:
         _refuse_order(where, stamps, steps)
     unsure = []
-    if repeats > REPEATS:
-        unit, note = _unit(told, float(np.mean(steps)))
-        rate = (stamps.size - 1) / (float(stamps[-1] - stamps[0]) * UNITS[unit][1])
+    gaps = np.any(steps > GAP_STEPS * np.median(steps[steps > 0.0]))
+    if repeats > REPEATS and not gaps:
+        unit = "date" if column in table.dates else _unit(told, float(np.mean(steps)))[0]
+        rate = (stamps.size - 1) / (float(stamps[-1] - stamps[0]) * SECONDS[unit])
         unsure.append(
             f"clock: {100 * repeats:.0f} % of the stamps in {column!r} repeat (too few digits); "
             f"equal steps at {rate:.6g} Hz are taken instead"
@@ -124,41 +122,29 @@ def _of_column(table: ForeignTable, column: str, told: Label) -> StampClock:
         return StampClock(
             np.arange(stamps.size) / rate, None, "s", float(f"{rate:.6g}"), None, f"mean of {column}", tuple(unsure)
         )
-    if repeats > 0.0:
+    if 0.0 < repeats <= REPEATS:
         row = int(np.flatnonzero(steps == 0.0)[0]) + 2
         raise InputError(
             f"{where}: row {row} of the numbers repeats the stamp of the row before; remove the duplicate row"
         )
-    unit, note = _unit(told, typical)
-    if note:
-        unsure.append(note)
-    factor = UNITS[unit][1]
-    _refuse_two_rates(where, steps, factor)
-    gap = int(np.argmax(steps))
-    if steps[gap] > GAP_STEPS * typical:
-        raise InputError(
-            f"{where}: a gap of {steps[gap] * factor:.4g} s after row {gap + 1} of the numbers, allowed steps near "
-            f"{typical * factor:.4g} s; cut the recording there and import the parts"
-        )
-    resample = None
-    uneven = float(np.max(np.abs(steps - typical)))
-    if uneven > CLOCK_TOLERANCE * typical:
-        resample = float(f"{1.0 / (typical * factor):.4g}")
-        unsure.append(
-            f"clock: steps from {steps.min() * factor:.4g} to {steps.max() * factor:.4g} s, typically "
-            f"{typical * factor:.4g} s; the channels are interpolated to {resample:g} Hz"
-        )
+    if column in table.dates:
+        unit = "date"
+    else:
+        unit, note = _unit(told, typical or float(np.mean(steps)))
+        unsure += [note] if note else []
     how = "by its name" if told.quantity is Quantity.TIME else "grows by equal steps"
-    return StampClock((stamps - stamps[0]) * factor, column, unit, None, resample, how, tuple(unsure))
+    return StampClock((stamps - stamps[0]) * SECONDS[unit], column, unit, None, None, how, tuple(unsure))
 
 
 def _unit(told: Label, step: float) -> tuple[str, str]:
     """Unit of the stamps, and a note where it is a guess or contradicts the name."""
-    plausible = [unit for unit in ("s", "ms", "us", "ns") if SLOWEST_HZ <= 1.0 / (step * UNITS[unit][1]) <= FASTEST_HZ]
+    plausible = [
+        unit for unit in ("s", "ms", "us", "ns", "d") if SLOWEST_HZ <= 1.0 / (step * SECONDS[unit]) <= FASTEST_HZ
+    ]
     if told.unit in plausible or (told.unit is not None and not plausible):
         return str(told.unit), ""
     # of seconds, milliseconds, ... the one with the rate nearest to 1 kHz, the usual one of a servo drive
-    best = min(plausible or ["s"], key=lambda unit: abs(np.log(step * UNITS[unit][1] / 1e-3)))
+    best = min(plausible or ["s"], key=lambda unit: abs(np.log(step * SECONDS[unit] / 1e-3)))
     if told.unit is not None:
         return best, (
             f"clock: {told.column!r} says {told.unit}, but steps of {step:g} {told.unit} are no rate of a recording; "
@@ -187,18 +173,3 @@ def _refuse_order(where: str, stamps: FloatArray, steps: FloatArray) -> None:
         f"{where}: time runs back at row {row} of the numbers, from {stamps[row - 2]:g} to {stamps[row - 1]:g}: two "
         "recordings in one file, or rows out of order; cut the file there, or sort it"
     )
-
-
-def _refuse_two_rates(where: str, steps: FloatArray, factor: float) -> None:
-    """Refuse a clock whose step changes for good: two recordings of different rate in one file."""
-    if steps.size < LEAST_STEPS:
-        return
-    tenth = steps.size // 10
-    first, last = float(np.median(steps[:tenth])), float(np.median(steps[-tenth:]))
-    if max(first, last) > 1.5 * min(first, last):
-        row = int(np.flatnonzero(np.abs(steps - first) > 0.25 * abs(last - first))[0]) + 1
-        raise InputError(
-            f"{where}: two sampling rates in one file, steps of {first * factor:.4g} s first and "
-            f"{last * factor:.4g} s at "
-            f"the end (from about row {row} of the numbers on); cut the file there and import the parts"
-        )

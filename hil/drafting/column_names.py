@@ -74,6 +74,7 @@ class Label:
     unit: str | None
     odd_unit: bool = False
     electric: str | None = None  # A or V if the word says current or voltage
+    letter: bool = False  # the name is one letter
 
     @property
     def sure(self) -> bool:
@@ -110,6 +111,7 @@ def label(column: str, unit_text: str = "") -> Label:
         unit,
         odd,
         electric if quantity is Quantity.EFFORT else None,
+        len(name.strip()) == 1 and quantity is not Quantity.TIME,
     )
 
 

@@ -35,6 +35,13 @@ def find_dialect(path: Path) -> CsvDialect:
     delimiter, point, width, first = _layout(path, lines)
     comments = tuple(_COMMENT.sub("", line) for line in lines[:first] if _COMMENT.match(line))
     above = [index for index in range(first) if lines[index].strip()]
+    given: dict[str, object] = {"delimiter": delimiter, "decimal_point": point, "encoding": encoding}
+    paired = _paired_names(lines[:first], delimiter, width)
+    if paired:
+        # lines such as "SampleTime;1;SampleTime;1" are half numbers
+        first = next(i for i in range(first, len(lines)) if _starts_with_number(lines[i], delimiter, point))
+        given |= {"skip_lines": first, "column_names": paired}
+        return CsvDialect(CsvOptions.model_validate(given), paired, ("",) * width, comments)
     unit_row: tuple[str, ...] = ()
     header = None
     for index in reversed(above[-4:]):
@@ -47,7 +54,6 @@ def find_dialect(path: Path) -> CsvDialect:
             continue
         header = index
         break
-    given: dict[str, object] = {"delimiter": delimiter, "decimal_point": point, "encoding": encoding}
     if header is None:
         names = tuple(f"column {index + 1}" for index in range(width))
         given |= {"skip_lines": first, "column_names": names}
@@ -65,12 +71,32 @@ def find_dialect(path: Path) -> CsvDialect:
     return CsvDialect(CsvOptions.model_validate(given), names, unit_row or ("",) * width, comments)
 
 
+def _starts_with_number(line: str, delimiter: str, point: str) -> bool:
+    fields = _fields(line, delimiter)
+    return bool(fields and fields[0] and _is_number(fields[0], point))
+
+
+def _paired_names(above: list[str], delimiter: str, width: int) -> tuple[str, ...]:
+    """Names of a file with a column of time beside each channel: "Name;Position;Name;Torque"; empty for others."""
+    for line in above:
+        fields = _fields(line, delimiter)
+        if len(fields) == width > 2 and width % 2 == 0 and {one.lower() for one in fields[::2]} == {"name"}:
+            return tuple(name for index, channel in enumerate(fields[1::2], 1) for name in (f"time{index}", channel))
+    return ()
+
+
 def number_of(text: str, decimal_point: str) -> float:
     """Number of a field, NaN where it is none."""
     text = text.strip()
     if not (_COMMA if decimal_point == "," else _POINT).fullmatch(text):
         return float("nan")
     return float(text.replace(",", "."))
+
+
+def is_missing(text: str) -> bool:
+    """True for an empty field or a word for a missing number; not for infinity."""
+    word = text.strip().lower()
+    return word in _WORDS and "inf" not in word
 
 
 def _sample(path: Path) -> tuple[list[str], str]:

@@ -9,10 +9,12 @@ from hil.drafting.estimate import Estimate
 from hil.drafting.loop_values import REPLAYED, LoopValues, loop_values
 from hil.drafting.plant_values import PlantValues, TransmissionValues, plant_values, transmission_values
 from hil.drafting.relations import proportional
-from hil.drafting.sensor_values import is_decimal, noise_of
+from hil.drafting.sensor_values import noise_of
 from hil.drafting.usual_values import ROTARY_LEAD_M, usual_lead
-from hil.identification.quantum import count_of
+from hil.errors import InputError
 from hil.quantities import digits
+from hil.recording.importing import STEP
+from hil.recording.quantum import count_of, is_decimal
 from hil.recording.recording import Recording
 
 _FINEST_M, _COARSEST_M = 1e-12, 1e-3  # resolution of a second encoder that a bench file takes
@@ -48,10 +50,22 @@ class BenchDraft:
 
 
 def draft_bench(recording: Recording) -> BenchDraft:
-    """Draft the bench of the axis of a recording.
+    """Draft the bench of the axis of a recording; with gaps in time, from its longest part that tells enough.
 
     Raises InputError if masses and friction cannot be told: no torque, one direction, too short, a wrong sign.
     """
+    parts = sorted(recording.parts(), key=len, reverse=True)
+    for number, part in enumerate(parts if len(parts) > 1 else ()):
+        try:
+            draft = draft_bench(part)
+        except InputError:
+            if number == len(parts) - 1:
+                raise
+            continue
+        draft.name = recording.name
+        seconds = len(part) * part.period_s
+        draft.notes.insert(0, f"found in {part.name}, {seconds:.4g} s long, of {len(parts)} parts between gaps in time")
+        return draft
     plant, transmission = plant_values(recording), transmission_values(recording)
     if recording.kind is AxisKind.LINEAR:
         draft = BenchDraft(recording.name, recording.kind, "one_mass")
@@ -211,8 +225,7 @@ def _control(draft: BenchDraft, recording: Recording, loop: LoopValues | None) -
 
 def _encoders(draft: BenchDraft, recording: Recording) -> None:
     names = recording.axis
-    motor = recording[names.motor_position]
-    step, noise = count_of(motor), noise_of(recording, names.motor_position)
+    step, noise = _step(recording, names.motor_position), noise_of(recording, names.motor_position)
     how = "step of the positions" if step is not None else f"no step is seen; from the noise of {noise:.2g}"
     step = step or max(noise * _STEPS_PER_NOISE, 1e-12)
     if recording.kind is AxisKind.LINEAR:
@@ -223,11 +236,16 @@ def _encoders(draft: BenchDraft, recording: Recording) -> None:
         counts = power if abs(counts / power - 1.0) < 0.002 else counts
         draft.motor_encoder = BenchValue("counts_per_rev", counts, "", how + _printed(step))
     if names.table_position in recording.columns and recording.kind is AxisKind.ROTARY:
-        table = recording[names.table_position]
-        step, noise = count_of(table), noise_of(recording, names.table_position)
+        step, noise = _step(recording, names.table_position), noise_of(recording, names.table_position)
         how = "step of the positions" if step is not None else f"no step is seen; from the noise of {noise:.2g} m"
         step = min(max(step or noise * _STEPS_PER_NOISE, _FINEST_M), _COARSEST_M)
         draft.table_encoder = BenchValue("resolution_m", float(f"{step:.4g}"), "m", how + _printed(step))
+
+
+def _step(recording: Recording, channel: str) -> float | None:
+    """Step of a channel in its unit, before an import interpolated it; None where none is seen."""
+    origin = recording.metadata.get("channels", {}).get(channel, {})
+    return float(origin[STEP]) if STEP in origin else count_of(recording[channel])
 
 
 def _printed(step: float) -> str:

@@ -7,18 +7,24 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.channels import AXIS_CHANNELS, AxisKind
-from hil.drafting.clock import StampClock, find_clock
+from hil.drafting.clock import find_clock
 from hil.drafting.column_names import Label, label
 from hil.drafting.effort import effort_entry
+from hil.drafting.even_rows import even_rows, filled_in, find_wraps, with_rate, without_duplicates
 from hil.drafting.foreign_table import read_table
 from hil.drafting.map_draft import DraftedChannel, MapDraft
-from hil.drafting.oddities import refuse_damage
-from hil.drafting.relations import MotionColumns, derivative_of, driven, motion, proportional
+from hil.drafting.oddities import refuse_damage, refuse_missing
+from hil.drafting.relations import MotionColumns, derivative_of, driven, lateness_s, motion, proportional
 from hil.drafting.roles import SAME_POSITION, Roles, find_roles
-from hil.drafting.unit_choice import MATCH, UnitChoice, is_length, misfit, position_unit, velocity_unit
-from hil.drafting.usual_values import COUNTS, LEADS_M, ROTARY_LEAD_M, mixed_up, usual_lead
+from hil.drafting.unit_choice import MATCH, UnitChoice, are_counts, is_length, misfit, position_unit, velocity_unit
+from hil.drafting.usual_values import COUNTS, LEADS_M, ROTARY_LEAD_M, mixed_up, screw_units, usual_lead
 from hil.errors import InputError
 from hil.quantities import UNITS
+from hil.recording.complete_rows import complete_rows
+from hil.recording.held_samples import rows_per_sample
+from hil.recording.wraps import unwrapped
+
+LATE_ROWS = 0.5  # by which a set-point may seem late: its rounding and the sampling of the encoder
 
 
 def draft_map(path: Path, rate_hz: float | None = None, axis: str | None = None) -> MapDraft:
@@ -26,49 +32,38 @@ def draft_map(path: Path, rate_hz: float | None = None, axis: str | None = None)
 
     Raises InputError: a damaged file, no clock, no motion, no column that goes with it, contradicting columns.
     """
-    table = read_table(path)
+    table, doubled = without_duplicates(read_table(path))
     labels = {name: label(name, table.units.get(name, "")) for name in table.columns}
     clock = find_clock(table, labels, rate_hz)
     columns = {name: values for name, values in table.columns.items() if name != clock.column}
-    even, period_s = _even(columns, clock)
-    roles = find_roles(str(path), even, labels, period_s, axis)
-    used = [name for name in _used(roles) if name]
-    refuse_damage(path, {name: columns[name] for name in used}, {name: even[name] for name in used}, roles, period_s)
-    draft = MapDraft(table, clock, unsure=[*clock.unsure, *roles.unsure], left_out=dict(roles.left_out))
+    wraps = find_wraps(columns, labels)
+    columns |= {name: unwrapped(columns[name], size) for name, size in wraps.items()}
+    filled = {n: filled_in(values, clock.time_s) for n, values in columns.items() if np.isfinite(values).any()}
+    first = even_rows(path, filled, clock.time_s)
+    roles = find_roles(str(path), first.columns, labels, first.period_s, axis)
+    used = {name: columns[name] for name in roles.used}
+    refuse_missing(path, used, table.texts)
+    # only now is it known which columns must be complete, and which repeat when a sample does
+    ratio = rows_per_sample({name: filled[name] for name in used})
+    complete = complete_rows(used | {"time_s": clock.time_s}, ratio if ratio > 1.0 else None)
+    kept = {name: values[complete.rows] for name, values in filled.items()}
+    even = even_rows(path, kept, complete.columns["time_s"], judged_by=[n for n in used if n != roles.unfollowed])
+    refuse_damage(path, {name: filled[name] for name in used}, clock.time_s, even.columns, roles, even.period_s)
+    clock = with_rate(clock, even)
+    notes = [*doubled, *clock.unsure, *complete.notes, *even.notes]
+    notes += [f"{name}: wraps at {wraps[name]:g}; it is unwrapped" for name in used if name in wraps]
+    draft = MapDraft(table, clock, unsure=[*notes, *roles.unsure], left_out=dict(roles.left_out))
     draft.left_out |= {remark.split(": ", 1)[0]: remark.split(": ", 1)[1] for remark in table.remarks}
     draft.unsure += [
         f"{one.column}: its unit is not known" for one in labels.values() if one.odd_unit and one.column in used
     ]
-    _Composer(draft, labels, roles, even, period_s).compose()
+    _Composer(draft, labels, roles, even.columns, even.period_s).compose()
+    draft.missing = any(np.isnan(values).any() for values in used.values())
+    draft.rows_per_sample = ratio if ratio > 1.0 else None
+    for one in draft.channels:
+        if one.entry["column"] in wraps:
+            one.entry["wraps_at"] = wraps[str(one.entry["column"])]
     return draft
-
-
-def _used(roles: Roles) -> tuple[str | None, ...]:
-    return (
-        roles.motor,
-        roles.motor_velocity,
-        roles.table,
-        roles.command,
-        roles.unfollowed,
-        roles.velocity_command,
-        roles.effort,
-        roles.effort_command,
-    )
-
-
-def _even(columns: dict[str, FloatArray], clock: StampClock) -> tuple[dict[str, FloatArray], float]:
-    """Columns on a regular clock without missing values, for the relations only."""
-    time_s = clock.time_s
-    period_s = float(np.median(np.diff(time_s)))
-    grid = (
-        np.arange(time_s.size) * period_s if clock.resample_hz is None else np.arange(time_s[0], time_s[-1], period_s)
-    )
-    even = {}
-    for name, values in columns.items():
-        good = np.isfinite(values)
-        if good.any():
-            even[name] = np.interp(grid, time_s[good], values[good])
-    return even, period_s
 
 
 class _Composer:
@@ -110,8 +105,16 @@ class _Composer:
         roles, labels, live = self.roles, self.labels, self.live
         positions = [name for name in (roles.command, roles.table, roles.motor) if name]
         prefers = self._prefers_length(positions)
+        far, motor = next((name for name in (roles.table, roles.command) if name), None), roles.motor
+        if far and motor and "counts" not in (labels[far].unit, labels[motor].unit) and not are_counts(live[motor]):
+            relation = proportional(live[far], live[motor])
+            told = screw_units(relation.factor, labels[far].unit, labels[motor].unit)
+            if told and relation.share > SAME_POSITION and None in (labels[far].unit, labels[motor].unit):
+                note = f"{far} in {told[0]} and {motor} in {told[1]}: with them the travel per turn is a usual lead"
+                self._choose(far, UnitChoice(told[0], note))
+                self._choose(motor, UnitChoice(told[1]))
         # columns with a unit first: they are the hints for the others
-        for column in sorted(positions, key=lambda name: labels[name].unit is None):
+        for column in sorted(set(positions) - set(self.units), key=lambda name: labels[name].unit is None):
             hints = [
                 (proportional(live[column], live[other]).factor, self.units[other])
                 for other in positions
@@ -200,6 +203,13 @@ class _Composer:
             if abs(ratio - 1.0) > 2.0 * MATCH and share > 0.9:
                 self.draft.unsure.append(
                     f"{name}: moves {ratio:.6g} times as far as {self.roles.motor}: a gear, or a wrong unit"
+                )
+        if channel == "position_command_m" and share > SAME_POSITION:
+            late_s = lateness_s(self.live[name], motion(self.live[str(self.roles.motor)], self.period_s))
+            if late_s > LATE_ROWS * self.period_s:
+                self.draft.unsure.append(
+                    f"{name}: comes {1e3 * late_s:.3g} ms after {self.roles.motor}, a set-point comes before: its "
+                    "stamps are late, or the drive leads it; the control law cannot be judged with it as it is"
                 )
         if unit == "counts":  # of the motor's encoder, as in the set-points of a drive
             entry |= {"unit": motor, "scale": float(f"{1.0 / abs(factor):.8g}")}

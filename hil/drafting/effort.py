@@ -1,5 +1,7 @@
 """Map entry of a torque, force, current or voltage: unit, constant and sign."""
 
+import re
+
 import numpy as np
 
 from hil.arrays import FloatArray
@@ -9,7 +11,8 @@ from hil.drafting.relations import EffortCause, MotionColumns
 
 CAUSED = 0.3  # share of an effort explained by its motion from which its sign can be judged
 PART = 0.1  # of the effort: the inertia's part must exceed it, else the sign of friction decides
-_CONSTANT_NAMES = ("tau", "torque", "kt", "km", "force", "kf")
+# names of a torque or force constant without underscores and digits; others ("torque_limit", "tau_filter") are none
+_CONSTANT_NAMES = "gtau ktau kt km kf km torqueconstant forceconstant motorconstant drehmomentkonstante kraftkonstante"
 
 
 def effort_entry(
@@ -54,11 +57,14 @@ def _unit(told: Label, kind: AxisKind, scalars: dict[str, float]) -> tuple[dict[
     unit = told.unit or told.electric
     si = "N" if kind is AxisKind.LINEAR else "N m"
     entry: dict[str, object] = {"column": told.column, "unit": unit or si}
-    notes = []
     if unit in ("mA", "mV"):
         entry |= {"unit": unit[1:], "scale": 1e-3}
         unit = unit[1:]
-    scalar = next((name for name in scalars if any(word in name.lower() for word in _CONSTANT_NAMES)), None)
+    constants = [name for name in scalars if re.sub(r"[^a-z]", "", name.lower()) in _CONSTANT_NAMES.split()]
+    scalar = constants[0] if len(constants) == 1 else None
+    notes = (
+        [f"{told.column}: several scalars may be its constant ({', '.join(constants)})"] if len(constants) > 1 else []
+    )
     if unit is None and scalar is not None:
         entry |= {"unit": "V", "gain": scalar}
         notes.append(

@@ -7,7 +7,7 @@ and column of what is wrong.
 import csv
 import re
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from itertools import islice
 from pathlib import Path
 
@@ -16,10 +16,11 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from hil.arrays import FloatArray
-from hil.drafting.csv_dialect import find_dialect, number_of
+from hil.drafting.csv_dialect import find_dialect, is_missing, number_of
 from hil.errors import InputError
 from hil.files import json_columns
-from hil.recording.foreign_files import ENDINGS, TEXT_ENDINGS, load_mat
+from hil.files.date_stamps import is_date, seconds_of
+from hil.recording.foreign_files import ENDINGS, TEXT_ENDINGS, load_mat, parquet_dates
 from hil.recording.import_map import CsvOptions
 
 MOST_ROWS = 200_000  # read of a text file for the draft: minutes of a recording
@@ -33,7 +34,10 @@ _SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6}
 
 @dataclass(frozen=True, eq=False)
 class ForeignTable:
-    """Columns of equal length, NaN where a field is no number; units and scalars as the file gives them."""
+    """Columns of equal length, NaN where a field is no number; units and scalars as the file gives them.
+
+    `dates` are columns of dates or times of day, in seconds; `texts` is the first text among the numbers of a column.
+    """
 
     path: Path
     columns: dict[str, FloatArray]
@@ -42,6 +46,8 @@ class ForeignTable:
     csv: CsvOptions
     rate_hz: float | None = None  # written in a comment
     remarks: tuple[str, ...] = ()
+    dates: frozenset[str] = frozenset()
+    texts: dict[str, str] = field(default_factory=dict)
 
 
 def read_table(path: Path) -> ForeignTable:
@@ -86,18 +92,24 @@ def _text(path: Path) -> ForeignTable:
             rows = list(islice(reader, skip, skip + MOST_ROWS))
         except csv.Error as error:
             raise InputError(f"{path}: is not text of a CSV file ({error}); give a CSV file") from None
-    width = len(dialect.names)
     columns, remarks = {}, []
+    dates, texts = set[str](), dict[str, str]()
     for index, name in enumerate(dialect.names):
         fields = [row[index] if index < len(row) else "" for row in rows]
         values = np.array([number_of(field, options.decimal_point) for field in fields])
         if np.isfinite(values).mean() > 0.01:
             columns[name] = values
+            text = next((f for f, bad in zip(fields, np.isnan(values), strict=True) if bad and not is_missing(f)), None)
+            if text is not None:
+                texts[name] = text
+        elif fields and is_date(fields[0]):
+            columns[name] = seconds_of(fields)
+            dates.add(name)
         elif name.strip():
             remarks.append(f"{name.strip()}: text such as {next((f for f in fields if f.strip()), '')!r}, no numbers")
-    del width
     units = {name: unit.strip("[]() ") for name, unit in zip(dialect.names, dialect.units, strict=True) if unit}
-    return ForeignTable(path, columns, units, {}, options, _rate_of(dialect.comments), tuple(remarks))
+    rate_hz = _rate_of(dialect.comments)
+    return ForeignTable(path, columns, units, {}, options, rate_hz, tuple(remarks), frozenset(dates), texts)
 
 
 def _rate_of(comments: tuple[str, ...]) -> float | None:
@@ -142,30 +154,40 @@ def _parquet(path: Path) -> ForeignTable:
             f"{path}: is no readable Parquet file ({str(error).splitlines()[0]}); it is cut or damaged"
         ) from None
     columns, units, remarks = {}, {}, []
-    for field in table.schema:
-        if pa.types.is_floating(field.type) or pa.types.is_integer(field.type):
-            columns[field.name] = table.column(field.name).to_numpy().astype(np.float64)
-            unit = (field.metadata or {}).get(b"unit")
+    dates = set[str]()
+    for one in table.schema:
+        if pa.types.is_floating(one.type) or pa.types.is_integer(one.type):
+            columns[one.name] = table.column(one.name).to_numpy().astype(np.float64)
+            unit = (one.metadata or {}).get(b"unit")
             if unit:
-                units[field.name] = unit.decode(errors="replace")
+                units[one.name] = unit.decode(errors="replace")
+        elif pa.types.is_timestamp(one.type):
+            columns[one.name] = parquet_dates(path, one.name)
+            dates.add(one.name)
         else:
-            remarks.append(f"{field.name}: {field.type} values, no numbers; convert the column to use it")
-    return ForeignTable(path, columns, units, {}, CsvOptions(), None, tuple(remarks))
+            remarks.append(f"{one.name}: {one.type} values, no numbers; convert the column to use it")
+    return ForeignTable(path, columns, units, {}, CsvOptions(), None, tuple(remarks), frozenset(dates))
 
 
 def _json(path: Path) -> ForeignTable:
     content = json_columns.read_json(path)
     columns, remarks = {}, []
+    dates = set[str]()
     for name, values in content.lists.items():
         if all(value is None or (isinstance(value, int | float) and not isinstance(value, bool)) for value in values):
             columns[name] = content.numbers(path, name)
+        elif all(isinstance(value, str) for value in values) and is_date(values[0]):
+            columns[name] = seconds_of(values)
+            dates.add(name)
         else:
             remarks.append(
                 f"{name}: values such as {next(v for v in values if isinstance(v, str | bool | list | dict))!r}, "
                 "no numbers"
             )
     return _equal_length(
-        ForeignTable(path, columns, content.units, content.scalars, CsvOptions(), None, tuple(remarks))
+        ForeignTable(
+            path, columns, content.units, content.scalars, CsvOptions(), None, tuple(remarks), frozenset(dates)
+        )
     )
 
 
@@ -181,6 +203,4 @@ def _equal_length(table: ForeignTable) -> ForeignTable:
         for name, values in table.columns.items()
         if values.size != rows
     ]
-    return ForeignTable(
-        table.path, kept, table.units, table.scalars, table.csv, table.rate_hz, (*table.remarks, *remarks)
-    )
+    return replace(table, columns=kept, remarks=(*table.remarks, *remarks))

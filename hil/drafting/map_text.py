@@ -14,6 +14,7 @@ _KEYS = """\
 #   unit    m mm um in | rad deg rev counts | m/s mm/s m/min rad/s deg/s rpm | N kN | N m mN m | A V % permille
 #   sign    -1 if the column is positive the other way
 #   scale   factor beside the unit (1);  offset: added afterwards, in SI (0)
+#   wraps_at                                  range of a counter or angle that starts again, in the unit of the column
 #   counts_per_rev, counts_per_m              for the unit counts
 #   torque_constant_n_m_a, force_constant_n_a for the unit A
 #   rated   N m or N at 100 %, for the units % and permille;  gain: N m or N per volt, for the unit V
@@ -29,13 +30,17 @@ def map_text(draft: MapDraft) -> str:
     lines += [f"about: {_scalar(content['about'])}"]
     if clock.column is not None:
         lines += [f"time:                     # {clock.how}", f"  column: {_scalar(clock.column)}"]
-        lines += [f"  unit: {clock.unit}                 # s, ms, us, ns or min"]
+        lines += [f"  unit: {clock.unit}                 # s, ms, us, ns, min, d (days), date (text)"]
     else:
         lines += [f"sample_rate_hz: {clock.rate_hz!r}   # instead of time stamps; {clock.how}"]
     if clock.resample_hz is not None:
         lines += [
             f"resample_hz: {clock.resample_hz!r}   # the steps of the clock are uneven: channels are interpolated"
         ]
+    if draft.rows_per_sample is not None:
+        lines += [f"rows_per_sample: {draft.rows_per_sample!r}   # the logger repeated samples: each is kept once"]
+    if draft.missing:
+        lines += ["missing: leave_out          # rows without a value; refuse: do not import such a file"]
     options = content.get("csv")
     if isinstance(options, dict):
         lines += ["csv:                      # how the text file is written"]

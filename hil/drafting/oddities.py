@@ -1,4 +1,4 @@
-"""Refuse columns that are damaged: values missing, spikes, wraps of an angle, a sign that turns, rows out of order."""
+"""Refuse columns that are damaged: many values missing, spikes, jumps, a sign that turns, rows out of order."""
 
 from pathlib import Path
 
@@ -8,6 +8,8 @@ from hil.arrays import FloatArray
 from hil.drafting.relations import NO_SPREAD, driven, motion, proportional, roughness
 from hil.drafting.roles import Roles
 from hil.errors import InputError
+from hil.recording.foreign_files import FEW_MISSING
+from hil.recording.stamps import GAP_STEPS
 
 NO_ORDER = 1.0  # roughness from which rows have no order: 1.4 for white noise, below 0.3 for a motion
 JUMP = 0.2  # of the travel in one row: no axis moves so far between two samples
@@ -16,12 +18,27 @@ SUDDEN = 20.0  # times the change of the rows around: a fast motion is fast for 
 TOLD = 0.8  # share of the torque that the motion of each half must explain before its sign is judged
 
 
+def refuse_missing(path: Path, columns: dict[str, FloatArray], texts: dict[str, str]) -> None:
+    """Refuse a column (n,) with text among its numbers, infinity, or many missing values. Raises InputError."""
+    for name, values in columns.items():
+        if name in texts:
+            raise InputError(f"{path}: {name} has text and no number in some rows: {texts[name]!r}; correct the values")
+        if np.isinf(values).any():
+            row = int(np.flatnonzero(np.isinf(values))[0]) + 1
+            raise InputError(f"{path}: {name} is infinite and no number in row {row} of the numbers; correct the value")
+        if np.mean(np.isnan(values)) > FEW_MISSING:
+            _refuse_missing(path, name, values)
+
+
 def refuse_damage(
-    path: Path, raw: dict[str, FloatArray], even: dict[str, FloatArray], roles: Roles, period_s: float
+    path: Path,
+    raw: dict[str, FloatArray],
+    time_s: FloatArray,
+    even: dict[str, FloatArray],
+    roles: Roles,
+    period_s: float,
 ) -> None:
     """Check the columns that are used: `raw` as in the file, `even` on a regular clock. Raises InputError."""
-    for name, values in raw.items():
-        _refuse_missing(path, name, values)
     if roles.motor is not None and roughness(even[roles.motor]) > NO_ORDER:
         raise InputError(
             f"{path}: {roles.motor} jumps from row to row as if the rows were shuffled; sort the rows by time, or "
@@ -30,7 +47,7 @@ def refuse_damage(
         )
     command = roles.command or roles.unfollowed
     for position in filter(None, (roles.motor, roles.table, command)):
-        _refuse_jumps(path, position, raw[position], steps=position == command)
+        _refuse_jumps(path, position, raw[position], time_s, steps=position == command)
     if roles.motor is None:
         return
     for position in filter(None, (roles.table, command)):
@@ -60,12 +77,13 @@ def _refuse_missing(path: Path, name: str, values: FloatArray) -> None:
     )
 
 
-def _refuse_jumps(path: Path, name: str, values: FloatArray, steps: bool) -> None:
-    """Refuse wraps (a jump of the whole range) and spikes (one row away from both neighbours).
+def _refuse_jumps(path: Path, name: str, values: FloatArray, time_s: FloatArray, steps: bool) -> None:
+    """Refuse jumps, and spikes (one row away from both neighbours); not over gaps of the clock.
 
     `steps` are allowed in a set-point.
     """
-    change = np.diff(values)
+    change, pause = np.diff(values), np.diff(time_s)
+    change[pause > GAP_STEPS * np.median(pause)] = 0.0
     size = np.abs(change)
     around = np.maximum(np.r_[0.0, 0.0, size[:-2]], np.r_[size[2:], 0.0, 0.0])
     if np.unique(values).size < FEW_VALUES:
@@ -81,15 +99,7 @@ def _refuse_jumps(path: Path, name: str, values: FloatArray, steps: bool) -> Non
         )
     if steps:
         return
-    wraps = size[row] > 0.9 * np.ptp(values)
-    raise InputError(
-        told
-        + (
-            ": it wraps at its range; export it unwrapped"
-            if wraps
-            else ": rows are missing, or another recording follows; cut the file there"
-        )
-    )
+    raise InputError(f"{told}: rows are missing, or another recording follows; cut the file there")
 
 
 def _refuse_turned(path: Path, name: str, values: FloatArray, motor: str, position: FloatArray) -> None:

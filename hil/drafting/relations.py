@@ -61,6 +61,13 @@ def derivative_of(values: FloatArray, moved: MotionColumns, period_s: float) -> 
     return proportional(smoothed(values, period_s), moved.velocity)
 
 
+def lateness_s(values: FloatArray, moved: MotionColumns) -> float:
+    """Time by which a position (n,) comes after a motion, from least squares: x = k (q - late v) + c."""
+    columns = np.column_stack([moved.position, moved.velocity, np.ones_like(moved.position)])
+    k, velocity, _ = np.linalg.lstsq(columns, values, rcond=None)[0]
+    return -float(velocity / k) if k else 0.0
+
+
 @dataclass(frozen=True, eq=False)
 class EffortCause:
     """Share of an effort that a motion explains, and the coefficients J, D, F, w, c (5,)."""
@@ -94,9 +101,16 @@ def roughness(values: FloatArray) -> float:
 
 
 def noise(values: FloatArray) -> float:
-    """White noise of a column over its spread, from fourth differences (variance 70 sigma^2)."""
-    spread = float(np.std(values))
-    return float(np.sqrt(np.mean(np.diff(values, 4) ** 2) / 70.0)) / spread if spread > 0.0 else 0.0
+    """White noise of a column in motion over its spread, from fourth differences (variance 70 sigma^2).
+
+    Without the largest tenth, the jerks at the ends of moves, and without rest, where a coarse encoder has no noise.
+    """
+    spread, far = float(np.std(values)), np.abs(values[4:] - values[:-4])
+    moving = far > NO_SPREAD * np.max(far, initial=0.0)
+    if spread == 0.0 or not moving.any():
+        return 0.0
+    size = np.sort(np.abs(np.diff(values, 4))[moving])
+    return float(np.sqrt(np.mean(size[: max(round(0.9 * size.size), 1)] ** 2) / 70.0)) / spread
 
 
 def lead_rows(values: FloatArray, other: FloatArray, most: int) -> int:

@@ -6,6 +6,7 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.drafting.column_names import Label, Quantity
+from hil.drafting.computed_position import computed_one
 from hil.drafting.relations import (
     MotionColumns,
     derivative_of,
@@ -19,7 +20,6 @@ from hil.drafting.relations import (
 from hil.errors import InputError
 
 SAME_POSITION = 0.98  # share from which a column is another reading of a position: following errors are below 5 %
-QUIET = 0.3  # of the noise of the measured position: a set-point is computed and has none but rounding
 FOLLOWED = 0.5  # share of a set-point that a controlled motion follows: less is another axis or no loop
 IS_DERIVATIVE = 0.9  # share from which a column is the velocity of another: counting and filters leave a few per cent
 IS_DRIVEN = 0.4  # share of an unnamed effort that one mass with friction explains: gravity and springs may be more
@@ -44,6 +44,12 @@ class Roles:
     left_out: dict[str, str] = field(default_factory=dict)
     unsure: list[str] = field(default_factory=list)
     how: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def used(self) -> list[str]:
+        """Columns with a role."""
+        positions = (self.motor, self.motor_velocity, self.table, self.command, self.unfollowed, self.velocity_command)
+        return [name for name in (*positions, self.effort, self.effort_command) if name]
 
 
 def find_roles(
@@ -116,7 +122,10 @@ def _with_quantities(
     live: dict[str, FloatArray], labels: dict[str, Label], period_s: float, roles: Roles
 ) -> dict[str, Label]:
     """Give the columns whose names say nothing a quantity by their relations to a position."""
-    labels = dict(labels)
+    told, labels = labels, dict(labels)
+    for name in live:  # a letter is a name by chance: the data say more, where they say something
+        if told[name].letter and told[name].unit is None:
+            labels[name] = replace(told[name], quantity=Quantity.UNKNOWN)
     unnamed = [name for name in live if labels[name].quantity is Quantity.UNKNOWN]
     positions = [name for name in live if labels[name].quantity is Quantity.POSITION]
     if not unnamed:
@@ -129,10 +138,13 @@ def _with_quantities(
 
     if not positions:
         smooth = [name for name in unnamed if roughness(live[name]) < SMOOTH]
-        scores = {name: _as_position(name, live, period_s) for name in smooth}
+        named = [name for name in smooth if told[name].quantity is Quantity.POSITION]
+        scores = {name: _as_position(name, live, period_s) for name in named or smooth}
+        if named and max(scores.values()) < IS_DRIVEN:
+            scores = {name: _as_position(name, live, period_s) for name in smooth}
         best = max(scores, key=lambda name: scores[name], default=None)
         if best is None or scores[best] < IS_DRIVEN:
-            return labels
+            return told
         become(best, Quantity.POSITION, "a position: other columns follow from its derivatives")
         positions, unnamed = [best], [name for name in unnamed if name != best]
     for name in unnamed:
@@ -149,6 +161,8 @@ def _with_quantities(
                 Quantity.EFFORT,
                 f"torque, force, current or voltage: inertia and friction of {positions[0]} explain it",
             )
+        elif told[name].quantity is not Quantity.UNKNOWN:
+            labels[name] = told[name]
         else:
             roles.left_out[name] = "no relation to the motion is found"
     return labels
@@ -184,14 +198,9 @@ def _positions(live: dict[str, FloatArray], labels: dict[str, Label], names: lis
     measured = [name for name in names if name not in commands]
     if not commands and len(measured) > 1:
         plain = [name for name in measured if not (labels[name].motor or labels[name].table or labels[name].measured)]
-        others = [name for name in measured if name not in plain] or measured
-        for name in plain:
-            noises = [noise(live[one]) for one in others if one != name]
-            if noises and noise(live[name]) < QUIET * min(noises):
-                commands = [name]
-                measured.remove(name)
-                roles.unsure.append(f"{name}: taken for the set-point, because it has less noise than {others[-1]}")
-                break
+        commands, why = computed_one({name: live[name] for name in measured}, plain)
+        roles.unsure += [f"{name}: taken for the set-point, because {why}" for name in commands]
+        measured = [name for name in measured if name not in commands]
     if not measured:
         return
     far = [name for name in measured if labels[name].table]

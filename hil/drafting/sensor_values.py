@@ -7,13 +7,6 @@ from hil.identification.noise import white_noise
 from hil.recording.recording import Recording
 
 MOST_LEAD_ROWS = 50  # of a command before the measured torque: tens of ms
-DIGITS = 1e-6  # relative deviation from a power of ten below which a step is that of printed digits
-
-
-def is_decimal(step: float) -> bool:
-    """True for a power of ten: the last digit of the file rather than a count of the encoder."""
-    power = np.log10(step)
-    return bool(abs(power - np.round(power)) < DIGITS / np.log(10.0))
 
 
 def noise_of(recording: Recording, channel: str) -> float:

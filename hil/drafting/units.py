@@ -63,7 +63,7 @@ def unit_named(text: str) -> str | None:
     """Unit of a map for a spelling in a file; None for an unknown one."""
     key = unicodedata.normalize("NFKC", text).strip().lower().replace("μ", "µ")
     key = re.sub(r"[\s·*⋅.]+", "", key)
-    return _UNIT_OF.get(key)
+    return "%" if key.startswith("%") else _UNIT_OF.get(key)  # % of what is told by no spelling
 
 
 def split_unit(name: str) -> tuple[str, str | None, bool]:

@@ -55,16 +55,16 @@ def read_header(path: Path, form: CsvFormat = PLAIN) -> tuple[str, ...]:
     return tuple(names)
 
 
-def read_columns(path: Path, wanted: Collection[str], form: CsvFormat = PLAIN) -> dict[str, FloatArray]:
-    """The columns named in `wanted`, as finite numbers of equal length.
+def read_columns(
+    path: Path, wanted: Collection[str], form: CsvFormat = PLAIN, missing: float = 0.0
+) -> dict[str, FloatArray]:
+    """The columns named in `wanted`, as numbers of equal length: finite, or NaN in a share of up to `missing` rows.
 
     Raises InputError with file, line and column: a missing column, text, an empty field, NaN or
     infinity, a row of another length, no rows.
     """
     names = read_header(path, form)
-    missing = [name for name in wanted if name not in names]
-    if missing:
-        raise InputError(f"{path}: column {missing[0]!r} is missing; the file has {', '.join(names)}")
+    _refuse_absent(path, wanted, names)
     lines_above = line_of_row(path, 0, form) - 1
     try:
         table = pacsv.read_csv(
@@ -83,10 +83,27 @@ def read_columns(path: Path, wanted: Collection[str], form: CsvFormat = PLAIN) -
         problem = None
     except (pa.ArrowInvalid, UnicodeDecodeError) as error:
         columns, problem = {}, error
-    if problem is not None or not all(np.isfinite(values).all() for values in columns.values()):
+    if problem is not None or any(
+        np.isinf(values).any() or np.isnan(values).mean() > missing for values in columns.values()
+    ):
         _raise_first_bad_field(path, names, wanted, form)
         raise InputError(f"{path}: cannot be read as CSV: {problem}; correct the file")
     return columns
+
+
+def read_texts(path: Path, name: str, form: CsvFormat = PLAIN) -> list[str]:
+    """The fields of a column as texts. Raises InputError for a missing column."""
+    names = read_header(path, form)
+    _refuse_absent(path, (name,), names)
+    index = names.index(name)
+    with _opened(path, form) as file:
+        return [row[index] if index < len(row) else "" for _, row in _data_rows(path, file, form)]
+
+
+def _refuse_absent(path: Path, wanted: Collection[str], names: tuple[str, ...]) -> None:
+    absent = [name for name in wanted if name not in names]
+    if absent:
+        raise InputError(f"{path}: column {absent[0]!r} is missing; the file has {', '.join(names)}")
 
 
 def line_of_row(path: Path, row: int, form: CsvFormat = PLAIN) -> int:

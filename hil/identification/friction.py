@@ -100,7 +100,10 @@ def identify_friction(
     Raises InputError if constant feeds are too few, too short, or of one direction.
     """
     points = tuple(
-        point for point in _points(recording, settling_s) if abs(point.speed) >= speed_min and point.speed != 0.0
+        point
+        for part in recording.parts()
+        for point in _points(part, settling_s)
+        if abs(point.speed) >= speed_min and point.speed != 0.0
     )
     speed = np.array([point.speed for point in points])
     torque = np.array([point.torque for point in points])

@@ -22,7 +22,8 @@ from hil.control import cascade
 from hil.errors import InputError
 from hil.identification.completion import completed, position_is_measured, rows_are_ticks, torque_is_measured
 from hil.identification.noise import Laps, Noise, estimate_noise, find_laps, moving, white_noise
-from hil.recording.recording import Recording, check_finite
+from hil.recording.recording import Recording
+from hil.recording.stamps import check_finite
 from hil.twin.axis import Response, Start
 
 Channels = tuple[FloatArray, FloatArray, FloatArray, FloatArray]  # as control.replay takes them
@@ -112,8 +113,13 @@ class Measured:
 def take(recording: Recording, bench: Bench) -> Measured:
     """Take the channels of a recording that the twin of `bench` needs; without a control law, complete it first.
 
-    Raises InputError for another kind of axis or period than the bench, a missing channel, NaN, or too few rows.
+    Raises InputError for another kind of axis or period than the bench, gaps, a missing channel, NaN, or too few rows.
     """
+    if len(recording.parts()) > 1:
+        raise InputError(
+            f"{recording.name}: given a recording with gaps in time, allowed one without; give one of its "
+            f"{len(recording.parts())} parts: recording.parts()"
+        )
     recording, bench = completed(recording, bench), bench.sampled(recording.period_s)
     names, gains = recording.axis, bench.gains
     if (recording.kind is AxisKind.LINEAR) != bench.axis.linear:

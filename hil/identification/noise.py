@@ -12,7 +12,7 @@ from scipy.signal import correlate, find_peaks
 
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
-from hil.identification.quantum import count_of
+from hil.recording.quantum import count_of
 
 _COARSER = 1.5  # factor of a recorded step over the count of the bench: one count, seen with noise, is below
 _DIGITS = 1e-7  # of the largest value: rounding of a recording in single precision, the least noise of a torque

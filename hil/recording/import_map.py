@@ -47,7 +47,9 @@ class TimeColumn(_Strict):
     """The column of time stamps."""
 
     column: str = Field(description="name in the file")
-    unit: Literal["s", "ms", "us", "ns", "min"] = Field(description="of the stamps")
+    unit: Literal["s", "ms", "us", "ns", "min", "d", "date"] = Field(
+        description="of the stamps; d: days, date: text such as 2024-03-01 12:00:00.001 or 12:00:00.001"
+    )
 
 
 class ChannelSource(_Strict):
@@ -57,6 +59,9 @@ class ChannelSource(_Strict):
     unit: str = Field(description="of the column, such as mm, deg, rpm, counts, A, V")
     scale: float = Field(default=1.0, description="factor beside the unit")
     offset: float = Field(default=0.0, description="added after scaling, in the SI unit of the channel")
+    wraps_at: PositiveFloat | None = Field(
+        default=None, description="range of a counter or angle that starts again, in the unit of the column"
+    )
     sign: Literal[1, -1] = Field(default=1, description="-1 if the column is positive the other way")
     counts_per_rev: PositiveFloat | None = Field(default=None, description="unit counts, rotary encoder")
     counts_per_m: PositiveFloat | None = Field(default=None, description="unit counts, linear encoder")
@@ -110,6 +115,13 @@ class RecordingMap(_Strict):
     sample_rate_hz: PositiveFloat | None = Field(default=None, description="instead of a column of time stamps")
     resample_hz: PositiveFloat | None = Field(
         default=None, description="rate to which stamps with uneven steps are interpolated"
+    )
+    rows_per_sample: float | None = Field(
+        default=None, gt=1.0, description="of a logger that ran faster than the loop: each sample is kept once"
+    )
+    missing: Literal["refuse", "leave_out"] = Field(
+        default="refuse",
+        description="rows without a value in up to 5 % of the file: refuse the file, or leave them out",
     )
     csv: CsvOptions = Field(default=CsvOptions(), description="how a CSV file is written")
     lead_m: PositiveFloat | None = Field(default=None, description="lead of the screw, to convert angle and length")

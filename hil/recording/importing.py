@@ -1,7 +1,6 @@
 """Import a foreign recording (CSV, MATLAB .mat to version 7, Parquet, JSON) by a map (`hil.recording.import_map`)."""
 
 import hashlib
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -9,14 +8,19 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.channels import CHANNELS, AxisChannels
-from hil.errors import InputError
+from hil.files.date_stamps import DAY_S
 from hil.files.yaml_model import load_model
-from hil.quantities import si_factor
-from hil.recording.foreign_files import read_foreign
+from hil.recording.complete_rows import complete_rows
+from hil.recording.foreign_files import FEW_MISSING, read_foreign
 from hil.recording.import_map import RecordingMap
-from hil.recording.recording import Recording, check_columns
+from hil.recording.quantum import count_of
+from hil.recording.recording import CLOCK_NOTES, Recording, clock_metadata
+from hil.recording.stamps import RegularRows, regular_rows
+from hil.recording.wraps import unwrapped
 
-GAP_STEPS = 10.0  # of the clock: above, rows are missing and are not interpolated
+EPOCH_S = 1e6  # start of a clock that counts from 1970 or year 0: its large numbers have few digits for the steps
+STEP = "step"  # key of a channel's metadata: step of its values before they are interpolated
+SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "d": DAY_S, "date": 1.0}
 MAPS = Path(__file__).parents[1] / "maps"
 
 
@@ -26,8 +30,10 @@ def import_recording(source: str | Path, map_path: str | Path) -> Recording:
     Missing channels are derived: velocity_command_m_s by central differences of the position command; torque from
     torque command or vice versa (on a linear axis force). The metadata list them (`derived`) and the source of each
     channel (`channels`).
-    Raises InputError with file, row and column: wrong format, a missing column, text, NaN or infinity, columns of
-    different length, an irregular clock.
+    Rows without a value are left out if the map says so; gaps of the clock cut the recording into `Recording.parts`.
+    The metadata say so (`clock_notes`).
+    Raises InputError with file, row and column: wrong format, a missing column, text, infinity, many missing values,
+    columns of different length, time that runs back.
     """
     source, map_path = Path(source), _find_map(map_path)
     the_map = load_model(map_path, RecordingMap)
@@ -35,21 +41,31 @@ def import_recording(source: str | Path, map_path: str | Path) -> Recording:
     if the_map.time is not None:
         wanted.append(the_map.time.column)
     gains = {entry.gain for entry in the_map.channels.values() if isinstance(entry.gain, str)}
-    foreign = read_foreign(source, wanted, sorted(gains), the_map.csv.format())
+    dates = the_map.time.column if the_map.time is not None and the_map.time.unit == "date" else None
+    few = FEW_MISSING if the_map.missing == "leave_out" else 0.0
+    foreign = read_foreign(source, wanted, sorted(gains), the_map.csv.format(), dates, few)
 
-    columns = {"time_s": _time_s(the_map, foreign.columns)}
+    raw = {"time_s": _time_s(the_map, foreign.columns)}
     origins = {}
     for name, entry in the_map.channels.items():
         gain = foreign.scalars[entry.gain] if isinstance(entry.gain, str) else 1.0
         factor = entry.factor_to(CHANNELS[name].unit, the_map.lead_m, gain)
         assert factor is not None  # the map was validated
-        columns[name] = factor * foreign.columns[entry.column] + entry.offset
+        values = foreign.columns[entry.column]
+        if entry.wraps_at is not None:
+            values = unwrapped(values, entry.wraps_at)
+        raw[name] = factor * values + entry.offset
         origins[name] = {"column": entry.column, "factor": factor, "offset": entry.offset}
+        step = count_of(raw[name][np.isfinite(raw[name])])
+        if step is not None:
+            origins[name][STEP] = step
     clock = the_map.time.column if the_map.time is not None else "sample_rate_hz"
-    if the_map.resample_hz is not None:
-        columns = _resampled(columns, the_map.resample_hz, lambda row: f"{foreign.place(row)}: {clock}")
-    period_s = check_columns(columns, lambda row: f"{foreign.place(row)}: {clock}")
-    derived = _derive(columns, the_map.axis, period_s)
+    complete = complete_rows(raw, the_map.rows_per_sample)
+    rows = regular_rows(
+        complete.columns, lambda row: f"{foreign.place(int(complete.rows[row]))}: {clock}", the_map.resample_hz
+    )
+    columns = dict(rows.columns)
+    derived = _derive(columns, the_map.axis, rows)
     metadata: dict[str, Any] = {
         "source": source.name,
         "source_sha256": _sha256(source),
@@ -58,9 +74,12 @@ def import_recording(source: str | Path, map_path: str | Path) -> Recording:
         "lead_m": the_map.lead_m,
         "channels": origins,
         "derived": derived,
-        "clock": _describe_clock(columns["time_s"], period_s),
+        "clock": _describe_clock(rows),
     }
-    return Recording(source.stem, columns, period_s, metadata)
+    metadata |= clock_metadata(rows)
+    if complete.notes or rows.notes:
+        metadata[CLOCK_NOTES] = [*complete.notes, *rows.notes]
+    return Recording(source.stem, columns, rows.period_s, metadata)
 
 
 def _find_map(map_path: str | Path) -> Path:
@@ -70,36 +89,21 @@ def _find_map(map_path: str | Path) -> Path:
 
 def _time_s(the_map: RecordingMap, raw: dict[str, FloatArray]) -> FloatArray:
     if the_map.time is not None:
-        factor = si_factor(the_map.time.unit, "s")
-        assert factor is not None
-        return np.asarray(factor * raw[the_map.time.column], dtype=np.float64)
+        stamps, factor = raw[the_map.time.column], SECONDS[the_map.time.unit]
+        if abs(factor * stamps[0]) > EPOCH_S:
+            stamps = stamps - stamps[0]
+        return np.asarray(factor * stamps, dtype=np.float64)
     assert the_map.sample_rate_hz is not None
     rows = next(iter(raw.values())).size
     return np.asarray(np.arange(rows) / the_map.sample_rate_hz, dtype=np.float64)
 
 
-def _resampled(columns: dict[str, FloatArray], rate_hz: float, place: Callable[[int], str]) -> dict[str, FloatArray]:
-    """Columns interpolated linearly to a regular clock. Raises InputError for time that runs back, or a gap."""
-    time_s = columns["time_s"]
-    steps = np.diff(time_s)
-    bad = np.flatnonzero((steps <= 0.0) | (steps > GAP_STEPS * np.median(steps)))
-    if bad.size:
-        row = int(bad[0]) + 1
-        raise InputError(
-            f"{place(row)}: a step of {steps[row - 1]:.6g} s, allowed above 0 and below {GAP_STEPS:g} x "
-            f"{np.median(steps):.6g} s to be interpolated; cut the recording there"
-        )
-    even_s = time_s[0] + np.arange(int((time_s[-1] - time_s[0]) * rate_hz) + 1) / rate_hz
-    return {"time_s": even_s} | {
-        name: np.interp(even_s, time_s, values) for name, values in columns.items() if name != "time_s"
-    }
-
-
-def _derive(columns: dict[str, FloatArray], axis: AxisChannels, period_s: float) -> dict[str, str]:
+def _derive(columns: dict[str, FloatArray], axis: AxisChannels, rows: RegularRows) -> dict[str, str]:
     """Add the channels that follow from others; return how each was derived."""
     derived = {}
     if axis.velocity_command not in columns and axis.position_command in columns:
-        columns[axis.velocity_command] = np.gradient(columns[axis.position_command], period_s)
+        parts = np.split(columns[axis.position_command], [part.row for part in rows.parts[1:]])
+        columns[axis.velocity_command] = np.concatenate([np.gradient(part, rows.period_s) for part in parts])
         derived[axis.velocity_command] = f"central differences of {axis.position_command}"
     for name, other in ((axis.torque, axis.torque_command), (axis.torque_command, axis.torque)):
         if name not in columns and other in columns:
@@ -108,10 +112,11 @@ def _derive(columns: dict[str, FloatArray], axis: AxisChannels, period_s: float)
     return derived
 
 
-def _describe_clock(time_s: FloatArray, period_s: float) -> str:
-    """Describe the largest deviation of the time stamps from start + tick x period."""
-    deviation_s = np.abs(time_s - time_s[0] - np.arange(time_s.size) * period_s).max()
-    return f"period {period_s:.9g} s; stamps within {deviation_s:.2g} s of start + tick x period"
+def _describe_clock(rows: RegularRows) -> str:
+    """Describe the largest deviation of the time stamps from start of the part + tick x period."""
+    parts = np.split(rows.columns["time_s"], [part.row for part in rows.parts[1:]])
+    deviation_s = max(float(np.abs(part - part[0] - np.arange(part.size) * rows.period_s).max()) for part in parts)
+    return f"period {rows.period_s:.9g} s; stamps within {deviation_s:.2g} s of start + tick x period"
 
 
 def _sha256(path: Path) -> str:

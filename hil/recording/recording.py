@@ -9,8 +9,8 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,13 +22,15 @@ from hil.arrays import FloatArray
 from hil.channels import AXIS_CHANNELS, CHANNELS, AxisChannels, AxisKind
 from hil.errors import InputError
 from hil.files import csv_columns
+from hil.recording.stamps import RegularRows, check_finite, regular_rows
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 METADATA_KEY = b"hil"  # of the schema: the metadata as JSON
-CLOCK_TOLERANCE = 0.01  # of the period: what a step of a regular clock may deviate
-LARGEST = 1e12  # above every SI value of a channel, and of a clock in microseconds per day
+PARTS = "parts"  # key of the metadata: row and start_s of each part, if there are gaps between them
+CLOCK_NOTES = "clock_notes"  # key of the metadata: what was done to the stamps
+RESAMPLED = "resampled"  # key of the metadata: the rows are not those of the control loop
 _STREAM_END = b"\xff\xff\xff\xff\x00\x00\x00\x00"  # Arrow IPC: the end-of-stream marker
 _FORMATS = ".parquet, .arrows (a run that was not closed) or .csv"
 
@@ -37,7 +39,8 @@ _FORMATS = ".parquet, .arrows (a run that was not closed) or .csv"
 class Recording:
     """A run: columns of equal length (names and units of `hil.channels`), one row per period.
 
-    `metadata` holds what JSON can: bench, profile, versions, seed, and remarks of the reader. Raises InputError for
+    `metadata` holds what JSON can: bench, profile, versions, seed, and remarks of the reader. `start_s` is the time of
+    the first row of a part since the first row of its whole recording. Raises InputError for
     columns of different length, NaN, infinity, and a period that is not positive.
     """
 
@@ -45,6 +48,7 @@ class Recording:
     columns: dict[str, FloatArray]
     period_s: float
     metadata: dict[str, Any] = field(default_factory=dict)
+    start_s: float = 0.0
 
     def __post_init__(self) -> None:
         if not 0.0 < self.period_s < math.inf:
@@ -80,6 +84,24 @@ class Recording:
         """Names of the channels of this kind of axis."""
         return AXIS_CHANNELS[self.kind]
 
+    def parts(self) -> tuple[Recording, ...]:
+        """The parts between gaps in time, named "run (part 2)", with their time; the recording itself without a gap."""
+        starts = self.metadata.get(PARTS, [])
+        if len(starts) < 2:
+            return (self,)
+        ends = [*(part["row"] for part in starts[1:]), len(self)]
+        metadata = {key: value for key, value in self.metadata.items() if key != PARTS}
+        return tuple(
+            replace(
+                self,
+                name=f"{self.name} (part {number})",
+                columns={name: values[part["row"] : end] for name, values in self.columns.items()},
+                metadata=metadata,
+                start_s=self.start_s + part["start_s"],
+            )
+            for number, (part, end) in enumerate(zip(starts, ends, strict=True), 1)
+        )
+
     def plot(self, *channels: str) -> Figure:
         """Draw channels over time, a panel each; without names: set-points, positions, torque and its command.
 
@@ -104,7 +126,8 @@ def read_recording(path: str | Path) -> Recording:
     so. Columns that the channel table does not know are left out and listed in `metadata["unknown_columns"]`.
     Raises InputError with file, row and column: no such file, not this format, a required channel missing (time,
     position or velocity of the motor, torque, its command or the table's position), NaN or infinity, text, a clock that
-    repeats, runs back or is irregular.
+    repeats or runs back, two rates. A clock with gaps gives `parts`, one with uneven steps is made regular
+    (`hil.recording.stamps`); `metadata["clock_notes"]` says so.
     """
     path = Path(path)
     readers = {".parquet": _read_parquet, ".arrows": _read_stream, ".csv": _read_csv}
@@ -118,50 +141,11 @@ def read_recording(path: str | Path) -> Recording:
     return readers[path.suffix.lower()](path)
 
 
-def check_finite(columns: Mapping[str, FloatArray], place: Callable[[int], str]) -> None:
-    """Raise InputError at the first NaN, infinity or number beyond LARGEST.
-
-    `place` gives the place of row i (from 0), such as "file:line".
-    """
-    for name, values in columns.items():
-        bad = np.flatnonzero(~(np.abs(values) <= LARGEST))
-        if bad.size:
-            row = int(bad[0])
-            raise InputError(
-                f"{place(row)}: {name}: given {values[row]}, allowed a finite number up to {LARGEST:g}; "
-                "correct the value or cut the recording before it"
-            )
-
-
-def check_columns(columns: Mapping[str, FloatArray], place: Callable[[int], str]) -> float:
-    """Return the period [s] of columns that are finite and whose clock is regular within 1 %.
-
-    `place` as in `check_finite`. Raises InputError.
-    """
-    check_finite(columns, place)
-    time_s = columns["time_s"]
-    if time_s.size < 3:
-        raise InputError(f"{place(0)}: time_s: given {time_s.size} rows, allowed 3 or more; give a longer recording")
-    steps = np.diff(time_s)
-    # rounded to 1 ps: the mean of printed stamps is a period with rounding errors
-    period_s = round(float(np.median(steps)), 12)
-    bad = np.flatnonzero(steps <= 0.0)
-    if bad.size:
-        row = int(bad[0]) + 1
-        what = "runs back" if steps[row - 1] else "repeats (a duplicate row, or stamps with too few digits)"
-        raise InputError(
-            f"{place(row)}: time_s: {what}: "
-            f"given {time_s[row]:.9g} s after {time_s[row - 1]:.9g} s, allowed a growing time; "
-            "remove the row, or import the file with a sample rate"
-        )
-    bad = np.flatnonzero(np.abs(steps - period_s) > CLOCK_TOLERANCE * period_s)
-    if bad.size:
-        row = int(bad[0]) + 1
-        raise InputError(
-            f"{place(row)}: time_s: a step of {steps[row - 1]:.6g} s, allowed the period "
-            f"{period_s:.6g} s +-1 %; rows are missing: cut the recording there, or resample it"
-        )
-    return round(float((time_s[-1] - time_s[0]) / steps.size), 12)
+def clock_metadata(rows: RegularRows) -> dict[str, Any]:
+    """Metadata of a clock: its parts if there are several, and what was done to the stamps."""
+    parts = {PARTS: [asdict(part) for part in rows.parts]} if len(rows.parts) > 1 else {}
+    resampled = {RESAMPLED: True} if rows.rate_hz else {}
+    return parts | resampled | ({CLOCK_NOTES: list(rows.notes)} if rows.notes else {})
 
 
 def write_parquet(recording: Recording, path: str | Path) -> None:
@@ -207,8 +191,9 @@ def _read_csv(path: Path) -> Recording:
     names = csv_columns.read_header(path)
     known = _known(path, names)
     columns = csv_columns.read_columns(path, known)
-    period_s = check_columns(columns, lambda row: f"{path}:{csv_columns.line_of_row(path, row)}")
-    return Recording(path.stem, columns, period_s, {"source": path.name} | _unknown(names))
+    rows = regular_rows(columns, lambda row: f"{path}:{csv_columns.line_of_row(path, row)}")
+    metadata = {"source": path.name} | _unknown(names) | clock_metadata(rows)
+    return Recording(path.stem, rows.columns, rows.period_s, metadata)
 
 
 def _read_parquet(path: Path) -> Recording:
@@ -260,10 +245,12 @@ def _from_table(path: Path, table: pa.Table, notes: dict[str, Any]) -> Recording
             raise InputError(f"{path}: {name}: given {about.type} values, allowed numbers; import it with a map")
     # an empty value becomes NaN, which the check refuses with its row
     columns = {name: table.column(name).to_numpy().astype(np.float64) for name in known}
-    period_s = check_columns(columns, lambda row: f"{path}: row {row + 1}")
+    rows = regular_rows(columns, lambda row: f"{path}: row {row + 1}")
     metadata = json.loads((table.schema.metadata or {}).get(METADATA_KEY, b"{}"))
-    period_s = metadata.pop("period_s", period_s)
-    return Recording(path.stem, columns, period_s, metadata | _unknown(tuple(table.column_names)) | notes)
+    stored_s = metadata.pop("period_s", rows.period_s)
+    period_s = rows.period_s if rows.rate_hz else stored_s
+    metadata = clock_metadata(rows) | metadata | _unknown(tuple(table.column_names)) | notes
+    return Recording(path.stem, rows.columns, period_s, metadata)
 
 
 def _known(path: Path, names: tuple[str, ...]) -> list[str]:

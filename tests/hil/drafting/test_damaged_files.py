@@ -89,12 +89,6 @@ def unequal(path: Path) -> None:
     savemat(path, {**GOOD, "torque_Nm": GOOD["torque_Nm"][::4], "motor_angle_rad": GOOD["motor_angle_rad"][::4]})
 
 
-def structure(path: Path) -> None:
-    from scipy.io import savemat
-
-    savemat(path, {"log": GOOD})
-
-
 def every_fourth(name: str) -> str:
     """Text in which a column has a number in every fourth row only."""
     index = list(NAMES.values()).index(name)
@@ -121,15 +115,24 @@ REFUSED: dict[str, tuple[str, Make, str]] = {
     "half of a row in the middle": ("csv", with_lines((1500, LINES[1500][:9])), "1501|no number"),
     "text in the torque": ("csv", with_lines(field(700, 3, "error")), "no number"),
     "a unit beside each torque": ("csv", text("\n".join([LINES[0], *(f"{line} Nm" for line in LINES[1:])])), "torque"),
-    "NaN in the position": ("csv", table(**in_rows("angle", slice(900, 903), np.nan)), "no number"),
     "infinity in the torque": ("csv", table(**in_rows("torque", slice(50, 51), np.inf)), "no number"),
+    "infinity as a word": ("csv", with_lines(field(700, 3, "inf")), "no number"),
+    "stamps of text": (
+        "csv",
+        text("\n".join([LINES[0], *(f"row {i},{line.split(',', 1)[1]}" for i, line in enumerate(LINES[1:]))])),
+        "time_s: text such as",
+    ),
+    "missing values in a tenth of the rows": (
+        "csv",
+        table(**in_rows("torque", slice(0, len(AXIS["t"]) // 10), np.nan)),
+        "no number in 10",
+    ),
     "the torque ends half way": ("csv", table(**in_rows("torque", slice(HALF, None), np.nan)), "never after"),
     "the position starts half way": ("csv", table(**in_rows("angle", slice(0, HALF), np.nan)), "no number in 50"),
     "a slow channel between fast ones": ("csv", text(every_fourth("torque_Nm")), "every 4th row"),
     "a slow position between fast ones": ("csv", text(every_fourth("motor_angle_rad")), "every 4th row"),
     "a placeholder of -9999": ("csv", table(**in_rows("angle", slice(800, 801), -9999.0)), "spike or a placeholder"),
     "a spike in the set-point": ("csv", table(**in_rows("x_set", slice(800, 801), 1e6)), "spike or a placeholder"),
-    "an angle that wraps": ("csv", table(angle=np.mod(AXIS["angle"], 2 * np.pi), x_set=None), "wraps"),
     "a position that jumps": ("csv", table(**in_rows("angle", slice(HALF, None), lambda v: v + 200.0)), "jumps"),
     "rows shuffled": ("csv", lambda path: write(path, shuffled()), "out of order"),
     "rows shuffled, without stamps": (
@@ -147,12 +150,10 @@ REFUSED: dict[str, tuple[str, Make, str]] = {
     "two recordings in one file": ("csv", text(TEXT + "\n".join(LINES[1:]) + "\n"), "runs back"),
     "two files with headers": ("csv", text(TEXT + TEXT), "no time stamp|runs back"),
     "two rates, one after the other": ("csv", lambda path: write(path, two_rates()), "two sampling rates"),
-    "a gap": ("csv", lambda path: write(path, {n: np.delete(v, slice(500, 900)) for n, v in GOOD.items()}), "a gap of"),
-    "a duplicate row": ("csv", with_lines((1000, LINES[999])), "duplicate row"),
     "a missing stamp": ("csv", with_lines(field(1000, 0, "")), "no time stamp"),
     "constant stamps": ("csv", table(t=np.zeros(len(AXIS["t"]))), "all 0"),
     "no stamps": ("csv", table(t=None), "--rate HZ"),
-    "dates as stamps": (
+    "dates whose milliseconds start again": (
         "csv",
         text(
             "\n".join(
@@ -165,7 +166,7 @@ REFUSED: dict[str, tuple[str, Make, str]] = {
                 ]
             )
         ),
-        "time_s: text such as",
+        "runs back",
     ),
     "a frozen motor": ("csv", table(angle=np.full(len(AXIS["t"]), 1.5), x_set=None), "constant are motor_angle_rad"),
     "everything constant": (
@@ -238,7 +239,6 @@ REFUSED: dict[str, tuple[str, Make, str]] = {
         content(b"MATLAB 7.3 MAT-file" + b" " * 105 + b"\x00\x02IM" + b"\x00" * 512),
         "7.3|no readable",
     ),
-    "a .mat with a structure": ("mat", structure, "no vector of numbers"),
     "a .mat with two rates": ("mat", unequal, "no column|no torque|no position|beside"),
     "a truncated Parquet": ("parquet", cut("parquet", 0.7), "no readable Parquet"),
     "text as Parquet": ("parquet", text(TEXT), "no readable Parquet"),
@@ -247,18 +247,6 @@ REFUSED: dict[str, tuple[str, Make, str]] = {
     "a JSON of a number": ("json", text("3.5"), "no list"),
     "a JSON of text": ("json", text(json.dumps({"t": ["a", "b", "c"], "x": ["d", "e", "f"]})), "columns of numbers"),
     "an empty JSON": ("json", text("{}"), "no list"),
-    "a JSON with null in the torque": (
-        "json",
-        lambda path: path.write_text(
-            json.dumps(
-                {
-                    n: [None if n == "torque_Nm" and i == 7 else float(x) for i, x in enumerate(v)]
-                    for n, v in GOOD.items()
-                }
-            )
-        ),
-        "no number",
-    ),
 }
 
 
@@ -282,6 +270,11 @@ NOTED: dict[str, tuple[Make, str]] = {
     "milliseconds called seconds": (table(t=1e3 * AXIS["t"]), "no rate of a recording"),
     "a torque that is another axis's": (table(torque=np.sin(7 * AXIS["t"])), "explain only"),
     "a set-point that is not followed": (table(x_set=RANDOM.normal(size=len(AXIS["t"])).cumsum()), "does not follow"),
+    "NaN in the position": (table(**in_rows("angle", slice(900, 903), np.nan)), "rows have no value of"),
+    "an empty field": (with_lines(field(700, 3, "")), "rows have no value of"),
+    "an angle that wraps": (table(angle=np.mod(AXIS["angle"], 2 * np.pi), x_set=None), "wraps at 6.28319"),
+    "a gap": (lambda path: write(path, {n: np.delete(v, slice(500, 600)) for n, v in GOOD.items()}), "a gap of"),
+    "a duplicate row": (with_lines((1000, LINES[999])), "duplicate rows: 1"),
     "numbers in quotes": (
         text("\n".join([LINES[0], *(",".join(f'"{f}"' for f in line.split(",")) for line in LINES[1:])]) + "\n"),
         "",

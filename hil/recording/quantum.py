@@ -8,6 +8,14 @@ _WHOLE = 0.05  # deviation from a whole number of steps up to which a difference
 _COUNTED = 0.9  # share of the differences that must be whole numbers of steps
 _STEPS = (20, 60, 200, 600)  # largest differences that are counted, in steps
 
+DIGITS = 1e-6  # relative deviation from a power of ten below which a step is that of printed digits
+
+
+def is_decimal(step: float) -> bool:
+    """True for a power of ten: the last digit of the file rather than a count of the encoder."""
+    power = np.log10(step)
+    return bool(abs(power - np.round(power)) < DIGITS / np.log(10.0))
+
 
 def count_of(values: FloatArray) -> float | None:
     """Step of a quantised channel (n,) in its unit; None where differences are no multiples of one step."""

@@ -1,0 +1,55 @@
+"""Leave out rows of a foreign file that hold no new sample: with a missing value, or that repeat the row before."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hil.arrays import FloatArray
+from hil.recording.held_samples import kept_rows
+from hil.recording.stamps import REPEATS
+
+
+@dataclass(frozen=True, eq=False)
+class CompleteRows:
+    """Columns without NaN, with the number of each row in the file (from 0), and notes on what was left out."""
+
+    columns: dict[str, FloatArray]
+    rows: NDArray[np.intp]
+    notes: tuple[str, ...]
+
+
+def complete_rows(columns: Mapping[str, FloatArray], rows_per_sample: float | None = None) -> CompleteRows:
+    """Leave out rows of columns (n,) with NaN, and those that repeat the row before with its stamp.
+
+    `rows_per_sample`: each sample stands in so many rows, of which one is kept. The clock then shows where rows are
+    missing: single ones are interpolated, long stretches are gaps (`stamps.regular_rows`).
+    """
+    notes = []
+    same = np.r_[False, np.logical_and.reduce([np.diff(values) == 0.0 for values in columns.values()])]
+    if same.mean() > REPEATS:  # stamps with too few digits
+        same[:] = False
+    if same.any():
+        notes.append(
+            f"duplicate rows: {same.sum()} repeat the row before with its stamp, first row "
+            f"{int(np.argmax(same)) + 1} of the numbers; they are left out"
+        )
+    good = np.logical_and.reduce([np.isfinite(values) for values in columns.values()])
+    rows = np.flatnonzero(good & ~same)
+    if not good.all():
+        lacking = ", ".join(name for name, values in columns.items() if not np.isfinite(values).all())
+        first = int(np.flatnonzero(~good)[0]) + 1
+        notes.append(
+            f"missing: {np.sum(~good)} rows have no value of {lacking} (first row {first} of the numbers) and are left "
+            "out: interpolated where they are few, else cut like a gap"
+        )
+    if rows_per_sample is not None:
+        told = {name: values[rows] for name, values in columns.items() if name != "time_s"}
+        kept = kept_rows(told, rows_per_sample)
+        notes.append(
+            f"repeated samples: the logger ran {rows_per_sample:g} times as fast as the loop; {kept.size} of "
+            f"{rows.size} rows are kept, one per sample"
+        )
+        rows = rows[kept]
+    return CompleteRows({name: values[rows] for name, values in columns.items()}, rows, tuple(notes))

@@ -1,0 +1,73 @@
+"""Find samples that a logger repeated because it ran faster than the loop, and keep each of them once."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hil.arrays import FloatArray
+
+_REACH = 5  # rows on each side over which a channel must move
+_FAST = 2.0  # least steps of a channel from row to row by which a motion is told from rest: each sample is new there
+_STRAIGHT = 0.5  # of the path that a motion makes in one direction: noise goes to and fro
+_MANY = 0.1  # share of repeated rows in motion: below, a few lost samples and no logger that is faster
+_LEAST_ROWS = 100  # in motion, for a share to a few per cent
+_WHOLE = 0.02  # deviation from a whole ratio of the rates
+_IN_STEP = 0.95  # share of the new samples at one phase of a whole ratio
+
+
+def rows_per_sample(columns: Mapping[str, FloatArray]) -> float:
+    """Rows of columns (n,) for each sample of the loop: 1 without repetitions, 2 if each sample stands twice.
+
+    Counted in rows in which a channel moves by several of its steps: no new sample repeats all channels there.
+    """
+    new, moving = _new(columns), _moving(columns)
+    if moving.sum() < _LEAST_ROWS or np.mean(~new[moving]) < _MANY:
+        return 1.0
+    ratio = float(moving.sum() / max(new[moving].sum(), 1))
+    return float(round(ratio)) if abs(ratio - round(ratio)) < _WHOLE * ratio else float(f"{ratio:.4g}")
+
+
+def kept_rows(columns: Mapping[str, FloatArray], ratio: float) -> NDArray[np.intp]:
+    """Rows to keep so that each sample stands once, for `ratio` rows per sample.
+
+    At a whole ratio every so many rows from that at which most samples are new; else each new sample, and at rest,
+    where samples do not differ, one row per `ratio`.
+    """
+    new = _new(columns)
+    rows = np.flatnonzero(new & _moving(columns))
+    if ratio == round(ratio) and rows.size:
+        phases = np.bincount(rows % int(ratio), minlength=int(ratio))
+        if phases.max() > _IN_STEP * rows.size:
+            return np.arange(int(phases.argmax()), new.size, int(ratio))
+    longest = int(np.ceil(ratio))
+    kept = [0]
+    for row in range(1, new.size):
+        if new[row] or row - kept[-1] >= longest:
+            kept.append(row)
+    return np.array(kept, dtype=np.intp)
+
+
+def _new(columns: Mapping[str, FloatArray]) -> NDArray[np.bool_]:
+    """Rows (n,) that differ from the row before in any column."""
+    rows = next(iter(columns.values())).size
+    new = np.zeros(rows, dtype=np.bool_)
+    new[0] = True
+    for values in columns.values():
+        new[1:] |= np.diff(values) != 0.0
+    return new
+
+
+def _moving(columns: Mapping[str, FloatArray]) -> NDArray[np.bool_]:
+    """Rows (n,) at which a column moves by several of its steps per row in one direction."""
+    moving = np.zeros(next(iter(columns.values())).size, dtype=np.bool_)
+    if moving.size <= 2 * _REACH:
+        return moving
+    for values in columns.values():
+        size = np.abs(np.diff(values))
+        if not size.any():
+            continue
+        path = np.convolve(size, np.ones(2 * _REACH), "valid")
+        far = np.abs(values[2 * _REACH :] - values[: -2 * _REACH])
+        moving[_REACH:-_REACH] |= (far > 2 * _REACH * _FAST * size[size > 0.0].min()) & (far > _STRAIGHT * path)
+    return moving

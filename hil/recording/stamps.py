@@ -1,0 +1,246 @@
+"""Turn the rows of a file into a regular clock: cut them at gaps, even out jitter of the stamps, and say both."""
+
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from hil.arrays import FloatArray
+from hil.errors import InputError
+
+CLOCK_TOLERANCE = 0.01  # of the period: what a step of a regular clock may deviate
+LARGEST = 1e12  # above every SI value of a channel, and of a clock in microseconds per day
+GAP_STEPS = 10.0  # of the clock: above, rows are missing and are not interpolated
+LEAST_ROWS = 50  # of a part: fewer show no motion
+REPEATS = 0.02  # share of repeated stamps from which they have too few digits, and are no duplicate rows
+_TENTHS = 200  # steps from which the median of a tenth is a typical step in spite of jitter
+_TWO_RATES = 1.5  # ratio of typical steps at both ends: more than jitter and drift
+_CLEARLY = 1.5  # ratio of mean squares: noise alone gives 1, and the stamps are believed
+_DROPPED = 1.9  # times the period: a step in which a row is missing, so that rows cannot be counted
+
+
+@dataclass(frozen=True)
+class PartStart:
+    """Where a part without gaps begins: its first row, and the time since the first row of the file [s]."""
+
+    row: int
+    start_s: float
+
+
+@dataclass(frozen=True, eq=False)
+class RegularRows:
+    """Columns (n,) whose `time_s` has one period in each part; `rate_hz` if they are interpolated to it."""
+
+    columns: dict[str, FloatArray]
+    period_s: float
+    parts: tuple[PartStart, ...]
+    rate_hz: float | None
+    notes: tuple[str, ...]
+
+
+def check_finite(columns: Mapping[str, FloatArray], place: Callable[[int], str]) -> None:
+    """Raise InputError at the first NaN, infinity or number beyond LARGEST.
+
+    `place` gives the place of row i (from 0), such as "file:line".
+    """
+    for name, values in columns.items():
+        bad = np.flatnonzero(~(np.abs(values) <= LARGEST))
+        if bad.size:
+            row = int(bad[0])
+            raise InputError(
+                f"{place(row)}: {name}: given {values[row]}, allowed a finite number up to {LARGEST:g}; "
+                "correct the value or cut the recording before it"
+            )
+
+
+def regular_rows(
+    columns: Mapping[str, FloatArray],
+    place: Callable[[int], str],
+    rate_hz: float | None = None,
+    judged_by: Collection[str] = (),
+) -> RegularRows:
+    """Cut columns (n,) at gaps of their `time_s` and give each part equal steps.
+
+    Stamps that are regular within 1 % stay as they are, single missing rows are interpolated; stamps with too few
+    digits get equal steps. Else either the stamps jitter and the rows do not, or the rows were taken at these times:
+    the one is right in which the channels are smoother. Rows taken at uneven times are interpolated, to `rate_hz` or
+    the mean rate. `judged_by` are the columns that decide, by default all.
+
+    `place` as in `check_finite`. Raises InputError: NaN, time that repeats or runs back, two rates, too few rows.
+    """
+    check_finite(columns, place)
+    time_s = columns["time_s"]
+    if time_s.size < 3:
+        raise InputError(f"{place(0)}: time_s: given {time_s.size} rows, allowed 3 or more; give a longer recording")
+    steps = np.diff(time_s)
+    few_digits = bool(time_s.size >= LEAST_ROWS and np.mean(steps == 0.0) > REPEATS and steps.max() > 0.0)
+    _refuse_order(time_s, steps, few_digits, place)
+    typical = float(np.median(steps[steps > 0.0]))
+    if not few_digits:
+        _refuse_two_rates(steps, place)
+    first = np.r_[0, np.flatnonzero(steps > GAP_STEPS * typical) + 1]
+    pieces = [slice(int(a), int(b)) for a, b in zip(first, np.r_[first[1:], time_s.size], strict=True)]
+    kept = [piece for piece in pieces if len(pieces) == 1 or piece.stop - piece.start >= LEAST_ROWS]
+    within = np.concatenate([steps[piece.start : piece.stop - 1] for piece in kept] or [np.empty(0)])
+    # rounded to 1 ps: the mean of printed stamps is a period with rounding errors
+    even = bool(within.size and np.all(np.abs(within - typical) <= CLOCK_TOLERANCE * round(typical, 12)))
+    if not kept or (not even and time_s.size < LEAST_ROWS):
+        row = int(np.flatnonzero(np.abs(steps - typical) > CLOCK_TOLERANCE * typical)[0]) + 1
+        raise InputError(
+            f"{place(row)}: time_s: a step of {steps[row - 1]:.6g} s, allowed the period "
+            f"{typical:.6g} s +-1 %; rows are missing: cut the recording there, or resample it"
+        )
+    notes = _of_gaps(time_s, pieces, kept, typical)
+    mean_s = float(np.sum(within) / within.size)
+    if even and rate_hz is None:
+        period_s = round(mean_s, 12)
+        return _joined([_taken(columns, piece) for piece in kept], time_s[0], period_s, None, notes)
+    if few_digits:
+        period_s = _slope(time_s, kept)
+        notes = (*notes, f"clock: stamps repeat (too few digits); equal steps of {period_s:.6g} s are taken")
+        return _joined([_counted(columns, piece, period_s) for piece in kept], time_s[0], period_s, None, notes)
+    missing = np.maximum(np.round(within / typical), 1.0) - 1.0
+    judged = {name: columns[name] for name in judged_by or columns} | {"time_s": time_s}
+    whole = bool(np.all(np.abs(within - (missing + 1.0) * typical) <= CLOCK_TOLERANCE * typical))
+    told = f"clock: steps from {within.min():.4g} to {within.max():.4g} s, typically {typical:.4g} s"
+    if rate_hz is None and whole:
+        mean_s = float(np.sum(within) / np.sum(missing + 1.0))
+        notes = (
+            *notes,
+            f"clock: {missing.sum():.0f} single rows are missing at a period of {mean_s:.6g} s; they are interpolated",
+        )
+    elif rate_hz is None and within.max() < _DROPPED * typical and _counts_better(judged, kept, mean_s):
+        period_s = _slope(time_s, kept)
+        notes = (*notes, f"{told}: the stamps jitter, the rows do not; equal steps of {period_s:.6g} s are taken")
+        return _joined([_counted(columns, piece, period_s) for piece in kept], time_s[0], period_s, None, notes)
+    else:
+        # a step that most rows have is the period of the logger, with delays between
+        most = np.mean(np.abs(within - typical) <= CLOCK_TOLERANCE * typical) > 0.5
+        mean_s = float(f"{typical if most else mean_s:.4g}") if rate_hz is None else 1.0 / rate_hz
+        notes = (*notes, f"{told}; the channels are interpolated to {1.0 / mean_s:.6g} Hz")
+    rate_hz = float(f"{1.0 / mean_s:.9g}")
+    parts = [_interpolated(columns, piece, rate_hz) for piece in kept]
+    return _joined(parts, time_s[0], round(1.0 / rate_hz, 12), rate_hz, notes)
+
+
+def _slope(time_s: FloatArray, kept: list[slice]) -> float:
+    """Period of counted rows: slope of the stamps over the rows in all parts, rounded to 1 ps."""
+    product, power = 0.0, 0.0
+    for piece in kept:
+        rows = np.arange(piece.stop - piece.start) - 0.5 * (piece.stop - piece.start - 1)
+        product += float(rows @ (time_s[piece] - time_s[piece].mean()))
+        power += float(rows @ rows)
+    return round(product / power, 12)
+
+
+def _refuse_order(time_s: FloatArray, steps: FloatArray, few_digits: bool, place: Callable[[int], str]) -> None:
+    bad = np.flatnonzero(steps < 0.0 if few_digits else steps <= 0.0)
+    if bad.size:
+        row = int(bad[0]) + 1
+        what = "runs back" if steps[row - 1] else "repeats (a duplicate row, or stamps with too few digits)"
+        raise InputError(
+            f"{place(row)}: time_s: {what}: "
+            f"given {time_s[row]:.9g} s after {time_s[row - 1]:.9g} s, allowed a growing time; "
+            "remove the row, or import the file with a sample rate"
+        )
+
+
+def _refuse_two_rates(steps: FloatArray, place: Callable[[int], str]) -> None:
+    """Refuse a clock whose step changes for good: two recordings of different rate in one file."""
+    if steps.size < _TENTHS:
+        return
+    tenth = steps.size // 10
+    first, last = float(np.median(steps[:tenth])), float(np.median(steps[-tenth:]))
+    if max(first, last) > _TWO_RATES * min(first, last):
+        row = int(np.flatnonzero(np.abs(steps - first) > 0.25 * abs(last - first))[0]) + 1
+        raise InputError(
+            f"{place(row - 1)}: two sampling rates in one file, steps of {first:.4g} s first and {last:.4g} s at "
+            "the end; cut the file there and import the parts"
+        )
+
+
+def _of_gaps(time_s: FloatArray, pieces: list[slice], kept: list[slice], typical: float) -> tuple[str, ...]:
+    """Notes on the gaps, and on parts that are too short."""
+    if len(pieces) == 1:
+        return ()
+    gaps = [float(time_s[piece.start] - time_s[piece.start - 1]) for piece in pieces[1:]]
+    sizes = (
+        f"a gap of {gaps[0]:.4g} s" if len(gaps) == 1 else f"{len(gaps)} gaps of {min(gaps):.4g} to {max(gaps):.4g} s"
+    )
+    starts = ", ".join(f"{time_s[piece.start] - time_s[0]:.4g}" for piece in kept[:10])
+    text = (
+        f"clock: {sizes} between steps of {typical:.4g} s, first after row {pieces[1].start} of the numbers: cut into "
+        f"{len(kept)} part{'s' if len(kept) > 1 else ''}, from {starts}{', ...' if len(kept) > 10 else ''} s on"
+    )
+    lost = sum(piece.stop - piece.start for piece in pieces) - sum(piece.stop - piece.start for piece in kept)
+    return (text + (f"; {lost} rows in parts of less than {LEAST_ROWS} are left out" if lost else ""),)
+
+
+def _counts_better(columns: Mapping[str, FloatArray], kept: list[slice], period_s: float) -> bool:
+    """True if channels are clearly smoother over the count of the rows than over their stamps.
+
+    The error of a cubic through the two rows on each side, of the channel in which both differ most.
+    """
+    ratio = 0.0
+    for name, values in columns.items():
+        if name == "time_s" or np.ptp(values) == 0.0:
+            continue
+        errors = []
+        for piece in kept:
+            time_s = columns["time_s"][piece]
+            counted = np.asarray(np.arange(time_s.size) * period_s, dtype=np.float64)
+            uneven = np.abs(time_s[4:] - time_s[:-4] - 4.0 * period_s) > CLOCK_TOLERANCE * period_s
+            errors.append([_cubic_error(time, values[piece])[uneven] for time in (time_s, counted)])
+        by_stamp, by_count = (float(np.sum(np.concatenate(one) ** 2)) for one in zip(*errors, strict=True))
+        if min(by_stamp, by_count) > 0.0:
+            ratio = max(ratio, float(np.log(by_stamp / by_count)), key=abs)
+    return bool(ratio > np.log(_CLEARLY))
+
+
+def _cubic_error(time: FloatArray, values: FloatArray) -> FloatArray:
+    """Value less the cubic (Lagrange) through two neighbours on each side, over the weight of white noise (n - 4,)."""
+    n = time.size - 4
+    at = time[2 : 2 + n]
+    others = [slice(0, n), slice(1, n + 1), slice(3, n + 3), slice(4, n + 4)]
+    error, weight = values[2 : 2 + n].copy(), np.ones(n)
+    for one in others:
+        factor = np.ones(n)
+        for other in others:
+            if other is not one:
+                factor *= (at - time[other]) / (time[one] - time[other])
+        error -= factor * values[one]
+        weight += factor**2
+    return np.asarray(error / np.sqrt(weight))
+
+
+def _taken(columns: Mapping[str, FloatArray], piece: slice) -> dict[str, FloatArray]:
+    return {name: values[piece] for name, values in columns.items()}
+
+
+def _counted(columns: Mapping[str, FloatArray], piece: slice, period_s: float) -> dict[str, FloatArray]:
+    """The rows of a part with equal steps from its first stamp on."""
+    taken = _taken(columns, piece)
+    return taken | {"time_s": taken["time_s"][0] + np.arange(piece.stop - piece.start) * period_s}
+
+
+def _interpolated(columns: Mapping[str, FloatArray], piece: slice, rate_hz: float) -> dict[str, FloatArray]:
+    """The rows of a part, linear between them."""
+    taken = _taken(columns, piece)
+    time_s = taken["time_s"]
+    # the last row counts although its time may be rounded down
+    rows = int((time_s[-1] - time_s[0]) * rate_hz + 1e-6) + 1
+    grid_s = time_s[0] + np.arange(rows) / rate_hz
+    return {name: np.interp(grid_s, time_s, values) for name, values in taken.items()} | {"time_s": grid_s}
+
+
+def _joined(
+    parts: list[dict[str, FloatArray]],
+    begin_s: float,
+    period_s: float,
+    rate_hz: float | None,
+    notes: tuple[str, ...],
+) -> RegularRows:
+    columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    rows = np.r_[0, np.cumsum([part["time_s"].size for part in parts])]
+    starts = (PartStart(int(row), float(part["time_s"][0] - begin_s)) for row, part in zip(rows, parts, strict=False))
+    return RegularRows(columns, period_s, tuple(starts), rate_hz, notes)

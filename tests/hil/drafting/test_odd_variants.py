@@ -1,0 +1,204 @@
+"""One known axis in the forms that loggers and users give it: names without meaning, structures, wraps, stamps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from foreign_axis import LEAD_M, axis, renamed, write
+
+from hil.drafting.draft_map import draft_map
+from hil.drafting.map_draft import MapDraft
+from hil.drafting.map_text import map_text
+from hil.recording.importing import import_recording
+from hil.recording.recording import Recording
+
+SHARED = Path(__file__).parents[4] / "shared" / "recordings"
+AXIS = axis()
+NAMES = {"t": "time_s", "x_set": "position_setpoint_mm", "angle": "motor_angle_rad", "torque": "torque_Nm"}
+COUNTS = np.round(AXIS["angle"] / (2 * np.pi) * 4096)
+
+
+def imported(path: Path) -> tuple[MapDraft, Recording]:
+    draft = draft_map(path)
+    text = path.with_name("map.yaml")
+    text.write_text(map_text(draft))
+    return draft, import_recording(path, text)
+
+
+def entries(draft: MapDraft) -> dict[str, dict[str, Any]]:
+    return {one.channel: one.entry for one in draft.channels}
+
+
+def dated(form: Callable[[int, float], str]) -> Callable[[Path], None]:
+    """A writer of the known axis with stamps of text."""
+
+    def make(path: Path) -> None:
+        columns = renamed(AXIS, **{key: name for key, name in NAMES.items() if key != "t"})
+        rows = zip(*(values.tolist() for values in columns.values()), strict=True)
+        lines = [
+            ";".join([form(int(t // 60), t % 60), *(f"{value:.9g}" for value in row)])
+            for t, row in zip(AXIS["t"], rows, strict=True)
+        ]
+        path.write_text("\n".join([";".join(["Zeit", *columns]), *lines]) + "\n")
+
+    return make
+
+
+def simulink(path: Path) -> None:
+    from scipy.io import savemat
+
+    signals = [{"values": AXIS[key].reshape(-1, 1), "label": name} for key, name in NAMES.items() if key != "t"]
+    savemat(path, {"logsout": {"time": AXIS["t"], "signals": signals}})
+
+
+def twincat(path: Path) -> None:
+    names = "Name;SetPos [mm];Name;ActAngle [rad];Name;ActTorque [Nm]"
+    above = f"Name;Project\nFile;a.svdx\n\n{names}\nSampleTime;1;SampleTime;1;SampleTime;1"
+    rows = zip(1e3 * AXIS["t"], AXIS["x_set"], AXIS["angle"], AXIS["torque"], strict=True)
+    lines = [f"{t:g};{x:.9g};{t:g};{angle:.9g};{t:g};{torque:.9g}" for t, x, angle, torque in rows]
+    path.write_text("\n".join([above, "", *lines]) + "\n")
+
+
+@pytest.mark.parametrize(
+    ("ending", "make"),
+    [
+        ("csv", dated(lambda minute, second: f"2024-03-01 12:{minute:02d}:{second:06.3f}")),
+        ("csv", dated(lambda minute, second: f"01.03.2024 12:{minute:02d}:{second:06.3f}")),
+        ("csv", dated(lambda minute, second: f"12:{minute:02d}:{second:06.3f}")),
+        ("csv", dated(lambda minute, second: f"{45352.5 + (60 * minute + second) / 86400:.13f}")),
+        ("mat", simulink),
+        ("csv", twincat),
+        ("csv", lambda path: write(path, renamed(AXIS | {"t": 1.7e9 + AXIS["t"]}, **NAMES))),
+    ],
+    ids=["date", "German date", "time of day", "day number", "Simulink structure", "TwinCAT Scope", "since 1970"],
+)
+def test_the_axis_is_imported_from_what_loggers_write(
+    tmp_path: Path, ending: str, make: Callable[[Path], None]
+) -> None:
+    path = tmp_path / f"log.{ending}"
+    make(path)
+    if path.suffix == ".csv" and path.read_text().startswith("time_s"):  # with the digits of the clock
+        lines = [
+            f"{1.7e9 + t:.4f},{line.split(',', 1)[1]}"
+            for t, line in zip(AXIS["t"], path.read_text().splitlines()[1:], strict=True)
+        ]
+        path.write_text("\n".join([",".join(NAMES.values()), *lines]) + "\n")
+    _, recording = imported(path)
+    assert recording.period_s == pytest.approx(1e-3, rel=1e-4)
+    assert len(recording.parts()) == 1
+    np.testing.assert_allclose(recording["motor_position_rad"], AXIS["angle"], atol=1e-5)
+    np.testing.assert_allclose(recording["position_command_m"], 1e-3 * AXIS["x_set"], atol=1e-8)
+    np.testing.assert_allclose(recording["torque_n_m"], AXIS["torque"], atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("values", "name", "size"),
+    [
+        (np.mod(COUNTS, 65536), "enc_counts", 65536.0),
+        (np.mod(COUNTS + 32768, 65536) - 32768, "enc_counts", 65536.0),
+        (np.mod(COUNTS, 4096), "enc_counts", 4096.0),
+        (np.mod(np.rad2deg(AXIS["angle"]), 360.0), "angle_deg", 360.0),
+    ],
+)
+def test_a_counter_that_wraps_is_unwrapped_and_said(tmp_path: Path, values: np.ndarray, name: str, size: float) -> None:
+    columns = {"time_s": AXIS["t"], name: values, "table_mm": AXIS["x_act"], "torque_Nm": AXIS["torque"]}
+    draft, recording = imported(write(tmp_path / "log.csv", columns))
+    entry = entries(draft)["motor_position_rad"]
+    assert entry["column"] == name
+    assert entry["wraps_at"] == size
+    assert f"{name}: wraps at {size:g}; it is unwrapped" in draft.unsure
+    moved = recording["motor_position_rad"] - recording["motor_position_rad"][0]
+    np.testing.assert_allclose(moved, AXIS["angle"] - AXIS["angle"][0], atol=4e-3)
+    assert draft.lead_m == pytest.approx(LEAD_M, rel=1e-3)
+
+
+def test_repeated_samples_are_said_and_kept_once(tmp_path: Path) -> None:
+    columns = {name: np.repeat(values, 2) for name, values in renamed(AXIS, **NAMES).items()}
+    columns["time_s"] = np.arange(2 * AXIS["t"].size) * 5e-4
+    draft, recording = imported(write(tmp_path / "log.csv", columns))
+    assert draft.rows_per_sample == 2.0
+    assert any("2 times as fast as the loop" in note for note in draft.unsure)
+    assert recording.period_s == pytest.approx(1e-3)
+    np.testing.assert_allclose(recording["motor_position_rad"], AXIS["angle"], atol=1e-5)
+
+
+def test_a_gap_and_missing_values_cut_the_file_into_parts_that_keep_their_time(tmp_path: Path) -> None:
+    torque = AXIS["torque"].copy()
+    torque[3000:3100] = np.nan
+    kept = np.r_[0:1000, 1200:4000]
+    columns = {name: values[kept] for name, values in renamed(AXIS | {"torque": torque}, **NAMES).items()}
+    draft, recording = imported(write(tmp_path / "log.csv", columns))
+    assert [part.start_s for part in recording.parts()] == pytest.approx([0.0, 1.2, 3.1])
+    assert any("cut into 3 parts" in note for note in draft.unsure)
+    # the derived velocity knows the gaps
+    for part in recording.parts():
+        rows = np.round(part["time_s"] / 1e-3).astype(int)
+        np.testing.assert_allclose(
+            part["velocity_command_m_s"], np.gradient(1e-3 * AXIS["x_set"][rows], 1e-3), atol=1e-5
+        )
+
+
+def test_two_encoders_without_units_are_a_screw_of_usual_lead(tmp_path: Path) -> None:
+    columns = {"time": AXIS["t"], "motor_pos": AXIS["angle"], "table_pos": AXIS["x_act"], "torque": AXIS["torque"]}
+    draft = draft_map(write(tmp_path / "log.csv", columns))
+    assert entries(draft)["motor_position_rad"]["unit"] == "rad"
+    assert entries(draft)["table_position_m"]["unit"] == "mm"
+    assert draft.lead_m == pytest.approx(LEAD_M, rel=1e-3)
+
+
+def test_a_set_point_after_the_motion_is_named(tmp_path: Path) -> None:
+    late = np.interp(AXIS["t"] - 0.006, AXIS["t"], AXIS["x_act"])
+    draft = draft_map(write(tmp_path / "log.csv", renamed(AXIS | {"x_set": late}, **NAMES)))
+    assert any("comes 6 ms after motor_angle_rad" in note for note in draft.unsure)
+    assert not any(
+        "a set-point comes before" in note
+        for note in draft_map(write(tmp_path / "good.csv", renamed(AXIS, **NAMES))).unsure
+    )
+
+
+def test_the_step_of_an_encoder_is_that_before_the_interpolation(tmp_path: Path) -> None:
+    random = np.random.default_rng(2)
+    uneven = AXIS["t"] + random.uniform(0.0, 4e-4, AXIS["t"].size)
+    count = 2 * np.pi / 4096
+    columns = {name: np.interp(uneven, AXIS["t"], values) for name, values in AXIS.items()} | {"t": uneven}
+    columns["angle"] = np.round(columns["angle"] / count) * count
+    _, recording = imported(write(tmp_path / "log.csv", renamed(columns, **NAMES)))
+    assert recording.metadata["channels"]["motor_position_rad"]["step"] == pytest.approx(count, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("scalars", "gain"), [({"gtau": 35.0}, "gtau"), ({"tau_filter": 0.01, "max_torque": 9.0}, None)]
+)
+def test_only_a_constant_by_its_name_scales_the_torque(
+    tmp_path: Path, scalars: dict[str, float], gain: str | None
+) -> None:
+    columns: dict[str, Any] = renamed(AXIS, t="t", x_set="qg", x_act="qm", torque="vir") | scalars
+    entry = entries(draft_map(write(tmp_path / "log.mat", columns)))["force_n"]
+    assert entry["column"] == "vir"
+    assert entry.get("gain") == gain
+
+
+@pytest.mark.skipif(not SHARED.is_dir(), reason="needs ../shared/recordings, not part of the repository")
+@pytest.mark.parametrize(
+    ("folder", "expected"),
+    [
+        (
+            "kuka/axis1_a.csv",
+            {"motor_position_m": "c", "table_position_m": "d", "position_command_m": "b", "force_n": "g"},
+        ),
+        (
+            "rig/null/train_1.csv",
+            {"motor_position_rad": "d", "table_position_m": "e", "position_command_m": "b", "torque_n_m": "f"},
+        ),
+    ],
+)
+def test_measured_recordings_are_told_without_names(tmp_path: Path, folder: str, expected: dict[str, str]) -> None:
+    lines = (SHARED / folder).read_text().splitlines()
+    letters = ",".join("abcdefgh"[: len(lines[0].split(","))])
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join([letters, *lines[1:]]) + "\n")
+    assert {channel: entry["column"] for channel, entry in entries(draft_map(path)).items()} == expected

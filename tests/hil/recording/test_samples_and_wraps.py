@@ -1,0 +1,93 @@
+"""Samples that a logger repeated are kept once; counters that start again are unwrapped; dates are read as seconds."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hil.files.date_stamps import is_date, seconds_of
+from hil.recording.held_samples import kept_rows, rows_per_sample
+from hil.recording.wraps import unwrapped, wrap_range
+
+RANDOM = np.random.default_rng(12)
+T = np.arange(4000) * 1e-3
+ANGLE = 40.0 * np.sin(2 * np.pi * 0.5 * T) + 6.0 * np.sin(2 * np.pi * 2.3 * T)
+COUNTS = np.round(ANGLE * 4096 / (2 * np.pi))
+COLUMNS = {"angle": COUNTS, "torque": np.round(np.gradient(ANGLE) * 50 + RANDOM.normal(0.0, 0.3, T.size), 1)}
+
+
+@pytest.mark.parametrize("ratio", [1, 2, 5])
+def test_repeated_samples_are_counted_and_kept_once(ratio: int) -> None:
+    logged = {name: np.repeat(values, ratio) for name, values in COLUMNS.items()}
+    assert rows_per_sample(logged) == ratio
+    if ratio > 1:
+        kept = kept_rows(logged, float(ratio))
+        np.testing.assert_array_equal(logged["angle"][kept], COUNTS)
+
+
+def test_a_logger_at_another_rate_keeps_each_sample() -> None:
+    index = np.floor(np.arange(int(1.6 * T.size)) / 1.6).astype(int)
+    logged = {name: values[index] for name, values in COLUMNS.items()}
+    ratio = rows_per_sample(logged)
+    assert ratio == pytest.approx(1.6, rel=0.01)
+    assert kept_rows(logged, ratio).size == pytest.approx(T.size, rel=0.01)
+
+
+def test_rest_and_coarse_counts_are_no_repetitions() -> None:
+    slow = {"angle": np.round(COUNTS / 400.0), "torque": np.round(COLUMNS["torque"])}
+    assert rows_per_sample(slow) == 1.0
+    still = {name: np.r_[np.full(3000, values[0]), values] for name, values in COLUMNS.items()}
+    assert rows_per_sample(still) == 1.0
+
+
+@pytest.mark.parametrize(
+    ("values", "size"),
+    [
+        (np.mod(COUNTS, 4096), 4096.0),
+        (np.mod(COUNTS + 32768, 65536) - 32768, None),  # does not reach the end of its range
+        (np.mod(8 * COUNTS + 32768, 65536) - 32768, 65536.0),
+        (np.mod(np.rad2deg(ANGLE), 360.0), 360.0),
+        (np.mod(ANGLE + np.pi, 2 * np.pi) - np.pi, 2 * np.pi),
+    ],
+)
+def test_a_wrap_is_found_with_its_range(values: np.ndarray, size: float | None) -> None:
+    found = wrap_range(values)
+    assert found == (pytest.approx(size) if size else None)
+    if size:
+        assert np.abs(np.diff(unwrapped(values, size))).max() < 0.2 * size
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        np.sign(np.sin(7.0 * T)) + 1e-3 * RANDOM.normal(size=T.size),  # a switched voltage
+        np.where(np.arange(T.size) == 800, -9999.0, ANGLE),  # a placeholder
+        np.where(T > 2.0, ANGLE + 500.0, ANGLE),  # a jump
+        RANDOM.normal(size=T.size),
+        ANGLE,
+    ],
+)
+def test_other_jumps_are_no_wraps(values: np.ndarray) -> None:
+    assert wrap_range(values) is None
+
+
+@pytest.mark.parametrize(
+    ("texts", "seconds"),
+    [
+        (["2024-03-01T12:00:00.001Z", "2024-03-01T12:00:01.001Z"], 1.0),
+        (["2024-02-29 23:59:59.5", "2024-03-01 00:00:00.5"], 1.0),
+        (["31.12.2023 23:59:59,5", "01.01.2024 00:00:00,75"], 1.25),
+        (["12:00:00.001", "12:00:00.003"], 0.002),
+        (["23:59:59.9", "00:00:00.1"], 0.2),
+        (["3/1/2024 11:59:59 AM", "3/1/2024 12:00:00 PM"], 1.0),
+        (["12:00:00:123", "12:00:00:125"], 0.002),
+    ],
+)
+def test_dates_and_times_of_day_are_seconds(texts: list[str], seconds: float) -> None:
+    assert is_date(texts[0])
+    assert np.diff(seconds_of(texts))[0] == pytest.approx(seconds, abs=1e-9)
+
+
+@pytest.mark.parametrize("text", ["", "1.5", "OK", "2024-03-01", "12"])
+def test_other_texts_are_no_dates(text: str) -> None:
+    assert not is_date(text)

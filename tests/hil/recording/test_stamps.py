@@ -1,0 +1,103 @@
+"""Stamps of any logger become a regular clock: gaps cut, jitter evened out, single missing rows interpolated."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hil.errors import InputError
+from hil.recording.recording import Recording, read_recording, write_parquet
+from hil.recording.stamps import LEAST_ROWS, RegularRows, regular_rows
+
+RANDOM = np.random.default_rng(11)
+ROWS, PERIOD_S = 3000, 1e-3
+TICKS_S = np.arange(ROWS) * PERIOD_S
+
+
+def position(time_s: np.ndarray) -> np.ndarray:
+    return np.sin(2 * np.pi * time_s) + 0.3 * np.sin(2 * np.pi * 3.1 * time_s)
+
+
+def made(time_s: np.ndarray, values: np.ndarray, rate_hz: float | None = None) -> RegularRows:
+    return regular_rows({"time_s": time_s, "x": values}, lambda row: f"row {row}", rate_hz)
+
+
+@pytest.mark.parametrize("start_s", [0.0, 12345.6, 1.7e9])
+def test_a_gap_cuts_and_each_part_keeps_its_time(start_s: float) -> None:
+    kept = np.r_[0:1000, 1500:ROWS]
+    rows = made(start_s + TICKS_S[kept], position(TICKS_S)[kept])
+    assert [(part.row, round(part.start_s, 6)) for part in rows.parts] == [(0, 0.0), (1000, 1.5)]
+    assert rows.period_s == pytest.approx(PERIOD_S, rel=1e-6)
+    np.testing.assert_array_equal(rows.columns["x"], position(TICKS_S)[kept])
+    assert "a gap of 0.501 s" in rows.notes[0]
+
+
+def test_a_part_of_few_rows_is_left_out_and_said() -> None:
+    kept = np.r_[0:1000, 1500:1520, 2000:ROWS]
+    rows = made(TICKS_S[kept], position(TICKS_S)[kept])
+    assert [part.row for part in rows.parts] == [0, 1000]
+    assert f"20 rows in parts of less than {LEAST_ROWS} are left out" in rows.notes[0]
+
+
+def test_single_missing_rows_are_interpolated_and_the_others_stay() -> None:
+    kept = np.delete(np.arange(ROWS), [700, 1200, 1201])
+    rows = made(TICKS_S[kept], position(TICKS_S)[kept])
+    assert len(rows.parts) == 1
+    np.testing.assert_allclose(rows.columns["time_s"], TICKS_S, atol=1e-12)
+    np.testing.assert_allclose(rows.columns["x"][kept], position(TICKS_S)[kept], atol=1e-12)
+    assert "3 single rows are missing" in rows.notes[0]
+
+
+def test_jitter_of_the_stamps_is_told_from_jitter_of_the_rows() -> None:
+    uneven_s = TICKS_S + RANDOM.uniform(-2e-4, 2e-4, ROWS)
+    of_stamps = made(uneven_s, position(TICKS_S))
+    assert of_stamps.rate_hz is None
+    assert "the stamps jitter, the rows do not" in of_stamps.notes[0]
+    np.testing.assert_array_equal(of_stamps.columns["x"], position(TICKS_S))
+    of_rows = made(uneven_s, position(uneven_s))
+    assert of_rows.rate_hz == pytest.approx(1000.0, rel=1e-3)
+    np.testing.assert_allclose(of_rows.columns["x"], position(of_rows.columns["time_s"]), atol=1e-4)
+
+
+def test_noise_alone_leaves_the_stamps_right() -> None:
+    assert made(TICKS_S + RANDOM.uniform(-2e-4, 2e-4, ROWS), RANDOM.normal(size=ROWS)).rate_hz is not None
+
+
+def test_stamps_with_few_digits_get_equal_steps_in_each_part() -> None:
+    quick_s = np.arange(ROWS) * 2.5e-4
+    kept = np.r_[0:1000, 2000:ROWS]
+    rows = made(np.floor(quick_s[kept] * 1e3) / 1e3, position(quick_s)[kept])
+    assert rows.period_s == pytest.approx(2.5e-4, rel=2e-3)
+    assert [part.row for part in rows.parts] == [0, 1000]
+
+
+def test_a_rate_that_changes_for_good_is_refused() -> None:
+    time_s = np.r_[TICKS_S[:1500], TICKS_S[1500::4]]
+    with pytest.raises(InputError, match="two sampling rates"):
+        made(time_s, position(time_s))
+
+
+def _csv(path: Path, kept: np.ndarray) -> Path:
+    lines = [f"{t:.4f},{position(t):.9f},{np.cos(t):.6f}" for t in 20.0 + TICKS_S[kept]]
+    path.write_text("\n".join(["time_s,motor_position_rad,torque_n_m", *lines]) + "\n")
+    return path
+
+
+def test_a_file_with_gaps_is_one_recording_with_parts(tmp_path: Path) -> None:
+    recording = read_recording(_csv(tmp_path / "run.csv", np.r_[0:1000, 1500:ROWS]))
+    first, second = recording.parts()
+    assert (first.name, second.name) == ("run (part 1)", "run (part 2)")
+    assert (len(first), len(second)) == (1000, 1500)
+    assert second.start_s == pytest.approx(1.5)
+    assert second["time_s"][0] == pytest.approx(21.5)
+    assert second.parts() == (second,)
+    write_parquet(recording, tmp_path / "run.parquet")
+    assert [len(part) for part in read_recording(tmp_path / "run.parquet").parts()] == [1000, 1500]
+
+
+def test_a_recording_without_gaps_is_its_only_part(tmp_path: Path) -> None:
+    recording = read_recording(_csv(tmp_path / "run.csv", np.arange(ROWS)))
+    assert isinstance(recording, Recording)
+    assert recording.parts() == (recording,)

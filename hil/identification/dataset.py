@@ -10,6 +10,7 @@ from scipy.signal import lfilter
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
 from hil.errors import InputError
+from hil.identification.command_timing import unknown_share
 from hil.identification.measured import Measured
 from hil.identification.noise import Laps
 from hil.twin.axis import Response, Start
@@ -141,23 +142,23 @@ def unknown_torque(run: Measured, bench: Bench, observer_s: float) -> FloatArray
 
     Between samples of a torque it is `Measured.torque_gap`. The sign of Coulomb friction is not known in a sample next
     to which the direction of motion is another one, nor, where positions are coarser than the counts of the bench,
-    while the motor passes less than a step in the observer's time constant.
+    while the motor passes less than a step in the observer's time constant. Of a command that is held over many rows
+    the motion tells the share of the first two that is real (`command_timing`).
     """
     found, unsure = np.zeros(run.motor.size), np.zeros(run.motor.size, dtype=bool)
-    count = np.sqrt(12.0) * run.noise.motor
+    count, coulomb = np.sqrt(12.0) * run.noise.motor, bench.axis.physics().coulomb_n_m
+    moved = maximum_filter1d(run.motor, _NEAR_ROWS) - minimum_filter1d(run.motor, _NEAR_ROWS)
+    moves = moved > 1.5 * count  # not at rest
     if run.sampled:
-        found = run.torque_gap
         direction = np.sign(np.diff(run.motor, append=run.motor[-1]))
         turning = np.diff(direction, prepend=direction[0]) != 0.0
-        unsure |= maximum_filter1d(turning, 3)
+        unsure = np.asarray(maximum_filter1d(turning, 3)) & moves
+        found = np.hypot(run.torque_gap, np.where(unsure, coulomb, 0.0))
+        found = unknown_share(run.torque_command, run.motor, found, run.period_s, inertia(bench)) * found
     if run.noise.coarse:
         ticks = max(round(observer_s / run.period_s), 1)
         passed = np.abs(np.convolve(np.gradient(run.motor), np.ones(ticks), mode="same"))
-        unsure |= passed < count
-    if unsure.any():
-        moved = maximum_filter1d(run.motor, _NEAR_ROWS) - minimum_filter1d(run.motor, _NEAR_ROWS)
-        unsure &= moved > 1.5 * count  # not at rest
-        found = np.hypot(found, np.where(unsure, bench.axis.physics().coulomb_n_m, 0.0))
+        found = np.hypot(found, np.where((passed < count) & moves & ~unsure, coulomb, 0.0))
     return np.asarray(found, dtype=np.float64)
 
 

@@ -44,7 +44,7 @@ def import_recording(source: str | Path, map_path: str | Path) -> Recording:
         factor = entry.factor_to(CHANNELS[name].unit, the_map.lead_m, gain)
         assert factor is not None  # the map was validated
         columns[name] = factor * foreign.columns[entry.column] + entry.offset
-        origins[name] = {"column": entry.column, "factor": factor, "offset": entry.offset}
+        origins[name] = {"column": entry.column, "unit": entry.unit, "factor": factor, "offset": entry.offset}
     clock = the_map.time.column if the_map.time is not None else "sample_rate_hz"
     if the_map.resample_hz is not None:
         columns = _resampled(columns, the_map.resample_hz, lambda row: f"{foreign.place(row)}: {clock}")

@@ -134,6 +134,7 @@ class Mechanism:
     proportional: bool = True  # the change is proportional to the strength
     neutral_at_zero: bool = True  # without effect where the strength is zero
     needs_table: bool = False  # not observable without a linear encoder
+    turning: bool = False  # only where the load turns
     transient: bool = False  # belongs to one recording: not expected on another motion
     softens: bool = False  # changes the stiffness of a spring of the chain
     most: int = 1  # number that may act at once, with periods or orders of their own

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 import hil
-from hil.bench.axis_models import Rotary, RotaryTwoMass, model_of
+from hil.bench.axis_models import model_of
 from hil.bench.bench_file import Bench, load_bench
+from hil.bench.turning_axes import Rotary, RotaryTwoMass
 from hil.motion.profile import Profile
 from hil.motion.trajectory import plan
 from hil.twin.structure.modal import modal

@@ -121,6 +121,8 @@ def starts(scene: Scene, bench: Bench) -> list[StartPoint]:
     """Starting points of all variants of the library for a scene."""
     found = []
     for mechanism in LIBRARY:
+        if mechanism.turning and not bench.axis.turns:
+            continue
         phases = mechanism.indices(Role.PHASE)
         for number, variant in enumerate(mechanism.variants):
             if (mechanism.needs_table or variant.needs_table) and not bench.has_table_encoder:

@@ -9,12 +9,15 @@ from hil.recording.recording import Recording
 
 
 def told(
-    recording: Recording, plant: PlantValues, transmission: TransmissionValues | None
+    recording: Recording, plant: PlantValues, transmission: TransmissionValues | None, unit: str | None = None
 ) -> tuple[list[str], list[str]]:
-    """Notes on what the recording tells, and those that the user should check."""
+    """Notes on what the recording tells, and those that the user should check.
+
+    `unit` is that of the torque if it is not the SI unit.
+    """
     notes, unsure = list[str](), list[str]()
     names, linear = recording.axis, recording.kind is AxisKind.LINEAR
-    effort, noise_unit = ("force", "N") if linear else ("torque", "N m")
+    effort, noise_unit = ("force", "N") if linear else ("voltage", unit) if unit else ("torque", "N m")
     if not plant.inertia.significant:
         unsure.append("the inertia is not identifiable from this motion: record moves with more acceleration")
     notes.append(
@@ -25,12 +28,10 @@ def told(
         f"constant {effort} {plant.offset.value:.3g} {noise_unit} +-{plant.offset.std_error:.2g}{sure}: a load, or "
         "friction that differs by direction"
     )
-    if plant.gravity is not None:
+    if plant.gravity is not None and not plant.gravity.significant:
         notes.append(
-            f"{effort} over the angle (gravity) {plant.gravity.value:.3g} N m +-{plant.gravity.std_error:.2g}: not "
-            "in this bench"
+            f"{effort} over the angle (gravity) {plant.gravity.value:.3g} {noise_unit}: not distinguishable from 0"
         )
-        unsure.append("the axis has a load that follows the sine of its angle (gravity); this bench has none")
     notes.append(f"noise of {names.torque}: {noise_of(recording, names.torque):.3g} {noise_unit} rms")
     notes.append(
         f"noise of {names.motor_position}: {noise_of(recording, names.motor_position):.3g} "

@@ -38,13 +38,15 @@ def import_recording(source: str | Path, map_path: str | Path) -> Recording:
     foreign = read_foreign(source, wanted, sorted(gains), the_map.csv.format())
 
     columns = {"time_s": _time_s(the_map, foreign.columns)}
-    origins = {}
+    origins: dict[str, dict[str, str | float]] = {}
     for name, entry in the_map.channels.items():
         gain = foreign.scalars[entry.gain] if isinstance(entry.gain, str) else 1.0
         factor = entry.factor_to(CHANNELS[name].unit, the_map.lead_m, gain)
         assert factor is not None  # the map was validated
         columns[name] = factor * foreign.columns[entry.column] + entry.offset
         origins[name] = {"column": entry.column, "unit": entry.unit, "factor": factor, "offset": entry.offset}
+        if entry.gain is not None:
+            origins[name]["si_per_volt"] = gain if isinstance(entry.gain, str) else entry.gain
     clock = the_map.time.column if the_map.time is not None else "sample_rate_hz"
     if the_map.resample_hz is not None:
         columns = _resampled(columns, the_map.resample_hz, lambda row: f"{foreign.place(row)}: {clock}")

@@ -28,7 +28,12 @@ def told(
         f"constant {effort} {plant.offset.value:.3g} {noise_unit} +-{plant.offset.std_error:.2g}{sure}: a load, or "
         "friction that differs by direction"
     )
-    if plant.gravity is not None and not plant.gravity.significant:
+    if plant.gravity is not None and plant.gravity.significant:
+        unsure.append(
+            f"the load follows the sine of its angle, as gravity does ({plant.gravity.value:.3g} {noise_unit} "
+            f"+-{plant.gravity.std_error:.2g} at the load); it stands under mechanisms"
+        )
+    elif plant.gravity is not None:
         notes.append(
             f"{effort} over the angle (gravity) {plant.gravity.value:.3g} {noise_unit}: not distinguishable from 0"
         )

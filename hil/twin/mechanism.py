@@ -107,6 +107,7 @@ class Variant:
     starts: Callable[[Scene], Points] | None = None  # if they differ from the mechanism's
     proportional: bool = True  # the change is proportional to the strength
     needs_table: bool = False  # not observable without a linear encoder
+    motor_alone: bool = False  # for a load that turns, with one encoder: its reaction on the motor shows it
     form_of: str = ""  # id of a friction law whose form a small contribution corrects
     play: bool = False  # the flanks of the transmission push only: contacts open and close
     slips: bool = False  # the contact is of Maxwell slip elements

@@ -28,15 +28,12 @@ def told(
         f"constant {effort} {plant.offset.value:.3g} {noise_unit} +-{plant.offset.std_error:.2g}{sure}: a load, or "
         "friction that differs by direction"
     )
-    if plant.gravity is not None and plant.gravity.significant:
-        unsure.append(
-            f"the load follows the sine of its angle, as gravity does ({plant.gravity.value:.3g} {noise_unit} "
-            f"+-{plant.gravity.std_error:.2g} at the load); it stands under mechanisms"
-        )
-    elif plant.gravity is not None:
-        notes.append(
-            f"{effort} over the angle (gravity) {plant.gravity.value:.3g} {noise_unit}: not distinguishable from 0"
-        )
+    if plant.gravity is not None:
+        sure = "" if plant.gravity.significant else ", not distinguishable from 0"
+        size = f"{plant.gravity.value:.3g} {noise_unit} +-{plant.gravity.std_error:.2g}"
+        notes.append(f"{effort} over the angle (gravity) {size} at the load{sure}")
+        if plant.gravity.significant:
+            unsure.append("the load follows the sine of its angle, as gravity does; see mechanisms")
     notes.append(f"noise of {names.torque}: {noise_of(recording, names.torque):.3g} {noise_unit} rms")
     notes.append(
         f"noise of {names.motor_position}: {noise_of(recording, names.motor_position):.3g} "

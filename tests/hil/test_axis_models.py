@@ -54,7 +54,8 @@ def test_a_voltage_drives_a_dc_motor_like_a_torque() -> None:
     time_s = period_s * np.arange(400)
     lag_s = inertia / per_speed
     expected = stall / per_speed * (time_s - lag_s * (1.0 - np.exp(-time_s / lag_s)))
-    assert driven.motor_position == pytest.approx(expected, rel=1e-3, abs=1e-4)
+    # friction is constant over an internal step of 0.2 ms, 0.3 % of the lag
+    assert driven.motor_position == pytest.approx(expected, rel=3e-3, abs=1e-4)
 
 
 def test_keys_tell_the_kind_of_axis() -> None:

@@ -77,7 +77,7 @@ CATALOGUE: Mapping[str, Definition] = MappingProxyType({
         "-stiffness (x - rest) on the table", {"stiffness_n_m": _AT_LEAST_0, "rest_position_m": _ANY}),
     "gravity_torque": Definition(
         "-m g r sin(angle + offset) on a load that turns, its angle [rad] the position of the table",
-        {"gravity_torque_n_m": _AT_LEAST_0, "angle_rad": _PHASE_0}),
+        {"gravity_torque_n_m": _AT_LEAST_0, "angle_rad": _PHASE}),
     # transmission
     "backlash": Definition("no force within +-gap/2 of stretch; contacts push only", {"gap_m": _AT_LEAST_0}),
     "preload_loss": Definition(

@@ -75,6 +75,9 @@ CATALOGUE: Mapping[str, Definition] = MappingProxyType({
         "force on the table while start <= t < end", {"force_n": _ANY, "start_s": _ANY, "end_s": _ANY}),
     "spring_load": Definition(
         "-stiffness (x - rest) on the table", {"stiffness_n_m": _AT_LEAST_0, "rest_position_m": _ANY}),
+    "gravity_torque": Definition(
+        "-m g r sin(angle + offset) on a load that turns, its angle [rad] the position of the table",
+        {"gravity_torque_n_m": _AT_LEAST_0, "angle_rad": _PHASE}),
     # transmission
     "backlash": Definition("no force within +-gap/2 of stretch; contacts push only", {"gap_m": _AT_LEAST_0}),
     "preload_loss": Definition(

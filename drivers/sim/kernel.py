@@ -74,11 +74,14 @@ def springs(p: Any, s: Any) -> None:
 
 @njit(cache=True)
 def table_force(p: Any, position_m: float, time_s: float) -> float:
-    """Force [N] on the table from outside: a push during a window, a spring, vibration, hammering."""
+    """Force [N] on the table from outside: a push during a window, spring, gravity of an arm, vibration, hammering."""
     force: float = -p.spring_load.stiffness_n_m * (position_m - p.spring_load.rest_position_m)
     e = p.external_force
     if e.start_s <= time_s < e.end_s:
         force += e.force_n
+    if p.gravity_torque.on:
+        weight = p.gravity_torque
+        force += weight.gravity_torque_n_m * sin(-position_m - weight.angle_rad)
     if p.novel_vibration.on:
         u = p.novel_vibration
         first, second = 2.0 * pi * u.frequency_hz * time_s + u.phase_rad, 2.0 * pi * u.frequency_2_hz * time_s

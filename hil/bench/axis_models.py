@@ -8,8 +8,10 @@ from dataclasses import replace
 from math import pi
 from typing import Annotated, ClassVar, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
+from hil.bench.axis_fields import FRICTION, BenchSection, Damping, Driven, Lead, NotNegative, Positive
+from hil.bench.turning_axes import DcMotor, Rotary, RotaryTwoMass
 from hil.errors import FieldError
 from hil.twin.physics import Physics
 from hil.twin.structure.chain import (
@@ -22,42 +24,8 @@ from hil.twin.structure.chain import (
     two_mass,
 )
 
-# 1e15: above every SI value of an axis; squares and products of such values stay finite
-Positive = Annotated[float, Field(gt=0.0, le=1e15, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
-# up to a metre: a lead in millimetres is refused
-Lead = Annotated[float, Field(ge=1e-5, le=1.0, allow_inf_nan=False)]
-Damping = Annotated[float, Field(ge=0.0, lt=1.0, description="modal damping ratio of the elastic modes")]
 
-
-class _Model(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-_FRICTION = ("coulomb_torque_n_m", "viscous_torque_n_m_s_rad")
-
-
-class _Driven(_Model):
-    """An axis driven by a rotary motor; friction is given at the motor."""
-
-    coulomb_torque_n_m: NotNegative = Field(description="Coulomb friction at the motor [N m]")
-    viscous_torque_n_m_s_rad: NotNegative = Field(description="viscous friction at the motor [N m s/rad]")
-
-    @property
-    def linear(self) -> bool:
-        """True if the motor side is in m and N."""
-        return False
-
-    def chain(self) -> Chain:
-        """The lumped chain of the axis."""
-        raise NotImplementedError
-
-    def physics(self) -> Physics:
-        """The nominal physics of the twin."""
-        return Physics(self.chain(), self.coulomb_torque_n_m, self.viscous_torque_n_m_s_rad)
-
-
-class _Rotary(_Driven):
+class Screw(Driven):
     """A motor and a screw that moves a table."""
 
     lead_m: Lead = Field(description="travel of the table per motor revolution [m]")
@@ -68,28 +36,12 @@ class _Rotary(_Driven):
         return self.lead_m / (2.0 * pi)
 
 
-class _Turning(_Driven):
-    """A motor and a load that turns: positions of the "table" are angles of the load, 1 m stands for 1 rad."""
-
-    gear_ratio: Positive = Field(1.0, description="motor revolutions per revolution of the load")
-
-    @property
-    def lead_m(self) -> float:
-        """Angle of the load per motor revolution [rad], in place of a lead."""
-        return 2.0 * pi / self.gear_ratio
-
-    @property
-    def ratio_m_rad(self) -> float:
-        """Angle of the load per radian of the motor [rad/rad]."""
-        return 1.0 / self.gear_ratio
-
-
-class TwoMass(_Rotary):
+class TwoMass(Screw):
     """Motor and table with a spring between them, seen at the table (Eq. 1)."""
 
     MASSES: ClassVar[tuple[str, ...]] = ("motor_mass_kg", "table_mass_kg")
     SPRINGS: ClassVar[tuple[str, ...]] = ("stiffness_n_m", "damping_ratio")
-    NOMINAL: ClassVar[tuple[str, ...]] = (*MASSES, *SPRINGS, *_FRICTION)
+    NOMINAL: ClassVar[tuple[str, ...]] = (*MASSES, *SPRINGS, *FRICTION)
     model: Literal["two_mass"] = "two_mass"
     motor_mass_kg: Positive = Field(description="motor inertia as translation at the table [kg]")
     table_mass_kg: Positive = Field(description="table and screw at the table [kg]")
@@ -101,12 +53,12 @@ class TwoMass(_Rotary):
         return two_mass(self.motor_mass_kg, self.table_mass_kg, self.stiffness_n_m, self.damping_ratio, self.lead_m)
 
 
-class Rigid(_Rotary):
+class Rigid(Screw):
     """A motor and a screw stiff enough to be one mass with the table."""
 
     MASSES: ClassVar[tuple[str, ...]] = ("mass_kg",)
     SPRINGS: ClassVar[tuple[str, ...]] = ()
-    NOMINAL: ClassVar[tuple[str, ...]] = (*MASSES, *SPRINGS, *_FRICTION)
+    NOMINAL: ClassVar[tuple[str, ...]] = (*MASSES, *SPRINGS, *FRICTION)
     model: Literal["rigid"] = "rigid"
     mass_kg: Positive = Field(description="all moving mass and inertia at the table [kg]")
 
@@ -115,12 +67,12 @@ class Rigid(_Rotary):
         return one_mass(self.mass_kg, self.lead_m)
 
 
-class SevenDofAxis(_Rotary):
+class SevenDofAxis(Screw):
     """The 7-dof drive of the source; defaults are the reconstruction of its lost Table 1."""
 
     MASSES: ClassVar[tuple[str, ...]] = ("motor_inertia_kg_m2", "table_mass_kg")
     SPRINGS: ClassVar[tuple[str, ...]] = ("nut_support_stiffness_n_m", "coupling_stiffness_n_m_rad", "damping_ratio")
-    NOMINAL: ClassVar[tuple[str, ...]] = (*MASSES, *SPRINGS, *_FRICTION)
+    NOMINAL: ClassVar[tuple[str, ...]] = (*MASSES, *SPRINGS, *FRICTION)
     model: Literal["seven_dof"] = "seven_dof"
     lead_m: Lead = RECONSTRUCTED_TABLE_1.lead_m
     motor_inertia_kg_m2: Positive = RECONSTRUCTED_TABLE_1.motor_inertia_kg_m2
@@ -138,12 +90,12 @@ class SevenDofAxis(_Rotary):
         return seven_dof(parameters, self.damping_ratio, self.nut_position_m)
 
 
-class SerialChain(_Rotary):
+class SerialChain(Screw):
     """Any number of inertias in a row, reduced to the motor shaft; the last spring is the nut."""
 
     MASSES: ClassVar[tuple[str, ...]] = ("inertia_scale",)
     SPRINGS: ClassVar[tuple[str, ...]] = ("stiffness_scale", "damping_ratio")
-    NOMINAL: ClassVar[tuple[str, ...]] = (*MASSES, *SPRINGS, *_FRICTION)
+    NOMINAL: ClassVar[tuple[str, ...]] = (*MASSES, *SPRINGS, *FRICTION)
     model: Literal["serial_chain"] = "serial_chain"
     inertias_kg_m2: tuple[Positive, ...] = Field(min_length=2, description="from motor to table [kg m^2]")
     stiffnesses_n_m_rad: tuple[Positive, ...] = Field(min_length=1, description="one fewer than inertias [N m/rad]")
@@ -170,7 +122,7 @@ class SerialChain(_Rotary):
         )
 
 
-class OneMass(_Model):
+class OneMass(BenchSection):
     """A linear axis: one mass, one encoder, newtons and metres."""
 
     MASSES: ClassVar[tuple[str, ...]] = ("mass_kg",)
@@ -192,6 +144,11 @@ class OneMass(_Model):
         """True if the motor side is in m and N."""
         return True
 
+    @property
+    def turns(self) -> bool:
+        """True if the load turns."""
+        return False
+
     def physics(self) -> Physics:
         """The nominal physics of the twin."""
         angle = 2.0 * pi / self.screw_lead_m if self.screw_lead_m else 1.0
@@ -204,42 +161,9 @@ class OneMass(_Model):
         )
 
 
-class Rotary(_Turning):
-    """A rotary axis of one inertia."""
-
-    MASSES: ClassVar[tuple[str, ...]] = ("inertia_kg_m2",)
-    SPRINGS: ClassVar[tuple[str, ...]] = ()
-    NOMINAL: ClassVar[tuple[str, ...]] = (*MASSES, *SPRINGS, *_FRICTION)
-    model: Literal["rotary"] = "rotary"
-    inertia_kg_m2: Positive = Field(description="all inertia at the motor [kg m^2]")
-
-    def chain(self) -> Chain:
-        """One inertia."""
-        return one_mass(self.inertia_kg_m2 / self.ratio_m_rad**2, self.lead_m)
-
-
-class RotaryTwoMass(_Turning):
-    """A motor and a load that turns, with a gear and a spring between them."""
-
-    MASSES: ClassVar[tuple[str, ...]] = ("motor_inertia_kg_m2", "load_inertia_kg_m2")
-    SPRINGS: ClassVar[tuple[str, ...]] = ("stiffness_n_m_rad", "damping_ratio")
-    NOMINAL: ClassVar[tuple[str, ...]] = (*MASSES, *SPRINGS, *_FRICTION)
-    model: Literal["rotary_two_mass"] = "rotary_two_mass"
-    motor_inertia_kg_m2: Positive = Field(description="motor and gear at the motor [kg m^2]")
-    load_inertia_kg_m2: Positive = Field(description="load at its own shaft [kg m^2]")
-    stiffness_n_m_rad: Positive = Field(description="gear and shaft at the load [N m/rad]")
-    damping_ratio: Damping = 0.03
-
-    def chain(self) -> Chain:
-        """The 2-dof chain, reduced to the motor."""
-        square = self.ratio_m_rad**2
-        inertias = (self.motor_inertia_kg_m2, self.load_inertia_kg_m2 * square)
-        names = ("motor", "table")
-        return serial_chain(inertias, [self.stiffness_n_m_rad * square], self.damping_ratio, self.lead_m, names=names)
-
-
 Axis = Annotated[
-    TwoMass | SevenDofAxis | SerialChain | Rigid | OneMass | Rotary | RotaryTwoMass, Field(discriminator="model")
+    TwoMass | SevenDofAxis | SerialChain | Rigid | OneMass | Rotary | RotaryTwoMass | DcMotor,
+    Field(discriminator="model"),
 ]
 
 
@@ -247,6 +171,8 @@ def model_of(keys: set[str]) -> str:
     """Return the kind of axis that a file without the key `model` describes, from its keys."""
     if keys & {"coulomb_force_n", "viscous_force_n_s_m"}:
         return "one_mass"
+    if "coulomb_voltage_v" in keys:
+        return "dc_motor"
     if "inertias_kg_m2" in keys:
         return "serial_chain"
     if "load_inertia_kg_m2" in keys:

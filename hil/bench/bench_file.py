@@ -12,7 +12,8 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from hil.bench.axis_models import Axis, OneMass, _Model, model_of
+from hil.bench.axis_fields import BenchSection
+from hil.bench.axis_models import Axis, OneMass, model_of
 from hil.bench.control_section import Control, ControlSection, UnknownControl, with_law
 from hil.bench.hardware import DriveSection, SimulationSection
 from hil.control import cascade as law
@@ -26,7 +27,7 @@ from hil.twin.physics import Active
 Resolution = Annotated[float, Field(gt=0.0, le=1e-3, allow_inf_nan=False, description="table travel per count [m]")]
 
 
-class MechanismEntry(_Model):
+class MechanismEntry(BenchSection):
     """A mechanism that the twin of this bench contains."""
 
     effect: str
@@ -68,7 +69,7 @@ class MechanismEntry(_Model):
         )
 
 
-class MotorEncoder(_Model):
+class MotorEncoder(BenchSection):
     """Motor encoder."""
 
     counts_per_rev: Annotated[int, Field(gt=0, lt=2**32)] = 2**20  # UNSIGNED32 in CiA 402, object 0x608F
@@ -76,14 +77,14 @@ class MotorEncoder(_Model):
     direction: Literal[1, -1] = 1
 
 
-class TableEncoder(_Model):
+class TableEncoder(BenchSection):
     """Linear encoder at the table."""
 
     resolution_m: Resolution = 0.5e-6
     direction: Literal[1, -1] = 1
 
 
-class Encoders(_Model):
+class Encoders(BenchSection):
     """Encoders of the axis; `table: null` where there is none."""
 
     motor: MotorEncoder = MotorEncoder()
@@ -103,7 +104,7 @@ _SECTIONS = {
 }
 
 
-class Bench(_Model):
+class Bench(BenchSection):
     """A bench file."""
 
     schema_version: Literal[1] = 1

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from hil.bench.axis_models import NotNegative, Positive, _Model
+from hil.bench.axis_fields import BenchSection, NotNegative, Positive
 from hil.control.cascade import INFINITE, Gains, make_gains
 from hil.errors import FieldError
 
@@ -19,7 +19,7 @@ UNKNOWN = "unknown"
 Period = Annotated[float, Field(gt=0.0, le=0.1, allow_inf_nan=False, description="[s]")]
 
 
-class Control(_Model):
+class Control(BenchSection):
     """The control law of `hil.control.cascade`, gains in SI or in the units of the source."""
 
     law: Literal["cascade"] = "cascade"
@@ -111,7 +111,7 @@ class Control(_Model):
         return self.model_copy(update=changed)
 
 
-class UnknownControl(_Model):
+class UnknownControl(BenchSection):
     """A control law that is not known. It is not simulated, and no mismatch is assigned to it."""
 
     law: Literal["unknown"]

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from hil.bench.axis_models import NotNegative, Positive, _Model
+from hil.bench.axis_fields import BenchSection, NotNegative, Positive
 from hil.errors import FieldError
 
 NodeId = Annotated[int, Field(ge=1, le=127, description="CANopen node-ID")]
@@ -23,7 +23,7 @@ class DriveMode(StrEnum):
     CSP = "csp"
 
 
-class EncoderConnection(_Model):
+class EncoderConnection(BenchSection):
     """Connection of the linear encoder; its resolution is in the section `encoders`."""
 
     interface: Literal["canopen", "serial", "none"] = "canopen"
@@ -36,7 +36,7 @@ class EncoderConnection(_Model):
     latency_s: NotNegative = 0.0
 
 
-class SetPointLimits(_Model):
+class SetPointLimits(BenchSection):
     """Limits of every set-point on this bench; a profile beyond them is refused."""
 
     velocity_m_s: Positive
@@ -44,7 +44,7 @@ class SetPointLimits(_Model):
     jerk_m_s3: Positive
 
 
-class DriveSection(_Model):
+class DriveSection(BenchSection):
     """Bus, drive and linear encoder, and what the loop allows before it stops the axis."""
 
     protocol: str = Field("canopen", description="protocol of the drive, a key of hil.loop.devices.PROTOCOLS")
@@ -88,7 +88,7 @@ class DriveSection(_Model):
         return self
 
 
-class SimulatedEffect(_Model):
+class SimulatedEffect(BenchSection):
     """A concealed effect of the simulated axis: ids, forms and parameters as drivers/sim/effects.py lists them."""
 
     effect: str
@@ -96,7 +96,7 @@ class SimulatedEffect(_Model):
     parameters: dict[str, float] = Field({}, description="SI values by name")
 
 
-class SimulationSection(_Model):
+class SimulationSection(BenchSection):
     """True parameters and effects of a simulated bench. If the section is present, the devices are simulated."""
 
     axis: dict[str, float] = Field({}, description="true values of keys of `axis`, where they differ")

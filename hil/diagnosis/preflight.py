@@ -16,7 +16,7 @@ from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
 from hil.channels import AXIS_CHANNELS
 from hil.errors import InputError
-from hil.identification.completion import completed, torque_is_measured
+from hil.identification.completion import DERIVED, completed, torque_is_measured
 from hil.identification.measured import Measured, take
 from hil.quantities import digits, misread_factors
 from hil.recording.recording import Recording
@@ -55,7 +55,11 @@ def prepare(recordings: Sequence[Recording], bench: Bench) -> list[Measured]:
     if found:
         raise InputError("\n".join(found))
     runs = [take(recording, bench) for recording in recordings]
-    found = [f"{run.name}: {problem}" for run in runs for problem in _problems(run, bench)]
+    found = [
+        f"{run.name}: {problem}"
+        for run, recording in zip(runs, recordings, strict=True)
+        for problem in _problems(run, bench, set(recording.metadata.get(DERIVED, {})))
+    ]
     if found:
         raise InputError("\n".join(found))
     return runs
@@ -83,7 +87,7 @@ def _raw_problems(recording: Recording, bench: Bench) -> Iterator[str]:
         )
 
 
-def _problems(run: Measured, bench: Bench) -> Iterator[str]:
+def _problems(run: Measured, bench: Bench, derived: set[str]) -> Iterator[str]:
     names, ratio = AXIS_CHANNELS[run.kind], bench.axis.ratio_m_rad
     command = run.position_command_m
     top = float(np.max(np.abs(run.velocity_command_m_s)))
@@ -113,10 +117,9 @@ def _problems(run: Measured, bench: Bench) -> Iterator[str]:
             "encoder or less; record a longer motion"
         )
         return
-    found = [
-        *_position_problems(run, bench, names.motor_position, names.table_position),
-        *_set_point_problems(run, names.velocity_command),
-    ]
+    found = [*_position_problems(run, bench, names.motor_position, names.table_position)]
+    if names.velocity_command not in derived:  # a derived channel has no unit of its own to be wrong
+        found += _set_point_problems(run, names.velocity_command)
     yield from found
     if bench.law_known:  # else the saturated rows obey the plant like the others
         yield from _saturation(run, bench, moving)

@@ -6,7 +6,7 @@ from hil.diagnosis.wording import titles
 from hil.identification.dataset import Dataset
 from hil.identification.measured import Measured
 from hil.twin.library import LIBRARY
-from hil.twin.mechanism import Block
+from hil.twin.mechanism import Block, Mechanism
 
 
 def untold(data: Dataset) -> list[str]:
@@ -39,10 +39,17 @@ def _of_torque(run: Measured) -> list[str]:
     return []
 
 
+def _on_motor(mechanism: Mechanism, bench: Bench) -> bool:
+    """True if a form of a mechanism shows in the motor's motion."""
+    return bench.axis.turns and any(variant.motor_alone for variant in mechanism.variants)
+
+
 def _of_encoders(run: Measured, bench: Bench) -> list[str]:
     if bench.has_table_encoder:
         return []
-    hidden = titles([mechanism.id for mechanism in LIBRARY if mechanism.needs_table])
+    hidden = titles(
+        [mechanism.id for mechanism in LIBRARY if mechanism.needs_table and not _on_motor(mechanism, bench)]
+    )
     names = AXIS_CHANNELS[run.kind]
     return [
         f"Only one position is recorded: {hidden} cannot be tested; record both {names.motor_position} and "

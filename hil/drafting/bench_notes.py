@@ -11,12 +11,15 @@ MUCH_LEFT = 0.3  # share of the torque from which what is left is as large as a 
 
 
 def told(
-    recording: Recording, plant: PlantValues, transmission: TransmissionValues | None
+    recording: Recording, plant: PlantValues, transmission: TransmissionValues | None, unit: str | None = None
 ) -> tuple[list[str], list[str]]:
-    """Notes on what the recording tells, and those that the user should check."""
+    """Notes on what the recording tells, and those that the user should check.
+
+    `unit` is that of the torque if it is not the SI unit.
+    """
     notes, unsure = list[str](), list[str]()
     names, linear = recording.axis, recording.kind is AxisKind.LINEAR
-    effort, noise_unit = ("force", "N") if linear else ("torque", "N m")
+    effort, noise_unit = ("force", "N") if linear else ("voltage", unit) if unit else ("torque", "N m")
     if not plant.inertia.significant:
         unsure.append("the inertia is not identifiable from this motion: record moves with more acceleration")
     if plant.left > MUCH_LEFT:
@@ -33,11 +36,11 @@ def told(
         "friction that differs by direction"
     )
     if plant.gravity is not None:
-        notes.append(
-            f"{effort} over the angle (gravity) {plant.gravity.value:.3g} N m +-{plant.gravity.std_error:.2g}: not "
-            "in this bench"
-        )
-        unsure.append("the axis has a load that follows the sine of its angle (gravity); this bench has none")
+        sure = "" if plant.gravity.significant else ", not distinguishable from 0"
+        size = f"{plant.gravity.value:.3g} {noise_unit} +-{plant.gravity.std_error:.2g}"
+        notes.append(f"{effort} over the angle (gravity) {size} at the load{sure}")
+        if plant.gravity.significant:
+            unsure.append("the load follows the sine of its angle, as gravity does; see mechanisms")
     notes.append(f"noise of {names.torque}: {noise_of(recording, names.torque):.3g} {noise_unit} rms")
     notes.append(
         f"noise of {names.motor_position}: {noise_of(recording, names.motor_position):.3g} "

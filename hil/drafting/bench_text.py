@@ -26,6 +26,9 @@ def bench_text(draft: BenchDraft) -> str:
         lines += [
             "  table: null   # no second encoder is recorded" if draft.kind is AxisKind.ROTARY else "  table: null"
         ]
+    lines += ["mechanisms:"] if draft.mechanisms else []
+    for effect, values in draft.mechanisms.items():
+        lines += [f"  - effect: {effect}", "    parameters:", *(f"      {_line(value)}" for value in values)]
     lines += ["# Told by the recording beside these keys:", *(f"#   {note}" for note in draft.notes)]
     return "\n".join(lines) + "\n"
 

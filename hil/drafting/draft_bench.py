@@ -1,7 +1,7 @@
 """Draft a bench file from a recording: kind of axis, masses, friction, lead, gains, encoders, each with its error."""
 
 from dataclasses import dataclass, field
-from math import log2, pi, sqrt
+from math import hypot, log2, pi, sqrt
 
 from hil.channels import AxisKind
 from hil.drafting.bench_notes import told
@@ -16,6 +16,7 @@ from hil.quantities import digits
 from hil.recording.importing import STEP
 from hil.recording.quantum import count_of, is_decimal
 from hil.recording.recording import Recording
+from hil.twin.mechanisms import gravity_torque
 
 _FINEST_M, _COARSEST_M = 1e-12, 1e-3  # resolution of a second encoder that a bench file takes
 LONGEST_LEAD_M = 1.0  # that a bench file takes; a load that turns as far as its motor, 1 m for 1 rad, has 6.3
@@ -43,6 +44,7 @@ class BenchDraft:
     axis: list[BenchValue] = field(default_factory=list)
     control: list[BenchValue] = field(default_factory=list)  # empty: unknown
     control_why: str = ""
+    mechanisms: dict[str, list[BenchValue]] = field(default_factory=dict)  # by effect
     motor_encoder: BenchValue | None = None
     table_encoder: BenchValue | None = None
     notes: list[str] = field(default_factory=list)
@@ -66,8 +68,10 @@ def draft_bench(recording: Recording) -> BenchDraft:
         seconds = len(part) * part.period_s
         draft.notes.insert(0, f"found in {part.name}, {seconds:.4g} s long, of {len(parts)} parts between gaps in time")
         return draft
-    plant, transmission = plant_values(recording), transmission_values(recording)
+    transmission = transmission_values(recording)
+    volts = False
     if recording.kind is AxisKind.LINEAR:
+        plant = plant_values(recording)
         draft = BenchDraft(recording.name, recording.kind, "one_mass")
         ratio = 1.0
         _linear(draft, plant)
@@ -76,17 +80,23 @@ def draft_bench(recording: Recording) -> BenchDraft:
         ratio = lead.value / (2.0 * pi)
         elastic = transmission if transmission is not None and _elastic(transmission) else None
         turns = recording.metadata.get("lead_m") == ROTARY_LEAD_M or lead.value > LONGEST_LEAD_M
+        plant = plant_values(recording, ratio if turns else None)
+        volts = turns and elastic is None and _in_volts(recording) and plant.viscous.significant
         model = {(True, True): "rotary_two_mass", (True, False): "rotary", (False, True): "two_mass"}.get(
             (turns, elastic is not None), "rigid"
         )
         draft = BenchDraft(recording.name, recording.kind, model)
-        if turns:
+        if volts:
+            draft.model = "dc_motor"
+            _dc_motor(draft, plant, lead)
+        elif turns:
             _turning(draft, plant, elastic, lead)
         else:
             _screw(draft, plant, elastic, lead)
     _control(draft, recording, loop_values(recording, ratio))
     _encoders(draft, recording)
-    notes, unsure = told(recording, plant, transmission)
+    _weight(draft, plant)
+    notes, unsure = told(recording, plant, transmission, "V" if volts else None)
     draft.notes += notes
     draft.unsure += unsure
     return draft
@@ -138,6 +148,37 @@ def _screw(draft: BenchDraft, plant: PlantValues, elastic: TransmissionValues | 
             "motor_mass_kg, table_mass_kg, stiffness_n_m: told are the sum of the masses and table mass over stiffness"
         )
     _rotary_friction(draft, plant)
+
+
+def _in_volts(recording: Recording) -> bool:
+    """True if the torque is a voltage whose torque per volt is not known: 1 N m stands for 1 V."""
+    origins, names = recording.metadata.get("channels", {}), recording.axis
+    origin = origins.get(names.torque) or origins.get(names.torque_command) or {}
+    return bool(origin.get("unit") == "V" and origin.get("si_per_volt") == 1.0)
+
+
+def _dc_motor(draft: BenchDraft, plant: PlantValues, lead: Estimate) -> None:
+    """Values of a motor driven by a voltage, which stands in the place of the torque."""
+    inertia, slope = plant.inertia, plant.viscous
+    time_s = inertia.value / slope.value
+    error_s = abs(time_s) * hypot(inertia.std_error / inertia.value, slope.std_error / slope.value)
+    draft.axis += [
+        _value("gear_ratio", Estimate(ROTARY_LEAD_M / lead.value, 0.0, lead.how), "motor per load"),
+        _value("time_constant_s", Estimate(time_s, error_s, inertia.how), "s"),
+        _friction("coulomb_voltage_v", plant.coulomb, "V"),
+        _value("voltage_constant_v_s_rad", slope, "V s/rad"),
+    ]
+    draft.notes.append("the voltage stands in the torque channels, 1 N m for 1 V: torques of a diagnosis are volts")
+
+
+def _weight(draft: BenchDraft, plant: PlantValues) -> None:
+    """Gravity over the angle, as a mechanism of the bench."""
+    if plant.gravity is not None and plant.gravity_angle is not None and plant.gravity.significant:
+        torque, angle = (parameter.name for parameter in gravity_torque.MECHANISM.parameters)
+        draft.mechanisms[gravity_torque.MECHANISM.id] = [
+            _value(torque, plant.gravity, "N m at the load"),
+            _value(angle, plant.gravity_angle, "rad: the angle of the load is seen from straight down"),
+        ]
 
 
 def _turning(draft: BenchDraft, plant: PlantValues, elastic: TransmissionValues | None, lead: Estimate) -> None:

@@ -1,6 +1,6 @@
 """Inertia, friction, load and transmission of an axis from its recording.
 
-T = J a + D v + Tc sign(v) + T0 (+ G1 sin q + G2 cos q)      at the motor
+T = J a + D v + Tc sign(v) + T0 (+ r G sin(r q + q0))        at the motor; r = 1 / gear ratio
 x = r q + c - r tau v - (m_t / k) a - (F_t / k) sign(v)      second encoder against the motor's
 """
 
@@ -10,7 +10,6 @@ import numpy as np
 from scipy.signal import butter, filtfilt
 
 from hil.arrays import FloatArray
-from hil.channels import AxisKind
 from hil.drafting.estimate import BlockFit, Estimate, fit_blocks
 from hil.drafting.relations import direction, motion, smoothed
 from hil.errors import InputError
@@ -25,11 +24,15 @@ LEAST_ROWS = 80  # after decimation: eight per block of the error estimate
 # Residual with gravity over that without, up to which gravity is reported: on LEAST_ROWS white rows two parameters
 # without effect remove 1 %.
 GRAVITY_GAIN = 0.85
+LEAST_ANGLE_RAD = 0.5  # of the load: over less, a sine is a straight line to 1 %, and gravity is a spring
 
 
 @dataclass(frozen=True)
 class PlantValues:
-    """Estimates at the motor: kg m^2, N m s/rad, N m (linear axis kg, N s/m, N); `left` is a share of the torque."""
+    """Estimates at the motor: kg m^2, N m s/rad, N m (linear axis kg, N s/m, N); `left` is a share of the torque.
+
+    `gravity` is the torque G over the load's angle [N m], `gravity_angle` its q0 [rad], both at the load.
+    """
 
     inertia: Estimate
     viscous: Estimate
@@ -37,6 +40,7 @@ class PlantValues:
     offset: Estimate
     left: float
     gravity: Estimate | None
+    gravity_angle: Estimate | None
     cutoff_hz: float
 
 
@@ -51,8 +55,11 @@ class TransmissionValues:
     left_m: float
 
 
-def plant_values(recording: Recording) -> PlantValues:
-    """Fit torque over motion. Raises InputError: too short, motion in one direction, no torque, no positive inertia."""
+def plant_values(recording: Recording, load_ratio: float | None = None) -> PlantValues:
+    """Fit torque over motion; with `load_ratio` [load rad per motor rad] also gravity on a load that turns.
+
+    Raises InputError: too short, motion in one direction, no torque, no positive inertia.
+    """
     names = recording.axis
     if names.torque not in recording.columns:
         raise InputError(
@@ -70,8 +77,8 @@ def plant_values(recording: Recording) -> PlantValues:
         )
     # the highest that noise allows: a lower one cuts acceleration, so that the inertia comes out too large
     cutoff_hz = next((one for one in allowed if _noise_share(recording, one) < NOISE_SHARE), allowed[-1])
-    fit, gravity = _fit(recording, cutoff_hz)
-    inertia, viscous, coulomb, offset = fit.estimates[:4]
+    fit = _fit(recording, cutoff_hz, load_ratio)
+    inertia, viscous, coulomb, offset, *weight = fit.estimates
     if inertia.value <= 0.0:
         raise InputError(
             f"{recording.name}: the inertia comes out as {inertia.value:.3g} +- {inertia.std_error:.2g}, allowed "
@@ -79,7 +86,17 @@ def plant_values(recording: Recording) -> PlantValues:
             "the torque has the wrong sign, or the motion does not separate inertia from a spring or gravity: record "
             "moves of different accelerations"
         )
-    return PlantValues(inertia, viscous, coulomb, offset, fit.left, gravity, cutoff_hz)
+    gravity, angle = _gravity(weight[0], weight[1], load_ratio) if weight and load_ratio else (None, None)
+    return PlantValues(inertia, viscous, coulomb, offset, fit.left, gravity, angle, cutoff_hz)
+
+
+def _gravity(sine: Estimate, cosine: Estimate, load_ratio: float) -> tuple[Estimate, Estimate]:
+    """Size and angle at the load from the coefficients of sine and cosine at the motor."""
+    size = float(np.hypot(sine.value, cosine.value))
+    error = float(np.hypot(sine.value * sine.std_error, cosine.value * cosine.std_error)) / size
+    across = float(np.hypot(cosine.value * sine.std_error, sine.value * cosine.std_error)) / size
+    angle = Estimate(float(np.arctan2(cosine.value, sine.value)), across / size, sine.how)
+    return Estimate(size, error, sine.how).scaled(1.0 / load_ratio), angle
 
 
 def _noise_share(recording: Recording, cutoff_hz: float) -> float:
@@ -94,8 +111,8 @@ def _noise_share(recording: Recording, cutoff_hz: float) -> float:
     return float(noise) / total if total > 0.0 else np.inf
 
 
-def _fit(recording: Recording, cutoff_hz: float) -> tuple[BlockFit, Estimate | None]:
-    """Fit without gravity, and with it on a rotary axis where it leaves clearly less."""
+def _fit(recording: Recording, cutoff_hz: float, load_ratio: float | None) -> BlockFit:
+    """Fit without gravity, or with it on a load that turns where it leaves clearly less."""
     # the filter of the decimation, alike for torque and motion, ends where that of the position does, at 40 Hz or below
     rate_hz = 1.0 / recording.period_s
     decimation = max(2, round(0.5 * CORNER * rate_hz / cutoff_hz), round(rate_hz / 100.0))
@@ -108,17 +125,13 @@ def _fit(recording: Recording, cutoff_hz: float) -> tuple[BlockFit, Estimate | N
     columns, torque = inverse_dynamics_columns(recording, cutoff_hz, decimation)
     how = f"least squares of torque over motion, position filtered at {cutoff_hz:g} Hz"
     plain = fit_blocks(list(columns.T), torque, [how] * 4)
-    position = recording[recording.axis.motor_position]
-    if recording.kind is AxisKind.LINEAR or np.ptp(position) < 0.5 or np.ptp(position) > 50.0:
-        return plain, None
-    angle = position[CUT_AT_START:]
+    angle = recording[recording.axis.motor_position] * (load_ratio or 0.0)
+    if np.ptp(angle) < LEAST_ANGLE_RAD:
+        return plain
+    angle = angle[CUT_AT_START:]
     angle = angle[(angle.size - 1) % decimation :: decimation]
-    more = fit_blocks([*columns.T, np.sin(angle), np.cos(angle)], torque, [*[f"{how}, with gravity"] * 4, "", ""])
-    if more.left > GRAVITY_GAIN * plain.left:
-        return plain, None
-    sine, cosine = more.estimates[4:]
-    size = float(np.hypot(sine.value, cosine.value))
-    return more, Estimate(size, float(np.hypot(sine.std_error, cosine.std_error)))
+    more = fit_blocks([*columns.T, np.sin(angle), np.cos(angle)], torque, [f"{how}, with gravity"] * 6)
+    return more if more.left < GRAVITY_GAIN * plain.left and more.estimates[0].value > 0.0 else plain
 
 
 def transmission_values(recording: Recording) -> TransmissionValues | None:

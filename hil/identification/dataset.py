@@ -10,6 +10,7 @@ from scipy.signal import lfilter
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
 from hil.errors import InputError
+from hil.identification.command_timing import unknown_share
 from hil.identification.measured import Measured
 from hil.identification.noise import Laps
 from hil.twin.axis import Response, Start
@@ -144,14 +145,16 @@ def unknown_torque(run: Measured, bench: Bench) -> FloatArray:
     """Standard deviation (n,) of the torque from row to row that samples of it leave open [motor unit].
 
     It is `Measured.torque_gap`, and that of Coulomb friction, whose sign is not known where the direction of motion
-    changes between neighbouring rows.
+    changes between neighbouring rows. Of a command that is held over many rows the motion tells the share of
+    the two that is real (`command_timing`).
     """
     direction = np.sign(np.diff(run.motor, append=run.motor[-1]))
     turning = maximum_filter1d(np.diff(direction, prepend=direction[0]) != 0.0, 3)
     step = np.sqrt(12.0) * run.noise.motor
     moved = maximum_filter1d(run.motor, _NEAR_ROWS) - minimum_filter1d(run.motor, _NEAR_ROWS)
     unsure = turning & (moved > 1.5 * step)  # not at rest
-    return np.asarray(np.hypot(run.torque_gap, np.where(unsure, bench.axis.physics().coulomb_n_m, 0.0)))
+    found = np.hypot(run.torque_gap, np.where(unsure, bench.axis.physics().coulomb_n_m, 0.0))
+    return unknown_share(run.torque_command, run.motor, found, run.period_s, inertia(bench)) * found
 
 
 def impulse_responses(run: Measured, bench: Bench, observer_s: float) -> dict[str, FloatArray]:

@@ -12,6 +12,7 @@ from scipy.signal import correlate, find_peaks
 
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
+from hil.identification.command_timing import is_held
 from hil.recording.quantum import count_of
 
 _COARSER = 1.5  # factor of a recorded step over the count of the bench: one count, seen with noise, is below
@@ -55,7 +56,10 @@ def estimate_noise(
         ratio_m = bench.axis.ratio_m_rad
         counting = np.hypot(_count(table, bench.encoders.table.resolution_m), ratio_m * count) / np.sqrt(12.0)
         table_noise = max(white_noise(table - ratio_m * motor), float(counting))
-    of_torque = white_noise(torque) if np.array_equal(command, torque) else _coloured(torque - command)
+    if not np.array_equal(command, torque):
+        of_torque = _coloured(torque - command)
+    else:  # the steps of a held command are no noise
+        of_torque = 0.0 if is_held(torque, motor) else white_noise(torque)
     of_torque = max(of_torque, _DIGITS * float(np.max(np.abs(torque), initial=0.0)))
     jitter_s = _jitter_s(motor, velocity, motor_noise, period_s)
     return Noise(motor_noise, table_noise, of_torque, jitter_s, coarse=count > bench.motor_count)

@@ -24,9 +24,10 @@ from drivers.sim.plant import Plant
 from drivers.sim.sensors import Sensors
 from drivers.sim.serial_line import SimulatedSerialEncoder
 from drivers.sim.servo import DriveServo, PositionFeedback, Servo, VelocityEstimate
-from hil.bench.axis_models import Axis, OneMass, Rigid, Rotary, RotaryTwoMass, SerialChain, SevenDofAxis, TwoMass
+from hil.bench.axis_models import Axis, OneMass, Rigid, SerialChain, SevenDofAxis, TwoMass
 from hil.bench.bench_file import Bench, bench_path
 from hil.bench.hardware import DriveSection, EncoderConnection, SimulationSection
+from hil.bench.turning_axes import DcMotor, Rotary, RotaryTwoMass
 from hil.errors import FieldError
 from hil.files.yaml_model import load_model
 
@@ -131,6 +132,11 @@ def _true_axis(believed: Axis, simulation: SimulationSection) -> AxisTruth:
     if isinstance(axis, OneMass):
         lead_m = axis.screw_lead_m or 2.0 * math.pi
         return truth.one_mass(axis.mass_kg, axis.coulomb_force_n, axis.viscous_force_n_s_m, lead_m)
+    if isinstance(axis, DcMotor):
+        raise FieldError(
+            ("axis", "model"),
+            "given dc_motor, allowed a kind of axis in N m: the simulated drive gives a torque; use rotary",
+        )
     friction: dict[str, Any] = {
         "lead_m": axis.lead_m,
         "coulomb_torque_n_m": axis.coulomb_torque_n_m,

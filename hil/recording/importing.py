@@ -46,7 +46,7 @@ def import_recording(source: str | Path, map_path: str | Path) -> Recording:
     foreign = read_foreign(source, wanted, sorted(gains), the_map.csv.format(), dates, few)
 
     raw = {"time_s": _time_s(the_map, foreign.columns)}
-    origins = {}
+    origins: dict[str, dict[str, str | float]] = {}
     for name, entry in the_map.channels.items():
         gain = foreign.scalars[entry.gain] if isinstance(entry.gain, str) else 1.0
         factor = entry.factor_to(CHANNELS[name].unit, the_map.lead_m, gain)
@@ -55,10 +55,12 @@ def import_recording(source: str | Path, map_path: str | Path) -> Recording:
         if entry.wraps_at is not None:
             values = unwrapped(values, entry.wraps_at)
         raw[name] = factor * values + entry.offset
-        origins[name] = {"column": entry.column, "factor": factor, "offset": entry.offset}
+        origins[name] = {"column": entry.column, "unit": entry.unit, "factor": factor, "offset": entry.offset}
         step = count_of(raw[name][np.isfinite(raw[name])])
         if step is not None:
             origins[name][STEP] = step
+        if entry.gain is not None:
+            origins[name]["si_per_volt"] = gain if isinstance(entry.gain, str) else entry.gain
     clock = the_map.time.column if the_map.time is not None else "sample_rate_hz"
     complete = complete_rows(raw, the_map.rows_per_sample)
     rows = regular_rows(

@@ -110,6 +110,7 @@ class Variant:
     proportional: bool = True  # the change is proportional to the strength
     needs_table: bool = False  # not observable without a linear encoder
     sign: float = 1.0  # of its strength where its effect is nearly that of the first variant
+    motor_alone: bool = False  # for a load that turns, with one encoder: its reaction on the motor shows it
     form_of: str = ""  # id of a friction law whose form a small contribution corrects
     play: bool = False  # the flanks of the transmission push only: contacts open and close
     slips: bool = False  # the contact is of Maxwell slip elements
@@ -138,6 +139,7 @@ class Mechanism:
     neutral_at_zero: bool = True  # without effect where the strength is zero
     neutral: Callable[[AxisFacts], float] | None = None  # strength without effect, if it is finite and not 0
     needs_table: bool = False  # not observable without a linear encoder
+    turning: bool = False  # only where the load turns
     transient: bool = False  # belongs to one recording: not expected on another motion
     softens: bool = False  # changes the stiffness of a spring of the chain
     most: int = 1  # number that may act at once, with periods or orders of their own

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 import hil
-from hil.bench.axis_models import Rotary, RotaryTwoMass, model_of
+from hil.bench.axis_models import model_of
 from hil.bench.bench_file import Bench, load_bench
+from hil.bench.turning_axes import DcMotor, Rotary, RotaryTwoMass
 from hil.motion.profile import Profile
 from hil.motion.trajectory import plan
 from hil.twin.structure.modal import modal
@@ -35,7 +36,30 @@ def test_the_load_is_reduced_by_the_square_of_the_gear() -> None:
     assert modal(chain).frequency_rad_s[1] == pytest.approx(expected, rel=1e-9)
 
 
+def test_a_voltage_drives_a_dc_motor_like_a_torque() -> None:
+    """R, Kt = Ke, J and D of a motor give its volts, and its speed under a step of the voltage."""
+    resistance, constant, inertia, drag, friction = 2.0, 0.05, 1e-4, 2e-4, 0.01
+    slope = constant + resistance * drag / constant
+    axis = DcMotor(
+        time_constant_s=resistance * inertia / (constant * slope),
+        coulomb_voltage_v=resistance * friction / constant,
+        voltage_constant_v_s_rad=slope,
+    )
+    period_s, volts = 1e-3, 12.0
+    bench = Bench.model_validate({"axis": axis.model_dump(), "control": {"law": "unknown"}}).sampled(period_s)
+    driven = bench.twin().drive(np.full(400, volts))
+    # J a = Kt (u - Ke w) / R - D w - Tc
+    stall = constant * volts / resistance - friction
+    per_speed = constant**2 / resistance + drag
+    time_s = period_s * np.arange(400)
+    lag_s = inertia / per_speed
+    expected = stall / per_speed * (time_s - lag_s * (1.0 - np.exp(-time_s / lag_s)))
+    # friction is constant over an internal step of 0.2 ms, 0.3 % of the lag
+    assert driven.motor_position == pytest.approx(expected, rel=3e-3, abs=1e-4)
+
+
 def test_keys_tell_the_kind_of_axis() -> None:
+    assert model_of({"coulomb_voltage_v", "time_constant_s", "voltage_constant_v_s_rad"}) == "dc_motor"
     assert model_of({"inertia_kg_m2"}) == "rotary"
     assert model_of({"motor_inertia_kg_m2", "load_inertia_kg_m2"}) == "rotary_two_mass"
 

@@ -131,9 +131,14 @@ def starts(scene: Scene, bench: Bench) -> list[StartPoint]:
     """Starting points of all variants of the library for a scene."""
     found = []
     for mechanism in LIBRARY:
+        if mechanism.turning and not bench.axis.turns:
+            continue
         phases = mechanism.indices(Role.PHASE)
         for number, variant in enumerate(mechanism.variants):
-            if (mechanism.needs_table or variant.needs_table) and not bench.has_table_encoder:
+            if variant.motor_alone:
+                if bench.has_table_encoder or not bench.axis.turns:
+                    continue
+            elif (mechanism.needs_table or variant.needs_table) and not bench.has_table_encoder:
                 continue
             strength, phase = mechanism.strength, next(iter(phases), -1)
             if not (mechanism.proportional and variant.proportional):

@@ -119,7 +119,11 @@ def not_testable(found: Fit, asked: Collection[str] = tuple(BY_ID), margin: floa
         change -= nuisance @ (nuisance.T @ change)
         return float(change @ change) > enough
 
-    wanted = [mechanism for mechanism in LIBRARY if mechanism.id in asked and mechanism.id not in present]
+    wanted = [
+        mechanism
+        for mechanism in LIBRARY
+        if mechanism.id in asked and mechanism.id not in present and (bench.axis.turns or not mechanism.turning)
+    ]
     jobs = [
         (mechanism.id, variant)
         for mechanism in wanted

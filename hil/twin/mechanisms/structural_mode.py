@@ -123,6 +123,18 @@ MECHANISM = Mechanism(
                 "the table has {mass_ratio} of its mass."
             ),
         ),
+        Variant(
+            Stage.CHAIN,
+            _with_mass_on_table,
+            "flexible load",
+            sentence=(
+                "The load is flexible: {mass_ratio} of the rest of the inertia swings at {frequency_hz} where the "
+                "motor is held, damped by {damping_ratio}."
+            ),
+            # an arm or a bar swings at some hertz
+            starts=lambda s: [(f, 0.03, 0.3) for f in np.geomspace(1.5, 100.0, 13)],
+            motor_alone=True,
+        ),
     ),
     starts=lambda s: [(f, 0.03, 0.15) for f in np.geomspace(12.0, 240.0, 13)],
     typical=lambda a: (40.0, 0.03, 0.1),

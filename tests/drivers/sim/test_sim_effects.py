@@ -46,6 +46,7 @@ SHOWN = {
     "scale_interpolation_error": {"amplitude_m": 3e-6, "period_m": 2e-5},
     "external_force": {"force_n": 300.0, "start_s": 0.4, "end_s": 0.8},
     "spring_load": {"stiffness_n_m": 3000.0, "rest_position_m": 0.0},
+    "gravity_torque": {"gravity_torque_n_m": 300.0, "angle_rad": 1.0},
 }
 EFFECTS = {name: Effect(name, parameters) for name, parameters in SHOWN.items()}
 # together with all loads the drive needs more than the limit that shows alone
@@ -63,7 +64,7 @@ def test_catalogue_holds_exactly_the_interface() -> None:
         for name, definition in CATALOGUE.items()
     }
     assert required == {name: set(parameters) for name, parameters in SHOWN.items()}
-    assert len(CATALOGUE) == 28
+    assert len(CATALOGUE) == 29
 
 
 @pytest.mark.parametrize("name", SHOWN)

@@ -141,6 +141,11 @@ def test_spring_load_pulls_the_table_to_its_rest_position() -> None:
     assert outer_force_n(plant, position_m=0.05) == pytest.approx(-2000.0 * 0.03, rel=1e-9)
 
 
+def test_gravity_turns_the_load_towards_straight_down() -> None:
+    plant = plant_with(FRICTIONLESS, Effect("gravity_torque", {"gravity_torque_n_m": 40.0, "angle_rad": np.pi / 6}))
+    assert outer_force_n(plant, position_m=0.0) == pytest.approx(-20.0, rel=1e-9)
+
+
 def test_friction_effects_combine() -> None:
     """Stribeck, position and offset at once: [Fc + (Fs - Fc) s] (1 + fraction sin) + offset + viscous."""
     effects = (

@@ -19,6 +19,7 @@ from hil.drafting.draft_bench import draft_bench
 from hil.errors import InputError
 from hil.recording.quantum import count_of
 from hil.recording.recording import Recording
+from hil.twin.mechanisms import gravity_torque
 
 AXIS = axis(rows=8000)
 SCREW = renamed(AXIS, t="time_s", x_act="table_position_mm", angle="motor_angle_rad", torque="torque_Nm")
@@ -70,6 +71,26 @@ def test_one_encoder_and_torque_make_a_rotary_axis(tmp_path: Path) -> None:
     assert bench.axis.model == "rotary"
     assert bench.axis.inertia_kg_m2 == pytest.approx(INERTIA_KG_M2, rel=0.02)
     assert bench.encoders.motor.counts_per_rev == 2**17
+
+
+def test_a_voltage_makes_a_dc_motor_in_volts(tmp_path: Path) -> None:
+    bench = load_bench(
+        drafted(tmp_path, renamed(AXIS, t="time_s", angle="motor_angle_rad", torque="voltage_command_V"))
+    )
+    assert bench.axis.model == "dc_motor"
+    assert bench.axis.voltage_constant_v_s_rad == pytest.approx(VISCOUS_N_M_S_RAD, rel=0.1)
+    assert bench.axis.time_constant_s == pytest.approx(INERTIA_KG_M2 / VISCOUS_N_M_S_RAD, rel=0.1)
+    assert bench.axis.coulomb_voltage_v == pytest.approx(COULOMB_N_M, rel=0.05)
+
+
+def test_gravity_over_the_angle_becomes_a_mechanism_of_the_bench(tmp_path: Path) -> None:
+    weight = 3.0 * np.sin(AXIS["angle"] / 10.0 + 0.5)
+    columns = {"time_s": AXIS["t"], "motor_angle_rad": AXIS["angle"] / 10.0, "torque_Nm": AXIS["torque"] + weight}
+    bench = load_bench(drafted(tmp_path, columns))
+    (entry,) = bench.mechanisms
+    assert entry.effect == gravity_torque.MECHANISM.id
+    assert entry.parameters["gravity_torque_n_m"] == pytest.approx(3.0, rel=0.02)
+    assert entry.parameters["angle_rad"] == pytest.approx(0.5, abs=0.02)
 
 
 def test_a_gear_follows_from_two_angles(tmp_path: Path) -> None:

@@ -44,7 +44,8 @@ def test_every_tier_has_a_quick_case() -> None:
 
 
 def test_the_library_of_the_generator_is_that_of_the_diagnosis() -> None:
-    assert set(LIBRARY) == set(BY_ID) == set(CATALOGUE)
+    assert set(BY_ID) == set(CATALOGUE)
+    assert set(LIBRARY) == {name for name in CATALOGUE if not BY_ID[name].turning}
 
 
 def test_same_numbers_same_case_other_numbers_another(cases: dict[str, DrawnCase]) -> None:

@@ -47,6 +47,7 @@ TABLE = {
     "scale_interpolation_error": ("sensor", ["amplitude_m", "period_m"]),
     "external_force": ("table", ["force_n", "start_s", "end_s"]),
     "spring_load": ("table", ["stiffness_n_m", "rest_position_m"]),
+    "gravity_torque": ("table", ["gravity_torque_n_m", "angle_rad"]),
 }
 
 # Parameters at which a mechanism leaves the value 0.7 of its stage, or any value, as it is
@@ -72,6 +73,7 @@ NEUTRAL = {
     "scale_interpolation_error": {"amplitude_m": 0.0, "period_m": 2e-5, "phase_rad": 1.0},
     "external_force": {"force_n": 0.0, "start_s": 1.0, "end_s": 2.0},
     "spring_load": {"stiffness_n_m": 0.0, "rest_position_m": 0.1},
+    "gravity_torque": {"gravity_torque_n_m": 0.0, "angle_rad": 1.0},
 }
 
 STEPPED = [mechanism for mechanism in LIBRARY if mechanism.variants[0].stage not in (Stage.CHAIN, Stage.CHANNEL)]

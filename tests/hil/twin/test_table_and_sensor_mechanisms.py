@@ -55,6 +55,23 @@ def test_spring_load_pulls_to_rest(stiffness, rest, offset) -> None:
     assert force == pytest.approx(-stiffness * offset, abs=1e-6)
 
 
+@given(
+    torque=st.floats(0.0, 1e3),
+    angle=st.floats(-3.0, 3.0),
+    from_down=st.floats(-3.0, 3.0),
+)
+@PROPERTY
+def test_gravity_pulls_an_arm_down(torque, angle, from_down) -> None:
+    def weight(seen_from_down):
+        at = AT_REST._replace(table_position_m=seen_from_down - angle)
+        return call("gravity_torque", 0.0, at, gravity_torque_n_m=torque, angle_rad=angle)
+
+    assert weight(0.0) == pytest.approx(0.0, abs=1e-9)
+    assert weight(np.pi / 2) == pytest.approx(-torque, abs=1e-9)
+    assert weight(np.pi / 6) == pytest.approx(-0.5 * torque, abs=1e-9)
+    assert weight(from_down) == pytest.approx(-weight(-from_down), abs=1e-9)
+
+
 # -- sensors
 
 

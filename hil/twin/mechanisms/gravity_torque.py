@@ -1,0 +1,35 @@
+"""Gravity torque: the weight of an arm or a pendulum that turns about a horizontal axis.
+
+The load's angle is 0 where the recording has its zero; `angle_rad` is that angle seen from straight down.
+"""
+
+import math
+
+from numba import njit
+
+from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, Stage, Variant
+from hil.twin.parameter import Dimension, Parameter, Role
+
+
+@njit
+def _pull_down(value: float, at: Moment, parameters: Row, memory: Row) -> float:
+    return value - parameters[0] * math.sin(at.table_position_m + parameters[1])
+
+
+MECHANISM = Mechanism(
+    id="gravity_torque",
+    block=Block.TABLE,
+    element="weight of the arm",
+    sentence="Gravity turns the load with up to {gravity_torque_n_m}.",
+    equation="T_load = -m g r sin(q + q0)",
+    source="Spong, Hutchinson and Vidyasagar, Robot Modeling and Control (2006), sec. 7.4, gravity of a link",
+    parameters=(
+        Parameter("gravity_torque_n_m", Dimension.TORQUE, 0.0, 1e5, role=Role.STRENGTH),
+        Parameter("angle_rad", Dimension.ANGLE, -2.0 * math.pi, 2.0 * math.pi, role=Role.PHASE),
+    ),
+    variants=(Variant(Stage.TABLE_FORCE, _pull_down),),
+    starts=lambda s: [(0.1 * s.coulomb / s.ratio, 0.0)],
+    typical=lambda a: (0.5 * a.friction / a.ratio, 0.0),
+    picture=Picture.POSITION,
+    turning=True,
+)

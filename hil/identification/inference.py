@@ -17,6 +17,7 @@ from scipy.signal import correlate, lfilter
 
 from hil.arrays import FloatArray
 from hil.identification.estimator import Fit
+from hil.identification.residuals import Residuals
 
 Filter = FloatArray
 
@@ -52,7 +53,7 @@ def against(better: Fit, worse: Fit, filters: Sequence[Filter] | None = None) ->
     It is the larger of two values: on plain residuals with their number of independent rows, sensitive to slow
     differences, and on whitened residuals, sensitive to small fast ones.
     """
-    more = better.hypothesis.x.size - worse.hypothesis.x.size
+    more = better.hypothesis.free - worse.hypothesis.free
     rows = effective_samples(better)
     plain = rows * np.log(worse.cost / better.cost) - more * np.log(rows)
     white = 0.0
@@ -103,6 +104,19 @@ _LEAST = 0.01  # least standard error in steps of the forward difference, which 
 _BLOCK_ROWS = 200  # longer than the correlation of residuals: 0.2 s at 1 kHz
 
 
+def sandwich(slopes: FloatArray, residuals: Residuals) -> FloatArray:
+    """Standard errors (k,) by the equation of `standard_errors` of k values with derivatives (m, k)."""
+    scale = np.linalg.norm(slopes, axis=0)
+    scale[scale == 0.0] = 1.0
+    slope = slopes / scale
+    inverse = np.linalg.pinv(slope.T @ slope, hermitian=True)
+    ends = (0, *residuals.splits, residuals.vector.size)
+    starts = np.concatenate([np.arange(begin, end, _BLOCK_ROWS) for begin, end in pairwise(ends)])
+    score = np.add.reduceat(slope * residuals.vector[:, None], starts, axis=0)
+    covariance = inverse @ (score.T @ score) @ inverse
+    return np.asarray(_WIDENED * np.sqrt(np.maximum(np.diag(covariance), 0.0)) / scale, dtype=np.float64)
+
+
 def standard_errors(found: Fit) -> list[float]:
     """Standard error of each physical parameter, robust against coloured residuals (sandwich estimator):
 
@@ -111,18 +125,10 @@ def standard_errors(found: Fit) -> list[float]:
     multiplied by `_WIDENED`. A controller replayed bit-identically leaves no noise; then the error is 1/100 of the step
     of the forward difference.
     """
-    scale = np.linalg.norm(found.jacobian, axis=0)
-    scale[scale == 0.0] = 1.0
-    slope = found.jacobian / scale
-    inverse = np.linalg.pinv(slope.T @ slope, hermitian=True)
-    ends = (0, *found.residuals.splits, found.rows)
-    starts = np.concatenate([np.arange(begin, end, _BLOCK_ROWS) for begin, end in pairwise(ends)])
-    score = np.add.reduceat(slope * found.residuals.vector[:, None], starts, axis=0)
-    covariance = inverse @ (score.T @ score) @ inverse
-    errors = np.sqrt(np.maximum(np.diag(covariance), 0.0)) / scale
+    errors = sandwich(found.jacobian, found.residuals)
     hypothesis = found.hypothesis
     steps = found.estimator.steps(hypothesis)
     return [
-        float(max(_WIDENED * error, _LEAST * step) * (abs(value) if coordinate.logarithmic else abs(coordinate.scale)))
+        float(max(error, _LEAST * step) * (abs(value) if coordinate.logarithmic else abs(coordinate.scale)))
         for error, step, value, coordinate in zip(errors, steps, hypothesis.values, hypothesis.coordinates, strict=True)
     ]

@@ -37,7 +37,8 @@ _FORMATS = ".parquet, .arrows (a run that was not closed) or .csv"
 class Recording:
     """A run: columns of equal length (names and units of `hil.channels`), one row per period.
 
-    `metadata` holds what JSON can: bench, profile, versions, seed, and remarks of the reader. Raises InputError for
+    `metadata` holds what JSON can: bench, profile, versions, seed, and remarks of the reader. `start_s` is the time of
+    the first row of a part since the first row of its whole recording. Raises InputError for
     columns of different length, NaN, infinity, and a period that is not positive.
     """
 
@@ -45,6 +46,7 @@ class Recording:
     columns: dict[str, FloatArray]
     period_s: float
     metadata: dict[str, Any] = field(default_factory=dict)
+    start_s: float = 0.0
 
     def __post_init__(self) -> None:
         if not 0.0 < self.period_s < math.inf:

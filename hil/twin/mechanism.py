@@ -14,6 +14,7 @@ from enum import StrEnum
 from itertools import product
 from typing import Any, NamedTuple
 
+from hil.arrays import FloatArray
 from hil.twin.parameter import Parameter, Role, default_starts, default_typical
 from hil.twin.scene import AxisFacts, Scene
 
@@ -134,7 +135,11 @@ class Mechanism:
     proportional: bool = True  # the change is proportional to the strength
     neutral_at_zero: bool = True  # without effect where the strength is zero
     needs_table: bool = False  # not observable without a linear encoder
-    transient: bool = False  # belongs to one recording: not expected on another motion
+    # force on the table [N], mean over each tick that begins at times (n,) [s], of (times, period, values): an event of
+    # the recording in which it is found, not expected in another one
+    over_time: Callable[[FloatArray, float, Sequence[float]], FloatArray] | None = None
+    repeated: str = ""  # sentence of several such events; may also name count
+    periodic: str = ""  # sentence of several at equal intervals; may also name count, width and period
     softens: bool = False  # changes the stiffness of a spring of the chain
     most: int = 1  # number that may act at once, with periods or orders of their own
     screw_locked: bool = False  # at one slow speed, a share of Coulomb friction that repeats with the screw
@@ -142,6 +147,11 @@ class Mechanism:
     hidden_starts: tuple[tuple[float, ...], ...] = ()  # starts where refitted springs hide it; the first value is in
     # units of the largest stretch of the transmission
     picture: Picture = Picture.TIME
+
+    @property
+    def transient(self) -> bool:
+        """True for an event of one recording."""
+        return self.over_time is not None
 
     @property
     def names(self) -> tuple[str, ...]:

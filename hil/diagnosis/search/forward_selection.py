@@ -212,7 +212,7 @@ def _simplest(tied: list[Fit]) -> Fit:
     Constant torque and direction-dependent Coulomb friction are equal on every motion; friction is preferred, since
     most axes are horizontal.
     """
-    return min(tied, key=lambda found: (found.hypothesis.x.size, found.terms[-1].key[:2] != (FRICTION, 0)))
+    return min(tied, key=lambda found: (found.hypothesis.free, found.terms[-1].key[:2] != (FRICTION, 0)))
 
 
 def _without(found: Fit, index: int) -> Fit:

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hil.arrays import FloatArray
+from hil.diagnosis.search.events import detect, event_term
 from hil.diagnosis.search.initial_values import StartPoint, scene, starts
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
@@ -81,8 +82,8 @@ def screen_library(base: Fit) -> list[Candidate]:
     known = scene(base.data.runs, base.bench, residuals.channels, base.data.observer_s)
     points = [
         _from_known(start, hypothesis)
-        for start in starts(known, hypothesis.bench)
-        if offered(Term(start.effect, start.variant, start.values), hypothesis, terms)
+        for start in (*starts(known, hypothesis.bench, base.data.runs), *_events(base))
+        if offered(start.term(), hypothesis, terms)
     ]
     best: dict[str, list[Candidate]] = {}
     for candidate in screen(base, points):
@@ -99,6 +100,15 @@ def screen_library(base: Fit) -> list[Candidate]:
     return [gathered(effect, same) for effect, same in best.items()]
 
 
+def _events(base: Fit) -> list[StartPoint]:
+    """The start of all events that the disturbance torque shows, as one term."""
+    found = [] if any(term.windows for term in base.terms) else detect(base)
+    if not found:
+        return []
+    term = event_term(found, base.bench.axis.ratio_m_rad)
+    return [StartPoint(term.effect, 0, term.values, BY_ID[term.effect].strength, windows=term.windows)]
+
+
 def offered(new: Term, hypothesis: Hypothesis, terms: Sequence[Term]) -> bool:
     """True if a mechanism is compatible with the terms; it replaces mechanisms of the bench that it repeats."""
     known = [entry.active() for entry in hypothesis.kept]
@@ -107,7 +117,7 @@ def offered(new: Term, hypothesis: Hypothesis, terms: Sequence[Term]) -> bool:
 
 def _from_known(start: StartPoint, hypothesis: Hypothesis) -> StartPoint:
     """Count the strength of a start from that of the mechanism of the bench that it replaces, if any."""
-    new = Term(start.effect, start.variant, start.values)
+    new = start.term()
     taken = [entry.active() for entry in hypothesis.kept if repeats(new, entry.active())]
     if start.strength < 0 or not taken:
         return start
@@ -127,7 +137,7 @@ def screen(base: Fit, points: Sequence[StartPoint]) -> list[Candidate]:
     unchanged = search.residuals(base.hypothesis).vector
 
     def direction(start: StartPoint, values: tuple[float, ...]) -> FloatArray:
-        changed = base.hypothesis.with_term(Term(start.effect, start.variant, values))
+        changed = base.hypothesis.with_term(start.term(values))
         return search.residuals(changed).vector - unchanged
 
     def candidate(start: StartPoint) -> Candidate:
@@ -147,12 +157,12 @@ def screen(base: Fit, points: Sequence[StartPoint]) -> list[Candidate]:
             # a start that cannot be scaled is also scored at its own strength
             whole = float(2.0 * target[0] - products[0, 0]) / energy
             return Candidate(
-                Term(start.effect, start.variant, start.values), max(share if coefficients[0] > 0.0 else 0.0, whole)
+                start.term(), max(share if coefficients[0] > 0.0 else 0.0, whole)
             )
         return Candidate(
-            Term(start.effect, start.variant, _scaled(start, coefficients)),
+            start.term(_scaled(start, coefficients)),
             share,
-            tuple(Term(start.effect, start.variant, _scaled(start, factor * coefficients)) for factor in _WEAKER),
+            tuple(start.term(_scaled(start, factor * coefficients)) for factor in _WEAKER),
         )
 
     return sorted(POOL.map(candidate, points), key=lambda found: -found.share)

@@ -112,5 +112,5 @@ def _gain(found: Fit, without: Fit) -> float:
 
     Both residuals are whitened by the filter of the fit with less cost: that of the other would hide the harm.
     """
-    paid = (found.hypothesis.x.size - without.hypothesis.x.size) * float(np.log(found.rows))
+    paid = (found.hypothesis.free - without.hypothesis.free) * float(np.log(found.rows))
     return against(found, without) + paid if found.cost <= without.cost else paid - against(without, found)

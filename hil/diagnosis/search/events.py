@@ -1,0 +1,129 @@
+"""Events of a recording: windows in which a constant force acts, from the disturbance torque that a fit leaves.
+
+Disturbance torque = what errors of inertia and friction explain + a constant level in each window. Both are estimated
+in turn. The motion is measured: the torque of a loop has the shape of the windows itself. All windows cost one pass, however many there are.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from hil.arrays import FloatArray
+from hil.diagnosis.search.change_points import Segment, joined, segments, standing_out
+from hil.diagnosis.search.disturbance import Disturbance, disturbance
+from hil.identification.dataset import inertia
+from hil.identification.estimator import Fit
+from hil.identification.measured import Measured
+from hil.identification.terms import Term, Window
+from hil.twin.library import LIBRARY
+from hil.twin.parameter import Role
+
+EVENT = next((mechanism for mechanism in LIBRARY if mechanism.transient), None)
+_BLOCK_S = 0.005  # an edge to be refined by simulation
+_MOST_BLOCKS = 6000  # the time of a partition grows with their square: half a second
+_REVERSAL_S = 0.05  # not used about a reversal, where friction is known least
+_STANDS_OUT = 5.0  # level over the rms of what the windows leave: 1 in 10^6 of Gaussian blocks
+_PENALTY = 20.0  # beside 3 log n of the three values of a window: that of a term in the search (NEEDED)
+_SHORTEST, _EDGE = 3, 6  # blocks of the shortest window; blocks in which the observer follows an edge
+_ALIKE = 0.25  # levels of adjacent windows that differ less are one
+_ROUNDS = 3  # windows found in one round do not count as motion in the next; then they stay
+_REWEIGHTED = 40  # iterations of the regression
+_LEAST_USUAL = 0.3  # of the blocks without an event: else which level is none cannot be told
+_SMOOTH_BLOCKS = 8  # the noise of a block is that of means over 40 ms: longer than the observer remembers
+
+
+class Event(NamedTuple):
+    """A window [s] of a run, by its name, and the level in it, in motor units."""
+
+    run: str
+    start_s: float
+    end_s: float
+    level: float
+
+
+def without_events(found: Fit) -> Fit:
+    """Evaluate a fit without its events."""
+    events = [index for index, term in enumerate(found.hypothesis.terms) if term.windows]
+    return found.estimator.evaluate(found.hypothesis.without(*events)) if events else found
+
+
+def event_term(found: Sequence[Event], ratio: float) -> Term:
+    """Make one term of events; the strongest gives its values."""
+    assert EVENT is not None
+    first = max(found, key=lambda one: abs(one.level))
+    start, end = EVENT.indices(Role.EDGE)
+    values = [0.0] * len(EVENT.parameters)
+    values[EVENT.strength], values[start], values[end] = first.level / ratio, first.start_s, first.end_s
+    windows = tuple(
+        Window(one.run, one.start_s - first.start_s, one.end_s - first.end_s, one.level / first.level) for one in found
+    )
+    return Term(EVENT.id, 0, tuple(values), windows=windows)
+
+
+def detect(found: Fit) -> list[Event]:
+    """Find the events of all runs of a fit, beside its permanent terms."""
+    bare = without_events(found)
+    pairs = zip(bare.data.runs, bare.residuals.channels, strict=True)
+    return [
+        event
+        for run, channels in pairs
+        if "motor" not in run.unseen
+        for event in _of_run(run, disturbance(run, channels["motor"], inertia(bare.bench), bare.data.observer_s))
+    ]
+
+
+def _of_run(run: Measured, seen: Disturbance) -> list[Event]:
+    block = max(round(_BLOCK_S / run.period_s), -(-run.motor.size // _MOST_BLOCKS), 1)
+    rows = run.motor.size // block * block
+    usable = seen.sliding.copy()
+    usable[: run.judged.start] = False
+    turns = np.diff(np.signbit(seen.velocity), append=np.signbit(seen.velocity[-1])).astype(float)
+    usable &= np.convolve(turns, np.ones(2 * round(_REVERSAL_S / run.period_s) + 1), "same") < 0.5
+
+    def means(values: FloatArray) -> FloatArray:
+        whole = (values * usable)[:rows].reshape(-1, block)
+        return np.asarray(whole.sum(axis=1) / np.maximum(known, 1), dtype=np.float64)
+
+    known = usable[:rows].reshape(-1, block).sum(axis=1)
+    weights = np.asarray(known >= block / 2, dtype=np.float64)
+    values = means(seen.torque)
+    speed = means(seen.velocity) / max(float(np.abs(seen.velocity).max()), 1e-300)
+    acceleration = means(np.gradient(seen.velocity, run.period_s))
+    columns = np.stack([np.ones(speed.size), np.sign(speed), speed, np.abs(speed), acceleration], axis=1)
+    columns /= np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+    usual = weights
+    for _ in range(_ROUNDS):
+        rest = values - _explained(columns, values, usual)
+        found = standing_out(rest, weights, _windows(rest, weights), _STANDS_OUT, _EDGE)
+        usual = weights.copy()
+        for one in found:
+            usual[one.first : one.last] = 0.0
+        if usual.sum() < _LEAST_USUAL * weights.sum():
+            return []
+    at_s, length_s = run.time_s[0], block * run.period_s
+    return [Event(run.name, at_s + one.first * length_s, at_s + one.last * length_s, one.level) for one in found]
+
+
+def _explained(columns: FloatArray, values: FloatArray, weights: FloatArray) -> FloatArray:
+    """Part of values (n,) that columns (n, k) explain; least absolute deviations, which windows do not shift."""
+    weight = weights
+    for _ in range(_REWEIGHTED):
+        solved, *_ = np.linalg.lstsq(columns * weight[:, None], values * weight, rcond=1e-9)
+        left = np.abs(values - columns @ solved)
+        least = 1e-3 * float(np.median(left[weights > 0.0])) + 1e-300
+        weight = weights / np.sqrt(np.maximum(left, least))
+    return np.asarray(columns @ solved, dtype=np.float64)
+
+
+def _windows(rest: FloatArray, weights: FloatArray) -> list[Segment]:
+    """Windows of constant level in a signal (n,)."""
+    size = rest.size // _SMOOTH_BLOCKS * _SMOOTH_BLOCKS
+    if not size or weights.sum() < 2 * _SMOOTH_BLOCKS:
+        return []
+    smoothed = (rest * weights)[:size].reshape(-1, _SMOOTH_BLOCKS).mean(axis=1)
+    noise = 1.4826 * float(np.median(np.abs(np.diff(smoothed)))) * np.sqrt(_SMOOTH_BLOCKS / 2.0)
+    if noise <= 0.0:
+        return []
+    cut = joined(segments(rest, weights, noise**2, 3.0 * np.log(rest.size) + _PENALTY), _EDGE, _ALIKE)
+    return [one for one in cut if weights[one.first : one.last].sum() >= _SHORTEST]

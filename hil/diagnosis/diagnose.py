@@ -16,6 +16,7 @@ from hil.diagnosis.experiment import Experiment, separating, showing
 from hil.diagnosis.location.locate import locate
 from hil.diagnosis.preflight import prepare
 from hil.diagnosis.result import ChannelFit, Location, Mode, NextExperiment, Result, TimeBudget, Unexplained, Verdict
+from hil.diagnosis.search.events import with_events_of
 from hil.diagnosis.search.forward_selection import Explanation, explain
 from hil.diagnosis.split import same, split
 from hil.diagnosis.time_left import with_time_left
@@ -139,7 +140,7 @@ def diagnose(
     explanation = explain(data, progress, begin + SEARCH_SHARE * budget_s)
     owner, nominal = explanation.owner, explanation.nominal
     progress("testing on held-out recordings")
-    proof = cross_validate(nominal, renamed(explanation.final), held_out)
+    proof = cross_validate(nominal, with_events_of(held_out, renamed(explanation.final)), held_out)
     verdict = judge(owner, nominal, proof.final, held_out)
     named = verdict is Verdict.MISSING_PHYSICS
     final = {Verdict.MISSING_PHYSICS: proof.final, Verdict.NO_MISMATCH: owner}.get(verdict, nominal)

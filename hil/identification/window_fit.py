@@ -28,7 +28,7 @@ def fit_windows(found: Fit, evaluations: int = 8, others: bool = True) -> Fit:
 
     Returns the fit itself if it has no event in its runs.
     """
-    estimator, at = found.estimator, found.hypothesis.rebased
+    estimator, at = found.estimator, found.hypothesis.rebased if others else found.hypothesis
     index = _event(found)
     if index is None:
         return found
@@ -56,8 +56,7 @@ def fit_windows(found: Fit, evaluations: int = 8, others: bool = True) -> Fit:
         at, residuals, damping = moved, there, 0.1 * damping
         if gained < _LEAST_GAIN * float(there.vector @ there.vector):
             break
-    at = _referred(at, index)
-    return estimator.fit(at, evaluations=4) if others else estimator.evaluate(at)
+    return estimator.fit(_referred(at, index), evaluations=4) if others else estimator.evaluate(at)
 
 
 def window_errors(found: Fit, index: int) -> FloatArray:

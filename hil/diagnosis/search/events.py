@@ -5,6 +5,7 @@ in turn. The motion is measured: the torque of a loop has the shape of the windo
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -12,11 +13,14 @@ import numpy as np
 from hil.arrays import FloatArray
 from hil.diagnosis.search.change_points import Segment, joined, segments, standing_out
 from hil.diagnosis.search.disturbance import Disturbance, disturbance
-from hil.identification.dataset import inertia
+from hil.identification.dataset import Dataset, inertia
 from hil.identification.estimator import Fit
+from hil.identification.hypothesis import Hypothesis
+from hil.identification.inference import against
 from hil.identification.measured import Measured
 from hil.identification.terms import Term, Window
-from hil.twin.library import LIBRARY
+from hil.identification.window_fit import fit_windows
+from hil.twin.library import BY_ID, LIBRARY
 from hil.twin.parameter import Role
 
 EVENT = next((mechanism for mechanism in LIBRARY if mechanism.transient), None)
@@ -27,6 +31,7 @@ _STANDS_OUT = 5.0  # level over the rms of what the windows leave: 1 in 10^6 of 
 _PENALTY = 20.0  # beside 3 log n of the three values of a window: that of a term in the search (NEEDED)
 _SHORTEST, _EDGE = 3, 6  # blocks of the shortest window; blocks in which the observer follows an edge
 _ALIKE = 0.25  # levels of adjacent windows that differ less are one
+_EVIDENCE = 20.0  # BIC difference for the events of a held-out recording: that of a term in the search (NEEDED)
 _ROUNDS = 3  # windows found in one round do not count as motion in the next; then they stay
 _REWEIGHTED = 40  # iterations of the regression
 _LEAST_USUAL = 0.3  # of the blocks without an event: else which level is none cannot be told
@@ -71,6 +76,85 @@ def detect(found: Fit) -> list[Event]:
         if "motor" not in run.unseen
         for event in _of_run(run, disturbance(run, channels["motor"], inertia(bare.bench), bare.data.observer_s))
     ]
+
+
+def beside_events(nominal: Fit, found: Fit) -> Fit:
+    """Fit the nominal parameters beside the events of another fit: what permanent terms are measured against.
+
+    Returns `nominal` without events.
+    """
+    index = _index(found)
+    if index is None:
+        return nominal
+    return nominal.estimator.fit(nominal.hypothesis.with_term(found.terms[index]), evaluations=6)
+
+
+def revised(found: Fit) -> Fit:
+    """Fit the events of a fit again, also as they show beside its other terms; return the best."""
+    index = _index(found)
+    if index is None:
+        return found
+    best = fit_windows(found)
+    events = detect(found)
+    if events:
+        other = found.hypothesis.replaced(index, event_term(events, found.bench.axis.ratio_m_rad))
+        again = fit_windows(found.estimator.evaluate(other))
+        best = again if against(again, best) > 0.0 else best
+    return best if best.cost <= found.cost or against(best, found) > 0.0 else found
+
+
+def with_events_of(held_out: Dataset, final: Fit) -> Fit:
+    """Add the events of held-out recordings to a fit: its parameters and its own events stay.
+
+    They are those that the disturbance torque shows, or those of the training recordings at the same times, whichever
+    the recordings support. An event is no prediction: it is found in each recording.
+    """
+    if EVENT is None or not held_out.runs:
+        return final
+    index, at = _index(final), final.hypothesis
+    there = replace(final.estimator, data=held_out)
+    before = there.evaluate(at)
+    choices = list[Term]()
+    found, ratio = detect(before), final.bench.axis.ratio_m_rad
+    if found:
+        choices.append(event_term(found, ratio))
+    if index is not None:
+        windows = dict.fromkeys(one._replace(run=run.name) for run in held_out.runs for one in at.terms[index].windows)
+        choices.append(replace(at.resolved.terms[index], windows=tuple(windows)))
+    best, evidence = final, _EVIDENCE
+    for choice in choices:
+        longer = at.with_term(choice) if index is None else _joined(at, index, choice)
+        fitted = fit_windows(there.evaluate(longer), others=False)
+        gain = against(fitted, before)
+        if gain > evidence:
+            own = final.estimator.residuals(fitted.hypothesis)
+            more = np.zeros((final.rows, fitted.hypothesis.x.size - at.x.size))
+            slopes = np.hstack([final.jacobian, more]) if final.jacobian.size else final.jacobian
+            best = replace(final, hypothesis=fitted.hypothesis, residuals=own, jacobian=slopes)
+            evidence = gain
+    return best
+
+
+def _joined(at: Hypothesis, index: int, more: Term) -> Hypothesis:
+    """The hypothesis with the windows of another term in one of its events."""
+    term, mechanism = at.resolved.terms[index], BY_ID[at.terms[index].effect]
+    (start, end), strength = mechanism.indices(Role.EDGE), mechanism.strength
+    added = tuple(
+        Window(
+            one.run,
+            more.at(one)[start] - term.values[start],
+            more.at(one)[end] - term.values[end],
+            more.at(one)[strength] / term.values[strength],
+        )
+        for one in more.windows
+    )
+    terms = list(at.terms)
+    terms[index] = replace(terms[index], windows=(*term.windows, *added))
+    return Hypothesis(at.bench, tuple(terms), at.x)
+
+
+def _index(found: Fit) -> int | None:
+    return next((index for index, term in enumerate(found.hypothesis.terms) if term.windows), None)
 
 
 def _of_run(run: Measured, seen: Disturbance) -> list[Event]:

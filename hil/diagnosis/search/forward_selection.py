@@ -12,6 +12,7 @@ from functools import partial
 
 import numpy as np
 
+from hil.diagnosis.search.events import beside_events, revised
 from hil.diagnosis.search.initial_values import claimable
 from hil.diagnosis.search.restart import from_owner, may_hide, unbent
 from hil.diagnosis.search.score_test import Candidate, screen_library
@@ -120,7 +121,8 @@ def explain(data: Dataset, progress: Progress = lambda text: None, deadline_s: f
             break
         candidates = [one for one in screen_library(base) if claimable(one.term, base.bench, data.runs)]
         first = first or candidates
-        found, best = _next_term(base, owner, nominal, candidates, step)
+        reference = beside_events(nominal, base)
+        found, best = _next_term(base, owner, reference, candidates, step)
         fitted = {fit.terms[-1].effect for fit in found if not base.estimator.expired}
         if best is None:
             break
@@ -133,19 +135,19 @@ def explain(data: Dataset, progress: Progress = lambda text: None, deadline_s: f
             (RivalFit(other, against(best, other, filters), (other.cost - best.cost) / base.rows) for other in found),
             key=lambda rival: rival.evidence,
         )
-        best, needed = _pruned(best, nominal)
+        best, needed = _pruned(best, reference)
         # to convergence: the residual of an unfinished fit resembles other mechanisms
-        base = claimed(best.refit(_ENDED, slopes=best.jacobian))
+        base = revised(claimed(best.refit(_ENDED, slopes=best.jacobian)))
         if not base.terms and base.cost < nominal.cost - NEEDED:
             nominal = base  # the term has only led the nominal parameters out of a local minimum
             continue
         if effects(base.terms) in tried:
             break  # the term that was added has been removed again
         tried.append(effects(base.terms))
-        if len(base.terms) >= _IN_VAIN and base.excess > MOST * nominal.excess:
+        if len(base.terms) >= _IN_VAIN and base.excess > MOST * beside_events(nominal, base).excess:
             break
     step("fitting the explanation to convergence")
-    final = base.refit(_ENDED)
+    final = revised(base).refit(_ENDED)
     kept = {term.key for term in final.terms}
     present = {*fitted, *(term.effect for term in final.terms)}
     not_tried = tuple(effect for effect in BY_ID if effect not in present) if stopped_at else ()

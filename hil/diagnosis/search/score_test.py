@@ -102,11 +102,16 @@ def screen_library(base: Fit) -> list[Candidate]:
 
 def _events(base: Fit) -> list[StartPoint]:
     """The start of all events that the disturbance torque shows, as one term."""
-    found = [] if any(term.windows for term in base.terms) else detect(base)
-    if not found:
+    if any(term.windows for term in base.terms):
         return []
-    term = event_term(found, base.bench.axis.ratio_m_rad)
-    return [StartPoint(term.effect, 0, term.values, BY_ID[term.effect].strength, windows=term.windows)]
+    # events may have led the fitted parameters astray, those of the bench file may be wrong
+    found = [detect(one) for one in (base, base.estimator.evaluate(base.hypothesis.owner))]
+    terms = [event_term(events, base.bench.axis.ratio_m_rad) for events in found if events]
+    return [
+        StartPoint(term.effect, 0, term.values, BY_ID[term.effect].strength, windows=term.windows)
+        for term in terms
+        if offered(term, base.hypothesis, base.terms)
+    ]
 
 
 def offered(new: Term, hypothesis: Hypothesis, terms: Sequence[Term]) -> bool:

@@ -26,7 +26,7 @@ class Ablation:
 
     `train` and `held_out` are the residual energy without the term over that with it, `laps` the same ratio of the part
     that does not repeat from lap to lap. `gain` is the evidence for the term on the held-out recordings. They are None
-    without held-out recordings or laps.
+    without held-out recordings or laps, and for an event, whose `train` is the ratio over all recordings.
     """
 
     term: Term
@@ -95,12 +95,17 @@ def _ablate(nominal: Fit, final: Fit, held_out: Dataset) -> list[Ablation]:
 
     def ablation(term: Term, other: Fit) -> Ablation:
         there = other.on(held_out) if held_out.runs else None
+        train, more, gain = energy(other) / own, None, None
+        if there and own_held_out and term.windows:  # an event is found in each recording: none is a test of another
+            train = (energy(other) + energy(there)) / (own + energy(own_held_out))
+        elif there and own_held_out:
+            more, gain = energy(there) / energy(own_held_out), _gain(own_held_out, there)
         return Ablation(
             term,
             other,
-            energy(other) / own,
-            energy(there) / energy(own_held_out) if there and own_held_out else None,
-            _gain(own_held_out, there) if there and own_held_out else None,
+            train,
+            more,
+            gain,
             unrepeated(other.hypothesis, other.data) / differs if differs > 0.0 else None,
         )
 

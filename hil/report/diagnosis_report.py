@@ -94,12 +94,27 @@ def _finding(page: Page, diagnosis: Diagnosis, index: int, folder: Path) -> None
         ("parameter", "value", "standard error", "unit"),
         [(name, *_value(entry)) for name, entry in finding.parameters.items()],
     )
+    if len(finding.windows) > 1:
+        page.table(
+            ("recording", "from [s]", "to [s]", f"strength [{finding.windows[0].strength.unit}]"), _windows(finding)
+        )
     if finding.equivalents:
         page.text(f"This motion cannot distinguish it from: {titles(finding.equivalents)}.")
     if finding.rivals:
         page.table(
             ("rejected alternative", "reason"), [(title(rival.effect), rival.evidence) for rival in finding.rivals]
         )
+
+
+def _windows(finding: Finding) -> list[tuple[str, str, str, str]]:
+    """Windows of an event, with standard errors."""
+    return [
+        (
+            one.recording,
+            *(f"{digits(entry.value)} ± {digits(entry.std)}" for entry in (one.start, one.end, one.strength)),
+        )
+        for one in finding.windows
+    ]
 
 
 def _fit(page: Page, diagnosis: Diagnosis, folder: Path) -> None:

@@ -136,7 +136,13 @@ class Twin:
         """
         setpoints = loops.Setpoints(position_command_m, velocity_command_m_s)
         channels = loops.closed_loop(
-            self.loop_gains, self._controller(start), setpoints, misread, measured_table_m, self.push_n, self._axis(start)
+            self.loop_gains,
+            self._controller(start),
+            setpoints,
+            misread,
+            measured_table_m,
+            self.push_n,
+            self._axis(start),
         )
         return self._recorded(Response(*channels))
 

@@ -75,6 +75,7 @@ class Picture(StrEnum):
     """Figure of the report that shows a mechanism."""
 
     TIME = "time"
+    FORCE = "force over time"
     FRICTION = "friction"  # over speed
     FRICTION_ALONG_TRAVEL = "friction along travel"
     POSITION = "position"  # torque over position

@@ -45,18 +45,18 @@ def segments(values: FloatArray, weights: FloatArray, variance: float, penalty: 
     return found[::-1]
 
 
-def joined(found: list[Segment], short: int, alike: float) -> list[Segment]:
-    """Join adjacent windows of the same sign: `short` ones to their neighbour, and those of levels `alike`."""
+def joined(found: list[Segment], weights: FloatArray, short: int, alike: float) -> list[Segment]:
+    """Join windows of one sign with no known block between: `short` ones to their neighbour, and levels `alike`."""
     result = list[Segment]()
     for one in found:
         before = result[-1] if result else None
-        if before is None or one.first > before.last or before.level * one.level < 0.0:
+        if before is None or weights[before.last : one.first].any() or before.level * one.level < 0.0:
             result.append(one)
             continue
-        sizes = before.last - before.first, one.last - one.first
+        sizes = [float(weights[part.first : part.last].sum()) for part in (before, one)]
         close = abs(one.level - before.level) < alike * max(abs(one.level), abs(before.level))
         if close:
-            level = float(np.average([before.level, one.level], weights=sizes))
+            level = float(np.average([before.level, one.level], weights=np.maximum(sizes, 1e-9)))
         elif min(sizes) <= short:
             level = before.level if sizes[0] > sizes[1] else one.level
         else:

@@ -1,7 +1,7 @@
 """Events of a recording: windows in which a constant force acts, from the disturbance torque that a fit leaves.
 
 Disturbance torque = what errors of inertia and friction explain + a constant level in each window. Both are estimated
-in turn. The motion is measured: the torque of a loop has the shape of the windows itself. All windows cost one pass, however many there are.
+in turn. The motion is the measured one: the torque of a loop has the shape of the windows itself.
 """
 
 from collections.abc import Sequence
@@ -209,5 +209,5 @@ def _windows(rest: FloatArray, weights: FloatArray) -> list[Segment]:
     noise = 1.4826 * float(np.median(np.abs(np.diff(smoothed)))) * np.sqrt(_SMOOTH_BLOCKS / 2.0)
     if noise <= 0.0:
         return []
-    cut = joined(segments(rest, weights, noise**2, 3.0 * np.log(rest.size) + _PENALTY), _EDGE, _ALIKE)
+    cut = joined(segments(rest, weights, noise**2, 3.0 * np.log(rest.size) + _PENALTY), weights, _EDGE, _ALIKE)
     return [one for one in cut if weights[one.first : one.last].sum() >= _SHORTEST]

@@ -161,9 +161,7 @@ def screen(base: Fit, points: Sequence[StartPoint]) -> list[Candidate]:
         if start.strength < 0:
             # a start that cannot be scaled is also scored at its own strength
             whole = float(2.0 * target[0] - products[0, 0]) / energy
-            return Candidate(
-                start.term(), max(share if coefficients[0] > 0.0 else 0.0, whole)
-            )
+            return Candidate(start.term(), max(share if coefficients[0] > 0.0 else 0.0, whole))
         return Candidate(
             start.term(_scaled(start, coefficients)),
             share,

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from hil.arrays import FloatArray
-from hil.twin.mechanism import Block, Mechanism, Moment, Row, Stage, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, Stage, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
 
 
@@ -43,6 +43,7 @@ MECHANISM = Mechanism(
     starts=lambda s: [(s.window[2] / s.ratio or 1.0, s.window[0], s.window[1])],
     typical=lambda a: (0.2 * a.friction / a.ratio, 0.5 * a.duration_s, 0.5 * a.duration_s + 1.0),
     over_time=_pushes,
+    picture=Picture.FORCE,
     repeated="In {count} windows from {start_s} to {end_s} forces of up to {force_n} push the table in positive direction.",
     periodic="From {start_s} on a force of {force_n} pushes the table in positive direction {count} times, for {width_s} "
     "every {period_s}.",

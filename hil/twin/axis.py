@@ -60,8 +60,8 @@ class Twin:
     """Axis with its control law and its active mechanisms.
 
     `modes` keeps only the lowest modes of the chain (None: all). `fine_step_s` and `coarse_step_s` are the longest
-    internal steps, of which a whole number makes a control tick; equal values give a fixed step. `push_n` (n,) is a force
-    on the table over each tick of a simulation, beside those of the mechanisms; empty: none.
+    internal steps, of which a whole number makes a control tick; equal values give a fixed step. `push_n` (n,) is a
+    force on the table over each tick of a simulation, beside those of the mechanisms; empty: none.
     """
 
     physics: Physics
@@ -135,14 +135,9 @@ class Twin:
         error of the motor encoder [motor units] and of the table encoder [m] that the controller sees.
         """
         setpoints = loops.Setpoints(position_command_m, velocity_command_m_s)
+        controller, axis = self._controller(start), self._axis(start)
         channels = loops.closed_loop(
-            self.loop_gains,
-            self._controller(start),
-            setpoints,
-            misread,
-            measured_table_m,
-            self.push_n,
-            self._axis(start),
+            self.loop_gains, controller, setpoints, misread, measured_table_m, self.push_n, axis
         )
         return self._recorded(Response(*channels))
 

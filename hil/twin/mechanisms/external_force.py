@@ -44,7 +44,8 @@ MECHANISM = Mechanism(
     typical=lambda a: (0.2 * a.friction / a.ratio, 0.5 * a.duration_s, 0.5 * a.duration_s + 1.0),
     over_time=_pushes,
     picture=Picture.FORCE,
-    repeated="In {count} windows from {start_s} to {end_s} forces of up to {force_n} push the table in positive direction.",
-    periodic="From {start_s} on a force of {force_n} pushes the table in positive direction {count} times, for {width_s} "
-    "every {period_s}.",
+    repeated="In {count} windows from {start_s} to {end_s} forces of up to {force_n} push the table in positive "
+    "direction.",
+    periodic="From {start_s} to {end_s} a force of {force_n} pushes the table in positive direction {count} times, for "
+    "{width_s} every {period_s}.",
 )

@@ -118,6 +118,9 @@ def _window_slopes(estimator: Estimator, at: Hypothesis, index: int) -> FloatArr
                 for place, number in enumerate(inside)
                 if term.windows[number].run == name
             )
+            if not own:
+                begin += time_s.size
+                continue
             starts = np.searchsorted(time_s, [at_s - 2.0 * step for at_s, _ in own])
             for (_, place), first, last in zip(own, starts, [*starts[1:], time_s.size], strict=True):
                 rows = slice(begin + first, begin + last)

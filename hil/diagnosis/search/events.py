@@ -19,7 +19,7 @@ from hil.identification.hypothesis import Hypothesis
 from hil.identification.inference import against
 from hil.identification.measured import Measured
 from hil.identification.terms import Term, Window
-from hil.identification.window_fit import fit_windows
+from hil.identification.window_fit import fit_windows, window_errors
 from hil.twin.library import BY_ID, LIBRARY
 from hil.twin.parameter import Role
 
@@ -32,6 +32,7 @@ _PENALTY = 20.0  # beside 3 log n of the three values of a window: that of a ter
 _SHORTEST, _EDGE = 3, 6  # blocks of the shortest window; blocks in which the observer follows an edge
 _ALIKE = 0.25  # levels of adjacent windows that differ less are one
 _EVIDENCE = 20.0  # BIC difference for the events of a held-out recording: that of a term in the search (NEEDED)
+_SIGMAS = 3.0  # standard errors of the force of a window: 0.3 % of Gaussian ones are above without a force
 _ROUNDS = 3  # windows found in one round do not count as motion in the next; then they stay
 _REWEIGHTED = 40  # iterations of the regression
 _LEAST_USUAL = 0.3  # of the blocks without an event: else which level is none cannot be told
@@ -100,7 +101,7 @@ def revised(found: Fit) -> Fit:
         other = found.hypothesis.replaced(index, event_term(events, found.bench.axis.ratio_m_rad))
         again = fit_windows(found.estimator.evaluate(other))
         best = again if against(again, best) > 0.0 else best
-    return best if best.cost <= found.cost or against(best, found) > 0.0 else found
+    return _trimmed(best if best.cost <= found.cost or against(best, found) > 0.0 else found)
 
 
 def with_events_of(held_out: Dataset, final: Fit) -> Fit:
@@ -124,7 +125,9 @@ def with_events_of(held_out: Dataset, final: Fit) -> Fit:
     best, evidence = final, _EVIDENCE
     for choice in choices:
         longer = at.with_term(choice) if index is None else _joined(at, index, choice)
-        fitted = fit_windows(there.evaluate(longer), others=False)
+        fitted = _trimmed(fit_windows(there.evaluate(longer), others=False), others=False)
+        if _index(fitted) is None or fitted.hypothesis.x.size != longer.x.size:
+            continue
         gain = against(fitted, before)
         if gain > evidence:
             own = final.estimator.residuals(fitted.hypothesis)
@@ -151,6 +154,30 @@ def _joined(at: Hypothesis, index: int, more: Term) -> Hypothesis:
     terms = list(at.terms)
     terms[index] = replace(terms[index], windows=(*term.windows, *added))
     return Hypothesis(at.bench, tuple(terms), at.x)
+
+
+def _trimmed(found: Fit, others: bool = True) -> Fit:
+    """Leave out windows of the runs of a fit whose force is no larger than its error allows, and fit the others again.
+
+    Such are windows at rest, where friction holds against a force.
+    """
+    index = _index(found)
+    if index is None:
+        return found
+    term, names = found.hypothesis.terms[index], {run.name for run in found.data.runs}
+    strength = BY_ID[term.effect].strength
+    errors = iter(window_errors(found, index))
+    at = found.hypothesis.resolved.terms[index]
+    kept = tuple(
+        one for one in term.windows if one.run not in names or abs(at.at(one)[strength]) > _SIGMAS * next(errors)[2]
+    )
+    if len(kept) == len(term.windows):
+        return found
+    if not kept:
+        return found.estimator.fit(found.hypothesis.without(index))
+    terms = (*found.hypothesis.terms[:index], replace(term, windows=kept), *found.hypothesis.terms[index + 1 :])
+    changed = Hypothesis(found.hypothesis.bench, terms, found.hypothesis.x)
+    return fit_windows(found.estimator.evaluate(changed), others=others)
 
 
 def _index(found: Fit) -> int | None:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
@@ -87,7 +88,7 @@ def irregular(count: int, seed: int, start_s: float = 0.6, end_s: float = 24.3) 
     rng = np.random.default_rng(seed)
     places = np.linspace(start_s, end_s, count + 1)
     found = []
-    for first, last in zip(places, places[1:], strict=False):
+    for first, last in pairwise(places):
         width_s = rng.uniform(0.05, min(0.5, 0.7 * (last - first)))
         begin_s = rng.uniform(first, last - width_s - 0.05)
         height_n = rng.choice([-1.0, 1.0]) * np.exp(rng.uniform(np.log(20.0), np.log(200.0)))

@@ -122,7 +122,7 @@ def explain(data: Dataset, progress: Progress = lambda text: None, deadline_s: f
         candidates = [one for one in screen_library(base) if claimable(one.term, base.bench, data.runs)]
         first = first or candidates
         reference = beside_events(nominal, base)
-        found, best = _next_term(base, owner, reference, candidates, step)
+        found, best = _next_term(base, owner, nominal, reference, candidates, step)
         fitted = {fit.terms[-1].effect for fit in found if not base.estimator.expired}
         if best is None:
             break
@@ -144,7 +144,7 @@ def explain(data: Dataset, progress: Progress = lambda text: None, deadline_s: f
         if effects(base.terms) in tried:
             break  # the term that was added has been removed again
         tried.append(effects(base.terms))
-        if len(base.terms) >= _IN_VAIN and base.excess > MOST * beside_events(nominal, base).excess:
+        if len(base.terms) >= _IN_VAIN and base.excess > MOST * nominal.excess:
             break
     step("fitting the explanation to convergence")
     final = revised(base).refit(_ENDED)
@@ -158,25 +158,28 @@ def explain(data: Dataset, progress: Progress = lambda text: None, deadline_s: f
 
 
 def _next_term(
-    base: Fit, owner: Fit, nominal: Fit, candidates: Sequence[Candidate], step: Progress
+    base: Fit, owner: Fit, nominal: Fit, reference: Fit, candidates: Sequence[Candidate], step: Progress
 ) -> tuple[list[Fit], Fit | None]:
-    """Fit the base with one more term; return the fits and the first one with sufficient evidence, if any."""
+    """Fit the base with one more term; return the fits and the first one with sufficient evidence, if any.
+
+    `reference` is the nominal fit beside the events of the base.
+    """
     bits = 1.0 - float(np.exp(-NEEDED / base.rows))  # share of white residuals whose removal gives evidence of NEEDED
     promising = [one for one in candidates if one.share > bits and one.share * base.cost > MATERIAL * base.rows]
     found: list[Fit] = []
     if promising:
         step("fitting " + ", ".join(one.term.effect for one in promising[:3]))
         found = _claimable(race(base, promising))
-    best = _worthwhile(found, base, nominal)
+    best = _worthwhile(found, base, reference)
     unfinished = (best is None or best.cost > _CLEAR * base.cost) and not base.estimator.expired
     if unfinished and not owner.at_floor and base.excess > _NOTHING * base.rows and may_hide(base):
         step("fitting a lost preload from the springs of the bench file")
         found = sorted([*found, unbent(base)], key=lambda other: other.cost)
-        best = _worthwhile(found, base, nominal)
+        best = _worthwhile(found, base, reference)
     if best is None and not base.at_floor and base.excess > MOST * nominal.excess and not base.estimator.expired:
         step("searching again beside the parameters of the bench file")
         found = _claimable(from_owner(base))
-        best = _worthwhile(found, base, nominal)
+        best = _worthwhile(found, base, reference)
     return found, best
 
 

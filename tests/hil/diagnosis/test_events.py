@@ -9,7 +9,7 @@ import pytest
 from diagnosis_runs import bench, dataset, evaluated, fitted, recorded
 from emps_windows import PERIOD_S, Push, emps_recording, irregular, pushed, regular, response
 
-from hil.bench.bench_file import Bench, load_bench
+from hil.bench.bench_file import load_bench
 from hil.diagnosis.diagnose import Diagnosis, diagnose
 from hil.diagnosis.search.events import detect, event_term, with_events_of
 from hil.diagnosis.split import split
@@ -142,7 +142,7 @@ def test_emps_itself_has_no_event() -> None:
 
 @pytest.mark.parametrize(
     "pushes",
-    [[Push(5.2, 5.9, 20.0)], regular(5, -60.0), regular(30, 50.0, 0.6, 24.0), irregular(30, 4)],
+    [[Push(5.2, 5.9, 20.0)], regular(5, -60.0), regular(30, 50.0, 0.6, 24.0), irregular(30, 2)],
     ids=["one", "five", "train", "irregular"],
 )
 def test_windows_in_emps_are_found_at_once(pushes: list[Push]) -> None:
@@ -171,3 +171,46 @@ def test_without_an_event_the_held_out_part_gets_none() -> None:
 
 def diagnosed(pushes: list[Push], name: str = "emps_symmetric") -> Diagnosis:
     return diagnose([pushed(pushes)], [], load_bench(name))
+
+
+def assert_one_finding(found: Diagnosis, pushes: list[Push], common_n: float | None) -> None:
+    """One finding holds all windows, with edges within 5 ms and a common force within 1 %."""
+    (event,) = [finding for finding in found.result.missing if finding.effect == "external_force"]
+    seen = [(one.start.value, one.end.value, one.strength.value) for one in event.windows]
+    assert_found(seen, pushes)
+    for (*_, force_n), push in zip(seen, pushes, strict=True):
+        assert force_n == pytest.approx(push.force_n, abs=max(0.01 * abs(push.force_n), MISFIT_N))
+    if common_n is not None:
+        assert event.parameters["force_n"].value == pytest.approx(common_n, rel=0.01)
+        assert len({force_n for *_, force_n in seen}) == 1
+    assert found.plot("finding", 1 + found.result.missing.index(event)).axes
+
+
+MISFIT_N = 2.0  # twice the force that the best model leaves on EMPS: a short window of its own force is known to it
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["emps_symmetric", "emps"])
+@pytest.mark.parametrize(
+    ("pushes", "common_n"),
+    [
+        ([Push(7.2, 7.9, -100.0)], -100.0),
+        (regular(5, -60.0), -60.0),
+        (regular(30, 50.0, 0.6, 24.0), 50.0),
+        (irregular(30, 2), None),
+        (regular(3, 60.0, 17.4, 24.0), 60.0),
+    ],
+    ids=["one", "five", "train", "irregular", "held out only"],
+)
+def test_windows_in_emps_are_one_finding(pushes: list[Push], common_n: float | None, name: str) -> None:
+    found = diagnosed(pushes, name)
+    assert_one_finding(found, pushes, common_n)
+    train = next(finding.train for finding in found.result.missing if finding.effect == "external_force")
+    assert (train is not None) == (common_n is not None and len(pushes) >= 3)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["emps_symmetric", "emps"])
+def test_emps_without_added_forces_has_no_event_in_its_diagnosis(name: str) -> None:
+    found = diagnose([emps_recording()], [], load_bench(name))
+    assert "external_force" not in [finding.effect for finding in found.result.missing]

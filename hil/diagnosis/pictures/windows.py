@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from hil.diagnosis.pictures.view import Captioned, View
 from hil.diagnosis.search.disturbance import disturbance
-from hil.figures.drawing import legend_above, style_axis
+from hil.figures.drawing import style_axis
 from hil.figures.panels import COMMAND, DEVIATION, MEASURED, SIMULATED, thin
 from hil.identification.dataset import inertia
 
@@ -32,13 +32,13 @@ def force_over_time(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:
         run, observer_s = view.run, diagnosis.train.observer_s
         owner = diagnosis.residuals(diagnosis.explanation.owner, run)["motor"]
         of_owner = disturbance(run, owner, inertia(diagnosis.owner), observer_s).torque / ratio
-        curves = of_owner, view.torque.torque / ratio, view.torque_modelled.torque / ratio
+        curves = view.torque_modelled.torque / ratio, view.torque.torque / ratio, of_owner
         rows = slice(run.judged.start, None)
         chosen = thin(tuple(values[rows] for values in curves), DRAWN_ROWS)
         looks = (
-            ("measured - twin of the bench file", COMMAND, 0.8, 1.0),
-            ("measured - twin without the event", MEASURED, 1.8, 0.5),
-            ("modelled by the event", SIMULATED, 1.2, 1.0),
+            ("modelled by the event", SIMULATED, 3.0, 0.5),
+            ("measured - twin without the event", MEASURED, 1.2, 1.0),
+            ("measured - twin of the bench file", COMMAND, 0.7, 1.0),
         )
         for values, (label, colour, width, alpha) in zip(curves, looks, strict=True):
             time_s, drawn = run.time_s[rows][chosen], values[rows][chosen]
@@ -49,7 +49,7 @@ def force_over_time(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:
         if strongest > 0.0:  # peaks at reversals would hide the windows
             axis.set_ylim(-1.6 * strongest, 1.6 * strongest)
         style_axis(axis, "force [N]", title=run.name)
-    legend_above(axes[0])
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper right", ncols=3, frameon=False)
     axes[-1].set_xlabel("time [s]")
     return Captioned(
         figure,

@@ -191,7 +191,7 @@ def _needed(ablation: Ablation) -> str:
     if ablation.term.windows:
         return (
             f"without it the residual energy of all recordings is {digits(ablation.train)} × as large; "
-            "an event is found in each recording, and not expected in another"
+            "an event is found in each recording, held-out ones too, so that their figures do not test it"
         )
     text = f"without it the residual energy is {digits(ablation.train)} × as large on the training recordings"
     if ablation.held_out is None:

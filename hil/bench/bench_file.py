@@ -167,6 +167,11 @@ class Bench(_Model):
         return not isinstance(self.control, UnknownControl)
 
     @property
+    def torque_delay_s(self) -> float | None:
+        """Delay with which a recorded torque acts, to be estimated; None: it acts as recorded."""
+        return self.control.torque_delay_s if isinstance(self.control, UnknownControl) else None
+
+    @property
     def known_control(self) -> Control:
         """The control law. Raises FieldError if it is unknown."""
         if isinstance(self.control, UnknownControl):

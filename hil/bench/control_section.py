@@ -86,12 +86,39 @@ class Control(_Model):
             velocity_filter_time_constant_s=self.velocity_filter_time_constant_s,
         )
 
+    @property
+    def gain_names(self) -> tuple[str, str, str, str]:
+        """Keys of position gain, velocity feed-forward, velocity gain and integral time that the section uses."""
+        keys = ("velocity_gain_n_m_s_rad", "velocity_gain_n_s_m", "velocity_gain_ma_rpm")
+        velocity = next(key for key in keys if getattr(self, key) is not None)
+        in_ms = self.velocity_integral_time_ms is not None
+        integral = "velocity_integral_time_ms" if in_ms else "velocity_integral_time_s"
+        return "position_gain_1_s", "velocity_feedforward", velocity, integral
+
+    def with_gains(self, gains: Gains) -> Self:
+        """The section with position gain, feed-forward, velocity gain and integral time of `gains`, in its units."""
+        before = self.gains(gains.ratio_m_rad)
+        position, feedforward, velocity, integral = self.gain_names
+        factor = gains.velocity_gain_n_m_s_rad / before.velocity_gain_n_m_s_rad
+        changed = {
+            position: gains.position_gain_1_s,
+            feedforward: gains.velocity_feedforward,
+            velocity: getattr(self, velocity) * factor,
+        }
+        if gains.integral_gain_n_m_rad > 0.0:
+            time_s = gains.velocity_gain_n_m_s_rad / gains.integral_gain_n_m_rad
+            changed[integral] = 1e3 * time_s if integral.endswith("_ms") else time_s
+        return self.model_copy(update=changed)
+
 
 class UnknownControl(_Model):
     """A control law that is not known. It is not simulated, and no mismatch is assigned to it."""
 
     law: Literal["unknown"]
     velocity_period_s: Period | None = None  # absent: the period of the recording
+    torque_delay_s: float | None = Field(
+        None, ge=-0.2, le=0.2, description="recorded torque acts so late; estimated from this value; absent: 0 [s]"
+    )
     position_feedback: Literal["motor", "table"] = "motor"
     torque_limit_n_m: Positive | None = None
     force_limit_n: Positive | None = None
@@ -114,6 +141,16 @@ class UnknownControl(_Model):
             torque_limit_n_m=self.torque_limit_n_m or self.force_limit_n or INFINITE,
             position_from_table=self.position_feedback == "table",
         )
+
+
+def without_law(control: Control) -> UnknownControl:
+    """What remains of a control section whose law is not used: feedback and limit."""
+    return UnknownControl(
+        law="unknown",
+        position_feedback=control.position_feedback,
+        torque_limit_n_m=control.torque_limit_n_m,
+        force_limit_n=control.force_limit_n,
+    )
 
 
 ControlSection = Annotated[Control | UnknownControl, Field(discriminator="law")]

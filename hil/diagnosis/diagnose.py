@@ -14,11 +14,10 @@ from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
 from hil.diagnosis.experiment import Experiment, separating, showing
 from hil.diagnosis.location.locate import locate
-from hil.diagnosis.preflight import prepare
+from hil.diagnosis.preparation import prepare_diagnosis
 from hil.diagnosis.result import ChannelFit, Location, Mode, NextExperiment, Result, TimeBudget, Unexplained, Verdict
 from hil.diagnosis.search.events import with_events_of
 from hil.diagnosis.search.forward_selection import Explanation, explain
-from hil.diagnosis.split import same, split
 from hil.diagnosis.time_left import with_time_left
 from hil.diagnosis.untold import untold
 from hil.diagnosis.verdict.cross_validation import CrossValidation, cross_validate, explained_share
@@ -27,8 +26,7 @@ from hil.diagnosis.verdict.fit_table import channel_names, channel_residuals, fi
 from hil.diagnosis.verdict.judge import judge, not_testable
 from hil.diagnosis.wording import title, titles, where_in_short
 from hil.errors import InputError
-from hil.identification.completion import completed, reduced
-from hil.identification.dataset import Dataset, prepare_dataset
+from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit, FitStatus
 from hil.identification.measured import Measured
 from hil.identification.noise_floor import FLOOR
@@ -121,34 +119,25 @@ def diagnose(
     begin = time.monotonic()
     progress = with_time_left(progress, begin, budget_s)
     progress("checking the recordings")
-    bench = reduced(bench, [*train, *validate])
-    train, validate = ([completed(run, bench) for run in runs] for runs in (train, validate))
-    notes = []
-    if not validate:
-        train, validate = split(train)
-        notes.append("No held-out recording was given: the last third of each recording is used for validation.")
-    twice = [held.name for held in validate for run in train if same(held, run)]
-    if twice:
-        raise InputError(
-            f"--validate: given {', '.join(twice)}, which is a training recording too, allowed recordings "
-            "of another motion; leave it out of one of them"
-        )
-    prepared = prepare([*train, *validate], bench)
-    data = prepare_dataset(prepared[: len(train)], bench)
-    held_out = data.over(prepared[len(train) :])
+    prepared = prepare_diagnosis(train, validate, bench)
+    believed, bench, law = bench, prepared.bench, prepared.law
+    data, held_out, notes = prepared.train, prepared.held_out, list(prepared.notes)
 
     explanation = explain(data, progress, begin + SEARCH_SHARE * budget_s)
     owner, nominal = explanation.owner, explanation.nominal
     progress("testing on held-out recordings")
     proof = cross_validate(nominal, with_events_of(held_out, renamed(explanation.final)), held_out)
-    verdict = judge(owner, nominal, proof.final, held_out)
+    of_plant = judge(owner, nominal, proof.final, held_out)
+    verdict = law.verdict(of_plant)
     named = verdict is Verdict.MISSING_PHYSICS
-    final = {Verdict.MISSING_PHYSICS: proof.final, Verdict.NO_MISMATCH: owner}.get(verdict, nominal)
+    final = {Verdict.MISSING_PHYSICS: proof.final, Verdict.NO_MISMATCH: owner}.get(of_plant, nominal)
     # a parameter error is located and measured against the parameters of the bench file
-    before = owner if verdict is Verdict.PARAMETER_ERROR else nominal
+    before = owner if of_plant is Verdict.PARAMETER_ERROR else nominal
 
     progress("locating")
     location = None if verdict is Verdict.NO_MISMATCH else locate(before, final)
+    if verdict is not of_plant:  # the plant is as the bench describes it, the law is not
+        location = Location(block="controller", element="settings of the control law", channels=())
     progress("comparing the fits with the noise floor")
     table = fit_table(owner, nominal, final, held_out)
     forms = form_of(explanation, proof.ablations)
@@ -169,10 +158,10 @@ def diagnose(
         statement="",
         location=location,
         missing=missing,
-        parameter_corrections={} if verdict is Verdict.NO_MISMATCH else corrections(bench, final),
+        parameter_corrections=law.corrections | ({} if of_plant is Verdict.NO_MISMATCH else corrections(bench, final)),
         fit=table,
         not_testable=hidden,
-        unexplained=_unexplained(before, final, held_out, location, verdict),
+        unexplained=_unexplained(before, final, held_out, location, of_plant),
         next_experiment=NextExperiment(profile=NEXT_EXPERIMENT, separates=experiment.separates)
         if experiment and experiment.profile
         else None,
@@ -184,8 +173,12 @@ def diagnose(
         notes=tuple(notes),
         runtime_s=time.monotonic() - begin,
     )
-    result = result.model_copy(update={"statement": statement(result)})
-    after = bench if verdict is Verdict.NO_MISMATCH else diagnosed_bench(bench, final)
+    told = statement(result.model_copy(update={"verdict": of_plant}))
+    result = result.model_copy(update={"statement": f"{law.advice} {told}".strip()})
+    after = bench if of_plant is Verdict.NO_MISMATCH else diagnosed_bench(bench, final)
+    if not bench.law_known:  # what was set aside stays in the file
+        after = after.model_copy(update={"control": believed.control})
+    after = after.model_copy(update={"encoders": believed.encoders})
     return Diagnosis(result, after, bench, data, held_out, explanation, proof, final, experiment)
 
 

@@ -9,8 +9,9 @@ from hil.drafting.estimate import Estimate
 from hil.drafting.loop_values import REPLAYED, LoopValues, loop_values
 from hil.drafting.plant_values import PlantValues, TransmissionValues, plant_values, transmission_values
 from hil.drafting.relations import proportional
-from hil.drafting.sensor_values import count_of, is_decimal, noise_of
+from hil.drafting.sensor_values import is_decimal, noise_of
 from hil.drafting.usual_values import ROTARY_LEAD_M, usual_lead
+from hil.identification.quantum import count_of
 from hil.quantities import digits
 from hil.recording.recording import Recording
 

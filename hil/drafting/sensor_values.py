@@ -2,32 +2,12 @@
 
 import numpy as np
 
-from hil.arrays import FloatArray
 from hil.drafting.relations import lead_rows
 from hil.identification.noise import white_noise
 from hil.recording.recording import Recording
 
-_WHOLE = 0.05  # deviation from a whole number of steps up to which a difference is counted
-_COUNTED = 0.9  # share of the differences that must be whole numbers of steps
-_STEPS = (20, 60, 200, 600)  # largest differences that are counted, in steps
 MOST_LEAD_ROWS = 50  # of a command before the measured torque: tens of ms
 DIGITS = 1e-6  # relative deviation from a power of ten below which a step is that of printed digits
-
-
-def count_of(values: FloatArray) -> float | None:
-    """Step of a quantised channel (n,) in its unit; None where differences are no multiples of one step."""
-    differences = np.abs(np.diff(values))
-    differences = differences[differences > 1e-12 * np.ptp(values)]
-    if differences.size < 100:
-        return None
-    step = float(differences.min())
-    # the smallest difference has the largest error of printed digits: ever larger ones sharpen the step
-    for most in _STEPS:
-        few = differences[differences < most * step]
-        whole = np.maximum(np.round(few / step), 1.0)
-        step = float((few @ whole) / (whole @ whole))
-    good = np.abs(few / step - np.round(few / step)) < _WHOLE
-    return step if few.size > 50 and good.mean() > _COUNTED else None
 
 
 def is_decimal(step: float) -> bool:

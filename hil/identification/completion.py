@@ -25,6 +25,7 @@ SMOOTH_S = 0.021  # window of the derivatives of the motor position: passes some
 _SHORTEST = 5  # rows of a parabola: the fewest that average noise on both sides
 _REST = 5.0  # speed at rest in standard deviations of its noise: one row in a million is above
 _SLOW = 1e-3  # of the top speed: below lies rest, as for set-points (`noise.moving`)
+RESAMPLED = "resampled"  # key of the metadata: the rows are not those of the control loop
 DERIVED = "derived"  # key of the metadata: channel -> how it was derived
 FROM_BENCH = "inertia and friction of the bench over the measured motion; not measured"
 
@@ -75,14 +76,27 @@ def completed(recording: Recording, bench: Bench) -> Recording:
 def reduced(bench: Bench, recordings: Sequence[Recording]) -> Bench:
     """The part of a bench without a control law that recordings can judge.
 
-    It has the period of the recordings, and no table encoder unless all have both positions: the sum of a velocity
-    drifts, so that it cannot be compared with the table.
+    It has the period of the recordings, and the delay of the torque is estimated unless rows are ticks. It has no table
+    encoder unless all recordings have both positions: the sum of a velocity drifts, so that it cannot be compared with
+    the table.
     """
     if bench.law_known or not recordings:
         return bench
     if not all({run.axis.motor_position, run.axis.table_position} <= set(run.columns) for run in recordings):
         bench = bench.model_copy(update={"encoders": bench.encoders.model_copy(update={"table": None})})
-    return bench.sampled(recordings[0].period_s)
+    bench = bench.sampled(recordings[0].period_s)
+    if bench.torque_delay_s is None and not all(rows_are_ticks(run) for run in recordings):
+        bench = bench.model_copy(update={"control": bench.control.model_copy(update={"torque_delay_s": 0.0})})
+    return bench
+
+
+def rows_are_ticks(recording: Recording) -> bool:
+    """True if the rows are the ticks of the drive, so that the torque of a row acts until the next one.
+
+    Rows of an imported file, or rows that were interpolated or left out, are samples of a torque that changes between
+    them.
+    """
+    return "source" not in recording.metadata and not recording.metadata.get(RESAMPLED)
 
 
 def torque_is_measured(recording: Recording) -> bool:

@@ -1,9 +1,10 @@
 """Recordings of one axis prepared for a fit: observer, noise and model discrepancy of each residual."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
 from scipy.signal import lfilter
 
 from hil.arrays import FloatArray
@@ -11,6 +12,7 @@ from hil.bench.bench_file import Bench
 from hil.errors import InputError
 from hil.identification.measured import Measured
 from hil.identification.noise import Laps
+from hil.twin.axis import Response, Start
 
 # Torque resolved by the motor channel over the noise of the torque channel. A fine encoder resolves less, but there lie
 # details below the material size too: friction at zero speed, the side force of a lead error.
@@ -23,6 +25,9 @@ DISCREPANCY = 0.005
 # start converges; below two ticks the sampled observer is unstable on an elastic axis. Slow: a coarse encoder still
 # resolves the torque.
 FASTEST_OBSERVER_TICKS, FASTEST_OBSERVER_S, SLOWEST_OBSERVER_S = 2.0, 0.002, 0.008
+
+_NEAR_ROWS = 21  # within which a motor that is not at rest passes more than a step
+_REMEMBERED_S = 0.3  # of an impulse: elastic modes of a machine axis have decayed
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,9 +123,57 @@ def scales(
     if run.table_m.size:
         deflection_m = run.table_m - bench.axis.ratio_m_rad * run.motor
         table = np.hypot(table, discrepancy * (deflection_m - np.median(deflection_m)))
-    return {
+    found = {
         "motor": np.hypot(run.motor_noise * np.linalg.norm(passed), seen),
         "table": table,
         "torque": torque,
         "command": torque,
     }
+    if run.sampled:
+        unknown = unknown_torque(run, bench)
+        for name, response in impulse_responses(run, bench, observer_s).items():
+            found[name] = np.sqrt(found[name] ** 2 + np.convolve(unknown**2, response**2)[: rows[0]])
+    if run.noise.coarse:
+        held = bench.axis.physics().coulomb_n_m * observer_s**2 / inertia(bench)
+        found["motor"] = np.hypot(found["motor"], np.where(run.creeping, held, 0.0))
+    return found
+
+
+def unknown_torque(run: Measured, bench: Bench) -> FloatArray:
+    """Standard deviation (n,) of the torque from row to row that samples of it leave open [motor unit].
+
+    It is `Measured.torque_gap`, and that of Coulomb friction, whose sign is not known where the direction of motion
+    changes between neighbouring rows.
+    """
+    direction = np.sign(np.diff(run.motor, append=run.motor[-1]))
+    turning = maximum_filter1d(np.diff(direction, prepend=direction[0]) != 0.0, 3)
+    step = np.sqrt(12.0) * run.noise.motor
+    moved = maximum_filter1d(run.motor, _NEAR_ROWS) - minimum_filter1d(run.motor, _NEAR_ROWS)
+    unsure = turning & (moved > 1.5 * step)  # not at rest
+    return np.asarray(np.hypot(run.torque_gap, np.where(unsure, bench.axis.physics().coulomb_n_m, 0.0)))
+
+
+def impulse_responses(run: Measured, bench: Bench, observer_s: float) -> dict[str, FloatArray]:
+    """Change of the block residuals (m,) from the tick on at which the torque is 1 more than recorded for one tick.
+
+    It is that of the axis of the bench without friction, in motion.
+    """
+    twin = bench.twin()
+    twin = replace(
+        twin, physics=replace(twin.physics, coulomb_n_m=0.0, viscous_n_m_s_rad=0.0), active=(), observer_s=observer_s
+    )
+    ticks = round(_REMEMBERED_S / run.period_s) + 3
+    ratio, speed = bench.axis.ratio_m_rad, float(np.max(np.abs(np.diff(run.motor)), initial=1e-9)) / run.period_s
+    motor = speed * run.period_s * np.arange(ticks, dtype=np.float64)
+    command = np.zeros(ticks)
+    table = ratio * motor if run.table_m.size else np.zeros(0)
+    measured = Response(motor, table, command, command)
+    start = Start(velocity_m_s=ratio * speed)
+    still = np.zeros(ticks)
+    quiet = twin.observe(still, still, measured, start)
+    kicked = twin.observe(still, still, measured._replace(torque_command=np.eye(1, ticks, 1)[0]), start)
+    moved = kicked.motor_position - quiet.motor_position
+    found = {"motor": moved[1:]}
+    if run.table_m.size:
+        found["table"] = (kicked.table_position_m - quiet.table_position_m - ratio * moved)[1:]
+    return found

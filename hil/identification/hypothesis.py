@@ -21,6 +21,7 @@ from hil.identification.residuals import Residuals, differences
 from hil.identification.terms import Term, push_n, repeats
 from hil.twin.axis import COARSE_STEP_S, FINE_STEP_S, Response, Twin
 from hil.twin.library import BY_ID
+from hil.twin.mechanisms.channel_time_skew import delayed_mean
 from hil.twin.parameter import Parameter, Role
 from hil.twin.physics import Active
 
@@ -36,6 +37,9 @@ SEARCH_STEPS_S = (100e-6, 500e-6)
 # Bound of nominal parameters over the bench file, as a factor: beyond it lie minima in which implausible parameters
 # compensate for a wrong structure.
 TRUST = 3.0
+# Delay of a recorded torque whose rows are not the ticks of the drive. A mean over the tick before or after a row, or
+# a sample of it, shifts it by up to a row and a half.
+DELAY, MOST_DELAY = "torque_delay_s", 1.5
 
 
 @dataclass(frozen=True)
@@ -141,7 +145,12 @@ class Hypothesis:
     @property
     def nominal_count(self) -> int:
         """Number of nominal parameters at the beginning of x."""
-        return len(self.bench.axis.NOMINAL)
+        return len(self.nominal)
+
+    @property
+    def nominal(self) -> tuple[str, ...]:
+        """Names of the nominal parameters: of the axis, and the delay of the torque where the bench leaves it open."""
+        return self.bench.axis.NOMINAL if self.bench.torque_delay_s is None else (*self.bench.axis.NOMINAL, DELAY)
 
     @property
     def free(self) -> int:
@@ -164,6 +173,9 @@ class Hypothesis:
                 continue
             scale = value if value > 0.0 else 1e-3
             found.append(Coordinate(name, scale, True, scale / TRUST, scale * TRUST))
+        if DELAY in self.nominal:
+            period_s = self.bench.period_s
+            found.append(Coordinate(DELAY, period_s, False, -MOST_DELAY * period_s, MOST_DELAY * period_s))
         for index, term in enumerate(self.terms):
             for parameter, start in zip(BY_ID[term.effect].parameters, term.values, strict=True):
                 positive = parameter.low > 0.0
@@ -176,6 +188,7 @@ class Hypothesis:
     @cached_property
     def _initial(self) -> FloatArray:
         starts = [float(getattr(self.bench.axis, name)) or None for name in self.bench.axis.NOMINAL]
+        starts += [self.bench.torque_delay_s] if DELAY in self.nominal else []
         values = [*starts, *(value for term in self.terms for value in term.values)]
         return np.array(
             [c.x(c.scale if value is None else value) for c, value in zip(self.coordinates, values, strict=True)]
@@ -192,7 +205,7 @@ class Hypothesis:
         step = CHATTER_STEP if self._chatters else 1e-4
         angle_rad = travel_m / self.bench.axis.ratio_m_rad * self.bench.axis.physics().angle_per_unit
         starts = [value for term in self.terms for value in term.values]
-        found = [max(step, 1e-3) if name == "damping_ratio" else step for name in self.bench.axis.NOMINAL]
+        found = [max(step, 1e-3) if name in ("damping_ratio", DELAY) else step for name in self.nominal]
         for coordinate, start in zip(self.coordinates[self.nominal_count :], starts, strict=True):
             own = step
             if coordinate.role is Role.PERIOD:
@@ -225,7 +238,11 @@ class Hypothesis:
         terms = tuple(
             replace(term, values=tuple(self.values[self.columns(index)])) for index, term in enumerate(self.terms)
         )
-        return Resolved(self.bench.model_copy(update={"axis": self.bench.axis.model_copy(update=nominal)}), terms)
+        changed: dict[str, object] = {"axis": self.bench.axis.model_copy(update=nominal)}
+        if DELAY in self.nominal:
+            delay_s = self.values[len(self.bench.axis.NOMINAL)]
+            changed["control"] = self.bench.control.model_copy(update={DELAY: delay_s})
+        return Resolved(self.bench.model_copy(update=changed), terms)
 
     @cached_property
     def kept(self) -> tuple[MechanismEntry, ...]:
@@ -262,7 +279,12 @@ class Hypothesis:
         """Measured less twin with each block fed measured inputs, per channel (n,); 0 for channels that are unseen."""
         twin = self.twin(observer_s, fast, run)
         measured = twin.undelayed(run.response)
-        predicted = twin.observe(run.position_command_m, run.velocity_command_m_s, measured, run.start)
+        if DELAY in self.nominal:
+            periods = (self.resolved.bench.torque_delay_s or 0.0) / run.period_s
+            command, torque = (delayed_mean(values, periods) for values in (measured.torque_command, measured.torque))
+            measured = measured._replace(torque_command=command, torque=torque)
+        resting = run.creeping if run.noise.coarse else None
+        predicted = twin.observe(run.position_command_m, run.velocity_command_m_s, measured, run.start, resting)
         found = differences(measured, predicted, self.bench, run.judged)
         found["command"] = measured.torque_command - predicted.torque_command
         return found | {name: np.zeros(run.motor.size) for name in run.unseen}

@@ -12,6 +12,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d
 
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
@@ -19,13 +20,14 @@ from hil.bench.hardware import DriveMode
 from hil.channels import AxisKind
 from hil.control import cascade
 from hil.errors import InputError
-from hil.identification.completion import completed, position_is_measured, torque_is_measured
+from hil.identification.completion import completed, position_is_measured, rows_are_ticks, torque_is_measured
 from hil.identification.noise import Laps, Noise, estimate_noise, find_laps, moving, white_noise
 from hil.recording.recording import Recording, check_finite
 from hil.twin.axis import Response, Start
 
 Channels = tuple[FloatArray, FloatArray, FloatArray, FloatArray]  # as control.replay takes them
 
+CREEP_S = 0.008  # time constant of the slowest observer
 SETTLE_S = 0.05  # not evaluated at the start: several time constants of the observer, for errors of the initial state
 _REPLAYED_ROWS = 200  # to find the phase of the position loop: many of its ticks
 _FITTED_ROWS = 11  # motor positions fitted by a parabola for the first velocity: averages encoder counts
@@ -50,6 +52,26 @@ class Measured:
     left_out: int = 0  # rows of the recording before the first tick of the position loop
     unseen: frozenset[str] = frozenset()  # channels of the twin whose input or output is unknown: their residual is 0
     integrated: bool = False  # the motor position is the sum of its measured velocity
+    sampled: bool = False  # the rows are samples of the torque, which changes between them
+
+    @cached_property
+    def torque_gap(self) -> FloatArray:
+        """Standard deviation (n,) of the mean torque from a row to the next one, given samples of it at both.
+
+        The torque changes between them at a time that is not known: the mean is uniform between both values.
+        """
+        return np.asarray(np.abs(np.diff(self.torque_command, append=self.torque_command[-1])) / np.sqrt(12.0))
+
+    @cached_property
+    def creeping(self) -> NDArray[np.bool_]:
+        """Rows (n,) at which the motor passes less than a step of its recorded position within `CREEP_S`.
+
+        The state of friction is not known there: an observer may rest anywhere within the band in which friction holds
+        it.
+        """
+        rows = max(round(CREEP_S / self.period_s), 1)
+        passed = np.abs(np.convolve(np.gradient(self.motor), np.ones(rows), mode="same"))
+        return np.asarray(maximum_filter1d(passed < np.sqrt(12.0) * self.noise.motor, 8 * rows + 1), dtype=np.bool_)
 
     @property
     def time_s(self) -> FloatArray:
@@ -152,6 +174,7 @@ def take(recording: Recording, bench: Bench) -> Measured:
         first,
         _unseen(recording, bench),
         integrated,
+        not bench.law_known and torque_is_measured(recording) and not rows_are_ticks(recording),
     )
 
 

@@ -12,7 +12,9 @@ from scipy.signal import correlate, find_peaks
 
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
+from hil.identification.quantum import count_of
 
+_COARSER = 1.5  # factor of a recorded step over the count of the bench: one count, seen with noise, is below
 _DIGITS = 1e-7  # of the largest value: rounding of a recording in single precision, the least noise of a torque
 
 
@@ -20,7 +22,8 @@ _DIGITS = 1e-7  # of the largest value: rounding of a recording in single precis
 class Noise:
     """Standard deviation of the white noise of a sensor: motor [rad or m], table [m], torque [N m or N].
 
-    `motor` is the noise of its travel per period if its velocity was recorded in place of its position.
+    `motor` is the noise of its travel per period if its velocity was recorded in place of its position. `coarse`: the
+    recorded steps of the motor position are coarser than the counts of the bench.
 
     `table_m` is that of table position less r x motor position, 0 without a linear encoder. `jitter_s` is that of the
     sampling instants of the encoders: its position error is proportional to the speed and equal for both.
@@ -30,6 +33,7 @@ class Noise:
     table_m: float
     torque: float
     jitter_s: float = 0.0
+    coarse: bool = False
 
 
 def estimate_noise(
@@ -41,15 +45,26 @@ def estimate_noise(
     torque: FloatArray,
     period_s: float,
 ) -> Noise:
-    """Estimate sensor noise from channels (n,) in motor units, at least that of counting: count / sqrt(12)."""
-    motor_noise, table_noise = max(white_noise(motor), bench.motor_count / np.sqrt(12.0)), 0.0
+    """Estimate sensor noise from channels (n,) in motor units, at least that of counting: count / sqrt(12).
+
+    The count is that of the bench, or that of the recording if it is coarser.
+    """
+    count = _count(motor, bench.motor_count)
+    motor_noise, table_noise = max(white_noise(motor), count / np.sqrt(12.0)), 0.0
     if table.size and bench.encoders.table is not None:
         ratio_m = bench.axis.ratio_m_rad
-        counting = np.hypot(bench.encoders.table.resolution_m, ratio_m * bench.motor_count) / np.sqrt(12.0)
+        counting = np.hypot(_count(table, bench.encoders.table.resolution_m), ratio_m * count) / np.sqrt(12.0)
         table_noise = max(white_noise(table - ratio_m * motor), float(counting))
     of_torque = white_noise(torque) if np.array_equal(command, torque) else _coloured(torque - command)
     of_torque = max(of_torque, _DIGITS * float(np.max(np.abs(torque), initial=0.0)))
-    return Noise(motor_noise, table_noise, of_torque, _jitter_s(motor, velocity, motor_noise, period_s))
+    jitter_s = _jitter_s(motor, velocity, motor_noise, period_s)
+    return Noise(motor_noise, table_noise, of_torque, jitter_s, coarse=count > bench.motor_count)
+
+
+def _count(values: FloatArray, of_bench: float) -> float:
+    """Count of a channel (n,): that of the bench, or the step of the values if it is clearly coarser."""
+    step = count_of(values) or 0.0
+    return step if step > _COARSER * of_bench else of_bench
 
 
 def moving(velocity: FloatArray) -> NDArray[np.bool_]:
@@ -109,6 +124,7 @@ _LAGS = 6  # strongest peaks of the correlation that are tried: each row counts 
 _NEAR = 30  # rows about a peak of the correlation that are searched: the shrinking overlap shifts a peak by a few
 _SAME_M = 2e-6  # set-points closer than this are the same: printed ones are rounded to 1 µm
 _SETTLED_S = 0.3  # set-points must have been equal for this time: friction and play depend on the past
+_LAP_ROWS = 500  # of a block: longer than the response of an axis, shorter than a lap
 _ENOUGH_S = 1.0  # least repeated motion: 1000 rows at 1 kHz give the floor to a few per cent
 
 
@@ -120,9 +136,18 @@ class Laps:
     again: Rows
     lag_s: float  # the lag with the most rows
 
-    def noise(self, residual: FloatArray) -> float:
+    def difference(self, residual: FloatArray) -> float:
         """Standard deviation of the non-repeating part of a residual (n,)."""
         return float(np.sqrt(np.mean((residual[self.first] - residual[self.again]) ** 2) / 2.0))
+
+    def noise(self, residual: FloatArray) -> float:
+        """Standard deviation of the part of a residual (n,) that neither repeats nor has structure in time.
+
+        A push in one lap does not repeat either, but is no noise: the median over blocks of rows leaves it out.
+        """
+        squares = (residual[self.first] - residual[self.again]) ** 2 / 2.0
+        blocks = squares[: squares.size // _LAP_ROWS * _LAP_ROWS].reshape(-1, _LAP_ROWS).mean(axis=1)
+        return min(float(np.sqrt(np.median(blocks))), self.difference(residual)) if blocks.size else 0.0
 
 
 def find_laps(position: FloatArray, velocity: FloatArray, period_s: float) -> Laps | None:

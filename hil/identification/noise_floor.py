@@ -4,7 +4,8 @@ If the same set-points repeat after a lag p, the repeatable motion cancels:
 
     sigma^2 = mean (r_k - r_{k+p})^2 / 2        over all rows k whose set-points repeat
 
-sigma is the non-repeatable part of the residual r; the repeatable part is physics that the twin lacks. In closed loop
+sigma is the non-repeatable part of the residual r; the repeatable part is physics that the twin lacks. The mean is the
+median over blocks of rows: an event in one lap does not repeat either, but is no noise. In closed loop
 the noise of the encoders moves the axis: see `noise_response`.
 """
 
@@ -115,7 +116,7 @@ def unrepeated(hypothesis: Hypothesis, data: Dataset) -> float:
     residuals = hypothesis.residuals(data)
     least = 0.0 if hypothesis.bench.law_known else 1.0
     return sum(
-        max(laps.noise(values) ** 2, least) * laps.first.size
+        max(laps.difference(values) ** 2, least) * laps.first.size
         for run, laps in data.laps
         for values in residuals.over_noise(run).values()
     )

@@ -152,18 +152,42 @@ class Twin:
         velocity_command_m_s: FloatArray,
         measured: Response,
         start: Start = _AT_REST,
+        resting: NDArray[np.bool_] | None = None,
     ) -> Response:
         """Simulate the axis block by block, each on measured inputs; see `hil.twin.stepping.loops`.
 
-        `measured.table_position_m` is empty without a linear encoder. Recorded lateness of a channel must
-        have been undone, see `undelayed`.
+        `measured.table_position_m` is empty without a linear encoder. `resting` (n,) marks the rows at which the motor
+        rests; by default those at which its measured position hardly changes. Recorded lateness of a channel must have
+        been undone, see `undelayed`.
         """
         setpoints = loops.Setpoints(position_command_m, velocity_command_m_s)
+        if resting is None:
+            passed = np.abs(np.diff(measured.motor_position, prepend=measured.motor_position[:1]))
+            resting = passed <= self._arrays[0][0]["slow_velocity"] * self.gains.period_s
         channels = loops.observe(
-            self.loop_gains, self._controller(start), setpoints, Response(*measured), self.push_n, self._axis(start)
+            self.loop_gains,
+            self._controller(start),
+            setpoints,
+            Response(*measured),
+            resting,
+            self.push_n,
+            self._axis(start),
         )
         # lateness of an input is taken back, that of the answer is simulated
         return self._recorded(Response(*channels), lambda variant: variant.name == _ANSWER)
+
+    def command(
+        self,
+        position_command_m: FloatArray,
+        velocity_command_m_s: FloatArray,
+        measured: Response,
+        start: Start = _AT_REST,
+    ) -> FloatArray:
+        """Torque command (n,) of the controller alone, fed measured inputs as in `observe`."""
+        setpoints = loops.Setpoints(position_command_m, velocity_command_m_s)
+        return np.asarray(
+            loops.replay_law(self.loop_gains, self._controller(start), setpoints, Response(*measured)), dtype=np.float64
+        )
 
     def undelayed(self, measured: Response) -> Response:
         """Undo the lateness that active mechanisms give to measured inputs."""

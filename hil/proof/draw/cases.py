@@ -22,7 +22,10 @@ _STEPS = 8  # of scaling
 
 @dataclass(frozen=True, eq=False)
 class CaseDraft:
-    """A case before it is recorded, with its right answer: effects and their sizes, the one to be found first."""
+    """A case before it is recorded, with its right answer: effects and their sizes, the one to be found first.
+
+    `forgotten`: the way of `less_known.WAYS` in which less is known than was recorded; empty if all is known.
+    """
 
     axis: DrawnAxis
     runs: Runs
@@ -30,6 +33,7 @@ class CaseDraft:
     effects: tuple[tuple[Effect | EncoderFault, float], ...] = ()
     rivals: tuple[str, ...] = ()
     not_testable: tuple[str, ...] = ()
+    forgotten: str = ""
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,6 +22,7 @@ from hil.proof.draw.axes import DrawnAxis
 from hil.proof.draw.axis_kinds import Kind
 from hil.proof.draw.cases import CaseDraft
 from hil.proof.draw.effects import LIBRARY
+from hil.proof.draw.less_known import forget
 from hil.proof.draw.tiers import RECIPES
 from hil.proof.draw.unknown_effects import NOVEL
 from hil.recording.recording import Recording, write_parquet
@@ -29,7 +30,14 @@ from hil.twin.library import names_of
 from hil.twin.parameter import Role
 
 TIERS = tuple(RECIPES)
-BALANCED = {"single": LIBRARY, "ladder": LIBRARY, "pair": LIBRARY, "masked": LIBRARY, "novel": NOVEL}
+BALANCED = {
+    "single": LIBRARY,
+    "ladder": LIBRARY,
+    "pair": LIBRARY,
+    "masked": LIBRARY,
+    "novel": NOVEL,
+    "less_known": LIBRARY,
+}
 RECORDINGS = ("train_1", "train_2", "holdout")
 _AXES = 300  # draws before a request counts as impossible
 # An engineer would stop an axis with more than this following error beyond that of the law, or share of limited torque.
@@ -86,6 +94,7 @@ class Truth:
     true_parameters: Mapping[str, Any]
     believed_parameters: Mapping[str, Any]
     noise: Mapping[str, float]
+    forgotten: str = ""  # what is not known, of `less_known.WAYS`
 
     @property
     def lead_m(self) -> float:
@@ -135,10 +144,10 @@ def draw(tier: str, number: int, seed: int, effect: str | None = None, axis: Kin
             rerun(draft, run, int(rng.integers(2**31)), name) for name, run in zip(RECORDINGS, draft.runs, strict=True)
         ]
         if all(_sound(recording, draft.axis) for recording in recordings):
-            name = f"case_{number:04d}"
-            return DrawnCase(
-                name, tuple(recordings), draft.axis.bench, truth_of(name, tier, number, seed, draft), draft
-            )
+            name, bench = f"case_{number:04d}", draft.axis.bench
+            if draft.forgotten:
+                recordings, bench = forget(draft.forgotten, recordings, bench, rng)
+            return DrawnCase(name, tuple(recordings), bench, truth_of(name, tier, number, seed, draft), draft)
     raise ValueError(
         f"tier {tier}: given {effect} on {axis or 'any axis'}, which gave no case on {_AXES} axes; "
         "leave the effect or the axis out"
@@ -188,7 +197,9 @@ def truth_of(name: str, tier: str, number: int, seed: int, draft: CaseDraft) -> 
         for effect, size in draft.effects
     )
     answer = (draft.verdict, concealed, draft.rivals, draft.not_testable)
-    return Truth(name, tier, number, seed, axis.kind, *answer, dict(axis.true), dict(axis.believed), noise)
+    return Truth(
+        name, tier, number, seed, axis.kind, *answer, dict(axis.true), dict(axis.believed), noise, draft.forgotten
+    )
 
 
 def _turn(names: tuple[str, ...], number: int, seed: int) -> str:

@@ -20,6 +20,7 @@ FULL: Mapping[str, int] = MappingProxyType(
         "ladder": 140,
         "ambiguous": 60,
         "insufficient": 60,
+        "less_known": 120,
     }
 )
 # MuJoCo moves two-mass axes: three of each effect that its model has.

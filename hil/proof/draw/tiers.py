@@ -4,6 +4,7 @@ A recipe returns None if its draws failed on this axis; the next call draws anot
 """
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from math import inf
 
 from hil.proof.draw import motions
@@ -14,6 +15,7 @@ from hil.proof.draw.cases import TRIES, CaseDraft, at_size, name_on, one, stage,
 from hil.proof.draw.effect_size import EffectSizes
 from hil.proof.draw.effects import applicable, draw_effect
 from hil.proof.draw.expected import block, inseparable, same_law
+from hil.proof.draw.less_known import possible
 from hil.proof.draw.unknown_effects import NOVEL, EncoderFault, draw_novel, novel
 
 Recipe = Callable[[Rng, str | None, Kind | None], CaseDraft | None]
@@ -22,6 +24,7 @@ RUNGS = (0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 5.0, 8.0, 13.0, 20.0, 30.0)
 _MASKED = (1.0, 6.0)  # sizes of the masked effect
 _MASKING = (4.0, 100.0)  # ratio of the masking effect to it
 _NOVEL = (3.0, 100.0)
+_CLEAR = (5.0, 100.0)  # where less is known, so that the effect stands out of what is left open
 _INVISIBLE = 5.0  # sum of squares over the noise's variance: below half of the threshold of any test
 _OTHER_BLOCK = 0.8  # share of the pairs whose effects lie in different blocks
 
@@ -118,6 +121,17 @@ def insufficient(rng: Rng, effect: str | None, kind: Kind | None) -> CaseDraft |
     return None
 
 
+def less_known(rng: Rng, effect: str | None, kind: Kind | None) -> CaseDraft | None:
+    """Conceal one clear effect and forget a part of what is known; it is to be named, or said not to be testable."""
+    on = stage(rng, kind)
+    name = name_on(on.axis, effect, kind is not None, rng)
+    draft = one(rng, on, name, _CLEAR) if name else None
+    if name is None or draft is None:
+        return None
+    ways = possible(on.axis)
+    return replace(draft, not_testable=same_law(name), forgotten=ways[int(rng.integers(len(ways)))])
+
+
 def _nothing(rng: Rng, effect: str | None, kind: Kind | None, belief: Belief, verdict: str) -> CaseDraft:
     if effect is not None:
         raise ValueError(f"effect: must be left out where nothing is concealed, got {effect!r}")
@@ -135,4 +149,5 @@ RECIPES: Mapping[str, Recipe] = {
     "novel": novel_physics,
     "ambiguous": ambiguous,
     "insufficient": insufficient,
+    "less_known": less_known,
 }

@@ -141,6 +141,8 @@ class GradedCase:
             return self.set_reported and not self.spurious
         if self.truth.tier == "insufficient":
             return self.called_untestable and not self.answer.named
+        if self.truth.tier == "less_known" and self.called_untestable:
+            return not self.answer.named
         if not self.truth.effects or self.truth.tier == "novel":
             return self.answer.verdict == self.truth.verdict and not self.answer.named
         if not self.above_floor and not self.answer.named:

@@ -96,7 +96,7 @@ def _goals(
     """Return all goals with their figures; `found`: confidence of each finding and whether it is right."""
     tier = {name: [case for case in cases if case.truth.tier == name] for name in TIERS}
     nulls, wrong, singles, pairs = tier["null"], tier["parameters_only"], tier["single"], tier["pair"]
-    novel, ambiguous, poor = tier["novel"], tier["ambiguous"], tier["insufficient"]
+    novel, ambiguous, poor, less = tier["novel"], tier["ambiguous"], tier["insufficient"], tier["less_known"]
     effects = by_effect(singles, lambda case: case.top)
     worst = min(effects, key=lambda effect: effects[effect].value or 0.0, default="")
     right = [case for case in singles if case.top]
@@ -143,6 +143,8 @@ def _goals(
         Goal("ambiguous: resolved by motion", rate(case.resolved for case in ambiguous), low=0.90),
         Goal("insufficient: called not testable", rate(case.called_untestable for case in poor)),
         Goal("insufficient: something named", rate(case.names_something for case in poor)),
+        Goal("less known: named or not testable", rate(case.top or case.called_untestable for case in less), low=0.90),
+        Goal("less known: a spurious name", rate(case.names_too_much for case in less)),
     ]
 
 

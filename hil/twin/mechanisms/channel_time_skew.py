@@ -24,10 +24,10 @@ def _late_table(channels: Channels, parameters: Sequence[float], period_s: float
 
 def _late_torque(channels: Channels, parameters: Sequence[float], period_s: float) -> Channels:
     motor, table, command, torque = channels
-    return motor, table, command, _delayed_mean(torque, parameters[0] / period_s)
+    return motor, table, command, delayed_mean(torque, parameters[0] / period_s)
 
 
-def _delayed_mean(means: FloatArray, periods: float) -> FloatArray:
+def delayed_mean(means: FloatArray, periods: float) -> FloatArray:
     """Delay means over each period (n,) of a held quantity by a number of periods; the ends are held."""
     whole = math.floor(periods)
     f, last = periods - whole, means.size - 1

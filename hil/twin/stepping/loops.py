@@ -74,15 +74,45 @@ def closed_loop(gains, state, setpoints, misread, measured_table, push, axis):  
     return motor, table, command, torque
 
 
+@njit(**COMPILE)
+def _follow(gains, state, inputs, command, period):  # type: ignore[no-untyped-def]
+    """Compute one tick of the controller on recorded inputs, and let its integrator follow the recorded `command`:
+    rounding of recorded set-points accumulates in it."""
+    state, outputs = _control_step(gains, state, inputs)
+    wanted = outputs.torque_n_m
+    resumed = state.integral_n_m + period / INTEGRATOR_S * (command - wanted)
+    state = cascade.State(
+        state.tick,
+        state.velocity_reference_m_s,
+        resumed,
+        state.previous_motor_rad,
+        state.previous2_motor_rad,
+        state.filtered_velocity_rad_s,
+    )
+    return state, wanted
+
+
 @njit(cache=True, nogil=True, **COMPILE)
-def observe(gains, state, setpoints, measured, push, axis):  # type: ignore[no-untyped-def]
+def replay_law(gains, state, setpoints, measured):  # type: ignore[no-untyped-def]
+    """Run the controller alone on measured inputs (a `Response`), as `observe` does: torque command (n,)."""
+    command, motor, table = measured.torque_command, measured.motor_position, measured.table_position_m
+    seen = motor * gains.ratio_m_rad if table.size == 0 else table
+    wanted = np.empty(command.size)
+    for k in range(command.size):
+        inputs = cascade.Inputs(setpoints.position_m[k], setpoints.velocity_m_s[k], motor[k], seen[k])
+        state, wanted[k] = _follow(gains, state, inputs, command[k], gains.period_s)
+    return wanted
+
+
+@njit(cache=True, nogil=True, **COMPILE)
+def observe(gains, state, setpoints, measured, resting, push, axis):  # type: ignore[no-untyped-def]
     """Run each block on measured inputs (a `Response`): motor, table, torque command, torque, each (n,).
 
     The controller gets the measured positions, the drive the measured command, the axis that torque, and the
     transmission the measured motor: the twin's motor is corrected by it after each prediction, its table only while
     it floats in a gap or rests. So a mismatch shows in its own block, at its own place and time, and is then
-    forgotten. The measured table is empty without a linear encoder. Its datum is the mean difference from the twin
-    while the axis moves. `push` as in `closed_loop`.
+    forgotten. `resting` (n,) marks the rows at which the motor rests. The measured table is empty without a linear
+    encoder. Its datum is the mean difference from the twin while the axis moves. `push` as in `closed_loop`.
     """
     constants, modes, values, codes, delta, memory = axis
     c, own, shapes = constants[0], memory[0], shapes_of(modes)
@@ -98,23 +128,11 @@ def observe(gains, state, setpoints, measured, push, axis):  # type: ignore[no-u
     for k in range(n):
         motor[k], table[k] = _read(constants, modes, values, codes, delta, memory)
         inputs = cascade.Inputs(setpoints.position_m[k], setpoints.velocity_m_s[k], measured_motor[k], seen[k])
-        state, outputs = _control_step(gains, state, inputs)
-        wanted[k] = outputs.torque_n_m
-        # rounding of recorded set-points accumulates in the integrator: forget it
-        resumed = state.integral_n_m + c.period / INTEGRATOR_S * (command[k] - wanted[k])
-        state = cascade.State(
-            state.tick,
-            state.velocity_reference_m_s,
-            resumed,
-            state.previous_motor_rad,
-            state.previous2_motor_rad,
-            state.filtered_velocity_rad_s,
-        )
+        state, wanted[k] = _follow(gains, state, inputs, command[k], c.period)
         error = measured_motor[k] - motor[k]
         _correct(shapes.motor_impulse, error, c.period, c.observer, delta)
         if measured_table.size:
-            passed = abs(measured_motor[k] - measured_motor[max(k - 1, 0)])
-            free = passed <= c.slow_velocity * c.period or own.floating > 0.0
+            free = resting[k] or own.floating > 0.0
             apart = measured_table[k] - table[k] - c.ratio * error
             if not free:
                 moved += 1

@@ -14,6 +14,7 @@ from hil.diagnosis.verdict.fit_table import fit_table
 from hil.identification.dataset import prepare_dataset
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.measured import Measured, take
+from hil.identification.noise import Laps
 from hil.identification.noise_floor import floor, noise_response
 from hil.identification.terms import Term
 from hil.proof.draw.generator import draw, rerun
@@ -127,3 +128,14 @@ def test_a_loop_that_sticks_and_slips_has_no_noise_of_its_own_making() -> None:
     assert set(noise_response(wrong.hypothesis, run).values()) == {0.0}
     table = fit_table(wrong, wrong, wrong, dataset([], bench()))["table_position_m"]
     assert table.train.after_rms > 50.0 * table.train.noise_floor_rms
+
+
+def test_a_push_in_one_lap_is_no_noise() -> None:
+    rng, rows = np.random.default_rng(3), np.arange(12_000)
+    laps = Laps(rows, rows + 12_000, 12.0)
+    residual = 0.2 * rng.standard_normal(24_000)
+    calm = laps.noise(residual)
+    residual[3_000:4_500] += 5.0
+    assert calm == pytest.approx(0.2, rel=0.03)
+    assert laps.noise(residual) == pytest.approx(0.2, rel=0.03)
+    assert laps.difference(residual) > 1.0

@@ -125,5 +125,6 @@ def test_confidence_tells_a_sure_name_from_a_guess() -> None:
     assert confidence(1.0, 10.0, 1e4) > 0.95
     assert confidence(1.0, 1.01, 1e4) < 0.8
     assert confidence(1.6, 1.05, 1e4) < 0.8
-    assert confidence(8.0, 10.0, 1e4) < 0.2
+    assert confidence(8.0, 1.05, 1e4) < 0.2
+    assert confidence(8.0, 46.0, 1e4) > 0.95  # there, though much is left unexplained
     assert confidence(1.0, 10.0, 10.0) < confidence(1.0, 10.0, 1e3)

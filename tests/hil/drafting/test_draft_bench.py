@@ -16,8 +16,8 @@ from hil.commands.identify import identify
 from hil.commands.import_ import import_
 from hil.drafting.bench_text import bench_text
 from hil.drafting.draft_bench import draft_bench
-from hil.drafting.sensor_values import count_of
 from hil.errors import InputError
+from hil.identification.quantum import count_of
 from hil.recording.recording import Recording
 
 AXIS = axis(rows=8000)

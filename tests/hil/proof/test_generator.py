@@ -31,7 +31,7 @@ from hil.twin.library import BY_ID
 QUICK: dict[str, tuple[int, Kind | None]] = {
     "single": (1, "two_mass"), "ladder": (2, "two_mass"), "pair": (1, "one_mass"), "null": (1, "serial_chain"),
     "parameters_only": (1, "seven_dof"), "masked": (4, "two_mass"), "novel": (1, "two_mass"),
-    "ambiguous": (19, None), "insufficient": (5, "one_mass")}  # fmt: skip
+    "ambiguous": (19, None), "insufficient": (5, "one_mass"), "less_known": (1, "two_mass")}  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -139,7 +139,8 @@ def test_the_truth_is_plain_data_and_says_what_is_right(cases: dict[str, DrawnCa
     counts = {"null": (0,), "parameters_only": (0,), "pair": (2,), "masked": (1, 2)}
     assert len(truth.effects) in counts.get(tier, (1,))
     assert bool(truth.rivals) == (tier == "ambiguous")
-    assert bool(truth.not_testable) == (tier == "insufficient")
+    assert bool(truth.not_testable) == (tier in ("insufficient", "less_known"))
+    assert bool(truth.forgotten) == (tier == "less_known")
     for concealed in truth.effects:
         assert (concealed.same_law == ()) == (tier == "novel")
         if tier != "novel":
@@ -247,7 +248,7 @@ def test_a_base_is_compared_by_the_mass_that_acts_like_it() -> None:
 
 
 @pytest.mark.parametrize(("arguments", "says"), [
-    ({"tier": "easy"}, r"tier: must be one of single, .*insufficient, got 'easy'"),
+    ({"tier": "easy"}, r"tier: must be one of single, .*insufficient, less_known, got 'easy'"),
     ({"tier": "single", "effect": "backslash"}, r"effect: must be one of .*backlash.*, got 'backslash'"),
     ({"tier": "single", "effect": "backlash", "axis": "one_mass"}, r"effect: must be one of .*, got 'backlash'"),
     ({"tier": "null", "effect": "backlash"}, r"effect: must be left out where nothing is concealed"),

@@ -1,0 +1,25 @@
+"""Step of a quantised channel, as its values show it."""
+
+import numpy as np
+
+from hil.arrays import FloatArray
+
+_WHOLE = 0.05  # deviation from a whole number of steps up to which a difference is counted
+_COUNTED = 0.9  # share of the differences that must be whole numbers of steps
+_STEPS = (20, 60, 200, 600)  # largest differences that are counted, in steps
+
+
+def count_of(values: FloatArray) -> float | None:
+    """Step of a quantised channel (n,) in its unit; None where differences are no multiples of one step."""
+    differences = np.abs(np.diff(values))
+    differences = differences[differences > 1e-12 * np.ptp(values)]
+    if differences.size < 100:
+        return None
+    step = float(differences.min())
+    # the smallest difference has the largest error of printed digits: ever larger ones sharpen the step
+    for most in _STEPS:
+        few = differences[differences < most * step]
+        whole = np.maximum(np.round(few / step), 1.0)
+        step = float((few @ whole) / (whole @ whole))
+    good = np.abs(few / step - np.round(few / step)) < _WHOLE
+    return step if few.size > 50 and good.mean() > _COUNTED else None

@@ -17,6 +17,7 @@ from hil.diagnosis.location.locate import locate
 from hil.diagnosis.notes import at_bound, ended, notes_on, on_torque, stopped
 from hil.diagnosis.preparation import prepare_diagnosis
 from hil.diagnosis.result import FitFigures, Location, Mode, NextExperiment, Result, TimeBudget, Unexplained, Verdict
+from hil.diagnosis.search.events import with_events_of
 from hil.diagnosis.search.forward_selection import Explanation, explain
 from hil.diagnosis.time_left import with_time_left
 from hil.diagnosis.untold import untold
@@ -127,7 +128,7 @@ def diagnose(
     explanation = explain(data, progress, begin + SEARCH_SHARE * budget_s)
     owner, nominal = explanation.owner, explanation.nominal
     progress("testing on held-out recordings")
-    proof = cross_validate(nominal, renamed(explanation.final), held_out)
+    proof = cross_validate(nominal, with_events_of(held_out, renamed(explanation.final)), held_out)
     of_plant = judge(owner, nominal, proof.final, held_out)
     verdict = law.verdict(of_plant)
     named = verdict is Verdict.MISSING_PHYSICS

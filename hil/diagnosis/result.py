@@ -67,6 +67,24 @@ class Rival(_Part):
     evidence: str
 
 
+class EventWindow(_Part):
+    """Window of one recording in which an event acts, by the time since the first row of the whole recording."""
+
+    recording: str
+    start: Value
+    end: Value
+    strength: Value
+
+
+class PulseTrain(_Part):
+    """Windows of equal width at equal intervals."""
+
+    start_s: float
+    width_s: NotNegative
+    period_s: NotNegative
+    count: int
+
+
 class Finding(_Part):
     """A mechanism that the twin lacks."""
 
@@ -76,6 +94,8 @@ class Finding(_Part):
     equivalents: tuple[str, ...] = Field((), description="mechanisms that this motion cannot distinguish from it")
     rivals: tuple[Rival, ...] = ()
     parameters: dict[str, Value]
+    windows: tuple[EventWindow, ...] = Field((), description="of an event, by time; empty for permanent effects")
+    train: PulseTrain | None = Field(None, description="period of the windows, if they have one")
     sentence: str
     form: str = Field("", description="term of the fit that only corrects the form of its curve")
     needed: str = Field("", description="residual energy without it, on training and on held-out recordings")

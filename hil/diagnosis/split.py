@@ -11,7 +11,7 @@ TRAINED = 2.0 / 3.0  # share of a recording for training if none is held out: a 
 
 
 def split(recordings: Sequence[Recording]) -> tuple[list[Recording], list[Recording]]:
-    """Split each recording into the first two thirds and the rest."""
+    """Split each recording into the first two thirds and the rest, which keeps its time."""
     train, rest = [], []
     for recording in recordings:
         cut = _standstill(recording, round(TRAINED * len(recording)))
@@ -39,4 +39,5 @@ def _standstill(recording: Recording, row: int) -> int:
 
 def _part(recording: Recording, rows: slice, what: str) -> Recording:
     columns = {name: values[rows] for name, values in recording.columns.items()}
-    return replace(recording, name=f"{recording.name} ({what})", columns=columns)
+    start_s = recording.start_s + (rows.start or 0) * recording.period_s
+    return replace(recording, name=f"{recording.name} ({what})", columns=columns, start_s=start_s)

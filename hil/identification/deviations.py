@@ -126,7 +126,7 @@ def held_on_motor(hypothesis: Hypothesis, run: Measured, observer_s: float) -> t
 
     Mechanisms of the drive and of the recorded channels are omitted: the measured torque already contains them.
     """
-    twin = hypothesis.twin(observer_s)
+    twin = hypothesis.twin(observer_s, run=run)
     measured = twin.undelayed(run.response)
     mechanical = tuple(active for active in twin.active if stage_of(BY_ID[active.effect], active.variant) not in _DRIVE)
     inputs = measured._replace(torque_command=measured.torque)

@@ -18,7 +18,7 @@ from hil.bench.bench_file import Bench, MechanismEntry
 from hil.identification.dataset import FASTEST_OBSERVER_S, Dataset
 from hil.identification.measured import Measured
 from hil.identification.residuals import Residuals, differences
-from hil.identification.terms import Term, repeats
+from hil.identification.terms import Term, push_n, repeats
 from hil.twin.axis import COARSE_STEP_S, FINE_STEP_S, Response, Twin
 from hil.twin.library import BY_ID
 from hil.twin.mechanisms.channel_time_skew import delayed_mean
@@ -152,6 +152,11 @@ class Hypothesis:
         """Names of the nominal parameters: of the axis, and the delay of the torque where the bench leaves it open."""
         return self.bench.axis.NOMINAL if self.bench.torque_delay_s is None else (*self.bench.axis.NOMINAL, DELAY)
 
+    @property
+    def free(self) -> int:
+        """Number of free values: x, and those of each further window of an event."""
+        return self.nominal_count + sum(term.free for term in self.terms)
+
     def columns(self, index: int) -> slice:
         """Entries of x that belong to a term."""
         first = self.nominal_count + sum(len(term.values) for term in self.terms[:index])
@@ -253,22 +258,26 @@ class Hypothesis:
 
     # --- simulation ---
 
-    def twin(self, observer_s: float = FASTEST_OBSERVER_S, fast: bool = False) -> Twin:
-        """The twin, with the time constant of its observer; `fast`: with the internal steps of a search."""
+    def twin(self, observer_s: float = FASTEST_OBSERVER_S, fast: bool = False, run: Measured | None = None) -> Twin:
+        """The twin, with the time constant of its observer and the events of a run.
+
+        `fast`: with the internal steps of a search.
+        """
         bench, terms = self.resolved
         active = tuple(entry.active() for entry in self.kept)
-        added = tuple(Active(term.effect, term.values, term.variant) for term in terms)
+        added = tuple(Active(term.effect, term.values, term.variant) for term in terms if not term.windows)
         fine_s, coarse_s = SEARCH_STEPS_S if fast else (FINE_STEP_S, COARSE_STEP_S)
-        return Twin(bench.axis.physics(), bench.gains, active + added, None, coarse_s, fine_s, observer_s)
+        push = np.empty(0) if run is None else push_n(terms, run.name, run.time_s, run.period_s)
+        return Twin(bench.axis.physics(), bench.gains, active + added, None, coarse_s, fine_s, observer_s, push)
 
     def respond(self, run: Measured) -> Response:
         """Response of the twin in closed loop to the set-points of a run. Raises FieldError without a control law."""
         _ = self.bench.known_control  # raises
-        return self.twin().simulate(run.position_command_m, run.velocity_command_m_s, run.start, run.table_m)
+        return self.twin(run=run).simulate(run.position_command_m, run.velocity_command_m_s, run.start, run.table_m)
 
     def blocks(self, run: Measured, observer_s: float, fast: bool = False) -> dict[str, FloatArray]:
         """Measured less twin with each block fed measured inputs, per channel (n,); 0 for channels that are unseen."""
-        twin = self.twin(observer_s, fast)
+        twin = self.twin(observer_s, fast, run)
         measured = twin.undelayed(run.response)
         if DELAY in self.nominal:
             periods = (self.resolved.bench.torque_delay_s or 0.0) / run.period_s

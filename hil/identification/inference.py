@@ -17,6 +17,7 @@ from scipy.signal import correlate, fftconvolve, lfilter
 
 from hil.arrays import FloatArray
 from hil.identification.estimator import Fit
+from hil.identification.residuals import Residuals
 
 Filter = FloatArray
 
@@ -52,7 +53,7 @@ def against(better: Fit, worse: Fit, filters: Sequence[Filter] | None = None) ->
     It is the larger of two values: on plain residuals with their number of independent rows, sensitive to slow
     differences, and on whitened residuals, sensitive to small fast ones.
     """
-    more = better.hypothesis.x.size - worse.hypothesis.x.size
+    more = better.hypothesis.free - worse.hypothesis.free
     plain = by_energy(better, worse)
     white = 0.0
     for taps, a, b in zip(
@@ -74,7 +75,7 @@ def by_energy(better: Fit, worse: Fit) -> float:
     apart only by a clear difference in energy.
     """
     rows = effective_samples(better)
-    more = better.hypothesis.x.size - worse.hypothesis.x.size
+    more = better.hypothesis.free - worse.hypothesis.free
     return float(rows * np.log(worse.cost / better.cost) - more * np.log(rows))
 
 
@@ -122,6 +123,23 @@ def _with_covariance(part: FloatArray, columns: FloatArray) -> FloatArray:
     return np.asarray(fftconvolve(columns, kernel[:, None], mode="full", axes=0)[lags - 1 :][: part.size])
 
 
+def sandwich(slopes: FloatArray, residuals: Residuals) -> FloatArray:
+    """Standard errors (k,) by the equation of `standard_errors` of k values with derivatives (m, k)."""
+    scale = np.linalg.norm(slopes, axis=0)
+    scale[scale == 0.0] = 1.0
+    slope = slopes / scale
+    inverse = np.linalg.pinv(slope.T @ slope, hermitian=True)
+    ends = (0, *residuals.splits, residuals.vector.size)
+    starts = np.concatenate([np.arange(begin, end, _BLOCK_ROWS) for begin, end in pairwise(ends)])
+    score = np.add.reduceat(slope * residuals.vector[:, None], starts, axis=0)
+    left = np.zeros_like(inverse)
+    for part, own in zip(residuals.parts.values(), np.split(slope, residuals.splits), strict=True):
+        left += own.T @ _with_covariance(part, own)
+    covariances = (inverse @ middle @ inverse for middle in (score.T @ score, left))
+    largest = np.maximum.reduce([np.diag(one) for one in covariances] + [np.zeros(scale.size)])
+    return np.asarray(_WIDENED * np.sqrt(largest) / scale, dtype=np.float64)
+
+
 def standard_errors(found: Fit) -> list[float]:
     """Standard error of each physical parameter, robust against coloured residuals (sandwich estimator):
 
@@ -133,21 +151,10 @@ def standard_errors(found: Fit) -> list[float]:
     block. A controller replayed bit-identically leaves no noise; then the error is
     1/100 of the step of the forward difference.
     """
-    scale = np.linalg.norm(found.jacobian, axis=0)
-    scale[scale == 0.0] = 1.0
-    slope = found.jacobian / scale
-    inverse = np.linalg.pinv(slope.T @ slope, hermitian=True)
-    ends = (0, *found.residuals.splits, found.rows)
-    starts = np.concatenate([np.arange(begin, end, _BLOCK_ROWS) for begin, end in pairwise(ends)])
-    score = np.add.reduceat(slope * found.residuals.vector[:, None], starts, axis=0)
-    left = np.zeros_like(inverse)
-    for part, own in zip(found.residuals.parts.values(), np.split(slope, found.residuals.splits), strict=True):
-        left += own.T @ _with_covariance(part, own)
-    covariances = (inverse @ middle @ inverse for middle in (score.T @ score, left))
-    errors = np.sqrt(np.maximum.reduce([np.diag(one) for one in covariances] + [np.zeros(scale.size)])) / scale
+    errors = sandwich(found.jacobian, found.residuals)
     hypothesis = found.hypothesis
     steps = found.estimator.steps(hypothesis)
     return [
-        float(max(_WIDENED * error, _LEAST * step) * (abs(value) if coordinate.logarithmic else abs(coordinate.scale)))
+        float(max(error, _LEAST * step) * (abs(value) if coordinate.logarithmic else abs(coordinate.scale)))
         for error, step, value, coordinate in zip(errors, steps, hypothesis.values, hypothesis.coordinates, strict=True)
     ]

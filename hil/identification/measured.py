@@ -76,8 +76,8 @@ class Measured:
 
     @property
     def time_s(self) -> FloatArray:
-        """Time from the first row of the recording, tick x period."""
-        return np.asarray((self.left_out + np.arange(self.motor.size)) * self.period_s, dtype=np.float64)
+        """Time from the first row of the whole recording, tick x period."""
+        return np.asarray(self.start.time_s + np.arange(self.motor.size) * self.period_s, dtype=np.float64)
 
     @cached_property
     def motor_noise(self) -> FloatArray:
@@ -173,7 +173,9 @@ def take(recording: Recording, bench: Bench) -> Measured:
         command,
         torque,
         bool(np.array_equal(command, torque)),
-        _start(gains, (position, velocity, motor, feedback), command),
+        _start(gains, (position, velocity, motor, feedback), command)._replace(
+            time_s=recording.start_s + first * recording.period_s
+        ),
         noise,
         first,
         _unseen(recording, bench),

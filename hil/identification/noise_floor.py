@@ -56,7 +56,7 @@ def noise_response(hypothesis: Hypothesis, run: Measured) -> dict[str, float]:
     unknown. Returns 0 for all if the response to half the noise is not about half, or that of motor or table is several
     times their sensor's noise: the loop is chaotic.
     """
-    twin, bench = hypothesis.twin(), hypothesis.bench
+    twin, bench = hypothesis.twin(run=run), hypothesis.bench
     quiet = hypothesis.respond(run)
     table = bench.encoders.table
     own_m = max(run.noise.table_m**2 - (bench.axis.ratio_m_rad * run.noise.motor) ** 2, 0.0) ** 0.5

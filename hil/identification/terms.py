@@ -3,7 +3,11 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations, count
+from typing import NamedTuple
 
+import numpy as np
+
+from hil.arrays import FloatArray
 from hil.twin.library import BY_ID, LIBRARY
 from hil.twin.parameter import Role
 from hil.twin.physics import Active
@@ -16,14 +20,27 @@ _APART = 1.1
 SAME = FRICTION, LOAD = next((mechanism.id, mechanism.same_as) for mechanism in LIBRARY if mechanism.same_as)
 
 
+class Window(NamedTuple):
+    """An event in one run: start and end later, and strength larger, than the values of its term."""
+
+    run: str  # its name
+    later_s: float = 0.0
+    end_later_s: float = 0.0
+    factor: float = 1.0
+
+
 @dataclass(frozen=True)
 class Term:
-    """A mechanism in a hypothesis, with its starting values; missing ones at the end are the defaults."""
+    """A mechanism in a hypothesis, with its starting values; missing ones at the end are the defaults.
+
+    A transient mechanism acts in its `windows` only; without any it acts at its values in every run.
+    """
 
     effect: str
     variant: int
     values: tuple[float, ...]
     slot: int = 0  # number among the terms of the same effect
+    windows: tuple[Window, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "values", BY_ID[self.effect].complete(self.values))
@@ -32,6 +49,41 @@ class Term:
     def key(self) -> Key:
         """Effect, variant and slot: unique among the terms of a hypothesis."""
         return self.effect, self.variant, self.slot
+
+    @property
+    def free(self) -> int:
+        """Number of free values: those of the mechanism, for each window."""
+        return len(self.values) * max(len(self.windows), 1)
+
+    def at(self, window: Window) -> tuple[float, ...]:
+        """Values of the mechanism in a window."""
+        mechanism, values = BY_ID[self.effect], list(self.values)
+        values[mechanism.strength] *= window.factor
+        start, end = mechanism.indices(Role.EDGE)
+        values[start] += window.later_s
+        values[end] += window.end_later_s
+        return tuple(values)
+
+    def edges(self, window: Window) -> tuple[float, float]:
+        """Start and end [s] of a window."""
+        values = self.at(window)
+        start, end = (values[index] for index in BY_ID[self.effect].indices(Role.EDGE))
+        return start, end
+
+    def windows_of(self, run: str) -> list[tuple[float, ...]]:
+        """Values of the mechanism in each window of a run."""
+        return [self.at(window) for window in self.windows if window.run == run]
+
+
+def push_n(terms: Sequence[Term], run: str, time_s: FloatArray, period_s: float) -> FloatArray:
+    """Force on the table [N] of the events of a run, mean over each tick (n,); empty without events."""
+    forces = [
+        over_time(time_s, period_s, values)
+        for term in terms
+        if (over_time := BY_ID[term.effect].over_time) is not None
+        for values in term.windows_of(run)
+    ]
+    return np.sum(forces, axis=0) if forces else np.empty(0)
 
 
 def ambiguous(one: Term | Active) -> bool:

@@ -5,7 +5,7 @@ from pathlib import Path
 from hil.diagnosis.diagnose import NEXT_EXPERIMENT, Diagnosis
 from hil.diagnosis.pictures.findings import finding_figure, term_of
 from hil.diagnosis.pictures.location import residual_panels
-from hil.diagnosis.result import FitFigures, Result, TorqueLeft, Value, Verdict
+from hil.diagnosis.result import Finding, FitFigures, Result, TorqueLeft, Value, Verdict
 from hil.diagnosis.wording import label, title, titles, where
 from hil.figures.drawing import save
 from hil.files.output import write_json
@@ -94,12 +94,23 @@ def _finding(page: Page, diagnosis: Diagnosis, index: int, folder: Path) -> None
         ("parameter", "value", "standard error", "unit"),
         [(name, *_value(entry)) for name, entry in finding.parameters.items()],
     )
+    if len(finding.windows) > 1:
+        unit = finding.windows[0].strength.unit
+        page.table(("recording", "from [s]", "to [s]", f"strength [{unit}]"), _windows(finding))
     if finding.equivalents:
         page.text(f"This motion cannot distinguish it from: {titles(finding.equivalents)}.")
     if finding.rivals:
         page.table(
             ("rejected alternative", "reason"), [(title(rival.effect), rival.evidence) for rival in finding.rivals]
         )
+
+
+def _windows(finding: Finding) -> list[tuple[str, ...]]:
+    """Windows of an event, with standard errors."""
+    return [
+        (one.recording, *(f"{digits(e.value)} ± {digits(e.std)}" for e in (one.start, one.end, one.strength)))
+        for one in finding.windows
+    ]
 
 
 def _fit(page: Page, diagnosis: Diagnosis, folder: Path) -> None:

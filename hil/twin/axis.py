@@ -5,7 +5,7 @@ The same packed arrays and kernel serve offline simulation in closed loop and th
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
@@ -43,12 +43,13 @@ class Response(NamedTuple):
 
 
 class Start(NamedTuple):
-    """Start of a simulation: table position, velocity, torque of the integrator, control tick."""
+    """Start of a simulation: table position, velocity, torque of the integrator, control tick, time of mechanisms."""
 
     position_m: float = 0.0
     velocity_m_s: float = 0.0
     torque: float = 0.0
     tick: int = 0
+    time_s: float = 0.0
 
 
 _AT_REST = Start()
@@ -59,7 +60,8 @@ class Twin:
     """Axis with its control law and its active mechanisms.
 
     `modes` keeps only the lowest modes of the chain (None: all). `fine_step_s` and `coarse_step_s` are the longest
-    internal steps, of which a whole number makes a control tick; equal values give a fixed step.
+    internal steps, of which a whole number makes a control tick; equal values give a fixed step. `push_n` (n,) is a
+    force on the table over each tick of a simulation, beside those of the mechanisms; empty: none.
     """
 
     physics: Physics
@@ -69,6 +71,7 @@ class Twin:
     coarse_step_s: float = COARSE_STEP_S
     fine_step_s: float = FINE_STEP_S
     observer_s: float = loops.OBSERVER_S
+    push_n: FloatArray = field(default_factory=lambda: _NOTHING)
 
     @cached_property
     def chain(self) -> Chain:
@@ -91,7 +94,9 @@ class Twin:
             max(math.ceil(self.gains.period_s / longest_s - 1e-6), 1)
             for longest_s in (self.coarse_step_s, self.fine_step_s)
         )
-        return pack(self.physics, self.chain, self.modal, self.gains, self.active, (coarse, fine), self.observer_s)
+        arrays = pack(self.physics, self.chain, self.modal, self.gains, self.active, (coarse, fine), self.observer_s)
+        arrays.constants["any_active"] |= self.push_n.size > 0
+        return arrays
 
     @cached_property
     def loop_gains(self) -> cascade.Gains:
@@ -108,6 +113,7 @@ class Twin:
         delta = np.zeros((2, modes.frequency_rad_s.size))
         delta[:, 0] = np.array(start[:2]) / ratio / modes.shape[modes.motor, 0]
         memory = start_memory()
+        memory["clock"] = start.time_s
         settle(*self.arrays(), delta, memory)
         return delta, memory
 
@@ -129,8 +135,9 @@ class Twin:
         error of the motor encoder [motor units] and of the table encoder [m] that the controller sees.
         """
         setpoints = loops.Setpoints(position_command_m, velocity_command_m_s)
+        controller, axis = self._controller(start), self._axis(start)
         channels = loops.closed_loop(
-            self.loop_gains, self._controller(start), setpoints, misread, measured_table_m, self._axis(start)
+            self.loop_gains, controller, setpoints, misread, measured_table_m, self.push_n, axis
         )
         return self._recorded(Response(*channels))
 
@@ -158,7 +165,13 @@ class Twin:
             passed = np.abs(np.diff(measured.motor_position, prepend=measured.motor_position[:1]))
             resting = passed <= self._arrays[0][0]["slow_velocity"] * self.gains.period_s
         channels = loops.observe(
-            self.loop_gains, self._controller(start), setpoints, Response(*measured), resting, self._axis(start)
+            self.loop_gains,
+            self._controller(start),
+            setpoints,
+            Response(*measured),
+            resting,
+            self.push_n,
+            self._axis(start),
         )
         # lateness of an input is taken back, that of the answer is simulated
         return self._recorded(Response(*channels), lambda variant: variant.name == _ANSWER)

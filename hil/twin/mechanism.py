@@ -15,6 +15,7 @@ from enum import StrEnum
 from itertools import product
 from typing import Any, NamedTuple
 
+from hil.arrays import FloatArray
 from hil.twin.parameter import Dimension, Parameter, Role, default_starts, default_typical
 from hil.twin.scene import AxisFacts, Scene
 
@@ -75,6 +76,7 @@ class Picture(StrEnum):
     """Figure of the report that shows a mechanism."""
 
     TIME = "time"
+    FORCE = "force over time"
     FRICTION = "friction"  # over speed
     FRICTION_ALONG_TRAVEL = "friction along travel"
     POSITION = "position"  # torque over position
@@ -140,7 +142,11 @@ class Mechanism:
     neutral: Callable[[AxisFacts], float] | None = None  # strength without effect, if it is finite and not 0
     needs_table: bool = False  # not observable without a linear encoder
     turning: bool = False  # only where the load turns
-    transient: bool = False  # belongs to one recording: not expected on another motion
+    # force on the table [N], mean over each tick that begins at times (n,) [s], of (times, period, values): an event of
+    # the recording in which it is found, not expected in another one
+    over_time: Callable[[FloatArray, float, Sequence[float]], FloatArray] | None = None
+    repeated: str = ""  # sentence of several such events; may also name count
+    periodic: str = ""  # sentence of several at equal intervals; may also name count, width and period
     softens: bool = False  # changes the stiffness of a spring of the chain
     most: int = 1  # number that may act at once, with periods or orders of their own
     screw_locked: bool = False  # at one slow speed, a share of Coulomb friction that repeats with the screw
@@ -149,6 +155,11 @@ class Mechanism:
     hidden_starts: tuple[tuple[float, ...], ...] = ()  # starts where refitted springs hide it; the first value is in
     # units of the largest stretch of the transmission
     picture: Picture = Picture.TIME
+
+    @property
+    def transient(self) -> bool:
+        """True for an event of one recording."""
+        return self.over_time is not None
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -112,7 +112,7 @@ def windows(energy: Energy) -> tuple[tuple[float, float], ...]:
     chosen[1:-1][order[:enough]] = True
     edges = np.flatnonzero(np.diff(chosen.astype(int)))
     spans = sorted(zip(edges[::2], edges[1::2], strict=True), key=lambda span: -blocks[span[0] : span[1]].sum())
-    begin, length = run.left_out * run.period_s, size * run.period_s
+    begin, length = run.start.time_s, size * run.period_s
     return tuple(
         sorted((round(begin + float(a) * length, 3), round(begin + float(b) * length, 3)) for a, b in spans[:_WINDOWS])
     )

@@ -25,6 +25,7 @@ from hil.diagnosis.pictures.view import (
     unit_of_channel,
     view_of,
 )
+from hil.diagnosis.pictures.windows import force_over_time
 from hil.figures.drawing import legend_above, style_axis
 from hil.figures.panels import COMMAND, MEASURED, SIMULATED, thin
 from hil.identification.terms import Term
@@ -46,7 +47,7 @@ def finding_figure(diagnosis: Diagnosis, term: Term) -> Captioned:
     """Draw the evidence for a term of the final hypothesis, on the held-out recordings if there are any."""
     picture = PICTURES[BY_ID[term.effect].picture]
     # a friction curve needs every feed of every recording
-    every = picture is friction_over_speed
+    every = picture is friction_over_speed or bool(term.windows)  # an event is in any of them
     train, held_out = diagnosis.train.runs, diagnosis.held_out.runs
     runs = (*train, *held_out) if every else held_out or train
     figure, caption = picture(diagnosis, [view_of(diagnosis, run, term) for run in runs])
@@ -56,8 +57,10 @@ def finding_figure(diagnosis: Diagnosis, term: Term) -> Captioned:
 def term_of(diagnosis: Diagnosis, index: int) -> Term:
     """The term of the final hypothesis that the finding `index` reports."""
     finding = diagnosis.result.missing[index]
-    strength = next(iter(finding.parameters.values())).value
     terms = diagnosis.final.terms
+    if finding.windows:
+        return next(term for term in terms if term.windows)
+    strength = next(iter(finding.parameters.values())).value
     return next(term for term in terms if term.effect == finding.effect and term.values[0] == strength)
 
 
@@ -202,6 +205,7 @@ def _within_signal_period(diagnosis: Diagnosis, view: View) -> FloatArray:
 
 PICTURES: dict[Picture, Drawer] = {
     Picture.TIME: _over_time,
+    Picture.FORCE: force_over_time,
     Picture.FRICTION: friction_over_speed,
     Picture.FRICTION_ALONG_TRAVEL: _friction_over_position,
     Picture.POSITION: _residual_over("position", position, "mm"),

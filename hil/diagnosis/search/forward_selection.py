@@ -12,6 +12,7 @@ from functools import partial
 
 import numpy as np
 
+from hil.diagnosis.search.events import beside_events, revised
 from hil.diagnosis.search.initial_values import claimable
 from hil.diagnosis.search.restart import from_owner, may_hide, unbent
 from hil.diagnosis.search.score_test import Candidate, screen_library
@@ -120,7 +121,8 @@ def explain(data: Dataset, progress: Progress = lambda text: None, deadline_s: f
             break
         candidates = screen_library(base)
         first = first or candidates
-        found, best = _next_term(base, owner, nominal, candidates, step)
+        reference = beside_events(nominal, base)
+        found, best = _next_term(base, owner, nominal, reference, candidates, step)
         fitted = {fit.terms[-1].effect for fit in found if not base.estimator.expired}
         if best is None:
             break
@@ -133,9 +135,9 @@ def explain(data: Dataset, progress: Progress = lambda text: None, deadline_s: f
             (RivalFit(other, against(best, other, filters), (other.cost - best.cost) / base.rows) for other in found),
             key=lambda rival: rival.evidence,
         )
-        best, needed = _pruned(best, nominal)
+        best, needed = _pruned(best, reference)
         # to convergence: the residual of an unfinished fit resembles other mechanisms
-        base = claimed(best.refit(_ENDED, slopes=best.jacobian))
+        base = revised(claimed(best.refit(_ENDED, slopes=best.jacobian)))
         if not base.terms and base.cost < nominal.cost - NEEDED:
             nominal = base  # the term has only led the nominal parameters out of a local minimum
             continue
@@ -145,7 +147,7 @@ def explain(data: Dataset, progress: Progress = lambda text: None, deadline_s: f
         if len(base.terms) >= _IN_VAIN and base.excess > MOST * nominal.excess:
             break
     step("fitting the explanation to convergence")
-    final = base.refit(_ENDED)
+    final = revised(base).refit(_ENDED)
     kept = {term.key for term in final.terms}
     present = {*fitted, *(term.effect for term in final.terms)}
     not_tried = tuple(effect for effect in BY_ID if effect not in present) if stopped_at else ()
@@ -156,25 +158,28 @@ def explain(data: Dataset, progress: Progress = lambda text: None, deadline_s: f
 
 
 def _next_term(
-    base: Fit, owner: Fit, nominal: Fit, candidates: Sequence[Candidate], step: Progress
+    base: Fit, owner: Fit, nominal: Fit, reference: Fit, candidates: Sequence[Candidate], step: Progress
 ) -> tuple[list[Fit], Fit | None]:
-    """Fit the base with one more term; return the fits and the first one with sufficient evidence, if any."""
+    """Fit the base with one more term; return the fits and the first one with sufficient evidence, if any.
+
+    `reference` is the nominal fit beside the events of the base.
+    """
     bits = 1.0 - float(np.exp(-NEEDED / base.rows))  # share of white residuals whose removal gives evidence of NEEDED
     promising = [one for one in candidates if one.share > bits and one.share * base.cost > MATERIAL * base.rows]
     found: list[Fit] = []
     if promising:
         step("fitting " + ", ".join(one.term.effect for one in promising[:3]))
         found = _claimable(race(base, promising))
-    best = _worthwhile(found, base, nominal)
+    best = _worthwhile(found, base, reference)
     unfinished = (best is None or best.cost > _CLEAR * base.cost) and not base.estimator.expired
     if unfinished and not owner.at_floor and base.excess > _NOTHING * base.rows and may_hide(base):
         step("fitting a lost preload from the springs of the bench file")
         found = sorted([*found, unbent(base)], key=lambda other: other.cost)
-        best = _worthwhile(found, base, nominal)
+        best = _worthwhile(found, base, reference)
     if best is None and not base.at_floor and base.excess > MOST * nominal.excess and not base.estimator.expired:
         step("searching again beside the parameters of the bench file")
         found = _claimable(from_owner(base))
-        best = _worthwhile(found, base, nominal)
+        best = _worthwhile(found, base, reference)
     return found, best
 
 
@@ -212,7 +217,7 @@ def _simplest(tied: list[Fit]) -> Fit:
     Constant torque and direction-dependent Coulomb friction are equal on every motion; friction is preferred, since
     most axes are horizontal.
     """
-    return min(tied, key=lambda found: (found.hypothesis.x.size, found.terms[-1].key[:2] != (FRICTION, 0)))
+    return min(tied, key=lambda found: (found.hypothesis.free, found.terms[-1].key[:2] != (FRICTION, 0)))
 
 
 def _without(found: Fit, index: int) -> Fit:

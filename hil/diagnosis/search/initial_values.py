@@ -19,7 +19,7 @@ from hil.bench.bench_file import Bench
 from hil.diagnosis.search import disturbance as estimate
 from hil.identification.dataset import inertia
 from hil.identification.measured import Measured
-from hil.identification.terms import Term, free_slot
+from hil.identification.terms import Term, Window, free_slot
 from hil.twin.library import BY_ID, LIBRARY
 from hil.twin.mechanism import Block, Mechanism
 from hil.twin.parameter import Dimension, Role
@@ -42,6 +42,11 @@ class StartPoint:
     harmonics: int = 1
     known: float = 0.0  # strength of the same mechanism in the bench
     instead: bool = False
+    windows: tuple[Window, ...] = ()
+
+    def term(self, values: tuple[float, ...] | None = None) -> Term:
+        """The term of the start, at other values if given."""
+        return Term(self.effect, self.variant, self.values if values is None else values, windows=self.windows)
 
 
 def axis_facts(bench: Bench, runs: Sequence[Measured] = ()) -> AxisFacts:
@@ -80,6 +85,7 @@ def scene(runs: Sequence[Measured], bench: Bench, blocks: Sequence[dict[str, Flo
     ]
     stretch, most_stretch = stretches(runs, ratio) if runs[0].table_m.size else (0.0, 0.0)
     longest = max(range(len(runs)), key=lambda i: runs[i].motor.size)
+    first_s, last_s, level = estimate.force_window(runs[longest], found[longest])
     travel = max(float(np.ptp(run.position_command_m)) for run in runs)
     lead = 2.0 * np.pi * ratio / physics.angle_per_unit
     # a screw-locked effect is periodic in the angle and along the travel: orders and periods start each other
@@ -108,7 +114,7 @@ def scene(runs: Sequence[Measured], bench: Bench, blocks: Sequence[dict[str, Flo
         scale_periods=(
             estimate.scale_periods(runs, [block["table"] for block in blocks]) if runs[0].table_m.size else []
         ),
-        window=estimate.force_window(runs[longest], found[longest]),
+        window=(runs[longest].start.time_s + first_s, runs[longest].start.time_s + last_s, level),
         stretch=max(stretch, 0.5e-6),
         most_stretch=max(most_stretch, 1e-6),
     )
@@ -127,8 +133,10 @@ _SHORTEST_M = 1e-3  # shortest period of friction along the travel: shorter ones
 _WHOLE = 0.05  # largest deviation of lead / period from a whole order of the screw
 
 
-def starts(scene: Scene, bench: Bench) -> list[StartPoint]:
-    """Starting points of all variants of the library for a scene."""
+def starts(scene: Scene, bench: Bench, runs: Sequence[Measured] = ()) -> list[StartPoint]:
+    """Starting points of all variants of the library for a scene; an event is in the longest of the runs, or in all."""
+    longest = max(runs, key=lambda run: run.motor.size, default=None)
+    somewhere = [tuple(Window(run.name) for run in chosen) for chosen in ([longest] if longest else [], runs)]
     found = []
     for mechanism in LIBRARY:
         if mechanism.turning and not bench.axis.turns:
@@ -144,8 +152,9 @@ def starts(scene: Scene, bench: Bench) -> list[StartPoint]:
             if not (mechanism.proportional and variant.proportional):
                 strength = phase = -1
             found += [
-                StartPoint(mechanism.id, number, point, strength, phase, max(len(phases), 1))
+                StartPoint(mechanism.id, number, point, strength, phase, max(len(phases), 1), windows=windows)
                 for point in mechanism.start_points(number, scene)
+                for windows in (dict.fromkeys(somewhere) if mechanism.transient else [()])
             ]
     return found
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hil.arrays import FloatArray
+from hil.diagnosis.search.events import detect, event_term
 from hil.diagnosis.search.initial_values import StartPoint, claimable, scene, starts
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
@@ -85,8 +86,8 @@ def screen_library(base: Fit) -> list[Candidate]:
     known = scene(base.data.runs, base.bench, residuals.channels, base.data.observer_s)
     points = [
         _from_known(start, hypothesis)
-        for start in starts(known, hypothesis.bench)
-        if offered(Term(start.effect, start.variant, start.values), hypothesis, terms)
+        for start in (*starts(known, hypothesis.bench, base.data.runs), *_events(base))
+        if offered(start.term(), hypothesis, terms)
     ]
     best: dict[str, list[Candidate]] = {}
     for candidate in screen(base, points):
@@ -108,6 +109,20 @@ def screen_library(base: Fit) -> list[Candidate]:
     return [candidate for candidate in candidates if candidate is not None]
 
 
+def _events(base: Fit) -> list[StartPoint]:
+    """The start of all events that the disturbance torque shows, as one term."""
+    if any(term.windows for term in base.terms):
+        return []
+    # events may have led the fitted parameters astray, those of the bench file may be wrong
+    found = [detect(one) for one in (base, base.estimator.evaluate(base.hypothesis.owner))]
+    terms = [event_term(events, base.bench.axis.ratio_m_rad) for events in found if events]
+    return [
+        StartPoint(term.effect, 0, term.values, BY_ID[term.effect].strength, windows=term.windows)
+        for term in terms
+        if offered(term, base.hypothesis, base.terms)
+    ]
+
+
 def offered(new: Term, hypothesis: Hypothesis, terms: Sequence[Term]) -> bool:
     """True if a mechanism is compatible with the terms; it replaces mechanisms of the bench that it repeats."""
     known = [entry.active() for entry in hypothesis.kept]
@@ -116,7 +131,7 @@ def offered(new: Term, hypothesis: Hypothesis, terms: Sequence[Term]) -> bool:
 
 def _from_known(start: StartPoint, hypothesis: Hypothesis) -> StartPoint:
     """Count the strength of a start from that of the mechanism of the bench that it replaces, if any."""
-    new = Term(start.effect, start.variant, start.values)
+    new = start.term()
     taken = [entry.active() for entry in hypothesis.kept if repeats(new, entry.active())]
     if start.strength < 0 or not taken:
         return start
@@ -136,7 +151,7 @@ def screen(base: Fit, points: Sequence[StartPoint]) -> list[Candidate]:
     unchanged = search.residuals(base.hypothesis).vector
 
     def direction(start: StartPoint, values: tuple[float, ...]) -> FloatArray:
-        changed = base.hypothesis.with_term(Term(start.effect, start.variant, values))
+        changed = base.hypothesis.with_term(start.term(values))
         return search.residuals(changed).vector - unchanged
 
     def candidate(start: StartPoint) -> Candidate:
@@ -155,13 +170,11 @@ def screen(base: Fit, points: Sequence[StartPoint]) -> list[Candidate]:
         if start.strength < 0:
             # a start that cannot be scaled is also scored at its own strength
             whole = float(2.0 * target[0] - products[0, 0]) / energy
-            return Candidate(
-                Term(start.effect, start.variant, start.values), max(share if coefficients[0] > 0.0 else 0.0, whole)
-            )
+            return Candidate(start.term(), max(share if coefficients[0] > 0.0 else 0.0, whole))
         return Candidate(
-            Term(start.effect, start.variant, _scaled(start, coefficients)),
+            start.term(_scaled(start, coefficients)),
             share,
-            tuple(Term(start.effect, start.variant, _scaled(start, factor * coefficients)) for factor in _WEAKER),
+            tuple(start.term(_scaled(start, factor * coefficients)) for factor in _WEAKER),
         )
 
     return sorted(POOL.map(candidate, points), key=lambda found: -found.share)

@@ -21,6 +21,7 @@ from hil.identification.levenberg_marquardt import robust_loss
 from hil.identification.nominal_fit import SOFT
 from hil.identification.parallel import POOL, in_parallel
 from hil.identification.terms import Term, compatible
+from hil.identification.window_fit import fit_windows
 from hil.twin.library import BY_ID
 
 # Torque accuracy of the motor channel in a search: its higher weight makes the cost of stick-slip smoother.
@@ -207,7 +208,7 @@ def _fit_fast_first(last: Estimator, hypothesis: Hypothesis) -> Fit:
 def _finish(fit: Fit) -> Fit:
     """Converge a fit, at last with the final weights."""
     if any(coordinate.edge for coordinate in fit.hypothesis.coordinates):
-        fit = _edges_moved(fit.refit(LONG, slopes=fit.jacobian))
+        fit = fit_windows(_edges_moved(fit.refit(LONG, slopes=fit.jacobian)))
     last = replace(fit.estimator, edge_step_s=LAST_EDGE_STEP_S)
     fit = last.fit(fit.hypothesis, evaluations=LONG, slopes=fit.jacobian)
     return replace(last, torque_accuracy=TORQUE_ACCURACY, fast=False).fit(fit.hypothesis, evaluations=SECOND)

@@ -37,8 +37,9 @@ class Ablation:
 
     `train` and `held_out` are the residual energy without the term over that with it, `laps` the same ratio of the part
     that does not repeat from lap to lap. `gain` is the evidence for the term on the held-out recordings. They are None
-    without held-out recordings or laps. `acts`: the term changes the held-out residuals as it does those in training.
-    `clear`: its strength is above its standard error. `worse`: channels of training recordings that it harms.
+    without held-out recordings or laps, and for an event, whose `train` is the ratio over all recordings. `acts`: the
+    term changes the held-out residuals as it does those in training. `clear`: its strength is above its standard error.
+    `worse`: channels of training recordings that it harms.
     """
 
     term: Term
@@ -120,12 +121,17 @@ def _ablate(owner: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> list[Abl
 
     def ablation(index: int, term: Term, other: Fit) -> Ablation:
         there = other.on(held_out) if held_out.runs else None
+        train, more, gain = energy(other) / own, None, None
+        if there and own_held_out and term.windows:  # an event is found in each recording: none is a test of another
+            train = (energy(other) + energy(there)) / (own + energy(own_held_out))
+        elif there and own_held_out:
+            more, gain = energy(there) / energy(own_held_out), _gain(own_held_out, there)
         return Ablation(
             term,
             other,
-            energy(other) / own,
-            energy(there) / energy(own_held_out) if there and own_held_out else None,
-            _gain(own_held_out, there) if there and own_held_out else None,
+            train,
+            more,
+            gain,
             unrepeated(other.hypothesis, other.data) / differs if differs > 0.0 else None,
             bool(there and own_held_out and _change(own_held_out, there) > _ACTS * _change(final, other)),
             clear[index],
@@ -172,5 +178,5 @@ def _gain(found: Fit, without: Fit) -> float:
 
     Both residuals are whitened by the filter of the fit with less cost: that of the other would hide the harm.
     """
-    paid = (found.hypothesis.x.size - without.hypothesis.x.size) * float(np.log(found.rows))
+    paid = (found.hypothesis.free - without.hypothesis.free) * float(np.log(found.rows))
     return against(found, without) + paid if found.cost <= without.cost else paid - against(without, found)

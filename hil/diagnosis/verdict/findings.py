@@ -14,6 +14,7 @@ from hil.diagnosis.result import Correction, Finding, Rival, Value
 from hil.diagnosis.search.forward_selection import TIED, Explanation, RivalFit
 from hil.diagnosis.search.initial_values import claimable
 from hil.diagnosis.verdict.cross_validation import Ablation
+from hil.diagnosis.verdict.event_windows import describe_event
 from hil.diagnosis.verdict.judge import confidence
 from hil.diagnosis.wording import sentence, title
 from hil.identification.dataset import Dataset
@@ -67,6 +68,7 @@ def findings(
             (rival.evidence for rival in rivals if rival.fit.terms[-1].effect not in tied),
             default=explanation.needed.get(_key(explanation, term), math.inf),
         )
+        event = describe_event(final, index, held_out) if term.windows else None
         result.append(
             (
                 ablation.train,
@@ -78,8 +80,10 @@ def findings(
                     rivals=tuple(
                         Rival(effect=rival.fit.terms[-1].effect, evidence=_text(rival, term)) for rival in rivals
                     ),
-                    parameters=_values(term, errors, bench),
-                    sentence=sentence(_normal(term), bench),
+                    parameters=event.parameters if event else _values(term, errors, bench),
+                    windows=event.windows if event else (),
+                    train=event.train if event else None,
+                    sentence=event.sentence if event else sentence(_normal(term), bench),
                     form=" ".join(
                         sentence(_normal(terms[other]), bench) for other, law in forms.items() if law == index
                     ),
@@ -106,7 +110,10 @@ def corrections(owner: Bench, found: Fit) -> dict[str, Correction]:
 
 
 def diagnosed_bench(owner: Bench, found: Fit) -> Bench:
-    """Bench file with the parameters and terms of a fit; every other command accepts it."""
+    """Bench file with the parameters and permanent terms of a fit; every other command accepts it.
+
+    An event is not expected in another recording.
+    """
     entries = tuple(
         MechanismEntry(
             effect=term.effect,
@@ -114,6 +121,7 @@ def diagnosed_bench(owner: Bench, found: Fit) -> Bench:
             parameters=dict(zip(BY_ID[term.effect].names, _normal(term).values, strict=True)),
         )
         for term in found.terms
+        if not term.windows
     )
     return found.bench.model_copy(
         update={"name": f"{owner.name}_diagnosed", "mechanisms": found.hypothesis.kept + entries}
@@ -181,6 +189,11 @@ def _text(rival: RivalFit, term: Term) -> str:
 
 
 def _needed(ablation: Ablation) -> str:
+    if ablation.term.windows:
+        return (
+            f"without it the residual energy of all recordings is {digits(ablation.train)} × as large; "
+            "an event is found in each recording, held-out ones too, so that their figures do not test it"
+        )
     text = f"without it the residual energy is {digits(ablation.train)} × as large on the training recordings"
     if ablation.held_out is None:
         return text + "; there are no held-out recordings"

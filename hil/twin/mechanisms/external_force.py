@@ -1,8 +1,12 @@
 """External force: something pushes the table during a window of time."""
 
+from collections.abc import Sequence
+
+import numpy as np
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Row, Stage, Variant
+from hil.arrays import FloatArray
+from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, Stage, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
 
 
@@ -14,6 +18,13 @@ def _push(value: float, at: Moment, parameters: Row, memory: Row) -> float:
     # the mean over this step, so that the answer is continuous in start and end
     overlap_s = min(end_s, at.time_s + at.step_s) - max(start_s, at.time_s)
     return value + force_n * max(overlap_s, 0.0) / at.step_s
+
+
+def _pushes(time_s: FloatArray, period_s: float, values: Sequence[float]) -> FloatArray:
+    """Mean force (n,) over each tick."""
+    force_n, start_s, end_s = values
+    overlap_s = np.minimum(end_s, time_s + period_s) - np.maximum(start_s, time_s)
+    return np.asarray(force_n / period_s * np.maximum(overlap_s, 0.0), dtype=np.float64)
 
 
 MECHANISM = Mechanism(
@@ -31,5 +42,10 @@ MECHANISM = Mechanism(
     variants=(Variant(Stage.TABLE_FORCE, _push),),
     starts=lambda s: [(s.window[2] / s.ratio or 1.0, s.window[0], s.window[1])],
     typical=lambda a: (0.2 * a.friction / a.ratio, 0.5 * a.duration_s, 0.5 * a.duration_s + 1.0),
-    transient=True,
+    over_time=_pushes,
+    picture=Picture.FORCE,
+    repeated="In {count} windows from {start_s} to {end_s} forces of up to {force_n} push the table in positive "
+    "direction.",
+    periodic="From {start_s} to {end_s} a force of {force_n} pushes the table in positive direction {count} times, for "
+    "{width_s} every {period_s}.",
 )

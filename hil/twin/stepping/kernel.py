@@ -110,7 +110,7 @@ def advance(command, constants, modes, values, codes, delta, memory):  # type: i
             at = moment(c, own.clock + j * h, j * h, h, middle, motion.speed, table_m)
             made = _current(command, at, effects)
             drive = _motor_torque(_torque(made, at, effects), at, effects)
-            push = _table_force(0.0, at, effects) * c.ratio
+            push = _table_force(own.push, at, effects) * c.ratio
             force = _transmit(c, own, shapes, motion, at, effects, delta)
             free, table_free = _move(shapes, step, c.coupled, coupling, drive, push, force, delta)
             motor, guide = _friction(c, own, internal, motion, at, effects, free, table_free)

@@ -44,12 +44,13 @@ def _correct(impulse, error, period, time_constant, delta):  # type: ignore[no-u
 
 
 @njit(cache=True, nogil=True, **COMPILE)
-def closed_loop(gains, state, setpoints, misread, measured_table, axis):  # type: ignore[no-untyped-def]
+def closed_loop(gains, state, setpoints, misread, measured_table, push, axis):  # type: ignore[no-untyped-def]
     """Run controller and axis from tick to tick: motor, table, torque command, torque, each (n,).
 
     Where `measured_table` (n,) is given (else empty), it holds a table that floats in a gap: its flight cannot be
     predicted from the commands, and a bounce early or late would stay for good. `misread` (2, n), or (2, 0), is
-    added to the readings of motor and table encoder for the controller.
+    added to the readings of motor and table encoder for the controller. `push` (n,), or (0,), is a force on the table
+    over each tick.
     """
     constants, modes, values, codes, delta, memory = axis
     c, own, shapes = constants[0], memory[0], shapes_of(modes)
@@ -71,6 +72,8 @@ def closed_loop(gains, state, setpoints, misread, measured_table, axis):  # type
         if told > 0 and own.floating > 0.0:
             error = (measured_table[k] - datum - table[k]) / c.ratio
             _correct(shapes.table_impulse, error, c.period, max(OBSERVER_S, LEAST_TICKS * c.period), delta)
+        if push.size:
+            own.push = push[k]
         torque[k] = _advance(command[k], constants, modes, values, codes, delta, memory)
     return motor, table, command, torque
 
@@ -106,14 +109,14 @@ def replay_law(gains, state, setpoints, measured):  # type: ignore[no-untyped-de
 
 
 @njit(cache=True, nogil=True, **COMPILE)
-def observe(gains, state, setpoints, measured, resting, axis):  # type: ignore[no-untyped-def]
+def observe(gains, state, setpoints, measured, resting, push, axis):  # type: ignore[no-untyped-def]
     """Run each block on measured inputs (a `Response`): motor, table, torque command, torque, each (n,).
 
     The controller gets the measured positions, the drive the measured command, the axis that torque, and the
     transmission the measured motor: the twin's motor is corrected by it after each prediction, its table only while
     it floats in a gap or rests. So a mismatch shows in its own block, at its own place and time, and is then
     forgotten. `resting` (n,) marks the rows at which the motor rests. The measured table is empty without a linear
-    encoder. Its datum is the mean difference from the twin while the axis moves.
+    encoder. Its datum is the mean difference from the twin while the axis moves. `push` as in `closed_loop`.
     """
     constants, modes, values, codes, delta, memory = axis
     c, own, shapes = constants[0], memory[0], shapes_of(modes)
@@ -148,6 +151,8 @@ def observe(gains, state, setpoints, measured, resting, axis):  # type: ignore[n
             if free and moved + settled > 0 and not rigid:
                 error = (measured_table[k] - datum - table[k]) / c.ratio
                 _correct(shapes.table_impulse, error, c.period, hold, delta)
+        if push.size:
+            own.push = push[k]
         torque[k] = _advance(command[k], constants, modes, values, codes, delta, memory)
     return motor, table, wanted, torque
 

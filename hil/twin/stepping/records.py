@@ -46,6 +46,7 @@ MEMORY = np.dtype(
     [
         ("mechanisms", np.float64, (len(SLOTS), WIDTH)),
         ("clock", np.float64),  # [s]
+        ("push", np.float64),  # force on the table over this tick beside the mechanisms [N]
         ("bristle_deflection", np.float64),  # of the contact after Dahl
         ("spring_extra", np.float64),  # deflection by mechanisms of the transmission at the last step
         ("floating", np.float64),  # 1: the table floats in a gap

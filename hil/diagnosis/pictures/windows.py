@@ -1,0 +1,58 @@
+"""Figure of an event: the force that the twin lacks over time, measured, with the windows found."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from hil.diagnosis.pictures.view import Captioned, View
+from hil.diagnosis.search.disturbance import disturbance
+from hil.figures.drawing import style_axis
+from hil.figures.panels import COMMAND, DEVIATION, MEASURED, SIMULATED, thin
+from hil.identification.dataset import inertia
+
+if TYPE_CHECKING:
+    from hil.diagnosis.diagnose import Diagnosis
+
+MOST_RUNS = 4  # panels of a figure; those with windows first
+DRAWN_ROWS = 6000  # several per pixel
+
+
+def force_over_time(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:
+    """Draw the force that the owner's twin lacks and that of the twin without the event, with its windows shaded."""
+    shown = sorted(views, key=lambda view: not view.term.windows_of(view.run.name))[:MOST_RUNS]
+    shown.sort(key=lambda view: view.run.start.time_s)
+    ratio = diagnosis.owner.axis.ratio_m_rad
+    figure = Figure(figsize=(10.0, 2.6 + 2.2 * len(shown)), layout="constrained")
+    axes = np.atleast_1d(figure.subplots(len(shown), 1))
+    for axis, view in zip(axes, shown, strict=True):
+        run, observer_s = view.run, diagnosis.train.observer_s
+        owner = diagnosis.residuals(diagnosis.explanation.owner, run)["motor"]
+        of_owner = disturbance(run, owner, inertia(diagnosis.owner), observer_s).torque / ratio
+        curves = view.torque_modelled.torque / ratio, view.torque.torque / ratio, of_owner
+        rows = slice(run.judged.start, None)
+        chosen = thin(tuple(values[rows] for values in curves), DRAWN_ROWS)
+        looks = (
+            ("modelled by the event", SIMULATED, 3.0, 0.5),
+            ("measured - twin without the event", MEASURED, 1.2, 1.0),
+            ("measured - twin of the bench file", COMMAND, 0.7, 1.0),
+        )
+        for values, (label, colour, width, alpha) in zip(curves, looks, strict=True):
+            time_s, drawn = run.time_s[rows][chosen], values[rows][chosen]
+            axis.plot(time_s, drawn, color=colour, linewidth=width, alpha=alpha, label=label)
+        for window in (one for one in view.term.windows if one.run == run.name):
+            axis.axvspan(*view.term.edges(window), color=DEVIATION, alpha=0.15, linewidth=0.0)
+        strongest = max((abs(force) for force, *_ in view.term.windows_of(run.name)), default=0.0)
+        if strongest > 0.0:  # peaks at reversals would hide the windows
+            axis.set_ylim(-1.6 * strongest, 1.6 * strongest)
+        style_axis(axis, "force [N]", title=run.name)
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper right", ncols=3, frameon=False)
+    axes[-1].set_xlabel("time [s]")
+    return Captioned(
+        figure,
+        "Force on the table that the twin lacks, from the motion that its torque does not explain; shaded: the windows "
+        "found.",
+    )

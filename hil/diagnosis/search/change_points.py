@@ -1,0 +1,82 @@
+"""Find the windows in which a signal is constant and not zero: optimal partitioning (Jackson et al. 2005).
+
+    max over windows  sum of (sum of y)^2 / (count variance) - penalty
+
+over the blocks of each window: the energy that a constant level removes there, less the cost of a window.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from hil.arrays import FloatArray
+
+
+class Segment(NamedTuple):
+    """Blocks `first` to `last` (exclusive) and their mean level."""
+
+    first: int
+    last: int
+    level: float
+
+
+def segments(values: FloatArray, weights: FloatArray, variance: float, penalty: float) -> list[Segment]:
+    """Partition values (n,) into windows of constant level and a rest at zero, in order of time.
+
+    `weights` (n,) are 0 where a value is not known, else 1. `variance` is that of one value.
+    """
+    count = np.concatenate([[0.0], np.cumsum(weights)])
+    total = np.concatenate([[0.0], np.cumsum(weights * values)])
+    best, begins = np.zeros(count.size), np.full(count.size, -1)
+    for end in range(1, count.size):
+        level_sum, rows = total[end] - total[:end], count[end] - count[:end]
+        gains = best[:end] + level_sum**2 / (np.maximum(rows, 1.0) * variance) - penalty
+        begin = int(np.argmax(gains))
+        best[end] = max(gains[begin], best[end - 1])
+        if gains[begin] > best[end - 1]:
+            begins[end] = begin
+    found, end = list[Segment](), count.size - 1
+    while end > 0:
+        begin = int(begins[end])
+        if begin >= 0:
+            level = (total[end] - total[begin]) / max(count[end] - count[begin], 1.0)
+            found.append(Segment(begin, end, float(level)))
+        end = begin if begin >= 0 else end - 1
+    return found[::-1]
+
+
+def joined(found: list[Segment], weights: FloatArray, short: int, alike: float) -> list[Segment]:
+    """Join windows of one sign with no known block between: `short` ones to their neighbour, and levels `alike`."""
+    result = list[Segment]()
+    for one in found:
+        before = result[-1] if result else None
+        if before is None or weights[before.last : one.first].any() or before.level * one.level < 0.0:
+            result.append(one)
+            continue
+        sizes = [float(weights[part.first : part.last].sum()) for part in (before, one)]
+        close = abs(one.level - before.level) < alike * max(abs(one.level), abs(before.level))
+        if close:
+            level = float(np.average([before.level, one.level], weights=np.maximum(sizes, 1e-9)))
+        elif min(sizes) <= short:
+            level = before.level if sizes[0] > sizes[1] else one.level
+        else:
+            result.append(one)
+            continue
+        result[-1] = Segment(before.first, one.last, level)
+    return result
+
+
+def standing_out(
+    values: FloatArray, weights: FloatArray, found: list[Segment], least: float, margin: int
+) -> list[Segment]:
+    """Keep the windows whose level is `least` times the rms of the blocks beside all stronger windows.
+
+    Where the model is wrong everywhere no window stands out. `margin` blocks about a window do not count: its edges.
+    """
+    ordered = sorted(found, key=lambda one: -abs(one.level))
+    beside, kept = weights > 0.0, 0
+    for number, one in enumerate(ordered, 1):
+        beside[max(one.first - margin, 0) : one.last + margin] = False
+        if abs(one.level) > least * np.sqrt(np.mean(values[beside] ** 2) if beside.any() else np.inf):
+            kept = number
+    return sorted(ordered[:kept])

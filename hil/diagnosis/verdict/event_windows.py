@@ -1,0 +1,148 @@
+"""Windows of an event as reported: with standard errors, a common strength where it fits, and their period.
+
+A window that the split of a recording cut is one window.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hil.arrays import FloatArray
+from hil.diagnosis.result import EventWindow, PulseTrain, Value
+from hil.identification.dataset import Dataset
+from hil.identification.estimator import Fit
+from hil.identification.measured import Measured
+from hil.identification.terms import Term
+from hil.identification.window_fit import window_errors
+from hil.quantities import quantity
+from hil.twin.library import BY_ID
+from hil.twin.parameter import Role
+
+# Largest deviation of a strength from the common one, in standard errors and as a share: what a model that is right to
+# its noise leaves, and what real axes leave.
+_SIGMAS, _SHARE = 3.0, 0.05
+_REGULAR_S = 0.005  # largest deviation of an edge from a period: a controlled event repeats more exactly
+_FEWEST = 3  # windows of a train: two always have a period
+_CUT_S = 0.15  # at the cut of a recording: rows at rest or not evaluated
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """A window of one run: start, end [s] and strength, and their standard errors."""
+
+    run: Measured
+    values: tuple[float, float, float]
+    errors: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class EventReport:
+    """Windows in order of time, the period that they have in common, and the sentence."""
+
+    windows: tuple[EventWindow, ...]
+    train: PulseTrain | None
+    sentence: str
+    parameters: dict[str, Value]
+
+
+def describe_event(final: Fit, index: int, held_out: Dataset) -> EventReport:
+    """Report the event that is the term `index` of a fit, with its windows in training and held-out recordings."""
+    term = final.terms[index]
+    mechanism, linear = BY_ID[term.effect], final.bench.axis.linear
+    fits = [final] + ([replace(final.estimator, data=held_out).evaluate(final.hypothesis)] if held_out.runs else [])
+    seen = _whole([one for fit in fits for one in _seen(fit, index)])
+    common = _common(np.array([one.values[2] for one in seen]), np.array([one.errors[2] for one in seen]))
+    if common is not None:
+        value, error = common
+        seen = [replace(one, values=(*one.values[:2], value), errors=(*one.errors[:2], error)) for one in seen]
+    names = [mechanism.names[place] for place in (*_edges(term), mechanism.strength)]
+    units = [mechanism.parameters[place].dimension.unit(linear) for place in (*_edges(term), mechanism.strength)]
+
+    def value_of(one: _Seen, place: int) -> Value:
+        return Value(value=one.values[place], std=one.errors[place], unit=units[place])
+
+    windows = tuple(
+        EventWindow(recording=one.run.name, start=value_of(one, 0), end=value_of(one, 1), strength=value_of(one, 2))
+        for one in seen
+    )
+    first, last = min(seen, key=lambda one: one.values[0]), max(seen, key=lambda one: one.values[1])
+    strongest = max(seen, key=lambda one: abs(one.values[2]))
+    found = dict(zip(names, (value_of(first, 0), value_of(last, 1), value_of(strongest, 2)), strict=True))
+    parameters = {name: found[name] for name in mechanism.names}
+    train = _train(seen) if common is not None else None
+    text = mechanism.sentence
+    if train is not None:
+        text = mechanism.periodic
+    elif _different(seen) > 1:
+        text = mechanism.repeated
+    words = {name: quantity(entry.value, entry.unit) for name, entry in parameters.items()}
+    words["count"] = str(train.count if train else _different(seen))
+    if train is not None:
+        words |= {"width_s": quantity(train.width_s, "s"), "period_s": quantity(train.period_s, "s")}
+    return EventReport(windows, train, text.format(**words), parameters)
+
+
+def _edges(term: Term) -> list[int]:
+    return BY_ID[term.effect].indices(Role.EDGE)
+
+
+def _seen(fit: Fit, index: int) -> list[_Seen]:
+    term, strength = fit.terms[index], BY_ID[fit.terms[index].effect].strength
+    runs = {run.name: run for run in fit.data.runs}
+    inside = [window for window in term.windows if window.run in runs]
+    if not inside:
+        return []
+    return [
+        _Seen(runs[window.run], (*term.edges(window), term.at(window)[strength]), (row[0], row[1], row[2]))
+        for window, row in zip(inside, window_errors(fit, index).tolist(), strict=True)
+    ]
+
+
+def _whole(seen: Sequence[_Seen]) -> list[_Seen]:
+    """Join windows that continue in the next part of a recording, in order of time."""
+    result = list[_Seen]()
+    for one in sorted(seen, key=lambda other: other.values[0]):
+        before = next((other for other in result if _continues(other, one)), None)
+        if before is None:
+            result.append(one)
+            continue
+        better = min(before, one, key=lambda other: other.errors[2])
+        values = (before.values[0], one.values[1], better.values[2])
+        result[result.index(before)] = _Seen(before.run, values, (before.errors[0], one.errors[1], better.errors[2]))
+    return result
+
+
+def _continues(before: _Seen, after: _Seen) -> bool:
+    cut_s = after.run.start.time_s
+    following = before.run is not after.run and abs(before.run.time_s[-1] - cut_s) < 2.0 * after.run.period_s
+    near = abs(before.values[1] - cut_s) < _CUT_S and abs(after.values[0] - cut_s) < _CUT_S
+    return following and near and before.values[2] * after.values[2] > 0.0
+
+
+def _common(strengths: FloatArray, errors: FloatArray) -> tuple[float, float] | None:
+    """Weighted mean of strengths (w,) and its standard error; None where they differ."""
+    weights = 1.0 / np.maximum(errors, 1e-3 * np.abs(strengths)) ** 2
+    mean, error = float(np.average(strengths, weights=weights)), float(weights.sum() ** -0.5)
+    fits = np.abs(strengths - mean) <= np.maximum(_SIGMAS * errors, _SHARE * abs(mean))
+    return (mean, error) if bool(fits.all()) else None
+
+
+def _different(seen: Sequence[_Seen]) -> int:
+    """Number of windows at different times: the same one in several recordings counts once."""
+    starts = np.sort([one.values[0] for one in seen])
+    return 1 + int(np.count_nonzero(np.diff(starts) > _REGULAR_S))
+
+
+def _train(seen: Sequence[_Seen]) -> PulseTrain | None:
+    """The period of windows of equal width; None without one."""
+    if _different(seen) < _FEWEST or _different(seen) != len(seen):
+        return None
+    starts, ends = (np.array([one.values[place] for one in seen]) for place in (0, 1))
+    numbers = np.arange(starts.size)
+    period_s, first_s = np.polyfit(numbers, starts, 1)
+    width_s = float(np.median(ends - starts))
+    late = np.abs(starts - first_s - period_s * numbers), np.abs(ends - starts - width_s)
+    if max(float(np.max(one)) for one in late) > _REGULAR_S:
+        return None
+    return PulseTrain(start_s=float(first_s), width_s=width_s, period_s=float(period_s), count=len(seen))

@@ -21,8 +21,9 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
+from hil.identification.coordinates import EDGE_STEP_S
 from hil.identification.dataset import TORQUE_ACCURACY, Dataset
-from hil.identification.hypothesis import EDGE_STEP_S, Hypothesis
+from hil.identification.hypothesis import Hypothesis
 from hil.identification.levenberg_marquardt import broyden, damped_step, robust_loss
 from hil.identification.noise_floor import FLOOR, noise_ratios
 from hil.identification.parallel import POOL

@@ -15,6 +15,7 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench, MechanismEntry
+from hil.identification.coordinates import CHATTER_STEP, DELAY, EDGE_STEP_S, MOST_DELAY, TRUST, Coordinate
 from hil.identification.dataset import FASTEST_OBSERVER_S, Dataset
 from hil.identification.measured import Measured
 from hil.identification.residuals import Residuals, differences
@@ -22,59 +23,13 @@ from hil.identification.terms import Term, push_n, repeats
 from hil.twin.axis import COARSE_STEP_S, FINE_STEP_S, Response, Twin
 from hil.twin.library import BY_ID
 from hil.twin.mechanisms.channel_time_skew import delayed_mean
-from hil.twin.parameter import Parameter, Role
+from hil.twin.parameter import Role
 from hil.twin.physics import Active
 
-# Steps of the forward difference for the edges of a window: first wide, to reach the edge, at last one tick at 1 kHz.
-EDGE_STEP_S, LAST_EDGE_STEP_S = 0.03, 0.001
-# Relative step with play: a light nut chatters in its gap, so residuals are noisy functions of the parameters, and only
-# a wide step averages them (Moré and Wild 2012). Of 1e-4, 0.01 and 0.03 only the last converged from values 20 % wrong.
-CHATTER_STEP = 0.03
 # Longest internal steps of the twin in a search, fine and coarse: block by block, residuals differ from those at the
 # twin's own steps by less than 0.25 of the noise (rms) for every mechanism but a chattering nut, in a half to a fifth
 # of the time.
 SEARCH_STEPS_S = (100e-6, 500e-6)
-# Bound of nominal parameters over the bench file, as a factor: beyond it lie minima in which implausible parameters
-# compensate for a wrong structure.
-TRUST = 3.0
-# Delay of a recorded torque whose rows are not the ticks of the drive. A mean over the tick before or after a row, or
-# a sample of it, shifts it by up to a row and a half.
-DELAY, MOST_DELAY = "torque_delay_s", 1.5
-
-
-@dataclass(frozen=True)
-class Coordinate:
-    """One entry of the parameter vector: value = scale exp(x) if logarithmic, else scale x."""
-
-    name: str
-    scale: float
-    logarithmic: bool
-    low: float
-    high: float
-    parameter: Parameter | None = None  # of a mechanism; None for a nominal parameter
-
-    def value(self, x: float) -> float:
-        """Physical value of x."""
-        return float(self.scale * np.exp(x)) if self.logarithmic else float(self.scale * x)
-
-    def x(self, value: float) -> float:
-        """x of a physical value."""
-        return float(np.log(value / self.scale)) if self.logarithmic else value / self.scale
-
-    @property
-    def bounds(self) -> tuple[float, float]:
-        """Bounds of x."""
-        return self.x(self.low), self.x(self.high)
-
-    @property
-    def role(self) -> Role | None:
-        """Role of a mechanism's parameter."""
-        return self.parameter.role if self.parameter else None
-
-    @property
-    def edge(self) -> bool:
-        """True for an instant at which a window begins or ends."""
-        return self.role is Role.EDGE
 
 
 class Resolved(NamedTuple):

@@ -11,8 +11,9 @@ from dataclasses import replace
 import numpy as np
 
 from hil.arrays import FloatArray
+from hil.identification.coordinates import LAST_EDGE_STEP_S
 from hil.identification.estimator import Estimator, Fit
-from hil.identification.hypothesis import LAST_EDGE_STEP_S, Hypothesis
+from hil.identification.hypothesis import Hypothesis
 from hil.identification.inference import sandwich
 from hil.identification.levenberg_marquardt import damped_step
 from hil.identification.terms import Term, Window

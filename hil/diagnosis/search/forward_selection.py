@@ -17,9 +17,10 @@ from hil.diagnosis.search.initial_values import claimable
 from hil.diagnosis.search.restart import from_owner, may_hide, unbent
 from hil.diagnosis.search.score_test import Candidate, screen_library
 from hil.diagnosis.search.successive_halving import race
+from hil.identification.coordinates import LAST_EDGE_STEP_S
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
-from hil.identification.hypothesis import LAST_EDGE_STEP_S, effects
+from hil.identification.hypothesis import effects
 from hil.identification.inference import against, whitening
 from hil.identification.noise_floor import REPEATS, unrepeated
 from hil.identification.nominal_fit import fit_nominal_parameters, require_finite

@@ -15,9 +15,9 @@ from functools import partial
 from hil.diagnosis.search.initial_values import stretches
 from hil.diagnosis.search.score_test import screen_library
 from hil.diagnosis.search.successive_halving import LONG, SEARCH_ACCURACY, owner_points, race
+from hil.identification.coordinates import LAST_EDGE_STEP_S
 from hil.identification.dataset import TORQUE_ACCURACY
 from hil.identification.estimator import Fit
-from hil.identification.hypothesis import LAST_EDGE_STEP_S
 from hil.identification.nominal_fit import SOFT
 from hil.identification.parallel import in_parallel
 from hil.identification.terms import Term, compatible

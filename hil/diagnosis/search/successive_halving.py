@@ -13,9 +13,10 @@ from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
 from hil.diagnosis.search.initial_values import likenesses
 from hil.diagnosis.search.score_test import Candidate, offered
+from hil.identification.coordinates import LAST_EDGE_STEP_S, TRUST
 from hil.identification.dataset import TORQUE_ACCURACY, inertia
 from hil.identification.estimator import Estimator, Fit
-from hil.identification.hypothesis import LAST_EDGE_STEP_S, TRUST, Hypothesis
+from hil.identification.hypothesis import Hypothesis
 from hil.identification.inference import by_energy
 from hil.identification.levenberg_marquardt import robust_loss
 from hil.identification.nominal_fit import SOFT

@@ -9,9 +9,10 @@ from diagnosis_runs import dataset, recorded
 from hil.bench.bench_file import load_bench
 from hil.diagnosis.diagnose import diagnose
 from hil.diagnosis.search.successive_halving import owner_points
+from hil.identification.coordinates import CHATTER_STEP, LAST_EDGE_STEP_S
 from hil.identification.dataset import inertia
 from hil.identification.estimator import Estimator, Fit
-from hil.identification.hypothesis import CHATTER_STEP, LAST_EDGE_STEP_S, Hypothesis
+from hil.identification.hypothesis import Hypothesis
 from hil.identification.residuals import Residuals
 from hil.identification.terms import Term
 

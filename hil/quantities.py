@@ -59,6 +59,7 @@ _READ_IN: dict[str, tuple[tuple[float, float, str], ...]] = {
 # endings of names of channels and parameters, longest first where one ends with another
 _ENDINGS = {
     "stiffness_n_m": "N/m",
+    "v_s_rad": "V s/rad",
     "n_m_s_rad": "N m s/rad",
     "n_m_rad": "N m/rad",
     "n_s_m": "N s/m",
@@ -71,6 +72,7 @@ _ENDINGS = {
     "n_m": "N m",
     "rad": "rad",
     "kg": "kg",
+    "v": "V",
     "hz": "Hz",
     "n": "N",
     "m": "m",

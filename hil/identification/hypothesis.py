@@ -110,7 +110,7 @@ class Hypothesis:
     @property
     def free(self) -> int:
         """Number of free values: x, and those of each further window of an event."""
-        return self.nominal_count + sum(term.free for term in self.terms)
+        return self.x.size + sum(term.free - len(term.values) for term in self.terms)
 
     def columns(self, index: int) -> slice:
         """Entries of x that belong to a term."""

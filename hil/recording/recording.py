@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 METADATA_KEY = b"hil"  # of the schema: the metadata as JSON
-PARTS = "parts"  # key of the metadata: row and start_s of each part, if there are gaps between them
+PARTS = "parts"  # key of the metadata: row and time_s of each part, if there are gaps between them
 CLOCK_NOTES = "clock_notes"  # key of the metadata: what was done to the stamps
 RESAMPLED = "resampled"  # key of the metadata: the rows are not those of the control loop
 _STREAM_END = b"\xff\xff\xff\xff\x00\x00\x00\x00"  # Arrow IPC: the end-of-stream marker
@@ -97,7 +97,7 @@ class Recording:
                 name=f"{self.name} (part {number})",
                 columns={name: values[part["row"] : end] for name, values in self.columns.items()},
                 metadata=metadata,
-                start_s=self.start_s + part["start_s"],
+                start_s=self.start_s + part["time_s"],
             )
             for number, (part, end) in enumerate(zip(starts, ends, strict=True), 1)
         )

@@ -24,7 +24,7 @@ class PartStart:
     """Where a part without gaps begins: its first row, and the time since the first row of the file [s]."""
 
     row: int
-    start_s: float
+    time_s: float
 
 
 @dataclass(frozen=True, eq=False)

@@ -30,6 +30,9 @@ PARAMETERS = {
     "viscous_torque_n_m_s_rad": "N m s/rad",
     "coulomb_force_n": "N",
     "viscous_force_n_s_m": "N s/m",
+    "time_constant_s": "s",
+    "coulomb_voltage_v": "V",
+    "voltage_constant_v_s_rad": "V s/rad",
 }
 
 

@@ -12,13 +12,13 @@ from hil.diagnosis.diagnose import diagnose
 from hil.diagnosis.result import Verdict, schema
 from hil.diagnosis.time_left import with_time_left
 from hil.errors import InputError
+from hil.identification.terms import Term
 from hil.report.diagnosis_report import write_diagnosis
 from hil.twin.library import BY_ID
-from hil.twin.physics import Active
 
 
 def test_a_search_without_time_names_nothing_and_lists_what_was_not_tried(tmp_path: Path) -> None:
-    run = recorded(bench(), Active("cogging_torque", (0.2, 4.0, 0.3)), times=3)
+    run = recorded(bench(), Term("cogging_torque", 0, (0.2, 4.0, 0.3)), times=3)
     diagnosis = diagnose([run], [], bench(), budget_s=1e-6)
     result, ended = diagnosis.result, diagnosis.result.time_budget
     assert ended is not None

@@ -29,7 +29,7 @@ def cut(*without: tuple[int, int]) -> Recording:
     kept = np.delete(np.arange(ROWS), np.concatenate([np.arange(*one) for one in without]))
     columns = {name: values[kept] for name, values in WHOLE.columns.items()}
     rows = regular_rows(columns, lambda row: f"row {row}")
-    parts = [{"row": part.row, "start_s": part.start_s} for part in rows.parts]
+    parts = [{"row": part.row, "time_s": part.time_s} for part in rows.parts]
     return replace(WHOLE, name="cut", columns=rows.columns, metadata=WHOLE.metadata | {"parts": parts})
 
 

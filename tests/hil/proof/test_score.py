@@ -146,6 +146,8 @@ def test_rates_by_hand() -> None:
         "ambiguous: resolved by motion": Rate(0, 1),
         "insufficient: called not testable": Rate(1, 1),
         "insufficient: something named": Rate(0, 1),
+        "less known: named or not testable": Rate(0, 0),
+        "less known: a spurious name": Rate(0, 0),
     }
     assert {name: goal.measured for name, goal in found.items() if isinstance(goal.measured, Rate)} == expected
     assert found["singles: worst effect"].detail == "spring_load"

@@ -28,7 +28,7 @@ def made(time_s: np.ndarray, values: np.ndarray, rate_hz: float | None = None) -
 def test_a_gap_cuts_and_each_part_keeps_its_time(start_s: float) -> None:
     kept = np.r_[0:1000, 1500:ROWS]
     rows = made(start_s + TICKS_S[kept], position(TICKS_S)[kept])
-    assert [(part.row, round(part.start_s, 6)) for part in rows.parts] == [(0, 0.0), (1000, 1.5)]
+    assert [(part.row, round(part.time_s, 6)) for part in rows.parts] == [(0, 0.0), (1000, 1.5)]
     assert rows.period_s == pytest.approx(PERIOD_S, rel=1e-6)
     np.testing.assert_array_equal(rows.columns["x"], position(TICKS_S)[kept])
     assert "a gap of 0.501 s" in rows.notes[0]

@@ -32,6 +32,7 @@ _PENALTY = 20.0  # beside 3 log n of the three values of a window: that of a ter
 _SHORTEST, _EDGE = 3, 6  # blocks of the shortest window; blocks in which the observer follows an edge
 _ALIKE = 0.25  # levels of adjacent windows that differ less are one
 _EVIDENCE = 20.0  # BIC difference for the events of a held-out recording: that of a term in the search (NEEDED)
+_MATERIAL = 0.02  # least energy per row that they remove, in units of noise^2: that of a term in the search (MATERIAL)
 _SIGMAS = 3.0  # standard errors of the force of a window: 0.3 % of Gaussian ones are above without a force
 _ROUNDS = 3  # windows found in one round do not count as motion in the next; then they stay
 _REWEIGHTED = 40  # iterations of the regression
@@ -129,7 +130,7 @@ def with_events_of(held_out: Dataset, final: Fit) -> Fit:
         if _index(fitted) is None or fitted.hypothesis.x.size != longer.x.size:
             continue
         gain = against(fitted, before)
-        if gain > evidence:
+        if gain > evidence and before.cost - fitted.cost > _MATERIAL * before.rows:
             own = final.estimator.residuals(fitted.hypothesis)
             more = np.zeros((final.rows, fitted.hypothesis.x.size - at.x.size))
             slopes = np.hstack([final.jacobian, more]) if final.jacobian.size else final.jacobian

@@ -207,10 +207,17 @@ def _residual(twin: Twin, run: Measured, cut: int) -> FloatArray:
     rows = slice(cut, None)
     measured = twin.undelayed(run.response)
     measured = Response(*(values[rows] for values in measured))
+    speed_m_s = float(twin.gains.ratio_m_rad * (run.motor[cut] - run.motor[cut - 1]) / run.period_s) if cut else None
     start = run.start._replace(
-        position_m=float(twin.gains.ratio_m_rad * run.motor[cut]), torque=run.torque_command[cut]
+        position_m=float(twin.gains.ratio_m_rad * run.motor[cut]),
+        velocity_m_s=run.start.velocity_m_s if speed_m_s is None else speed_m_s,
+        torque=0.0,
     )
-    wanted = twin.command(run.position_command_m[rows], run.velocity_command_m_s[rows], measured, start)
+    commands = run.position_command_m[rows], run.velocity_command_m_s[rows]
+    if twin.gains.integral_gain_n_m_rad > 0.0:  # at first, the integrator holds what the proportional part does not
+        proportional = twin.command(commands[0][:1], commands[1][:1], Response(*(one[:1] for one in measured)), start)
+        start = start._replace(torque=float(measured.torque_command[0] - proportional[0]))
+    wanted = twin.command(*commands, measured, start)
     judged = slice(max(run.judged.start - cut, 0), None)
     with np.errstate(over="ignore", invalid="ignore"):
         return np.nan_to_num((measured.torque_command - wanted)[judged] / run.noise.torque, posinf=1e6, neginf=-1e6)

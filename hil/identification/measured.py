@@ -30,6 +30,7 @@ Channels = tuple[FloatArray, FloatArray, FloatArray, FloatArray]  # as control.r
 
 CREEP_S = 0.008  # time constant of the slowest observer
 SETTLE_S = 0.05  # not evaluated at the start: several time constants of the observer, for errors of the initial state
+SETTLE_IN_MOTION_S = 0.3  # modes of a machine axis have decayed
 _REPLAYED_ROWS = 200  # to find the phase of the position loop: many of its ticks
 _FITTED_ROWS = 11  # motor positions fitted by a parabola for the first velocity: averages encoder counts
 
@@ -104,10 +105,12 @@ class Measured:
     def judged(self) -> slice:
         """Rows that are evaluated: from the first motion on, and after the start has settled.
 
-        Before the first motion the state of friction is unknown.
+        Before the first motion the state of friction is unknown. In a recording that begins in motion elastic modes swing
+        at first.
         """
         first = min(int(np.argmax(self.moving)), self.motor.size // 2)
-        return slice(max(round(SETTLE_S / self.period_s), first), None)
+        settle_s = SETTLE_IN_MOTION_S if self.moving[0] else SETTLE_S
+        return slice(max(min(round(settle_s / self.period_s), self.motor.size // 4), first), None)
 
 
 def take(recording: Recording, bench: Bench) -> Measured:
@@ -206,10 +209,10 @@ def _column(recording: Recording, name: str) -> FloatArray:
 def _first_tick(gains: cascade.Gains, channels: Channels, command: FloatArray) -> int:
     """Find the first tick of the position loop: the row whose replay reproduces the commands best.
 
-    The beginning of the first motion is replayed: at rest every phase gives the same.
+    The first change of the set velocity is replayed: at rest and at constant feed every phase gives the same.
     """
     _, velocity, motor, _ = channels
-    begin = max(int(np.argmax(moving(velocity))), 2)
+    begin = max(int(np.argmax(moving(np.diff(velocity, append=velocity[-1])))), 2)
 
     def misfit(row: int) -> float:
         rows = slice(row, row + _REPLAYED_ROWS)
@@ -242,6 +245,7 @@ def _start(gains: cascade.Gains, channels: Channels, command: FloatArray) -> Sta
     rows = motor[:_FITTED_ROWS]
     speed = 0.0
     if np.ptp(rows) > 0.0:  # at rest the polynomial would give rounding errors
-        speed = float(np.polyfit(np.arange(rows.size), rows, 2)[1]) / gains.period_s
+        curve, slope, _ = np.polyfit(np.arange(rows.size), rows, 2)
+        speed = float(slope - curve) / gains.period_s  # backward difference, as the controller takes it
     state = _state_at(gains, channels, command, 0, speed)
     return Start(float(gains.ratio_m_rad * motor[0]), gains.ratio_m_rad * speed, state.integral_n_m)

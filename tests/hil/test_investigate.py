@@ -65,7 +65,8 @@ def test_what_one_direction_hides_is_found_by_the_motion_that_it_designs(
     assert json.loads((out / "diagnosis.json").read_text())["missing"] == last["missing"]
     (finding,) = last["missing"]
     assert finding["effect"] == "asymmetric_friction"
-    assert finding["equivalents"] == ["constant_load"]
+    # within the model accuracy a soft spring far from its rest is a constant load
+    assert set(finding["equivalents"]) == {"constant_load", "spring_load"}
     assert finding["parameters"]["offset_torque_n_m"]["value"] == pytest.approx(0.1, rel=0.03)
     assert last["next_experiment"] is None
     assert (out / "report.html").is_file()

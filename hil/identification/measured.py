@@ -105,8 +105,8 @@ class Measured:
     def judged(self) -> slice:
         """Rows that are evaluated: from the first motion on, and after the start has settled.
 
-        Before the first motion the state of friction is unknown. In a recording that begins in motion elastic modes swing
-        at first.
+        Before the first motion the state of friction is unknown. In a recording that begins in motion elastic modes
+        swing at first.
         """
         first = min(int(np.argmax(self.moving)), self.motor.size // 2)
         settle_s = SETTLE_IN_MOTION_S if self.moving[0] else SETTLE_S

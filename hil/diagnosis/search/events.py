@@ -34,6 +34,7 @@ _ALIKE = 0.25  # levels of adjacent windows that differ less are one
 _EVIDENCE = 20.0  # BIC difference for the events of a held-out recording: that of a term in the search (NEEDED)
 _MATERIAL = 0.02  # least energy per row that they remove, in units of noise^2: that of a term in the search (MATERIAL)
 _SIGMAS = 3.0  # standard errors of the force of a window: 0.3 % of Gaussian ones are above without a force
+_OF_CONSTANT = 4.0  # energy per row left inside windows over that outside: twice the rms, for edges between two rows
 _ROUNDS = 3  # windows found in one round do not count as motion in the next; then they stay
 _REWEIGHTED = 40  # iterations of the regression
 _LEAST_USUAL = 0.3  # of the blocks without an event: else which level is none cannot be told
@@ -130,7 +131,7 @@ def with_events_of(held_out: Dataset, final: Fit) -> Fit:
         if _index(fitted) is None or fitted.hypothesis.x.size != longer.x.size:
             continue
         gain = against(fitted, before)
-        if gain > evidence and before.cost - fitted.cost > _MATERIAL * before.rows:
+        if gain > evidence and before.cost - fitted.cost > _MATERIAL * before.rows and constant_inside(fitted):
             own = final.estimator.residuals(fitted.hypothesis)
             more = np.zeros((final.rows, fitted.hypothesis.x.size - at.x.size))
             slopes = np.hstack([final.jacobian, more]) if final.jacobian.size else final.jacobian
@@ -179,6 +180,30 @@ def _trimmed(found: Fit, others: bool = True) -> Fit:
     terms = (*found.hypothesis.terms[:index], replace(term, windows=kept), *found.hypothesis.terms[index + 1 :])
     changed = Hypothesis(found.hypothesis.bench, terms, found.hypothesis.x)
     return fit_windows(found.estimator.evaluate(changed), others=others)
+
+
+def constant_inside(found: Fit) -> bool:
+    """True if a constant force explains the windows of a fit as well as the rest of its recordings is explained.
+
+    A force of another form, such as friction at one place, leaves more inside.
+    """
+    index = _index(found)
+    if index is None:
+        return True
+    start, end = BY_ID[found.terms[index].effect].indices(Role.EDGE)
+    term, inside, outside = found.terms[index], list[FloatArray](), list[FloatArray]()
+    for (number, channel), part in found.residuals.parts.items():
+        run = found.data.runs[number]
+        if channel != "motor":
+            continue
+        time_s, within = run.time_s[run.judged], np.zeros(part.size, dtype=bool)
+        for one in term.windows:
+            if one.run == run.name:
+                within |= (time_s >= term.at(one)[start]) & (time_s < term.at(one)[end])
+        inside.append(part[within] ** 2)
+        outside.append(part[~within] ** 2)
+    left, rest = np.concatenate(inside), np.concatenate(outside)
+    return not left.size or bool(np.mean(left) <= _OF_CONSTANT * max(float(np.mean(rest)), 1.0))
 
 
 def _index(found: Fit) -> int | None:

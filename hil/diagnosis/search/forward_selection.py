@@ -12,7 +12,7 @@ from functools import partial
 
 import numpy as np
 
-from hil.diagnosis.search.events import beside_events, revised
+from hil.diagnosis.search.events import beside_events, constant_inside, revised
 from hil.diagnosis.search.initial_values import claimable
 from hil.diagnosis.search.restart import from_owner, may_hide, unbent
 from hil.diagnosis.search.score_test import Candidate, screen_library
@@ -199,6 +199,7 @@ def _worthwhile(found: Sequence[Fit], base: Fit, nominal: Fit) -> Fit | None:
             if against(other, base) >= NEEDED
             and gain(base, other, nominal) >= enough
             and REPEATS * unrepeated(other.hypothesis, other.data) <= differs
+            and constant_inside(other)
         ),
         None,
     )

@@ -46,8 +46,10 @@ def judge(owner: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> Verdict:
         evidence = held_out if held_out.runs else final.data
         left = 1.0 - explained_share(nominal.on(evidence), final.on(evidence))
         above = max(final.on(data).worst_ratio for data in (final.data, held_out) if data.runs)
-        # a recording that leaves inputs open has leftovers of its own
-        open_inputs = any(run.sampled or run.noise.coarse for run in (*final.data.runs, *held_out.runs))
+        # where inputs are open, or nothing is known of the control law, something is left beside any name
+        open_inputs = not final.bench.law_known or any(
+            run.sampled or run.noise.coarse for run in (*final.data.runs, *held_out.runs)
+        )
         if (
             names_stand(left, above)
             or (open_inputs and left <= MOST)

@@ -144,7 +144,7 @@ class UnknownControl(BenchSection):
 
 
 def without_law(control: Control) -> UnknownControl:
-    """What remains of a control section whose law is not used: feedback and limit."""
+    """Return the section without its law; position feedback and torque limit are kept."""
     return UnknownControl(
         law="unknown",
         position_feedback=control.position_feedback,

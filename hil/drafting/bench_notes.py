@@ -7,7 +7,7 @@ from hil.errors import InputError
 from hil.identification.friction import identify_friction
 from hil.recording.recording import Recording
 
-MUCH_LEFT = 0.3  # share of the torque from which what is left is as large as a usual friction
+MUCH_LEFT = 0.3  # share of the torque unexplained, from which it is as large as a usual friction
 
 
 def told(

@@ -145,7 +145,7 @@ def standard_errors(found: Fit) -> list[float]:
 
         A^-1 B A^-1,   A = J^T J
         B = sum over blocks of g g^T,   g = J^T r of a block                           (Liang and Zeger 1986)
-        B = sum over parts of  J^T C J,   C: covariance of what is left, by its autocorrelation   (Newey and West 1987)
+        B = sum over parts of  J^T C J,   C: autocovariance of the residual                     (Newey and West 1987)
 
     the larger of both, multiplied by `_WIDENED`. The second holds for residuals that are correlated over more than a
     block. A controller replayed bit-identically leaves no noise; then the error is

@@ -189,7 +189,7 @@ def _claimable(found: Sequence[Fit]) -> list[Fit]:
 
 
 def _worthwhile(found: Sequence[Fit], base: Fit, nominal: Fit) -> Fit | None:
-    """Return the first fit whose last term has evidence, a material energy, and repeats from lap to lap."""
+    """Return the first fit whose last term has evidence and material energy, repeats over laps, and is well formed."""
     enough = max(MATERIAL * base.rows, WORTH * base.excess)
     differs = unrepeated(base.hypothesis, base.data)
     return next(

@@ -24,7 +24,7 @@ RUNGS = (0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 5.0, 8.0, 13.0, 20.0, 30.0)
 _MASKED = (1.0, 6.0)  # sizes of the masked effect
 _MASKING = (4.0, 100.0)  # ratio of the masking effect to it
 _NOVEL = (3.0, 100.0)
-_CLEAR = (5.0, 100.0)  # where less is known, so that the effect stands out of what is left open
+_CLEAR = (5.0, 100.0)  # where less is known: the noise floor is higher there
 _INVISIBLE = 5.0  # sum of squares over the noise's variance: below half of the threshold of any test
 _OTHER_BLOCK = 0.8  # share of the pairs whose effects lie in different blocks
 

@@ -32,8 +32,8 @@ from hil.twin.mechanism import Stage
 # and structure leave tens of per cent if they are wrong, mechanisms on the controller's inputs a few.
 REPLAYED = 0.05
 _COARSE = (
-    "The control law reproduces the commands to the noise that the steps of the recorded positions make in a replay; it "
-    "was not tested further, because the control loop may have seen finer positions."
+    "The control law reproduces the commands to the noise that the steps of the recorded positions make in a replay. "
+    "It was not tested further, because the control loop may have seen finer positions."
 )
 _SAME_PERIOD = 0.01  # relative: stamps are printed with few digits
 _SURE = 3.0  # standard errors from which a gain differs from that of the bench

@@ -43,8 +43,7 @@ def judge(owner: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> Verdict:
     If the terms are rejected, the first two decide.
     """
     if final.terms:
-        evidence = held_out if held_out.runs else final.data
-        left = 1.0 - explained_share(nominal.on(evidence), final.on(evidence))
+        left = unexplained_share(nominal, final, held_out)
         above = max(final.on(data).worst_ratio for data in (final.data, held_out) if data.runs)
         # where inputs are open, or nothing is known of the control law, something is left beside any name
         open_inputs = not final.bench.law_known or any(
@@ -59,6 +58,17 @@ def judge(owner: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> Verdict:
     if not nominal.at_floor:
         return Verdict.UNEXPLAINED
     return Verdict.NO_MISMATCH if owner.at_floor or not refit_matters(owner, nominal) else Verdict.PARAMETER_ERROR
+
+
+def unexplained_share(nominal: Fit, final: Fit, held_out: Dataset) -> float:
+    """Share of the energy above the floor that the terms leave, on held-out recordings if there are any."""
+    evidence = held_out if held_out.runs else final.data
+    return 1.0 - explained_share(nominal.on(evidence), final.on(evidence))
+
+
+def explains_most(nominal: Fit, final: Fit, held_out: Dataset) -> bool:
+    """True if the terms explain most of the mismatch, whatever is left above the noise."""
+    return bool(final.terms) and unexplained_share(nominal, final, held_out) <= MOST
 
 
 def names_stand(left: float, above: float) -> bool:

@@ -144,7 +144,7 @@ def starts(scene: Scene, bench: Bench, runs: Sequence[Measured] = ()) -> list[St
         phases = mechanism.indices(Role.PHASE)
         for number, variant in enumerate(mechanism.variants):
             if variant.motor_alone:
-                if bench.has_table_encoder or not bench.axis.turns:
+                if bench.has_table_encoder:
                     continue
             elif (mechanism.needs_table or variant.needs_table) and not bench.has_table_encoder:
                 continue

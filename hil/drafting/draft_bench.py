@@ -12,6 +12,7 @@ from hil.drafting.relations import proportional
 from hil.drafting.sensor_values import noise_of
 from hil.drafting.usual_values import ROTARY_LEAD_M, usual_lead
 from hil.errors import InputError
+from hil.identification.completion import with_position
 from hil.quantities import digits
 from hil.recording.importing import STEP
 from hil.recording.quantum import count_of, is_decimal
@@ -58,6 +59,7 @@ def draft_bench(recording: Recording) -> BenchDraft:
 
     Raises InputError if masses and friction cannot be told: no torque, one direction, too short, a wrong sign.
     """
+    recording = with_position(recording)
     parts = sorted(recording.parts(), key=len, reverse=True)
     for number, part in enumerate(parts if len(parts) > 1 else ()):
         try:

@@ -44,6 +44,8 @@ def _delayed(samples: FloatArray, periods: float) -> FloatArray:
     Interpolation between neighbours would average their noise, which a fit would take for evidence. The ends are
     continued by point reflection, the line between them is delayed by itself.
     """
+    if periods == 0.0:
+        return samples
     ends = min(_ENDS + math.ceil(abs(periods)), samples.size - 1)
     longer = np.pad(samples, (ends, ends + (samples.size + 1) % 2), mode="reflect", reflect_type="odd")
     slope = (longer[-1] - longer[0]) / (longer.size - 1)

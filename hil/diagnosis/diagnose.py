@@ -16,9 +16,10 @@ from hil.diagnosis.experiment import Experiment, separating, showing
 from hil.diagnosis.location.locate import locate
 from hil.diagnosis.notes import at_bound, ended, notes_on, on_torque, stopped
 from hil.diagnosis.preparation import prepare_diagnosis
-from hil.diagnosis.result import FitFigures, Location, Mode, NextExperiment, Result, TimeBudget, Unexplained, Verdict
+from hil.diagnosis.result import Location, Mode, NextExperiment, Result, TimeBudget, Unexplained, Verdict
 from hil.diagnosis.search.events import with_events_of
 from hil.diagnosis.search.forward_selection import Explanation, explain
+from hil.diagnosis.statement import statement
 from hil.diagnosis.time_left import with_time_left
 from hil.diagnosis.untold import untold
 from hil.diagnosis.verdict.cross_validation import CrossValidation, cross_validate
@@ -33,7 +34,7 @@ from hil.identification.estimator import Fit
 from hil.identification.measured import Measured
 from hil.identification.noise_floor import FLOOR
 from hil.identification.parallel import one_blas_thread
-from hil.quantities import digits, percent, quantity
+from hil.quantities import digits
 from hil.recording.recording import Recording
 
 if TYPE_CHECKING:
@@ -194,58 +195,6 @@ def diagnose(
         after = after.model_copy(update={"control": believed.control})
     after = after.model_copy(update={"encoders": believed.encoders})
     return Diagnosis(result, after, bench, data, held_out, explanation, proof, final, experiment)
-
-
-def statement(result: Result) -> str:
-    """The verdict as one sentence."""
-    if result.verdict is Verdict.MISSING_PHYSICS:
-        named = " ".join(finding.sentence for finding in result.missing)
-        name, entry = max(
-            result.fit.items(),
-            key=lambda item: (item[1].mode is Mode.CLOSED_LOOP, _improvement(item[1].train)),
-        )
-        found = entry.validate_ or entry.train
-        before, after, noise = (
-            quantity(value, entry.unit) for value in (found.best_before_rms, found.after_rms, found.noise_floor_rms)
-        )
-        change = (
-            f"decreases from {before} to {after}"
-            if found.after_rms < found.best_before_rms
-            else (f"does not decrease: {after} instead of {before}")
-        )
-        return (
-            f"Missing physics: {named} With it the residual of {name} on {'held-out' if entry.validate_ else 'these'} "
-            f"recordings {change} rms; the noise floor is {noise}."
-        )
-    if result.verdict is Verdict.PARAMETER_ERROR:
-        worst = sorted(
-            result.parameter_corrections.items(),
-            key=lambda item: -abs(np.log(max(item[1].value, 1e-300) / max(item[1].nominal, 1e-300))),
-        )
-        changes = ", ".join(
-            f"{name} {100.0 * (entry.value / entry.nominal - 1.0):+.1f} %"
-            for name, entry in worst[:3]
-            if entry.nominal > 0.0
-        )
-        if not changes:
-            return "No physics is missing, but parameters of the bench file are wrong; this motion does not tell them."
-        return f"No physics is missing; parameters of the bench file are wrong: {changes}."
-    if result.verdict is Verdict.NO_MISMATCH:
-        return "The twin reproduces these recordings to within their noise."
-    if result.time_budget:
-        return f"The time budget ended before a mechanism was found: {result.unexplained.description}"
-    if result.partial:
-        part = " ".join(finding.sentence for finding in result.partial)
-        share = percent(1.0 - result.unexplained.share)
-        return (
-            f"No mechanism of the library explains the whole mismatch. Found, for {share} of its energy above the "
-            f"noise: {part} {result.unexplained.description}"
-        )
-    return f"The mismatch is not explained by any mechanism of the library: {result.unexplained.description}"
-
-
-def _improvement(found: FitFigures) -> float:
-    return found.best_before_rms / max(found.after_rms, 1e-300)
 
 
 def _unexplained(

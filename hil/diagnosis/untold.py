@@ -47,9 +47,7 @@ def _on_motor(mechanism: Mechanism) -> bool:
 def _of_encoders(run: Measured, bench: Bench) -> list[str]:
     if bench.has_table_encoder:
         return []
-    hidden = titles(
-        [mechanism.id for mechanism in LIBRARY if mechanism.needs_table and not _on_motor(mechanism)]
-    )
+    hidden = titles([mechanism.id for mechanism in LIBRARY if mechanism.needs_table and not _on_motor(mechanism)])
     names = AXIS_CHANNELS[run.kind]
     return [
         f"Only one position is recorded: {hidden} cannot be tested; record both {names.motor_position} and "

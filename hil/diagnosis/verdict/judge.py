@@ -22,7 +22,7 @@ import numpy as np
 
 from hil.diagnosis.result import Verdict
 from hil.diagnosis.search.forward_selection import MATERIAL, MOST, NEEDED
-from hil.diagnosis.search.initial_values import axis_facts, judged
+from hil.diagnosis.search.initial_values import axis_facts, judged, observable
 from hil.diagnosis.verdict.cross_validation import explained_share
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
@@ -137,10 +137,10 @@ def not_testable(found: Fit, asked: Collection[str] = tuple(BY_ID), margin: floa
         if mechanism.id in asked and mechanism.id not in present and (bench.axis.turns or not mechanism.turning)
     ]
     jobs = [
-        (mechanism.id, variant)
+        (mechanism.id, number)
         for mechanism in wanted
-        for variant in range(len(mechanism.variants))
-        if (bench.has_table_encoder or not mechanism.needs_table) and judged(mechanism.id, found.data.runs)
+        for number, variant in enumerate(mechanism.variants)
+        if observable(mechanism, variant, bench) and judged(mechanism.id, found.data.runs)
     ]
     shown = {effect for (effect, _), seen in zip(jobs, POOL.map(lambda job: visible(*job), jobs), strict=True) if seen}
     return tuple(mechanism.id for mechanism in wanted if mechanism.id not in shown)

@@ -73,7 +73,7 @@ def draft_bench(recording: Recording) -> BenchDraft:
         draft.notes.insert(0, f"found in {part.name}, {seconds:.4g} s long, of {len(parts)} parts between gaps in time")
         return draft
     transmission = transmission_values(recording)
-    volts = False
+    volts = turns = False
     if recording.kind is AxisKind.LINEAR:
         plant = plant_values(recording)
         draft = BenchDraft(recording.name, recording.kind, "one_mass")
@@ -101,7 +101,7 @@ def draft_bench(recording: Recording) -> BenchDraft:
     _control(draft, recording, loop_values(recording, ratio))
     _encoders(draft, recording)
     _weight(draft, plant)
-    notes, unsure = told(recording, plant, transmission, "V" if volts else None)
+    notes, unsure = told(recording, plant, transmission, "V" if volts else None, turns)
     draft.notes += notes
     draft.unsure += unsure
     return draft

@@ -26,7 +26,7 @@ MECHANISM = Mechanism(
     sentence="There are {gap_m} of lost motion between screw and table.",
     equation="T = k dz(q, gap/2): no torque while |q| < gap/2",
     source="Nordin and Gutman, Automatica 38 (2002) 1633, dead-zone model",
-    parameters=(Parameter("gap_m", Dimension.LENGTH, 0.0, 1e-3, role=Role.STRENGTH),),
+    parameters=(Parameter("gap_m", Dimension.LENGTH, 0.0, 0.05, role=Role.STRENGTH),),
     variants=(
         Variant(Stage.TRANSMISSION, _free_play, "oiled flanks"),
         Variant(Stage.TRANSMISSION, _free_play, "dry flanks", play=True),

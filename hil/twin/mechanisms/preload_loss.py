@@ -24,7 +24,7 @@ MECHANISM = Mechanism(
     equation="T = k e(q), de/dq = rho for |q| < zone/2, else 1",
     source="ISO 3408-4:2006, axial rigidity of preloaded nuts; Feng and Pan, Int. J. Machine Tools 52 (2012) 85",
     parameters=(
-        Parameter("zone_m", Dimension.LENGTH, 0.0, 1e-3, role=Role.STRENGTH),
+        Parameter("zone_m", Dimension.LENGTH, 0.0, 0.05, role=Role.STRENGTH),
         Parameter("stiffness_ratio", Dimension.RATIO, 0.0, 1.0),
     ),
     variants=(Variant(Stage.TRANSMISSION, _soft_zone),),

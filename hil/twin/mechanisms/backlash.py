@@ -3,10 +3,13 @@
 Damping resists the parting of oiled flanks; dry flanks only push.
 """
 
+from collections.abc import Sequence
+
 from numba import njit
 
 from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, Stage, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
+from hil.twin.scene import AxisFacts
 
 
 @njit
@@ -17,6 +20,11 @@ def _free_play(value: float, at: Moment, parameters: Row, memory: Row) -> float:
     if value < -half:
         return value + half
     return 0.0
+
+
+def _valid(values: Sequence[float], variant: int, axis: AxisFacts) -> bool:
+    """Check that the table crosses the gap: in a wider one it floats, and shows nothing of its width."""
+    return values[0] <= axis.lost_m
 
 
 MECHANISM = Mechanism(
@@ -33,6 +41,7 @@ MECHANISM = Mechanism(
     ),
     starts=lambda s: [(f * s.stretch,) for f in (0.5, 1.0, 2.0, 4.0)],
     typical=lambda a: (3e-6,),
+    valid=_valid,
     proportional=False,
     needs_table=True,
     picture=Picture.LOST_MOTION,

@@ -1,9 +1,12 @@
 """Preload loss: the transmission is soft around zero load."""
 
+from collections.abc import Sequence
+
 from numba import njit
 
 from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, Stage, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
+from hil.twin.scene import AxisFacts
 
 
 @njit
@@ -14,6 +17,11 @@ def _soft_zone(value: float, at: Moment, parameters: Row, memory: Row) -> float:
     if value < -half:
         return value + (1.0 - ratio) * half
     return ratio * value
+
+
+def _valid(values: Sequence[float], variant: int, axis: AxisFacts) -> bool:
+    """Check that the transmission leaves the zone: a wider one is a softer spring."""
+    return values[0] <= axis.lost_m
 
 
 MECHANISM = Mechanism(
@@ -32,6 +40,7 @@ MECHANISM = Mechanism(
         [(f * s.stretch, 0.4) for f in (0.5, 1.0, 2.0)] + [(f * s.most_stretch, 0.4) for f in (0.5, 1.0, 1.5)]
     ),
     typical=lambda a: (3e-6, 0.5),
+    valid=_valid,
     proportional=False,
     needs_table=True,
     picture=Picture.LOST_MOTION,

@@ -124,14 +124,17 @@ def _lead(recording: Recording, transmission: TransmissionValues | None) -> Esti
     return Estimate(lead, measured.std_error, how)
 
 
-def _deflection_s2(transmission: TransmissionValues) -> Estimate:
+def _deflection_s2(transmission: TransmissionValues) -> Estimate | None:
     """Deflection of the transmission over the load's acceleration; where it is not told, its standard error.
 
-    Two encoders show what a transmission does, which a rigid axis does not have: lead error, play, twist.
+    Two encoders show what a transmission does, which a rigid axis does not have: lead error, play, twist. None: the
+    second encoder is late, and no deflection is told beside its delay.
     """
     stretch = transmission.compliance_s2.scaled(-1.0)
     if stretch.significant and stretch.value > 0.0:
         return replace(stretch, how="deflection over acceleration")
+    if transmission.delay_s.significant:
+        return None
     how = "not told by this motion: the deflection over acceleration is at most its standard error"
     return Estimate(max(stretch.value, stretch.std_error, _STIFFEST_S2), stretch.std_error, how)
 

@@ -63,9 +63,7 @@ def axis_facts(bench: Bench, runs: Sequence[Measured] = ()) -> AxisFacts:
         table_count_m=table.resolution_m if table is not None else None,
         duration_s=max((run.motor.size * run.period_s for run in runs), default=0.0),
         travel_m=max((ratio * float(np.ptp(run.motor)) for run in runs), default=math.inf),
-        lost_m=max(
-            (float(np.ptp(run.table_m - ratio * run.motor)) for run in runs if run.table_m.size), default=math.inf
-        ),
+        lost_m=max(apart, default=math.inf),
         held_s=lambda level: max((_held_s(run, level) for run in runs), default=math.inf),
     )
 

@@ -140,7 +140,7 @@ def _best(rows: LawRows, ratio_m_rad: float, period_s: float) -> LawFit | None:
     tried = []
     for ticks, integral, mean in product(_TICKS, (True, False), (True, False)):
         if ticks * period_s <= _LONGEST_S:
-            base = closed_form([rows], Settings(_gains(ratio_m_rad, period_s, ticks, integral, mean)), [0])
+            base = closed_form([rows], Settings(_gains(ratio_m_rad, period_s, ticks, integral, mean)), [0]).settings
             # the start is too far off to tell which variant is right
             tried += [fit_settings([rows], base, twin, most=_FIRST_STEPS)] if base is not None else []
     if not tried:

@@ -9,7 +9,6 @@ simulated: nothing is assumed of the plant.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import product
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -19,7 +18,17 @@ from hil.bench.bench_file import Bench
 from hil.control.cascade import Gains
 from hil.identification.inference import correlation_time
 from hil.identification.law_fit import LawErrors, LawFit
-from hil.identification.law_replay import LawRows, Parts, Settings, closed_form, residuals, to_explain
+from hil.identification.law_replay import (
+    FEEDBACK_ROWS,
+    SETPOINT_ROWS,
+    LawRows,
+    Parts,
+    Settings,
+    closed_form,
+    find_delays,
+    residuals,
+    to_explain,
+)
 from hil.identification.measured import Measured
 from hil.identification.terms import Term
 from hil.twin.axis import Twin
@@ -29,9 +38,6 @@ from hil.twin.physics import Active
 
 _FARTHEST = 20.0  # factor of a gain over that of the bench: beyond, another unit is meant
 _MOST_FEEDFORWARD = 3.0  # of the set velocity; 1 is exact
-_SETPOINT_ROWS, _FEEDBACK_ROWS = 100.0, 12.0  # largest delays: of a logger's buffer, of a bus with its drive
-_SETPOINT_STARTS = (0.0, 1.0, -1.0, 2.0, -2.0, 4.0, -4.0, 8.0, -8.0, 16.0, -16.0, 32.0, -32.0)
-_FEEDBACK_STARTS = (0.0, 1.0, 2.0, 4.0)
 _STEPS = 40  # of a fit with up to nine parameters, nearly linear in the logarithms of the gains
 
 
@@ -83,7 +89,7 @@ class _Law:
     def bounds(self) -> tuple[FloatArray, FloatArray]:
         most = np.log(_FARTHEST)
         bounds = [(-most, most), (0.0, _MOST_FEEDFORWARD), (-most, most), (-most, most)] if self.gains else []
-        bounds += [(-_SETPOINT_ROWS, _SETPOINT_ROWS), (0.0, _FEEDBACK_ROWS)] if self.delays else []
+        bounds += [(-SETPOINT_ROWS, SETPOINT_ROWS), (0.0, FEEDBACK_ROWS)] if self.delays else []
         bounds += [(-most, most)] if self.scaled else []
         for term in self.terms:
             for parameter, value in zip(BY_ID[term.effect].parameters, term.values, strict=True):
@@ -165,12 +171,17 @@ def fit_settings(
 ) -> LawFit:
     """Fit settings, from `base` or a closed form, and `terms`; `twin` has the known mechanisms of the axis.
 
-    Every tick of the position loop is tried as the first one if gains are free. `most`: evaluations of the fit.
+    Every tick of the position loop is tried as the first one if gains or delays are free. `most`: evaluations.
     """
     law = _Law(base, tuple(terms), free, delays, all(run.speed_set_point.size > 0 for run in rows))
+    cuts = range(base.gains.position_ticks)
+    if delays:
+        late, old = find_delays(rows[0], base)
+        start = base._replace(setpoint_rows=late, feedback_rows=old)
+        found = [min(cuts, key=lambda cut, run=run: closed_form([run], start, [cut]).left) for run in rows]  # type: ignore[misc]
+        return _fitted(law, twin, rows, found, most, start)
     if not free or base.gains.position_ticks == 1:
         return _fitted(law, twin, rows, [0] * len(rows), most)
-    cuts = range(base.gains.position_ticks)
     found = [min(cuts, key=lambda cut, run=run: _fitted(law, twin, [run], [cut], most).cost) for run in rows]  # type: ignore[misc]
     return _fitted(law, twin, rows, found, most)
 
@@ -185,7 +196,9 @@ def _scale(rows: Sequence[LawRows], gains: Gains) -> float:
     return both / own if both > 0.0 else 1.0
 
 
-def _fitted(law: _Law, twin: Twin, runs: Sequence[LawRows], cuts: Sequence[int], most: int) -> LawFit:
+def _fitted(
+    law: _Law, twin: Twin, runs: Sequence[LawRows], cuts: Sequence[int], most: int, start: Settings | None = None
+) -> LawFit:
     def parts(y: FloatArray, weight: float | None = None) -> tuple[Parts, ...]:
         settings, terms = law.values(y)
         added = tuple(Active(term.effect, term.values, term.variant) for term in terms)
@@ -199,7 +212,9 @@ def _fitted(law: _Law, twin: Twin, runs: Sequence[LawRows], cuts: Sequence[int],
     y, errors = law.at(law.base), LawErrors()
     if y.size:
         low, high = law.bounds
-        starts = [np.clip(one, low, high) for one in (y, *_starts(law, runs, cuts))]
+        near = law.base if start is None else start
+        learnt = closed_form(runs, near, cuts).settings if law.gains else None
+        starts = [np.clip(law.at(one), low, high) for one in (law.base, near, learnt) if one is not None]
         first = starts[0] if len(starts) == 1 else min(starts, key=lambda one: float(np.sum(stacked(one) ** 2)))
         fit = least_squares(stacked, first, bounds=(low, high), max_nfev=most)
         y = fit.x
@@ -218,11 +233,3 @@ def _fitted(law: _Law, twin: Twin, runs: Sequence[LawRows], cuts: Sequence[int],
 def _rms(parts: Sequence[FloatArray]) -> float:
     values = np.concatenate(parts)
     return float(np.sqrt(np.mean(values**2))) if values.size else 0.0
-
-
-def _starts(law: _Law, runs: Sequence[LawRows], cuts: Sequence[int]) -> list[FloatArray]:
-    """Starts at several delays if these are free, with gains of a closed form if these are."""
-    grid = product(_SETPOINT_STARTS, _FEEDBACK_STARTS) if law.delays else [(0.0, 0.0)] if law.gains else []
-    based = (law.base._replace(setpoint_rows=late, feedback_rows=old) for late, old in grid)
-    found = (closed_form(runs, one, cuts) if law.gains else one for one in based)
-    return [law.at(one) for one in found if one is not None]

@@ -11,9 +11,11 @@ count.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
+from scipy.optimize import minimize
 from scipy.signal import lfilter
 
 from hil.arrays import FloatArray
@@ -21,6 +23,11 @@ from hil.control.cascade import Gains
 from hil.twin.axis import Response, Start, Twin
 from hil.twin.mechanisms.channel_time_skew import delayed
 from hil.twin.stepping.loops import INTEGRATOR_S
+
+# Largest delays in rows: buffer and look-ahead of a logger; bus and drive.
+SETPOINT_ROWS, FEEDBACK_ROWS = 40.0, 12.0
+_SCANNED = 6000  # rows in which delays are looked for: seconds of motion at a usual rate
+_BEFORE = 50  # rows before the first judged one
 
 
 class Settings(NamedTuple):
@@ -61,6 +68,16 @@ class LawRows:
             position_command_m=delayed(self.position_command_m, late) if late else self.position_command_m,
             velocity_command_m_s=delayed(self.velocity_command_m_s, late) if late else self.velocity_command_m_s,
             measured=self.measured._replace(motor_position=motor, table_position_m=table),
+        )
+
+    def until(self, row: int) -> "LawRows":
+        """The rows before `row`."""
+        return replace(
+            self,
+            position_command_m=self.position_command_m[:row],
+            velocity_command_m_s=self.velocity_command_m_s[:row],
+            measured=Response(*(values[:row] for values in self.measured)),
+            speed_set_point=self.speed_set_point[:row],
         )
 
     def since(self, row: int) -> "LawRows":
@@ -143,8 +160,15 @@ def high_pass(values: FloatArray, period_s: float) -> FloatArray:
     return np.asarray(lfilter([1.0, -1.0], [1.0, -keep], values - values[:1], axis=0))
 
 
-def closed_form(runs: Sequence[LawRows], base: Settings, cuts: Sequence[int]) -> Settings | None:
-    """Settings from linear least squares with the delays of `base`; None if a gain is not positive.
+class ClosedForm(NamedTuple):
+    """Settings, None if a gain is not positive, and the share of command and speed set-point (rms) that they leave."""
+
+    settings: Settings | None
+    left: float
+
+
+def closed_form(runs: Sequence[LawRows], base: Settings, cuts: Sequence[int]) -> ClosedForm:
+    """Gains from linear least squares with the delays of `base`.
 
     T = Kp x + Ki integral(x) with x = Kv e / r + ff v_c / r - v is linear in Kp Kv, Kp ff, Kp and Ki Kv, Ki ff, Ki; all
     pass the high-pass of an integrator that follows the command. A recorded speed set-point takes the place of e and
@@ -166,24 +190,47 @@ def closed_form(runs: Sequence[LawRows], base: Settings, cuts: Sequence[int]) ->
         of_command.append(high_pass(both, gains.period_s)[keep])
     table = np.concatenate(of_command)
     k = (table.shape[1] - 1) // 2
-    columns = table[:, :-1] if gains.integral_gain_n_m_rad > 0.0 else table[:, :k]
-    found = np.linalg.lstsq(columns, table[:, -1], rcond=None)[0]
+    found, left = _least_squares(table[:, :-1] if gains.integral_gain_n_m_rad > 0.0 else table[:, :k], table[:, -1])
     kp, ki = float(found[k - 1]), float(found[-1]) if gains.integral_gain_n_m_rad > 0.0 else 0.0
-    if kp <= 0.0 or ki < 0.0:
-        return None
-    scale, (kv, feedforward) = 1.0, found[:2] / kp
+    scale, outer = 1.0, found[:2]
     if of_speed:
-        scale = float(found[0]) / kp
         table = np.concatenate(of_speed)
-        kv, feedforward = scale * np.linalg.lstsq(table[:, :2], table[:, 2], rcond=None)[0]
-    if kv <= 0.0 or scale <= 0.0:
-        return None
-    return base._replace(
-        gains=gains._replace(
-            position_gain_1_s=float(kv),
-            velocity_feedforward=max(float(feedforward), 0.0),
-            velocity_gain_n_m_s_rad=kp,
-            integral_gain_n_m_rad=ki,
-        ),
-        scale=scale,
+        outer, of_outer = _least_squares(table[:, :2], table[:, 2])
+        scale, outer, left = float(found[0]) / kp if kp else 0.0, outer * found[0], float(np.hypot(left, of_outer))
+    if kp <= 0.0 or ki < 0.0 or outer[0] <= 0.0 or scale <= 0.0:
+        return ClosedForm(None, left)
+    learnt = gains._replace(
+        position_gain_1_s=float(outer[0] / kp),
+        velocity_feedforward=max(float(outer[1] / kp), 0.0),
+        velocity_gain_n_m_s_rad=kp,
+        integral_gain_n_m_rad=ki,
     )
+    return ClosedForm(base._replace(gains=learnt, scale=scale), left)
+
+
+def _least_squares(columns: FloatArray, values: FloatArray) -> tuple[FloatArray, float]:
+    found = np.linalg.lstsq(columns, values, rcond=None)[0]
+    rest, size = values - columns @ found, float(values @ values)
+    return np.asarray(found, dtype=np.float64), float(np.sqrt(rest @ rest / size)) if size else 1.0
+
+
+def find_delays(run: LawRows, base: Settings) -> tuple[float, float]:
+    """Delays of set-points and feedback [rows] at which a closed form leaves least.
+
+    The misfit has several minima over the delay of the set-points, and one valley near the least of them.
+    """
+    short = run.since(max(run.judged - _BEFORE, 0)).until(_SCANNED)
+
+    def left(late: float, old: float, cut: int) -> float:
+        return closed_form([short], base._replace(setpoint_rows=late, feedback_rows=old), [cut]).left
+
+    cuts = range(base.gains.position_ticks)
+    grid = product(np.arange(-SETPOINT_ROWS, SETPOINT_ROWS + 1.0), cuts)
+    late, cut = min(grid, key=lambda one: left(one[0], 0.0, one[1]))
+
+    def of_both(delays: FloatArray) -> float:
+        return left(float(delays[0]), abs(float(delays[1])), cut)
+
+    simplex = np.array([[late, 0.0], [late + 1.0, 1.0], [late, 1.0]])
+    found = minimize(of_both, simplex[0], method="Nelder-Mead", options={"initial_simplex": simplex, "maxfev": 80}).x
+    return float(np.clip(found[0], -SETPOINT_ROWS, SETPOINT_ROWS)), float(min(abs(found[1]), FEEDBACK_ROWS))

@@ -123,7 +123,7 @@ def fit_loops(recording: Recording, ratio_m_rad: float) -> LawFit | None:
         velocity[rows],
         Response(motor, np.empty(0), command, command),
         np.empty(0),
-        Start(position_m=float(ratio_m_rad * motor[0])),
+        Start(float(ratio_m_rad * motor[0]), float(ratio_m_rad * (motor[1] - motor[0])) / recording.period_s),
         _SETTLED,
         _NOISE * max(float(np.std(command)), 1e-300),
     )

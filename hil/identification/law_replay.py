@@ -20,8 +20,8 @@ from scipy.signal import lfilter
 
 from hil.arrays import FloatArray
 from hil.control.cascade import Gains
+from hil.identification.measured import later
 from hil.twin.axis import Response, Start, Twin
-from hil.twin.mechanisms.channel_time_skew import delayed
 from hil.twin.stepping.loops import INTEGRATOR_S
 
 # Largest delays in rows: buffer and look-ahead of a logger; bus and drive.
@@ -62,11 +62,11 @@ class LawRows:
         late, old = settings.setpoint_rows, settings.feedback_rows
         motor, table = self.measured.motor_position, self.measured.table_position_m
         if old:
-            motor, table = delayed(motor, old), delayed(table, old) if table.size else table
+            motor, table = later(motor, old), later(table, old) if table.size else table
         return replace(
             self,
-            position_command_m=delayed(self.position_command_m, late) if late else self.position_command_m,
-            velocity_command_m_s=delayed(self.velocity_command_m_s, late) if late else self.velocity_command_m_s,
+            position_command_m=later(self.position_command_m, late) if late else self.position_command_m,
+            velocity_command_m_s=later(self.velocity_command_m_s, late) if late else self.velocity_command_m_s,
             measured=self.measured._replace(motor_position=motor, table_position_m=table),
         )
 
@@ -178,19 +178,26 @@ def closed_form(runs: Sequence[LawRows], base: Settings, cuts: Sequence[int]) ->
     of_command, of_speed = [], []
     for run, cut in zip(runs, cuts, strict=True):
         law = run.delayed(base).since(cut)
-        motor, keep = law.measured.motor_position, slice(law.judged, None)
+        motor = law.measured.motor_position
+        step = 2 if gains.two_sample_mean else 1  # rows of a difference: the first ones have none
+        keep = slice(max(law.judged - step, 0), None)
         held = np.arange(motor.size) // gains.position_ticks * gains.position_ticks
         inputs = np.stack([law.position_command_m - law.feedback_m(gains), law.velocity_command_m_s], axis=1)[held]
         if law.speed_set_point.size:
-            of_speed.append(np.column_stack([inputs, law.speed_set_point])[keep])
+            of_speed.append(np.column_stack([inputs, law.speed_set_point])[step:][keep])
             inputs = law.speed_set_point[:, None]
-        speed = np.diff(motor, prepend=motor[:1]) / gains.period_s
-        x = np.column_stack([inputs / gains.ratio_m_rad, -speed])
-        both = np.column_stack([x, np.cumsum(x, axis=0) * gains.period_s, law.measured.torque_command])
+        speed = (motor[step:] - motor[:-step]) / (step * gains.period_s)
+        x = np.column_stack([inputs[step:] / gains.ratio_m_rad, -speed])
+        both = np.column_stack([x, np.cumsum(x, axis=0) * gains.period_s, law.measured.torque_command[step:]])
         of_command.append(high_pass(both, gains.period_s)[keep])
     table = np.concatenate(of_command)
     k = (table.shape[1] - 1) // 2
-    found, left = _least_squares(table[:, :-1] if gains.integral_gain_n_m_rad > 0.0 else table[:, :k], table[:, -1])
+    columns = table[:, :-1] if gains.integral_gain_n_m_rad > 0.0 else table[:, :k]
+    found, left = _least_squares(columns, table[:, -1])
+    if not of_speed and found[1] < 0.0:  # the feed-forward
+        kept = np.arange(columns.shape[1]) % k != 1
+        found[kept], left = _least_squares(columns[:, kept], table[:, -1])
+        found[~kept] = 0.0
     kp, ki = float(found[k - 1]), float(found[-1]) if gains.integral_gain_n_m_rad > 0.0 else 0.0
     scale, outer = 1.0, found[:2]
     if of_speed:

@@ -7,6 +7,7 @@ commands best. Rows before the first such tick are omitted, since their velocity
 A drive in CSP gets positions only: its velocity feed-forward is their difference from SYNC to SYNC.
 """
 
+import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -153,7 +154,7 @@ def take(recording: Recording, bench: Bench) -> Measured:
     if bench.drive is not None and bench.drive.mode is DriveMode.CSP:
         velocity = np.diff(position, prepend=2.0 * position[0] - position[1]) / gains.period_s
     if bench.setpoint_delay_s:
-        position, velocity = (delayed(one, bench.setpoint_delay_s / gains.period_s) for one in (position, velocity))
+        position, velocity = (later(one, bench.setpoint_delay_s / gains.period_s) for one in (position, velocity))
     has_command = names.torque_command in recording.columns
     command = _column(recording, names.torque_command) if has_command else torque
     table = _column(recording, names.table_position) if bench.has_table_encoder else np.empty(0)
@@ -205,6 +206,15 @@ def bench_of(recording: Recording) -> Bench:
     if not isinstance(described, dict):
         raise InputError(f"{recording.name}: no bench is recorded in it; give one: --bench FILE or a shipped name")
     return Bench.model_validate(described)
+
+
+def later(values: FloatArray, rows: float) -> FloatArray:
+    """Delay samples (n,) by a number of rows; both ends are continued by straight lines."""
+    more = math.ceil(abs(rows)) + 2
+    beyond = np.arange(1, more + 1)
+    before = values[0] - beyond[::-1] * (values[1] - values[0])
+    after = values[-1] + beyond * (values[-1] - values[-2])
+    return delayed(np.concatenate([before, values, after]), rows)[more:-more]
 
 
 def _column(recording: Recording, name: str) -> FloatArray:

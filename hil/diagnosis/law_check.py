@@ -225,7 +225,8 @@ def _of_delays(bench: Bench, found: LawFit) -> dict[str, Correction]:
         (_SETPOINT_DELAY, settings.setpoint_rows, errors.setpoint_rows, bench.known_control.setpoint_delay_s),
         (_FEEDBACK_DELAY, settings.feedback_rows, errors.feedback_rows, 0.0),
     ):
-        if sure(rows, error):
+        # a fit has a delay of the set-points only where it needs one, sure or not: the law has it then
+        if sure(rows, error if name == _FEEDBACK_DELAY else 0.0):
             value = nominal + period_s * rows
             corrections[name] = Correction(nominal=nominal, value=value, std=period_s * error, unit=unit_of(name))
     return corrections
@@ -243,7 +244,9 @@ def _refused(bench: Bench, given: LawFit, best: LawFit) -> LawCheck:
     )
     corrections: dict[str, Correction] = {}
     if best.left_of_speed:
-        why += f" and {100.0 * best.left_of_speed:.0f} % of the recorded speed set-point"
+        why += (
+            f" in the velocity loop and {100.0 * best.left_of_speed:.0f} % in the speed set-point of the position loop"
+        )
         corrections |= _of_velocity_loop(bench, best) if best.left_of_command <= REPLAYED else {}
         corrections |= _of_position_loop(bench, best) if best.left_of_speed <= REPLAYED else {}
     told = f" One loop follows its settings with {_told(corrections)}." if corrections else ""

@@ -77,7 +77,7 @@ def loop_values(recording: Recording, ratio_m_rad: float) -> ControlValues:
         time_s = gains.velocity_gain_n_m_s_rad / gains.integral_gain_n_m_rad
         error_s = time_s * hypot(errors.velocity_gain, errors.integral_gain)
         values.append(BenchValue("velocity_integral_time_s", time_s, f"s, +-{error_s:.2g}"))
-    if sure(delays.setpoint_rows, errors.setpoint_rows):
+    if sure(delays.setpoint_rows, 0.0):
         values.append(
             BenchValue(
                 "setpoint_delay_s", period_s * delays.setpoint_rows, f"s, +-{period_s * errors.setpoint_rows:.2g}"
@@ -96,7 +96,7 @@ def loop_values(recording: Recording, ratio_m_rad: float) -> ControlValues:
 
 
 def _left(loop: LawFit) -> str:
-    of_speed = f" and {100 * loop.left_of_speed:.2g} % of the speed set-point" if loop.left_of_speed else ""
+    of_speed = f", {100 * loop.left_of_speed:.2g} % in the speed set-point" if loop.left_of_speed else ""
     return f"{100 * loop.left_of_command:.2g} % of the torque command{of_speed}"
 
 
@@ -107,7 +107,8 @@ def fit_loops(recording: Recording, ratio_m_rad: float) -> LawFit | None:
     is not recorded, the chain of both loops is.
     """
     names = recording.axis
-    if not {names.position_command, names.torque_command} <= set(recording.columns):
+    torque = names.torque_command if names.torque_command in recording.columns else names.torque
+    if not {names.position_command, names.motor_position, torque} <= set(recording.columns):
         return None
     position = recording[names.position_command]
     velocity = recording.columns.get(names.velocity_command)
@@ -117,7 +118,7 @@ def fit_loops(recording: Recording, ratio_m_rad: float) -> LawFit | None:
     if not moving.size:
         return None
     rows = slice(max(int(moving[0]) - 50, 0), max(int(moving[0]) - 50, 0) + _ROWS)
-    motor, command = recording[names.motor_position][rows], recording[names.torque_command][rows]
+    motor, command = recording[names.motor_position][rows], recording[torque][rows]
     law = LawRows(
         position[rows],
         velocity[rows],

@@ -38,6 +38,8 @@ from hil.twin.physics import Active
 
 _FARTHEST = 20.0  # factor of a gain over that of the bench: beyond, another unit is meant
 _MOST_FEEDFORWARD = 3.0  # of the set velocity; 1 is exact
+_STEP = 1e-6  # of logarithms of gains, and of delays in rows, for derivatives
+_AT_BOUND = 1e-3  # distance to a bound, which the fit keeps from reaching it
 _STEPS = 40  # of a fit with up to nine parameters, nearly linear in the logarithms of the gains
 
 
@@ -55,7 +57,7 @@ class _Law:
         """Settings and terms of y (p,)."""
         settings = self.base
         if self.gains:
-            gains, kv, kp, ki = settings.gains, *np.exp(y[[0, 2, 3]])
+            gains, (kv, kp, ki) = settings.gains, np.exp(y[[0, 2, 3]]).tolist()
             gains = gains._replace(
                 position_gain_1_s=gains.position_gain_1_s * kv,
                 velocity_feedforward=float(y[1]),
@@ -209,6 +211,14 @@ def _fitted(
     def stacked(y: FloatArray) -> FloatArray:
         return np.concatenate([one for run in parts(y) for one in run])
 
+    def jac(y: FloatArray) -> FloatArray:
+        # steps of equal size: those of scipy are relative to values that may be 0
+        steps = np.where(y + _STEP < law.bounds[1], _STEP, -_STEP)
+        now = stacked(y)
+        return np.stack(
+            [(stacked(y + step * one) - now) / step for step, one in zip(steps, np.eye(y.size), strict=True)], axis=1
+        )
+
     y, errors = law.at(law.base), LawErrors()
     if y.size:
         low, high = law.bounds
@@ -216,7 +226,7 @@ def _fitted(
         learnt = closed_form(runs, near, cuts).settings if law.gains else None
         starts = [np.clip(law.at(one), low, high) for one in (law.base, near, learnt) if one is not None]
         first = starts[0] if len(starts) == 1 else min(starts, key=lambda one: float(np.sum(stacked(one) ** 2)))
-        fit = least_squares(stacked, first, bounds=(low, high), max_nfev=most)
+        fit = least_squares(stacked, first, jac, bounds=(low, high), max_nfev=most)
         y = fit.x
     settings, terms = law.values(y)
     weight = settings.gains.velocity_gain_n_m_s_rad
@@ -224,10 +234,14 @@ def _fitted(
     if y.size:
         rows = sum(part.size / correlation_time(part) for run in found for part in run if part.size)
         variance = float(np.sum(fit.fun**2)) / max(rows - law.count, 1.0) * rows / fit.fun.size
-        errors = law.errors(np.sqrt(variance * np.maximum(np.diag(np.linalg.pinv(fit.jac.T @ fit.jac)), 0.0)))
-    asked = [to_explain(run, settings, weight) for run in runs]
-    left = [_rms([run[loop] for run in found]) / max(_rms([run[loop] for run in asked]), 1e-150) for loop in range(2)]
-    return LawFit(settings, terms, found, errors, law.count, left[0], left[1], tuple(cuts))
+        # one at its bound is kept there: near a feed-forward of 0 a delay of the set-points acts as another one
+        inside = (y > low + _AT_BOUND) & (y < high - _AT_BOUND)
+        variances = np.zeros(y.size)
+        variances[inside] = np.diag(np.linalg.pinv(fit.jac[:, inside].T @ fit.jac[:, inside]))
+        errors = law.errors(np.sqrt(variance * np.maximum(variances, 0.0)))
+    asked = _rms([to_explain(run, settings.gains) for run in runs])
+    left = [_rms([run[loop] for run in found]) / max(asked, 1e-150) for loop in range(2)]
+    return LawFit(settings, terms, found, errors, law.count, left[0], left[1])
 
 
 def _rms(parts: Sequence[FloatArray]) -> float:

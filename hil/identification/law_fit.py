@@ -40,9 +40,8 @@ class LawFit:
     runs: tuple[Parts, ...]
     errors: LawErrors
     free: int  # number of parameters fitted
-    left_of_command: float  # rms of the rest over that of what is to be explained
-    left_of_speed: float  # the same of the recorded speed set-point; 0 without one
-    cuts: tuple[int, ...] = ()  # first row of the position loop in each run
+    left_of_command: float  # rms of the rest over that of the command that is to be explained
+    left_of_speed: float  # the same of what a rest of the speed set-point makes of the command; 0 if it is not recorded
 
     @property
     def gains(self) -> Gains:

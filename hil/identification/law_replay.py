@@ -144,14 +144,12 @@ def _finite(values: FloatArray) -> FloatArray:
     return np.asarray(np.nan_to_num(values, posinf=1e6, neginf=-1e6))
 
 
-def to_explain(rows: LawRows, settings: Settings, weight: float) -> Parts:
-    """What a law has to explain in the units of `residuals`.
+def to_explain(rows: LawRows, gains: Gains) -> FloatArray:
+    """What a law has to explain of the command, in the units of `residuals`.
 
-    Of the command it is what passes the integrator that follows it: a slow command is followed without any law.
+    It is what passes the integrator that follows the command: a slow one is followed without any law.
     """
-    command = high_pass(rows.measured.torque_command, settings.gains.period_s)
-    speed = weight / settings.gains.ratio_m_rad * settings.scale * rows.speed_set_point[rows.judged :]
-    return Parts(command[rows.judged :] / rows.noise, (speed - speed.mean() if speed.size else speed) / rows.noise)
+    return high_pass(rows.measured.torque_command, gains.period_s)[rows.judged :] / rows.noise
 
 
 def high_pass(values: FloatArray, period_s: float) -> FloatArray:

@@ -1,7 +1,7 @@
 """Gains of a cascaded control law from set-points, motion and torque command, without a bench.
 
 The fit is that of `hil.identification.control_law`, from a closed form, at every period of the position loop, with both
-velocity estimates, with and without an integrator; the best of these is refined.
+velocity estimates, with and without an integrator and delays; the best of these is refined.
 """
 
 from dataclasses import replace
@@ -16,7 +16,7 @@ from hil.control.cascade import Gains, make_gains
 from hil.drafting.estimate import BenchValue
 from hil.identification.control_law import fit_settings
 from hil.identification.law_fit import REPLAYED, LawFit, preferred, sure
-from hil.identification.law_replay import LawRows, Settings, closed_form
+from hil.identification.law_replay import LawRows, Settings, closed_form, find_delays, first_tick
 from hil.recording.recording import Recording
 from hil.twin.axis import Response, Start, Twin
 from hil.twin.physics import Physics
@@ -136,19 +136,25 @@ def fit_loops(recording: Recording, ratio_m_rad: float) -> LawFit | None:
 
 
 def _best(rows: LawRows, ratio_m_rad: float, period_s: float) -> LawFit | None:
-    """The variant of the law with the best criterion, with delays if these improve it."""
+    """The variant of the law with the best criterion, with and without delays."""
     twin = Twin(Physics(one_mass(1.0), 0.0, 0.0), _gains(ratio_m_rad, period_s, 1, True, False))
     tried = []
-    for ticks, integral, mean in product(_TICKS, (True, False), (True, False)):
-        if ticks * period_s <= _LONGEST_S:
-            base = closed_form([rows], Settings(_gains(ratio_m_rad, period_s, ticks, integral, mean)), [0]).settings
-            # the start is too far off to tell which variant is right
-            tried += [fit_settings([rows], base, twin, most=_FIRST_STEPS)] if base is not None else []
+    for ticks, mean in product(_TICKS, (True, False)):
+        if ticks * period_s > _LONGEST_S:
+            continue
+        delays = find_delays(rows, Settings(_gains(ratio_m_rad, period_s, ticks, True, mean)))
+        for integral, late in product((True, False), (False, True)):
+            start = Settings(
+                _gains(ratio_m_rad, period_s, ticks, integral, mean), 1.0, *(delays if late else (0.0, 0.0))
+            )
+            base = closed_form([rows], start, [first_tick(rows, start)]).settings
+            if base is not None:  # the start is too far off to tell which variant is right
+                tried.append((late, fit_settings([rows], base, twin, delays=late, start=base, most=_FIRST_STEPS)))
     if not tried:
         return None
-    best = fit_settings([rows], preferred(tried).settings, twin, most=_LAST_STEPS)
-    late = fit_settings([rows], best.settings, twin, delays=True, most=_LAST_STEPS)
-    return preferred([best, late])
+    best = preferred([one for _, one in tried])
+    late = next(late for late, one in tried if one is best)
+    return fit_settings([rows], best.settings, twin, delays=late, start=best.settings, most=_LAST_STEPS)
 
 
 def _gains(ratio_m_rad: float, period_s: float, ticks: int, integral: bool, mean: bool) -> Gains:

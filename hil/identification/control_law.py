@@ -26,6 +26,7 @@ from hil.identification.law_replay import (
     Settings,
     closed_form,
     find_delays,
+    first_tick,
     residuals,
     to_explain,
 )
@@ -169,21 +170,23 @@ def fit_settings(
     *,
     free: bool = True,
     delays: bool = False,
+    start: Settings | None = None,
     most: int = _STEPS,
 ) -> LawFit:
     """Fit settings, from `base` or a closed form, and `terms`; `twin` has the known mechanisms of the axis.
 
-    Every tick of the position loop is tried as the first one if gains or delays are free. `most`: evaluations.
+    Every tick of the position loop is tried as the first one if gains or delays are free. Delays are looked for
+    unless they `start` somewhere. `most`: evaluations.
     """
     law = _Law(base, tuple(terms), free, delays, all(run.speed_set_point.size > 0 for run in rows))
-    cuts = range(base.gains.position_ticks)
     if delays:
-        late, old = find_delays(rows[0], base)
-        start = base._replace(setpoint_rows=late, feedback_rows=old)
-        found = [min(cuts, key=lambda cut, run=run: closed_form([run], start, [cut]).left) for run in rows]  # type: ignore[misc]
-        return _fitted(law, twin, rows, found, most, start)
+        if start is None:
+            late, old = find_delays(rows[0], base)
+            start = base._replace(setpoint_rows=late, feedback_rows=old)
+        return _fitted(law, twin, rows, [first_tick(run, start) for run in rows], most, start)
     if not free or base.gains.position_ticks == 1:
         return _fitted(law, twin, rows, [0] * len(rows), most)
+    cuts = range(base.gains.position_ticks)
     found = [min(cuts, key=lambda cut, run=run: _fitted(law, twin, [run], [cut], most).cost) for run in rows]  # type: ignore[misc]
     return _fitted(law, twin, rows, found, most)
 

@@ -27,6 +27,7 @@ from hil.twin.stepping.loops import INTEGRATOR_S
 # Largest delays in rows: buffer and look-ahead of a logger; bus and drive.
 SETPOINT_ROWS, FEEDBACK_ROWS = 40.0, 12.0
 _SCANNED = 6000  # rows in which delays are looked for: seconds of motion at a usual rate
+_EACH = 8.0  # rows: delays that are tried one by one, longer ones by two
 _BEFORE = 50  # rows before the first judged one
 
 
@@ -219,6 +220,11 @@ def _least_squares(columns: FloatArray, values: FloatArray) -> tuple[FloatArray,
     return np.asarray(found, dtype=np.float64), float(np.sqrt(rest @ rest / size)) if size else 1.0
 
 
+def first_tick(run: LawRows, start: Settings) -> int:
+    """First row of the position loop: that at which a closed form leaves least."""
+    return min(range(start.gains.position_ticks), key=lambda cut: closed_form([run], start, [cut]).left)
+
+
 def find_delays(run: LawRows, base: Settings) -> tuple[float, float]:
     """Delays of set-points and feedback [rows] at which a closed form leaves least.
 
@@ -230,7 +236,8 @@ def find_delays(run: LawRows, base: Settings) -> tuple[float, float]:
         return closed_form([short], base._replace(setpoint_rows=late, feedback_rows=old), [cut]).left
 
     cuts = range(base.gains.position_ticks)
-    grid = product(np.arange(-SETPOINT_ROWS, SETPOINT_ROWS + 1.0), cuts)
+    each = np.arange(-SETPOINT_ROWS, SETPOINT_ROWS + 1.0)
+    grid = product(each[(np.abs(each) <= _EACH) | (each % 2.0 == 0.0)], cuts)
     late, cut = min(grid, key=lambda one: left(one[0], 0.0, one[1]))
 
     def of_both(delays: FloatArray) -> float:

@@ -39,7 +39,7 @@ class Control(BenchSection):
     velocity_estimate: Literal["backward_difference", "two_sample_mean"] = "backward_difference"
     velocity_filter_time_constant_s: NotNegative = 0.0
     setpoint_delay_s: float = Field(
-        0.0, ge=-0.2, le=0.2, description="the loop uses the set-points of a recording so much later [s]"
+        0.0, ge=-10.0, le=10.0, description="the loop uses the set-points of a recording so much later [s]"
     )
 
     @model_validator(mode="after")

@@ -47,8 +47,8 @@ class LawCheck:
     """Bench whose control law may be used, corrections of its gains, and notes.
 
     `coarse`: the law is right to the noise that the recorded positions make in a replay, and cannot be tested further.
-    `advice` is what the
-    owner should check, empty if nothing; `mismatch`: the law was set aside because no gains reproduce the commands.
+    `advice` is what the owner should check, empty if nothing; `mismatch`: the law was set aside because no gains
+    reproduce the commands.
     """
 
     bench: Bench
@@ -112,6 +112,8 @@ def check_law(runs: Sequence[Measured], bench: Bench) -> LawCheck:
     given = fit_law(runs, bench, free=False)
     if given.ratio <= FLOOR:
         return LawCheck(bench)
+    if _is_coarse(runs, given):
+        return LawCheck(bench, coarse=True, notes=(_COARSE,))
     found = list[LawFit]()
     # a recorded speed set-point may be another one: then the chain of both loops tells more
     for by_loop in (True, False) if all(run.speed_set_point.size for run in runs) else (False,):

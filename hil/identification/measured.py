@@ -26,7 +26,6 @@ from hil.identification.noise import Laps, Noise, estimate_noise, find_laps, mov
 from hil.recording.recording import Recording
 from hil.recording.stamps import check_finite
 from hil.twin.axis import Response, Start
-from hil.twin.mechanisms.channel_time_skew import delayed
 
 Channels = tuple[FloatArray, FloatArray, FloatArray, FloatArray]  # as control.replay takes them
 
@@ -209,12 +208,29 @@ def bench_of(recording: Recording) -> Bench:
 
 
 def later(values: FloatArray, rows: float) -> FloatArray:
-    """Delay samples (n,) by a number of rows; both ends are continued by straight lines."""
-    more = math.ceil(abs(rows)) + 2
+    """Delay samples (n,) by a number of rows; both ends are continued by straight lines.
+
+    Cubic convolution (Keys, IEEE Trans. Acoustics, Speech, and Signal Processing 29 (1981) 1153, a = -1/2), which
+    averages the counts of an encoder: they would make the gains of a law that is fitted to them too small.
+    """
+    whole = math.floor(rows)
+    f = rows - whole
+    # weights of the samples 1 after to 2 before the whole delay
+    weights = (
+        0.5 * f * (-1.0 + f * (2.0 - f)),
+        1.0 + 0.5 * f * f * (3.0 * f - 5.0),
+        0.5 * f * (1.0 + f * (4.0 - 3.0 * f)),
+        0.5 * f * f * (f - 1.0),
+    )
+    more = abs(whole) + 2
     beyond = np.arange(1, more + 1)
     before = values[0] - beyond[::-1] * (values[1] - values[0])
-    after = values[-1] + beyond * (values[-1] - values[-2])
-    return delayed(np.concatenate([before, values, after]), rows)[more:-more]
+    longer = np.concatenate([before, values, values[-1] + beyond * (values[-1] - values[-2])])
+    shifted = [
+        weight * longer[more - whole - late : more - whole - late + values.size]
+        for late, weight in zip((-1, 0, 1, 2), weights, strict=True)
+    ]
+    return np.asarray(np.sum(shifted, axis=0), dtype=np.float64)
 
 
 def _column(recording: Recording, name: str) -> FloatArray:

@@ -122,4 +122,6 @@ def fitted(hypothesis: Hypothesis, runs: Sequence[Measured] | Dataset, evaluatio
 def rows_of(run: Measured, rows: slice | NDArray[np.bool_]) -> Measured:
     """Return these rows of a recording, as if nothing else had been recorded."""
     arrays = {field.name: getattr(run, field.name) for field in fields(run)}
-    return replace(run, **{name: value[rows] for name, value in arrays.items() if isinstance(value, np.ndarray)})
+    return replace(
+        run, **{name: value[rows] for name, value in arrays.items() if isinstance(value, np.ndarray) and value.size}
+    )

@@ -203,5 +203,6 @@ def test_without_a_linear_encoder_nothing_behind_the_motor_can_be_shown() -> Non
     blind = OWNER.model_copy(update={"encoders": OWNER.encoders.model_copy(update={"table": None})})
     train = [take(recorded(OWNER), blind)]
     hidden = not_testable(fitted(Hypothesis(blind), train, evaluations=4))
-    assert {"backlash", "periodic_lead_error", "thermal_growth", "structural_mode"} <= set(hidden)
-    assert "constant_load" not in hidden
+    assert {"backlash", "periodic_lead_error", "thermal_growth"} <= set(hidden)
+    # a load that swings pushes back on the motor
+    assert not {"constant_load", "structural_mode"} & set(hidden)

@@ -194,14 +194,18 @@ def _request_short_wake_up() -> int:
     return descriptor
 
 
-def _cores(kind: str) -> set[int]:
-    """Read a list of cores such as `0-2,5`: kind is isolated or online."""
-    try:
-        text = Path(f"/sys/devices/system/cpu/{kind}").read_text().strip()
-    except OSError:
-        return set()
+def core_list(text: str) -> set[int]:
+    """Read a list of cores such as `0-2,5`."""
     spans = [part.split("-") for part in text.split(",") if part]
     return {core for span in spans for core in range(int(span[0]), int(span[-1]) + 1)}
+
+
+def _cores(kind: str) -> set[int]:
+    """Return the cores of the kernel's list `kind`: isolated or online."""
+    try:
+        return core_list(Path(f"/sys/devices/system/cpu/{kind}").read_text().strip())
+    except OSError:
+        return set()
 
 
 def _lock_memory() -> None:

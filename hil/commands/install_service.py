@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 UNITS = Path("etc/systemd/system")
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,62}")  # safe in file names and as an instance of a unit, unescaped
 _INTERFACE = re.compile(r"[A-Za-z0-9_.]{1,15}")  # 15: IFNAMSIZ of linux/if.h
+_DEVICE = re.compile(r"/dev/[A-Za-z0-9_./:+-]+")
 _HIDDEN = ("/home", "/root", "/run/user", "/tmp", "/var/tmp")  # ProtectHome= and PrivateTmp= of the unit
 # After bus-off the controller returns to the bus by itself after this time: later than the loop has found the fault,
 # sooner than its quick stop gives up (2 s), so that the drive still hears it.
@@ -70,6 +71,7 @@ def install_service(
             except OSError as error:
                 raise InputError(f"{target.parent}: cannot be made ({error.strerror}); run it with sudo") from None
             write_text(target, text)
+            target.chmod(0o644)  # the service reads them as another user
     out.print(f"\n{'Nothing was written. After the installation' if dry_run else 'Nothing was started. Now'}:\n")
     out.print(_next_steps(name, any("network" in path.parts for path in texts)))
 
@@ -117,6 +119,8 @@ def bench_files(bench: Bench, name: str, cores: str) -> dict[Path, str]:
         found = _can_files(can, section.bitrate)
     encoder = section.encoder
     if bench.has_table_encoder and encoder.interface == "serial" and encoder.device and bench.simulation is None:
+        if not _DEVICE.fullmatch(encoder.device):
+            raise FieldError(("drive", "encoder", "device"), f"given {encoder.device!r}, allowed as /dev/ttyUSB0")
         service.append(f"DeviceAllow={encoder.device} rw")
     lines = ["# Of this bench; written by `hil install-service`.", "[Unit]", *unit, "", "[Service]", *service]
     return {UNITS / f"hil-bench@{name}.service.d" / "bench.conf": "\n".join(lines) + "\n", **found}

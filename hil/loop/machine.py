@@ -16,7 +16,10 @@ from hil.loop.clock import SPIN_S
 from hil.loop.realtime import PRIORITY, Grant, core_list, loop_core
 
 FASTEST_PERIOD_S = 0.0005  # the highest rate that this program is meant for
-_CMDLINE = "GRUB_CMDLINE_LINUX_DEFAULT in /etc/default/grub, then: sudo update-grub && sudo reboot"
+# Adds words to the kernel's command line (Debian, Ubuntu).
+_BOOT_WITH = (
+    """sudo sed -i 's/^GRUB_CMDLINE_LINUX_DEFAULT="/&{} /' /etc/default/grub && sudo update-grub && sudo reboot"""
+)
 
 
 class Level(StrEnum):
@@ -96,7 +99,7 @@ class Machine:
         why = "the loop reads the clock while it waits for a tick; hpet and acpi_pm take microseconds for it"
         slow = source in ("hpet", "acpi_pm", "jiffies")
         if source:
-            command = f"add tsc=reliable to {_CMDLINE}" if slow else ""
+            command = _BOOT_WITH.format("tsc=reliable") if slow else ""
             yield MachineFinding(Level.ADVICE if slow else Level.FINE, "clock source", source, why, command)
 
     def isolation(self) -> Iterator[MachineFinding]:
@@ -108,7 +111,7 @@ class Machine:
             rest = _text(self.online - {self.core})
             words = (f"isolcpus=domain,managed_irq,{self.core} nohz_full={self.core} rcu_nocbs={self.core} "
                      f"irqaffinity={rest}")  # fmt: skip
-            yield MachineFinding(Level.ADVICE, "isolated cores", "none", why, f"add {words} to {_CMDLINE}")
+            yield MachineFinding(Level.ADVICE, "isolated cores", "none", why, _BOOT_WITH.format(words))
         else:
             yield MachineFinding(
                 Level.ADVICE, "isolated cores", "only one core", why, "take a machine with two or more cores"
@@ -177,7 +180,7 @@ class Machine:
 
 def grant_findings(grants: tuple[Grant, ...]) -> Iterator[MachineFinding]:
     """Yield what `real_time` was granted or refused, with the command that grants it."""
-    limits = "/etc/security/limits.d/hil.conf, then log in again; a service of hil install-service has it"
+    limits = "/etc/security/limits.d/hil.conf  # then log in again; a service of hil install-service has it"
     what = {
         "SCHED_FIFO": ("every other process may delay the loop",
                        f"echo \"$USER - rtprio {PRIORITY}\" | sudo tee -a {limits}"),

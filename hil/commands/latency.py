@@ -47,9 +47,11 @@ def latency(
     for series in found:
         out.print("\n".join(_histogram(series)) + "\n")
         if series.reference is None:
-            out.print(f"{series.why_not}\n")
+            out.print(series.why_not)
         else:
-            out.print(f"{beside(series.tick, series.reference, series.period_s)}\n")
+            out.print(beside(series.tick, series.reference, series.period_s))
+        counts = ", ".join(f"{name.replace('_', ' ')} {count}" for name, count in series.disturbances._asdict().items())
+        out.print(f"in the loop: {counts}\n")
     for grant in found[0].grants:
         if grant.refused:
             out.print(f"not granted: {grant.setting} ({grant.refused}); see hil doctor")
@@ -103,6 +105,7 @@ def _as_data(found: list[Series], processes: int) -> dict[str, Any]:
         "bin_edges_s": HALF_DECADES,
         "series": [
             {"period_s": series.period_s, "cyclictest_missing": series.why_not}
+            | {"disturbances": series.disturbances._asdict()}
             | {name: _series_data(one, series.period_s) for name, one in _columns(series).items()}
             for series in found
         ],

@@ -16,6 +16,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from array import array
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -23,6 +24,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from hil.loop.clock import SPIN_S, WallClock
+from hil.loop.disturbances import Disturbances
 from hil.loop.realtime import PRIORITY, Grant, loop_core, real_time
 
 HALF_DECADES = (1e-6, 2e-6, 5e-6, 1e-5, 2e-5, 5e-5, 1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2, 0.1)
@@ -70,7 +72,8 @@ class Latencies:
 
 
 class Series(NamedTuple):
-    """Latencies at one period. reference: those of cyclictest, None without it; why_not: the reason."""
+    """Latencies at one period. reference: those of cyclictest, None without it; why_not: the reason.
+    disturbances: in the loop."""
 
     period_s: float
     tick: Latencies
@@ -78,6 +81,7 @@ class Series(NamedTuple):
     reference: Latencies | None
     why_not: str
     grants: tuple[Grant, ...]
+    disturbances: Disturbances
 
 
 def measure(period_s: float, seconds: float, core: int | None = None) -> Series:
@@ -85,7 +89,8 @@ def measure(period_s: float, seconds: float, core: int | None = None) -> Series:
     core = loop_core() if core is None else core
     ticks = max(1, round(seconds / period_s))
     sleeping, spinning = WallClock(period_s, 0.0), WallClock(period_s)
-    late_s, woke_s = [0.0] * ticks, [0.0] * ticks
+    done = 0
+    late_s, woke_s = array("d", bytes(8 * ticks)), array("d", bytes(8 * ticks))  # a list would take memory per tick
     with _cyclictest(period_s, seconds, core) as reference, real_time(core) as grants:
         # full seconds are the phase of cyclictest; the loop is half a period away
         start_s = math.ceil(time.perf_counter() + _LEAD_S) + 1.0 + 0.5 * period_s
@@ -94,11 +99,16 @@ def measure(period_s: float, seconds: float, core: int | None = None) -> Series:
         sleeping.start()
         _spin_until(start_s)
         spinning.start()
-        for tick in range(1, ticks + 1):
-            woke_s[tick - 1] = sleeping.wait(tick)
-            late_s[tick - 1] = spinning.wait(tick)
+        before = Disturbances.now()
+        tick = 1
+        while tick <= ticks:
+            woke_s[done] = sleeping.wait(tick)
+            late_s[done] = spinning.wait(tick)
+            tick += 1 + int(late_s[done] / period_s)  # periods that have passed are skipped, as cyclictest does
+            done += 1
+        disturbances = Disturbances.now().since(before)
     found, why_not = reference()
-    return Series(period_s, _counted(late_s), _counted(woke_s), found, why_not, grants)
+    return Series(period_s, _counted(late_s[:done]), _counted(woke_s[:done]), found, why_not, grants, disturbances)
 
 
 @contextmanager
@@ -171,7 +181,7 @@ def _spin_until(time_s: float) -> None:
         pass
 
 
-def _counted(values_s: list[float]) -> Latencies:
+def _counted(values_s: array[float]) -> Latencies:
     counts: dict[float, int] = {}
     for value_s in values_s:
         rounded_s = round(value_s, 7)  # 0.1 us

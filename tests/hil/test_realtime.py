@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import gc
+import mmap
 import os
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import pytest
@@ -14,7 +16,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hil.loop import realtime
-from hil.loop.realtime import Jitter, NotPunctual, check_punctual, machine_state, measure_jitter, real_time, report
+from hil.loop.disturbances import Disturbances
+from hil.loop.realtime import (
+    Jitter,
+    NotPunctual,
+    check_punctual,
+    machine_state,
+    measure_jitter,
+    real_time,
+    report,
+)
 from hil.loop.run import run_profile
 
 
@@ -58,6 +69,23 @@ def test_the_loop_takes_an_isolated_core_or_the_last(monkeypatch: pytest.MonkeyP
     assert realtime.loop_core() == 2
     cores["isolated"], allowed = set(), {0, 1, 2, 3}
     assert realtime.loop_core() == 3
+
+
+def test_disturbances_are_those_of_the_span() -> None:
+    before = Disturbances.now()
+    untouched = mmap.mmap(-1, 64 * mmap.PAGESIZE)
+    for page in range(64):
+        untouched[page * mmap.PAGESIZE] = 1
+    gc.collect()
+    thread = threading.Event()
+    other = threading.Thread(target=thread.wait)
+    other.start()
+    found = Disturbances.now().since(before)
+    thread.set()
+    other.join()
+    assert found.page_faults > 0
+    assert found.collections >= 1
+    assert found.threads == before.threads + 1
 
 
 def test_lists_of_cores_are_read() -> None:

@@ -31,6 +31,10 @@ GROUPS = {
 LARGEST_PHASE_STEP = 1.5  # omega h; leapfrog is stable below 2, less with damping
 
 
+class StepTooLong(ValueError):
+    """The internal step is too long for the fastest mode of an axis with its effects."""
+
+
 def pack(axis: AxisTruth, sensors: Sensors, effects: Mapping[str, Effect], step_s: float) -> NDArray[np.void]:
     """Return an array of one PARAMETERS record.
 
@@ -162,7 +166,7 @@ def _pack_bristles(p: Any, axis: AxisTruth, effect: Effect | None) -> float:
 
 
 def _check_step(p: Any, step_s: float, bristle_stiffness: float) -> None:
-    """Raise ValueError if the phase of the fastest mode advances by more than LARGEST_PHASE_STEP [rad] per step."""
+    """Raise StepTooLong if the phase of the fastest mode advances by more than LARGEST_PHASE_STEP [rad] per step."""
     count = int(p["masses"])
     stiffness = np.zeros((count, count))
     stiffness[0, 0] = bristle_stiffness
@@ -180,7 +184,7 @@ def _check_step(p: Any, step_s: float, bristle_stiffness: float) -> None:
     root = np.sqrt(p["mass"][:count])
     fastest = sqrt(max(float(np.linalg.eigvalsh(stiffness / np.outer(root, root))[-1]), 0.0))
     if fastest * step_s > LARGEST_PHASE_STEP:
-        raise ValueError(
+        raise StepTooLong(
             f"step_s: must be <= {LARGEST_PHASE_STEP / fastest:.3g} s for the fastest mode of this axis "
             f"({fastest / (2 * pi):.4g} Hz), got {step_s!r}"
         )

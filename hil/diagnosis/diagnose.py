@@ -16,15 +16,16 @@ from hil.diagnosis.experiment import Experiment, separating, showing
 from hil.diagnosis.location.locate import locate
 from hil.diagnosis.notes import at_bound, ended, notes_on, on_torque, stopped
 from hil.diagnosis.preparation import prepare_diagnosis
-from hil.diagnosis.result import FitFigures, Location, Mode, NextExperiment, Result, TimeBudget, Unexplained, Verdict
+from hil.diagnosis.result import Location, Mode, NextExperiment, Result, TimeBudget, Unexplained, Verdict
 from hil.diagnosis.search.events import with_events_of
 from hil.diagnosis.search.forward_selection import Explanation, explain
+from hil.diagnosis.statement import statement
 from hil.diagnosis.time_left import with_time_left
 from hil.diagnosis.untold import untold
-from hil.diagnosis.verdict.cross_validation import CrossValidation, cross_validate, explained_share
+from hil.diagnosis.verdict.cross_validation import CrossValidation, cross_validate
 from hil.diagnosis.verdict.findings import corrections, diagnosed_bench, findings, form_of, renamed
 from hil.diagnosis.verdict.fit_table import channel_names, channel_residuals, closed_loop_held, fit_table
-from hil.diagnosis.verdict.judge import judge, not_testable
+from hil.diagnosis.verdict.judge import explains_most, judge, not_testable, unexplained_share
 from hil.diagnosis.verdict.refit import reported_refit, torque_left
 from hil.diagnosis.wording import title, titles, where_in_short
 from hil.errors import InputError
@@ -33,7 +34,7 @@ from hil.identification.estimator import Fit
 from hil.identification.measured import Measured
 from hil.identification.noise_floor import FLOOR
 from hil.identification.parallel import one_blas_thread
-from hil.quantities import digits, quantity
+from hil.quantities import digits
 from hil.recording.recording import Recording
 
 if TYPE_CHECKING:
@@ -73,8 +74,8 @@ class Diagnosis:
         if what == "location":
             return location.location_figure(self)
         if what == "finding":
-            if not 1 <= number <= len(self.result.missing):
-                raise InputError(f"number: given {number}, allowed 1 to {len(self.result.missing)} findings")
+            if not 1 <= number <= len(self.result.findings):
+                raise InputError(f"number: given {number}, allowed 1 to {len(self.result.findings)} findings")
             return findings.finding_figure(self, findings.term_of(self, number - 1)).figure
         run = (*self.held_out.runs, *self.train.runs)[0]
         title = f"{run.name}: measured - twin, noise floor in grey"
@@ -82,7 +83,7 @@ class Diagnosis:
 
     def __repr__(self) -> str:
         lines = [f"Diagnosis: {self.result.verdict}", f"  {self.result.statement}"]
-        for finding in self.result.missing:
+        for finding in self.result.findings:
             lines.append(f"  {title(finding.effect)}, confidence {finding.confidence:.2f}")
             lines += [
                 f"    {name} = {digits(entry.value)} ± {digits(entry.std)} {entry.unit}"
@@ -132,23 +133,28 @@ def diagnose(
     of_plant = judge(owner, nominal, proof.final, held_out)
     verdict = law.verdict(of_plant)
     named = verdict is Verdict.MISSING_PHYSICS
+    # what explains most of a mismatch is told, though it is not the name of all of it
+    partly = verdict is Verdict.UNEXPLAINED and explains_most(nominal, proof.final, held_out)
     refit = reported_refit(nominal)
     nominal = refit.fit
     explanation = replace(explanation, nominal=nominal)
-    final = {Verdict.MISSING_PHYSICS: proof.final, Verdict.NO_MISMATCH: owner}.get(of_plant, nominal)
+    if partly:
+        final = proof.final
+    else:
+        final = {Verdict.MISSING_PHYSICS: proof.final, Verdict.NO_MISMATCH: owner}.get(of_plant, nominal)
     # a parameter error is located and measured against the parameters of the bench file
     before = owner if of_plant is Verdict.PARAMETER_ERROR else nominal
 
     progress("locating")
-    location = None if verdict is Verdict.NO_MISMATCH else locate(before, final)
+    location = None if verdict is Verdict.NO_MISMATCH else locate(before, nominal if partly else final)
     if verdict is not of_plant:  # the plant is as the bench describes it, the law is not
         location = Location(block="controller", element="settings of the control law", channels=())
     progress("comparing the fits with the noise floor")
     table = fit_table(owner, nominal, final, held_out)
     forms = form_of(explanation, proof.ablations)
-    missing = findings(explanation, proof.final, proof.ablations, forms, held_out) if named else ()
+    found = findings(explanation, proof.final, proof.ablations, forms, held_out) if named or partly else ()
     progress("testing which mechanisms this motion can show")
-    hidden = not_testable(final if named else nominal)
+    hidden = not_testable(final if named or partly else nominal)
     progress("designing the next experiment")
     # with findings only their rivals are in question; without, the cause may be a mechanism that the motion cannot show
     experiment = None
@@ -163,7 +169,8 @@ def diagnose(
         verdict=verdict,
         statement="",
         location=location,
-        missing=missing,
+        missing=found if named else (),
+        partial=found if partly else (),
         parameter_corrections=law.corrections | ({} if of_plant is Verdict.NO_MISMATCH else corrections(bench, final)),
         not_identifiable=() if of_plant is Verdict.NO_MISMATCH else at_bound(final),
         fit=table,
@@ -190,57 +197,11 @@ def diagnose(
     return Diagnosis(result, after, bench, data, held_out, explanation, proof, final, experiment)
 
 
-def statement(result: Result) -> str:
-    """The verdict as one sentence."""
-    if result.verdict is Verdict.MISSING_PHYSICS:
-        named = " ".join(finding.sentence for finding in result.missing)
-        name, entry = max(
-            result.fit.items(),
-            key=lambda item: (item[1].mode is Mode.CLOSED_LOOP, _improvement(item[1].train)),
-        )
-        found = entry.validate_ or entry.train
-        before, after, noise = (
-            quantity(value, entry.unit) for value in (found.best_before_rms, found.after_rms, found.noise_floor_rms)
-        )
-        change = (
-            f"decreases from {before} to {after}"
-            if found.after_rms < found.best_before_rms
-            else (f"does not decrease: {after} instead of {before}")
-        )
-        return (
-            f"Missing physics: {named} With it the residual of {name} on {'held-out' if entry.validate_ else 'these'} "
-            f"recordings {change} rms; the noise floor is {noise}."
-        )
-    if result.verdict is Verdict.PARAMETER_ERROR:
-        worst = sorted(
-            result.parameter_corrections.items(),
-            key=lambda item: -abs(np.log(max(item[1].value, 1e-300) / max(item[1].nominal, 1e-300))),
-        )
-        changes = ", ".join(
-            f"{name} {100.0 * (entry.value / entry.nominal - 1.0):+.1f} %"
-            for name, entry in worst[:3]
-            if entry.nominal > 0.0
-        )
-        if not changes:
-            return "No physics is missing, but parameters of the bench file are wrong; this motion does not tell them."
-        return f"No physics is missing; parameters of the bench file are wrong: {changes}."
-    if result.verdict is Verdict.NO_MISMATCH:
-        return "The twin reproduces these recordings to within their noise."
-    if result.time_budget:
-        return f"The time budget ended before a mechanism was found: {result.unexplained.description}"
-    return f"The mismatch is not explained by any mechanism of the library: {result.unexplained.description}"
-
-
-def _improvement(found: FitFigures) -> float:
-    return found.best_before_rms / max(found.after_rms, 1e-300)
-
-
 def _unexplained(
     before: Fit, final: Fit, held_out: Dataset, location: Location | None, verdict: Verdict
 ) -> Unexplained:
     """Unexplained share of the energy above the floor, and the channels above their noise."""
-    evidence = held_out if held_out.runs else final.data
-    share = 0.0 if verdict is Verdict.NO_MISMATCH else 1.0 - explained_share(before.on(evidence), final.on(evidence))
+    share = 0.0 if verdict is Verdict.NO_MISMATCH else unexplained_share(before, final, held_out)
     worst: dict[str, float] = {}
     names = channel_names(final.bench, final.data.runs[0])
     for data in (final.data, held_out):
@@ -251,6 +212,6 @@ def _unexplained(
     if not above:
         return Unexplained(share=share, description="Every channel is at its noise floor.")
     text = ", ".join(f"{name} at {digits(above[name])} × noise rms" for name in sorted(above, key=lambda n: -above[n]))
-    if verdict is Verdict.UNEXPLAINED and location is not None:
+    if verdict is Verdict.UNEXPLAINED and not final.terms and location is not None:
         text += f"; {where_in_short(location)}"
     return Unexplained(share=share, description=f"Residuals above the noise, block by block: {text}.")

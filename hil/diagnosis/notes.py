@@ -49,9 +49,9 @@ def notes_on(
         for index, ablation in enumerate(proof.ablations)
         if index not in forms and ablation.gain is not None and not ablation.shown
     ]
-    if verdict is Verdict.UNEXPLAINED and explanation.terms:
+    if verdict is Verdict.UNEXPLAINED and explanation.terms and not final.terms:
         tried = ", ".join(title(term.effect) for term in explanation.terms)
-        notes.append(f"The closest mechanisms ({tried}) leave too much of the mismatch unexplained; none is reported.")
+        notes.append(f"The closest mechanisms ({tried}) explain less than half of the mismatch; none is reported.")
     return notes
 
 

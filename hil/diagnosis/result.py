@@ -191,7 +191,10 @@ class Result(_Part):
     verdict: Verdict
     statement: str = Field(description="the verdict as one sentence")
     location: Location | None = Field(description="null without a mismatch")
-    missing: tuple[Finding, ...]
+    missing: tuple[Finding, ...] = Field(description="physics that the twin lacks, the one with most energy first")
+    partial: tuple[Finding, ...] = Field(
+        (), description="only for `unexplained`: mechanisms that explain most of the mismatch and leave more than noise"
+    )
     parameter_corrections: dict[str, Correction]
     not_identifiable: tuple[str, ...] = Field(
         (), description="nominal parameters whose fit ended at the bound of the allowed range: no correction"
@@ -204,6 +207,11 @@ class Result(_Part):
     time_budget: TimeBudget | None = Field(None, description="null if the search was completed")
     notes: tuple[str, ...] = ()
     runtime_s: NotNegative
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """Findings that explain the mismatch, or most of it."""
+        return self.missing or self.partial
 
     def as_json(self) -> dict[str, Any]:
         """Return the content of `diagnosis.json`."""

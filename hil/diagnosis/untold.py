@@ -39,17 +39,15 @@ def _of_torque(run: Measured) -> list[str]:
     return []
 
 
-def _on_motor(mechanism: Mechanism, bench: Bench) -> bool:
+def _on_motor(mechanism: Mechanism) -> bool:
     """True if a form of a mechanism shows in the motor's motion."""
-    return bench.axis.turns and any(variant.motor_alone for variant in mechanism.variants)
+    return any(variant.motor_alone for variant in mechanism.variants)
 
 
 def _of_encoders(run: Measured, bench: Bench) -> list[str]:
     if bench.has_table_encoder:
         return []
-    hidden = titles(
-        [mechanism.id for mechanism in LIBRARY if mechanism.needs_table and not _on_motor(mechanism, bench)]
-    )
+    hidden = titles([mechanism.id for mechanism in LIBRARY if mechanism.needs_table and not _on_motor(mechanism)])
     names = AXIS_CHANNELS[run.kind]
     return [
         f"Only one position is recorded: {hidden} cannot be tested; record both {names.motor_position} and "

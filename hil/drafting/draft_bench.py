@@ -1,6 +1,6 @@
 """Draft a bench file from a recording: kind of axis, masses, friction, lead, gains, encoders, each with its error."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import hypot, log2, pi, sqrt
 
 from hil.channels import AxisKind
@@ -12,6 +12,7 @@ from hil.drafting.relations import proportional
 from hil.drafting.sensor_values import noise_of
 from hil.drafting.usual_values import ROTARY_LEAD_M, usual_lead
 from hil.errors import InputError
+from hil.identification.completion import with_position
 from hil.quantities import digits
 from hil.recording.importing import STEP
 from hil.recording.quantum import count_of, is_decimal
@@ -21,6 +22,8 @@ from hil.twin.mechanisms import gravity_torque
 _FINEST_M, _COARSEST_M = 1e-12, 1e-3  # resolution of a second encoder that a bench file takes
 LONGEST_LEAD_M = 1.0  # that a bench file takes; a load that turns as far as its motor, 1 m for 1 rad, has 6.3
 DIRECT = 0.02  # deviation from equal angles of motor and load up to which there is no gear
+# Least deflection over acceleration that is written: a mode at 5 kHz, beyond any control loop.
+_STIFFEST_S2 = (2.0 * pi * 5e3) ** -2
 _STEPS_PER_NOISE = sqrt(12.0)  # a count of q has noise of q / sqrt(12)
 
 
@@ -56,6 +59,7 @@ def draft_bench(recording: Recording) -> BenchDraft:
 
     Raises InputError if masses and friction cannot be told: no torque, one direction, too short, a wrong sign.
     """
+    recording = with_position(recording)
     parts = sorted(recording.parts(), key=len, reverse=True)
     for number, part in enumerate(parts if len(parts) > 1 else ()):
         try:
@@ -78,21 +82,22 @@ def draft_bench(recording: Recording) -> BenchDraft:
     else:
         lead = _lead(recording, transmission)
         ratio = lead.value / (2.0 * pi)
-        elastic = transmission if transmission is not None and _elastic(transmission) else None
+        deflection = None if transmission is None else _deflection_s2(transmission)
         turns = recording.metadata.get("lead_m") == ROTARY_LEAD_M or lead.value > LONGEST_LEAD_M
         plant = plant_values(recording, ratio if turns else None)
-        volts = turns and elastic is None and _in_volts(recording) and plant.viscous.significant
+        stiff = deflection is None or not deflection.significant
+        volts = turns and stiff and _in_volts(recording) and plant.viscous.significant
         model = {(True, True): "rotary_two_mass", (True, False): "rotary", (False, True): "two_mass"}.get(
-            (turns, elastic is not None), "rigid"
+            (turns, deflection is not None), "rigid"
         )
         draft = BenchDraft(recording.name, recording.kind, model)
         if volts:
             draft.model = "dc_motor"
             _dc_motor(draft, plant, lead)
         elif turns:
-            _turning(draft, plant, elastic, lead)
+            _turning(draft, plant, deflection, lead)
         else:
-            _screw(draft, plant, elastic, lead)
+            _screw(draft, plant, deflection, lead)
     _control(draft, recording, loop_values(recording, ratio))
     _encoders(draft, recording)
     _weight(draft, plant)
@@ -119,8 +124,16 @@ def _lead(recording: Recording, transmission: TransmissionValues | None) -> Esti
     return Estimate(lead, measured.std_error, how)
 
 
-def _elastic(transmission: TransmissionValues) -> bool:
-    return transmission.compliance_s2.significant and transmission.compliance_s2.value < 0.0
+def _deflection_s2(transmission: TransmissionValues) -> Estimate:
+    """Deflection of the transmission over the load's acceleration; where it is not told, its standard error.
+
+    Two encoders show what a transmission does, which a rigid axis does not have: lead error, play, twist.
+    """
+    stretch = transmission.compliance_s2.scaled(-1.0)
+    if stretch.significant and stretch.value > 0.0:
+        return replace(stretch, how="deflection over acceleration")
+    how = "not told by this motion: the deflection over acceleration is at most its standard error"
+    return Estimate(max(stretch.value, stretch.std_error, _STIFFEST_S2), stretch.std_error, how)
 
 
 def _linear(draft: BenchDraft, plant: PlantValues) -> None:
@@ -131,18 +144,18 @@ def _linear(draft: BenchDraft, plant: PlantValues) -> None:
     ]
 
 
-def _screw(draft: BenchDraft, plant: PlantValues, elastic: TransmissionValues | None, lead: Estimate) -> None:
+def _screw(draft: BenchDraft, plant: PlantValues, deflection: Estimate | None, lead: Estimate) -> None:
     mass = plant.inertia.scaled((2.0 * pi / lead.value) ** 2)
     inertia = f"inertia {digits(plant.inertia.value)} kg m^2 at the motor"
     draft.axis.append(BenchValue("lead_m", lead.value, f"m per revolution, {_error(lead)}", lead.how))
-    if elastic is None:
+    if deflection is None:
         draft.axis.append(_value("mass_kg", mass, "kg", inertia))
     else:
         half = mass.scaled(0.5)
         draft.axis += [
             _value("motor_mass_kg", half, "kg", f"half of {digits(mass.value)} kg: the split is not told"),
             _value("table_mass_kg", half, "kg", f"the other half; {inertia}"),
-            _value("stiffness_n_m", _stiffness(half, elastic), "N/m", "deflection over acceleration, for this split"),
+            _value("stiffness_n_m", _stiffness(half, deflection), "N/m", "for this split"),
         ]
         draft.unsure.append(
             "motor_mass_kg, table_mass_kg, stiffness_n_m: told are the sum of the masses and table mass over stiffness"
@@ -181,10 +194,10 @@ def _weight(draft: BenchDraft, plant: PlantValues) -> None:
         ]
 
 
-def _turning(draft: BenchDraft, plant: PlantValues, elastic: TransmissionValues | None, lead: Estimate) -> None:
+def _turning(draft: BenchDraft, plant: PlantValues, deflection: Estimate | None, lead: Estimate) -> None:
     gear = Estimate(ROTARY_LEAD_M / lead.value, ROTARY_LEAD_M / lead.value**2 * lead.std_error, lead.how)
     draft.axis.append(_value("gear_ratio", gear, "motor per load"))
-    if elastic is None:
+    if deflection is None:
         draft.axis.append(_value("inertia_kg_m2", plant.inertia, "kg m^2 at the motor"))
     else:
         motor = plant.inertia.scaled(0.5)
@@ -192,7 +205,7 @@ def _turning(draft: BenchDraft, plant: PlantValues, elastic: TransmissionValues 
         draft.axis += [
             _value("motor_inertia_kg_m2", motor, "kg m^2 at the motor", "half of the sum: the split is not told"),
             _value("load_inertia_kg_m2", load, "kg m^2 at the load", "the other half"),
-            _value("stiffness_n_m_rad", _stiffness(load, elastic), "N m/rad", "deflection over acceleration"),
+            _value("stiffness_n_m_rad", _stiffness(load, deflection), "N m/rad"),
         ]
         draft.unsure.append(
             "motor_inertia_kg_m2, load_inertia_kg_m2, stiffness_n_m_rad: told are the sum of the inertias at the "
@@ -208,9 +221,9 @@ def _rotary_friction(draft: BenchDraft, plant: PlantValues) -> None:
     ]
 
 
-def _stiffness(mass: Estimate, elastic: TransmissionValues) -> Estimate:
-    stretch = elastic.compliance_s2
-    return Estimate(mass.value / -stretch.value, mass.value / stretch.value**2 * stretch.std_error)
+def _stiffness(mass: Estimate, deflection: Estimate) -> Estimate:
+    stiffness = mass.value / deflection.value
+    return Estimate(stiffness, stiffness * deflection.std_error / deflection.value, deflection.how)
 
 
 def _error(estimate: Estimate) -> str:

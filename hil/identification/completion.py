@@ -36,6 +36,7 @@ def completed(recording: Recording, bench: Bench) -> Recording:
     """
     if bench.law_known:
         return recording
+    recording = with_position(recording)
     names, columns = recording.axis, dict(recording.columns)
     derived: dict[str, str] = {}
 
@@ -43,14 +44,6 @@ def completed(recording: Recording, bench: Bench) -> Recording:
         if name not in columns:
             columns[name], derived[name] = values, how
 
-    if names.motor_position not in columns:
-        if names.motor_velocity not in columns:
-            raise InputError(
-                f"{recording.name}: {names.motor_position} is not recorded, allowed are recordings with it or with "
-                f"{names.motor_velocity}; record one of them"
-            )
-        travelled = cumulative_trapezoid(columns[names.motor_velocity], dx=recording.period_s, initial=0.0)
-        add(names.motor_position, np.asarray(travelled, dtype=np.float64), f"sum of {names.motor_velocity}")
     motor = columns[names.motor_position]
     velocity = derivatives(motor, recording.period_s)[0]
     ratio = bench.axis.ratio_m_rad
@@ -70,6 +63,25 @@ def completed(recording: Recording, bench: Bench) -> Recording:
             add(name, torque, FROM_BENCH)
     known = recording.metadata.get(DERIVED, {})
     return replace(recording, columns=columns, metadata={**recording.metadata, DERIVED: {**known, **derived}})
+
+
+def with_position(recording: Recording) -> Recording:
+    """Add the motor position as the sum of the motor velocity where it was not recorded, and say so in the metadata.
+
+    Raises InputError if neither of them was recorded.
+    """
+    names, columns = recording.axis, recording.columns
+    if names.motor_position in columns:
+        return recording
+    if names.motor_velocity not in columns:
+        raise InputError(
+            f"{recording.name}: {names.motor_position} is not recorded, allowed are recordings with it or with "
+            f"{names.motor_velocity}; record one of them"
+        )
+    travelled = cumulative_trapezoid(columns[names.motor_velocity], dx=recording.period_s, initial=0.0)
+    position = {names.motor_position: np.asarray(travelled, dtype=np.float64)}
+    derived = {**recording.metadata.get(DERIVED, {}), names.motor_position: f"sum of {names.motor_velocity}"}
+    return replace(recording, columns={**columns, **position}, metadata={**recording.metadata, DERIVED: derived})
 
 
 def reduced(bench: Bench, recordings: Sequence[Recording]) -> Bench:

@@ -34,7 +34,7 @@ def write_diagnosis(diagnosis: Diagnosis, folder: Path) -> None:
     names = ", ".join(run.name for run in diagnosis.train.runs)
     good = result.verdict is not Verdict.UNEXPLAINED and result.time_budget is None
     page = Page(f"Diagnosis of {names}", _lead(diagnosis), result.statement, good)
-    for index in range(len(result.missing)):
+    for index in range(len(result.findings)):
         _finding(page, diagnosis, index, folder)
     if result.location is not None:
         page.heading("Where it is")
@@ -79,9 +79,11 @@ def _lead(diagnosis: Diagnosis) -> str:
 
 
 def _finding(page: Page, diagnosis: Diagnosis, index: int, folder: Path) -> None:
-    finding, term = diagnosis.result.missing[index], term_of(diagnosis, index)
+    finding, term = diagnosis.result.findings[index], term_of(diagnosis, index)
     mechanism = BY_ID[finding.effect]
-    page.heading(f"{index + 1}. {title(finding.effect).capitalize()}: {mechanism.element}")
+    name = title(finding.effect)
+    name = f"Explains a part: {name}" if diagnosis.result.partial else name.capitalize()
+    page.heading(f"{index + 1}. {name}: {mechanism.element}")
     figure, caption = finding_figure(diagnosis, term)
     again = f"_{term.slot + 1}" if term.slot else ""
     page.picture(save(figure, folder / f"{term.effect}{again}.png"), caption)
@@ -132,7 +134,7 @@ def _fit(page: Page, diagnosis: Diagnosis, folder: Path) -> None:
     if result.torque_left:
         page.text(torque_line(result.torque_left))
     kept, dropped = diagnosis.proof.ablations, diagnosis.proof.dropped
-    if not dropped and not (result.missing and len(kept) > 1):
+    if not dropped and not (result.findings and len(kept) > 1):
         return
     page.text("Growth of the residual energy if one term is left out and everything else is refitted.")
     page.table(

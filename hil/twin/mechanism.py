@@ -112,7 +112,7 @@ class Variant:
     proportional: bool = True  # the change is proportional to the strength
     needs_table: bool = False  # not observable without a linear encoder
     sign: float = 1.0  # of its strength where its effect is nearly that of the first variant
-    motor_alone: bool = False  # for a load that turns, with one encoder: its reaction on the motor shows it
+    motor_alone: bool = False  # for an axis with one encoder: the reaction on the motor shows it
     form_of: str = ""  # id of a friction law whose form a small contribution corrects
     play: bool = False  # the flanks of the transmission push only: contacts open and close
     slips: bool = False  # the contact is of Maxwell slip elements

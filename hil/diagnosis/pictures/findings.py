@@ -56,7 +56,7 @@ def finding_figure(diagnosis: Diagnosis, term: Term) -> Captioned:
 
 def term_of(diagnosis: Diagnosis, index: int) -> Term:
     """The term of the final hypothesis that the finding `index` reports."""
-    finding = diagnosis.result.missing[index]
+    finding = diagnosis.result.findings[index]
     terms = diagnosis.final.terms
     if finding.windows:
         return next(term for term in terms if term.windows)

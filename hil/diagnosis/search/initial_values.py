@@ -21,7 +21,7 @@ from hil.identification.dataset import inertia
 from hil.identification.measured import Measured
 from hil.identification.terms import Term, Window, free_slot
 from hil.twin.library import BY_ID, LIBRARY
-from hil.twin.mechanism import Block, Mechanism
+from hil.twin.mechanism import Block, Mechanism, Variant
 from hil.twin.parameter import Dimension, Role
 from hil.twin.scene import AxisFacts, Scene
 
@@ -143,10 +143,7 @@ def starts(scene: Scene, bench: Bench, runs: Sequence[Measured] = ()) -> list[St
             continue
         phases = mechanism.indices(Role.PHASE)
         for number, variant in enumerate(mechanism.variants):
-            if variant.motor_alone:
-                if bench.has_table_encoder or not bench.axis.turns:
-                    continue
-            elif (mechanism.needs_table or variant.needs_table) and not bench.has_table_encoder:
+            if not observable(mechanism, variant, bench):
                 continue
             strength, phase = mechanism.strength, next(iter(phases), -1)
             if not (mechanism.proportional and variant.proportional):
@@ -209,6 +206,13 @@ def _other(mechanism: Mechanism, value: float, lead_m: float) -> float:
 
 
 _BLOCK_OF = {"command": Block.CONTROLLER, "torque": Block.DRIVE, "motor": Block.MOTOR_SIDE}
+
+
+def observable(mechanism: Mechanism, variant: Variant, bench: Bench) -> bool:
+    """True if the encoders of a bench can show a variant of a mechanism."""
+    if variant.motor_alone:
+        return not bench.has_table_encoder
+    return bench.has_table_encoder or not (mechanism.needs_table or variant.needs_table)
 
 
 def judged(effect: str, runs: Sequence[Measured]) -> bool:

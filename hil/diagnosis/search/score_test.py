@@ -22,9 +22,13 @@ from hil.identification.inference import whitened, whitening
 from hil.identification.parallel import POOL
 from hil.identification.terms import Term, compatible, free_slot, repeats
 from hil.twin.library import BY_ID
+from hil.twin.parameter import Role
 
 _SOFT = 3.0  # residual in robust standard deviations above which the weight falls: 0.3 % of Gaussian rows are above
 _WEAKER = (0.3, 0.1)  # of the strength from the linear score test: half an order of magnitude apart
+# Factors by which a start with a frequency is moved: half of the grid of starts, and a decade for other parameters;
+# halved in each round.
+_FREQUENCY_STEP, _STEP, _ROUNDS = 1.2, 3.0, 4
 _OTHERS = 6  # starts of one mechanism that are kept: limits the evaluations of a race
 
 
@@ -90,8 +94,12 @@ def screen_library(base: Fit) -> list[Candidate]:
         if offered(start.term(), hypothesis, terms)
     ]
     best: dict[str, list[Candidate]] = {}
-    for candidate in screen(base, points):
+    views = [_view(base, False), _view(base, True)]
+    for candidate in screen(base, points, views):
         best.setdefault(candidate.term.effect, []).append(candidate)
+    # a tuned start replaces the grid of its mechanism
+    tuned = {effect: _tuned(base, same[0], views) for effect, same in best.items()}
+    best = {effect: same if tuned[effect] is same[0] else [tuned[effect]] for effect, same in best.items()}
 
     def gathered(effect: str, same: Sequence[Candidate]) -> Candidate | None:
         slot = free_slot(effect, terms)
@@ -106,7 +114,7 @@ def screen_library(base: Fit) -> list[Candidate]:
         return Candidate(begun[0], same[0].share, tuple(begun[1:]))
 
     candidates = [gathered(effect, same) for effect, same in best.items()]
-    return [candidate for candidate in candidates if candidate is not None]
+    return sorted((one for one in candidates if one is not None), key=lambda found: -found.share)
 
 
 def _events(base: Fit) -> list[StartPoint]:
@@ -140,13 +148,30 @@ def _from_known(start: StartPoint, hypothesis: Hypothesis) -> StartPoint:
     return replace(start, known=taken[0].values[start.strength])
 
 
-def screen(base: Fit, points: Sequence[StartPoint]) -> list[Candidate]:
-    """Score each start, best first.
+def _tuned(base: Fit, best: Candidate, views: Sequence[_View]) -> Candidate:
+    """Move a start with a frequency to a higher score: a resonance is narrower than the grid of starts."""
+    mechanism, variant = BY_ID[best.term.effect], best.term.variant
+    if mechanism.proportional or not mechanism.indices(Role.FREQUENCY):
+        return best
+    for number in range(_ROUNDS):
+        points = []
+        for index, parameter in enumerate(mechanism.parameters):
+            step = (_FREQUENCY_STEP if parameter.role is Role.FREQUENCY else _STEP) ** (0.5**number)
+            for factor in (step, 1.0 / step):
+                values = list(best.term.values)
+                values[index] = min(max(factor * values[index], parameter.low), parameter.high)
+                points.append(StartPoint(mechanism.id, variant, tuple(values), strength=-1))
+        best = max(best, screen(base, points, views)[0], key=lambda found: found.share)
+    return best
+
+
+def screen(base: Fit, points: Sequence[StartPoint], views: Sequence[_View] = ()) -> list[Candidate]:
+    """Score each start, best first; `views` of the base are made if not given.
 
     The score is the larger of two: on plain residuals, sensitive to the largest cause, and on whitened residuals,
     sensitive to a small cause beside a large one.
     """
-    views = [_view(base, False), _view(base, True)]
+    views = views or [_view(base, False), _view(base, True)]
     search = replace(base.estimator, fast=True)
     unchanged = search.residuals(base.hypothesis).vector
 

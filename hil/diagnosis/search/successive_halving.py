@@ -11,7 +11,7 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
-from hil.diagnosis.search.initial_values import likenesses
+from hil.diagnosis.search.initial_values import likenesses, observable
 from hil.diagnosis.search.score_test import Candidate, offered
 from hil.identification.coordinates import LAST_EDGE_STEP_S, TRUST
 from hil.identification.dataset import TORQUE_ACCURACY, inertia
@@ -181,7 +181,12 @@ class _Race:
     def _variants(self, fit: Fit) -> list[Fit]:
         """Fit the other variants of the last term from its values."""
         last, rebased = fit.terms[-1], fit.hypothesis.rebased
-        others = [_as_variant(last, v) for v in range(len(BY_ID[last.effect].variants)) if v != last.variant]
+        mechanism = BY_ID[last.effect]
+        others = [
+            _as_variant(last, number)
+            for number, variant in enumerate(mechanism.variants)
+            if number != last.variant and observable(mechanism, variant, fit.bench)
+        ]
         return in_parallel([partial(_fit_fast_first, fit.estimator, rebased.replaced(-1, term)) for term in others])
 
     def _equivalents(self, fit: Fit) -> list[Fit]:

@@ -22,7 +22,7 @@ import numpy as np
 
 from hil.diagnosis.result import Verdict
 from hil.diagnosis.search.forward_selection import MATERIAL, MOST, NEEDED
-from hil.diagnosis.search.initial_values import axis_facts, judged
+from hil.diagnosis.search.initial_values import axis_facts, judged, observable
 from hil.diagnosis.verdict.cross_validation import explained_share
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
@@ -43,8 +43,7 @@ def judge(owner: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> Verdict:
     If the terms are rejected, the first two decide.
     """
     if final.terms:
-        evidence = held_out if held_out.runs else final.data
-        left = 1.0 - explained_share(nominal.on(evidence), final.on(evidence))
+        left = unexplained_share(nominal, final, held_out)
         above = max(final.on(data).worst_ratio for data in (final.data, held_out) if data.runs)
         # where inputs are open, or nothing is known of the control law, something is left beside any name
         open_inputs = not final.bench.law_known or any(
@@ -59,6 +58,17 @@ def judge(owner: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> Verdict:
     if not nominal.at_floor:
         return Verdict.UNEXPLAINED
     return Verdict.NO_MISMATCH if owner.at_floor or not refit_matters(owner, nominal) else Verdict.PARAMETER_ERROR
+
+
+def unexplained_share(nominal: Fit, final: Fit, held_out: Dataset) -> float:
+    """Share of the energy above the floor that the terms leave, on held-out recordings if there are any."""
+    evidence = held_out if held_out.runs else final.data
+    return 1.0 - explained_share(nominal.on(evidence), final.on(evidence))
+
+
+def explains_most(nominal: Fit, final: Fit, held_out: Dataset) -> bool:
+    """True if the terms explain most of the mismatch, whatever is left above the noise."""
+    return bool(final.terms) and unexplained_share(nominal, final, held_out) <= MOST
 
 
 def names_stand(left: float, above: float) -> bool:
@@ -127,10 +137,10 @@ def not_testable(found: Fit, asked: Collection[str] = tuple(BY_ID), margin: floa
         if mechanism.id in asked and mechanism.id not in present and (bench.axis.turns or not mechanism.turning)
     ]
     jobs = [
-        (mechanism.id, variant)
+        (mechanism.id, number)
         for mechanism in wanted
-        for variant in range(len(mechanism.variants))
-        if (bench.has_table_encoder or not mechanism.needs_table) and judged(mechanism.id, found.data.runs)
+        for number, variant in enumerate(mechanism.variants)
+        if observable(mechanism, variant, bench) and judged(mechanism.id, found.data.runs)
     ]
     shown = {effect for (effect, _), seen in zip(jobs, POOL.map(lambda job: visible(*job), jobs), strict=True) if seen}
     return tuple(mechanism.id for mechanism in wanted if mechanism.id not in shown)

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from drivers.sim.effects import Effect
+from drivers.sim.packing import StepTooLong
 from hil.motion.trajectory import Trajectory
 from hil.proof.draw import motions
 from hil.proof.draw.axes import Belief, DrawnAxis, draw_axis
@@ -111,7 +112,10 @@ def at_size(effect: Effect, wanted: float, on: AxisOnMotions) -> Sized | None:
     for _ in range(_STEPS):
         if found is None:
             return None
-        size = on.sizes.size([found])
+        try:
+            size = on.sizes.size([found])
+        except StepTooLong:  # a stiffness beyond the internal step of the simulated axis
+            return None
         if abs(size / wanted - 1.0) < _ON_RUNG:
             return found, size
         # sizes are about proportional to the strength; limited steps for effects with a threshold

@@ -22,6 +22,13 @@ def _with_mass_on_table(chain: Chain, parameters: Sequence[float]) -> Chain:
     return _with_structure(chain, parameters, _on_the_table)
 
 
+def _with_flexible_load(chain: Chain, parameters: Sequence[float]) -> Chain:
+    """Part the inertia of the load into two with a spring between; the sum stays, as slow motion shows it."""
+    inertia = chain.inertia_kg_m2.copy()
+    inertia[chain.table, chain.table] /= 1.0 + parameters[2]
+    return _with_mass_on_table(replace(chain, inertia_kg_m2=inertia), parameters)
+
+
 def _with_yielding_base(chain: Chain, parameters: Sequence[float]) -> Chain:
     """Add a machine base that yields."""
     return _with_structure(chain, parameters, _under_the_axis)
@@ -125,14 +132,14 @@ MECHANISM = Mechanism(
         ),
         Variant(
             Stage.CHAIN,
-            _with_mass_on_table,
+            _with_flexible_load,
             "flexible load",
             sentence=(
                 "The load is flexible: {mass_ratio} of the rest of the inertia swings at {frequency_hz} where the "
                 "motor is held, damped by {damping_ratio}."
             ),
-            # an arm or a bar swings at some hertz
-            starts=lambda s: [(f, 0.03, 0.3) for f in np.geomspace(1.5, 100.0, 13)],
+            # an arm or a bar swings at some hertz; behind a belt or a gear it may be most of the inertia
+            starts=lambda s: [(f, 0.03, ratio) for f in np.geomspace(1.5, 100.0, 13) for ratio in (0.3, 3.0)],
             motor_alone=True,
         ),
     ),

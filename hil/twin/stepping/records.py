@@ -160,10 +160,9 @@ def pack(
 
 def _pack_shapes(own: Chain, chain: Chain, modes: Modal, damping: FloatArray) -> Shapes:
     """Shares of the modes; `own`: the chain without the coordinates that mechanisms add after its own."""
+    n = len(own.names)
     table_side = chain.inertia_kg_m2 @ chain.side(chain.table) @ modes.shape
-    table, motor = (
-        own.inertia_kg_m2 @ own.side(place) @ modes.shape[: len(own.names)] for place in (own.table, own.motor)
-    )
+    table, motor = (chain.inertia_kg_m2[:n, :n] @ own.side(place) @ modes.shape[:n] for place in (own.table, own.motor))
     # a side that is the whole axis is damped by rounding alone, which play must not remove
     resisting = damping @ table_side
     some = resisting @ table_side > _ROUNDING * np.trace(damping) * np.sum(table_side**2)

@@ -55,12 +55,14 @@ def test_each_value_stands_within_its_error_and_beside_it_how_it_was_found(tmp_p
     path = drafted(tmp_path, SCREW)
     bench, text = load_bench(path), path.read_text()
     ratio = LEAD_M / (2 * np.pi)
-    assert bench.axis.model == "rigid"
-    assert bench.axis.mass_kg == pytest.approx(INERTIA_KG_M2 / ratio**2, rel=0.02)
+    assert bench.axis.model == "two_mass"  # what two encoders show of a transmission needs one, stiff as it is here
+    assert bench.axis.motor_mass_kg + bench.axis.table_mass_kg == pytest.approx(INERTIA_KG_M2 / ratio**2, rel=0.02)
+    assert bench.axis.stiffness_n_m > bench.axis.table_mass_kg * (2.0 * np.pi * 20.0) ** 2
+    assert "not told by this motion" in text
     assert bench.axis.coulomb_torque_n_m == pytest.approx(COULOMB_N_M, rel=0.05)
     assert bench.axis.viscous_torque_n_m_s_rad == pytest.approx(VISCOUS_N_M_S_RAD, rel=0.1)
     assert isinstance(bench.control, UnknownControl)
-    for key in ("lead_m", "mass_kg", "coulomb_torque_n_m", "viscous_torque_n_m_s_rad"):
+    for key in ("lead_m", "motor_mass_kg", "stiffness_n_m", "coulomb_torque_n_m", "viscous_torque_n_m_s_rad"):
         line = next(line for line in text.splitlines() if line.strip().startswith(key))
         assert "+-" in line
         assert "over" in line
@@ -96,8 +98,10 @@ def test_gravity_over_the_angle_becomes_a_mechanism_of_the_bench(tmp_path: Path)
 def test_a_gear_follows_from_two_angles(tmp_path: Path) -> None:
     columns = {"time_s": AXIS["t"], "motor_angle_rad": AXIS["angle"], "load_angle_rad": AXIS["angle"] / 50.0}
     bench = load_bench(drafted(tmp_path, columns | {"torque_Nm": AXIS["torque"]}))
-    assert bench.axis.model == "rotary"
+    assert bench.axis.model == "rotary_two_mass"
     assert bench.axis.gear_ratio == pytest.approx(50.0, rel=1e-3)
+    load = bench.axis.load_inertia_kg_m2 / bench.axis.gear_ratio**2
+    assert bench.axis.motor_inertia_kg_m2 + load == pytest.approx(INERTIA_KG_M2, rel=0.02)
 
 
 def test_a_late_second_encoder_is_said(tmp_path: Path) -> None:

@@ -197,6 +197,13 @@ def test_sizes_are_monotone_in_the_strength_and_hit_the_rungs() -> None:
         assert strengths == sorted(strengths)
 
 
+def test_a_size_beyond_the_internal_step_is_no_size() -> None:
+    rng = np.random.default_rng(5)
+    on = stage(rng, "two_mass")
+    # the smaller the effect, the stiffer the bristle: at last its mode is too fast for the step
+    assert at_size(draw_effect("presliding_hysteresis", on.scale, rng), 1e-4, on) is None
+
+
 def test_a_size_counts_only_what_no_parameter_explains() -> None:
     rng = np.random.default_rng(8)
     axis = draw_axis(rng, "two_mass")

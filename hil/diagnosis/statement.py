@@ -1,0 +1,69 @@
+"""The verdict of a diagnosis as one sentence."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from hil.diagnosis.result import Finding, FitFigures, Mode, Result, Verdict
+from hil.diagnosis.wording import title
+from hil.quantities import percent, quantity
+
+
+def statement(result: Result) -> str:
+    """The verdict as one sentence."""
+    if result.verdict is Verdict.MISSING_PHYSICS:
+        named = _sentences(result.missing)
+        name, entry = max(
+            result.fit.items(),
+            key=lambda item: (item[1].mode is Mode.CLOSED_LOOP, _improvement(item[1].train)),
+        )
+        found = entry.validate_ or entry.train
+        before, after, noise = (
+            quantity(value, entry.unit) for value in (found.best_before_rms, found.after_rms, found.noise_floor_rms)
+        )
+        change = (
+            f"decreases from {before} to {after}"
+            if found.after_rms < found.best_before_rms
+            else (f"does not decrease: {after} instead of {before}")
+        )
+        return (
+            f"Missing physics: {named} With it the residual of {name} on {'held-out' if entry.validate_ else 'these'} "
+            f"recordings {change} rms; the noise floor is {noise}."
+        )
+    if result.verdict is Verdict.PARAMETER_ERROR:
+        worst = sorted(
+            result.parameter_corrections.items(),
+            key=lambda item: -abs(np.log(max(item[1].value, 1e-300) / max(item[1].nominal, 1e-300))),
+        )
+        changes = ", ".join(
+            f"{name} {100.0 * (entry.value / entry.nominal - 1.0):+.1f} %"
+            for name, entry in worst[:3]
+            if entry.nominal > 0.0
+        )
+        if not changes:
+            return "No physics is missing, but parameters of the bench file are wrong; this motion does not tell them."
+        return f"No physics is missing; parameters of the bench file are wrong: {changes}."
+    if result.verdict is Verdict.NO_MISMATCH:
+        return "The twin reproduces these recordings to within their noise."
+    if result.time_budget:
+        return f"The time budget ended before a mechanism was found: {result.unexplained.description}"
+    if result.partial:
+        part = _sentences(result.partial)
+        share = percent(1.0 - result.unexplained.share)
+        return (
+            f"No mechanism of the library explains the whole mismatch. Found, for {share} of its energy above the "
+            f"noise: {part} {result.unexplained.description}"
+        )
+    return f"The mismatch is not explained by any mechanism of the library: {result.unexplained.description}"
+
+
+def _sentences(found: Sequence[Finding]) -> str:
+    """The sentences of findings that are more likely there than not, and the names of the others."""
+    likely = [one for one in found if one.confidence >= 0.5] or found
+    doubtful = ", ".join(f"{title(one.effect)} ({percent(one.confidence)})" for one in found if one not in likely)
+    sentences = " ".join(one.sentence for one in likely)
+    return f"{sentences} Doubtful, by their confidence: {doubtful}." if doubtful else sentences
+
+
+def _improvement(found: FitFigures) -> float:
+    return found.best_before_rms / max(found.after_rms, 1e-300)

@@ -32,6 +32,8 @@ class Channel:
     sign: str = ""
 
 
+SPEED_SET_POINT = "velocity_reference_m_s"
+
 _TABLE = (
     Channel("time_s", "s", "time of the sample, tick x period"),
     Channel("position_command_m", "m", "position set-point of the table", "away from home"),
@@ -61,7 +63,7 @@ _TABLE = (
         "accelerates away from home",
     ),
     Channel("force_n", "N", "motor force of a linear axis, mean over the next period", "accelerates away from home"),
-    Channel("velocity_reference_m_s", "m/s", "output of the position loop", "away from home"),
+    Channel(SPEED_SET_POINT, "m/s", "output of the position loop", "away from home"),
     Channel("twin_motor_position_rad", "rad", "motor position of the live twin", "as motor_position_rad"),
     Channel("twin_motor_position_m", "m", "motor position of the live twin, linear axis", "as motor_position_m"),
     Channel("twin_table_position_m", "m", "table position of the live twin", "as table_position_m"),

@@ -173,6 +173,11 @@ class Bench(BenchSection):
         return self.control.torque_delay_s if isinstance(self.control, UnknownControl) else None
 
     @property
+    def setpoint_delay_s(self) -> float:
+        """Time by which the control law uses recorded set-points later; 0 without a known law."""
+        return 0.0 if isinstance(self.control, UnknownControl) else self.control.setpoint_delay_s
+
+    @property
     def known_control(self) -> Control:
         """The control law. Raises FieldError if it is unknown."""
         if isinstance(self.control, UnknownControl):

@@ -21,6 +21,7 @@ from hil.diagnosis.search.events import with_events_of
 from hil.diagnosis.search.forward_selection import Explanation, explain
 from hil.diagnosis.statement import statement
 from hil.diagnosis.time_left import with_time_left
+from hil.diagnosis.turning import labelled
 from hil.diagnosis.untold import untold
 from hil.diagnosis.verdict.cross_validation import CrossValidation, cross_validate
 from hil.diagnosis.verdict.findings import corrections, diagnosed_bench, findings, form_of, renamed
@@ -72,7 +73,7 @@ class Diagnosis:
         from hil.figures.drawing import over_time
 
         if what == "location":
-            return location.location_figure(self)
+            return labelled(location.location_figure(self), self.owner.axis.turns)
         if what == "finding":
             if not 1 <= number <= len(self.result.findings):
                 raise InputError(f"number: given {number}, allowed 1 to {len(self.result.findings)} findings")
@@ -213,5 +214,5 @@ def _unexplained(
         return Unexplained(share=share, description="Every channel is at its noise floor.")
     text = ", ".join(f"{name} at {digits(above[name])} × noise rms" for name in sorted(above, key=lambda n: -above[n]))
     if verdict is Verdict.UNEXPLAINED and not final.terms and location is not None:
-        text += f"; {where_in_short(location)}"
+        text += f"; {where_in_short(location, final.bench.axis.turns)}"
     return Unexplained(share=share, description=f"Residuals above the noise, block by block: {text}.")

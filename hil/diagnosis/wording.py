@@ -4,6 +4,7 @@ from collections.abc import Iterable
 
 from hil.bench.bench_file import Bench
 from hil.diagnosis.result import Location
+from hil.diagnosis.turning import of_load
 from hil.identification.terms import Term
 from hil.quantities import digits, quantity
 from hil.twin.library import BY_ID
@@ -33,19 +34,19 @@ def label(term: Term) -> str:
 
 def sentence(term: Term, bench: Bench) -> str:
     """Describe a term in a sentence with its values, and its variant in brackets."""
-    mechanism, linear = BY_ID[term.effect], bench.axis.linear
+    mechanism, axis = BY_ID[term.effect], bench.axis
     values = {
-        parameter.name: quantity(value, parameter.dimension.unit(linear))
+        parameter.name: quantity(value, parameter.dimension.unit(axis.linear, axis.turns))
         for parameter, value in zip(mechanism.parameters, term.values, strict=True)
     }
-    values["viscous_speed"] = quantity(bench.axis.physics().viscous_speed, "m/s" if linear else "rad/s")
+    values["viscous_speed"] = quantity(bench.axis.physics().viscous_speed, "m/s" if axis.linear else "rad/s")
     variant = mechanism.variants[term.variant]
-    text = (variant.sentence or mechanism.sentence).format(**values)
+    text = of_load(variant.sentence or mechanism.sentence, axis.turns).format(**values)
     return f"{text.removesuffix('.')} ({variant.name})." if variant.name else text
 
 
-def where(location: Location) -> dict[str, str]:
-    """Describe a location: aspect (block, element, channels, phases, ...) -> text."""
+def where(location: Location, turns: bool) -> dict[str, str]:
+    """Describe a location: aspect (block, element, channels, phases, ...) -> text. `turns`: of a load that turns."""
     phases = [f"{title(phase.kind)} {100.0 * phase.share:.0f} %" for phase in location.phases if phase.share >= 0.005]
     found = {
         "block": title(location.block),
@@ -64,10 +65,10 @@ def where(location: Location) -> dict[str, str]:
         found["repetition"] = f"every {quantity(location.period_m, 'm')} of travel"
     elif location.frequency_hz:
         found["repetition"] = f"{digits(location.frequency_hz)} Hz"
-    return {what: text for what, text in found.items() if text}
+    return {what: of_load(text, turns) for what, text in found.items() if text}
 
 
-def where_in_short(location: Location) -> str:
+def where_in_short(location: Location, turns: bool) -> str:
     """Describe block, phases, ranges and repetition of a location in one clause."""
     wanted = ("block", "phases of motion", "position", "speed", "repetition")
-    return ", ".join(f"{what} {text}" for what, text in where(location).items() if what in wanted)
+    return ", ".join(f"{what} {text}" for what, text in where(location, turns).items() if what in wanted)

@@ -11,11 +11,15 @@ MUCH_LEFT = 0.3  # share of the torque unexplained, from which it is as large as
 
 
 def told(
-    recording: Recording, plant: PlantValues, transmission: TransmissionValues | None, unit: str | None = None
+    recording: Recording,
+    plant: PlantValues,
+    transmission: TransmissionValues | None,
+    unit: str | None = None,
+    turns: bool = False,
 ) -> tuple[list[str], list[str]]:
     """Notes on what the recording tells, and those that the user should check.
 
-    `unit` is that of the torque if it is not the SI unit.
+    `unit` is that of the torque if it is not the SI unit. `turns`: the load turns, its position is an angle.
     """
     notes, unsure = list[str](), list[str]()
     names, linear = recording.axis, recording.kind is AxisKind.LINEAR
@@ -50,6 +54,7 @@ def told(
     if delay_s is not None:
         notes.append(f"{names.torque} follows {names.torque_command} after {1e3 * delay_s:.3g} ms (to half a row)")
     if transmission is not None:
+        micro = "urad" if turns else "um"
         late = transmission.delay_s
         if late.significant:
             notes.append(
@@ -62,10 +67,12 @@ def told(
             )
         if transmission.friction_m.significant:
             notes.append(
-                f"second encoder differs by {2e6 * abs(transmission.friction_m.value):.3g} um between directions: "
+                f"second encoder differs by {2e6 * abs(transmission.friction_m.value):.3g} {micro} between directions: "
                 "lost motion, or friction over stiffness"
             )
-        notes.append(f"ratio, delay and stretch leave {1e6 * transmission.left_m:.3g} um rms of the second encoder")
+        notes.append(
+            f"ratio, delay and stretch leave {1e6 * transmission.left_m:.3g} {micro} rms of the second encoder"
+        )
     try:
         feeds = identify_friction(recording)
     except InputError:

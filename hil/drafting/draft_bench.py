@@ -5,8 +5,8 @@ from math import hypot, log2, pi, sqrt
 
 from hil.channels import AxisKind
 from hil.drafting.bench_notes import told
-from hil.drafting.estimate import Estimate
-from hil.drafting.loop_values import REPLAYED, LoopValues, loop_values
+from hil.drafting.estimate import BenchValue, Estimate
+from hil.drafting.loop_values import loop_values
 from hil.drafting.plant_values import PlantValues, TransmissionValues, plant_values, transmission_values
 from hil.drafting.relations import proportional
 from hil.drafting.sensor_values import noise_of
@@ -25,16 +25,6 @@ DIRECT = 0.02  # deviation from equal angles of motor and load up to which there
 # Least deflection over acceleration that is written: a mode at 5 kHz, beyond any control loop.
 _STIFFEST_S2 = (2.0 * pi * 5e3) ** -2
 _STEPS_PER_NOISE = sqrt(12.0)  # a count of q has noise of q / sqrt(12)
-
-
-@dataclass(frozen=True)
-class BenchValue:
-    """A key of the bench file with its value, its unit and error, and how it was found."""
-
-    key: str
-    value: float | int | str
-    error: str
-    how: str = ""
 
 
 @dataclass
@@ -73,7 +63,7 @@ def draft_bench(recording: Recording) -> BenchDraft:
         draft.notes.insert(0, f"found in {part.name}, {seconds:.4g} s long, of {len(parts)} parts between gaps in time")
         return draft
     transmission = transmission_values(recording)
-    volts = False
+    volts = turns = False
     if recording.kind is AxisKind.LINEAR:
         plant = plant_values(recording)
         draft = BenchDraft(recording.name, recording.kind, "one_mass")
@@ -98,10 +88,10 @@ def draft_bench(recording: Recording) -> BenchDraft:
             _turning(draft, plant, deflection, lead)
         else:
             _screw(draft, plant, deflection, lead)
-    _control(draft, recording, loop_values(recording, ratio))
+    draft.control, draft.control_why = loop_values(recording, ratio)
     _encoders(draft, recording)
     _weight(draft, plant)
-    notes, unsure = told(recording, plant, transmission, "V" if volts else None)
+    notes, unsure = told(recording, plant, transmission, "V" if volts else None, turns)
     draft.notes += notes
     draft.unsure += unsure
     return draft
@@ -124,14 +114,17 @@ def _lead(recording: Recording, transmission: TransmissionValues | None) -> Esti
     return Estimate(lead, measured.std_error, how)
 
 
-def _deflection_s2(transmission: TransmissionValues) -> Estimate:
+def _deflection_s2(transmission: TransmissionValues) -> Estimate | None:
     """Deflection of the transmission over the load's acceleration; where it is not told, its standard error.
 
-    Two encoders show what a transmission does, which a rigid axis does not have: lead error, play, twist.
+    Two encoders show what a transmission does, which a rigid axis does not have: lead error, play, twist. None: the
+    second encoder is late, and no deflection is told beside its delay.
     """
     stretch = transmission.compliance_s2.scaled(-1.0)
     if stretch.significant and stretch.value > 0.0:
         return replace(stretch, how="deflection over acceleration")
+    if transmission.delay_s.significant:
+        return None
     how = "not told by this motion: the deflection over acceleration is at most its standard error"
     return Estimate(max(stretch.value, stretch.std_error, _STIFFEST_S2), stretch.std_error, how)
 
@@ -240,41 +233,6 @@ def _friction(key: str, estimate: Estimate, unit: str) -> BenchValue:
         return BenchValue(key, estimate.value, f"{unit}, {_error(estimate)}", sure + estimate.how)
     how = f"not identifiable from this motion: {estimate.value:.3g} is below 0; {estimate.how}"
     return BenchValue(key, 0.0, f"{unit}, {_error(estimate)}", how)
-
-
-def _control(draft: BenchDraft, recording: Recording, loop: LoopValues | None) -> None:
-    if loop is None or loop.left > REPLAYED:
-        draft.control_why = (
-            "no set-points are recorded, or no gains reproduce the torque command"
-            if loop is None
-            else f"the best cascaded law leaves {100 * loop.left:.0f} % of the torque command"
-        )
-        return
-    linear = recording.kind is AxisKind.LINEAR
-    kv, feedforward, kp, time_s = loop.errors
-    how = f"the replayed law leaves {100 * loop.left:.2g} % of the torque command"
-    period_s = recording.period_s
-    draft.control = [
-        BenchValue("position_gain_1_s", loop.position_gain_1_s, f"1/s, +-{kv:.2g}", how),
-        BenchValue("velocity_feedforward", loop.velocity_feedforward, f"1 is 100 %, +-{feedforward:.2g}"),
-        BenchValue(
-            "position_period_s",
-            float(f"{loop.position_ticks * period_s:.9g}"),
-            "s",
-            f"of 1, 2, 4 and 8 rows {loop.position_ticks} fits best",
-        ),
-        BenchValue(
-            "velocity_gain_n_s_m" if linear else "velocity_gain_n_m_s_rad",
-            loop.velocity_gain,
-            f"{'N s/m' if linear else 'N m s/rad'}, +-{kp:.2g}",
-        ),
-    ]
-    if loop.integral_time_s is not None:
-        draft.control.append(BenchValue("velocity_integral_time_s", loop.integral_time_s, f"s, +-{time_s:.2g}"))
-    draft.control += [
-        BenchValue("velocity_period_s", float(f"{period_s:.9g}"), "s", "the period of the recording"),
-        BenchValue("velocity_estimate", loop.velocity_estimate, "", "the better of the two"),
-    ]
 
 
 def _encoders(draft: BenchDraft, recording: Recording) -> None:

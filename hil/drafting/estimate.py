@@ -31,6 +31,16 @@ class Estimate:
 
 
 @dataclass(frozen=True)
+class BenchValue:
+    """A key of the bench file with its value, its unit and error, and how it was found."""
+
+    key: str
+    value: float | int | str
+    error: str
+    how: str = ""
+
+
+@dataclass(frozen=True)
 class BlockFit:
     """Estimates in the order of the regressors, and the share of the standard deviation that they leave."""
 

@@ -1,183 +1,169 @@
-"""Gains of a cascaded control law from set-points, motion and torque command.
+"""Gains of a cascaded control law from set-points, motion and torque command, without a bench.
 
-The law of `hil.control.cascade` with continuous position loop is linear in combinations of its gains:
-
-    T = Kp (Kv e / r + ff v_c / r - v) + Kp / Ti (integral of the same)
-
-Least squares gives initial values; then the law is replayed over the recording at every period of the position loop and
-with both velocity estimates, and the gains of the best are refined.
+The fit is that of `hil.identification.control_law`, from a closed form, at every period of the position loop, with both
+velocity estimates, with and without an integrator and delays; the best of these is refined.
 """
 
-from dataclasses import dataclass
+from dataclasses import replace
+from itertools import product
+from math import hypot
+from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import least_squares
 
-from hil.arrays import FloatArray
-from hil.control import cascade
-from hil.drafting.estimate import fit_blocks
+from hil.channels import SPEED_SET_POINT, AxisKind
+from hil.control.cascade import Gains, make_gains
+from hil.drafting.estimate import BenchValue
+from hil.identification.control_law import fit_settings
+from hil.identification.law_fit import REPLAYED, LawFit, preferred, sure
+from hil.identification.law_replay import LawRows, Settings, closed_form, find_delays, first_tick
 from hil.recording.recording import Recording
+from hil.twin.axis import Response, Start, Twin
+from hil.twin.physics import Physics
+from hil.twin.structure.chain import one_mass
 
-REPLAYED = 0.05  # share of the torque command that a law may leave to be written into a bench
 _TICKS = (1, 2, 4, 8)  # of the velocity loop per tick of the position loop, as drives have them
 _LONGEST_S = 0.1  # period of a position loop that a bench allows
 _FIRST_STEPS, _LAST_STEPS = 8, 40  # of the refinement of each variant, and of the best
 _ROWS = 8000  # that are replayed: seconds of motion at a usual rate
-_NO_INTEGRAL = 10.0  # s: an integral time above it acts no more within a recording
-_ESTIMATES = ("backward_difference", "two_sample_mean")
+_SETTLED = 10  # rows after which the first difference of the position is forgotten
+_NOISE = 1e-4  # of the command: a scale of the residuals, of no influence on the values
 
 
-Start4 = tuple[float, float, float, float]  # Kv, ff, Kp, Kp / Ti
+class ControlValues(NamedTuple):
+    """Keys of the control section; if they are not known, none and the reason."""
+
+    values: list[BenchValue]
+    why: str = ""
 
 
-@dataclass(frozen=True)
-class LoopValues:
-    """The law that leaves least of the torque command; errors are those of the refined fit, 0 for kept values."""
+def loop_values(recording: Recording, ratio_m_rad: float) -> ControlValues:
+    """Draft the control section of a bench from a recording; `ratio_m_rad`: travel over motor angle."""
+    loop = fit_loops(recording, ratio_m_rad)
+    if loop is None or loop.left > REPLAYED:
+        why = "no set-points are recorded, or no gains reproduce the torque command"
+        return ControlValues([], why if loop is None else f"the best cascaded law leaves {_left(loop)}")
+    linear, period_s = recording.kind is AxisKind.LINEAR, recording.period_s
+    gains, delays, errors = loop.gains, loop.settings, loop.errors
+    if sure(delays.feedback_rows, errors.feedback_rows):
+        return ControlValues(
+            [],
+            f"the cascaded law leaves {_left(loop)} with positions that are "
+            f"{1e3 * period_s * delays.feedback_rows:.3g} ms old, +-{1e3 * period_s * errors.feedback_rows:.1g}; "
+            "such a delay of the loop is not simulated",
+        )
+    how = f"the replayed law leaves {_left(loop)}"
+    values = [
+        BenchValue(
+            "position_gain_1_s",
+            gains.position_gain_1_s,
+            f"1/s, +-{gains.position_gain_1_s * errors.position_gain:.2g}",
+            how,
+        ),
+        BenchValue("velocity_feedforward", gains.velocity_feedforward, f"1 is 100 %, +-{errors.feedforward:.2g}"),
+        BenchValue(
+            "position_period_s",
+            float(f"{gains.position_ticks * period_s:.9g}"),
+            "s",
+            f"of 1, 2, 4 and 8 rows {gains.position_ticks} fits best",
+        ),
+        BenchValue(
+            "velocity_gain_n_s_m" if linear else "velocity_gain_n_m_s_rad",
+            gains.velocity_gain_n_m_s_rad,
+            f"{'N s/m' if linear else 'N m s/rad'}, +-{gains.velocity_gain_n_m_s_rad * errors.velocity_gain:.2g}",
+        ),
+    ]
+    if gains.integral_gain_n_m_rad > 0.0:
+        time_s = gains.velocity_gain_n_m_s_rad / gains.integral_gain_n_m_rad
+        error_s = time_s * hypot(errors.velocity_gain, errors.integral_gain)
+        values.append(BenchValue("velocity_integral_time_s", time_s, f"s, +-{error_s:.2g}"))
+    if sure(delays.setpoint_rows, 0.0):
+        values.append(
+            BenchValue(
+                "setpoint_delay_s", period_s * delays.setpoint_rows, f"s, +-{period_s * errors.setpoint_rows:.2g}"
+            )
+        )
+    values += [
+        BenchValue("velocity_period_s", float(f"{period_s:.9g}"), "s", "the period of the recording"),
+        BenchValue(
+            "velocity_estimate",
+            "two_sample_mean" if gains.two_sample_mean else "backward_difference",
+            "",
+            "the better of the two",
+        ),
+    ]
+    return ControlValues(values)
 
-    position_gain_1_s: float
-    velocity_feedforward: float
-    velocity_gain: float
-    integral_time_s: float | None
-    errors: tuple[float, float, float, float]
-    position_ticks: int
-    velocity_estimate: str
-    left: float  # share of the standard deviation of the torque command
-    phase: int  # first row at which the position loop runs
 
-    @property
-    def start(self) -> Start4:
-        """Kv, ff, Kp, Kp / Ti."""
-        integral = 0.0 if self.integral_time_s is None else self.velocity_gain / self.integral_time_s
-        return self.position_gain_1_s, self.velocity_feedforward, self.velocity_gain, integral
+def _left(loop: LawFit) -> str:
+    of_speed = f", {100 * loop.left_of_speed:.2g} % in the speed set-point" if loop.left_of_speed else ""
+    return f"{100 * loop.left_of_command:.2g} % of the torque command{of_speed}"
 
 
-@dataclass(frozen=True, eq=False)
-class _Loop:
-    """Channels (n,) of the replayed rows."""
+def fit_loops(recording: Recording, ratio_m_rad: float) -> LawFit | None:
+    """Fit the control law; None without set-points or torque, or where no gains are found.
 
-    position: FloatArray
-    velocity: FloatArray
-    motor: FloatArray
-    feedback: FloatArray
-    command: FloatArray
-    ratio: float
-    period_s: float
-
-
-def loop_values(recording: Recording, ratio_m_rad: float) -> LoopValues | None:
-    """Fit the control law; None without set-points or torque, or where no gains are found."""
+    Where the speed set-point is recorded, each loop is fitted to its own output; if these do not reproduce it, or if it
+    is not recorded, the chain of both loops is.
+    """
     names = recording.axis
-    if not {names.position_command, names.torque_command} <= set(recording.columns):
+    torque = names.torque_command if names.torque_command in recording.columns else names.torque
+    if not {names.position_command, names.motor_position, torque} <= set(recording.columns):
         return None
     position = recording[names.position_command]
     velocity = recording.columns.get(names.velocity_command)
     velocity = np.gradient(position, recording.period_s) if velocity is None else velocity
-    motor = recording[names.motor_position]
+    speed = np.asarray(recording.columns.get(SPEED_SET_POINT, np.empty(0)))
     moving = np.flatnonzero(np.abs(velocity) > 1e-3 * np.max(np.abs(velocity), initial=0.0))
     if not moving.size:
         return None
     rows = slice(max(int(moving[0]) - 50, 0), max(int(moving[0]) - 50, 0) + _ROWS)
-    loop = _Loop(
-        position[rows], velocity[rows], motor[rows], ratio_m_rad * motor[rows], recording[names.torque_command][rows],
-        ratio_m_rad, recording.period_s,
-    )  # fmt: skip
-    variants = [
-        (start, ticks, phase, estimate)
-        for start in _initial(loop)
-        for ticks in _TICKS
-        if ticks * recording.period_s <= _LONGEST_S
-        for phase in range(ticks)
-        for estimate in _ESTIMATES
-    ]
-    # the start is too far off to tell which variant is right
-    tried = [_refined(loop, *variant, most=_FIRST_STEPS) for variant in variants]
+    motor, command = recording[names.motor_position][rows], recording[torque][rows]
+    law = LawRows(
+        position[rows],
+        velocity[rows],
+        Response(motor, np.empty(0), command, command),
+        np.empty(0),
+        Start(float(ratio_m_rad * motor[0]), float(ratio_m_rad * (motor[1] - motor[0])) / recording.period_s),
+        _SETTLED,
+        _NOISE * max(float(np.std(command)), 1e-300),
+    )
+    if np.any(speed):
+        found = _best(replace(law, speed_set_point=speed[rows]), ratio_m_rad, recording.period_s)
+        if found is not None and found.left <= REPLAYED:
+            return found
+    return _best(law, ratio_m_rad, recording.period_s)
+
+
+def _best(rows: LawRows, ratio_m_rad: float, period_s: float) -> LawFit | None:
+    """The variant of the law with the best criterion, with and without delays."""
+    twin = Twin(Physics(one_mass(1.0), 0.0, 0.0), _gains(ratio_m_rad, period_s, 1, True, False))
+    tried = []
+    for ticks, mean in product(_TICKS, (True, False)):
+        if ticks * period_s > _LONGEST_S:
+            continue
+        delays = find_delays(rows, Settings(_gains(ratio_m_rad, period_s, ticks, True, mean)))
+        for integral, late in product((True, False), (False, True)):
+            start = Settings(
+                _gains(ratio_m_rad, period_s, ticks, integral, mean), 1.0, *(delays if late else (0.0, 0.0))
+            )
+            base = closed_form([rows], start, [first_tick(rows, start)]).settings
+            if base is not None:  # the start is too far off to tell which variant is right
+                tried.append((late, fit_settings([rows], base, twin, delays=late, start=base, most=_FIRST_STEPS)))
     if not tried:
         return None
-    best = min(tried, key=lambda one: one.left)
-    return _refined(loop, best.start, best.position_ticks, best.phase, best.velocity_estimate, most=_LAST_STEPS)
+    best = preferred([one for _, one in tried])
+    late = next(late for late, one in tried if one is best)
+    return fit_settings([rows], best.settings, twin, delays=late, start=best.settings, most=_LAST_STEPS)
 
 
-def _initial(loop: _Loop) -> list[Start4]:
-    """Values of Kv, ff, Kp, Kp/Ti from least squares, of a P and of a PI velocity loop."""
-    r = loop.ratio
-    error, feed = (loop.position - loop.feedback) / r, loop.velocity / r
-    speed = np.diff(loop.motor, prepend=loop.motor[0]) / loop.period_s
-    ones = np.ones_like(error)
-    found = []
-    proportional = fit_blocks([error, feed, speed, ones], loop.command).estimates
-    kp = -proportional[2].value
-    if kp > 0.0:
-        found.append((proportional[0].value / kp, max(proportional[1].value / kp, 0.0), kp, 0.0))
-    summed = np.cumsum(error) * loop.period_s
-    c_e, c_v, c_speed, c_sum, _, _ = (
-        one.value
-        for one in fit_blocks([error, feed, speed, summed, loop.motor - loop.motor[0], ones], loop.command).estimates
+def _gains(ratio_m_rad: float, period_s: float, ticks: int, integral: bool, mean: bool) -> Gains:
+    return make_gains(
+        position_gain_1_s=1.0,
+        velocity_gain_n_m_s_rad=1.0,
+        ratio_m_rad=ratio_m_rad,
+        velocity_integral_time_s=1.0 if integral else None,
+        velocity_period_s=period_s,
+        position_period_s=ticks * period_s,
+        two_sample_mean=mean,
     )
-    kp = -c_speed
-    if kp > 0.0:
-        feedforward = max(c_v / kp, 0.0)
-        root = c_e**2 - 4.0 * kp * c_sum * feedforward
-        for sign in (-1.0, 1.0):
-            x = 0.5 * (c_e + sign * np.sqrt(max(root, 0.0)))
-            if x > 0.0 and c_sum > 0.0:
-                found.append((x / kp, feedforward, kp, kp * c_sum / x))
-    return [one for one in found if one[0] > 0.0]
-
-
-def _left(loop: _Loop, values: Start4, ticks: int, phase: int, estimate: str) -> FloatArray:
-    """Torque command less that of the replayed law, without its mean: the state of the integrator is not known."""
-    kv, feedforward, kp, integral = values
-    gains = cascade.make_gains(
-        position_gain_1_s=kv,
-        velocity_gain_n_m_s_rad=kp,
-        ratio_m_rad=loop.ratio,
-        velocity_feedforward=feedforward,
-        velocity_integral_time_s=kp / integral if integral > 0.0 else None,
-        velocity_period_s=loop.period_s,
-        position_period_s=ticks * loop.period_s,
-        two_sample_mean=estimate == "two_sample_mean",
-    )
-    rows = slice(phase, None)
-    motor = loop.motor[rows]
-    state = cascade.init(motor[0], 0.0, 0.0, gains.period_s)
-    replayed, _ = cascade.replay(gains, state, loop.position[rows], loop.velocity[rows], motor, loop.feedback[rows])
-    left = (loop.command[rows] - replayed)[10:]
-    return np.asarray(left - left.mean())
-
-
-def _refined(loop: _Loop, start: Start4, ticks: int, phase: int, estimate: str, most: int) -> LoopValues:
-    scale = np.array([max(abs(one), 1e-6) for one in start])
-    scale[1] = max(scale[1], 0.1)
-
-    def misfit(x: FloatArray) -> FloatArray:
-        kv, feedforward, kp, integral = (float(one) for one in np.maximum(x, 0.0) * scale)
-        return _left(loop, (max(kv, 1e-9), feedforward, max(kp, 1e-12), integral), ticks, phase, estimate)
-
-    x0 = np.array(start) / scale
-    free = np.array([True, True, True, start[3] > 0.0])
-
-    def of_free(y: FloatArray) -> FloatArray:
-        x = x0.copy()
-        x[free] = y
-        return misfit(x)
-
-    fit = least_squares(of_free, x0[free], max_nfev=most)
-    values = x0.copy()
-    values[free] = np.maximum(fit.x, 0.0)
-    values *= scale
-    errors = np.zeros(4)
-    residual = of_free(fit.x)
-    # least squares over rows that depend on each other: as many independent ones as blocks of ten
-    variance = float(residual @ residual) / max(residual.size - 4, 1) * 10.0
-    inverse = np.linalg.pinv(fit.jac.T @ fit.jac)
-    errors[free] = np.sqrt(variance * np.diag(inverse)) * scale[free]
-    kv, feedforward, kp, integral = (float(one) for one in values)
-    time_s = kp / integral if integral > 0.0 and kp > 0.0 else None
-    if time_s is not None and time_s > _NO_INTEGRAL:
-        time_s = None
-    error_time = 0.0 if time_s is None else float(time_s * np.hypot(errors[3] / integral, errors[2] / max(kp, 1e-300)))
-    error_kv, error_feedforward, error_kp, _ = (float(one) for one in errors)
-    return LoopValues(
-        kv, feedforward, kp, time_s, (error_kv, error_feedforward, error_kp, error_time), ticks, estimate,
-        float(np.std(residual) / np.std(loop.command)), phase,
-    )  # fmt: skip

@@ -7,7 +7,8 @@ commands best. Rows before the first such tick are omitted, since their velocity
 A drive in CSP gets positions only: its velocity feed-forward is their difference from SYNC to SYNC.
 """
 
-from dataclasses import dataclass, replace
+import math
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -17,7 +18,7 @@ from scipy.ndimage import maximum_filter1d
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
 from hil.bench.hardware import DriveMode
-from hil.channels import AxisKind
+from hil.channels import SPEED_SET_POINT, AxisKind
 from hil.control import cascade
 from hil.errors import InputError
 from hil.identification.completion import completed, position_is_measured, rows_are_ticks, torque_is_measured
@@ -25,6 +26,7 @@ from hil.identification.noise import Laps, Noise, estimate_noise, find_laps, mov
 from hil.recording.recording import Recording
 from hil.recording.stamps import check_finite
 from hil.twin.axis import Response, Start
+from hil.twin.mechanisms.channel_time_skew import delayed
 
 Channels = tuple[FloatArray, FloatArray, FloatArray, FloatArray]  # as control.replay takes them
 
@@ -55,6 +57,7 @@ class Measured:
     unseen: frozenset[str] = frozenset()  # channels of the twin whose input or output is unknown: their residual is 0
     integrated: bool = False  # the motor position is the sum of its measured velocity
     sampled: bool = False  # the rows are samples of the torque, which changes between them
+    speed_set_point: FloatArray = field(default_factory=lambda: np.empty(0))  # of unknown scale; empty if not recorded
 
     @cached_property
     def torque_gap(self) -> FloatArray:
@@ -150,6 +153,8 @@ def take(recording: Recording, bench: Bench) -> Measured:
     position, velocity = _column(recording, names.position_command), _column(recording, names.velocity_command)
     if bench.drive is not None and bench.drive.mode is DriveMode.CSP:
         velocity = np.diff(position, prepend=2.0 * position[0] - position[1]) / gains.period_s
+    if bench.setpoint_delay_s:
+        position, velocity = (later(one, bench.setpoint_delay_s / gains.period_s) for one in (position, velocity))
     has_command = names.torque_command in recording.columns
     command = _column(recording, names.torque_command) if has_command else torque
     table = _column(recording, names.table_position) if bench.has_table_encoder else np.empty(0)
@@ -161,6 +166,7 @@ def take(recording: Recording, bench: Bench) -> Measured:
     position, velocity, motor, feedback, table, command, torque = (
         values[first:] for values in (position, velocity, motor, feedback, table, command, torque)
     )
+    speed = _column(recording, SPEED_SET_POINT)[first:] if SPEED_SET_POINT in recording.columns else np.empty(0)
     noise = estimate_noise(bench, velocity, motor, table, command, torque, recording.period_s)
     integrated = not position_is_measured(recording)
     if integrated:
@@ -184,6 +190,7 @@ def take(recording: Recording, bench: Bench) -> Measured:
         _unseen(recording, bench),
         integrated,
         not bench.law_known and torque_is_measured(recording) and not rows_are_ticks(recording),
+        speed if np.any(speed) else np.empty(0),
     )
 
 
@@ -199,6 +206,15 @@ def bench_of(recording: Recording) -> Bench:
     if not isinstance(described, dict):
         raise InputError(f"{recording.name}: no bench is recorded in it; give one: --bench FILE or a shipped name")
     return Bench.model_validate(described)
+
+
+def later(values: FloatArray, rows: float) -> FloatArray:
+    """Delay samples (n,) by a number of rows; both ends are continued by straight lines."""
+    more = math.ceil(abs(rows)) + 2
+    beyond = np.arange(1, more + 1)
+    before = values[0] - beyond[::-1] * (values[1] - values[0])
+    after = values[-1] + beyond * (values[-1] - values[-2])
+    return delayed(np.concatenate([before, values, after]), rows)[more:-more]
 
 
 def _column(recording: Recording, name: str) -> FloatArray:

@@ -181,7 +181,12 @@ def open_devices(bench: Bench, seed: int | None = None) -> Devices:
 def check_runnable(bench: Bench) -> None:
     """Raise FieldError at the field for which a bench cannot be run over CANopen."""
     section = bench.drive or DriveSection()
-    _ = bench.known_control  # raises
+    control = bench.known_control  # raises
+    if control.setpoint_delay_s:
+        raise FieldError(
+            ("control", "setpoint_delay_s"),
+            f"given {control.setpoint_delay_s:g}, allowed 0 for a run: its loop uses set-points at once; remove it",
+        )
     if bench.drive is None and bench.simulation is None:
         raise FieldError(
             ("drive",),

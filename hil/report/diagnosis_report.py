@@ -6,6 +6,7 @@ from hil.diagnosis.diagnose import NEXT_EXPERIMENT, Diagnosis
 from hil.diagnosis.pictures.findings import finding_figure, term_of
 from hil.diagnosis.pictures.location import residual_panels
 from hil.diagnosis.result import Finding, FitFigures, Result, TorqueLeft, Value, Verdict
+from hil.diagnosis.turning import of_load
 from hil.diagnosis.wording import label, title, titles, where
 from hil.figures.drawing import save
 from hil.files.output import write_json
@@ -38,7 +39,12 @@ def write_diagnosis(diagnosis: Diagnosis, folder: Path) -> None:
         _finding(page, diagnosis, index, folder)
     if result.location is not None:
         page.heading("Where it is")
-        page.items([f"{what.capitalize()}: {text}." for what, text in where(result.location).items()])
+        page.items(
+            [
+                f"{what.capitalize()}: {text}."
+                for what, text in where(result.location, diagnosis.owner.axis.turns).items()
+            ]
+        )
         page.picture(
             save(diagnosis.plot("location"), folder / "location.png"),
             "Energy of the mismatch above the noise. The input of each block is the measured one, so that a mismatch "
@@ -83,10 +89,11 @@ def _finding(page: Page, diagnosis: Diagnosis, index: int, folder: Path) -> None
     mechanism = BY_ID[finding.effect]
     name = title(finding.effect)
     name = f"Explains a part: {name}" if diagnosis.result.partial else name.capitalize()
-    page.heading(f"{index + 1}. {name}: {mechanism.element}")
+    turns = diagnosis.owner.axis.turns
+    page.heading(f"{index + 1}. {name}: {of_load(mechanism.element, turns)}")
     figure, caption = finding_figure(diagnosis, term)
     again = f"_{term.slot + 1}" if term.slot else ""
-    page.picture(save(figure, folder / f"{term.effect}{again}.png"), caption)
+    page.picture(save(figure, folder / f"{term.effect}{again}.png"), of_load(caption, turns))
     sure = f"{100.0 * finding.confidence:.0f} %" if finding.confidence < 0.99 else "above 99 %"
     page.text(f"{finding.sentence} Confidence {sure}: {finding.needed}.")
     page.text(f"{mechanism.equation} ({mechanism.source})")

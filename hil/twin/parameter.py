@@ -25,9 +25,10 @@ class Dimension(StrEnum):
     PER_LENGTH = "1/m"
     COUNT = "1/rev"
 
-    def unit(self, linear: bool) -> str:
-        """SI unit on a rotary or on a linear axis."""
-        return _LINEAR_UNITS.get(self, self.value) if linear else self.value
+    def unit(self, linear: bool, turns: bool = False) -> str:
+        """SI unit on a rotary or on a linear axis; `turns`: of a load that turns."""
+        other = _LINEAR_UNITS if linear else _TURNING_UNITS if turns else {}
+        return other.get(self, self.value)
 
 
 _LINEAR_UNITS = {
@@ -36,6 +37,12 @@ _LINEAR_UNITS = {
     Dimension.MOTOR_STIFFNESS: "N/m",
     Dimension.MOTOR_DRAG: "N s^2/m^2",
     Dimension.INVERSE_TORQUE_SQUARED: "1/N^2",
+}
+_TURNING_UNITS = {
+    Dimension.LENGTH: "rad",
+    Dimension.FORCE: "N m",
+    Dimension.STIFFNESS: "N m/rad",
+    Dimension.PER_LENGTH: "1/rad",
 }
 
 

@@ -20,6 +20,7 @@ class AxisFacts:
     table_count_m: float | None  # resolution of the linear encoder; None without one
     duration_s: float  # of the longest recording
     travel_m: float = math.inf  # of the longest motion
+    lost_m: float = math.inf  # largest range of the table against the motor
     held_s: Callable[[float], float] = _always  # longest time for which |torque command| is at a level or above
 
     @property

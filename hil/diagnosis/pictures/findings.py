@@ -26,6 +26,7 @@ from hil.diagnosis.pictures.view import (
     view_of,
 )
 from hil.diagnosis.pictures.windows import force_over_time
+from hil.diagnosis.turning import labelled
 from hil.figures.drawing import legend_above, style_axis
 from hil.figures.panels import COMMAND, MEASURED, SIMULATED, thin
 from hil.identification.terms import Term
@@ -51,7 +52,9 @@ def finding_figure(diagnosis: Diagnosis, term: Term) -> Captioned:
     train, held_out = diagnosis.train.runs, diagnosis.held_out.runs
     runs = (*train, *held_out) if every else held_out or train
     figure, caption = picture(diagnosis, [view_of(diagnosis, run, term) for run in runs])
-    return Captioned(figure, f"{caption} Recordings: {', '.join(run.name for run in runs)}.")
+    return Captioned(
+        labelled(figure, diagnosis.owner.axis.turns), f"{caption} Recordings: {', '.join(run.name for run in runs)}."
+    )
 
 
 def term_of(diagnosis: Diagnosis, index: int) -> Term:
@@ -166,7 +169,8 @@ def _spectrum(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:
         density = np.sqrt(np.mean([power for _, power in spectra], axis=0))
         axis.loglog(spectra[0][0][1:], density[1:], color=colour, label=label)
     # here the motor's residual is a position, not converted to a torque
-    unit = "m" if channel == "table" or diagnosis.owner.axis.linear else "rad"
+    linear = diagnosis.owner.axis.linear or (channel == "table" and not diagnosis.owner.axis.turns)
+    unit = "m" if linear else "rad"
     label = CHANNEL_LABELS["table"] if channel == "table" else "motor position"
     style_axis(axis, f"{label} [{unit}/√Hz]", "frequency [Hz]", "Spectrum of the residual")
     axis.legend(frameon=False)

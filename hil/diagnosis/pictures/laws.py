@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from scipy.signal import savgol_filter
 
 from hil.arrays import FloatArray
-from hil.diagnosis.pictures.view import Captioned, Curve, View, around, binned, longest, three_curves
+from hil.diagnosis.pictures.view import Captioned, Curve, View, around, binned, longest, three_curves, unit_of_channel
 from hil.figures.drawing import style_axis
 from hil.figures.panels import COMMAND, DEVIATION, MEASURED, SIMULATED
 from hil.identification.dataset import inertia
@@ -103,7 +103,7 @@ def lost_motion(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:
     run = longest(views).run
     stretch = run.table_m - diagnosis.owner.axis.ratio_m_rad * run.motor
     stretch = stretch - np.mean(stretch)  # the zero of the linear encoder is arbitrary
-    factor, unit = reading_unit("m", float(np.abs(stretch).max()))
+    factor, unit = reading_unit(unit_of_channel(diagnosis, "table"), float(np.abs(stretch).max()))
     curves = three_curves(diagnosis, run, "table", stretch)
     window = max(round(0.009 / run.period_s) | 1, 5)
     acceleration = savgol_filter(run.table_m, window, 2, deriv=2, delta=run.period_s)

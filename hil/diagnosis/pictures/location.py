@@ -9,7 +9,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from hil.arrays import FloatArray
-from hil.channels import CHANNELS
 from hil.diagnosis.location.locate import BLOCKS, block_shares, mismatch_energies, phase_shares
 from hil.diagnosis.result import Verdict
 from hil.diagnosis.verdict.fit_table import channel_names
@@ -77,7 +76,7 @@ def residual_panels(diagnosis: Diagnosis, run: Measured) -> list[Panel]:
         )
         lines = Line("before", first, COMMAND, broad=True), Line("after", second, SIMULATED)
         label = recorded.removesuffix("_rad").removesuffix("_n_m").removesuffix("_m").removesuffix("_n")
-        panels.append(Panel(f"{label.replace('_', ' ')}\n{title(entry.mode)}", CHANNELS[recorded].unit, lines, floor))
+        panels.append(Panel(f"{label.replace('_', ' ')}\n{title(entry.mode)}", entry.unit, lines, floor))
     return panels
 
 

@@ -96,7 +96,10 @@ def longest(views: Sequence[View]) -> View:
 
 def unit_of_channel(diagnosis: Diagnosis, channel: str) -> str:
     """SI unit of a residual."""
-    return "m" if channel == "table" else "N" if diagnosis.owner.axis.linear else "N m"
+    axis = diagnosis.owner.axis
+    if channel == "table":
+        return "rad" if axis.turns else "m"
+    return "N" if axis.linear else "N m"
 
 
 def noise(run: Measured, channel: str) -> float:

@@ -53,14 +53,17 @@ def axis_facts(bench: Bench, runs: Sequence[Measured] = ()) -> AxisFacts:
     """Collect facts of the axis, with the nominal parameters of `bench`, and of its recordings."""
     physics, table, limit = bench.axis.physics(), bench.encoders.table, bench.gains.torque_limit_n_m
     peak = max((float(np.max(np.abs(run.torque))) for run in runs), default=0.0)
+    ratio = bench.axis.ratio_m_rad
+    apart = [float(np.ptp(run.table_m - ratio * run.motor)) for run in runs if run.table_m.size]
     return AxisFacts(
         coulomb=physics.coulomb_n_m,
-        ratio=bench.axis.ratio_m_rad,
+        ratio=ratio,
         angle_per_unit=physics.angle_per_unit,
         rated_torque=limit / 3.0 if np.isfinite(limit) else peak,
         table_count_m=table.resolution_m if table is not None else None,
         duration_s=max((run.motor.size * run.period_s for run in runs), default=0.0),
-        travel_m=max((bench.axis.ratio_m_rad * float(np.ptp(run.motor)) for run in runs), default=math.inf),
+        travel_m=max((ratio * float(np.ptp(run.motor)) for run in runs), default=math.inf),
+        lost_m=max(apart, default=math.inf),
         held_s=lambda level: max((_held_s(run, level) for run in runs), default=math.inf),
     )
 

@@ -49,7 +49,7 @@ class EventReport:
 def describe_event(final: Fit, index: int, held_out: Dataset) -> EventReport:
     """Report the event that is the term `index` of a fit, with its windows in training and held-out recordings."""
     term = final.terms[index]
-    mechanism, linear = BY_ID[term.effect], final.bench.axis.linear
+    mechanism, kind = BY_ID[term.effect], (final.bench.axis.linear, final.bench.axis.turns)
     fits = [final] + ([replace(final.estimator, data=held_out).evaluate(final.hypothesis)] if held_out.runs else [])
     seen = _whole([one for fit in fits for one in _seen(fit, index)])
     common = _common(np.array([one.values[2] for one in seen]), np.array([one.errors[2] for one in seen]))
@@ -57,7 +57,7 @@ def describe_event(final: Fit, index: int, held_out: Dataset) -> EventReport:
         value, error = common
         seen = [replace(one, values=(*one.values[:2], value), errors=(*one.errors[:2], error)) for one in seen]
     names = [mechanism.names[place] for place in (*_edges(term), mechanism.strength)]
-    units = [mechanism.parameters[place].dimension.unit(linear) for place in (*_edges(term), mechanism.strength)]
+    units = [mechanism.parameters[place].dimension.unit(*kind) for place in (*_edges(term), mechanism.strength)]
 
     def value_of(one: _Seen, place: int) -> Value:
         return Value(value=one.values[place], std=one.errors[place], unit=units[place])

@@ -139,7 +139,9 @@ def _normal(term: Term) -> Term:
 
 def _values(term: Term, errors: Sequence[float], bench: Bench) -> dict[str, Value]:
     return {
-        parameter.name: Value(value=value, std=error, unit=parameter.dimension.unit(bench.axis.linear))
+        parameter.name: Value(
+            value=value, std=error, unit=parameter.dimension.unit(bench.axis.linear, bench.axis.turns)
+        )
         for parameter, value, error in zip(BY_ID[term.effect].parameters, _normal(term).values, errors, strict=True)
     }
 

@@ -141,7 +141,7 @@ def fit_table(owner: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> dict[s
             chaotic = closed > STRAYS >= block and not train.runs[0].torque_is_command
             mode = Mode.BLOCKS if chaotic else Mode.CLOSED_LOOP
         result[recorded] = ChannelFit(
-            unit=CHANNELS[recorded].unit,
+            unit="rad" if final.bench.axis.turns and channel == "table" else CHANNELS[recorded].unit,
             mode=mode,
             floor_from="repeated_laps" if laps else "white_noise",
             train=figures[mode][0],

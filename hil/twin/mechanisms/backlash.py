@@ -3,10 +3,13 @@
 Damping resists the parting of oiled flanks; dry flanks only push.
 """
 
+from collections.abc import Sequence
+
 from numba import njit
 
 from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, Stage, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
+from hil.twin.scene import AxisFacts
 
 
 @njit
@@ -19,6 +22,11 @@ def _free_play(value: float, at: Moment, parameters: Row, memory: Row) -> float:
     return 0.0
 
 
+def _valid(values: Sequence[float], variant: int, axis: AxisFacts) -> bool:
+    """Check that the table crosses the gap: in a wider one it floats, and shows nothing of its width."""
+    return values[0] <= axis.lost_m
+
+
 MECHANISM = Mechanism(
     id="backlash",
     block=Block.TRANSMISSION,
@@ -26,13 +34,14 @@ MECHANISM = Mechanism(
     sentence="There are {gap_m} of lost motion between screw and table.",
     equation="T = k dz(q, gap/2): no torque while |q| < gap/2",
     source="Nordin and Gutman, Automatica 38 (2002) 1633, dead-zone model",
-    parameters=(Parameter("gap_m", Dimension.LENGTH, 0.0, 1e-3, role=Role.STRENGTH),),
+    parameters=(Parameter("gap_m", Dimension.LENGTH, 0.0, 0.05, role=Role.STRENGTH),),
     variants=(
         Variant(Stage.TRANSMISSION, _free_play, "oiled flanks"),
         Variant(Stage.TRANSMISSION, _free_play, "dry flanks", play=True),
     ),
     starts=lambda s: [(f * s.stretch,) for f in (0.5, 1.0, 2.0, 4.0)],
     typical=lambda a: (3e-6,),
+    valid=_valid,
     proportional=False,
     needs_table=True,
     picture=Picture.LOST_MOTION,

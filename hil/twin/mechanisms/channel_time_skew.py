@@ -15,12 +15,12 @@ Channels = tuple[FloatArray, ...]  # motor position, table position, torque comm
 
 def _late_motor(channels: Channels, parameters: Sequence[float], period_s: float) -> Channels:
     motor, table, command, torque = channels
-    return _delayed(motor, parameters[0] / period_s), table, command, torque
+    return delayed(motor, parameters[0] / period_s), table, command, torque
 
 
 def _late_table(channels: Channels, parameters: Sequence[float], period_s: float) -> Channels:
     motor, table, command, torque = channels
-    return motor, _delayed(table, parameters[0] / period_s), command, torque
+    return motor, delayed(table, parameters[0] / period_s), command, torque
 
 
 def _late_torque(channels: Channels, parameters: Sequence[float], period_s: float) -> Channels:
@@ -38,7 +38,7 @@ def delayed_mean(means: FloatArray, periods: float) -> FloatArray:
     )
 
 
-def _delayed(samples: FloatArray, periods: float) -> FloatArray:
+def delayed(samples: FloatArray, periods: float) -> FloatArray:
     """Delay samples (n,) by a number of periods, by the phase of their spectrum.
 
     Interpolation between neighbours would average their noise, which a fit would take for evidence. The ends are

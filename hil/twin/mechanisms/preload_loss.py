@@ -1,9 +1,12 @@
 """Preload loss: the transmission is soft around zero load."""
 
+from collections.abc import Sequence
+
 from numba import njit
 
 from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, Stage, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
+from hil.twin.scene import AxisFacts
 
 
 @njit
@@ -16,6 +19,11 @@ def _soft_zone(value: float, at: Moment, parameters: Row, memory: Row) -> float:
     return ratio * value
 
 
+def _valid(values: Sequence[float], variant: int, axis: AxisFacts) -> bool:
+    """Check that the transmission leaves the zone: a wider one is a softer spring."""
+    return values[0] <= axis.lost_m
+
+
 MECHANISM = Mechanism(
     id="preload_loss",
     block=Block.TRANSMISSION,
@@ -24,7 +32,7 @@ MECHANISM = Mechanism(
     equation="T = k e(q), de/dq = rho for |q| < zone/2, else 1",
     source="ISO 3408-4:2006, axial rigidity of preloaded nuts; Feng and Pan, Int. J. Machine Tools 52 (2012) 85",
     parameters=(
-        Parameter("zone_m", Dimension.LENGTH, 0.0, 1e-3, role=Role.STRENGTH),
+        Parameter("zone_m", Dimension.LENGTH, 0.0, 0.05, role=Role.STRENGTH),
         Parameter("stiffness_ratio", Dimension.RATIO, 0.0, 1.0),
     ),
     variants=(Variant(Stage.TRANSMISSION, _soft_zone),),
@@ -32,6 +40,7 @@ MECHANISM = Mechanism(
         [(f * s.stretch, 0.4) for f in (0.5, 1.0, 2.0)] + [(f * s.most_stretch, 0.4) for f in (0.5, 1.0, 1.5)]
     ),
     typical=lambda a: (3e-6, 0.5),
+    valid=_valid,
     proportional=False,
     needs_table=True,
     picture=Picture.LOST_MOTION,

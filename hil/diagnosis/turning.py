@@ -1,0 +1,32 @@
+"""Words and units for a load that turns: the channels of the table hold its angle [rad] and torque [N m]."""
+
+import re
+
+from matplotlib.figure import Figure
+
+_WORDS = {
+    "ball nut and thrust bearing": "gear or coupling",
+    "ball screw": "gear",
+    "lead": "transmission",
+    "table": "load",
+    "screw": "motor",
+    "mm": "mrad",
+    "µm": "µrad",
+    "m/min": "rad/min",
+    "m/s²": "rad/s²",
+}
+_ANY = re.compile(rf"(?<![\w/])({'|'.join(map(re.escape, _WORDS))})(?![\w/])")
+
+
+def of_load(text: str, turns: bool) -> str:
+    """The text in the words of a load that turns, if it does."""
+    return _ANY.sub(lambda match: _WORDS[match[1]], text) if turns else text
+
+
+def labelled(figure: Figure, turns: bool) -> Figure:
+    """The figure with titles and labels in the words of a load that turns, if it does."""
+    for axis in figure.axes if turns else ():
+        axis.set_title(of_load(axis.get_title(loc="left"), turns), loc="left")
+        axis.set_xlabel(of_load(axis.get_xlabel(), turns))
+        axis.set_ylabel(of_load(axis.get_ylabel(), turns))
+    return figure

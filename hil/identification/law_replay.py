@@ -1,0 +1,248 @@
+"""Replay of a cascaded control law on measured inputs, loop by loop where the speed set-point between them is recorded.
+
+    position loop   s w = Kv (x_cmd(t - d) - x) + ff v_cmd(t - d)
+    velocity loop   T   = Kp (s w / r - v) + Kp / Ti (integral of the same)
+
+w is the recorded speed set-point and s its scale, which need not be known; d is the delay of the recorded set-points,
+and x and v may be those of some rows ago. Without w both loops are one chain from set-points to torque command. The
+integrator follows the recorded command (`hil.twin.stepping.loops.replay_law`), so offsets and slow rounding do not
+count.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import minimize
+from scipy.signal import lfilter
+
+from hil.arrays import FloatArray
+from hil.control.cascade import Gains
+from hil.identification.measured import later
+from hil.twin.axis import Response, Start, Twin
+from hil.twin.stepping.loops import INTEGRATOR_S
+
+# Largest delays in rows: buffer and look-ahead of a logger; bus and drive.
+SETPOINT_ROWS, FEEDBACK_ROWS = 40.0, 12.0
+_SCANNED = 6000  # rows in which delays are looked for: seconds of motion at a usual rate
+_EACH = 8.0  # rows: delays that are tried one by one, longer ones by two
+_BEFORE = 50  # rows before the first judged one
+
+
+class Settings(NamedTuple):
+    """Settings of a control law; `scale` of the recorded speed set-point, delays in rows."""
+
+    gains: Gains
+    scale: float = 1.0
+    setpoint_rows: float = 0.0  # the law uses the recorded set-points so much later
+    feedback_rows: float = 0.0  # the law uses positions that are so old
+
+
+@dataclass(frozen=True, eq=False)
+class LawRows:
+    """Inputs and output of a control law at the rows (n,) of a recording, in motor units."""
+
+    position_command_m: FloatArray
+    velocity_command_m_s: FloatArray
+    measured: Response
+    speed_set_point: FloatArray  # (0,) if it is not recorded, or not used
+    start: Start
+    judged: int  # first row that is evaluated
+    noise: float  # standard deviation of the torque command
+
+    def feedback_m(self, gains: Gains) -> FloatArray:
+        """Position (n,) that the position loop gets."""
+        if gains.position_from_table and self.measured.table_position_m.size:
+            return self.measured.table_position_m
+        return np.asarray(gains.ratio_m_rad * self.measured.motor_position)
+
+    def delayed(self, settings: Settings) -> "LawRows":
+        """The rows with the inputs that the law uses, by the delays of `settings`."""
+        late, old = settings.setpoint_rows, settings.feedback_rows
+        motor, table = self.measured.motor_position, self.measured.table_position_m
+        if old:
+            motor, table = later(motor, old), later(table, old) if table.size else table
+        return replace(
+            self,
+            position_command_m=later(self.position_command_m, late) if late else self.position_command_m,
+            velocity_command_m_s=later(self.velocity_command_m_s, late) if late else self.velocity_command_m_s,
+            measured=self.measured._replace(motor_position=motor, table_position_m=table),
+        )
+
+    def until(self, row: int) -> "LawRows":
+        """The rows before `row`."""
+        return replace(
+            self,
+            position_command_m=self.position_command_m[:row],
+            velocity_command_m_s=self.velocity_command_m_s[:row],
+            measured=Response(*(values[:row] for values in self.measured)),
+            speed_set_point=self.speed_set_point[:row],
+        )
+
+    def since(self, row: int) -> "LawRows":
+        """The rows from `row` on."""
+        return replace(
+            self,
+            position_command_m=self.position_command_m[row:],
+            velocity_command_m_s=self.velocity_command_m_s[row:],
+            measured=Response(*(values[row:] for values in self.measured)),
+            speed_set_point=self.speed_set_point[row:],
+            judged=max(self.judged - row, 0),
+        )
+
+
+class Parts(NamedTuple):
+    """One channel for each loop: torque command, and speed set-point where it is recorded, over the noise."""
+
+    command: FloatArray
+    speed: FloatArray  # (0,) without a recorded speed set-point
+
+
+def position_loop(gains: Gains, rows: LawRows) -> FloatArray:
+    """Speed set-point (n,) [m/s] of the position loop, which runs at the first row."""
+    ticks = np.arange(rows.position_command_m.size) // gains.position_ticks * gains.position_ticks
+    error = (rows.position_command_m - rows.feedback_m(gains))[ticks]
+    return np.asarray(
+        gains.position_gain_1_s * error + gains.velocity_feedforward * rows.velocity_command_m_s[ticks],
+        dtype=np.float64,
+    )
+
+
+def residuals(rows: LawRows, settings: Settings, twin: Twin, cut: int, weight: float) -> Parts:
+    """What is recorded less what the law gives, at the judged rows of a recording without its first `cut` rows.
+
+    `twin` has the mechanisms on the inputs of the controller. `weight` is the velocity gain with which a deviation of
+    the speed set-point counts as one of the command.
+    """
+    gains, period_s = settings.gains, settings.gains.period_s
+    ratio = gains.ratio_m_rad
+    whole = replace(rows, measured=twin.undelayed(rows.measured)).delayed(settings)
+    law, motor = whole.since(cut), rows.measured.motor_position
+    position, velocity, speed = law.position_command_m, law.velocity_command_m_s, np.empty(0)
+    if law.speed_set_point.size:
+        wanted = position_loop(gains, law)
+        velocity = settings.scale * law.speed_set_point
+        speed = weight / ratio * (velocity - wanted)
+        gains = gains._replace(position_gain_1_s=0.0, velocity_feedforward=1.0, position_ticks=1)
+    start = rows.start._replace(
+        position_m=float(ratio * motor[cut]),
+        velocity_m_s=float(ratio * (motor[cut] - motor[cut - 1]) / period_s) if cut else rows.start.velocity_m_s,
+        torque=0.0,
+    )
+    controller = replace(twin, gains=gains)
+    if gains.integral_gain_n_m_rad > 0.0:  # at first, the integrator holds what the proportional part does not
+        first = Response(*(one[:1] for one in law.measured))
+        proportional = controller.command(position[:1], velocity[:1], first, start)
+        start = start._replace(torque=float(first.torque_command[0] - proportional[0]))
+    command = law.measured.torque_command - controller.command(position, velocity, law.measured, start)
+    with np.errstate(over="ignore", invalid="ignore"):
+        return Parts(*(_finite(one[law.judged :] / rows.noise) for one in (command, speed)))
+
+
+def _finite(values: FloatArray) -> FloatArray:
+    return np.asarray(np.nan_to_num(values, posinf=1e6, neginf=-1e6))
+
+
+def to_explain(rows: LawRows, gains: Gains) -> FloatArray:
+    """What a law has to explain of the command, in the units of `residuals`.
+
+    It is what passes the integrator that follows the command: a slow one is followed without any law.
+    """
+    return high_pass(rows.measured.torque_command, gains.period_s)[rows.judged :] / rows.noise
+
+
+def high_pass(values: FloatArray, period_s: float) -> FloatArray:
+    """Values (n,) or (n, k) less what an integrator follows that is corrected by them."""
+    keep = np.exp(-period_s / INTEGRATOR_S)
+    return np.asarray(lfilter([1.0, -1.0], [1.0, -keep], values - values[:1], axis=0))
+
+
+class ClosedForm(NamedTuple):
+    """Settings, None if a gain is not positive, and the share of command and speed set-point (rms) that they leave."""
+
+    settings: Settings | None
+    left: float
+
+
+def closed_form(runs: Sequence[LawRows], base: Settings, cuts: Sequence[int]) -> ClosedForm:
+    """Gains from linear least squares with the delays of `base`.
+
+    T = Kp x + Ki integral(x) with x = Kv e / r + ff v_c / r - v is linear in Kp Kv, Kp ff, Kp and Ki Kv, Ki ff, Ki; all
+    pass the high-pass of an integrator that follows the command. A recorded speed set-point takes the place of e and
+    v_c, which then give it. The integral is left out if `base` has none.
+    """
+    gains = base.gains
+    of_command, of_speed = [], []
+    for run, cut in zip(runs, cuts, strict=True):
+        law = run.delayed(base).since(cut)
+        motor = law.measured.motor_position
+        step = 2 if gains.two_sample_mean else 1  # rows of a difference: the first ones have none
+        keep = slice(max(law.judged - step, 0), None)
+        held = np.arange(motor.size) // gains.position_ticks * gains.position_ticks
+        inputs = np.stack([law.position_command_m - law.feedback_m(gains), law.velocity_command_m_s], axis=1)[held]
+        if law.speed_set_point.size:
+            of_speed.append(np.column_stack([inputs, law.speed_set_point])[step:][keep])
+            inputs = law.speed_set_point[:, None]
+        speed = (motor[step:] - motor[:-step]) / (step * gains.period_s)
+        x = np.column_stack([inputs[step:] / gains.ratio_m_rad, -speed])
+        both = np.column_stack([x, np.cumsum(x, axis=0) * gains.period_s, law.measured.torque_command[step:]])
+        of_command.append(high_pass(both, gains.period_s)[keep])
+    table = np.concatenate(of_command)
+    k = (table.shape[1] - 1) // 2
+    columns = table[:, :-1] if gains.integral_gain_n_m_rad > 0.0 else table[:, :k]
+    found, left = _least_squares(columns, table[:, -1])
+    if not of_speed and found[1] < 0.0:  # the feed-forward
+        kept = np.arange(columns.shape[1]) % k != 1
+        found[kept], left = _least_squares(columns[:, kept], table[:, -1])
+        found[~kept] = 0.0
+    kp, ki = float(found[k - 1]), float(found[-1]) if gains.integral_gain_n_m_rad > 0.0 else 0.0
+    scale, outer = 1.0, found[:2]
+    if of_speed:
+        table = np.concatenate(of_speed)
+        outer, of_outer = _least_squares(table[:, :2], table[:, 2])
+        scale, outer, left = float(found[0]) / kp if kp else 0.0, outer * found[0], float(np.hypot(left, of_outer))
+    if kp <= 0.0 or ki < 0.0 or outer[0] <= 0.0 or scale <= 0.0:
+        return ClosedForm(None, left)
+    learnt = gains._replace(
+        position_gain_1_s=float(outer[0] / kp),
+        velocity_feedforward=max(float(outer[1] / kp), 0.0),
+        velocity_gain_n_m_s_rad=kp,
+        integral_gain_n_m_rad=ki,
+    )
+    return ClosedForm(base._replace(gains=learnt, scale=scale), left)
+
+
+def _least_squares(columns: FloatArray, values: FloatArray) -> tuple[FloatArray, float]:
+    found = np.linalg.lstsq(columns, values, rcond=None)[0]
+    rest, size = values - columns @ found, float(values @ values)
+    return np.asarray(found, dtype=np.float64), float(np.sqrt(rest @ rest / size)) if size else 1.0
+
+
+def first_tick(run: LawRows, start: Settings) -> int:
+    """First row of the position loop: that at which a closed form leaves least."""
+    return min(range(start.gains.position_ticks), key=lambda cut: closed_form([run], start, [cut]).left)
+
+
+def find_delays(run: LawRows, base: Settings) -> tuple[float, float]:
+    """Delays of set-points and feedback [rows] at which a closed form leaves least.
+
+    The misfit has several minima over the delay of the set-points, and one valley near the least of them.
+    """
+    short = run.since(max(run.judged - _BEFORE, 0)).until(_SCANNED)
+
+    def left(late: float, old: float, cut: int) -> float:
+        return closed_form([short], base._replace(setpoint_rows=late, feedback_rows=old), [cut]).left
+
+    cuts = range(base.gains.position_ticks)
+    each = np.arange(-SETPOINT_ROWS, SETPOINT_ROWS + 1.0)
+    grid = product(each[(np.abs(each) <= _EACH) | (each % 2.0 == 0.0)], cuts)
+    late, cut = min(grid, key=lambda one: left(one[0], 0.0, one[1]))
+
+    def of_both(delays: FloatArray) -> float:
+        return left(float(delays[0]), abs(float(delays[1])), cut)
+
+    simplex = np.array([[late, 0.0], [late + 1.0, 1.0], [late, 1.0]])
+    found = minimize(of_both, simplex[0], method="Nelder-Mead", options={"initial_simplex": simplex, "maxfev": 80}).x
+    return float(np.clip(found[0], -SETPOINT_ROWS, SETPOINT_ROWS)), float(min(abs(found[1]), FEEDBACK_ROWS))

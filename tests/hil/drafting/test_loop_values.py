@@ -1,0 +1,70 @@
+"""The control section of a drafted bench: gains and delays of a simulated loop, from set-points and torque."""
+
+from __future__ import annotations
+
+import pytest
+from diagnosis_runs import RIG, bench, changed
+from servo_loop import one_encoder, servo_run
+
+from hil.bench.bench_file import load_bench
+from hil.drafting.loop_values import ControlValues, loop_values
+from hil.recording.importing import import_recording
+from hil.recording.recording import Recording
+
+OWNER = one_encoder(bench())
+RATIO_M_RAD = OWNER.axis.ratio_m_rad
+EMPS = RIG.parent / "emps" / "DATA_EMPS.mat"
+
+
+def assert_drafted(drafted: ControlValues, **more: float) -> None:
+    values = {entry.key: entry.value for entry in drafted.values}
+    gains = OWNER.gains
+    expected = {
+        "position_gain_1_s": gains.position_gain_1_s,
+        "velocity_feedforward": gains.velocity_feedforward,
+        "velocity_gain_n_m_s_rad": gains.velocity_gain_n_m_s_rad,
+        "velocity_integral_time_s": gains.velocity_gain_n_m_s_rad / gains.integral_gain_n_m_rad,
+        "position_period_s": gains.position_ticks * gains.period_s,
+        "velocity_period_s": gains.period_s,
+        **more,
+    }
+    assert values.pop("velocity_estimate") == "backward_difference"
+    assert values == pytest.approx(expected, rel=2e-3)
+
+
+@pytest.mark.parametrize("scale", [None, 1.0, 57.3])
+def test_gains_are_drafted_with_and_without_a_speed_set_point(scale: float | None) -> None:
+    recording = servo_run(OWNER, scale=scale or 1.0)
+    recording = recording if scale else changed(recording, velocity_reference_m_s=None)
+    assert_drafted(loop_values(recording, RATIO_M_RAD))
+
+
+def test_a_delay_of_the_set_points_is_drafted() -> None:
+    drafted = loop_values(servo_run(OWNER, late_rows=7), RATIO_M_RAD)
+    assert_drafted(drafted, setpoint_delay_s=7e-3)
+
+
+def test_a_delay_of_the_loop_is_said_and_the_law_left_unknown() -> None:
+    drafted = loop_values(servo_run(OWNER, old_rows=1.0), RATIO_M_RAD)
+    assert not drafted.values
+    assert "1 ms old" in drafted.why
+
+
+def test_the_measured_torque_stands_for_its_command() -> None:
+    """A drive that closes the velocity loop itself reports no command; the current is noisy."""
+    recording: Recording = changed(servo_run(OWNER), torque_command_n_m=None)
+    values = {entry.key: entry.value for entry in loop_values(recording, RATIO_M_RAD).values}
+    assert values["velocity_gain_n_m_s_rad"] == pytest.approx(OWNER.gains.velocity_gain_n_m_s_rad, rel=0.01)
+
+
+def test_the_law_of_emps_is_drafted() -> None:
+    """The published law: 160.18 1/s, 243.45 V s/m x 35.15065 N/V, no feed-forward, difference of two-sample means."""
+    if not EMPS.exists():
+        pytest.skip("the EMPS recording is not beside the repository")
+    published = load_bench("emps_symmetric").gains
+    values = {entry.key: entry.value for entry in loop_values(import_recording(EMPS, "emps"), 1.0).values}
+    assert values["position_gain_1_s"] == pytest.approx(published.position_gain_1_s, rel=1e-3)
+    assert values["velocity_gain_n_s_m"] == pytest.approx(published.velocity_gain_n_m_s_rad, rel=1e-3)
+    assert values["velocity_feedforward"] == pytest.approx(0.0, abs=1e-3)
+    assert values["velocity_estimate"] == "two_sample_mean"
+    assert "velocity_integral_time_s" not in values

@@ -19,10 +19,13 @@ from hil.commands.bench import bench
 from hil.commands.compare import compare
 from hil.commands.demo import demo
 from hil.commands.diagnose import diagnose
+from hil.commands.doctor import doctor
 from hil.commands.friction import friction
 from hil.commands.identify import identify
 from hil.commands.import_ import import_
+from hil.commands.install_service import install_service
 from hil.commands.investigate import investigate
+from hil.commands.latency import latency
 from hil.commands.paper import paper
 from hil.commands.prove import prove
 from hil.commands.run import run
@@ -69,6 +72,9 @@ COMMANDS: tuple[tuple[str, Callable[..., Any]], ...] = (
     ("validate", validate),
     ("bench", bench),
     ("warm-up", warm_up),
+    ("latency", latency),
+    ("doctor", doctor),
+    ("install-service", install_service),
 )
 for _name, _command in COMMANDS:
     app.command(_name)(_command)

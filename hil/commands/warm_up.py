@@ -25,9 +25,9 @@ def warm_up() -> None:
 
 def compile_kernels() -> None:
     """Compile all kernels if they are not compiled yet, with a progress bar; raises HilError without a cache folder."""
-    mark, versions = _folder() / "compiled.txt", _versions()
-    if mark.exists() and mark.read_text(encoding="utf-8") == versions:
+    if kernels_are_compiled():
         return
+    mark, versions = _mark(), _versions()
     with progress() as tell:
         task = "compiling kernels, once after the installation: about a minute"
         tell(task, 0.0)
@@ -53,6 +53,16 @@ def compile_kernels() -> None:
         bench.twin().drive(measured.torque_command)
         tell(task, 1.0)
     mark.write_text(versions, encoding="utf-8")
+
+
+def kernels_are_compiled() -> bool:
+    """Return True if all kernels are in the cache, for these versions of numba and Python and this processor."""
+    mark = _mark()
+    return mark.exists() and mark.read_text(encoding="utf-8") == _versions()
+
+
+def _mark() -> Path:
+    return _folder() / "compiled.txt"
 
 
 def _folder() -> Path:

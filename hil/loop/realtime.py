@@ -10,6 +10,7 @@ import ctypes
 import gc
 import math
 import os
+import struct
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -23,6 +24,7 @@ from hil.loop.clock import WallClock
 PRIORITY = 80  # SCHED_FIFO; the kernel's own interrupt threads run at 50
 _MCL_CURRENT, _MCL_FUTURE = 1, 2  # linux/mman.h
 _PR_SET_TIMERSLACK = 29  # linux/prctl.h
+_WAKE_UP = Path("/dev/cpu_dma_latency")  # PM QoS: the longest time that an idle core may take to wake up, int32 us
 
 
 class NotPunctual(HilError):
@@ -70,17 +72,19 @@ class Jitter:
 def real_time(cpu: int | None = None, priority: int = PRIORITY) -> Iterator[tuple[Grant, ...]]:
     """Request real-time conditions; yields the settings with their refusals, and restores the former ones at the end.
 
-    cpu: the core to run on; None: the last one this process may use (interrupts mostly go to the first).
-    Compile and allocate before entering: the garbage collector is off inside.
+    cpu: the core to run on; None: `loop_core()`. Compile and allocate before entering: the garbage collector is off
+    inside.
     """
     before = os.sched_getaffinity(0)
     policy, parameters = os.sched_getscheduler(0), os.sched_getparam(0)
     gc.collect()
     gc.freeze()
     gc.disable()
-    core = max(before) if cpu is None else cpu
+    core = loop_core() if cpu is None else cpu
+    wake_up: list[int] = []  # the request holds as long as the file is open
     grants = (
         Grant("garbage collector off"),
+        _try("no deep sleep of idle cores", lambda: wake_up.append(_request_short_wake_up())),
         _try("memory locked", _lock_memory),
         _try("timer slack 1 ns", lambda: _check(_libc().prctl(_PR_SET_TIMERSLACK, 1, 0, 0, 0))),
         _try(f"core {core}", lambda: os.sched_setaffinity(0, {core})),
@@ -93,12 +97,27 @@ def real_time(cpu: int | None = None, priority: int = PRIORITY) -> Iterator[tupl
         yield grants
     finally:
         if not grants[-1].refused:
-            os.sched_setscheduler(0, policy, parameters)
+            _leave_fifo(policy, parameters)
         os.sched_setaffinity(0, before)
+        for descriptor in wake_up:
+            os.close(descriptor)
         _libc().prctl(_PR_SET_TIMERSLACK, 0, 0, 0, 0)  # 0: the default of the thread
         _libc().munlockall()
         gc.enable()
         gc.unfreeze()
+
+
+def loop_core() -> int:
+    """Return the core for the loop: an isolated one if there is any, else the last one that this process may use.
+
+    Interrupts mostly go to the first cores. The kernel's `isolcpus=` takes its cores out of the affinity of every
+    process, so that an isolated core is used only by a process that asks for it. A process whose affinity was
+    narrowed (taskset, CPUAffinity= of its service) stays within it.
+    """
+    allowed = os.sched_getaffinity(0)
+    isolated, online = _cores("isolated"), _cores("online")
+    narrowed = bool((online - isolated) - allowed)
+    return max(isolated & allowed or (set() if narrowed else isolated) or allowed)
 
 
 def measure_jitter(period_s: float, duration_s: float = 0.5, clock: WallClock | None = None) -> Jitter:
@@ -154,6 +173,39 @@ def _try(setting: str, action: Callable[[], Any]) -> Grant:
     except OSError as error:
         return Grant(setting, error.strerror or str(error))
     return Grant(setting)
+
+
+def _leave_fifo(policy: int, parameters: os.sched_param) -> None:
+    """Restore the policy of before; without CAP_SYS_NICE the kernel keeps reset-on-fork set (sched_setscheduler(2))."""
+    try:
+        os.sched_setscheduler(0, policy, parameters)
+    except PermissionError:
+        os.sched_setscheduler(0, policy | os.SCHED_RESET_ON_FORK, parameters)
+
+
+def _request_short_wake_up() -> int:
+    """Ask the power management for a wake-up time of 0 us, as cyclictest does; returns the file to keep open."""
+    descriptor = os.open(_WAKE_UP, os.O_WRONLY | os.O_CLOEXEC)
+    try:
+        os.write(descriptor, struct.pack("=i", 0))
+    except OSError:
+        os.close(descriptor)
+        raise
+    return descriptor
+
+
+def core_list(text: str) -> set[int]:
+    """Read a list of cores such as `0-2,5`."""
+    spans = [part.split("-") for part in text.split(",") if part]
+    return {core for span in spans for core in range(int(span[0]), int(span[-1]) + 1)}
+
+
+def _cores(kind: str) -> set[int]:
+    """Return the cores of the kernel's list `kind`: isolated or online."""
+    try:
+        return core_list(Path(f"/sys/devices/system/cpu/{kind}").read_text().strip())
+    except OSError:
+        return set()
 
 
 def _lock_memory() -> None:

@@ -15,8 +15,9 @@ import numpy as np
 from hil.bench.bench_file import Bench
 from hil.bench.hardware import DriveSection
 from hil.errors import FieldError
-from hil.loop.clock import Clock, VirtualClock, WallClock
+from hil.loop.clock import Clock, VirtualClock
 from hil.loop.devices import Devices, Rig, open_devices
+from hil.loop.notify import Notifier, NotifyingClock
 from hil.loop.realtime import Jitter, NotPunctual, check_punctual, measure_jitter, now_text, real_time, report
 from hil.loop.session import Outcome, Session, make_cycle
 from hil.loop.simulated_bench import make_plant, simulated_copy
@@ -91,13 +92,15 @@ def run_profile(
         cycle = make_cycle(rig, sample.motor_position_rad)
         doubts = [_refused(force, lambda: _check_bus_load(rig, section))]
         conditions: dict[str, Any] = {}
+        notifier = Notifier()
+        stack.callback(notifier.close)
         clock: Clock = VirtualClock()
         if not virtual:
             grants = stack.enter_context(real_time())
             jitter = measure_jitter(gains.period_s)
             doubts.append(_refused(force, lambda: check_punctual(jitter, section.jitter_p99 * gains.period_s)))
             conditions = report(grants, jitter)
-            clock = WallClock(gains.period_s)
+            clock = NotifyingClock(gains.period_s, notifier)
         metadata = run_metadata(
             bench=bench.model_dump(mode="json"),
             profile=profile.model_dump(mode="json"),
@@ -123,6 +126,7 @@ def run_profile(
             ended = f"{type(error).__name__}: {error}"
             raise
         finally:
+            notifier.send("STOPPING=1", f"STATUS={ended}")  # from here no tick feeds the watchdog
             recording = recorder.close(ended)
     notes = trajectory.notes
     if recorder.path.stem != name:

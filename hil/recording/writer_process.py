@@ -83,8 +83,9 @@ class Writer:
 
 def main() -> None:
     """Serve one recording: from the task on standard input to its end."""
-    for name in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(name, signal.SIG_IGN)  # the loop decides when a run is over
+    # the loop decides when a run is over; SIGABRT: systemd ends a hung loop by it, and means its whole service
+    for name in (signal.SIGINT, signal.SIGTERM, signal.SIGABRT):
+        signal.signal(name, signal.SIG_IGN)
     if os.sched_getscheduler(0) != os.SCHED_OTHER:
         os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))  # not with the loop's priority
     os.sched_setaffinity(0, range(os.cpu_count() or 1))  # nor bound to its core

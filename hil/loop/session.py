@@ -4,7 +4,7 @@
     RUN        set-points of the trajectory, which begins at the position of the axis
     STOP       set-points of the shortest stop (ruckig) from the present set-point or measured state
     QUICK_STOP the drive stops by its own ramp, or has tripped; recorded until its power stage is off
-    DISARM     power stage off
+    DISARM     power stage off, confirmed by the drive; else StillPowered
 
 Every failure stops the drive as follows; the recording stays readable:
 
@@ -12,6 +12,7 @@ Every failure stops the drive as follows; the recording stays readable:
     linear encoder lost: fed back to the position loop -> QUICK_STOP, else -> STOP
     following error, travel limit, loop too late, ctrl-C                -> STOP; a second time -> QUICK_STOP
     exception in the loop                                               -> QUICK_STOP unrecorded, then the exception
+    stop command without answer                                         -> SYNC, heartbeat, RPDO withheld, NMT stop
 
 The same code runs on the wall clock and in virtual time.
 """
@@ -25,7 +26,7 @@ from typing import Protocol
 from drivers.port import Condition, DriveGoal, DriveSample, EncoderSample
 from hil.bench.hardware import DriveMode
 from hil.channels import AxisKind
-from hil.errors import HilError
+from hil.errors import HilError, StillPowered
 from hil.loop.clock import Clock
 from hil.loop.cycle import Cycle, Samples, Setpoint, Watch
 from hil.loop.devices import Devices, driver_errors
@@ -107,30 +108,34 @@ class Session:
         self._now_s = 0.0  # of the tick: tick x period
         self._clock_tick = 0  # ticks since the clock was started; the rows count from the first after arming
         self._stops_asked = 0
+        self._switching_off = False
         self._phase = LoopPhase.RUN
         self._ending, self._reason = Ending.COMPLETE, "the profile is done"
         self._last_tick = len(trajectory) - 1  # row at which the phase ends
         self._lateness_s: list[float] = []
 
     def ask_stop(self) -> None:
-        """Stop the axis: under control the first time, by the drive's own ramp the second, at once the third."""
+        """Stop the axis: under control the first time, by the drive's own ramp the second, at once the third. Nothing
+        ends the switching-off."""
         self._stops_asked += 1
-        if self._stops_asked > 2:
+        if self._stops_asked > 2 and not self._switching_off:
             raise KeyboardInterrupt
 
     def run(self) -> Outcome:
-        """Arm, run, stop, disarm. Raises HilError when the drive cannot be armed or a device fails in the loop;
-        the drive is commanded to stop before any exception leaves."""
+        """Arm, run, stop, disarm. Raises HilError when the drive cannot be armed or a device fails in the loop, and
+        StillPowered instead of any other error or outcome when the drive does not confirm that its power is off."""
         with driver_errors():
             try:
                 self._clock.start()
                 self._master.start(0.0)
                 sample, seen = self._arm()
                 rows = self._loop(sample, seen)
-                self._disarm()
-            except BaseException:
-                self._abandon()
+            except BaseException as error:
+                self._power_off(DriveGoal.QUICK_STOP, f"{type(error).__name__}: {error}", error)
                 raise
+        self._power_off(DriveGoal.DISABLED, f"{self._ending}: {self._reason}")
+        if self._drive.tripped & Condition.UNANSWERED:
+            self._reason += "; the drive did not follow its controlword: SYNC, heartbeat and set-points were withheld"
         return Outcome(self._ending, self._reason, rows, tuple(self._lateness_s))
 
     # -- one tick -------------------------------------------------------------------------------------------------
@@ -157,10 +162,10 @@ class Session:
         self._drive.goal = DriveGoal.ENABLED
         for _ in range(self._ticks(ARM_TIMEOUT_S)):
             sample, seen = self._exchange()
+            self._drive.check()
             if sample.enabled and not sample.age_cycles:
                 self._check_start(sample, seen)
                 return sample, seen
-            self._drive.check()
             self._drive.command(self._now_s, 0.0)
             if self._stops_asked:
                 raise HilError("interrupted while the drive was armed; nothing moved")
@@ -252,23 +257,30 @@ class Session:
         """Return the position of the axis from the encoder of the position loop."""
         return seen.position_m if self._from_table else self._ratio * sample.motor_position_rad
 
-    def _disarm(self) -> None:
-        """Switch the power stage off; the recording has ended."""
-        self._drive.goal = DriveGoal.DISABLED
-        for _ in range(self._ticks(DISARM_TIMEOUT_S)):
-            sample, _ = self._exchange()
-            self._drive.command(self._now_s, 0.0)
-            if not sample.powered:
-                return
+    def _power_off(self, goal: DriveGoal, ended: str, cause: BaseException | None = None) -> None:
+        """Switch the power stage off, unrecorded: by its controlword, then by another way (`Drive.confirm_off`).
 
-    def _abandon(self) -> None:
-        """Send quick-stop commands after an exception, as long as the bus accepts them."""
-        self._drive.goal = DriveGoal.QUICK_STOP
+        Nothing that fails here ends it before the drive was asked. Raises StillPowered from `cause` if it does not say
+        in two fresh answers, or to that question, that its power is off. ended: how the run ended, for the message.
+        """
+        drive, self._switching_off = self._drive, True
+        drive.goal, confirmed = goal, 0
         for _ in range(self._ticks(DISARM_TIMEOUT_S)):
             with contextlib.suppress(Exception):
-                self._exchange()
+                sample, _ = self._exchange()
+                confirmed = 0 if sample.powered or sample.age_cycles else confirmed + 1
+            if confirmed == 2:
+                return
             with contextlib.suppress(Exception):
-                self._drive.command(self._now_s, 0.0)
+                drive.command(self._now_s, 0.0)
+        said = f"The drive still reports {drive.status}"
+        try:
+            if drive.confirm_off(self._now_s):
+                return
+            said = f"The drive still reports {drive.status}"
+        except Exception as error:
+            said = f"The drive does not answer ({error}); it reported last {drive.status}"
+        raise StillPowered(f"{said}: switch it off at the mains. The run ended by {ended}") from cause
 
     def _ticks(self, duration_s: float) -> int:
         return round(duration_s / self._period_s)

@@ -70,9 +70,10 @@ class DriveInfo:
     torque_resolution_n_m: float
     quick_stop_rad_s2: float  # 0x6085 as the drive has it after the set-up
     supervises_commands: bool  # it has a deadline of the RPDO (0x1400:5)
+    max_torque_n_m: float  # 0x6072, to which the drive limits its torque
 
 
-NO_INFO: Final = DriveInfo(0.0, 0.0, 0.0, 0.0, math.inf, False)
+NO_INFO: Final = DriveInfo(0.0, 0.0, 0.0, 0.0, math.inf, False, math.inf)
 
 
 class DriveAnswer(NamedTuple):
@@ -108,6 +109,8 @@ def set_up_drive(master: CanopenMaster, settings: DriveSettings) -> DriveAnswer:
         if settings.mode is OperationMode.HOMING and settings.homing is not None:
             _write_homing(device, settings.homing, info.rad_per_count)
         info = _write_watchdogs(device, master, settings, info)
+        if device.has(Index.MAX_TORQUE):
+            info = replace(info, max_torque_n_m=device.read(Index.MAX_TORQUE) * info.torque_resolution_n_m)
         commands = (CONTROLWORD, TARGET[settings.mode])
         device.map_pdo(Index.RPDO_COMMUNICATION, commands, settings.command_transmission, 0x200 + node_id)
         device.map_pdo(Index.TPDO_COMMUNICATION, FEEDBACK, EVERY_SYNC, 0x180 + node_id)
@@ -143,6 +146,7 @@ def _read_info(device: DeviceSetup, settings: DriveSettings) -> DriveInfo:
         torque_resolution_n_m=rated_torque_n_m / 1000,
         quick_stop_rad_s2=math.inf,
         supervises_commands=False,
+        max_torque_n_m=math.inf,
     )
 
 

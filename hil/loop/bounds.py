@@ -6,7 +6,7 @@ from hil.bench.hardware import DriveMode
 from hil.channels import AxisKind
 from hil.loop.checks import Bounds
 from hil.loop.cycle import Cycle, Setpoint, Watch
-from hil.loop.devices import Devices
+from hil.loop.devices import Devices, Rig
 from hil.motion.pieces import MotionLimits
 
 _SETPOINTS = {DriveMode.CST: Setpoint.TORQUE, DriveMode.CSV: Setpoint.VELOCITY, DriveMode.CSP: Setpoint.POSITION}
@@ -42,6 +42,7 @@ def make_bounds(rig: Devices, limits: MotionLimits | None) -> Bounds:
         frozen_torque=given.frozen_torque or FROZEN_TORQUE_SHARE * torque,
         torque=given.torque or TORQUE_MARGIN * torque,
         torque_difference=given.torque_difference or ACTING_SHARE * torque,
+        drive_torque=rig.drive.info.max_torque_n_m if isinstance(rig, Rig) else math.inf,
         continuous_torque=given.continuous_torque or math.inf,
         thermal_time_s=given.thermal_time_s,
         residual_motor_m=residual.motor_m if residual else math.inf,

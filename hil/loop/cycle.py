@@ -118,7 +118,7 @@ class Loop(NamedTuple):
     """Arguments of the compiled cycle that stay the same objects during a run."""
 
     setpoint: int  # quantity commanded to the drive (`Setpoint`)
-    bounds: Bounds
+    bounds: FloatArray  # `Bounds`
     memory: FloatArray  # (len(Memory),) of the checks
     law: Law
     twin_law: Law
@@ -214,12 +214,13 @@ class Cycle:
         place = np.array([present.index(column) if column in present else width for column in Column], dtype=np.int64)
         rows = np.zeros((2, width + 1))
         self._views = tuple(memoryview(row)[:width] for row in rows)  # type: ignore[arg-type]
+        self.bounds = watch.bounds
         gains, ratio = twin.gains, twin.gains.ratio_m_rad
         delta, memory = twin.state(Start(ratio * motor_position))
         start = np.array(cascade.init(motor_position, period_s=gains.period_s), dtype=np.float64)
         self.loop = Loop(
             int(watch.setpoint),
-            watch.bounds,
+            np.array(watch.bounds, dtype=np.float64),
             np.zeros(len(Memory)),
             Law(gains, start.copy()),
             Law(twin.loop_gains, start.copy()),

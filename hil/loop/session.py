@@ -143,7 +143,8 @@ class Session:
 
     def _exchange(self) -> tuple[DriveSample, EncoderSample]:
         """Wait for the next tick that can be in time, send SYNC, take in the answers."""
-        tick, lateness_s, skipped = next_due(self._clock, self._clock_tick + 1, self._period_s)
+        self._clock_tick += 1  # also if waiting raises
+        tick, lateness_s, skipped = next_due(self._clock, self._clock_tick, self._period_s)
         self._clock_tick = tick
         self._skipped += skipped
         start_s = tick * self._period_s
@@ -233,14 +234,13 @@ class Session:
                 self._last_tick = min(self._last_tick, tick + self._ticks(AFTERMATH_S))
             return
         stopping = self._phase is LoopPhase.STOP
-        findings = find(self._rig, seen, passed, self._lateness_s[-1], self._stops_asked, stopping=stopping)
-        # while the axis stops, only findings that require a quick stop interrupt it
-        found = next((finding for finding in findings if finding.quick or not stopping), None)
-        if found is None:
+        findings = list(find(self._rig, seen, passed, self._lateness_s[-1], self._stops_asked, stopping=stopping))
+        quick = any(finding.quick for finding in findings)
+        if not findings or (stopping and not quick):  # a controlled stop goes on
             return
         if self._phase is LoopPhase.RUN:
-            self._ending, self._reason = found.ending, found.reason
-        stop = None if found.quick else self._stop(tick, sample, seen, measured=passed != 0)
+            self._ending, self._reason = findings[0].ending, findings[0].reason
+        stop = None if quick else self._stop(tick, sample, seen, measured=passed != 0)
         if stop is None:  # the drive stops by itself
             self._cycle.hold(tick, STOP_SEGMENT)
             self._phase = LoopPhase.QUICK_STOP
@@ -256,7 +256,7 @@ class Session:
         state = MotionState(*self._cycle.setpoint(tick))
         if measured:
             state = MotionState(self._position_m(sample, seen), self._cycle.velocity_m_s, 0.0)
-        return plan_stop(state, self._limits, self._cycle.loop.bounds, self._period_s)
+        return plan_stop(state, self._limits, self._cycle.bounds, self._period_s)
 
     def _position_m(self, sample: DriveSample, seen: EncoderSample) -> float:
         """Return the position of the axis from the encoder of the position loop."""

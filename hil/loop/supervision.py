@@ -1,8 +1,8 @@
 """The rules of supervision: what stops the axis at a tick, how, how fast, and with which words.
 
 A rule holds if one of its bits is set: `Limit` (compiled checks of the tick), conditions of the drive or of the linear
-encoder, or a sign of the loop itself. The first rule in `RULES` that holds names the end of a run. ARCHITECTURE.md
-shows the table; a test compares them.
+encoder, or a sign of the loop itself. The first rule in `RULES` that holds names the end of a run; any that holds may
+require a quick stop. ARCHITECTURE.md shows the table; a test compares them.
 """
 
 from collections.abc import Callable, Iterator
@@ -76,6 +76,10 @@ _STALE = "missed_answers + 2"
 _BEAT = "heartbeat time-out + 1"
 
 RULES: tuple[Rule, ...] = (
+    # first, because a late loop has the drive trip by its own watchdog
+    Rule("loop late", _E.OVERRUN, "lateness > overrun_s", _R.STOP, "1",
+         "the loop was {lateness_s:.3f} s late, allowed {overrun_s} s (drive.overrun_s): take load off the machine",
+         loop=LoopSign.LATE),
     Rule("drive bus-off", _E.DRIVE_FAULT, "the controller left the bus", _R.QUICK_STOP, "1", "{text}",
          drive=_C.BUS_OFF),
     Rule("drive heartbeat lost", _E.DRIVE_FAULT, "no heartbeat of the drive", _R.QUICK_STOP, _BEAT, "{text}",
@@ -150,9 +154,6 @@ RULES: tuple[Rule, ...] = (
          "the axis deviates from its twin; suspect: load (friction, mass, external force)", _L.RESIDUAL_LOAD),
     Rule("stop asked", _E.INTERRUPTED, "ctrl-C or a signal", _R.TWICE, "1", "stopped by the user",
          loop=LoopSign.ASKED),
-    Rule("loop late", _E.OVERRUN, "lateness > overrun_s", _R.STOP, "1",
-         "the loop was {lateness_s:.3f} s late, allowed {overrun_s} s (drive.overrun_s): take load off the machine",
-         loop=LoopSign.LATE),
 )  # fmt: skip
 # Conditions that stop the axis; a late sample or a damaged frame of an encoder does not.
 _ENCODER_LOST = Condition(sum(rule.encoder for rule in RULES))

@@ -82,6 +82,7 @@ class Memory(IntEnum):
     TORQUE_GAP = 15  # measured less commanded torque, smoothed
     HEAT = 16  # mean square of the torque over the thermal time
     SKIPPED = 17
+    RESIDUAL_TICKS = 18  # in a row beyond a threshold
 
 
 class Facts(NamedTuple):
@@ -106,6 +107,7 @@ class Facts(NamedTuple):
 
 SMOOTHING = 0.125  # share of a new value: noise of one count in one period is no speed
 TORQUE_TICKS = 3  # in a row beyond the torque bound: one sample may be an impact
+RESIDUAL_TICKS = 20  # a force shows at the table first, then in the motor and the torque: some ms of an axis
 FRESH_PERIODS = 2.0  # what two encoders may be apart in time: a serial one is a period late, and jitters by one
 
 _M = Memory
@@ -246,7 +248,8 @@ def _torque(b, m, f):  # type: ignore[no-untyped-def]
         motor = abs(f.motor_m - f.twin_motor_m) / b.residual_motor_m
         table = abs(f.table_m - f.twin_table_m) / b.residual_table_m
         torque = abs(f.torque - m[_M.TWIN_TORQUE]) / b.residual_torque
-        if max(motor, table, torque) > 1.0:  # half: nearly beyond counts as beyond beside another that is
+        m[_M.RESIDUAL_TICKS] = m[_M.RESIDUAL_TICKS] + 1.0 if max(motor, table, torque) > 1.0 else 0.0
+        if m[_M.RESIDUAL_TICKS] >= RESIDUAL_TICKS:  # half: nearly beyond counts as beyond beside another that is
             if abs(unlike_command) > b.residual_torque:
                 passed |= _RESIDUAL_DRIVE
             elif torque <= 0.5 and b.has_table and min(motor, table) <= 0.5:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from enum import IntEnum
+from math import isfinite
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -151,20 +152,24 @@ def compiled_cycle(tick, first, samples, setpoints, loop):  # type: ignore[no-un
     gains, place = loop.law.gains, loop.place
     index = min(tick + samples.skipped - first, setpoints.shape[0] - 1)
     position, velocity = setpoints[index, 0], setpoints[index, 1]
-    command, reference = _control(loop.law, position, velocity, samples.motor, samples.table)
+    before, row = loop.rows[(tick + 1) & 1], loop.rows[tick & 1]
+    motor, table, torque = samples.motor, samples.table, samples.torque
+    finite = abs(motor) + abs(table) + abs(torque) < np.inf
+    if not finite:  # the row repeats the one before: the recording stays readable, the law's state a number
+        motor, table, torque = before[place[Column.MOTOR]], before[place[Column.TABLE]], row[place[Column.TORQUE]]
+    command, reference = _control(loop.law, position, velocity, motor, table)
     twin_motor, twin_table = _read(*loop.twin)
     twin_command, _ = _control(loop.twin_law, position, velocity, twin_motor, twin_table)
     twin_torque = _advance(twin_command, *loop.twin)
-    before, row = loop.rows[(tick + 1) & 1], loop.rows[tick & 1]
-    before[place[Column.TORQUE]] = samples.torque
+    before[place[Column.TORQUE]] = torque
     before[place[Column.CYCLE]] = samples.cycle_s
     row[place[Column.TIME]] = (tick + samples.skipped) * gains.period_s
     row[place[Column.POSITION_COMMAND]] = position
     row[place[Column.VELOCITY_COMMAND]] = velocity
     row[place[Column.ACCELERATION_COMMAND]] = setpoints[index, 2]
     row[place[Column.SEGMENT]] = setpoints[index, 3]
-    row[place[Column.MOTOR]] = samples.motor
-    row[place[Column.TABLE]] = samples.table
+    row[place[Column.MOTOR]] = motor
+    row[place[Column.TABLE]] = table
     row[place[Column.TORQUE_COMMAND]] = command
     row[place[Column.VELOCITY_REFERENCE]] = reference
     row[place[Column.TWIN_MOTOR]] = twin_motor
@@ -174,12 +179,12 @@ def compiled_cycle(tick, first, samples, setpoints, loop):  # type: ignore[no-un
     row[place[Column.ERROR_CODE]] = samples.error_code
     row[place[Column.LATENESS]] = samples.lateness_s
     ratio = gains.ratio_m_rad
-    actual = ratio * samples.motor
-    fed_back = samples.table if gains.position_from_table else actual
-    facts = Facts(position, velocity, actual, samples.table, fed_back, samples.torque, command, reference,
+    actual = ratio * motor
+    fed_back = table if gains.position_from_table else actual
+    facts = Facts(position, velocity, actual, table, fed_back, torque, command, reference,
                   ratio * twin_motor, twin_table, twin_torque,
                   samples.motor_age, samples.table_age, samples.skipped, gains.period_s)  # fmt: skip
-    passed = check(loop.bounds, loop.memory, facts)
+    passed = check(loop.bounds, loop.memory, facts) if finite else _NOT_FINITE
     if loop.setpoint == _TO_TORQUE:
         return (0.0 if passed & _NOT_FINITE else command), passed
     if loop.setpoint == _TO_VELOCITY:
@@ -213,6 +218,7 @@ class Cycle:
         width = len(present)
         place = np.array([present.index(column) if column in present else width for column in Column], dtype=np.int64)
         rows = np.zeros((2, width + 1))
+        rows[:, place[Column.MOTOR]] = motor_position
         self._views = tuple(memoryview(row)[:width] for row in rows)  # type: ignore[arg-type]
         self.bounds = watch.bounds
         gains, ratio = twin.gains, twin.gains.ratio_m_rad
@@ -278,5 +284,5 @@ class Cycle:
     def complete(self, tick: int, torque: float, cycle_s: float) -> memoryview:
         """Complete and return the row of the last tick with its torque and cycle time."""
         row, place = self.loop.rows[tick & 1], self.loop.place
-        row[place[Column.TORQUE]], row[place[Column.CYCLE]] = torque, cycle_s
+        row[place[Column.TORQUE]], row[place[Column.CYCLE]] = torque if isfinite(torque) else 0.0, cycle_s
         return self._views[tick & 1]

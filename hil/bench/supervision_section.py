@@ -9,7 +9,7 @@ from hil.bench.axis_fields import BenchSection, NotNegative, Positive
 
 class ResidualThresholds(BenchSection):
     """Largest differences between axis and live twin [m, m, N m or N]; from recordings without fault:
-    `hil.loop.residual_thresholds.learn`."""
+    `hil.identification.residual_thresholds.learn`."""
 
     motor_m: Positive
     table_m: Positive | None = None

@@ -81,10 +81,9 @@ class DueTick(NamedTuple):
     skipped: int
 
 
-def next_due(clock: Clock, tick: int, period_s: float) -> DueTick:
-    """Wait for `tick`, or for the first tick after it that can be met within SKIP_FROM periods."""
-    late_s = worst_s = clock.wait(tick)
-    first = tick
+def next_due(clock: Clock, tick: int, period_s: float, late_s: float) -> DueTick:
+    """Wait for the first tick after `tick`, which came late_s too late, that is met within SKIP_FROM periods."""
+    first, worst_s = tick, late_s
     while late_s > SKIP_FROM * period_s:
         tick += math.ceil(late_s / period_s)
         late_s = clock.wait(tick)

@@ -25,7 +25,7 @@ from typing import Protocol
 
 from drivers.port import Condition, DriveGoal, DriveSample, EncoderSample
 from hil.errors import HilError, StillPowered
-from hil.loop.clock import Clock, next_due
+from hil.loop.clock import SKIP_FROM, Clock, next_due
 from hil.loop.cycle import Cycle, Samples
 from hil.loop.devices import Devices, driver_errors
 from hil.loop.stopping import plan_stop
@@ -104,6 +104,7 @@ class Session:
         gains = rig.bench.gains
         self._period_s, self._ratio = gains.period_s, gains.ratio_m_rad
         self._response_s = rig.section.response * gains.period_s
+        self._skip_from_s = SKIP_FROM * gains.period_s
         self._from_table = gains.position_from_table
         self._now_s = 0.0  # of the tick: tick x period
         self._clock_tick = 0  # ticks since the clock was started; the rows count from the first after arming
@@ -143,10 +144,12 @@ class Session:
 
     def _exchange(self) -> tuple[DriveSample, EncoderSample]:
         """Wait for the next tick that can be in time, send SYNC, take in the answers."""
-        self._clock_tick += 1  # also if waiting raises
-        tick, lateness_s, skipped = next_due(self._clock, self._clock_tick, self._period_s)
-        self._clock_tick = tick
-        self._skipped += skipped
+        tick = self._clock_tick = self._clock_tick + 1
+        lateness_s = self._clock.wait(tick)
+        if lateness_s > self._skip_from_s:
+            self._clock_tick, lateness_s, skipped = next_due(self._clock, tick, self._period_s, lateness_s)
+            tick = self._clock_tick
+            self._skipped += skipped
         start_s = tick * self._period_s
         self._lateness_s.append(lateness_s)
         self._master.sync(start_s)

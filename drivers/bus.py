@@ -168,21 +168,24 @@ class PythonCanPort:
 
 
 class PumpedPort:
-    """Port of a loop that shares its thread with the simulated nodes: `poll` first polls the ports of the nodes.
+    """Port of a loop that shares its thread with the simulated nodes: `poll` first polls the ports of the nodes,
+    then calls their clock.
 
     Loop and nodes need no second Python thread, in virtual and in wall-clock time.
     """
 
-    __slots__ = ("_nodes", "_port", "health", "ignore", "listen", "send")
+    __slots__ = ("_clock", "_nodes", "_port", "health", "ignore", "listen", "send")
 
-    def __init__(self, port: CanPort, *nodes: CanPort) -> None:
-        self._port, self._nodes = port, nodes
+    def __init__(self, port: CanPort, *nodes: CanPort, clock: Callable[[float], None] | None = None) -> None:
+        self._port, self._nodes, self._clock = port, nodes, clock
         self.health = port.health
         self.listen, self.ignore, self.send = port.listen, port.ignore, port.send
 
     def poll(self, now_s: float, timeout_s: float = 0.0) -> None:
         for node in self._nodes:
             node.poll(now_s)
+        if self._clock is not None:
+            self._clock(now_s)
         self._port.poll(now_s)
 
     def close(self) -> None:

@@ -5,6 +5,7 @@ Faults are bits of `DriveSample.condition`. A condition of TRIPPING sets the goa
 `reset_fault`; `check` raises it as DriveFault.
 """
 
+import math
 from typing import Final
 
 from drivers.canopen_master import CanopenMaster
@@ -28,6 +29,7 @@ from drivers.cia402_setup import (
     DriveSettings,
     HomingSettings,
     set_up_drive,
+    switch_off,
 )
 from drivers.emcy import Emergency
 from drivers.pdo import layout, saturate
@@ -38,11 +40,15 @@ __all__ = ["TRIPPING", "CanopenDrive", "DriveInfo", "DriveSettings", "HomingRun"
 # Conditions that stop the axis.
 TRIPPING: Final = (
     Condition.STALE | Condition.HEARTBEAT_LOST | Condition.EMERGENCY | Condition.FAULT | Condition.DISABLED
-    | Condition.BUS_OFF | Condition.NOT_OPERATIONAL
+    | Condition.BUS_OFF | Condition.NOT_OPERATIONAL | Condition.UNANSWERED
 )  # fmt: skip
 # Bound once: a look-up of an enumeration member takes time in the loop.
 _OK, _ENABLED_STATE, _ENABLED = Condition.OK, DriveState.OPERATION_ENABLED, DriveGoal.ENABLED
-_POWERED: Final = (_ENABLED_STATE, DriveState.QUICK_STOP_ACTIVE, DriveState.FAULT_REACTION_ACTIVE)
+# UNKNOWN: a statusword that CiA 402 does not define tells nothing about the power stage
+_POWERED: Final = (_ENABLED_STATE, DriveState.QUICK_STOP_ACTIVE, DriveState.FAULT_REACTION_ACTIVE, DriveState.UNKNOWN)
+_TRANSITION_S: Final = 0.01  # some drives take several ms for a transition of the state machine
+_RAMP_MARGIN: Final = 1.5  # measured speed and the drive's ramp differ by its following error
+_RAMP_EXTRA_S: Final = 0.1  # standstill detection of drives takes some 10 ms
 _new = tuple.__new__  # makes a named tuple without the call of its Python constructor
 
 
@@ -67,6 +73,8 @@ class CanopenDrive(CanopenNode, Drive):
         self._torque = 0
         self._controlword = 0
         self._was_enabled = self._reset_requested = False
+        self._moved_counts = 0  # between the last two answers
+        self._stop_cycles, self._ramp_cycles = 0, math.inf  # since a stop was commanded; allowed for its ramp
 
     # -- before the loop --------------------------------------------------------------------------------------------
 
@@ -95,6 +103,7 @@ class CanopenDrive(CanopenNode, Drive):
         self.tripped = Condition.OK
         self.goal = DriveGoal.DISABLED
         self._was_enabled = self._reset_requested = False
+        self._stop_cycles = 0
 
     # -- frames -----------------------------------------------------------------------------------------------------
 
@@ -103,7 +112,8 @@ class CanopenDrive(CanopenNode, Drive):
             self.malformed_frames += 1
             return
         self._statusword, raw, self._torque = self._unpack(data)
-        self._counts += ((raw - self._raw_counts + 0x80000000) & 0xFFFFFFFF) - 0x80000000
+        self._moved_counts = ((raw - self._raw_counts + 0x80000000) & 0xFFFFFFFF) - 0x80000000
+        self._counts += self._moved_counts
         self._raw_counts = raw
         self._answered = self._master.syncs
         self._sample_time_s = self._master.sync_time_s
@@ -133,8 +143,11 @@ class CanopenDrive(CanopenNode, Drive):
         condition = self._node_condition(age, now_s)
         if state in (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE):
             condition |= Condition.FAULT
-        if self._was_enabled and self.goal is DriveGoal.ENABLED and state is not DriveState.OPERATION_ENABLED:
-            condition |= Condition.DISABLED
+        if self.goal is DriveGoal.ENABLED:
+            if state is DriveState.OPERATION_ENABLED:
+                self._was_enabled = True  # whatever else is wrong
+            elif self._was_enabled:
+                condition |= Condition.DISABLED
         trips = condition & TRIPPING
         if trips:
             self.tripped |= trips
@@ -145,7 +158,8 @@ class CanopenDrive(CanopenNode, Drive):
     def command(self, now_s: float, setpoint: float) -> None:
         """Send controlword and set-point: N m (CST), rad/s (CSV), rad (CSP).
 
-        Until the drive reports OPERATION ENABLED the target is the present position (CSP) or zero.
+        Until the drive reports OPERATION ENABLED the target is the present position (CSP) or zero. After a stop command
+        without effect the master is cut off and nothing is sent.
         """
         state = STATE_BY_STATUS[self._statusword & 0x7F]
         if state is _ENABLED_STATE and self.goal is _ENABLED:
@@ -153,7 +167,11 @@ class CanopenDrive(CanopenNode, Drive):
             target = round(setpoint * self._target_per_unit)
             if not -32768 <= target <= 32767:  # fits every target object otherwise
                 target = self._fit(target)
+            self._stop_cycles = 0
         else:
+            self._await_stop(state, now_s)
+            if self._master.silent:
+                return
             self._was_enabled = False
             controlword = next_controlword(
                 state, enable=self.goal is DriveGoal.ENABLED, quick_stop=self.goal is DriveGoal.QUICK_STOP,
@@ -164,6 +182,34 @@ class CanopenDrive(CanopenNode, Drive):
             target = self._raw_counts if self._holds_position else 0
         self._controlword = controlword
         self._send(self._rpdo_id, self._pack(controlword, target), now_s)
+
+    def _await_stop(self, state: DriveState, now_s: float) -> None:
+        """Cut the master off if the drive stays enabled, or under power for longer than its ramp takes, after a stop
+        command. An answer that does not come counts as the state before it.
+        """
+        if self.goal is DriveGoal.ENABLED or state not in _POWERED:
+            self._stop_cycles = 0
+            return
+        period_s = self.settings.period_s
+        if self._stop_cycles == 0:
+            speed = abs(self._moved_counts) * self._rad_per_count / period_s
+            ramp_s = _RAMP_MARGIN * speed / self.info.quick_stop_rad_s2 if self.info.quick_stop_rad_s2 else math.inf
+            self._ramp_cycles = (ramp_s + _RAMP_EXTRA_S) / period_s
+        # the effect of a command is reported at the second SYNC after it, and some answers may be missed
+        answer_cycles = max(self.settings.missed_answers_allowed + 3, _TRANSITION_S / period_s)
+        limit = answer_cycles if state is _ENABLED_STATE else self._ramp_cycles
+        if self._stop_cycles >= limit and not self._master.silent:
+            self._master.cut_off(now_s)
+            self._latched |= Condition.UNANSWERED
+            self.tripped |= Condition.UNANSWERED
+        self._stop_cycles += 1
+
+    def confirm_off(self, now_s: float) -> bool:
+        for statusword in switch_off(self._master, self.settings, now_s):
+            self._statusword = statusword
+            if STATE_BY_STATUS[statusword & 0x7F] not in _POWERED:
+                return True
+        return False
 
     def _fit(self, target: int) -> int:
         """Wrap a position to INTEGER32; limit a torque or velocity to its range."""

@@ -24,7 +24,7 @@ class CanopenMaster:
     """
 
     __slots__ = ("_heartbeat_due_s", "_heartbeat_id", "_send", "health", "heartbeat_s", "network", "node_id",
-                 "poll", "port", "sync_time_s", "syncs")  # fmt: skip
+                 "poll", "port", "silent", "sync_time_s", "syncs")  # fmt: skip
 
     def __init__(self, port: CanPort, *, node_id: int = 1, heartbeat_s: float = 0.02) -> None:
         self.port, self.node_id, self.heartbeat_s = port, node_id, heartbeat_s
@@ -34,6 +34,7 @@ class CanopenMaster:
         self._heartbeat_id = 0x700 + node_id
         self._heartbeat_due_s = 0.0
         self.health: BusHealth = port.health
+        self.silent = False  # after `cut_off`: SYNC, heartbeat and set-points are withheld
         self.syncs = 0  # SYNCs sent; samples count their age by it
         self.sync_time_s = 0.0  # when the last one was sent
 
@@ -43,12 +44,17 @@ class CanopenMaster:
 
     def start(self, now_s: float) -> None:
         """Set all nodes operational and send the first heartbeat; from now on call `sync` every period."""
+        self.silent = False
         self.nmt(NMT_START, now_s=now_s)
         self._heartbeat_due_s = now_s + self.heartbeat_s
         self._send(self._heartbeat_id, _OPERATIONAL, now_s)
 
     def sync(self, now_s: float) -> None:
-        """Heartbeat when due, then SYNC."""
+        """Heartbeat when due, then SYNC. After `cut_off` NMT stop instead, in case it was lost before."""
+        if self.silent:
+            self.syncs += 1
+            self.nmt(NMT_STOP, now_s=now_s)
+            return
         if now_s >= self._heartbeat_due_s:
             self._heartbeat_due_s += self.heartbeat_s
             if self._heartbeat_due_s <= now_s:  # after a pause of the loop: do not send the missed heartbeats
@@ -57,3 +63,12 @@ class CanopenMaster:
         self.syncs += 1
         self.sync_time_s = now_s
         self._send(SYNC, b"", now_s)
+
+    def cut_off(self, now_s: float) -> None:
+        """Withhold SYNC, heartbeat and set-points until `start`, and stop all nodes by NMT.
+
+        For a drive that does not follow its controlword: losing the master is what its own watchdogs react to (0x1016,
+        0x1400:5), and entering NMT stopped is an event of its abort connection option code (0x6007, CiA 402-2).
+        """
+        self.silent = True
+        self.nmt(NMT_STOP, now_s=now_s)

@@ -1,7 +1,8 @@
 """Configure a CiA 402 drive by SDO before the loop, with read-back, and read its units and ratings."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -18,6 +19,9 @@ TARGET: Final = {
     OperationMode.CYCLIC_SYNC_POSITION: Entry(Index.TARGET_POSITION, 0, 32, True),
     OperationMode.HOMING: Entry(Index.TARGET_POSITION, 0, 32, True),
 }
+RPDO_EVENT_TIMER: Final = 5  # sub-index of 0x1400
+_DEADLINE_PERIODS: Final = 3  # shortest deadline: one set-point lost, one late
+_OFF_LIMIT_S: Final = 1.0  # a stop ramp under way ends within it, from 0.6 m/s at 1 m/s^2
 CONTROLWORD: Final = Entry(Index.CONTROLWORD, 0, 16)
 FEEDBACK: Final = (
     Entry(Index.STATUSWORD, 0, 16),
@@ -50,6 +54,7 @@ class DriveSettings:
     rated_torque_n_m: float | None = None  # checked against 0x6076; None: not checked
     max_torque_n_m: float | None = None  # 0x6072; None: as the drive has it
     quick_stop_rad_s2: float | None = None  # 0x6085; None: as the drive has it
+    command_deadline_s: float = 0.05  # without an RPDO for longer, the drive stops by itself (0x1400:5); in whole ms
     command_transmission: int = EVENT_DRIVEN  # RPDO: acts at once (255) or at the next SYNC (1)
     homing: HomingSettings | None = None  # for OperationMode.HOMING; None: as the drive has it
     travel_per_rev: float = 2 * math.pi  # rad per revolution; linear drives: m per "revolution" of 0x608F
@@ -63,9 +68,12 @@ class DriveInfo:
     rated_torque_n_m: float
     torque_constant_n_m_a: float
     torque_resolution_n_m: float
+    quick_stop_rad_s2: float  # 0x6085 as the drive has it after the set-up
+    supervises_commands: bool  # it has a deadline of the RPDO (0x1400:5)
+    max_torque_n_m: float  # 0x6072, to which the drive limits its torque
 
 
-NO_INFO: Final = DriveInfo(0.0, 0.0, 0.0, 0.0)
+NO_INFO: Final = DriveInfo(0.0, 0.0, 0.0, 0.0, math.inf, False, math.inf)
 
 
 class DriveAnswer(NamedTuple):
@@ -100,7 +108,9 @@ def set_up_drive(master: CanopenMaster, settings: DriveSettings) -> DriveAnswer:
             device.write(Index.QUICK_STOP_DECELERATION, 0, round(settings.quick_stop_rad_s2 / info.rad_per_count))
         if settings.mode is OperationMode.HOMING and settings.homing is not None:
             _write_homing(device, settings.homing, info.rad_per_count)
-        _write_watchdogs(device, master, settings)
+        info = _write_watchdogs(device, master, settings, info)
+        if device.has(Index.MAX_TORQUE):
+            info = replace(info, max_torque_n_m=device.read(Index.MAX_TORQUE) * info.torque_resolution_n_m)
         commands = (CONTROLWORD, TARGET[settings.mode])
         device.map_pdo(Index.RPDO_COMMUNICATION, commands, settings.command_transmission, 0x200 + node_id)
         device.map_pdo(Index.TPDO_COMMUNICATION, FEEDBACK, EVERY_SYNC, 0x180 + node_id)
@@ -134,6 +144,9 @@ def _read_info(device: DeviceSetup, settings: DriveSettings) -> DriveInfo:
         rated_torque_n_m=rated_torque_n_m,
         torque_constant_n_m_a=rated_torque_n_m / rated_current_a,
         torque_resolution_n_m=rated_torque_n_m / 1000,
+        quick_stop_rad_s2=math.inf,
+        supervises_commands=False,
+        max_torque_n_m=math.inf,
     )
 
 
@@ -146,8 +159,8 @@ def _write_homing(device: DeviceSetup, homing: HomingSettings, rad_per_count: fl
     device.write(Index.HOME_OFFSET, 0, round(homing.offset_rad / rad_per_count))
 
 
-def _write_watchdogs(device: DeviceSetup, master: CanopenMaster, settings: DriveSettings) -> None:
-    """Stop reactions, cycle times and heartbeats both ways."""
+def _write_watchdogs(device: DeviceSetup, master: CanopenMaster, settings: DriveSettings, info: DriveInfo) -> DriveInfo:
+    """Stop reactions, cycle times, deadline of the RPDO and heartbeats both ways; what the drive has of them."""
     device.write(Index.QUICK_STOP_OPTION, 0, 2)  # quick stop: ramp, then SWITCH ON DISABLED
     device.write(Index.FAULT_REACTION_OPTION, 0, 2)  # fault reaction: the same ramp, then FAULT
     device.write(Index.ABORT_CONNECTION_OPTION, 0, 1)  # master lost: fault
@@ -156,3 +169,25 @@ def _write_watchdogs(device: DeviceSetup, master: CanopenMaster, settings: Drive
     device.write(Index.COMMUNICATION_CYCLE_PERIOD, 0, round(settings.period_s * 1e6))
     device.write(Index.CONSUMER_HEARTBEAT_TIME, 1, master.node_id << 16 | round(3000 * master.heartbeat_s))
     device.write(Index.PRODUCER_HEARTBEAT_TIME, 0, round(1000 * settings.heartbeat_s))
+    # CiA 301: the event timer of an RPDO is a deadline in ms; without it only the client notices a lost command path
+    supervised = device.has(Index.RPDO_COMMUNICATION, RPDO_EVENT_TIMER)
+    if supervised:
+        deadline_s = max(settings.command_deadline_s, _DEADLINE_PERIODS * settings.period_s)
+        device.write(Index.RPDO_COMMUNICATION, RPDO_EVENT_TIMER, math.ceil(1000 * deadline_s))
+    deceleration = device.read(Index.QUICK_STOP_DECELERATION) * info.rad_per_count
+    return replace(info, quick_stop_rad_s2=deceleration, supervises_commands=supervised)
+
+
+def switch_off(master: CanopenMaster, settings: DriveSettings, now_s: float) -> Iterator[int]:
+    """Command "disable voltage" by SDO and yield the statusword as often as it is asked for, for _OFF_LIMIT_S.
+
+    The node is in NMT pre-operational for it: without PDOs, so that no set-point acts. Raises DriverError.
+    """
+    network = master.network
+    network.time_s = now_s
+    with DeviceSetup(network, settings.node_id, settings.eds) as device:
+        master.nmt(NMT_PRE_OPERATIONAL, settings.node_id)
+        device.write_only(Index.CONTROLWORD, 0, 0)
+        while network.time_s < now_s + _OFF_LIMIT_S:
+            yield device.read(Index.STATUSWORD)
+            network.pump()

@@ -62,7 +62,8 @@ class InProcessPort:
             listener(can_id, data, now_s)
 
     def poll(self, now_s: float, timeout_s: float = 0.0) -> None:
-        """Do nothing: no frame waits on an ideal bus."""
+        """Let the nodes on the bus know the time: no frame waits on an ideal bus."""
+        self._bus.pass_time(now_s)
 
     def close(self) -> None:
         self._bus.remove(self)
@@ -73,6 +74,7 @@ class InProcessBus:
 
     def __init__(self) -> None:
         self._ports: list[InProcessPort] = []
+        self.clocks: list[Callable[[float], None]] = []  # of simulated nodes: called with the time of every poll
 
     def port(self) -> InProcessPort:
         """Connect a participant."""
@@ -80,6 +82,11 @@ class InProcessBus:
         self._ports.append(port)
         self.forget_routes()
         return port
+
+    def pass_time(self, now_s: float) -> None:
+        """Call the clocks of the simulated nodes."""
+        for clock in self.clocks:
+            clock(now_s)
 
     def remove(self, port: InProcessPort) -> None:
         """Disconnect a participant."""

@@ -92,6 +92,8 @@ class ModelledPort(InProcessPort):
 
     def poll(self, now_s: float, timeout_s: float = 0.0) -> None:
         self._model.run_until(now_s)
+        self._model.pass_time(now_s)
+        self._model.run_until(now_s)
 
     def listeners(self, can_id: int) -> list:  # type: ignore[type-arg]
         return [] if self.health.state is BusState.OFF else super().listeners(can_id)

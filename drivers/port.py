@@ -98,6 +98,7 @@ class Condition(IntFlag):
     CORRUPT = 512  # encoder: frames with a wrong checksum since the last read
     LINE_LOST = 1024  # encoder: the serial line is gone
     DISABLED = 2048  # the drive left OPERATION ENABLED by itself
+    UNANSWERED = 4096  # the drive did not follow a stop command; the master has cut it off
 
 
 class DriveGoal(IntEnum):
@@ -175,6 +176,14 @@ class Drive(Protocol):
     @abstractmethod
     def command(self, now_s: float, setpoint: float) -> None:
         """Send goal and set-point; the target is zero, or the position held, until the drive is enabled."""
+
+    @abstractmethod
+    def confirm_off(self, now_s: float) -> bool:
+        """Switch the power stage off by another way than the cyclic data, and ask for its state; blocking.
+
+        For the end of a loop whose samples do not tell that power is off. True: the drive says so. `status` then holds
+        the last report. Raises DriverError if the drive refuses or does not answer.
+        """
 
     @abstractmethod
     def check(self) -> None:

@@ -53,9 +53,10 @@ def simulate(bench: Bench, trajectory: Trajectory, *, seed: int | None = None, n
     names of its channels. Raises FieldError for another period or parameters that cannot be simulated, HilError if the
     axis is stopped before the end, for example by a following error.
     """
+    from hil.loop.bounds import make_cycle
     from hil.loop.clock import VirtualClock
     from hil.loop.devices import Rig
-    from hil.loop.session import Session, make_cycle
+    from hil.loop.session import Session
     from hil.loop.simulated_bench import make_plant, simulated_copy
     from hil.loop.supervision import Ending
     from hil.loop.virtual import compiled_ticks
@@ -77,7 +78,7 @@ def simulate(bench: Bench, trajectory: Trajectory, *, seed: int | None = None, n
     rows = _RowsInMemory()
     with Rig(bench, plant=plant) as rig:
         rig.set_up()
-        cycle = make_cycle(rig, rig.drive.read(0.0).motor_position_rad)
+        cycle = make_cycle(rig, rig.drive.read(0.0).motor_position_rad, limits)
         ticks = compiled_ticks(rig, rows)
         outcome = Session(rig, cycle, trajectory, limits, VirtualClock(), rows, ticks).run()
     if outcome.ending is not Ending.COMPLETE:

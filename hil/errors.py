@@ -1,6 +1,7 @@
 """Errors of the project; the command line turns each into its message and its exit code, without a trace.
 
 HilError          1   something went wrong that the user can act on
+├── StillPowered  3   the drive does not confirm that its power stage is off
 └── InputError    2   a file or an argument is wrong; the message says what, where, what is allowed
     └── FieldError    the same, at one field of a model whose file is known to the caller only
 """
@@ -14,6 +15,12 @@ class HilError(Exception):
     """Base of all errors raised on purpose."""
 
     exit_code = 1
+
+
+class StillPowered(HilError):
+    """The power stage of the drive is on, or may be: nothing this program can send has confirmed that it is off."""
+
+    exit_code = 3
 
 
 class InputError(HilError):

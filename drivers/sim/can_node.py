@@ -20,6 +20,7 @@ EDS_FOLDER: Final = Path(__file__).parent.parent / "eds"
 _EMCY: Final = struct.Struct("<HB5s")
 _HISTORY: Final = key_of(Index.ERROR_HISTORY)
 HEARTBEAT_ERROR: Final = 0x8130  # EMCY: heartbeat consumer time-out, CiA 301 table 26
+RPDO_TIMEOUT: Final = 0x8250  # EMCY: event timer of an RPDO (0x1400:5 ff.) ran out, CiA 301 table 26
 # Keys of the heartbeat times, computed once.
 _PRODUCER_TIME, _CONSUMER_TIME = key_of(Index.PRODUCER_HEARTBEAT_TIME), key_of(Index.CONSUMER_HEARTBEAT_TIME, 1)
 
@@ -76,7 +77,7 @@ class SimulatedDevice:
         """Take new set-points from `values`, after an RPDO."""
 
     def communication_lost(self, now_s: float) -> None:
-        """React to the time-out of a consumed heartbeat."""
+        """React to a time-out of a consumed heartbeat or an RPDO, and to the NMT command "stop"."""
 
     # -- NMT, boot-up, timers ---------------------------------------------------------------------------------------
 
@@ -103,7 +104,10 @@ class SimulatedDevice:
         if command == NmtCommand.START:
             self._enter(NmtState.OPERATIONAL)
         elif command == NmtCommand.STOP:
+            running = self.nmt_state is NmtState.OPERATIONAL
             self._enter(NmtState.STOPPED)
+            if running:  # an event of 0x6007, as a lost heartbeat is (CiA 402-2, abort connection option code)
+                self.communication_lost(now_s)
         elif command == NmtCommand.ENTER_PRE_OPERATIONAL:
             self._enter(NmtState.PRE_OPERATIONAL)
         elif command == NmtCommand.RESET_NODE:
@@ -117,6 +121,7 @@ class SimulatedDevice:
         if now_s < self._last_s:  # the time base was reset: restart the timers
             self._consumed = dict.fromkeys(self._consumed, now_s + self._consumer_time_s())
             self._heartbeat_due_s = now_s
+            self.pdo.restart_deadlines()
         self._last_s = now_s
         period_s = self.values[_PRODUCER_TIME] / 1000
         if period_s and now_s >= self._heartbeat_due_s:
@@ -125,11 +130,18 @@ class SimulatedDevice:
         for node_id, deadline_s in list(self._consumed.items()):
             if now_s >= deadline_s:
                 del self._consumed[node_id]
-                self.emergency(HEARTBEAT_ERROR, 0x11, now_s, bytes([node_id]))
-                if self.dictionary.number(Index.ERROR_BEHAVIOUR, 1) == 0 and self.nmt_state is NmtState.OPERATIONAL:
-                    self._enter(NmtState.PRE_OPERATIONAL)
-                self.communication_lost(now_s)
+                self._communication_error(HEARTBEAT_ERROR, now_s, bytes([node_id]))
+        if now_s >= self.pdo.deadline_s:
+            self.pdo.restart_deadlines()
+            self._communication_error(RPDO_TIMEOUT, now_s)
         self._schedule(now_s)
+
+    def _communication_error(self, code: int, now_s: float, detail: bytes = b"") -> None:
+        """Send the EMCY, leave NMT operational if 0x1029:1 is 0, and let the device react."""
+        self.emergency(code, 0x11, now_s, detail)
+        if self.dictionary.number(Index.ERROR_BEHAVIOUR, 1) == 0 and self.nmt_state is NmtState.OPERATIONAL:
+            self._enter(NmtState.PRE_OPERATIONAL)
+        self.communication_lost(now_s)
 
     def _schedule(self, now_s: float) -> None:
         due = [*self._consumed.values()]
@@ -170,9 +182,11 @@ class SimulatedDevice:
             self._send(0x580 + self.node_id, response, now_s)
 
     def _on_sync(self, can_id: int, data: bytes, now_s: float) -> None:
-        if now_s >= self._timer_s or now_s < self._last_s:
+        if now_s >= self._timer_s or now_s < self._last_s or now_s >= self.pdo.deadline_s:
             self.tick(now_s)
         self._last_s = now_s
+        if self.nmt_state is NmtState.STOPPED:  # NMT and heartbeat only, CiA 301 table "NMT states and objects"
+            return
         self.process_sync(now_s)
         if not self.mute:
             self.pdo.on_sync(now_s)  # holds no PDOs outside NMT operational

@@ -1,7 +1,8 @@
 """Simulated servo drive on CANopen: CiA 402 states, CST, CSV, CSP, homing, quick stop, faults. It moves a plant.
 
 The node reads no clock: each SYNC moves the plant by one period with the torque in force since the SYNC before, then
-the node sends the positions and torques of that instant. A torque that arrives by an event-driven RPDO after
+the node sends the positions and torques of that instant. Where SYNCs are missing, late or sent in a burst, the plant
+moves by the time that passed, also at a `tick` between them. A torque that arrives by an event-driven RPDO after
 SYNC k thus acts from SYNC k to k + 1, one by a synchronous RPDO (type 1) from SYNC k + 1 on, as CiA 301 requires.
 """
 
@@ -20,17 +21,11 @@ from drivers.sim.sdo_server import AbortCode, SdoAbort
 
 _CONTROLWORD, _STATUSWORD = key_of(Index.CONTROLWORD), key_of(Index.STATUSWORD)
 _MODE, _MODE_DISPLAY = key_of(Index.MODE_OF_OPERATION), key_of(Index.MODE_DISPLAY)
-_POSITION, _VELOCITY, _TORQUE = (
-    key_of(Index.POSITION_ACTUAL),
-    key_of(Index.VELOCITY_ACTUAL),
-    key_of(Index.TORQUE_ACTUAL),
-)
+_POSITION, _VELOCITY = key_of(Index.POSITION_ACTUAL), key_of(Index.VELOCITY_ACTUAL)
+_TORQUE = key_of(Index.TORQUE_ACTUAL)
 _MAX_TORQUE = key_of(Index.MAX_TORQUE)
-_TARGET_TORQUE, _TARGET_POSITION, _TARGET_VELOCITY = (
-    key_of(Index.TARGET_TORQUE),
-    key_of(Index.TARGET_POSITION),
-    key_of(Index.TARGET_VELOCITY),
-)
+_TARGET_TORQUE, _TARGET_VELOCITY = key_of(Index.TARGET_TORQUE), key_of(Index.TARGET_VELOCITY)
+_TARGET_POSITION = key_of(Index.TARGET_POSITION)
 _ERROR_CODE, _QUICK_STOP_DECELERATION = key_of(Index.ERROR_CODE), key_of(Index.QUICK_STOP_DECELERATION)
 _FOLLOWING_ERROR, _FOLLOWING_ERROR_WINDOW = key_of(Index.FOLLOWING_ERROR_ACTUAL), key_of(Index.FOLLOWING_ERROR_WINDOW)
 
@@ -62,6 +57,7 @@ class SimulatedDrive(SimulatedDevice):
     ) -> None:
         self.plant = plant
         self._set_period(period_s)
+        self._moved_s = math.inf  # time until which the plant has moved; inf: no SYNC yet
         self._loops = DriveLoops(plant, servo)
         self._rated_torque_mn_m, self._counts_per_rev = round(rated_torque_n_m * 1000), counts_per_rev
         self._travel_per_rev = travel_per_rev
@@ -176,7 +172,8 @@ class SimulatedDrive(SimulatedDevice):
             self._react(DriveState.QUICK_STOP_ACTIVE)
 
     def _react(self, reaction: DriveState) -> None:
-        powered = self.state in (DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE)
+        # a second cause does not end the reaction to the first
+        powered = self.state is DriveState.OPERATION_ENABLED or self.state in _STOPPING
         self._set_state(reaction if powered or reaction is DriveState.QUICK_STOP_ACTIVE else DriveState.FAULT)
 
     def _velocity_rad_s(self) -> float:
@@ -205,11 +202,8 @@ class SimulatedDrive(SimulatedDevice):
 
     def _on_interpolation_time(self, index: int, subindex: int, value: int) -> None:
         number = self.dictionary.number
-        units, exponent = (
-            (value, number(Index.INTERPOLATION_TIME, 2))
-            if subindex == 1
-            else (number(Index.INTERPOLATION_TIME, 1), value)
-        )
+        units = value if subindex == 1 else number(Index.INTERPOLATION_TIME, 1)
+        exponent = number(Index.INTERPOLATION_TIME, 2) if subindex == 1 else value
         if units == 0:
             raise SdoAbort(AbortCode.INVALID_VALUE)
         self._set_period(units * 10**exponent if exponent >= 0 else units / 10**-exponent)
@@ -220,6 +214,32 @@ class SimulatedDrive(SimulatedDevice):
     # -- in the loop ------------------------------------------------------------------------------------------------
 
     def process_sync(self, now_s: float) -> None:
+        periods = (now_s - self._moved_s) * self._syncs_per_s
+        if 0.5 < periods < 1.5 or periods < -0.5:  # follow the phase of the SYNC; first SYNC, new time base
+            self._moved_s = now_s
+            self._move(now_s)
+        else:
+            self._catch_up(now_s)
+
+    def tick(self, now_s: float) -> None:
+        """Heartbeats and deadlines; moves the plant by its own clock where the SYNC is missing."""
+        if now_s - self._moved_s > 1.5 * self.period_s:
+            self._catch_up(now_s)
+        super().tick(now_s)
+
+    def clock(self, now_s: float) -> None:
+        """Pass the time where no SYNC does."""
+        if now_s - self._moved_s > 1.5 * self.period_s:
+            self.tick(now_s)
+
+    def _catch_up(self, now_s: float) -> None:
+        periods = round((now_s - self._moved_s) * self._syncs_per_s)
+        self._moved_s += periods * self.period_s
+        for _ in range(periods):
+            self._move(now_s)
+
+    def _move(self, now_s: float) -> None:
+        """Move the plant by one period and measure."""
         plant = self.plant
         if self._direct or self._idle:
             plant.advance(self._torque_n_m, self.period_s)
@@ -231,11 +251,10 @@ class SimulatedDrive(SimulatedDevice):
 
     def _measure(self, counts: int) -> None:
         """Store position, wrapped to INTEGER32, and velocity as its difference."""
-        moved = counts - self._counts
+        moved, values = counts - self._counts, self.values
         self._last_counts, self._counts = self._counts, counts
-        values = self.values
         values[_VELOCITY] = int(moved * self._syncs_per_s)
-        values[_POSITION] = ((counts - self._offset_counts + 0x80000000) & 0xFFFFFFFF) - 0x80000000
+        values[_POSITION] = _wrap(counts - self._offset_counts)
 
     def _advance_by_loops(self, now_s: float) -> float:
         """Advance one period under the loops inside the drive: CSV, CSP, homing, stops; mean measured torque [N m]."""

@@ -1,5 +1,6 @@
 """PDOs of a simulated node: communication and mapping parameters (CiA 301, 7.5.2.35 ff.) compiled to struct packers."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from operator import itemgetter
@@ -27,6 +28,8 @@ class _Pdo:
     get: Callable[[dict[int, Any]], Any]
     pending: bytes = b""  # synchronous RPDO: waits for the SYNC; event-driven TPDO: sent last
     syncs: int = 0
+    timeout_s: float = 0.0  # RPDO: its event timer, sub-index 5; 0: not supervised
+    deadline_s: float = math.inf  # RPDO: of the next one, once the first has come
 
 
 class ProcessData:
@@ -48,6 +51,8 @@ class ProcessData:
         self._synchronous: list[_Pdo] = []  # RPDOs that wait for the SYNC
         self._every_sync: list[tuple[int, Callable[..., bytes], Callable[[dict[int, Any]], Any]]] = []
         self._tpdos: list[_Pdo] = []  # of all other transmission types
+        self._supervised: list[_Pdo] = []  # RPDOs with an event timer
+        self.deadline_s = math.inf  # the earliest of them
         self._operational = False
         for index in {key >> 8 for key in dictionary.items}:
             if RPDO_COMMUNICATION <= index < RPDO_MAPPING or TPDO_COMMUNICATION <= index < TPDO_MAPPING:
@@ -61,10 +66,12 @@ class ProcessData:
             self._port.ignore(cob_id, take)
         self._operational = operational
         self._takers, self._synchronous, self._every_sync, self._tpdos = [], [], [], []
+        self._supervised, self.deadline_s = [], math.inf
         if not operational:
             return
         rpdos = self._compile(RPDO_COMMUNICATION, RPDO_MAPPING)
         self._synchronous = [pdo for pdo in rpdos if pdo.transmission_type <= 240]
+        self._supervised = [pdo for pdo in rpdos if pdo.timeout_s]
         self._takers = [(pdo.cob_id, self._taker(pdo)) for pdo in rpdos]
         tpdos = self._compile(TPDO_COMMUNICATION, TPDO_MAPPING)
         self._every_sync = [(pdo.cob_id, pdo.packer.pack, pdo.get) for pdo in tpdos if pdo.transmission_type == 1]
@@ -85,7 +92,10 @@ class ProcessData:
             # itemgetter of one key would return the bare value.
             get = itemgetter(*keys) if len(keys) > 1 else _tuple_getter(keys[0])
             packer = layout([item.entry for item in items])
-            pdos.append(_Pdo(cob_id & 0x7FF, self._dictionary.number(communication + n, 2), packer, keys, get))
+            timer = communication == RPDO_COMMUNICATION and key_of(communication + n, 5) in self._values
+            timeout_s = self._dictionary.number(communication + n, 5) / 1000 if timer else 0.0
+            transmission_type = self._dictionary.number(communication + n, 2)
+            pdos.append(_Pdo(cob_id & 0x7FF, transmission_type, packer, keys, get, timeout_s=timeout_s))
         return pdos
 
     def _mapped(self, index: int, count: int) -> list[Item]:
@@ -130,6 +140,9 @@ class ProcessData:
                 if len(data) < size:
                     return
                 data = data[:size]
+            if pdo.timeout_s:
+                pdo.deadline_s = now_s + pdo.timeout_s
+                self.deadline_s = min(each.deadline_s for each in self._supervised)
             if waits:
                 pdo.pending = data
                 return
@@ -137,6 +150,12 @@ class ProcessData:
             received(now_s)
 
         return take
+
+    def restart_deadlines(self) -> None:
+        """Supervise each RPDO again from its next frame on: after a time-out, or when the time base was reset."""
+        for pdo in self._supervised:
+            pdo.deadline_s = math.inf
+        self.deadline_s = math.inf
 
     def on_sync(self, now_s: float) -> None:
         """Apply the synchronous RPDOs, then send the TPDOs that are due."""

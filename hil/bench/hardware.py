@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from hil.bench.axis_fields import BenchSection, NotNegative, Positive
+from hil.bench.supervision_section import SupervisionSection
 from hil.errors import FieldError
 
 NodeId = Annotated[int, Field(ge=1, le=127, description="CANopen node-ID")]
@@ -72,6 +73,7 @@ class DriveSection(BenchSection):
     missed_answers: Annotated[int, Field(ge=0, le=100)] = Field(3, description="in a row, before data count as stale")
     jitter_p99: Share = Field(0.5, description="share of the period; lateness beyond: not armed")
     overrun_s: Positive = Field(0.05, description="lateness at which the axis is stopped [s]")
+    supervision: SupervisionSection = SupervisionSection()
     bus_load: Share = Field(0.7, description="largest share of the bus's time at which the drive is armed")
 
     @model_validator(mode="after")

@@ -2,10 +2,13 @@
 
 from hil.bench.bench_file import Bench, load_bench
 from hil.bench.hardware import DriveSection, SimulationSection
+from hil.bench.supervision_section import SupervisionSection
 from hil.motion.profile import Profile
 from hil.motion.trajectory import Trajectory, plan
 
 MODES = 20
+
+_STANDING = SupervisionSection(frozen_torque=1e9, torque_difference=1e9)
 
 
 def moves() -> Profile:
@@ -53,7 +56,7 @@ def twenty_modes(interface: str = "inprocess") -> Bench:
             "viscous_torque_n_m_s_rad": 0.0064,
         },
         # the axis stands still; the loop takes the same time, and the deviation is no fault in a benchmark
-        "drive": DriveSection(interface=interface, following_error_m=10.0).model_dump(),
+        "drive": DriveSection(interface=interface, following_error_m=10.0, supervision=_STANDING).model_dump(),
         "simulation": SimulationSection().model_dump(),
     }
     assert not axis.linear

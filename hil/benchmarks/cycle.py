@@ -14,9 +14,10 @@ import can
 from drivers.bus import BusConfig, open_bus
 from hil.benchmarks.axis import moves, trajectory, twenty_modes
 from hil.benchmarks.figure import Figure, Reference, ReferenceKind, percentile
+from hil.loop.bounds import make_cycle
 from hil.loop.clock import VirtualClock
 from hil.loop.devices import Rig
-from hil.loop.session import Session, make_cycle
+from hil.loop.session import Session
 from hil.recording.writer import Recorder
 
 LOOPS = 4
@@ -77,7 +78,7 @@ def whole_cycle(interface: str) -> tuple[list[float], list[float]]:
             rig.set_up()
             if rig.ports:
                 watch.serve_apart(rig)
-            cycle = make_cycle(rig, 0.0)
+            cycle = make_cycle(rig, 0.0, profile.motion_limits)
             with Recorder(folder, "bench", cycle.channels, bench.gains.period_s, {}) as recorder:
                 Session(rig, cycle, motion, profile.motion_limits, watch, recorder).run()
         if run:  # the first one compiles

@@ -7,9 +7,10 @@ from drivers.sim.kernel import advance_period
 from hil.bench.bench_file import Bench
 from hil.benchmarks.axis import moves, trajectory, twenty_modes, two_mass
 from hil.benchmarks.figure import Figure, Reference, ReferenceKind, best_of
+from hil.loop.bounds import make_cycle
 from hil.loop.clock import VirtualClock
 from hil.loop.devices import Rig
-from hil.loop.session import Session, make_cycle
+from hil.loop.session import Session
 from hil.loop.simulated_bench import make_plant
 from hil.loop.virtual import compiled_ticks
 from hil.motion.trajectory import Trajectory
@@ -33,7 +34,7 @@ def _one_run(bench: Bench, motion: Trajectory, compiled: bool) -> float:
     limits = moves().motion_limits
     with Rig(bench) as rig, tempfile.TemporaryDirectory() as folder:
         rig.set_up()
-        cycle = make_cycle(rig, rig.drive.read(0.0).motor_position_rad)
+        cycle = make_cycle(rig, rig.drive.read(0.0).motor_position_rad, limits)
         with Recorder(folder, "bench", cycle.channels, bench.gains.period_s, {}, lossless=True) as recorder:
             start = perf_counter()
             ticks = compiled_ticks(rig, recorder) if compiled else None

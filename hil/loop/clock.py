@@ -1,11 +1,14 @@
 """Clocks of the loop: the wall clock with absolute deadlines, and a virtual one that is always on time.
 
-Tick k is due at start + k x period, never at now + period: an error of one tick is not handed on to the next.
+Tick k is due at start + k x period, never at now + period: an error of one tick is not handed on to the next. A tick
+that comes too late is left out, as are all that were due meanwhile: set-points sent in a burst would be steps.
 """
 
+import math
 import time
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
+SKIP_FROM = 0.5  # lateness in periods: two SYNCs are never closer than half a period
 SPIN_S = 100e-6  # sleep up to here before the deadline, then spin: waking takes some 50 us
 
 
@@ -68,3 +71,21 @@ class VirtualClock:
 
     def may_wait(self, tick: int, span_s: float) -> bool:
         return False
+
+
+class DueTick(NamedTuple):
+    """A tick that is due now, its lateness or that of the first one left out [s], and how many were left out."""
+
+    tick: int
+    lateness_s: float
+    skipped: int
+
+
+def next_due(clock: Clock, tick: int, period_s: float, late_s: float) -> DueTick:
+    """Wait for the first tick after `tick`, which came late_s too late, that is met within SKIP_FROM periods."""
+    first, worst_s = tick, late_s
+    while late_s > SKIP_FROM * period_s:
+        tick += math.ceil(late_s / period_s)
+        late_s = clock.wait(tick)
+        worst_s = max(worst_s, late_s)
+    return DueTick(tick, worst_s, tick - first)

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
-from enum import IntEnum, IntFlag
+from enum import IntEnum
+from math import isfinite
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,6 +20,7 @@ from numba import njit, typeof
 from hil.arrays import FloatArray
 from hil.channels import AXIS_CHANNELS, AxisKind
 from hil.control import cascade
+from hil.loop.checks import Bounds, Facts, Limit, Memory, check
 from hil.motion.trajectory import Trajectory
 from hil.twin.axis import Start, Twin
 from hil.twin.stepping import kernel
@@ -32,22 +34,12 @@ class Setpoint(IntEnum):
     POSITION = 2
 
 
-class Limit(IntFlag):
-    """AxisLimits of the axis that are passed."""
-
-    NONE = 0
-    FOLLOWING_ERROR = 1
-    TRAVEL = 2
-
-
 @dataclass(frozen=True)
 class Watch:
-    """Quantity commanded to the drive, presence of a linear encoder, and limits of the axis [m]."""
+    """Quantity commanded to the drive, and bounds of the checks."""
 
     setpoint: Setpoint
-    has_table: bool
-    following_error_m: float
-    travel_m: tuple[float, float]
+    bounds: Bounds
 
 
 def _always(watch: Watch) -> bool:
@@ -55,7 +47,7 @@ def _always(watch: Watch) -> bool:
 
 
 def _with_table(watch: Watch) -> bool:
-    return watch.has_table
+    return watch.bounds.has_table
 
 
 def _with_velocity_loop(watch: Watch) -> bool:
@@ -101,7 +93,8 @@ class Column(IntEnum):
 
 
 class Samples(NamedTuple):
-    """Inputs of a tick; torque [N m or N] and cycle time belong to the tick before."""
+    """Inputs of a tick; torque [N m or N] and cycle time belong to the tick before. Ages: cycles since a position was
+    sampled. skipped: ticks left out since the first one; the set-points and the time of the row go on with them."""
 
     motor: float  # rad or m
     table: float  # m
@@ -110,15 +103,9 @@ class Samples(NamedTuple):
     error_code: int
     lateness_s: float
     cycle_s: float
-
-
-class AxisLimits(NamedTuple):
-    """Quantity commanded to the drive (`Setpoint`) and limits of the axis [m]."""
-
-    setpoint: int
-    following_error_m: float
-    travel_low_m: float
-    travel_high_m: float
+    motor_age: int = 0
+    table_age: int = 0
+    skipped: int = 0
 
 
 class Law(NamedTuple):
@@ -131,7 +118,9 @@ class Law(NamedTuple):
 class Loop(NamedTuple):
     """Arguments of the compiled cycle that stay the same objects during a run."""
 
-    limits: AxisLimits
+    setpoint: int  # quantity commanded to the drive (`Setpoint`)
+    bounds: FloatArray  # `Bounds`
+    memory: FloatArray  # (len(Memory),) of the checks
     law: Law
     twin_law: Law
     twin: tuple[Any, ...]  # arrays of the kernel, with modal state and memory at the end
@@ -141,7 +130,7 @@ class Loop(NamedTuple):
 
 _read, _advance, _step = kernel.read, kernel.advance, cascade.step
 _TO_TORQUE, _TO_VELOCITY = int(Setpoint.TORQUE), int(Setpoint.VELOCITY)
-_FOLLOWING_ERROR, _TRAVEL = int(Limit.FOLLOWING_ERROR), int(Limit.TRAVEL)
+_NOT_FINITE = int(Limit.NOT_FINITE)
 
 
 @njit(_nrt=False, error_model="numpy")  # no references counted: see hil.twin.stepping.kernel
@@ -158,25 +147,29 @@ def _control(law, position, velocity, motor, table):  # type: ignore[no-untyped-
 
 @njit(cache=True, _nrt=False, error_model="numpy")
 def compiled_cycle(tick, first, samples, setpoints, loop):  # type: ignore[no-untyped-def]
-    """Tick `tick` of set-points (n, 4) that begin at tick `first`: completes the row before (torque, cycle time)
+    """Row `tick` with set-points (n, 4) that begin at tick `first`: completes the row before (torque, cycle time)
     and fills this one. Returns the set-point for the drive and the limits passed."""
-    gains, limits, place = loop.law.gains, loop.limits, loop.place
-    index = min(tick - first, setpoints.shape[0] - 1)
+    gains, place = loop.law.gains, loop.place
+    index = min(tick + samples.skipped - first, setpoints.shape[0] - 1)
     position, velocity = setpoints[index, 0], setpoints[index, 1]
-    command, reference = _control(loop.law, position, velocity, samples.motor, samples.table)
+    before, row = loop.rows[(tick + 1) & 1], loop.rows[tick & 1]
+    motor, table, torque = samples.motor, samples.table, samples.torque
+    finite = abs(motor) + abs(table) + abs(torque) < np.inf
+    if not finite:  # the row repeats the one before: the recording stays readable, the law's state a number
+        motor, table, torque = before[place[Column.MOTOR]], before[place[Column.TABLE]], row[place[Column.TORQUE]]
+    command, reference = _control(loop.law, position, velocity, motor, table)
     twin_motor, twin_table = _read(*loop.twin)
     twin_command, _ = _control(loop.twin_law, position, velocity, twin_motor, twin_table)
     twin_torque = _advance(twin_command, *loop.twin)
-    before, row = loop.rows[(tick + 1) & 1], loop.rows[tick & 1]
-    before[place[Column.TORQUE]] = samples.torque
+    before[place[Column.TORQUE]] = torque
     before[place[Column.CYCLE]] = samples.cycle_s
-    row[place[Column.TIME]] = tick * gains.period_s
+    row[place[Column.TIME]] = (tick + samples.skipped) * gains.period_s
     row[place[Column.POSITION_COMMAND]] = position
     row[place[Column.VELOCITY_COMMAND]] = velocity
     row[place[Column.ACCELERATION_COMMAND]] = setpoints[index, 2]
     row[place[Column.SEGMENT]] = setpoints[index, 3]
-    row[place[Column.MOTOR]] = samples.motor
-    row[place[Column.TABLE]] = samples.table
+    row[place[Column.MOTOR]] = motor
+    row[place[Column.TABLE]] = table
     row[place[Column.TORQUE_COMMAND]] = command
     row[place[Column.VELOCITY_REFERENCE]] = reference
     row[place[Column.TWIN_MOTOR]] = twin_motor
@@ -185,15 +178,34 @@ def compiled_cycle(tick, first, samples, setpoints, loop):  # type: ignore[no-un
     row[place[Column.DRIVE_STATE]] = samples.drive_state
     row[place[Column.ERROR_CODE]] = samples.error_code
     row[place[Column.LATENESS]] = samples.lateness_s
-    actual = gains.ratio_m_rad * samples.motor
-    passed = 0
-    if abs(position - actual) > limits.following_error_m:
-        passed |= _FOLLOWING_ERROR
-    if not limits.travel_low_m <= actual <= limits.travel_high_m:
-        passed |= _TRAVEL
-    if limits.setpoint == _TO_TORQUE:
-        return command, passed
-    return (reference if limits.setpoint == _TO_VELOCITY else position) / gains.ratio_m_rad, passed
+    ratio = gains.ratio_m_rad
+    actual = ratio * motor
+    fed_back = table if gains.position_from_table else actual
+    facts = Facts(position, velocity, actual, table, fed_back, torque, command, reference,
+                  ratio * twin_motor, twin_table, twin_torque,
+                  samples.motor_age, samples.table_age, samples.skipped, gains.period_s)  # fmt: skip
+    passed = check(loop.bounds, loop.memory, facts) if finite else _NOT_FINITE
+    if loop.setpoint == _TO_TORQUE:
+        return (0.0 if passed & _NOT_FINITE else command), passed
+    if loop.setpoint == _TO_VELOCITY:
+        return (0.0 if passed & _NOT_FINITE else reference / ratio), passed
+    return position / ratio, passed
+
+
+@njit(cache=True, _nrt=False, error_model="numpy")
+def compiled_skip(first, last, begin, motor, setpoints, loop):  # type: ignore[no-untyped-def]
+    """Pass the ticks first .. last, for which there are no samples: the twin moves on along their set-points, the
+    position loop keeps its ticks, and the motor's travel counts as evenly spread over them, since the velocity loop
+    divides by one period."""
+    for tick in range(first, last + 1):
+        index = min(tick - begin, setpoints.shape[0] - 1)
+        twin_motor, twin_table = _read(*loop.twin)
+        command, _ = _control(loop.twin_law, setpoints[index, 0], setpoints[index, 1], twin_motor, twin_table)
+        _advance(command, *loop.twin)
+    state, count = loop.law.state, last + 1 - first
+    state[0] += count
+    step = (motor - state[3]) / (count + 1)
+    state[3], state[4] = motor - step, motor - 2.0 * step
 
 
 class Cycle:
@@ -206,24 +218,31 @@ class Cycle:
         width = len(present)
         place = np.array([present.index(column) if column in present else width for column in Column], dtype=np.int64)
         rows = np.zeros((2, width + 1))
+        rows[:, place[Column.MOTOR]] = motor_position
         self._views = tuple(memoryview(row)[:width] for row in rows)  # type: ignore[arg-type]
+        self.bounds = watch.bounds
         gains, ratio = twin.gains, twin.gains.ratio_m_rad
         delta, memory = twin.state(Start(ratio * motor_position))
         start = np.array(cascade.init(motor_position, period_s=gains.period_s), dtype=np.float64)
         self.loop = Loop(
-            AxisLimits(int(watch.setpoint), watch.following_error_m, *watch.travel_m),
+            int(watch.setpoint),
+            np.array(watch.bounds, dtype=np.float64),
+            np.zeros(len(Memory)),
             Law(gains, start.copy()),
             Law(twin.loop_gains, start.copy()),
             (*twin.arrays(), delta, memory),
             rows,
             place,
         )
-        self.state_arrays = (self.loop.law.state, self.loop.twin_law.state, delta, memory, rows)  # changed by a step
+        law, twin_law = self.loop.law.state, self.loop.twin_law.state
+        self.state_arrays = (law, twin_law, delta, memory, rows, self.loop.memory)  # changed by a step
         self.first_tick = 0  # of the set-points
         self.setpoints = np.array([[ratio * motor_position, 0.0, 0.0, 0.0]])
         # Compiled for these types here; a call of the result omits the look-up of types, which takes 3 us for records.
         arguments = (0, 0, Samples(0.0, 0.0, 0.0, 0, 0, 0.0, 0.0), self.setpoints, self.loop)
         self._compiled = compiled_cycle.compile(tuple(typeof(argument) for argument in arguments))
+        passing = (0, 0, 0, 0.0, self.setpoints, self.loop)
+        self._skip = compiled_skip.compile(tuple(typeof(argument) for argument in passing))
 
     def follow(self, trajectory: Trajectory, first_tick: int = 0, segment: int | None = None) -> None:
         """Take set-points that begin at `first_tick`. segment: number recorded instead of the trajectory's own."""
@@ -232,6 +251,15 @@ class Cycle:
         self.setpoints = np.column_stack(
             (trajectory.position_m, trajectory.velocity_m_s, trajectory.acceleration_m_s2, segments)
         ).astype(np.float64, order="C", copy=False)
+
+    def hold(self, tick: int, segment: int) -> None:
+        """Hold the set-point of a tick from this tick on."""
+        self.setpoints = np.array([[self.setpoint(tick)[0], 0.0, 0.0, segment]])
+        self.first_tick = tick
+
+    def skip(self, first: int, last: int, motor: float) -> None:
+        """Pass ticks without samples; motor: its position at the tick after them [rad or m]."""
+        self._skip(first, last, self.first_tick, motor, self.setpoints, self.loop)
 
     def setpoint(self, tick: int) -> tuple[float, float, float]:
         """Position, velocity and acceleration set-point of a tick [m, m/s, m/s^2]; the last ones are held."""
@@ -256,5 +284,5 @@ class Cycle:
     def complete(self, tick: int, torque: float, cycle_s: float) -> memoryview:
         """Complete and return the row of the last tick with its torque and cycle time."""
         row, place = self.loop.rows[tick & 1], self.loop.place
-        row[place[Column.TORQUE]], row[place[Column.CYCLE]] = torque, cycle_s
+        row[place[Column.TORQUE]], row[place[Column.CYCLE]] = torque if isfinite(torque) else 0.0, cycle_s
         return self._views[tick & 1]

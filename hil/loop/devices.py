@@ -130,6 +130,7 @@ class Rig(Devices):
         if self.section.interface == "inprocess":
             bus = bus or InProcessBus()
             self.nodes = simulate(bus.port())  # before the master's port, which so gets no boot-up messages
+            bus.clocks.append(self.nodes.drive.clock)
             return bus.port()
         config = BusConfig(self.section.interface, self.section.channel, self.section.bitrate)
         port = PythonCanPort(open_bus(config))
@@ -139,7 +140,7 @@ class Rig(Devices):
         far_end = PythonCanPort(open_bus(config))
         self.ports.append(far_end)
         self.nodes = simulate(far_end)
-        return PumpedPort(port, far_end)
+        return PumpedPort(port, far_end, clock=self.nodes.drive.clock)
 
     def _drive_settings(self) -> DriveSettings:
         section = self.section

@@ -15,11 +15,12 @@ import numpy as np
 from hil.bench.bench_file import Bench
 from hil.bench.hardware import DriveSection
 from hil.errors import FieldError
+from hil.loop.bounds import make_cycle
 from hil.loop.clock import Clock, VirtualClock
 from hil.loop.devices import Devices, Rig, open_devices
 from hil.loop.notify import Notifier, NotifyingClock
 from hil.loop.realtime import Jitter, NotPunctual, check_punctual, measure_jitter, now_text, real_time, report
-from hil.loop.session import Outcome, Session, make_cycle
+from hil.loop.session import Outcome, Session
 from hil.loop.simulated_bench import make_plant, simulated_copy
 from hil.loop.supervision import Ending
 from hil.loop.virtual import compiled_ticks
@@ -89,7 +90,7 @@ def run_profile(
         if planned is not None:
             planned(trajectory)
         rehearse(bench, trajectory, profile)
-        cycle = make_cycle(rig, sample.motor_position_rad)
+        cycle = make_cycle(rig, sample.motor_position_rad, profile.motion_limits)
         doubts = [_refused(force, lambda: _check_bus_load(rig, section))]
         conditions: dict[str, Any] = {}
         notifier = Notifier()
@@ -211,7 +212,7 @@ def rehearse(bench: Bench, trajectory: Trajectory, profile: Profile) -> None:
     with Rig(copy, plant=plant) as rig:
         rig.set_up()
         clock = _AlarmClock()
-        cycle = make_cycle(rig, rig.drive.read(0.0).motor_position_rad)
+        cycle = make_cycle(rig, rig.drive.read(0.0).motor_position_rad, profile.motion_limits)
         session = Session(rig, cycle, trajectory, profile.motion_limits, clock, _NoRows())
         clock.alarm = session.ask_stop
         session.run()

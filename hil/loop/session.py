@@ -4,7 +4,7 @@
     RUN        set-points of the trajectory, which begins at the position of the axis
     STOP       set-points of the shortest stop (ruckig) from the present set-point or measured state
     QUICK_STOP the drive stops by its own ramp, or has tripped; recorded until its power stage is off
-    DISARM     power stage off
+    DISARM     power stage off, confirmed by the drive; else StillPowered
 
 Every failure stops the drive as follows; the recording stays readable:
 
@@ -12,6 +12,7 @@ Every failure stops the drive as follows; the recording stays readable:
     linear encoder lost: fed back to the position loop -> QUICK_STOP, else -> STOP
     following error, travel limit, loop too late, ctrl-C                -> STOP; a second time -> QUICK_STOP
     exception in the loop                                               -> QUICK_STOP unrecorded, then the exception
+    stop command without answer                                         -> SYNC, heartbeat, RPDO withheld, NMT stop
 
 The same code runs on the wall clock and in virtual time.
 """
@@ -23,15 +24,15 @@ from enum import IntEnum
 from typing import Protocol
 
 from drivers.port import Condition, DriveGoal, DriveSample, EncoderSample
-from hil.bench.hardware import DriveMode
-from hil.channels import AxisKind
-from hil.errors import HilError
-from hil.loop.clock import Clock
-from hil.loop.cycle import Cycle, Samples, Setpoint, Watch
+from hil.errors import HilError, StillPowered
+from hil.loop.clock import SKIP_FROM, Clock, next_due
+from hil.loop.cycle import Cycle, Samples
 from hil.loop.devices import Devices, driver_errors
+from hil.loop.stopping import plan_stop
 from hil.loop.supervision import Ending, find
 from hil.motion.pieces import MotionLimits
-from hil.motion.trajectory import Trajectory, stop_from
+from hil.motion.time_optimal import MotionState
+from hil.motion.trajectory import Trajectory
 
 ARM_TIMEOUT_S = 2.0
 SETTLE_S = 0.1  # hold after a controlled stop
@@ -40,7 +41,6 @@ AFTERMATH_S = 0.1  # recorded after the power stage is off
 DISARM_TIMEOUT_S = 0.2
 STOP_SEGMENT = -1  # in the recording: set-points of a stop
 _NO_ENCODER = EncoderSample(0.0, 0, 0.0, 0, Condition.OK)
-_SETPOINTS = {DriveMode.CST: Setpoint.TORQUE, DriveMode.CSV: Setpoint.VELOCITY, DriveMode.CSP: Setpoint.POSITION}
 
 
 class LoopPhase(IntEnum):
@@ -53,12 +53,13 @@ class LoopPhase(IntEnum):
 
 @dataclass(frozen=True)
 class Outcome:
-    """Ending of a run, its reason in words, number of rows, and lateness of its ticks [s]."""
+    """Ending of a run, its reason in words, number of rows, lateness of its ticks [s], and ticks left out."""
 
     ending: Ending
     reason: str
     rows: int
     lateness_s: tuple[float, ...]
+    skipped: int = 0
 
 
 class Rows(Protocol):
@@ -103,43 +104,54 @@ class Session:
         gains = rig.bench.gains
         self._period_s, self._ratio = gains.period_s, gains.ratio_m_rad
         self._response_s = rig.section.response * gains.period_s
+        self._skip_from_s = SKIP_FROM * gains.period_s
         self._from_table = gains.position_from_table
         self._now_s = 0.0  # of the tick: tick x period
         self._clock_tick = 0  # ticks since the clock was started; the rows count from the first after arming
+        self._skipped = 0  # ticks left out since the first row
         self._stops_asked = 0
+        self._switching_off = False
         self._phase = LoopPhase.RUN
         self._ending, self._reason = Ending.COMPLETE, "the profile is done"
         self._last_tick = len(trajectory) - 1  # row at which the phase ends
         self._lateness_s: list[float] = []
 
     def ask_stop(self) -> None:
-        """Stop the axis: under control the first time, by the drive's own ramp the second, at once the third."""
+        """Stop the axis: under control the first time, by the drive's own ramp the second, at once the third. Nothing
+        ends the switching-off."""
         self._stops_asked += 1
-        if self._stops_asked > 2:
+        if self._stops_asked > 2 and not self._switching_off:
             raise KeyboardInterrupt
 
     def run(self) -> Outcome:
-        """Arm, run, stop, disarm. Raises HilError when the drive cannot be armed or a device fails in the loop;
-        the drive is commanded to stop before any exception leaves."""
+        """Arm, run, stop, disarm. Raises HilError when the drive cannot be armed or a device fails in the loop, and
+        StillPowered instead of any other error or outcome when the drive does not confirm that its power is off."""
         with driver_errors():
             try:
                 self._clock.start()
                 self._master.start(0.0)
                 sample, seen = self._arm()
                 rows = self._loop(sample, seen)
-                self._disarm()
-            except BaseException:
-                self._abandon()
+            except BaseException as error:
+                self._power_off(DriveGoal.QUICK_STOP, f"{type(error).__name__}: {error}", error)
                 raise
-        return Outcome(self._ending, self._reason, rows, tuple(self._lateness_s))
+        self._power_off(DriveGoal.DISABLED, f"{self._ending}: {self._reason}")
+        if self._drive.tripped & Condition.UNANSWERED:
+            self._reason += "; the drive did not follow its controlword: SYNC, heartbeat and set-points were withheld"
+        return Outcome(self._ending, self._reason, rows, tuple(self._lateness_s), self._skipped)
 
     # -- one tick -------------------------------------------------------------------------------------------------
 
     def _exchange(self) -> tuple[DriveSample, EncoderSample]:
-        """Wait for the next tick, send SYNC, take in the answers."""
-        self._clock_tick = tick = self._clock_tick + 1
+        """Wait for the next tick that can be in time, send SYNC, take in the answers."""
+        tick = self._clock_tick = self._clock_tick + 1
+        lateness_s = self._clock.wait(tick)
+        if lateness_s > self._skip_from_s:
+            self._clock_tick, lateness_s, skipped = next_due(self._clock, tick, self._period_s, lateness_s)
+            tick = self._clock_tick
+            self._skipped += skipped
         start_s = tick * self._period_s
-        self._lateness_s.append(self._clock.wait(tick))
+        self._lateness_s.append(lateness_s)
         self._master.sync(start_s)
         self._now_s = now_s = start_s + self._response_s
         drive, encoder = self._drive, self._encoder
@@ -157,10 +169,10 @@ class Session:
         self._drive.goal = DriveGoal.ENABLED
         for _ in range(self._ticks(ARM_TIMEOUT_S)):
             sample, seen = self._exchange()
+            self._drive.check()
             if sample.enabled and not sample.age_cycles:
                 self._check_start(sample, seen)
                 return sample, seen
-            self._drive.check()
             self._drive.command(self._now_s, 0.0)
             if self._stops_asked:
                 raise HilError("interrupted while the drive was armed; nothing moved")
@@ -186,26 +198,28 @@ class Session:
         lateness = self._lateness_s
         del lateness[:-1]
         overrun_s = self._rig.section.overrun_s
-        tick, error_code, cycle_s = 0, 0, 0.0
+        tick, error_code, cycle_s, skipped = 0, 0, 0.0, 0
+        self._skipped = 0
         if self._fast_forward is not None:
             tick, sample, seen = self._fast_forward.run(cycle, sample, seen, lambda: self._stops_asked > 0)
             lateness.extend([0.0] * tick)
         while True:
             motor, torque = sample.motor_position_rad, sample.torque_n_m
-            setpoint, passed = step(
-                tick, Samples(motor, seen.position_m, torque, sample.state, error_code, lateness[-1], cycle_s)
-            )
+            if skipped != self._skipped:
+                cycle.skip(tick + skipped, tick + self._skipped - 1, motor)
+                skipped = self._skipped
+            setpoint, passed = step(tick, Samples(motor, seen.position_m, torque, sample.state, error_code,
+                                                  lateness[-1], cycle_s, sample.age_cycles, seen.age_cycles,
+                                                  skipped))  # fmt: skip
             drive.command(self._now_s, setpoint)
             if tick:
                 record(row(tick - 1))
             late = lateness[-1] > overrun_s
             if sample.condition or seen.condition or passed or late or self._stops_asked or self._phase:
-                stop = self._supervise(tick, sample, seen, passed)
+                self._supervise(tick + skipped, sample, seen, passed)
                 error_code = drive.error_code
-                if stop is not None:
-                    cycle.follow(stop, tick, STOP_SEGMENT)
             cycle_s = clock.since(self._clock_tick) - lateness[-1]
-            if tick >= self._last_tick:
+            if tick + skipped >= self._last_tick:
                 break
             sample, seen = exchange()
             tick += 1
@@ -216,68 +230,65 @@ class Session:
 
     # -- faults and stops ----------------------------------------------------------------------------------
 
-    def _supervise(self, tick: int, sample: DriveSample, seen: EncoderSample, passed: int) -> Trajectory | None:
-        """Change the phase if required; return the stop that begins at this tick, if any."""
+    def _supervise(self, tick: int, sample: DriveSample, seen: EncoderSample, passed: int) -> None:
+        """Change the phase and the set-points from this tick on if a rule requires it."""
         if self._phase is LoopPhase.QUICK_STOP:
             if not sample.powered:
                 self._last_tick = min(self._last_tick, tick + self._ticks(AFTERMATH_S))
-            return None
+            return
         stopping = self._phase is LoopPhase.STOP
-        findings = find(self._rig, seen, passed, self._lateness_s[-1], self._stops_asked, stopping=stopping)
-        # while the axis stops, only findings that require a quick stop interrupt it
-        found = next((finding for finding in findings if finding.quick or not stopping), None)
-        if found is None:
-            return None
+        findings = list(find(self._rig, seen, passed, self._lateness_s[-1], self._stops_asked, stopping=stopping))
+        quick = any(finding.quick for finding in findings)
+        if not findings or (stopping and not quick):  # a controlled stop goes on
+            return
         if self._phase is LoopPhase.RUN:
-            self._ending, self._reason = found.ending, found.reason
-        stop = self._stop(tick, sample, seen, measured=passed != 0)
-        if found.quick:
+            self._ending, self._reason = findings[0].ending, findings[0].reason
+        stop = None if quick else self._stop(tick, sample, seen, measured=passed != 0)
+        if stop is None:  # the drive stops by itself
+            self._cycle.hold(tick, STOP_SEGMENT)
             self._phase = LoopPhase.QUICK_STOP
             self._drive.goal = DriveGoal.QUICK_STOP
             self._last_tick = tick + self._ticks(QUICK_STOP_LIMIT_S)
         else:
+            self._cycle.follow(stop, tick, STOP_SEGMENT)
             self._phase = LoopPhase.STOP
             self._last_tick = tick + len(stop) + self._ticks(SETTLE_S)
-        return stop
 
-    def _stop(self, tick: int, sample: DriveSample, seen: EncoderSample, *, measured: bool) -> Trajectory:
+    def _stop(self, tick: int, sample: DriveSample, seen: EncoderSample, *, measured: bool) -> Trajectory | None:
         """Plan the shortest stop from the set-point, or from the measured state when the axis does not follow."""
-        position, velocity, acceleration = self._cycle.setpoint(tick)
+        state = MotionState(*self._cycle.setpoint(tick))
         if measured:
-            position, velocity = self._position_m(sample, seen), self._cycle.velocity_m_s
-            acceleration = 0.0
-        return stop_from(position, velocity, acceleration, self._limits, self._period_s)
+            state = MotionState(self._position_m(sample, seen), self._cycle.velocity_m_s, 0.0)
+        return plan_stop(state, self._limits, self._cycle.bounds, self._period_s)
 
     def _position_m(self, sample: DriveSample, seen: EncoderSample) -> float:
         """Return the position of the axis from the encoder of the position loop."""
         return seen.position_m if self._from_table else self._ratio * sample.motor_position_rad
 
-    def _disarm(self) -> None:
-        """Switch the power stage off; the recording has ended."""
-        self._drive.goal = DriveGoal.DISABLED
-        for _ in range(self._ticks(DISARM_TIMEOUT_S)):
-            sample, _ = self._exchange()
-            self._drive.command(self._now_s, 0.0)
-            if not sample.powered:
-                return
+    def _power_off(self, goal: DriveGoal, ended: str, cause: BaseException | None = None) -> None:
+        """Switch the power stage off, unrecorded: by its controlword, then by another way (`Drive.confirm_off`).
 
-    def _abandon(self) -> None:
-        """Send quick-stop commands after an exception, as long as the bus accepts them."""
-        self._drive.goal = DriveGoal.QUICK_STOP
+        Nothing that fails here ends it before the drive was asked. Raises StillPowered from `cause` if it does not say
+        in two fresh answers, or to that question, that its power is off. ended: how the run ended, for the message.
+        """
+        drive, self._switching_off = self._drive, True
+        drive.goal, confirmed = goal, 0
         for _ in range(self._ticks(DISARM_TIMEOUT_S)):
             with contextlib.suppress(Exception):
-                self._exchange()
+                sample, _ = self._exchange()
+                confirmed = 0 if sample.powered or sample.age_cycles else confirmed + 1
+            if confirmed == 2:
+                return
             with contextlib.suppress(Exception):
-                self._drive.command(self._now_s, 0.0)
+                drive.command(self._now_s, 0.0)
+        said = f"The drive still reports {drive.status}"
+        try:
+            if drive.confirm_off(self._now_s):
+                return
+            said = f"The drive still reports {drive.status}"
+        except Exception as error:
+            said = f"The drive does not answer ({error}); it reported last {drive.status}"
+        raise StillPowered(f"{said}: switch it off at the mains. The run ended by {ended}") from cause
 
     def _ticks(self, duration_s: float) -> int:
         return round(duration_s / self._period_s)
-
-
-def make_cycle(rig: Devices, motor_position: float) -> Cycle:
-    """Controller and twin of a bench, for an axis at rest at this motor position [rad, m]."""
-    bench, section = rig.bench, rig.section
-    travel = section.travel_m or (float("-inf"), float("inf"))
-    kind = AxisKind.LINEAR if bench.axis.linear else AxisKind.ROTARY
-    watch = Watch(_SETPOINTS[section.mode], rig.encoder is not None, section.following_error_m, travel)
-    return Cycle(bench.twin(), kind, watch, motor_position)

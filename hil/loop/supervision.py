@@ -1,16 +1,17 @@
-"""Find the faults at a tick of the loop, and decide if the loop can still stop the axis under control."""
+"""The rules of supervision: what stops the axis at a tick, how, how fast, and with which words.
+
+A rule holds if one of its bits is set: `Limit` (compiled checks of the tick), conditions of the drive or of the linear
+encoder, or a sign of the loop itself. The first rule in `RULES` that holds names the end of a run; any that holds may
+require a quick stop. ARCHITECTURE.md shows the table; a test compares them.
+"""
 
 from collections.abc import Callable, Iterator
-from enum import StrEnum
+from enum import IntFlag, StrEnum
 from typing import NamedTuple
 
 from drivers.port import Condition, DriverError, EncoderSample
-from hil.loop.cycle import Limit
+from hil.loop.checks import Limit
 from hil.loop.devices import Devices
-
-# Conditions that make a linear encoder unusable; a late sample or a damaged frame does not.
-_ENCODER_LOST = (Condition.STALE | Condition.HEARTBEAT_LOST | Condition.BUS_OFF | Condition.NOT_OPERATIONAL
-                 | Condition.ALARM | Condition.LINE_LOST)  # fmt: skip
 
 
 class Ending(StrEnum):
@@ -23,6 +24,42 @@ class Ending(StrEnum):
     FOLLOWING_ERROR = "following error"
     TRAVEL_LIMIT = "travel limit"
     OVERRUN = "loop too late"
+    NOT_FINITE = "not a number"
+    VELOCITY = "velocity"
+    TORQUE = "torque"
+    RESIDUAL = "twin's residual"
+
+
+class Reaction(StrEnum):
+    """What stops the axis: the loop within the limits of the profile, or the drive by its own ramp."""
+
+    STOP = "controlled stop"
+    QUICK_STOP = "quick stop"
+    BY_FEEDBACK = "quick stop if fed back, else controlled stop"
+    TWICE = "controlled stop; again: quick stop"
+
+
+class LoopSign(IntFlag):
+    """Signs of the loop itself."""
+
+    NONE = 0
+    ASKED = 1  # by the user
+    LATE = 2
+
+
+class Rule(NamedTuple):
+    """A line of the table. cycles: from the fault (bound passed, last good frame) to the reaction, at most, as text."""
+
+    name: str
+    ending: Ending
+    condition: str
+    reaction: Reaction
+    cycles: str
+    reason: str  # {text}: of the device; fields of the section `drive` by name
+    limit: Limit = Limit.NONE
+    drive: Condition = Condition.OK
+    encoder: Condition = Condition.OK
+    loop: LoopSign = LoopSign.NONE
 
 
 class StopCause(NamedTuple):
@@ -31,39 +68,132 @@ class StopCause(NamedTuple):
     ending: Ending
     reason: str
     quick: bool
+    rule: str
+
+
+_E, _R, _L, _C = Ending, Reaction, Limit, Condition
+_STALE = "missed_answers + 2"
+_BEAT = "heartbeat time-out + 1"
+
+RULES: tuple[Rule, ...] = (
+    # first, because a late loop has the drive trip by its own watchdog
+    Rule("loop late", _E.OVERRUN, "lateness > overrun_s", _R.STOP, "1",
+         "the loop was {lateness_s:.3f} s late, allowed {overrun_s} s (drive.overrun_s): take load off the machine",
+         loop=LoopSign.LATE),
+    Rule("drive bus-off", _E.DRIVE_FAULT, "the controller left the bus", _R.QUICK_STOP, "1", "{text}",
+         drive=_C.BUS_OFF),
+    Rule("drive heartbeat lost", _E.DRIVE_FAULT, "no heartbeat of the drive", _R.QUICK_STOP, _BEAT, "{text}",
+         drive=_C.HEARTBEAT_LOST),
+    Rule("drive not operational", _E.DRIVE_FAULT, "the drive left NMT operational", _R.QUICK_STOP, "1", "{text}",
+         drive=_C.NOT_OPERATIONAL),
+    Rule("drive emergency", _E.DRIVE_FAULT, "EMCY with an error code", _R.QUICK_STOP, "1", "{text}",
+         drive=_C.EMERGENCY),
+    Rule("drive fault", _E.DRIVE_FAULT, "state FAULT or FAULT REACTION ACTIVE", _R.QUICK_STOP, "1", "{text}",
+         drive=_C.FAULT),
+    Rule("drive switched off", _E.DRIVE_FAULT, "left OPERATION ENABLED by itself", _R.QUICK_STOP, "1", "{text}",
+         drive=_C.DISABLED),
+    Rule("drive unanswered", _E.DRIVE_FAULT, "does not follow its controlword", _R.QUICK_STOP, "1", "{text}",
+         drive=_C.UNANSWERED),
+    Rule("drive stale", _E.DRIVE_FAULT, "SYNC or answers lost: more than missed_answers in a row", _R.QUICK_STOP,
+         _STALE, "{text}", drive=_C.STALE),
+    Rule("table encoder bus-off", _E.ENCODER_FAULT, "the controller left the bus", _R.BY_FEEDBACK, "1", "{text}",
+         encoder=_C.BUS_OFF),
+    Rule("table encoder heartbeat lost", _E.ENCODER_FAULT, "no heartbeat of the encoder", _R.BY_FEEDBACK, _BEAT,
+         "{text}", encoder=_C.HEARTBEAT_LOST),
+    Rule("table encoder not operational", _E.ENCODER_FAULT, "the encoder left NMT operational", _R.BY_FEEDBACK, "1",
+         "{text}", encoder=_C.NOT_OPERATIONAL),
+    Rule("table encoder alarm", _E.ENCODER_FAULT, "alarm of the encoder", _R.BY_FEEDBACK, "1", "{text}",
+         encoder=_C.ALARM),
+    Rule("table encoder line lost", _E.ENCODER_FAULT, "serial line gone", _R.BY_FEEDBACK, "1", "{text}",
+         encoder=_C.LINE_LOST),
+    Rule("table encoder stale", _E.ENCODER_FAULT, "more than missed_answers in a row", _R.BY_FEEDBACK, _STALE, "{text}",
+         encoder=_C.STALE),
+    Rule("not a number", _E.NOT_FINITE, "NaN or infinity in set-point, sample, command or twin", _R.QUICK_STOP, "1",
+         "a set-point, sample, command or value of the twin is NaN or infinite", _L.NOT_FINITE),
+    Rule("motor encoder jump", _E.ENCODER_FAULT, "step > velocity bound x time + frozen_m", _R.QUICK_STOP, "1",
+         "the motor encoder jumped further than the axis can move: check encoder and cable", _L.MOTOR_JUMP),
+    Rule("table encoder jump", _E.ENCODER_FAULT, "step > velocity bound x time + frozen_m", _R.BY_FEEDBACK, "1",
+         "the table encoder jumped further than the axis can move: check encoder and cable", _L.TABLE_JUMP),
+    Rule("motor encoder frozen", _E.ENCODER_FAULT,
+         "value repeats; table moved > frozen_m or torque command changed > frozen_torque", _R.QUICK_STOP, "1",
+         "the motor encoder is frozen, or the axis blocked: its value repeats while table or torque command change",
+         _L.MOTOR_FROZEN),
+    Rule("table encoder frozen", _E.ENCODER_FAULT, "value repeats; motor moved > frozen_m", _R.BY_FEEDBACK, "1",
+         "the table encoder is frozen: its value repeats while the motor moves", _L.TABLE_FROZEN),
+    Rule("motor encoder reversed", _E.ENCODER_FAULT, "against the table and the set-points by > frozen_m",
+         _R.QUICK_STOP, "1", "the motor encoder counts against the table encoder and the set-points: correct its "
+         "direction", _L.MOTOR_REVERSED),
+    Rule("table encoder reversed", _E.ENCODER_FAULT, "against the motor by > frozen_m", _R.BY_FEEDBACK, "1",
+         "the table encoder counts against the motor encoder: correct encoders.table.direction", _L.TABLE_REVERSED),
+    Rule("encoder difference", _E.ENCODER_FAULT, "motor and table differ by > encoder_difference_m", _R.BY_FEEDBACK,
+         "1", "motor encoder and table encoder differ by more than the transmission allows "
+         "(drive.supervision.encoder_difference_m): one counts wrong or the coupling slips", _L.ENCODER_DIFFERENCE),
+    Rule("velocity", _E.VELOCITY, "smoothed velocity > velocity_m_s", _R.QUICK_STOP, "16",
+         "the motor is faster than its bound (drive.supervision.velocity_m_s)", _L.VELOCITY),
+    Rule("acting set-point", _E.DRIVE_FAULT, "smoothed measured less commanded torque > torque_difference (CST)",
+         _R.QUICK_STOP, "16", "the torque differs from its command (drive.supervision.torque_difference): set-points "
+         "do not reach the drive, or it limits them", _L.ACTING_TORQUE),
+    Rule("torque", _E.TORQUE, "measured torque > torque", _R.QUICK_STOP, "3",
+         "the torque exceeds its bound (drive.supervision.torque)", _L.TORQUE),
+    Rule("following error", _E.FOLLOWING_ERROR,
+         "set-point less fed-back position > following_error_m + following_error_s x speed", _R.TWICE, "1",
+         "the axis is more than {following_error_m} m from its set-point (drive.following_error_m): blocked, "
+         "overloaded, or badly tuned", _L.FOLLOWING_ERROR),
+    Rule("travel", _E.TRAVEL_LIMIT, "fed-back position outside travel_m", _R.STOP, "1",
+         "the axis left {travel_m} m (drive.travel_m): correct the profile or home the axis", _L.TRAVEL),
+    Rule("stopping distance", _E.TRAVEL_LIMIT, "place of a stop from now outside travel_m by > following_error_m",
+         _R.STOP, "16", "the axis is too fast to stop inside {travel_m} m (drive.travel_m)", _L.STOPPING_DISTANCE),
+    Rule("torque over time", _E.TORQUE, "mean square over thermal_time_s > continuous_torque squared", _R.STOP, "1",
+         "the torque over time exceeds drive.supervision.continuous_torque: let the motor cool, lower the "
+         "accelerations", _L.TORQUE_TIME),
+    Rule("residual: encoder", _E.RESIDUAL, "one position leaves the twin, torque does not", _R.STOP, "20",
+         "the axis deviates from its twin; suspect: encoder (one position alone)", _L.RESIDUAL_ENCODER),
+    Rule("residual: drive", _E.RESIDUAL, "torque leaves the twin and its command", _R.STOP, "20",
+         "the axis deviates from its twin; suspect: drive (torque differs from its command)", _L.RESIDUAL_DRIVE),
+    Rule("residual: load", _E.RESIDUAL, "torque or both positions leave the twin", _R.STOP, "20",
+         "the axis deviates from its twin; suspect: load (friction, mass, external force)", _L.RESIDUAL_LOAD),
+    Rule("stop asked", _E.INTERRUPTED, "ctrl-C or a signal", _R.TWICE, "1", "stopped by the user",
+         loop=LoopSign.ASKED),
+)  # fmt: skip
+# Conditions that stop the axis; a late sample or a damaged frame of an encoder does not.
+_ENCODER_LOST = Condition(sum(rule.encoder for rule in RULES))
 
 
 def find(
     rig: Devices, seen: EncoderSample, passed: int, lateness_s: float, stops_asked: int, *, stopping: bool
 ) -> Iterator[StopCause]:
     """Yield the faults, the gravest first. passed: the `Limit`s; lateness_s of the tick; stopping: under control."""
-    section, gains = rig.section, rig.bench.gains
-    if rig.drive.tripped:
-        yield StopCause(Ending.DRIVE_FAULT, _text(rig.drive.check), True)
-    if seen.condition & _ENCODER_LOST and rig.encoder is not None:
-        yield StopCause(Ending.ENCODER_FAULT, _text(rig.encoder.check), gains.position_from_table)
-    if passed & Limit.FOLLOWING_ERROR:
-        yield StopCause(
-            Ending.FOLLOWING_ERROR,
-            f"the axis is more than {section.following_error_m} m from its set-point "
-            "(drive.following_error_m): blocked, overloaded, or badly tuned",
-            stopping,
-        )
-    if passed & Limit.TRAVEL:
-        yield StopCause(
-            Ending.TRAVEL_LIMIT,
-            f"the axis left {section.travel_m} m (drive.travel_m): correct the profile or home the axis",
-            False,
-        )
-    if stops_asked:
-        yield StopCause(Ending.INTERRUPTED, "stopped by the user", stops_asked > 1)
+    section, tripped = rig.section, rig.drive.tripped
+    lost = seen.condition & _ENCODER_LOST if rig.encoder is not None else Condition.OK
+    loop = LoopSign.ASKED if stops_asked else LoopSign.NONE
     if lateness_s > section.overrun_s:
-        yield StopCause(
-            Ending.OVERRUN,
-            f"the loop was {lateness_s:.3f} s late, allowed {section.overrun_s} s "
-            "(drive.overrun_s): take load off the machine",
-            False,
-        )
+        loop |= LoopSign.LATE
+    for rule in RULES:
+        if not (rule.limit & passed or rule.drive & tripped or rule.encoder & lost or rule.loop & loop):
+            continue
+        text = ""
+        if rule.drive:
+            text = _text(rig.drive.check)
+        elif rule.encoder and rig.encoder is not None:
+            text = _text(rig.encoder.check)
+        reason = rule.reason.format(
+            text=text, lateness_s=lateness_s, overrun_s=section.overrun_s, travel_m=section.travel_m,
+            following_error_m=section.following_error_m)  # fmt: skip
+        again = stops_asked > 1 if rule.loop else stopping
+        quick = {
+            Reaction.STOP: False,
+            Reaction.QUICK_STOP: True,
+            Reaction.BY_FEEDBACK: rig.bench.gains.position_from_table,
+            Reaction.TWICE: again,
+        }[rule.reaction]
+        yield StopCause(rule.ending, reason, quick, rule.name)
+
+
+def rules_table() -> str:
+    """The rules as the table of ARCHITECTURE.md."""
+    lines = ["| rule | condition | reaction | cycles | ending |", "|---|---|---|---|---|"]
+    lines += [f"| {r.name} | {r.condition} | {r.reaction} | {r.cycles} | {r.ending} |" for r in RULES]
+    return "\n".join(lines) + "\n"
 
 
 def _text(check: Callable[[], None]) -> str:

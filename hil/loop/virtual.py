@@ -70,7 +70,7 @@ def _ticks(first, count, drive_state, measured, block, setpoints, loop, axis):  
     width, scales, state = block.shape[1], axis.scales, axis.state[0]
     for k in range(count):
         tick = first + k
-        samples = Samples(measured[0], measured[1], measured[2], drive_state, 0, 0.0, 0.0)
+        samples = Samples(measured[0], measured[1], measured[2], drive_state, 0, 0.0, 0.0, 0, 0, 0)
         setpoint, passed = _cycle(tick, 0, samples, setpoints, loop)
         for column in range(width):
             block[k, column] = loop.rows[(tick + 1) & 1, column]

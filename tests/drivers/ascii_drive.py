@@ -61,6 +61,10 @@ class AsciiDrive(Drive, Master):
     def command(self, now_s: float, setpoint: float) -> None:
         self.motor.ask(f"E {setpoint if self.sample.enabled else 0.0!r}" if self.goal is DriveGoal.ENABLED else "D")
 
+    def confirm_off(self, now_s: float) -> bool:
+        self.motor.ask("D")
+        return not self.motor.enabled
+
     def check(self) -> None:
         if self.tripped:
             raise DriveFault("tripped", where="ASCII drive", given=f"code {self.error_code}")

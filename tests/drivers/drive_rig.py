@@ -67,6 +67,7 @@ class Rig:
     def cycle(self, setpoint: float = 0.0) -> DriveSample:
         now_s = self.now_s
         self.master.sync(now_s)
+        self.node.clock(now_s + self.reply_s)  # it has a clock of its own, where no SYNC comes
         self.master.poll(now_s + self.reply_s)
         sample = self.drive.read(now_s + self.reply_s)
         self.encoder_sample = self.encoder.read(now_s + self.reply_s)

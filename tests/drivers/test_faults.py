@@ -142,7 +142,9 @@ def test_a_mute_drive_is_stale_then_lost() -> None:
     seen = Condition.OK
     for _ in range(90):
         seen |= rig.cycle().condition
-    assert seen == Condition.LATE | Condition.STALE | Condition.HEARTBEAT_LOST
+    assert seen == Condition.LATE | Condition.STALE | Condition.HEARTBEAT_LOST | Condition.UNANSWERED
+    assert rig.node.state is DriveState.FAULT
+    assert abs(rig.plant.velocity_rad_s) < 0.5
 
 
 def test_bus_off_of_the_master_is_visible_and_the_drive_stops_by_itself() -> None:
@@ -156,7 +158,8 @@ def test_bus_off_of_the_master_is_visible_and_the_drive_stops_by_itself() -> Non
         rig.cycle(1.0)
         rig.node.tick(rig.now_s)
     assert rig.master.health.frames_lost > 100
-    assert rig.node.state is DriveState.FAULT_REACTION_ACTIVE
+    assert rig.node.state is DriveState.FAULT  # after its stop ramp
+    assert abs(rig.plant.velocity_rad_s) < 0.5
     with pytest.raises(DriveFault, match="BUS_OFF"):
         rig.drive.check()
 

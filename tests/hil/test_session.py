@@ -12,6 +12,7 @@ from bench_runs import MOVE, MOVING, Ran, bench_with, run
 
 from drivers.cia402 import DriveState
 from drivers.modelled_bus import Fault, FaultKind, ModelledBus
+from hil.errors import StillPowered
 from hil.loop.devices import Rig
 from hil.loop.session import STOP_SEGMENT, Session
 from hil.loop.supervision import Ending
@@ -25,6 +26,14 @@ MANY = 100_000
 def at_rest(ran: Ran) -> bool:
     """True if the motor stands at the end: below 0.5 rad/s, 1 % of the speed of the move, over the last 20 ms."""
     return bool(np.ptp(ran.recording["motor_position_rad"][-20:]) < 0.01)
+
+
+def speed_rad_s(rig: Rig) -> float:
+    """Speed of the motor over the next millisecond, without torque."""
+    plant = rig.nodes.plant
+    before_rad = plant.motor_position_rad
+    plant.advance(0.0, 0.001)
+    return abs(plant.motor_position_rad - before_rad) / 0.001
 
 
 def test_complete_run_follows_set_points_and_twin(tmp_path: Path) -> None:
@@ -107,14 +116,17 @@ def test_frames_lost_on_the_bus(tmp_path: Path, can_id: int, count: int, ending:
 
 
 def test_bus_off_leaves_the_drive_to_its_watchdog(tmp_path: Path) -> None:
-    bus = ModelledBus()
-    ran = run(tmp_path, bus=bus, script=lambda *_: {MOVING: lambda: bus.inject(Fault(FaultKind.BUS_OFF, SYNC))})
-    assert ran.outcome.ending is Ending.DRIVE_FAULT
-    assert "BUS_OFF" in ran.outcome.reason
-    drive = ran.rig.nodes.drive
-    assert drive.state is DriveState.OPERATION_ENABLED  # no command reached it
-    drive.tick(10.0)  # the master's heartbeat is overdue
-    assert drive.state is DriveState.FAULT_REACTION_ACTIVE
+    bus, rigs = ModelledBus(), []
+
+    def script(rig: Rig, _: Session) -> dict:
+        rigs.append(rig)
+        return {MOVING: lambda: bus.inject(Fault(FaultKind.BUS_OFF, SYNC))}
+
+    with pytest.raises(StillPowered, match=r"does not answer.*reported last OPERATION_ENABLED.*at the mains.*BUS_OFF"):
+        run(tmp_path, bus=bus, script=script)  # nothing tells that the drive has stopped
+    assert read_recording(tmp_path / "run.parquet").metadata["ended"] == "StillPowered"
+    assert rigs[0].nodes.drive.state is DriveState.FAULT  # no command reached it: its watchdogs stopped it
+    assert speed_rad_s(rigs[0]) < 0.5
 
 
 def test_master_that_dies_leaves_the_drive_to_its_watchdog(tmp_path: Path) -> None:

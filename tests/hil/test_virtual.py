@@ -25,6 +25,8 @@ CASES: dict[str, tuple[dict[str, Any], Ending]] = {
     "noisy sensors": ({"simulation": {"sensors": {"table_noise_m": 1e-6, "motor_noise_rad": 1e-5}}}, Ending.COMPLETE),
     "travel limit": ({"drive": {"travel_m": (-0.01, 0.03)}}, Ending.TRAVEL_LIMIT),
     "blocked": ({"simulation": {"effects": [PUSH]}, "drive": {"following_error_m": 0.001}}, Ending.FOLLOWING_ERROR),
+    "velocity": ({"drive": {"supervision": {"velocity_m_s": 0.06}}}, Ending.VELOCITY),
+    "torque": ({"drive": {"supervision": {"torque": 1.0}}}, Ending.TORQUE),
     "drive's own loops": ({"drive": {"mode": "csv"}}, Ending.COMPLETE),
 }
 

@@ -9,10 +9,11 @@ from typing import Any
 
 from drivers.inprocess import InProcessBus
 from hil.bench.bench_file import Bench
+from hil.loop.bounds import make_cycle
 from hil.loop.clock import VirtualClock
 from hil.loop.devices import Rig
 from hil.loop.run import _interruptible
-from hil.loop.session import Outcome, Session, make_cycle
+from hil.loop.session import Outcome, Session
 from hil.loop.simulated_bench import load_simulated
 from hil.loop.virtual import compiled_ticks
 from hil.motion.profile import Profile
@@ -76,7 +77,7 @@ def run(
     rig = Rig(bench, bus=bus)
     try:
         rig.set_up()
-        cycle = make_cycle(rig, rig.drive.read(0.0).motor_position_rad)
+        cycle = make_cycle(rig, rig.drive.read(0.0).motor_position_rad, profile.motion_limits)
         trajectory = plan(profile, bench.gains.period_s, 0.0)
         clock = ScriptedClock({})
         with Recorder(folder, "run", cycle.channels, bench.gains.period_s, {}, lossless=True) as recorder:

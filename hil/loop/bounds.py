@@ -1,0 +1,59 @@
+"""Bounds of the supervision of a bench, and the cycle that holds them."""
+
+import math
+
+from hil.bench.hardware import DriveMode
+from hil.channels import AxisKind
+from hil.loop.checks import Bounds
+from hil.loop.cycle import Cycle, Setpoint, Watch
+from hil.loop.devices import Devices, Rig
+from hil.motion.pieces import MotionLimits
+
+_SETPOINTS = {DriveMode.CST: Setpoint.TORQUE, DriveMode.CSV: Setpoint.VELOCITY, DriveMode.CSP: Setpoint.POSITION}
+FROZEN_SHARE = 0.1  # of the encoder difference: backlash and windup of a usable transmission are below
+FROZEN_COUNTS = 4.0  # noise of a quantised position is below
+SPEED_MARGIN = 1.5  # overshoot of the velocity beyond the limit of the set-points
+TORQUE_MARGIN = 1.5  # measured peaks beyond the limit of the command
+ACTING_SHARE = 0.3  # of the torque limit: error of a torque constant, ripple and offset are below
+FROZEN_TORQUE_SHARE = 0.5  # of the torque limit: stiction of a usable axis is below
+
+
+def make_bounds(rig: Devices, limits: MotionLimits | None) -> Bounds:
+    """Bounds of a bench; limits: of the profile, None: those of the bench, none at all: no bound of velocity."""
+    section, gains, given = rig.section, rig.bench.gains, rig.section.supervision
+    low_m, high_m = section.travel_m or (-math.inf, math.inf)
+    allowed = limits or section.limits
+    error_m, torque = section.following_error_m, gains.torque_limit_n_m
+    velocity_m_s = SPEED_MARGIN * allowed.velocity_m_s + gains.position_gain_1_s * error_m if allowed else math.inf
+    difference_m = given.encoder_difference_m or error_m
+    table, residual = rig.bench.encoders.table, given.residual
+    count_m = table.resolution_m if table is not None else 0.0
+    return Bounds(
+        has_table=rig.encoder is not None,
+        commands_torque=section.mode is DriveMode.CST,
+        following_error_m=error_m,
+        following_error_s=given.following_error_s,
+        travel_low_m=low_m,
+        travel_high_m=high_m,
+        deceleration_m_s2=allowed.acceleration_m_s2 if allowed else math.inf,
+        velocity_m_s=given.velocity_m_s or velocity_m_s,
+        encoder_difference_m=difference_m,
+        frozen_m=given.frozen_m or max(FROZEN_SHARE * difference_m, FROZEN_COUNTS * count_m),
+        frozen_torque=given.frozen_torque or FROZEN_TORQUE_SHARE * torque,
+        torque=given.torque or TORQUE_MARGIN * torque,
+        torque_difference=given.torque_difference or ACTING_SHARE * torque,
+        drive_torque=rig.drive.info.max_torque_n_m if isinstance(rig, Rig) else math.inf,
+        continuous_torque=given.continuous_torque or math.inf,
+        thermal_time_s=given.thermal_time_s,
+        residual_motor_m=residual.motor_m if residual else math.inf,
+        residual_table_m=(residual.table_m if residual else None) or math.inf,
+        residual_torque=residual.torque if residual else math.inf,
+    )
+
+
+def make_cycle(rig: Devices, motor_position: float, limits: MotionLimits | None = None) -> Cycle:
+    """Controller, twin and checks of a bench, for an axis at rest at this motor position [rad, m]."""
+    bench = rig.bench
+    kind = AxisKind.LINEAR if bench.axis.linear else AxisKind.ROTARY
+    watch = Watch(_SETPOINTS[rig.section.mode], make_bounds(rig, limits))
+    return Cycle(bench.twin(), kind, watch, motor_position)

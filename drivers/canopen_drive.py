@@ -12,6 +12,7 @@ from drivers.canopen_master import CanopenMaster
 from drivers.canopen_node import CanopenNode, condition_names
 from drivers.cia402 import (
     ENABLE_OPERATION,
+    POWERED,
     STATE_BY_STATUS,
     Controlword,
     DriveState,
@@ -44,8 +45,6 @@ TRIPPING: Final = (
 )  # fmt: skip
 # Bound once: a look-up of an enumeration member takes time in the loop.
 _OK, _ENABLED_STATE, _ENABLED = Condition.OK, DriveState.OPERATION_ENABLED, DriveGoal.ENABLED
-# UNKNOWN: a statusword that CiA 402 does not define tells nothing about the power stage
-_POWERED: Final = (_ENABLED_STATE, DriveState.QUICK_STOP_ACTIVE, DriveState.FAULT_REACTION_ACTIVE, DriveState.UNKNOWN)
 _TRANSITION_S: Final = 0.01  # some drives take several ms for a transition of the state machine
 _RAMP_MARGIN: Final = 1.5  # measured speed and the drive's ramp differ by its following error
 _RAMP_EXTRA_S: Final = 0.1  # standstill detection of drives takes some 10 ms
@@ -137,7 +136,7 @@ class CanopenDrive(CanopenNode, Drive):
             self._was_enabled = True
         return _new(DriveSample, (self._sample_time_s, age, state, self._counts * self._rad_per_count,
                                   self._torque * self._n_m_per_mille, statusword, condition, enabled,
-                                  enabled or state in _POWERED))  # fmt: skip
+                                  enabled or state in POWERED))  # fmt: skip
 
     def _diagnose(self, age: int, state: DriveState, now_s: float) -> Condition:
         condition = self._node_condition(age, now_s)
@@ -187,7 +186,7 @@ class CanopenDrive(CanopenNode, Drive):
         """Cut the master off if the drive stays enabled, or under power for longer than its ramp takes, after a stop
         command. An answer that does not come counts as the state before it.
         """
-        if self.goal is DriveGoal.ENABLED or state not in _POWERED:
+        if self.goal is DriveGoal.ENABLED or state not in POWERED:
             self._stop_cycles = 0
             return
         period_s = self.settings.period_s
@@ -207,7 +206,7 @@ class CanopenDrive(CanopenNode, Drive):
     def confirm_off(self, now_s: float) -> bool:
         for statusword in switch_off(self._master, self.settings, now_s):
             self._statusword = statusword
-            if STATE_BY_STATUS[statusword & 0x7F] not in _POWERED:
+            if STATE_BY_STATUS[statusword & 0x7F] not in POWERED:
                 return True
         return False
 

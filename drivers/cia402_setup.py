@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from drivers.canopen_master import NMT_PRE_OPERATIONAL, CanopenMaster
-from drivers.cia402 import OperationMode
+from drivers.cia402 import POWERED, OperationMode, state_of
 from drivers.object_index import ObjectIndex as Index
 from drivers.pdo import EVENT_DRIVEN, EVERY_SYNC, Entry
 from drivers.port import ConfigurationError
@@ -111,7 +111,14 @@ def set_up_drive(master: CanopenMaster, settings: DriveSettings) -> DriveAnswer:
         commands = (CONTROLWORD, TARGET[settings.mode])
         device.map_pdo(Index.RPDO_COMMUNICATION, commands, settings.command_transmission, 0x200 + node_id)
         device.map_pdo(Index.TPDO_COMMUNICATION, FEEDBACK, EVERY_SYNC, 0x180 + node_id)
-        return DriveAnswer(info, device.read(Index.POSITION_ACTUAL), device.read(Index.STATUSWORD))
+        statusword = device.read(Index.STATUSWORD)
+        if state_of(statusword) in POWERED:
+            raise ConfigurationError(
+                "the power stage is still on after \"disable voltage\"",
+                where=f"drive node {node_id}, object 0x6041", given=f"{state_of(statusword).name}, 0x{statusword:04X}",
+                advice="Switch the drive off at the mains, and find out why it does not follow its controlword.",
+            )  # fmt: skip
+        return DriveAnswer(info, device.read(Index.POSITION_ACTUAL), statusword)
 
 
 def _read_info(device: DeviceSetup, settings: DriveSettings) -> DriveInfo:

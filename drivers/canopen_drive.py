@@ -29,6 +29,7 @@ from drivers.cia402_setup import (
     DriveInfo,
     DriveSettings,
     HomingSettings,
+    clear_fault,
     set_up_drive,
     switch_off,
 )
@@ -104,6 +105,9 @@ class CanopenDrive(CanopenNode, Drive):
         self._was_enabled = self._reset_requested = False
         self._stop_cycles = 0
 
+    def clear_fault(self) -> None:
+        clear_fault(self._master, self.settings)
+
     # -- frames -----------------------------------------------------------------------------------------------------
 
     def _on_tpdo(self, can_id: int, data: bytes, now_s: float) -> None:
@@ -176,7 +180,7 @@ class CanopenDrive(CanopenNode, Drive):
                 state, enable=self.goal is DriveGoal.ENABLED, quick_stop=self.goal is DriveGoal.QUICK_STOP,
                 reset_fault=self._reset_requested, previous=self._controlword,
             )  # fmt: skip
-            if controlword & 0x80:
+            if controlword & 0x80 or state not in (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE):
                 self._reset_requested = False
             target = self._raw_counts if self._holds_position else 0
         self._controlword = controlword
@@ -217,10 +221,12 @@ class CanopenDrive(CanopenNode, Drive):
         return saturate(target, self._target_bits)
 
     def reset_fault(self) -> None:
-        """Clear the latched fault and send one rising edge of the fault-reset bit; the goal becomes DISABLED."""
+        """Clear the latched fault; to a drive in FAULT send one rising edge of its reset bit. The goal becomes DISABLED."""
         self.goal = DriveGoal.DISABLED
         self._latched, self.tripped = 0, Condition.OK
-        self._reset_requested = True
+        # without a fault nothing is requested, which could reset a later one
+        state = STATE_BY_STATUS[self._statusword & 0x7F]
+        self._reset_requested = state in (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE)
         self._was_enabled = False
 
     @property

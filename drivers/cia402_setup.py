@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from drivers.canopen_master import NMT_PRE_OPERATIONAL, CanopenMaster
-from drivers.cia402 import POWERED, OperationMode, state_of
+from drivers.cia402 import FAULT_RESET, POWERED, DriveState, OperationMode, state_of
 from drivers.object_index import ObjectIndex as Index
 from drivers.pdo import EVENT_DRIVEN, EVERY_SYNC, Entry
 from drivers.port import ConfigurationError
@@ -194,3 +194,17 @@ def switch_off(master: CanopenMaster, settings: DriveSettings, now_s: float) -> 
         while network.time_s < now_s + _OFF_LIMIT_S:
             yield device.read(Index.STATUSWORD)
             network.pump()
+
+
+def clear_fault(master: CanopenMaster, settings: DriveSettings) -> None:
+    """Send one rising edge of "fault reset" by SDO, power stage off. Raises DriverError if the fault remains."""
+    with DeviceSetup(master.network, settings.node_id, settings.eds) as device:
+        master.nmt(NMT_PRE_OPERATIONAL, settings.node_id)
+        for controlword in (0, FAULT_RESET, 0):
+            device.write_only(Index.CONTROLWORD, 0, controlword)
+        state = state_of(device.read(Index.STATUSWORD))
+    if state in (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE):
+        raise ConfigurationError(
+            "the fault remains after its reset", where=f"drive node {settings.node_id}, object 0x6041",
+            given=state.name, advice="Remove its cause; the drive's error code is object 0x603F.",
+        )  # fmt: skip

@@ -50,15 +50,16 @@ def test_a_passive_bus_while_arming_does_not_hide_a_drive_that_switches_off(at: 
     assert DriveState.OPERATION_ENABLED not in states[left:]
 
 
-def test_an_axis_that_moves_while_the_drive_is_armed_is_not_started(at: FaultyBench) -> None:
+@pytest.mark.parametrize("moved_m", [0.002, -0.002])
+def test_an_axis_that_moves_while_the_drive_is_armed_is_not_started(at: FaultyBench, moved_m: float) -> None:
     bench = bench_with(drive={"mode": "cst", "following_error_m": 0.001})
 
     def push(rig: Rig) -> None:
         plant = rig.nodes.plant
-        plant.reset(0.002)
+        plant.reset(moved_m)
         rig.nodes.drive._measure(round(plant.motor_position_rad * rig.nodes.drive._counts_per_rad))
 
-    with pytest.raises(HilError, match=r"the axis stands at 0.002.*begin at 0.000000 m: it moved"):
+    with pytest.raises(HilError, match=rf"the axis stands at {moved_m:.3f}.*begin at 0.000000 m: it moved"):
         at.run(bench, lambda rig, _: {ARMING: lambda: push(rig)})
     assert at.rig.nodes.drive.state is DriveState.SWITCH_ON_DISABLED
     assert not (at.folder / "run.parquet").exists()  # not one row

@@ -221,7 +221,7 @@ class CanopenDrive(CanopenNode, Drive):
         return saturate(target, self._target_bits)
 
     def reset_fault(self) -> None:
-        """Clear the latched fault; send one rising edge of the reset bit to a drive in FAULT. The goal becomes DISABLED."""
+        """Clear the latched fault; send one rising edge of its reset bit to a drive in FAULT. Goal: DISABLED."""
         self.goal = DriveGoal.DISABLED
         self._latched, self.tripped = 0, Condition.OK
         # without a fault nothing is requested, which could reset a later one

@@ -186,3 +186,17 @@ def test_a_reset_without_a_fault_does_not_reset_a_later_one(at: FaultyBench) -> 
     ran = at.run(bench_with(), lambda rig, _: {MOVING - 50: lambda: reset(rig), MOVING: lambda: trip(rig)})
     assert ran.outcome.ending is Ending.DRIVE_FAULT
     assert ran.rig.nodes.drive.state is DriveState.FAULT
+
+
+def test_an_old_answer_does_not_confirm_that_power_is_off(at: FaultyBench) -> None:
+    """The bus fails after "enable operation" was sent: the last answer says SWITCHED ON, the drive is enabled."""
+
+    def fail(rig: Rig, session: Session) -> None:
+        assert rig.nodes.drive.state is DriveState.OPERATION_ENABLED
+        at.lose(DRIVE_TPDO)
+        at.lose(RPDO)
+        session.ask_stop()
+
+    with pytest.raises(HilError, match="interrupted while the drive was armed"):
+        at.run(bench_with(), lambda rig, session: {ARMING + 1: lambda: fail(rig, session)})
+    assert at.rig.nodes.drive.state in (DriveState.SWITCH_ON_DISABLED, DriveState.FAULT)

@@ -191,12 +191,20 @@ def test_a_reset_without_a_fault_does_not_reset_a_later_one(at: FaultyBench) -> 
 def test_an_old_answer_does_not_confirm_that_power_is_off(at: FaultyBench) -> None:
     """The bus fails after "enable operation" was sent: the last answer says SWITCHED ON, the drive is enabled."""
 
+    states: list[DriveState] = []
+
     def fail(rig: Rig, session: Session) -> None:
-        assert rig.nodes.drive.state is DriveState.OPERATION_ENABLED
         at.lose(DRIVE_TPDO)
         at.lose(RPDO)
         session.ask_stop()
 
     with pytest.raises(HilError, match="interrupted while the drive was armed"):
-        at.run(bench_with(), lambda rig, session: {ARMING + 1: lambda: fail(rig, session)})
+        at.run(
+            bench_with(),
+            lambda rig, session: {
+                ARMING + 2: lambda: fail(rig, session),
+                ARMING + 3: lambda: states.append(rig.nodes.drive.state),
+            },
+        )
+    assert states == [DriveState.OPERATION_ENABLED]
     assert at.rig.nodes.drive.state in (DriveState.SWITCH_ON_DISABLED, DriveState.FAULT)

@@ -202,8 +202,8 @@ def test_an_old_answer_does_not_confirm_that_power_is_off(at: FaultyBench) -> No
         at.run(
             bench_with(),
             lambda rig, session: {
-                ARMING + 2: lambda: fail(rig, session),
-                ARMING + 3: lambda: states.append(rig.nodes.drive.state),
+                ARMING + 1: lambda: fail(rig, session),
+                ARMING + 2: lambda: states.append(rig.nodes.drive.state),
             },
         )
     assert states == [DriveState.OPERATION_ENABLED]

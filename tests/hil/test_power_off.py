@@ -115,6 +115,7 @@ def test_a_drive_that_ignores_controlwords_at_the_end_is_cut_off(at: FaultyBench
 
     ran = at.run(bench_with(drive={"mode": mode}), events)
     assert ran.rig.nodes.drive.state is DriveState.FAULT
+    assert ran.outcome.ending is Ending.DRIVE_FAULT
     assert "did not follow its controlword" in ran.outcome.reason
 
 

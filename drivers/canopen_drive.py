@@ -204,7 +204,6 @@ class CanopenDrive(CanopenNode, Drive):
         if self._stop_cycles >= limit and not self._master.silent:
             self._master.cut_off(now_s)
             self._latched |= Condition.UNANSWERED
-            self.tripped |= Condition.UNANSWERED
         self._stop_cycles += 1
 
     def confirm_off(self, now_s: float) -> bool:

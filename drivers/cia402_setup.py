@@ -176,7 +176,7 @@ def _write_watchdogs(device: DeviceSetup, master: CanopenMaster, settings: Drive
     supervised = device.has(Index.RPDO_COMMUNICATION, RPDO_EVENT_TIMER)
     if supervised:
         deadline_s = max(settings.command_deadline_s, _DEADLINE_PERIODS * settings.period_s)
-        device.write(Index.RPDO_COMMUNICATION, RPDO_EVENT_TIMER, math.ceil(1000 * deadline_s))
+        device.write(Index.RPDO_COMMUNICATION, RPDO_EVENT_TIMER, math.ceil(round(1000 * deadline_s, 6)))
     deceleration = device.read(Index.QUICK_STOP_DECELERATION) * info.rad_per_count
     return replace(info, quick_stop_rad_s2=deceleration, supervises_commands=supervised)
 

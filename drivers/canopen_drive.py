@@ -12,6 +12,7 @@ from drivers.canopen_master import CanopenMaster
 from drivers.canopen_node import CanopenNode, condition_names
 from drivers.cia402 import (
     ENABLE_OPERATION,
+    POWERED,
     STATE_BY_STATUS,
     Controlword,
     DriveState,
@@ -28,6 +29,7 @@ from drivers.cia402_setup import (
     DriveInfo,
     DriveSettings,
     HomingSettings,
+    clear_fault,
     set_up_drive,
     switch_off,
 )
@@ -44,8 +46,6 @@ TRIPPING: Final = (
 )  # fmt: skip
 # Bound once: a look-up of an enumeration member takes time in the loop.
 _OK, _ENABLED_STATE, _ENABLED = Condition.OK, DriveState.OPERATION_ENABLED, DriveGoal.ENABLED
-# UNKNOWN: a statusword that CiA 402 does not define tells nothing about the power stage
-_POWERED: Final = (_ENABLED_STATE, DriveState.QUICK_STOP_ACTIVE, DriveState.FAULT_REACTION_ACTIVE, DriveState.UNKNOWN)
 _TRANSITION_S: Final = 0.01  # some drives take several ms for a transition of the state machine
 _RAMP_MARGIN: Final = 1.5  # measured speed and the drive's ramp differ by its following error
 _RAMP_EXTRA_S: Final = 0.1  # standstill detection of drives takes some 10 ms
@@ -105,6 +105,9 @@ class CanopenDrive(CanopenNode, Drive):
         self._was_enabled = self._reset_requested = False
         self._stop_cycles = 0
 
+    def clear_fault(self) -> None:
+        clear_fault(self._master, self.settings)
+
     # -- frames -----------------------------------------------------------------------------------------------------
 
     def _on_tpdo(self, can_id: int, data: bytes, now_s: float) -> None:
@@ -137,7 +140,7 @@ class CanopenDrive(CanopenNode, Drive):
             self._was_enabled = True
         return _new(DriveSample, (self._sample_time_s, age, state, self._counts * self._rad_per_count,
                                   self._torque * self._n_m_per_mille, statusword, condition, enabled,
-                                  enabled or state in _POWERED))  # fmt: skip
+                                  enabled or state in POWERED))  # fmt: skip
 
     def _diagnose(self, age: int, state: DriveState, now_s: float) -> Condition:
         condition = self._node_condition(age, now_s)
@@ -177,7 +180,7 @@ class CanopenDrive(CanopenNode, Drive):
                 state, enable=self.goal is DriveGoal.ENABLED, quick_stop=self.goal is DriveGoal.QUICK_STOP,
                 reset_fault=self._reset_requested, previous=self._controlword,
             )  # fmt: skip
-            if controlword & 0x80:
+            if controlword & 0x80 or state not in (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE):
                 self._reset_requested = False
             target = self._raw_counts if self._holds_position else 0
         self._controlword = controlword
@@ -187,7 +190,7 @@ class CanopenDrive(CanopenNode, Drive):
         """Cut the master off if the drive stays enabled, or under power for longer than its ramp takes, after a stop
         command. An answer that does not come counts as the state before it.
         """
-        if self.goal is DriveGoal.ENABLED or state not in _POWERED:
+        if self.goal is DriveGoal.ENABLED or state not in POWERED:
             self._stop_cycles = 0
             return
         period_s = self.settings.period_s
@@ -201,13 +204,12 @@ class CanopenDrive(CanopenNode, Drive):
         if self._stop_cycles >= limit and not self._master.silent:
             self._master.cut_off(now_s)
             self._latched |= Condition.UNANSWERED
-            self.tripped |= Condition.UNANSWERED
         self._stop_cycles += 1
 
     def confirm_off(self, now_s: float) -> bool:
         for statusword in switch_off(self._master, self.settings, now_s):
             self._statusword = statusword
-            if STATE_BY_STATUS[statusword & 0x7F] not in _POWERED:
+            if STATE_BY_STATUS[statusword & 0x7F] not in POWERED:
                 return True
         return False
 
@@ -218,10 +220,12 @@ class CanopenDrive(CanopenNode, Drive):
         return saturate(target, self._target_bits)
 
     def reset_fault(self) -> None:
-        """Clear the latched fault and send one rising edge of the fault-reset bit; the goal becomes DISABLED."""
+        """Clear the latched fault; send one rising edge of its reset bit to a drive in FAULT. Goal: DISABLED."""
         self.goal = DriveGoal.DISABLED
         self._latched, self.tripped = 0, Condition.OK
-        self._reset_requested = True
+        # without a fault nothing is requested, which could reset a later one
+        state = STATE_BY_STATUS[self._statusword & 0x7F]
+        self._reset_requested = state in (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE)
         self._was_enabled = False
 
     @property

@@ -22,6 +22,12 @@ class DriveState(IntEnum):
     FAULT = 7
 
 
+# States in which the motor may produce torque. UNKNOWN: an undefined statusword tells nothing about the power stage.
+POWERED: Final = (
+    DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE, DriveState.FAULT_REACTION_ACTIVE, DriveState.UNKNOWN
+)  # fmt: skip
+
+
 class Statusword(IntFlag):
     """Object 0x6041. Bits 12 and 13 depend on the mode; bit 10 means target reached."""
 

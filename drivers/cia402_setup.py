@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from drivers.canopen_master import NMT_PRE_OPERATIONAL, CanopenMaster
-from drivers.cia402 import OperationMode
+from drivers.cia402 import FAULT_RESET, POWERED, DriveState, OperationMode, state_of
 from drivers.object_index import ObjectIndex as Index
 from drivers.pdo import EVENT_DRIVEN, EVERY_SYNC, Entry
 from drivers.port import ConfigurationError
@@ -114,7 +114,14 @@ def set_up_drive(master: CanopenMaster, settings: DriveSettings) -> DriveAnswer:
         commands = (CONTROLWORD, TARGET[settings.mode])
         device.map_pdo(Index.RPDO_COMMUNICATION, commands, settings.command_transmission, 0x200 + node_id)
         device.map_pdo(Index.TPDO_COMMUNICATION, FEEDBACK, EVERY_SYNC, 0x180 + node_id)
-        return DriveAnswer(info, device.read(Index.POSITION_ACTUAL), device.read(Index.STATUSWORD))
+        statusword = device.read(Index.STATUSWORD)
+        if state_of(statusword) in POWERED:
+            raise ConfigurationError(
+                "the power stage is still on after \"disable voltage\"",
+                where=f"drive node {node_id}, object 0x6041", given=f"{state_of(statusword).name}, 0x{statusword:04X}",
+                advice="Switch the drive off at the mains, and find out why it does not follow its controlword.",
+            )  # fmt: skip
+        return DriveAnswer(info, device.read(Index.POSITION_ACTUAL), statusword)
 
 
 def _read_info(device: DeviceSetup, settings: DriveSettings) -> DriveInfo:
@@ -173,7 +180,7 @@ def _write_watchdogs(device: DeviceSetup, master: CanopenMaster, settings: Drive
     supervised = device.has(Index.RPDO_COMMUNICATION, RPDO_EVENT_TIMER)
     if supervised:
         deadline_s = max(settings.command_deadline_s, _DEADLINE_PERIODS * settings.period_s)
-        device.write(Index.RPDO_COMMUNICATION, RPDO_EVENT_TIMER, math.ceil(1000 * deadline_s))
+        device.write(Index.RPDO_COMMUNICATION, RPDO_EVENT_TIMER, math.ceil(round(1000 * deadline_s, 6)))
     deceleration = device.read(Index.QUICK_STOP_DECELERATION) * info.rad_per_count
     return replace(info, quick_stop_rad_s2=deceleration, supervises_commands=supervised)
 
@@ -191,3 +198,17 @@ def switch_off(master: CanopenMaster, settings: DriveSettings, now_s: float) -> 
         while network.time_s < now_s + _OFF_LIMIT_S:
             yield device.read(Index.STATUSWORD)
             network.pump()
+
+
+def clear_fault(master: CanopenMaster, settings: DriveSettings) -> None:
+    """Send one rising edge of "fault reset" by SDO, power stage off. Raises DriverError if the fault remains."""
+    with DeviceSetup(master.network, settings.node_id, settings.eds) as device:
+        master.nmt(NMT_PRE_OPERATIONAL, settings.node_id)
+        for controlword in (0, FAULT_RESET, 0):
+            device.write_only(Index.CONTROLWORD, 0, controlword)
+        state = state_of(device.read(Index.STATUSWORD))
+    if state in (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE):
+        raise ConfigurationError(
+            "the fault remains after its reset", where=f"drive node {settings.node_id}, object 0x6041",
+            given=state.name, advice="Remove its cause; the drive's error code is object 0x603F.",
+        )  # fmt: skip

@@ -170,6 +170,10 @@ class Drive(Protocol):
         """Check and configure the device; blocking, power stage off. Raises DriverError."""
 
     @abstractmethod
+    def clear_fault(self) -> None:
+        """Reset a fault that the drive has latched; blocking, before `set_up`. Raises DriverError if it remains."""
+
+    @abstractmethod
     def read(self, now_s: float) -> DriveSample:
         """Return the latest sample. Never raises, never waits."""
 

@@ -14,5 +14,8 @@ Virtual = Annotated[
     bool, typer.Option("--virtual/--wall", help="Simulated bench: run as fast as possible or in wall-clock time.")
 ]
 Force = Annotated[bool, typer.Option("--force", help="Run although jitter or bus load exceed the bench's limits.")]
+ResetFault = Annotated[
+    bool, typer.Option("--reset-fault", help="Reset the fault that the drive has latched, after its cause is removed.")
+]
 Seed = Annotated[int | None, typer.Option(min=0, help="Seed of the simulated sensors. Default: the bench's seed.")]
 Out = Annotated[Path | None, typer.Option("--out", help="Folder for the results. Default: a new one in runs/.")]

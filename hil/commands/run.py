@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from hil.commands.options import Force, Out, RunBench, Seed, Virtual
+from hil.commands.options import Force, Out, ResetFault, RunBench, Seed, Virtual
 from hil.report.console import err, out
 
 if TYPE_CHECKING:
@@ -21,10 +21,14 @@ def run(
     bench: RunBench = "reference",
     virtual: Virtual = False,
     force: Force = False,
+    reset_fault: ResetFault = False,
     seed: Seed = None,
     folder: Out = None,
 ) -> None:
-    """Run a profile on a bench and record it. ctrl-C: controlled stop; again: stop by the drive's ramp."""
+    """Run a profile on a bench and record it. ctrl-C: controlled stop; again: stop by the drive's ramp.
+
+    Exit code 3: the drive did not confirm that its power stage is off; switch it off at the mains.
+    """
     from hil.commands.warm_up import compile_kernels
     from hil.errors import HilError
     from hil.files.output import default_folder
@@ -39,7 +43,7 @@ def run(
         wanted = load_profile(profile)
         compile_kernels()
         result = run_profile(
-            loaded, wanted, folder, profile.stem, virtual=virtual, force=force, seed=seed,
+            loaded, wanted, folder, profile.stem, virtual=virtual, force=force, reset_fault=reset_fault, seed=seed,
             planned=lambda trajectory: err.print(
                 f"{profile.stem} on {loaded.name}: {trajectory.duration_s:.1f} s of motion ..."))  # fmt: skip
     say(result, virtual)

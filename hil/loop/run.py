@@ -17,7 +17,7 @@ from hil.bench.hardware import DriveSection
 from hil.errors import FieldError
 from hil.loop.bounds import make_cycle
 from hil.loop.clock import Clock, VirtualClock
-from hil.loop.devices import Devices, Rig, open_devices
+from hil.loop.devices import Devices, Rig, driver_errors, open_devices
 from hil.loop.notify import Notifier, NotifyingClock
 from hil.loop.realtime import Jitter, NotPunctual, check_punctual, measure_jitter, now_text, real_time, report
 from hil.loop.session import Outcome, Session
@@ -56,6 +56,7 @@ def run_profile(
     *,
     virtual: bool = False,
     force: bool = False,
+    reset_fault: bool = False,
     seed: int | None = None,
     planned: Callable[[Trajectory], None] | None = None,
     rig: Devices | None = None,
@@ -63,10 +64,12 @@ def run_profile(
     """Run a profile on a bench and record it as `folder`/`name`.parquet.
 
     virtual: as fast as the machine allows, by a clock that is always on time; simulated benches only. force: arm
-    although jitter or bus load exceed the budget. seed: of the simulated sensors, instead of the bench's. planned: told
-    the trajectory before the axis moves. rig: an opened one, left open.
+    although jitter or bus load exceed the budget. reset_fault: first reset a fault that the drive has latched. seed:
+    of the simulated sensors, instead of the bench's. planned: told the trajectory before the axis moves. rig: an
+    opened one, left open.
 
-    Raises InputError for what cannot be run, NotPunctual for a budget exceeded, HilError for devices that fail.
+    Raises InputError for what cannot be run, NotPunctual for a budget exceeded, HilError for devices that fail,
+    StillPowered if the drive does not confirm at the end that its power is off.
     """
     section = bench.drive or DriveSection()
     if virtual and bench.drive is not None and bench.simulation is None:  # before any device is opened
@@ -76,6 +79,9 @@ def run_profile(
     with contextlib.ExitStack() as stack:
         if rig is None:
             rig = stack.enter_context(open_devices(bench, seed))
+        if reset_fault:
+            with driver_errors():
+                rig.drive.clear_fault()
         rig.set_up()
         sample = rig.drive.read(0.0)
         encoder = rig.encoder.read(0.0) if rig.encoder is not None else None

@@ -137,6 +137,8 @@ class Session:
                 raise
         self._power_off(DriveGoal.DISABLED, f"{self._ending}: {self._reason}")
         if self._drive.tripped & Condition.UNANSWERED:
+            if self._ending is Ending.COMPLETE:
+                self._ending = Ending.DRIVE_FAULT
             self._reason += "; the drive did not follow its controlword: SYNC, heartbeat and set-points were withheld"
         return Outcome(self._ending, self._reason, rows, tuple(self._lateness_s), self._skipped)
 

@@ -41,6 +41,9 @@ class AsciiDrive(Drive, Master):
     def set_up(self) -> None:
         self.motor.ask("D")
 
+    def clear_fault(self) -> None:
+        self.motor.trips = 0
+
     def start(self, now_s: float) -> None:
         self.sync(now_s)
 

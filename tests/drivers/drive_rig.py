@@ -67,8 +67,8 @@ class Rig:
     def cycle(self, setpoint: float = 0.0) -> DriveSample:
         now_s = self.now_s
         self.master.sync(now_s)
-        self.node.clock(now_s + self.reply_s)  # it has a clock of its own, where no SYNC comes
         self.master.poll(now_s + self.reply_s)
+        self.node.clock(now_s + self.reply_s)  # it has a clock of its own, where no SYNC comes
         sample = self.drive.read(now_s + self.reply_s)
         self.encoder_sample = self.encoder.read(now_s + self.reply_s)
         self.drive.command(now_s + self.reply_s, setpoint)

@@ -14,6 +14,7 @@ from drivers.canopen_drive import DriveSettings
 from drivers.cia402 import DriveState, OperationMode
 from drivers.port import ConfigurationError, IdentityError, ResponseTimeout
 from drivers.sdo_setup import EDS_FOLDER, DeviceSetup, SetupNetwork
+from drivers.sim.sdo_server import SdoServer
 
 
 def test_no_answer_names_node_and_object() -> None:
@@ -89,3 +90,23 @@ def test_a_setting_that_reads_back_differently_is_refused(
         pytest.raises(ConfigurationError, match=r"0x1006:00 .*another value.*given: 20 \(0x14\).*keeps 25 \(0x19\)"),
     ):
         device.write(0x1006, 0, 20)
+
+
+@pytest.mark.parametrize(
+    ("index", "subindex"),
+    [(0x1400, 5), (0x1016, 1), (0x1017, 0), (0x1006, 0), (0x1029, 1), (0x605A, 0), (0x605E, 0), (0x6007, 0),
+     (0x6072, 0), (0x6085, 0), (0x1600, 0), (0x1600, 2), (0x1A00, 1), (0x1400, 1), (0x1800, 2)],
+)  # fmt: skip
+def test_every_setting_that_stops_the_axis_is_read_back(index: int, subindex: int) -> None:
+    """A drive that acknowledges the write and keeps another value is refused, power stage off."""
+    rig = in_process(settings=DriveSettings(max_torque_n_m=6.0, quick_stop_rad_s2=200.0))
+    read = rig.node.dictionary.read
+
+    def other(asked: int, sub: int) -> bytes:
+        data = read(asked, sub)
+        return bytes([data[0] ^ 0x40]) + data[1:] if (asked, sub) == (index, subindex) else data
+
+    rig.node._sdo = SdoServer(other, rig.node.dictionary.write)
+    with pytest.raises(ConfigurationError, match=f"0x{index:04X}:0{subindex}.*reads back another value"):
+        rig.set_up()
+    assert rig.node.state is DriveState.SWITCH_ON_DISABLED

@@ -6,14 +6,14 @@ import math
 from typing import Any
 
 import pytest
-from drive_rig import Rig
+from drive_rig import Rig, in_process
 
 from drivers.bus import BusState
 from drivers.canopen_drive import DriveSettings
 from drivers.cia402 import DriveState, OperationMode
 from drivers.emcy import decode_emergency
 from drivers.modelled_bus import Fault, FaultKind, ModelledBus
-from drivers.port import Condition, DriveFault, DriveGoal, EncoderError
+from drivers.port import Condition, DriveFault, DriveGoal, EncoderError, ServoTarget
 from drivers.sim.servo import DriveServo, Servo
 
 TPDO, RPDO, ENCODER_TPDO, HEARTBEAT, SYNC = 0x185, 0x205, 0x186, 0x705, 0x080
@@ -258,3 +258,23 @@ def test_bus_load_of_a_kilohertz_loop() -> None:
 )
 def test_emcy_text_also_of_short_frames(data: bytes, text: str) -> None:
     assert decode_emergency(data, 0.0).text == text
+
+
+def test_a_quick_stop_that_does_not_end_is_cut_off_after_its_ramp() -> None:
+    _, rig = running()
+    speed_rad_s = rig.plant.velocity_rad_s
+    rig.node._loops.stop_target = lambda *_: ServoTarget(speed_rad_s)  # it says that it stops, and goes on
+    rig.drive.goal = DriveGoal.QUICK_STOP
+    cut = next(k for k in range(400) if rig.cycle() and rig.master.silent)
+    ramp_cycles = 1000 * speed_rad_s / rig.drive.info.quick_stop_rad_s2
+    assert ramp_cycles + 50 < cut < 1.5 * ramp_cycles + 110
+    assert rig.cycle().condition & Condition.UNANSWERED
+    assert rig.drive.tripped & Condition.UNANSWERED
+    with pytest.raises(DriveFault, match="UNANSWERED"):
+        rig.drive.check()
+
+
+def test_an_rpdo_deadline_is_never_shorter_than_the_loop_needs() -> None:
+    slow = in_process(settings=DriveSettings(period_s=0.025))
+    slow.set_up()
+    assert slow.node.values[0x1400_05] == 75

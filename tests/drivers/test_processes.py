@@ -59,7 +59,10 @@ def test_a_drive_in_another_process_runs_in_wall_clock_time(nodes: subprocess.Po
     port = PythonCanPort(open_bus(BusConfig("udp_multicast", GROUP)))
     master = CanopenMaster(port, heartbeat_s=0.05)
     # A busy machine may hold the other process up: what is tested is that the frames are right, not how fast they are.
-    drive = CanopenDrive(master, DriveSettings(period_s=0.005, heartbeat_s=0.2, missed_answers_allowed=200))
+    drive = CanopenDrive(
+        master,
+        DriveSettings(period_s=0.005, heartbeat_s=0.2, missed_answers_allowed=200, command_deadline_s=0.6),
+    )
     encoder = CanopenEncoder(master, EncoderSettings(heartbeat_s=0.2, missed_answers_allowed=200))
     drive.set_up()
     encoder.set_up()

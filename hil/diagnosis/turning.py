@@ -1,8 +1,12 @@
 """Words and units for a load that turns: the channels of the table hold its angle [rad] and torque [N m]."""
 
-import re
+from __future__ import annotations
 
-from matplotlib.figure import Figure
+import re
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _WORDS = {
     "ball nut and thrust bearing": "gear or coupling",

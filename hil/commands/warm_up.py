@@ -48,6 +48,7 @@ def compile_kernels() -> None:
         measured = bench.twin().simulate(*setpoints)
         tell(task, 0.8)
         bench.twin().observe(*setpoints, measured)
+        bench.twin().command(*setpoints, measured)
         tell(task, 0.9)
         cascade.replay(bench.gains, cascade.init(0.0), *setpoints, measured.motor_position, measured.table_position_m)
         bench.twin().drive(measured.torque_command)

@@ -9,6 +9,7 @@ from drivers.emcy import Emergency, decode_emergency
 from drivers.port import Condition
 
 _OPERATIONAL: Final = 5
+_KEPT_EMERGENCIES: Final = 100  # a device that sends them without end does not fill the memory
 
 
 class NodeSettings(Protocol):
@@ -52,6 +53,7 @@ class CanopenNode:
     def _on_emergency(self, can_id: int, data: bytes, now_s: float) -> None:
         emergency = decode_emergency(data, now_s)
         self.emergencies.append(emergency)
+        del self.emergencies[:-_KEPT_EMERGENCIES]
         self._latch(emergency)
 
     def _latch(self, emergency: Emergency) -> None:

@@ -34,7 +34,8 @@ class FaultKind(StrEnum):
 
     DROP = "drop"  # passes the bus, no node receives it
     DELAY = "delay"  # its sender holds it back
-    CORRUPT = "corrupt"  # its first byte arrives inverted (an error the CRC of the frame did not see)
+    CORRUPT = "corrupt"  # a byte arrives inverted (an error the CRC of the frame did not see)
+    DUPLICATE = "duplicate"  # arrives twice (its sender saw an error in the last bit of the frame, ISO 11898-1)
     TRUNCATE = "truncate"  # arrives one byte short
     ERROR_FRAME = "error_frame"  # destroyed by an error frame, sent again by itself
     BUS_OFF = "bus_off"  # its sender's controller leaves the bus
@@ -49,6 +50,7 @@ class Fault:
     first: int = 0
     count: int = 1
     delay_s: float = 0.0
+    byte: int = 0  # that is inverted; a frame without it arrives as it is
 
 
 @dataclass(slots=True)
@@ -177,8 +179,12 @@ class ModelledBus(InProcessBus):
             frame.drop = True
         elif fault.kind is FaultKind.DELAY:
             frame.request_s += fault.delay_s
-        elif fault.kind is FaultKind.CORRUPT and frame.data:
-            frame.data = bytes([frame.data[0] ^ 0xFF]) + frame.data[1:]
+        elif fault.kind is FaultKind.CORRUPT and len(frame.data) > fault.byte:
+            at = fault.byte
+            frame.data = frame.data[:at] + bytes([frame.data[at] ^ 0xFF]) + frame.data[at + 1 :]
+        elif fault.kind is FaultKind.DUPLICATE:
+            self._age += 1
+            self._pending.append(_Frame(frame.request_s, frame.can_id, self._age, frame.data, frame.sender))
         elif fault.kind is FaultKind.TRUNCATE:
             frame.data = frame.data[:-1]
         elif fault.kind is FaultKind.BUS_OFF:

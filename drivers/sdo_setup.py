@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import canopen
-from canopen.objectdictionary import ODVariable, datatypes
+from canopen.objectdictionary import ObjectDictionaryError, ODVariable, datatypes
 from canopen.sdo import SdoAbortedError, SdoClient, SdoCommunicationError
 
 from drivers.bus import CanPort
@@ -24,6 +24,9 @@ from drivers.port import ConfigurationError, IdentityError, ResponseTimeout
 EDS_FOLDER: Final = Path(__file__).parent / "eds"
 RESPONSE_TIMEOUT_S: Final = 0.5
 _PUMP_S: Final = 0.001
+_SDO_BYTES: Final = 8  # CiA 301: every SDO frame has eight bytes
+_MOST_ANSWERS: Final = 16  # of one transfer: the objects used here have 8 bytes or less, in two segments
+_MOST_EDS_BYTES: Final = 2_000_000  # ten times the EDS of a large drive
 
 
 class SetupNetwork(canopen.Network):  # type: ignore[misc]  # canopen is not typed
@@ -53,7 +56,9 @@ class SetupNetwork(canopen.Network):  # type: ignore[misc]  # canopen is not typ
 
 
 class _PumpedSdoClient(SdoClient):  # type: ignore[misc]
-    """canopen's SDO client, waiting by pumping the port."""
+    """canopen's SDO client, waiting by pumping the port. answers_left: that one transfer may still take."""
+
+    answers_left = 0
 
     def read_response(self) -> bytes:
         deadline_s = self.network.time_s + RESPONSE_TIMEOUT_S
@@ -62,6 +67,11 @@ class _PumpedSdoClient(SdoClient):  # type: ignore[misc]
                 raise SdoCommunicationError("No SDO response received")
             self.network.pump()
         response: bytes = self.responses.get_nowait()
+        self.answers_left -= 1
+        if self.answers_left < 0:  # also ends a segmented answer without end
+            raise SdoCommunicationError(f"more than {_MOST_ANSWERS} answers to one request")
+        if len(response) != _SDO_BYTES:
+            raise SdoCommunicationError(f"an answer of {len(response)} bytes, allowed {_SDO_BYTES}")
         if response[0] == 0x80:
             raise SdoAbortedError(struct.unpack_from("<L", response, 4)[0])
         return response
@@ -78,6 +88,18 @@ class _PumpedNode(canopen.RemoteNode):  # type: ignore[misc]
         return client
 
 
+def _node(node_id: int, eds: Path) -> _PumpedNode:
+    """Node of an EDS. Raises ConfigurationError for a file that is no readable EDS."""
+    where, advice = f"{eds}", "Give the EDS file of the device, as its maker supplies it."
+    if not eds.is_file() or eds.stat().st_size > _MOST_EDS_BYTES:  # a pipe or a device may never end
+        raise ConfigurationError("is no EDS file", where=where, allowed=f"up to {_MOST_EDS_BYTES} bytes", advice=advice)
+    try:
+        return _PumpedNode(node_id, str(eds))
+    except Exception as error:  # canopen and configparser raise many kinds for a damaged file
+        text = (str(error) or type(error).__name__).splitlines()[0]
+        raise ConfigurationError(f"is no readable EDS file ({text})", where=where, advice=advice) from None
+
+
 class DeviceSetup:
     """Configures one node by SDO. Errors name node, object, value and what the device said.
 
@@ -85,7 +107,7 @@ class DeviceSetup:
     """
 
     def __init__(self, network: SetupNetwork, node_id: int, eds: Path) -> None:
-        self._node = _PumpedNode(node_id, str(eds))
+        self._node = _node(node_id, eds)
         self._network = network
         self.node_id, self.eds = node_id, eds
         self.dictionary = self._node.object_dictionary
@@ -100,8 +122,15 @@ class DeviceSetup:
     def read(self, index: int, subindex: int = 0) -> int:
         """An integer object."""
         variable = self._variable(index, subindex)
-        value = variable.decode_raw(self._transfer(index, subindex, lambda: self._node.sdo.upload(index, subindex)))
-        return int(value)
+        data = self._transfer(index, subindex, lambda: self._node.sdo.upload(index, subindex))
+        try:
+            return int(variable.decode_raw(data))
+        except (ObjectDictionaryError, ValueError, TypeError, struct.error) as error:
+            raise ConfigurationError(
+                f"the answer is no number as the EDS describes it ({error})", where=self._where(index, subindex),
+                given=f"{bytes(data[:8]).hex(' ') or 'no byte'}", allowed=f"{len(variable) // 8} bytes",
+                advice="Give the EDS of the device that is connected.",
+            ) from error  # fmt: skip
 
     def has(self, index: int, subindex: int = 0) -> bool:
         """Return True if the EDS has the object."""
@@ -204,6 +233,7 @@ class DeviceSetup:
         return f"node {self.node_id}, object 0x{index:04X}:{subindex:02X}{name}"
 
     def _transfer(self, index: int, subindex: int, action: Callable[[], Any], value: int | None = None) -> Any:
+        self._node.sdo.answers_left = _MOST_ANSWERS
         try:
             return action()
         except SdoAbortedError as error:
@@ -214,6 +244,7 @@ class DeviceSetup:
             ) from error  # fmt: skip
         except SdoCommunicationError as error:
             raise ResponseTimeout(
-                "no SDO answer", where=self._where(index, subindex), given=f"{RESPONSE_TIMEOUT_S} s",
+                f"no usable SDO answer ({error})", where=self._where(index, subindex),
+                given=f"{RESPONSE_TIMEOUT_S} s",
                 advice="Is the device powered, its node-ID and bit rate right, the bus terminated?",
             ) from error  # fmt: skip

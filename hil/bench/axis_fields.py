@@ -9,7 +9,7 @@ from hil.twin.structure.chain import Chain
 
 # 1e15: above every SI value of an axis; squares and products of such values stay finite
 Positive = Annotated[float, Field(gt=0.0, le=1e15, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0.0, le=1e15, allow_inf_nan=False)]
 # up to a metre: a lead in millimetres is refused
 Lead = Annotated[float, Field(ge=1e-5, le=1.0, allow_inf_nan=False)]
 Damping = Annotated[float, Field(ge=0.0, lt=1.0, description="modal damping ratio of the elastic modes")]

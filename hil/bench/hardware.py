@@ -105,4 +105,5 @@ class SimulationSection(BenchSection):
     effects: tuple[SimulatedEffect, ...] = ()
     sensors: dict[str, float] = Field({}, description="as drivers/sim/sensors.py: offsets and noise")
     seed: Annotated[int, Field(ge=0)] = 1
-    step_s: Positive = Field(1e-5, description="internal step of the simulated axis [s]")
+    # shorter ones change nothing that a sensor shows, and take minutes for a second of motion
+    step_s: Annotated[float, Field(ge=1e-7, le=1e-2, description="internal step of the simulated axis [s]")] = 1e-5

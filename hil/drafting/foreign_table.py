@@ -13,13 +13,14 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 
 from hil.arrays import FloatArray
 from hil.drafting.csv_dialect import find_dialect, is_missing, number_of
 from hil.errors import InputError
 from hil.files import json_columns
 from hil.files.date_stamps import is_date, seconds_of
+from hil.files.input_file import check_file
+from hil.recording.arrow_files import MOST_BYTES, numbers, read_parquet, stored_unit
 from hil.recording.foreign_files import ENDINGS, TEXT_ENDINGS, load_mat, parquet_dates
 from hil.recording.import_map import CsvOptions
 
@@ -52,8 +53,7 @@ class ForeignTable:
 
 def read_table(path: Path) -> ForeignTable:
     """Read `path`. Raises InputError: no such file, empty, damaged, binary, another format, no columns of numbers."""
-    if not path.is_file():
-        raise InputError(f"{path}: there is no such file; give the path of a recording: {ENDINGS}")
+    check_file(path, f"the path of a recording: {ENDINGS}", MOST_BYTES)
     if path.stat().st_size == 0:
         raise InputError(f"{path}: the file is empty; give a file with rows of numbers")
     ending = path.suffix.lower()
@@ -147,20 +147,15 @@ def _mat(path: Path) -> ForeignTable:
 
 
 def _parquet(path: Path) -> ForeignTable:
-    try:
-        table = pq.read_table(path)
-    except (pa.ArrowException, OSError) as error:
-        raise InputError(
-            f"{path}: is no readable Parquet file ({str(error).splitlines()[0]}); it is cut or damaged"
-        ) from None
+    table = read_parquet(path)
     columns, units, remarks = {}, {}, []
     dates = set[str]()
     for one in table.schema:
         if pa.types.is_floating(one.type) or pa.types.is_integer(one.type):
-            columns[one.name] = table.column(one.name).to_numpy().astype(np.float64)
-            unit = (one.metadata or {}).get(b"unit")
+            columns[one.name] = numbers(path, table, one.name)
+            unit = stored_unit(table, one.name)
             if unit:
-                units[one.name] = unit.decode(errors="replace")
+                units[one.name] = unit
         elif pa.types.is_timestamp(one.type):
             columns[one.name] = parquet_dates(path, one.name)
             dates.add(one.name)

@@ -3,6 +3,7 @@
 import json
 import math
 import os
+import re
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -17,8 +18,9 @@ from hil.errors import InputError
 
 
 def default_folder(what: str) -> Path:
-    """runs/WHAT-DATE-TIME, for results without a given folder."""
-    return Path("runs") / f"{what}-{datetime.now():%Y%m%d-%H%M%S}"
+    """runs/WHAT-DATE-TIME, for results without a given folder; of WHAT only letters, digits, points, - and _."""
+    plain = re.sub(r"[^\w.-]+", "_", what)[:80]
+    return Path("runs") / f"{plain}-{datetime.now():%Y%m%d-%H%M%S}"
 
 
 def refuse_used(folder: Path) -> None:

@@ -18,9 +18,11 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from hil.errors import FieldError, FieldPath, InputError, field_name
+from hil.files.input_file import check_file
 
 Model = TypeVar("Model", bound=BaseModel)
 SHOWN_ERRORS = 8  # more would scroll the first one away
+MOST_BYTES = 200_000  # read in some seconds; ten times the longest profile
 
 
 def load_model(path: str | Path, model: type[Model]) -> Model:
@@ -37,14 +39,13 @@ def load_model(path: str | Path, model: type[Model]) -> Model:
         schema = model.model_json_schema()
         details = error.errors(include_url=False)
         # a list is called too short when its items are wrong: keep the innermost finding
-        findings = sorted(
-            _finding(detail, root, schema)
-            for detail in details
-            if not any(other["loc"][: len(detail["loc"])] == detail["loc"] != other["loc"] for other in details)
-        )
-        lines = [f"{path}:{found.line}: {found.text}" for found in findings[:SHOWN_ERRORS]]
-        if len(findings) > SHOWN_ERRORS:
-            lines.append(f"{path}: and {len(findings) - SHOWN_ERRORS} more")
+        outer = {detail["loc"][:depth] for detail in details for depth in range(len(detail["loc"]))}
+        inner = [detail for detail in details if detail["loc"] not in outer]
+        shown = sorted(inner, key=lambda detail: _locate(root, detail["loc"])[0])[:SHOWN_ERRORS]
+        findings = sorted(_finding(detail, root, schema) for detail in shown)
+        lines = [f"{path}:{found.line}: {found.text}" for found in findings]
+        if len(inner) > SHOWN_ERRORS:
+            lines.append(f"{path}: and {len(inner) - SHOWN_ERRORS} more")
         raise InputError("\n".join(lines)) from None
 
 
@@ -90,6 +91,7 @@ for _tag, _pattern, _first in (
 
 def _read(path: Path) -> tuple[yaml.Node, Any]:
     """The node tree, which knows lines, and the plain data of a file."""
+    check_file(path, "the path of a YAML file", MOST_BYTES)
     try:
         text = path.read_text(encoding="utf-8")
     except OSError as error:
@@ -174,12 +176,20 @@ def _closest(word: str, choices: list[str], otherwise: str) -> str:
     return f"did you mean {close[0]}?" if close else otherwise
 
 
+def _entries(node: yaml.MappingNode) -> dict[str, tuple[yaml.Node, yaml.Node]]:
+    """Key and value of a mapping by the text of the key, made once: a file may have thousands of unknown keys."""
+    if not hasattr(node, "entries"):
+        node.entries = {key.value: (key, value) for key, value in node.value if isinstance(key, yaml.ScalarNode)}
+    entries: dict[str, tuple[yaml.Node, yaml.Node]] = node.entries
+    return entries
+
+
 def _locate(root: yaml.Node, loc: FieldPath) -> tuple[int, FieldPath]:
     """Line (from 1) and path in the file of a pydantic location, which also holds names of union members."""
     node, line, field = root, root.start_mark.line + 1, list[str | int]()
     for depth, part in enumerate(loc):
         if isinstance(node, yaml.MappingNode):
-            entry = next(((key, value) for key, value in node.value if key.value == str(part)), None)
+            entry = _entries(node).get(str(part))
             if entry is not None:
                 line, node = entry[0].start_mark.line + 1, entry[1]
                 field.append(part)

@@ -13,6 +13,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import ValidationError
 from scipy.ndimage import maximum_filter1d
 
 from hil.arrays import FloatArray
@@ -204,7 +205,14 @@ def bench_of(recording: Recording) -> Bench:
     described = recording.metadata.get("bench")
     if not isinstance(described, dict):
         raise InputError(f"{recording.name}: no bench is recorded in it; give one: --bench FILE or a shipped name")
-    return Bench.model_validate(described)
+    try:
+        return Bench.model_validate(described)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        raise InputError(
+            f"{recording.name}: bench.{'.'.join(map(str, first['loc']))}: {first['msg']}: the bench recorded in it is "
+            "damaged; give one: --bench FILE or a shipped name"
+        ) from None
 
 
 def later(values: FloatArray, rows: float) -> FloatArray:

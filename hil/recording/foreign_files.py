@@ -9,12 +9,13 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 
 from hil.arrays import FloatArray
 from hil.errors import InputError
 from hil.files import csv_columns, json_columns
 from hil.files.date_stamps import seconds_of
+from hil.files.input_file import check_file
+from hil.recording.arrow_files import MOST_BYTES, numbers, read_parquet
 
 TEXT_ENDINGS = (".csv", ".txt", ".tsv", ".dat", ".asc")
 FEW_MISSING = 0.05  # share of rows without a value: more is a channel of another rate, or a damaged file
@@ -43,8 +44,7 @@ def read_foreign(
     Raises InputError with file, row and column: no such file or format, a missing column, text, infinity, values
     missing in a larger share of the rows than `missing`, columns of different length.
     """
-    if not path.is_file():
-        raise InputError(f"{path}: there is no such file; give the path of a recording: {ENDINGS}")
+    check_file(path, f"the path of a recording: {ENDINGS}", MOST_BYTES)
     wanted = tuple(name for name in dict.fromkeys(wanted) if name != dates)
     ending = path.suffix.lower()
     if wanted_scalars and ending != ".mat":
@@ -92,7 +92,7 @@ def _row(path: Path, row: int) -> str:
 
 def parquet_dates(path: Path, name: str) -> FloatArray:
     """A column of time stamps of a Parquet file in seconds (n,) since midnight before the first."""
-    column = pq.read_table(path, columns=[name]).column(name)
+    column = read_parquet(path, (name,)).column(name)
     if not pa.types.is_timestamp(column.type):
         return seconds_of([str(text) for text in column.to_pylist()])
     nanoseconds = column.cast(pa.timestamp("ns", column.type.tz), safe=False).cast(pa.int64()).to_numpy()
@@ -177,21 +177,8 @@ def _mat_variable(path: Path, variables: dict[str, Any], name: str) -> FloatArra
 
 
 def _parquet_columns(path: Path, wanted: tuple[str, ...]) -> dict[str, FloatArray]:
-    try:
-        names = pq.read_schema(path).names
-        missing = [name for name in wanted if name not in names]
-        if missing:
-            raise InputError(f"{path}: column {missing[0]!r} is missing; the file has {', '.join(names)}")
-        table = pq.read_table(path, columns=list(wanted))
-    except (pa.ArrowException, OSError) as error:
-        raise InputError(
-            f"{path}: is no readable Parquet file ({str(error).splitlines()[0]}); it is cut or damaged"
-        ) from None
-    for name in wanted:
-        kind = table.schema.field(name).type
-        if not (pa.types.is_floating(kind) or pa.types.is_integer(kind)):
-            raise InputError(f"{path}: {name}: given {kind} values, allowed numbers; convert the column")
-    return {name: table.column(name).to_numpy().astype(np.float64) for name in wanted}
+    table = read_parquet(path, wanted)
+    return {name: numbers(path, table, name) for name in wanted}
 
 
 def _check(path: Path, columns: dict[str, FloatArray], place: Callable[[int], str], share: float) -> None:

@@ -14,7 +14,6 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
@@ -22,17 +21,25 @@ from hil.arrays import FloatArray
 from hil.channels import AXIS_CHANNELS, CHANNELS, AxisChannels, AxisKind
 from hil.errors import InputError
 from hil.files import csv_columns
-from hil.recording.stamps import RegularRows, check_finite, regular_rows
+from hil.files.input_file import check_file
+from hil.recording.arrow_files import (
+    FORMATS,
+    METADATA_KEY as METADATA_KEY,
+    MOST_BYTES,
+    numbers,
+    read_parquet,
+    read_stream,
+    stored_metadata,
+    stored_unit,
+)
+from hil.recording.stamps import CLOCK_TOLERANCE, RegularRows, check_finite, regular_rows
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-METADATA_KEY = b"hil"  # of the schema: the metadata as JSON
 PARTS = "parts"  # key of the metadata: row and time_s of each part, if there are gaps between them
 CLOCK_NOTES = "clock_notes"  # key of the metadata: what was done to the stamps
 RESAMPLED = "resampled"  # key of the metadata: the rows are not those of the control loop
-_STREAM_END = b"\xff\xff\xff\xff\x00\x00\x00\x00"  # Arrow IPC: the end-of-stream marker
-_FORMATS = ".parquet, .arrows (a run that was not closed) or .csv"
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,11 +140,10 @@ def read_recording(path: str | Path) -> Recording:
     readers = {".parquet": _read_parquet, ".arrows": _read_stream, ".csv": _read_csv}
     if path.suffix.lower() not in readers:
         raise InputError(
-            f"{path}: the ending {path.suffix!r} is no recording, allowed {_FORMATS}; "
+            f"{path}: the ending {path.suffix!r} is no recording, allowed .parquet, .arrows or .csv; "
             "import a foreign file with: hil import FILE --map MAP.yaml"
         )
-    if not path.is_file():
-        raise InputError(f"{path}: there is no such file; give the path of a recording: {_FORMATS}")
+    check_file(path, FORMATS, MOST_BYTES)
     return readers[path.suffix.lower()](path)
 
 
@@ -197,38 +203,14 @@ def _read_csv(path: Path) -> Recording:
 
 
 def _read_parquet(path: Path) -> Recording:
-    try:
-        table = pq.read_table(path, memory_map=True)
-    except (pa.ArrowException, OSError) as error:
-        raise InputError(
-            f"{path}: is no readable Parquet file ({_first_line(error)}); it is cut or damaged: "
-            "read the .arrows file of the run if there is one"
-        ) from None
-    return _from_table(path, table, {})
+    return _from_table(path, read_parquet(path), {})
 
 
 def _read_stream(path: Path) -> Recording:
-    batches = []
-    try:
-        with pa.OSFile(str(path)) as file, pa.ipc.open_stream(file) as stream:
-            schema = stream.schema
-            problem = ""
-            try:
-                batches.extend(stream)
-            except (pa.ArrowException, OSError) as error:
-                problem = _first_line(error)
-    except (pa.ArrowException, OSError) as error:
-        raise InputError(
-            f"{path}: is no readable Arrow stream ({_first_line(error)}); "
-            "nothing of the run was written yet, or it is another file"
-        ) from None
-    table = pa.Table.from_batches(batches, schema)
-    with path.open("rb") as raw:
-        raw.seek(-min(8, path.stat().st_size), os.SEEK_END)
-        closed = raw.read() == _STREAM_END
+    table, batches, problem, closed = read_stream(path)
     notes = {}
     if problem or not closed:
-        notes["recovered"] = f"the run was not closed: {table.num_rows} rows in {len(batches)} complete batches" + (
+        notes["recovered"] = f"the run was not closed: {table.num_rows} rows in {batches} complete batches" + (
             ", the batch after them is cut and left out" if problem else ""
         )
     return _from_table(path, table, notes)
@@ -237,18 +219,18 @@ def _read_stream(path: Path) -> Recording:
 def _from_table(path: Path, table: pa.Table, notes: dict[str, Any]) -> Recording:
     known = _known(path, tuple(table.column_names))
     for name in known:
-        about = table.schema.field(name)
-        unit = (about.metadata or {}).get(b"unit", CHANNELS[name].unit.encode()).decode()
-        if unit != CHANNELS[name].unit:
-            raise InputError(f"{path}: {name}: given in {unit}, allowed {CHANNELS[name].unit}; import it with a map")
-        if not (pa.types.is_floating(about.type) or pa.types.is_integer(about.type)):
-            raise InputError(f"{path}: {name}: given {about.type} values, allowed numbers; import it with a map")
+        unit, own = stored_unit(table, name), CHANNELS[name].unit
+        if unit not in (None, own):
+            raise InputError(f"{path}: {name}: given in {unit}, allowed {own}; import it with a map")
     # an empty value becomes NaN, which the check refuses with its row
-    columns = {name: table.column(name).to_numpy().astype(np.float64) for name in known}
+    columns = {name: numbers(path, table, name) for name in known}
     rows = regular_rows(columns, lambda row: f"{path}: row {row + 1}")
-    metadata = json.loads((table.schema.metadata or {}).get(METADATA_KEY, b"{}"))
+    metadata = stored_metadata(path, table)
+    metadata.pop(PARTS, None)  # the rows tell
     stored_s = metadata.pop("period_s", rows.period_s)
     period_s = rows.period_s if rows.rate_hz else stored_s
+    if abs(period_s - rows.period_s) > CLOCK_TOLERANCE * rows.period_s:
+        raise InputError(f"{path}: period_s: given {period_s} s, the rows have {rows.period_s:g} s; it is damaged")
     metadata = clock_metadata(rows) | metadata | _unknown(tuple(table.column_names)) | notes
     return Recording(path.stem, rows.columns, period_s, metadata)
 
@@ -274,6 +256,3 @@ def _unknown(names: tuple[str, ...]) -> dict[str, Any]:
     unknown = [name for name in names if name not in CHANNELS]
     return {"unknown_columns": unknown} if unknown else {}
 
-
-def _first_line(error: BaseException) -> str:
-    return str(error).splitlines()[0]

@@ -126,6 +126,13 @@ def test_stribeck_falls_from_static_to_coulomb(coulomb, static, stribeck) -> Non
     assert level(-0.5 * stribeck) == level(0.5 * stribeck)
 
 
+@given(level=st.floats(0.1, 5.0), slope=st.floats(-20.0, 20.0), position=st.floats(-0.5, 0.5))
+def test_a_friction_gradient_is_straight_and_never_pushes(level, slope, position) -> None:
+    at = AT_REST._replace(table_position_m=position)
+    found = call("friction_gradient", level, at, slope_1_m=slope)
+    assert found == pytest.approx(max(level * (1.0 + slope * position), 0.0), abs=1e-9)
+
+
 @given(
     level=st.floats(0.1, 5.0),
     fraction=st.floats(0.0, 1.0),

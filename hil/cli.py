@@ -28,6 +28,7 @@ from hil.commands.investigate import investigate
 from hil.commands.latency import latency
 from hil.commands.paper import paper
 from hil.commands.prove import prove
+from hil.commands.recover import recover
 from hil.commands.run import run
 from hil.commands.validate import validate
 from hil.commands.warm_up import warm_up
@@ -61,6 +62,7 @@ def _options(
 COMMANDS: tuple[tuple[str, Callable[..., Any]], ...] = (
     ("demo", demo),
     ("run", run),
+    ("recover", recover),
     ("import", import_),
     ("identify", identify),
     ("compare", compare),

@@ -1,0 +1,31 @@
+"""hil recover."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from hil.report.console import out
+
+
+def recover(
+    stream: Annotated[Path, typer.Argument(help="NAME.arrows of a run that was not closed.", show_default=False)],
+    to: Annotated[Path | None, typer.Option("--out", help="File to write. Default: NAME.parquet beside it.")] = None,
+) -> None:
+    """Make a readable recording of a run that was killed, or whose disk was full or damaged; NAME.arrows stays.
+
+    Whole blocks of the file are used, and the rows that are still in memory. Gaps are marked in the recording.
+    """
+    from hil.loop.certificate import of_rows
+    from hil.recording.recover import remains, write_remains
+
+    path = to or stream.with_suffix(".parquet")
+    if path.suffix != ".parquet":
+        from hil.errors import InputError
+
+        raise InputError(f"{path}: given the ending {path.suffix!r} as --out, allowed .parquet; correct it")
+    with remains(stream) as found:
+        write_remains(found, path, of_rows(dict(zip(found.channels, found.rows.T, strict=True)), found.metadata))
+        out.print(f"{path}: {found.text}")

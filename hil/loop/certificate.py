@@ -34,7 +34,7 @@ def before_run(
 def of_run(
     lateness_s: Sequence[float], skipped: int, period_s: float, disturbances: Disturbances | None = None
 ) -> dict[str, Any]:
-    """Part `run` of a certificate. lateness_s: of each tick; skipped: ticks left out; disturbances: None, not counted."""
+    """Part `run` of a certificate. lateness_s: of each tick; skipped: ticks left out; disturbances: None if unknown."""
     counted = disturbances._asdict() if disturbances is not None else {}
     return {"run": asdict(Jitter.of(lateness_s, period_s)) | {"skipped": skipped} | counted}
 

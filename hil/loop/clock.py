@@ -4,6 +4,8 @@ Tick k is due at start + k x period, never at now + period: an error of one tick
 that comes too late is left out, as are all that were due meanwhile: set-points sent in a burst would be steps.
 """
 
+from __future__ import annotations
+
 import math
 import time
 from array import array

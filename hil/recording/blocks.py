@@ -22,6 +22,8 @@ from hil.arrays import FloatArray
 _MARK = b"\xff\xff\xff\xff"  # begins each message; its length follows, 0 at the end of the stream
 STREAM_END = _MARK + bytes(4)
 
+_DAMAGED = (pa.ArrowException, OSError, ValueError, EOFError)  # what pyarrow raises at bytes that are no message
+
 
 class Block(NamedTuple):
     """Rows (n, columns) of a block, the number of the first (None: not told), and its place in the file [bytes]."""
@@ -47,7 +49,7 @@ def read_schema(data: bytes | mmap.mmap) -> tuple[pa.Schema, int] | None:
         message = pa.ipc.read_message(pa.py_buffer(data))
         schema = pa.ipc.read_schema(message)
         return schema, 8 + message.metadata.size
-    except (pa.ArrowException, OSError, ValueError):
+    except _DAMAGED:
         return None
 
 
@@ -70,7 +72,7 @@ def block_at(data: memoryview, start: int, schema: pa.Schema) -> Block | None:
         if b"crc32" in told and int(told[b"crc32"]) != _checksum(rows):
             return None
         return Block(rows, int(told[b"row"]) if b"row" in told else None, start, end)
-    except (pa.ArrowException, OSError, ValueError):
+    except _DAMAGED:
         return None
 
 

@@ -68,7 +68,7 @@ def remains(stream: Path) -> Iterator[Remains]:
             ring.remove()
     finally:
         if ring is not None:
-            os.close(ring.descriptor)
+            ring.release()
 
 
 def write_remains(found: Remains, path: Path, about: dict[str, Any]) -> None:

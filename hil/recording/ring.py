@@ -133,6 +133,11 @@ class Ring:
         with contextlib.suppress(FileNotFoundError):
             self.path.unlink()
 
+    def release(self) -> None:
+        """Unlock and close the file; the memory stays until nobody uses it."""
+        fcntl.flock(self.descriptor, fcntl.LOCK_UN)
+        os.close(self.descriptor)
+
     def __getitem__(self, counter: Counter) -> int:
         return self.counters[counter]
 

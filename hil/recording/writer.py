@@ -130,6 +130,16 @@ class Recorder:
         """Process id of the present writer."""
         return self._ring[Counter.WRITER_PID]
 
+    @property
+    def keeper_pid(self) -> int:
+        """Process id of the keeper of the writer."""
+        return self._keeper.pid
+
+    @property
+    def error(self) -> str:
+        """Why no row can be written at present; "" if rows can."""
+        return self._ring.error
+
     def record(self, row: Sequence[float]) -> None:
         """Take one row, a value per channel in their order. A tuple is fastest (0.2 us for 24 channels).
 
@@ -164,16 +174,17 @@ class Recorder:
         """
         if self._closed:  # closed before, or stopped with an error that was raised
             return None
-        gaps = [gap._asdict() for gap in self.gaps]
-        self._ring.say_end(
-            {"ended": ended, "rows": self._head, "rows_lost": self.rows_lost} | ({"gaps": gaps} if gaps else {}) | about
-        )
+        end: dict[str, Any] = {"ended": ended, "rows": self._head, "rows_lost": self.rows_lost, **about}
+        if self.gaps:
+            end["gaps"] = [gap._asdict() for gap in self.gaps]
+        self._ring.say_end(end)
         self._wake_writer()
         while not (finished := self._ring[Counter.FINISHED]) or self._keeper.poll() is None:
             self._check_keeper()
             time.sleep(0.001)
         self._closed = True
         self._close_pipe()
+        self._ring.release()
         return self.path if finished == 1 else None
 
     def __enter__(self) -> Self:
@@ -236,6 +247,7 @@ class Recorder:
         else:
             ring.remove()
             rest = "make room or choose another folder"
+        ring.release()
         raise HilError(
             f"{self.stream_path}: the recorder stopped at row {self.rows_on_disk}: {reason}; what was written until "
             f"then is readable; {rest}"

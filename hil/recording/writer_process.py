@@ -80,7 +80,9 @@ class Writer:
             if self._ring[Counter.ON_DISK]:
                 os.pwrite(self._file, STREAM_END, self._ring[Counter.FILE_BYTES])
                 with pa.memory_map(str(self.path)) as source, pa.ipc.open_stream(source) as stream:
-                    about = {METADATA_KEY: json.dumps(self._metadata | end | {"writers": self._ring[Counter.WRITERS]})}
+                    replaced = self._ring[Counter.WRITERS] - 1
+                    end |= {"writers_replaced": replaced} if replaced else {}
+                    about = {METADATA_KEY: json.dumps(self._metadata | end)}
                     table = stream.read_all().combine_chunks().replace_schema_metadata(about)
                 write_table(table, self.path.with_suffix(".parquet"))
             self._ring[Counter.FINISHED] = 1 if self._ring[Counter.ON_DISK] else 2

@@ -1,0 +1,345 @@
+"""A recording survives its processes and its disk: real processes, signals, files, and disks full or frozen."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_line import hil, refused
+from processes import DEADLINE_S, is_over, state_of, wait_for
+
+from hil.errors import HilError, InputError
+from hil.recording import ring
+from hil.recording.blocks import Block, read_schema, whole_blocks
+from hil.recording.recording import read_recording
+from hil.recording.recover import remains
+from hil.recording.writer import Recorder
+
+CHANNELS = ("time_s", "position_command_m", "motor_position_rad", "torque_n_m", "lateness_s")
+PERIOD_S = 0.001
+ROWS = 500
+
+
+def row(k: int) -> tuple[float, ...]:
+    return (k * PERIOD_S, k * 1.0, k * 2.0, k * 3.0, k * 1e-7)
+
+
+def recorder(folder: Path, rows: int = 0, **options: int) -> Recorder:
+    """A recorder as of a run, with some rows already on the disk."""
+    metadata = {"seed": 7, "real_time": {"clock": "wall"}}
+    run = Recorder(folder, "run", CHANNELS, PERIOD_S, metadata, **options)
+    for k in range(rows):
+        run.record(row(k))
+    wait_for(lambda: run.rows_on_disk == rows)
+    return run
+
+
+def assert_holds(path: Path, numbers: np.ndarray) -> None:
+    """The file holds the rows of these numbers, bit by bit."""
+    recording = read_recording(path)
+    expected = np.array([row(int(k)) for k in numbers])
+    for index, name in enumerate(CHANNELS):
+        assert np.array_equal(recording[name], expected[:, index]), name
+
+
+def rings() -> set[Path]:
+    return set(ring.FOLDER.glob(ring.PATTERN))
+
+
+@pytest.fixture(autouse=True)
+def _no_ring_is_left() -> Iterator[None]:
+    before = rings()
+    yield
+    for path in rings() - before:
+        path.unlink()
+
+
+LOOP = f"""
+import sys
+from pathlib import Path
+from hil.recording.writer import Recorder
+channels = {CHANNELS!r}
+run = Recorder(Path(sys.argv[1]), "run", channels, {PERIOD_S}, {{"seed": 7, "real_time": {{"clock": "wall"}}}})
+for k in range({ROWS}):
+    run.record((k * {PERIOD_S}, k * 1.0, k * 2.0, k * 3.0, k * 1e-7))
+print(run.keeper_pid, run.writer_pid, flush=True)
+sys.stdin.read()
+"""
+
+
+class Loop:
+    """A loop in a process of its own that has recorded ROWS rows and now stands still."""
+
+    def __init__(self, folder: Path) -> None:
+        self.process = subprocess.Popen(
+            [sys.executable, "-c", LOOP, str(folder)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        )
+        assert self.process.stdout is not None
+        self.keeper, self.writer = map(int, self.process.stdout.readline().split())
+
+    def kill(self, *pids: int) -> None:
+        """Kill processes of the recorder, then the loop."""
+        for pid in pids:
+            os.kill(pid, signal.SIGKILL)
+        self.process.kill()
+        self.process.communicate(timeout=DEADLINE_S)
+
+
+def recover(folder: Path) -> str:
+    ran = hil(folder, "recover", "run.arrows")
+    assert ran.returncode == 0, ran.stderr
+    return " ".join(ran.stdout.split())
+
+
+# -- processes --------------------------------------------------------------------------------------------------------
+
+
+def test_a_keeper_that_is_killed_is_replaced_at_the_end(tmp_path: Path) -> None:
+    run = recorder(tmp_path, 100)
+    os.kill(run.keeper_pid, signal.SIGKILL)
+    for k in range(100, 300):
+        run.record(row(k))
+    wait_for(lambda: run.rows_on_disk == 300)  # its writer goes on
+    assert_holds(run.close(), np.arange(300))
+
+
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP])
+def test_keeper_killed_and_writer_killed_or_stopped(tmp_path: Path, how: signal.Signals) -> None:
+    run = recorder(tmp_path, 100)
+    os.kill(run.keeper_pid, signal.SIGKILL)
+    os.kill(run.writer_pid, how)
+    for k in range(100, 300):
+        run.record(row(k))
+    assert_holds(run.close(), np.arange(300))
+
+
+def test_a_writer_killed_while_the_dead_loop_s_rows_are_saved(tmp_path: Path) -> None:
+    loop = Loop(tmp_path)
+    os.kill(loop.writer, signal.SIGSTOP)
+    loop.kill()
+    wait_for(lambda: is_over(loop.keeper))
+    assert_holds(tmp_path / "run.arrows", np.arange(ROWS))
+    assert not rings()
+
+
+def test_all_processes_killed_at_once_lose_nothing_that_is_in_memory(tmp_path: Path) -> None:
+    loop = Loop(tmp_path)
+    loop.kill(loop.keeper, loop.writer)
+    assert f"{ROWS} rows, " in recover(tmp_path)
+    assert_holds(tmp_path / "run.parquet", np.arange(ROWS))
+    metadata = read_recording(tmp_path / "run.parquet").metadata
+    assert (metadata["seed"], metadata["ended"], metadata["gaps"]) == (7, "not closed", [])
+    run = metadata["real_time"]["run"]
+    assert (run["ticks"], run["missed"], run["skipped"]) == (ROWS, 0, 0)
+    assert run["max_s"] == (ROWS - 1) * 1e-7
+    assert not rings()
+    assert (tmp_path / "run.arrows").exists()
+
+
+def test_a_stopped_loop_s_rows_reach_the_disk(tmp_path: Path) -> None:
+    loop = Loop(tmp_path)
+    loop.process.send_signal(signal.SIGSTOP)
+    wait_for(lambda: len(read_or_none(tmp_path / "run.arrows")) == ROWS)
+    loop.kill()
+    wait_for(lambda: is_over(loop.keeper))
+
+
+def read_or_none(path: Path) -> np.ndarray:
+    try:
+        return read_recording(path)["time_s"]
+    except InputError:  # no block yet
+        return np.empty(0)
+
+
+def test_recover_waits_for_a_recorder_at_work(tmp_path: Path) -> None:
+    run = recorder(tmp_path, 100)
+    with pytest.raises(InputError, match="its recorder still works"), remains(run.stream_path):
+        pass
+    assert_holds(run.close(), np.arange(100))
+
+
+def test_signals_of_a_terminal_or_a_service_do_not_reach_the_recorder(tmp_path: Path) -> None:
+    run = recorder(tmp_path, 100)
+    for name in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGABRT):
+        os.kill(run.keeper_pid, name)
+        os.kill(run.writer_pid, name)
+    assert_holds(run.close(), np.arange(100))
+    assert "writers_replaced" not in read_recording(run.path).metadata
+
+
+# -- disks ------------------------------------------------------------------------------------------------------------
+
+
+def mounted(folder: Path, *command: str) -> Iterator[Path]:
+    done = subprocess.run([*command, str(folder)], capture_output=True, check=False)
+    if done.returncode:
+        pytest.skip(f"no right to mount: {done.stderr.decode().strip()}")
+    try:
+        yield folder
+    finally:
+        subprocess.run(["umount", str(folder)], check=True)
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Iterator[Path]:
+    (tmp_path / "small").mkdir()
+    yield from mounted(tmp_path / "small", "mount", "-t", "tmpfs", "-o", "size=1m", "tmpfs")
+
+
+@pytest.fixture
+def freezable_disk(tmp_path: Path) -> Iterator[Path]:
+    image, folder = tmp_path / "image", tmp_path / "frozen"
+    image.write_bytes(bytes(16 << 20))
+    folder.mkdir()
+    made = subprocess.run(["mkfs.ext4", "-q", str(image)], capture_output=True, check=False)
+    if made.returncode:
+        pytest.skip("mkfs.ext4 is missing")
+    yield from mounted(folder, "mount", "-o", "loop", str(image))
+
+
+def fill(disk: Path) -> Path:
+    """Leave no block of a disk free; returns the file to remove."""
+    path = disk / "ballast"
+    with path.open("wb", buffering=0) as file, contextlib.suppress(OSError):
+        while file.write(bytes(4096)):
+            pass
+    return path
+
+
+def test_a_full_disk_costs_no_row_once_it_has_room_again(small_disk: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    run = recorder(small_disk, 100)
+    ballast = fill(small_disk)
+    for k in range(100, 5000):
+        run.record(row(k))
+    wait_for(lambda: "No space left" in run.error)
+    assert run.rows_on_disk < 5000
+    ballast.unlink()
+    wait_for(lambda: run.rows_on_disk == 5000)
+    wait_for(lambda: not run.error)
+    assert_holds(run.close(), np.arange(5000))
+    said = capfd.readouterr().err
+    assert "No space left on device" in said
+    assert "make room" in said
+
+
+def test_a_disk_that_stays_full_keeps_the_rest_in_memory_for_recovery(small_disk: Path) -> None:
+    run = recorder(small_disk, 100)
+    ballast = fill(small_disk)
+    for k in range(100, 5000):
+        run.record(row(k))
+    with pytest.raises(HilError, match=r"No space left on device; .* rows wait in memory .*hil recover .*run\.arrows"):
+        run.close("complete: the profile is done")
+    on_disk = run.rows_on_disk
+    assert len(read_recording(run.stream_path)) == on_disk < 5000
+    ballast.unlink()
+    assert f"5000 rows, {5000 - on_disk} of them from memory; no gap" in recover(small_disk)
+    assert_holds(small_disk / "run.parquet", np.arange(5000))
+    assert read_recording(small_disk / "run.parquet").metadata["ended"] == "complete: the profile is done"
+
+
+def test_a_disk_that_does_not_answer_does_not_hold_the_loop(freezable_disk: Path) -> None:
+    run = recorder(freezable_disk, 100)
+    subprocess.run(["fsfreeze", "--freeze", str(freezable_disk)], check=True)
+    try:
+        for k in range(100, 5000):
+            run.record(row(k))
+        wait_for(lambda: state_of(run.writer_pid) == "D")
+    finally:
+        subprocess.run(["fsfreeze", "--unfreeze", str(freezable_disk)], check=True)
+    assert_holds(run.close(), np.arange(5000))
+    assert "writers_replaced" not in read_recording(run.path).metadata
+
+
+# -- damaged files ----------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def torn(tmp_path: Path) -> Path:
+    """Stream of a run after a power failure: five blocks of 100 rows, nothing in memory."""
+    run = recorder(tmp_path)
+    for block in range(5):
+        for k in range(100 * block, 100 * (block + 1)):
+            run.record(row(k))
+        wait_for(lambda wanted=100 * (block + 1): run.rows_on_disk == wanted)
+    data = run.stream_path.read_bytes()
+    run.close()
+    path = tmp_path / "torn" / "run.arrows"
+    path.parent.mkdir()
+    path.write_bytes(data)
+    return path
+
+
+def blocks_of(path: Path) -> list[Block]:
+    data = path.read_bytes()
+    schema, start = read_schema(data)
+    return list(whole_blocks(data, start, schema))
+
+
+def test_blocks_know_their_first_row(torn: Path) -> None:
+    blocks = blocks_of(torn)
+    assert [block.first for block in blocks] == np.cumsum([0, *(len(block.rows) for block in blocks[:-1])]).tolist()
+    assert blocks[-1].end == torn.stat().st_size
+
+
+@pytest.mark.parametrize("cut", [1, 8, 100])
+def test_a_torn_last_block_is_left_out(torn: Path, cut: int) -> None:
+    last = blocks_of(torn)[-1]
+    torn.write_bytes(torn.read_bytes()[:-cut])
+    assert f"{last.end - last.start - cut} bytes of the file are damaged" in recover(torn.parent)
+    assert_holds(torn.with_suffix(".parquet"), np.arange(ROWS - len(last.rows)))
+
+
+def test_a_last_block_of_zeros_as_after_a_power_failure_is_left_out(torn: Path) -> None:
+    last = blocks_of(torn)[-1]
+    torn.write_bytes(torn.read_bytes()[:-1000] + bytes(1000))
+    recover(torn.parent)
+    assert_holds(torn.with_suffix(".parquet"), np.arange(ROWS - len(last.rows)))
+
+
+@pytest.mark.parametrize("place", [0, 4, 40, -9])
+def test_a_damaged_block_leaves_a_marked_gap(torn: Path, place: int) -> None:
+    blocks = blocks_of(torn)
+    bad = next(block for block in blocks if block.first == 200)
+    data = bytearray(torn.read_bytes())
+    data[bad.end + place if place < 0 else bad.start + place] ^= 0x10
+    torn.write_bytes(data)
+    recover(torn.parent)
+    recording = read_recording(torn.with_suffix(".parquet"))
+    assert recording.metadata["gaps"] == [{"row": 200, "rows_lost": len(bad.rows)}]
+    assert_holds(torn.with_suffix(".parquet"), np.r_[0:200, 200 + len(bad.rows) : ROWS])
+    assert len(recording.parts()) == 2
+
+
+def test_without_head_and_memory_nothing_can_be_told(torn: Path) -> None:
+    torn.write_bytes(bytes(100) + torn.read_bytes()[100:])
+    with pytest.raises(InputError, match="its head is damaged or missing"), remains(torn):
+        pass
+
+
+def test_a_damaged_head_is_replaced_from_memory(tmp_path: Path) -> None:
+    loop = Loop(tmp_path)
+    loop.kill(loop.keeper, loop.writer)
+    (tmp_path / "run.arrows").write_bytes(b"")
+    assert f"{ROWS} rows, {ROWS} of them from memory; no gap" in recover(tmp_path)
+    assert_holds(tmp_path / "run.parquet", np.arange(ROWS))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["run.parquet"], "given no .arrows file"),
+        (["absent.arrows"], "given no .arrows file"),
+        (["run.arrows", "--out", "run.csv"], "allowed .parquet"),
+        (["run.arrows", "--out", "taken.parquet"], "exists and is not overwritten"),
+    ],
+)
+def test_wrong_files_are_refused(torn: Path, arguments: list[str], message: str) -> None:
+    (torn.parent / "taken.parquet").write_bytes(b"")
+    assert message in " ".join(refused(torn.parent, "recover", *arguments).split())

@@ -25,7 +25,7 @@ STREAM_END = _MARK + bytes(4)
 _DAMAGED = (pa.ArrowException, OSError, ValueError, EOFError)  # what pyarrow raises at bytes that are no message
 
 
-class Block(NamedTuple):
+class StreamBlock(NamedTuple):
     """Rows (n, columns) of a block, the number of the first (None: not told), and its place in the file [bytes]."""
 
     rows: FloatArray
@@ -53,7 +53,7 @@ def read_schema(data: bytes | mmap.mmap) -> tuple[pa.Schema, int] | None:
         return None
 
 
-def block_at(data: memoryview, start: int, schema: pa.Schema) -> Block | None:
+def block_at(data: memoryview, start: int, schema: pa.Schema) -> StreamBlock | None:
     """Return the block that begins at `start` of a stream, None if there is no whole one."""
     head = bytes(data[start : start + 8])
     if len(head) < 8 or head[:4] != _MARK or not 0 < struct.unpack("<i", head[4:])[0] <= len(data) - start - 8:
@@ -71,12 +71,12 @@ def block_at(data: memoryview, start: int, schema: pa.Schema) -> Block | None:
         told = dict(about or {})
         if b"crc32" in told and int(told[b"crc32"]) != _checksum(rows):
             return None
-        return Block(rows, int(told[b"row"]) if b"row" in told else None, start, end)
+        return StreamBlock(rows, int(told[b"row"]) if b"row" in told else None, start, end)
     except _DAMAGED:
         return None
 
 
-def whole_blocks(data: bytes | mmap.mmap, start: int, schema: pa.Schema) -> Iterator[Block]:
+def whole_blocks(data: bytes | mmap.mmap, start: int, schema: pa.Schema) -> Iterator[StreamBlock]:
     """Yield the whole blocks of a stream from `start` on; what stands between them is damaged and left out."""
     while start >= 0:
         block = block_at(memoryview(data), start, schema)

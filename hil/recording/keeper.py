@@ -26,7 +26,8 @@ def keep(ring: Ring) -> int:
     _end_orphan(ring[Counter.WRITER_PID])
     while True:
         writer = subprocess.Popen(
-            [sys.executable, "-m", "hil.recording.writer_process", str(ring.descriptor)], pass_fds=[ring.descriptor]
+            [sys.executable, "-P", "-m", "hil.recording.writer_process", str(ring.descriptor)],
+            pass_fds=[ring.descriptor],
         )
         ring[Counter.WRITER_PID] = writer.pid
         ring[Counter.WRITERS] += 1

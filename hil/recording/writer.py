@@ -214,7 +214,7 @@ class Recorder:
 
     def _start_keeper(self) -> None:
         self._keeper = subprocess.Popen(
-            [sys.executable, "-m", "hil.recording.keeper", str(self._ring.descriptor)],
+            [sys.executable, "-P", "-m", "hil.recording.keeper", str(self._ring.descriptor)],
             stdin=subprocess.PIPE,
             pass_fds=[self._ring.descriptor],
             start_new_session=True,

@@ -183,6 +183,18 @@ def test_a_folder_that_cannot_be_written_is_refused(tmp_path: Path) -> None:
         recorder(tmp_path / "file")
 
 
+def test_files_in_the_working_folder_are_no_modules_of_the_recorder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("struct.py", "json.py", "numpy.py"):
+        (tmp_path / name).write_text("raise ImportError\n")
+    monkeypatch.chdir(tmp_path)
+    run = recorder(tmp_path / "out")
+    run.record(row(0))
+    run.close()
+    assert run.path.exists()
+
+
 def test_metadata_tells_versions_and_everything_needed_to_repeat_a_run() -> None:
     about = run_metadata(
         bench={"name": "b"}, profile={"name": "p"}, seed=3, commands=["hil", "run"], start_time="2024-01-01T00:00:00Z"

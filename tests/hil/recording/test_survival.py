@@ -17,7 +17,7 @@ from processes import DEADLINE_S, is_over, state_of, wait_for
 
 from hil.errors import HilError, InputError
 from hil.recording import ring
-from hil.recording.blocks import Block, read_schema, whole_blocks
+from hil.recording.blocks import StreamBlock, read_schema, whole_blocks
 from hil.recording.recording import read_recording
 from hil.recording.recover import remains
 from hil.recording.writer import Recorder
@@ -276,7 +276,7 @@ def torn(tmp_path: Path) -> Path:
     return path
 
 
-def blocks_of(path: Path) -> list[Block]:
+def blocks_of(path: Path) -> list[StreamBlock]:
     data = path.read_bytes()
     schema, start = read_schema(data)
     return list(whole_blocks(data, start, schema))

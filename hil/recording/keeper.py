@@ -1,7 +1,7 @@
 """The process that keeps a writer at work: it starts one, and another one when that is killed, stopped or hangs.
 
 It does not touch the disk, and changes nothing of the rows. While the axis moves it tells on standard error what the
-user can mend: a writer that had to be replaced, a disk without room.
+user can mend: a disk without room, a disk that does not answer, a writer that had to be replaced.
 """
 
 from __future__ import annotations
@@ -17,45 +17,63 @@ from pathlib import Path
 from hil.recording.ring import Counter, Ring
 
 WATCH_S = 0.05  # how often the writer is looked at; its end is told by the kernel at once
-HUNG_S = 10.0  # without a sign of life; a start of pyarrow on a loaded machine takes seconds, the ring lasts a minute
+SILENT_S = 2.0  # without a sign of life the user is told; a disk that syncs for longer is in trouble
+HUNG_S = 10.0  # and the writer is replaced; a start of pyarrow on a loaded machine takes seconds, the ring lasts longer
 
 
-def keep(ring: Ring) -> int:
-    """Keep a writer at work until the recording is over. Returns the exit code of the last one."""
-    name, error = Path(ring.task["path"]).name, ""
-    _end_orphan(ring[Counter.WRITER_PID])
-    while True:
-        writer = subprocess.Popen(
-            [sys.executable, "-P", "-m", "hil.recording.writer_process", str(ring.descriptor)],
-            pass_fds=[ring.descriptor],
-        )
-        ring[Counter.WRITER_PID] = writer.pid
-        ring[Counter.WRITERS] += 1
-        beat, beat_s = ring[Counter.BEAT], time.monotonic()
-        fate = ""
+class Keeper:
+    """Keeps a writer at work on a ring."""
+
+    def __init__(self, ring: Ring) -> None:
+        self._ring, self._name = ring, Path(ring.task["path"]).name
+        self._told = ""  # the trouble that was told last
+        _end_orphan(ring[Counter.WRITER_PID])
+
+    def keep(self) -> int:
+        """Keep a writer at work until the recording is over. Returns the exit code of the last one."""
+        while True:
+            command = [sys.executable, "-P", "-m", "hil.recording.writer_process", str(self._ring.descriptor)]
+            writer = subprocess.Popen(command, pass_fds=[self._ring.descriptor])
+            self._ring[Counter.WRITER_PID] = writer.pid
+            self._ring[Counter.WRITERS] += 1
+            fate = self._watch(writer)
+            if writer.returncode == 0:
+                self._ring.remove()
+            if writer.returncode >= 0:
+                return writer.returncode
+            row = self._ring[Counter.ON_DISK]
+            self._say(f"its process {writer.pid} {fate or 'was killed'}; another one goes on at row {row}")
+
+    def _watch(self, writer: subprocess.Popen[bytes]) -> str:
+        """Wait for the end of a writer; kill it if it is stopped or hangs, and return which."""
+        fate, beat, beat_s = "", self._ring[Counter.BEAT], time.monotonic()
         while True:
             signal.sigtimedwait({signal.SIGCHLD}, WATCH_S)
             pid, status = os.waitpid(writer.pid, os.WNOHANG | os.WUNTRACED)
             if pid and not os.WIFSTOPPED(status):
                 writer.returncode = os.waitstatus_to_exitcode(status)
-                break
-            if ring[Counter.BEAT] != beat:
-                beat, beat_s = ring[Counter.BEAT], time.monotonic()
-            hung = time.monotonic() - beat_s > HUNG_S and not _waits_for_disk(writer.pid)
-            if pid or hung:
+                return fate
+            if self._ring[Counter.BEAT] != beat:
+                beat, beat_s = self._ring[Counter.BEAT], time.monotonic()
+            silent_s = time.monotonic() - beat_s
+            if pid or (silent_s > HUNG_S and not _waits_for_disk(writer.pid)):
                 fate = "was stopped" if pid else "hung"
-                os.kill(writer.pid, signal.SIGKILL)
-            if ring.error != error:
-                error = ring.error
-                rows = ring[Counter.RECORDED] - ring[Counter.ON_DISK]
-                _tell(f"{error}; {rows} rows wait in memory, which holds {ring.rows}: make room" if error
-                      else "the rows are written again", name)  # fmt: skip
-        if writer.returncode == 0:
-            ring.remove()
-        if writer.returncode >= 0:
-            return writer.returncode
-        _tell(f"its process {writer.pid} {fate or 'was killed'}; another one goes on at row {ring[Counter.ON_DISK]}",
-              name)  # fmt: skip
+                writer.kill()
+            self._tell_trouble("the disk does not answer" if silent_s > SILENT_S else "")
+
+    def _tell_trouble(self, silence: str) -> None:
+        """Tell the user why rows wait in memory, once for each reason, and when that is over."""
+        trouble = self._ring.error or silence
+        if trouble == self._told:
+            return
+        self._told = trouble
+        waiting = self._ring[Counter.RECORDED] - self._ring[Counter.ON_DISK]
+        self._say(f"{trouble}; {waiting} rows wait in memory, which holds {self._ring.rows}: make room, or mend the disk"
+                  if trouble else "rows are written again")  # fmt: skip
+
+    def _say(self, text: str) -> None:
+        with contextlib.suppress(OSError):  # a terminal that is closed
+            print(f"recorder of {self._name}: {text}", file=sys.stderr, flush=True)
 
 
 def _end_orphan(pid: int) -> None:
@@ -73,20 +91,15 @@ def _waits_for_disk(pid: int) -> bool:
         return False
 
 
-def _tell(text: str, name: str) -> None:
-    with contextlib.suppress(OSError):  # a terminal that is closed
-        print(f"recorder of {name}: {text}", file=sys.stderr, flush=True)
-
-
 def main() -> None:
-    """Keep the ring whose descriptor is the argument; standard input ends when the loop does."""
+    """Keep a writer on the ring whose descriptor is the argument; standard input ends when the loop does."""
     for name in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGABRT):  # as in the writer
         signal.signal(name, signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGCHLD})
     if os.sched_getscheduler(0) != os.SCHED_OTHER:
         os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))  # not with the loop's priority
     os.sched_setaffinity(0, range(os.cpu_count() or 1))  # nor bound to its core
-    os._exit(keep(Ring(int(sys.argv[1]))))
+    os._exit(Keeper(Ring(int(sys.argv[1]))).keep())
 
 
 if __name__ == "__main__":

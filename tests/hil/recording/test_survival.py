@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import os
 import signal
 import subprocess
@@ -174,6 +175,23 @@ def test_signals_of_a_terminal_or_a_service_do_not_reach_the_recorder(tmp_path: 
     assert "writers_replaced" not in read_recording(run.path).metadata
 
 
+@pytest.mark.long
+def test_a_writer_that_hangs_is_replaced(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """A new writer waits for a lock of the one before, which is held here: it sleeps, and gives no sign of life."""
+    run = recorder(tmp_path, 100)
+    first, lock = run.writer_pid, os.open(next(iter(rings())), os.O_RDWR)
+    os.kill(first, signal.SIGKILL)
+    fcntl.lockf(lock, fcntl.LOCK_EX)
+    wait_for(lambda: run.writer_pid != first)
+    second = run.writer_pid
+    wait_for(lambda: run.writer_pid != second)
+    fcntl.lockf(lock, fcntl.LOCK_UN)
+    for k in range(100, 300):
+        run.record(row(k))
+    assert_holds(run.close(), np.arange(300))
+    assert f"its process {second} hung; another one goes on at row 100" in capfd.readouterr().err
+
+
 # -- disks ------------------------------------------------------------------------------------------------------------
 
 
@@ -244,13 +262,17 @@ def test_a_disk_that_stays_full_keeps_the_rest_in_memory_for_recovery(small_disk
     assert read_recording(small_disk / "run.parquet").metadata["ended"] == "complete: the profile is done"
 
 
-def test_a_disk_that_does_not_answer_does_not_hold_the_loop(freezable_disk: Path) -> None:
+def test_a_disk_that_does_not_answer_does_not_hold_the_loop(
+    freezable_disk: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
     run = recorder(freezable_disk, 100)
     subprocess.run(["fsfreeze", "--freeze", str(freezable_disk)], check=True)
     try:
         for k in range(100, 5000):
             run.record(row(k))
         wait_for(lambda: state_of(run.writer_pid) == "D")
+        told: list[str] = []
+        wait_for(lambda: told.append(capfd.readouterr().err) or "the disk does not answer" in "".join(told))
     finally:
         subprocess.run(["fsfreeze", "--unfreeze", str(freezable_disk)], check=True)
     assert_holds(run.close(), np.arange(5000))

@@ -53,7 +53,8 @@ class Keeper:
             if pid and not os.WIFSTOPPED(status):
                 writer.returncode = os.waitstatus_to_exitcode(status)
                 return fate
-            if self._ring[Counter.BEAT] != beat:
+            ended = self._ring[Counter.END_BYTES] > 0  # then a Parquet file is made of it, which takes its time
+            if self._ring[Counter.BEAT] != beat or ended:
                 beat, beat_s = self._ring[Counter.BEAT], time.monotonic()
             silent_s = time.monotonic() - beat_s
             if pid or (silent_s > HUNG_S and not _waits_for_disk(writer.pid)):
@@ -68,8 +69,8 @@ class Keeper:
             return
         self._told = trouble
         waiting = self._ring[Counter.RECORDED] - self._ring[Counter.ON_DISK]
-        self._say(f"{trouble}; {waiting} rows wait in memory, which holds {self._ring.rows}: make room, or mend the disk"
-                  if trouble else "rows are written again")  # fmt: skip
+        memory = f"{waiting} rows wait in memory, which holds {self._ring.rows}"
+        self._say(f"{trouble}; {memory}: make room, or mend the disk" if trouble else "rows are written again")
 
     def _say(self, text: str) -> None:
         with contextlib.suppress(OSError):  # a terminal that is closed

@@ -3,7 +3,7 @@
     record(row) --> hil.recording.ring --> hil.recording.writer_process --> NAME.arrows --(close)--> NAME.parquet
                                              ^ started and replaced by hil.recording.keeper
 
-The loop never touches the disk and never waits for it. The Arrow stream grows every 50 ms; a run that is closed
+The loop never touches the disk and never waits for it. The Arrow stream grows every 40 ms; a run that is closed
 becomes a Parquet file. What is not on the disk is in the ring, which outlives every process
 (`hil.recording.recover`).
 """

@@ -27,7 +27,7 @@ from hil.recording.recording import METADATA_KEY, arrow_schema, write_table
 from hil.recording.ring import ROWS_AT, Counter, Ring
 
 POLL_S = 0.02  # how often the ring is looked at
-FLUSH_S = 0.05  # a row waits no longer than this for the file and the disk: with the poll less than 100 ms
+FLUSH_S = 0.03  # a row waits no longer than this and two polls for the file, and then for the disk: less than 100 ms
 FLUSH_ROWS = 8192  # in virtual time rows come faster: flush when there are as many
 RETRY_S = 0.2  # after an error of the disk
 GIVE_UP_S = 3.0  # how long a disk without room is tried after the run

@@ -49,16 +49,16 @@ class Keeper:
         fate, beat, beat_s = "", self._ring[Counter.BEAT], time.monotonic()
         while True:
             signal.sigtimedwait({signal.SIGCHLD}, WATCH_S)
-            pid, status = os.waitpid(writer.pid, os.WNOHANG | os.WUNTRACED)
-            if pid and not os.WIFSTOPPED(status):
-                writer.returncode = os.waitstatus_to_exitcode(status)
+            if end_if_stopped(writer):
+                fate = "was stopped"
+            if writer.returncode is not None:
                 return fate
             ended = self._ring[Counter.END_BYTES] > 0  # then a Parquet file is made of it, which takes its time
             if self._ring[Counter.BEAT] != beat or ended:
                 beat, beat_s = self._ring[Counter.BEAT], time.monotonic()
             silent_s = time.monotonic() - beat_s
-            if pid or (silent_s > HUNG_S and not _waits_for_disk(writer.pid)):
-                fate = "was stopped" if pid else "hung"
+            if silent_s > HUNG_S and not _waits_for_disk(writer.pid):
+                fate = "hung"
                 writer.kill()
             self._tell_trouble("the disk does not answer" if silent_s > SILENT_S else "")
 
@@ -75,6 +75,17 @@ class Keeper:
     def _say(self, text: str) -> None:
         with contextlib.suppress(OSError):  # a terminal that is closed
             print(f"recorder of {self._name}: {text}", file=sys.stderr, flush=True)
+
+
+def end_if_stopped(child: subprocess.Popen[bytes]) -> bool:
+    """Kill a child that is stopped, as by SIGSTOP, and return True; set the return code of one that has ended."""
+    pid, status = os.waitpid(child.pid, os.WNOHANG | os.WUNTRACED)
+    if pid and os.WIFSTOPPED(status):
+        child.kill()
+        return True
+    if pid:
+        child.returncode = os.waitstatus_to_exitcode(status)
+    return False
 
 
 def _end_orphan(pid: int) -> None:

@@ -61,8 +61,8 @@ class Ring:
         self.counters = memoryview(self.memory)[:_COUNTER_BYTES].cast("q")
 
     @classmethod
-    def create(cls, task: Mapping[str, Any], rows: int, columns: int) -> Self:
-        """Make and lock a ring. Raises HilError for lack of shared memory."""
+    def create(cls, task: Mapping[str, Any], rows: int, columns: int, *, outlives: bool = True) -> Self:
+        """Make and lock a ring, which `outlives` its processes or not. Raises HilError for lack of shared memory."""
         text = json.dumps(task, default=str).encode()
         counters = [0] * (_COUNTER_BYTES // 8)
         counters[Counter.RING_ROWS], counters[Counter.COLUMNS] = rows, columns
@@ -70,7 +70,8 @@ class Ring:
         task_at = ROWS_AT + rows * columns * 8
         path = FOLDER / f"{PATTERN[:-1]}{os.getpid()}-{os.urandom(4).hex()}"
         try:
-            descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
+            flags = os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC
+            descriptor = os.open(path, flags, 0o600) if outlives else os.memfd_create(path.name)
         except OSError as error:
             raise HilError(f"{path}: no shared memory ({error.strerror}); mount a tmpfs at {FOLDER}") from None
         try:

@@ -24,6 +24,7 @@ from typing import Any, NamedTuple, Self
 
 from hil.channels import CHANNELS
 from hil.errors import HilError, InputError
+from hil.recording.keeper import end_if_stopped
 from hil.recording.ring import ROWS_AT, Counter, Ring
 
 RING_ROWS = 1 << 16  # about a minute at 1 kHz that the disk may stall
@@ -99,7 +100,8 @@ class Recorder:
             "metadata": {**metadata, "period_s": period_s},
         }
         try:
-            self._ring = Ring.create(task, ring_rows, len(channels))
+            # a run in virtual time can be repeated: nothing of it has to outlive its processes
+            self._ring = Ring.create(task, ring_rows, len(channels), outlives=not lossless)
         except HilError:
             self.stream_path.unlink(missing_ok=True)
             raise
@@ -179,8 +181,7 @@ class Recorder:
             end["gaps"] = [gap._asdict() for gap in self.gaps]
         self._ring.say_end(end)
         self._wake_writer()
-        while not (finished := self._ring[Counter.FINISHED]) or self._keeper.poll() is None:
-            self._check_keeper()
+        while not (self._check_keeper() and (finished := self._ring[Counter.FINISHED])):
             time.sleep(0.001)
         self._closed = True
         self._close_pipe()
@@ -226,16 +227,18 @@ class Recorder:
             self._keeper.stdin.write(b"\n")
             self._keeper.stdin.flush()
 
-    def _check_keeper(self) -> None:
-        """Replace a keeper that was killed. Raises HilError if it ended because the recording cannot be written."""
-        code, ring = self._keeper.poll(), self._ring
+    def _check_keeper(self) -> bool:
+        """Replace a keeper that was killed or stopped; True if it is done. Raises HilError if the recording cannot be
+        written."""
+        end_if_stopped(self._keeper)
+        code, ring = self._keeper.returncode, self._ring
         if code is None or (code == 0 and ring[Counter.FINISHED]):
-            return
+            return code == 0
         self._close_pipe()
         if code <= 0:
             self._start_keeper()
             self._wake_writer()
-            return
+            return False
         self._closed = True
         reason = ring.error or f"its process ended with exit code {code}, see above"
         waiting = self._head - self.rows_on_disk

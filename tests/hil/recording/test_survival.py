@@ -50,16 +50,9 @@ def assert_holds(path: Path, numbers: np.ndarray) -> None:
         assert np.array_equal(recording[name], expected[:, index]), name
 
 
-def rings() -> set[Path]:
-    return set(ring.FOLDER.glob(ring.PATTERN))
-
-
-@pytest.fixture(autouse=True)
-def _no_ring_is_left() -> Iterator[None]:
-    before = rings()
-    yield
-    for path in rings() - before:
-        path.unlink()
+def rings(pid: int) -> list[Path]:
+    """Files of the rings that a process has made."""
+    return list(ring.FOLDER.glob(f"{ring.PATTERN[:-1]}{pid}-*"))
 
 
 LOOP = f"""
@@ -86,7 +79,7 @@ class Loop:
         self.keeper, self.writer = map(int, self.process.stdout.readline().split())
 
     def kill(self, *pids: int) -> None:
-        """Kill processes of the recorder, then the loop."""
+        """Kill processes of the recorder, then the loop; the test removes what they leave."""
         for pid in pids:
             os.kill(pid, signal.SIGKILL)
         self.process.kill()
@@ -111,6 +104,15 @@ def test_a_keeper_that_is_killed_is_replaced_at_the_end(tmp_path: Path) -> None:
     assert_holds(run.close(), np.arange(300))
 
 
+def test_a_keeper_that_is_stopped_is_replaced_at_the_end(tmp_path: Path) -> None:
+    run = recorder(tmp_path, 100)
+    os.kill(run.keeper_pid, signal.SIGSTOP)
+    os.kill(run.writer_pid, signal.SIGKILL)
+    for k in range(100, 300):
+        run.record(row(k))
+    assert_holds(run.close(), np.arange(300))
+
+
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP])
 def test_keeper_killed_and_writer_killed_or_stopped(tmp_path: Path, how: signal.Signals) -> None:
     run = recorder(tmp_path, 100)
@@ -127,7 +129,7 @@ def test_a_writer_killed_while_the_dead_loop_s_rows_are_saved(tmp_path: Path) ->
     loop.kill()
     wait_for(lambda: is_over(loop.keeper))
     assert_holds(tmp_path / "run.arrows", np.arange(ROWS))
-    assert not rings()
+    assert not rings(loop.process.pid)
 
 
 def test_all_processes_killed_at_once_lose_nothing_that_is_in_memory(tmp_path: Path) -> None:
@@ -140,7 +142,7 @@ def test_all_processes_killed_at_once_lose_nothing_that_is_in_memory(tmp_path: P
     run = metadata["real_time"]["run"]
     assert (run["ticks"], run["missed"], run["skipped"]) == (ROWS, 0, 0)
     assert run["max_s"] == (ROWS - 1) * 1e-7
-    assert not rings()
+    assert not rings(loop.process.pid)
     assert (tmp_path / "run.arrows").exists()
 
 
@@ -179,7 +181,7 @@ def test_signals_of_a_terminal_or_a_service_do_not_reach_the_recorder(tmp_path: 
 def test_a_writer_that_hangs_is_replaced(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     """A new writer waits for a lock of the one before, which is held here: it sleeps, and gives no sign of life."""
     run = recorder(tmp_path, 100)
-    first, lock = run.writer_pid, os.open(next(iter(rings())), os.O_RDWR)
+    first, lock = run.writer_pid, os.open(rings(os.getpid())[-1], os.O_RDWR)
     os.kill(first, signal.SIGKILL)
     fcntl.lockf(lock, fcntl.LOCK_EX)
     wait_for(lambda: run.writer_pid != first)

@@ -11,7 +11,9 @@ from hil.report.console import out
 
 
 def recover(
-    stream: Annotated[Path, typer.Argument(help="NAME.arrows of a run that was not closed.", show_default=False)],
+    stream: Annotated[
+        Path | None, typer.Argument(help="NAME.arrows of a run that was not closed. Default: list those in memory.")
+    ] = None,
     to: Annotated[Path | None, typer.Option("--out", help="File to write. Default: NAME.parquet beside it.")] = None,
 ) -> None:
     """Make a readable recording of a run that was killed, or whose disk was full or damaged; NAME.arrows stays.
@@ -19,8 +21,12 @@ def recover(
     Whole blocks of the file are used, and the rows that are still in memory. Gaps are marked in the recording.
     """
     from hil.loop.certificate import of_rows
-    from hil.recording.recover import remains, write_remains
+    from hil.recording.recover import remains, unfinished, write_remains
 
+    if stream is None:
+        for left in unfinished():
+            out.print(str(left))
+        return
     path = to or stream.with_suffix(".parquet")
     if path.suffix != ".parquet":
         from hil.errors import InputError

@@ -8,7 +8,7 @@ import mmap
 import os
 import struct
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -118,8 +118,35 @@ def _kept(ring: Ring) -> tuple[int, FloatArray]:
     return first, rows[np.arange(first, recorded) % ring.rows]
 
 
+def unfinished() -> list[Path]:
+    """Streams of runs whose processes have ended, and of which rows are in memory."""
+    found = []
+    for ring in _rings():
+        with suppress(BlockingIOError):
+            fcntl.flock(ring.descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            found.append(Path(ring.task["path"]))
+        ring.release()
+    return found
+
+
 def _ring_of(stream: Path) -> Ring | None:
     """Find and lock the ring of a stream; None if there is none. Raises InputError if its recorder still works."""
+    found = None
+    for ring in _rings():
+        if found is not None or ring.task["path"] != str(stream.resolve()):
+            ring.release()
+            continue
+        found = ring
+        try:
+            fcntl.flock(ring.descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            ring.release()
+            raise InputError(f"{stream}: its recorder still works; wait until the run is over") from None
+    return found
+
+
+def _rings() -> Iterator[Ring]:
+    """Open the rings of this user; the caller releases them."""
     for path in FOLDER.glob(PATTERN):
         try:
             descriptor = os.open(path, os.O_RDWR | os.O_CLOEXEC)
@@ -127,16 +154,8 @@ def _ring_of(stream: Path) -> Ring | None:
             continue
         try:
             ring = Ring(descriptor)
-            wanted = ring.task["path"] == str(stream.resolve())
+            _ = ring.task["path"]
         except (ValueError, KeyError, OSError, struct.error):  # another file, or a ring that was never finished
-            wanted = False
-        if not wanted:
             os.close(descriptor)
             continue
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            os.close(descriptor)
-            raise InputError(f"{stream}: its recorder still works; wait until the run is over") from None
-        return ring
-    return None
+        yield ring

@@ -20,7 +20,7 @@ from hil.errors import HilError, InputError
 from hil.recording import ring
 from hil.recording.blocks import StreamBlock, read_schema, whole_blocks
 from hil.recording.recording import read_recording
-from hil.recording.recover import remains
+from hil.recording.recover import remains, unfinished
 from hil.recording.writer import Recorder
 
 CHANNELS = ("time_s", "position_command_m", "motor_position_rad", "torque_n_m", "lateness_s")
@@ -134,7 +134,10 @@ def test_a_writer_killed_while_the_dead_loop_s_rows_are_saved(tmp_path: Path) ->
 
 def test_all_processes_killed_at_once_lose_nothing_that_is_in_memory(tmp_path: Path) -> None:
     loop = Loop(tmp_path)
+    assert tmp_path / "run.arrows" not in unfinished()
     loop.kill(loop.keeper, loop.writer)
+    assert tmp_path / "run.arrows" in unfinished()
+    assert str(tmp_path / "run.arrows") in hil(tmp_path, "recover").stdout.replace("\n", "")
     assert f"{ROWS} rows, " in recover(tmp_path)
     assert_holds(tmp_path / "run.parquet", np.arange(ROWS))
     metadata = read_recording(tmp_path / "run.parquet").metadata

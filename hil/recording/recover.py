@@ -17,9 +17,10 @@ import numpy as np
 import pyarrow as pa
 
 from hil.arrays import FloatArray
+from hil.channels import CHANNELS
 from hil.errors import HilError, InputError
-from hil.recording.blocks import STREAM_END, read_schema, whole_blocks
-from hil.recording.recording import METADATA_KEY, arrow_schema, write_table
+from hil.recording.blocks import STREAM_END, read_head, whole_blocks
+from hil.recording.recording import arrow_schema, write_table
 from hil.recording.ring import FOLDER, PATTERN, ROWS_AT, Counter, Ring
 from hil.recording.writer import RowGap
 
@@ -36,10 +37,16 @@ class Remains:
     metadata: dict[str, Any]
 
     @property
+    def period_s(self) -> float:
+        """Period of the run, as told or as most rows have it [s]."""
+        steps = np.diff(self.rows[:, self.channels.index("time_s")])
+        return float(self.metadata.get("period_s") or (round(np.median(steps), 12) if steps.size else 1.0))
+
+    @property
     def gaps(self) -> tuple[RowGap, ...]:
         """Places where the time goes on by more than a period: rows lost, damaged, or ticks that were left out."""
         time_s = self.rows[:, self.channels.index("time_s")]
-        missing = np.rint(np.diff(time_s) / self.metadata["period_s"]) - 1
+        missing = np.rint(np.diff(time_s) / self.period_s) - 1
         return tuple(RowGap(int(row) + 1, int(missing[row])) for row in np.flatnonzero(missing > 0))
 
     @property
@@ -49,6 +56,7 @@ class Remains:
         parts = [f"{len(self.rows)} rows, {self.from_memory} of them from memory"]
         parts += [f"{self.damaged_bytes} bytes of the file are damaged and left out"] if self.damaged_bytes else []
         parts += [f"{lost} periods without a row in {len(self.gaps)} gaps" if lost else "no gap between them"]
+        parts += [] if self.metadata else ["the metadata are damaged and left out"]
         return "; ".join(parts)
 
 
@@ -76,7 +84,7 @@ def write_remains(found: Remains, path: Path, about: dict[str, Any]) -> None:
     if path.exists():
         raise InputError(f"{path}: the file exists and is not overwritten; give another --out")
     gaps = [gap._asdict() for gap in found.gaps]
-    told = {"rows": len(found.rows), "gaps": gaps, "recovered": found.text}
+    told = {"period_s": found.period_s, "rows": len(found.rows), "gaps": gaps, "recovered": found.text}
     schema = arrow_schema(found.channels, {"ended": "not closed"} | found.metadata | told | about)
     columns = [pa.array(column) for column in np.ascontiguousarray(found.rows.T)]
     write_table(pa.Table.from_arrays(columns, schema=schema), path)
@@ -86,28 +94,28 @@ def _read(stream: Path, ring: Ring | None) -> Remains:
     with stream.open("rb") as file:
         size = os.fstat(file.fileno()).st_size
         data = mmap.mmap(file.fileno(), 0, prot=mmap.PROT_READ) if size else b""
-    head = read_schema(data)
+    head = read_head(data)
+    if head is not None and ("time_s" not in head.channels or not set(head.channels) <= set(CHANNELS)):
+        head = None
+    task = ring.task if ring is not None else {}
     if head is None and ring is None:
         raise InputError(f"{stream}: its head is damaged or missing, and nothing of the run is in memory")
-    task = ring.task if ring is not None else {}
-    schema, start = head or (arrow_schema(tuple(task["channels"]), task["metadata"]), 0)
-    if "time_s" not in schema.names or any(field.type != pa.float64() for field in schema):
-        raise InputError(f"{stream}: is no stream of a run; it has the columns {', '.join(schema.names)}")
-    metadata = json.loads((schema.metadata or {}).get(METADATA_KEY, b"{}"))
-    kept_from, kept = _kept(ring) if ring is not None else (None, np.empty((0, len(schema))))
+    channels = head.channels if head is not None else tuple(task["channels"])
+    kept_from, kept = _kept(ring) if ring is not None else (None, np.empty((0, len(channels))))
+    start = head.end if head is not None else 0
     pieces, due, undamaged = [], 0, start
-    for block in whole_blocks(data, start, schema):
-        first = due if block.first is None else block.first
-        due, undamaged = first + len(block.rows), undamaged + block.end - block.start
-        pieces.append(block.rows if kept_from is None else block.rows[: max(0, kept_from - first)])
+    for block in whole_blocks(data, start, len(channels)):
+        due, undamaged = block.first + len(block.rows), undamaged + block.end - block.start
+        pieces.append(block.rows if kept_from is None else block.rows[: max(0, kept_from - block.first)])
     if data[-len(STREAM_END) :] == STREAM_END:
         undamaged += len(STREAM_END)
     rows = np.concatenate([*pieces, kept])
     if not len(rows):
         raise HilError(f"{stream}: no row is left of this run")
     from_memory = 0 if kept_from is None else min(len(kept), max(0, kept_from + len(kept) - due))
+    metadata = task.get("metadata") or (json.loads(head.metadata) if head is not None and head.metadata else {})
     end = (ring.end or {}) if ring is not None else {}
-    return Remains(tuple(schema.names), rows, from_memory, size - undamaged, metadata | end)
+    return Remains(channels, rows, from_memory, size - undamaged, metadata | end)
 
 
 def _kept(ring: Ring) -> tuple[int, FloatArray]:

@@ -22,7 +22,7 @@ import numpy as np
 import pyarrow as pa
 
 from hil.errors import HilError
-from hil.recording.blocks import STREAM_END, block_at, encode
+from hil.recording.blocks import STREAM_END, block_at, encode, encode_head
 from hil.recording.recording import METADATA_KEY, arrow_schema, write_table
 from hil.recording.ring import ROWS_AT, Counter, Ring
 
@@ -48,7 +48,7 @@ class Writer:
         if not 0 < ring[Counter.FILE_BYTES] <= size:  # a new file, or one that somebody cut
             os.ftruncate(self._file, 0)
             ring[Counter.FILE_BYTES] = 0
-            self._append(self._schema.serialize().to_pybytes())
+            self._append(encode_head(self._schema))
         else:
             self._take_up(os.pread(self._file, size - ring[Counter.FILE_BYTES], ring[Counter.FILE_BYTES]))
         self._flushed_s = time.monotonic()
@@ -91,8 +91,8 @@ class Writer:
     def _take_up(self, tail: bytes) -> None:
         """Count a whole block that the writer before had written but not counted, and cut what follows."""
         start = self._ring[Counter.FILE_BYTES]
-        block = block_at(memoryview(tail), 0, self._bare)
-        if block is not None and block.first is not None:
+        block = block_at(tail, 0, len(self._bare))
+        if block is not None:
             self._ring[Counter.ON_DISK] = block.first + len(block.rows)
             self._ring[Counter.FILE_BYTES] = start = start + block.end
         os.ftruncate(self._file, start)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import fcntl
 import os
+import random
 import signal
 import subprocess
 import sys
@@ -12,13 +13,14 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 import pytest
 from command_line import hil, refused
 from processes import DEADLINE_S, is_over, state_of, wait_for
 
 from hil.errors import HilError, InputError
 from hil.recording import ring
-from hil.recording.blocks import StreamBlock, read_schema, whole_blocks
+from hil.recording.blocks import StreamBlock, encode, read_head, whole_blocks
 from hil.recording.recording import read_recording
 from hil.recording.recover import remains, unfinished
 from hil.recording.writer import Recorder
@@ -305,8 +307,8 @@ def torn(tmp_path: Path) -> Path:
 
 def blocks_of(path: Path) -> list[StreamBlock]:
     data = path.read_bytes()
-    schema, start = read_schema(data)
-    return list(whole_blocks(data, start, schema))
+    head = read_head(data)
+    return list(whole_blocks(data, head.end, len(head.channels)))
 
 
 def test_blocks_know_their_first_row(torn: Path) -> None:
@@ -330,7 +332,7 @@ def test_a_last_block_of_zeros_as_after_a_power_failure_is_left_out(torn: Path) 
     assert_holds(torn.with_suffix(".parquet"), np.arange(ROWS - len(last.rows)))
 
 
-@pytest.mark.parametrize("place", [0, 4, 40, -9])
+@pytest.mark.parametrize("place", [0, 4, -9])
 def test_a_damaged_block_leaves_a_marked_gap(torn: Path, place: int) -> None:
     blocks = blocks_of(torn)
     bad = next(block for block in blocks if block.first == 200)
@@ -342,6 +344,57 @@ def test_a_damaged_block_leaves_a_marked_gap(torn: Path, place: int) -> None:
     assert recording.metadata["gaps"] == [{"row": 200, "rows_lost": len(bad.rows)}]
     assert_holds(torn.with_suffix(".parquet"), np.r_[0:200, 200 + len(bad.rows) : ROWS])
     assert len(recording.parts()) == 2
+
+
+def test_a_block_is_read_without_its_arrow_message(torn: Path) -> None:
+    """Decoding a damaged message may end the process; number, length and checksum of the rows stand beside it."""
+    block = blocks_of(torn)[0]
+    data = bytearray(torn.read_bytes())
+    data[block.start + 8 : block.start + 40] = bytes(32)
+    torn.write_bytes(data)
+    assert "no gap" in recover(torn.parent)
+    assert_holds(torn.with_suffix(".parquet"), np.arange(ROWS))
+
+
+def test_damaged_metadata_are_left_out_and_said(torn: Path) -> None:
+    torn.write_bytes(torn.read_bytes().replace(b'"seed": 7', b'"seed": 8'))
+    assert "the metadata are damaged and left out" in recover(torn.parent)
+    assert_holds(torn.with_suffix(".parquet"), np.arange(ROWS))
+    recording = read_recording(torn.with_suffix(".parquet"))
+    assert recording.period_s == PERIOD_S
+    assert "seed" not in recording.metadata
+
+
+@pytest.mark.parametrize("count", [1, 2, 7, 8192])
+def test_a_block_is_an_arrow_message_and_columns(count: int) -> None:
+    schema = pa.schema([pa.field(name, pa.float64(), nullable=False) for name in CHANNELS])
+    rows = np.array([row(k) for k in range(count)])
+    data = encode(rows, 123, schema)
+    assert data.endswith(rows.T.tobytes())
+    (block,) = whole_blocks(data, 0, len(CHANNELS))
+    assert np.array_equal(block.rows, rows)
+    assert (block.first, block.end) == (123, len(data))
+    with pa.ipc.open_stream(schema.serialize().to_pybytes() + data) as stream:
+        assert stream.read_all().column("lateness_s").to_pylist() == rows[:, 4].tolist()
+
+
+def test_whatever_happened_to_a_file_no_wrong_row_comes_of_it(torn: Path) -> None:
+    good, draw, recovered = torn.read_bytes(), random.Random(19), 0
+    for _ in range(300):
+        data = bytearray(good)
+        for _ in range(draw.choice([1, 1, 5, 40])):
+            place, size = draw.randrange(len(data)), draw.randrange(1, 400)
+            damage = draw.choice(
+                [bytes([data[place] ^ 1 << draw.randrange(8)]), bytes(size), draw.randbytes(size), b""]
+            )
+            data[place : place + draw.choice([len(damage), size])] = damage
+        torn.write_bytes(data)
+        with contextlib.suppress(HilError), remains(torn) as found:
+            numbers = found.rows[:, 1]
+            assert np.array_equal(found.rows, [row(int(k)) for k in numbers])
+            assert (np.diff(numbers) > 0).all()
+            recovered += 1
+    assert recovered > 100
 
 
 def test_without_head_and_memory_nothing_can_be_told(torn: Path) -> None:

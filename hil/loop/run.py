@@ -147,6 +147,11 @@ def run_profile(
             f"{name}.parquet or {name}.arrows of an earlier run is in {folder} and stays; this run is "
             f"{recorder.path.name}",
         )
+    if recorder.rows_lost:
+        notes += (
+            f"{recorder.rows_lost} rows are missing in {len(recorder.gaps)} gaps: the disk took none for longer than "
+            "the memory lasts; use another disk",
+        )
     return RunResult(
         outcome,
         recording,

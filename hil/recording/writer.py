@@ -108,9 +108,13 @@ class Recorder:
         self._memory, self._counters = self._ring.memory, self._ring.counters
         self._closed = False
         self._start_keeper()
-        while not self._ring[Counter.READY]:
-            self._check_keeper()
-            time.sleep(0.001)
+        try:
+            while not self._ring[Counter.READY]:
+                self._check_keeper()
+                time.sleep(0.001)
+        except HilError:
+            self.stream_path.unlink(missing_ok=True)
+            raise
 
     @property
     def rows_recorded(self) -> int:
@@ -242,9 +246,9 @@ class Recorder:
         self._closed = True
         reason = ring.error or f"its process ended with exit code {code}, see above"
         waiting = self._head - self.rows_on_disk
-        if waiting and not self._lossless:
+        if self._head and not self._lossless:
             rest = (
-                f"{waiting} rows wait in memory ({ring.path}) until this PC is switched off: make room, then "
+                f"{waiting} rows are in memory only ({ring.path}), until this PC is switched off: make room, then "
                 f"hil recover {self.stream_path}"
             )
         else:

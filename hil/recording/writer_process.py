@@ -45,9 +45,9 @@ class Writer:
         self._bare = self._schema.remove_metadata()
         self._file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
         size = os.fstat(self._file).st_size
-        if not 0 < ring[Counter.FILE_BYTES] <= size:  # a new file, or one that somebody cut
+        ring[Counter.FILE_BYTES] = min(ring[Counter.FILE_BYTES], size)  # somebody may have cut it
+        if not ring[Counter.FILE_BYTES]:
             os.ftruncate(self._file, 0)
-            ring[Counter.FILE_BYTES] = 0
             self._append(encode_head(self._schema))
         else:
             self._take_up(os.pread(self._file, size - ring[Counter.FILE_BYTES], ring[Counter.FILE_BYTES]))

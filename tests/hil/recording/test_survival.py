@@ -254,12 +254,36 @@ def test_a_full_disk_costs_no_row_once_it_has_room_again(small_disk: Path, capfd
     assert "make room" in said
 
 
+def test_a_disk_that_is_full_before_the_run_is_refused(small_disk: Path) -> None:
+    fill(small_disk)
+    with pytest.raises(HilError, match=r"recorder stopped at row 0: .*No space left on device.*choose another folder"):
+        recorder(small_disk)
+    assert [path.name for path in small_disk.iterdir()] == ["ballast"]
+    assert not rings(os.getpid())
+
+
+def test_lack_of_shared_memory_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ring, "FOLDER", tmp_path / "absent")
+    with pytest.raises(HilError, match=r"no shared memory .*; mount a tmpfs at"):
+        recorder(tmp_path / "out")
+    assert list((tmp_path / "out").iterdir()) == []
+
+
+def test_too_little_shared_memory_is_refused(small_disk: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ring, "FOLDER", small_disk)  # a tmpfs of 1 MB
+    with pytest.raises(HilError, match="no shared memory for 65536 rows of 5 values"):
+        recorder(tmp_path / "out")
+    assert list(small_disk.iterdir()) == []
+
+
 def test_a_disk_that_stays_full_keeps_the_rest_in_memory_for_recovery(small_disk: Path) -> None:
     run = recorder(small_disk, 100)
     ballast = fill(small_disk)
     for k in range(100, 5000):
         run.record(row(k))
-    with pytest.raises(HilError, match=r"No space left on device; .* rows wait in memory .*hil recover .*run\.arrows"):
+    with pytest.raises(
+        HilError, match=r"No space left on device; .* rows are in memory only .*hil recover .*run\.arrows"
+    ):
         run.close("complete: the profile is done")
     on_disk = run.rows_on_disk
     assert len(read_recording(run.stream_path)) == on_disk < 5000
@@ -284,6 +308,29 @@ def test_a_disk_that_does_not_answer_does_not_hold_the_loop(
         subprocess.run(["fsfreeze", "--unfreeze", str(freezable_disk)], check=True)
     assert_holds(run.close(), np.arange(5000))
     assert "writers_replaced" not in read_recording(run.path).metadata
+
+
+def test_a_file_that_was_cut_while_its_writer_was_replaced_keeps_what_is_left(tmp_path: Path) -> None:
+    run = recorder(tmp_path, 100)
+    for k in range(100, 200):
+        run.record(row(k))
+    wait_for(lambda: run.rows_on_disk == 200)
+    last = blocks_of(run.stream_path)[-1]
+    os.kill(run.keeper_pid, signal.SIGSTOP)
+    os.kill(run.writer_pid, signal.SIGKILL)
+    wait_for(lambda: state_of(run.writer_pid) == "Z")
+    os.truncate(run.stream_path, last.end - 20)
+    os.kill(run.keeper_pid, signal.SIGCONT)
+    for k in range(200, 300):
+        run.record(row(k))
+    wait_for(lambda: run.rows_on_disk == 300)
+    blocks = blocks_of(run.stream_path)
+    kept = np.concatenate([block.rows[:, 1] for block in blocks])
+    assert np.array_equal(kept, np.r_[0 : last.first, 200:300])
+    with pytest.raises(HilError, match="recorder stopped"):
+        run.close()
+    recover(tmp_path)
+    assert_holds(tmp_path / "run.parquet", np.r_[0:300])  # the ring still has them
 
 
 # -- damaged files ----------------------------------------------------------------------------------------------------

@@ -243,6 +243,10 @@ def _interruptible(session: Session) -> Iterator[None]:
         return
 
     def stop(number: int, frame: FrameType | None) -> None:
+        if (
+            number == signal.SIGHUP
+        ):  # sent by the kernel and by a shell: one request, also while the recording is closed
+            signal.signal(signal.SIGHUP, signal.SIG_IGN)
         session.ask_stop()
 
     numbers = [signal.SIGINT, signal.SIGTERM]
@@ -253,4 +257,5 @@ def _interruptible(session: Session) -> Iterator[None]:
         yield
     finally:
         for number, handler in before.items():
-            signal.signal(number, handler)
+            if signal.getsignal(number) is stop:
+                signal.signal(number, handler)

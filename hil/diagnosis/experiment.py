@@ -192,7 +192,7 @@ def _group(explanation: Explanation, final: Fit, index: int) -> list[_Alternativ
     group = [_alternative(term.effect, final)]
     for rival in rivals_of(explanation, term):
         if rival.tied:
-            other = rival.fit.terms[-1]
+            other = rival.terms[-1]
             replaced = rebased.replaced(index, other)
             if compatible(replaced.terms):  # else the rival is another term of the final fit
                 group.append(_alternative(other.effect, final.estimator.fit(replaced, evaluations=12)))

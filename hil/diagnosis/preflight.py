@@ -2,7 +2,8 @@
 
     torque = J a + D v + Fc sign(v) + T0      by least squares over the measured motion
 
-A negative J shows a wrong sign; J and Fc that both deviate from the bench by a large factor show a wrong unit.
+A negative J without positive friction Fc shows a wrong sign; J and Fc that both deviate from the bench by a large
+factor show a wrong unit.
 """
 
 import math
@@ -180,7 +181,7 @@ def _torque_problems(run: Measured, bench: Bench) -> Iterator[str]:
     if measured is None:
         return
     (j, _, coulomb, _), errors = measured
-    if j < -3.0 * errors[0]:
+    if j < -3.0 * errors[0] and coulomb < 3.0 * errors[2]:  # friction has the sign of the torque too
         yield (
             f"{names.torque} has the wrong sign: its regression gives a negative inertia, {j:.3g} ± {errors[0]:.1g}; "
             "correct the sign of the channel, or of the encoder"

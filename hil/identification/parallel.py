@@ -1,5 +1,6 @@
 """Simulations in parallel: compiled kernels run without the GIL, so threads take all cores."""
 
+import ctypes
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -10,7 +11,10 @@ from threadpoolctl import threadpool_limits
 Output = TypeVar("Output")
 Function = TypeVar("Function", bound=Callable[..., Any])
 # HIL_THREADS: where the cores that this process may use are not its own, as on a cluster
+_ARENA_MAX = -8  # M_ARENA_MAX of mallopt(3)
 THREADS = int(os.environ.get("HIL_THREADS", 0)) or len(os.sched_getaffinity(0))
+if hasattr(ctypes.CDLL(None), "mallopt"):  # glibc: one heap for all threads, else each keeps memory the others freed
+    ctypes.CDLL(None).mallopt(_ARENA_MAX, 1)
 POOL = ThreadPoolExecutor(THREADS)
 
 

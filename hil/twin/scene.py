@@ -21,6 +21,7 @@ class AxisFacts:
     duration_s: float  # of the longest recording
     travel_m: float = math.inf  # of the longest motion
     lost_m: float = math.inf  # largest range of the table against the motor
+    turn_known: bool = True  # False on a linear axis without a lead
     held_s: Callable[[float], float] = _always  # longest time for which |torque command| is at a level or above
 
     @property

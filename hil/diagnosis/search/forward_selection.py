@@ -63,12 +63,19 @@ ALIKE = 0.25 * MATERIAL
 class RivalFit:
     """Another explanation of the same residual and the evidence against it (BIC difference).
 
-    `more` is its energy per row in units of noise^2 less that of the chosen explanation.
+    `reduced` is its mean squared weighted residual, `more` its energy per row in units of noise^2 less that of the
+    chosen explanation. The fit itself is not kept: its residuals and derivatives grow with the recordings.
     """
 
-    fit: Fit
+    terms: tuple[Term, ...]
+    reduced: float
     evidence: float
     more: float = np.inf
+
+    @classmethod
+    def of(cls, fit: Fit, evidence: float, more: float = np.inf) -> "RivalFit":
+        """The explanation by a fit."""
+        return cls(fit.terms, fit.reduced, evidence, more)
 
     @property
     def tied(self) -> bool:
@@ -133,9 +140,10 @@ def explain(data: Dataset, progress: Progress = lambda text: None, deadline_s: f
             best = replace(best.estimator, edge_step_s=LAST_EDGE_STEP_S).fit(best.hypothesis)
         filters = whitening(best)
         rivals[best.terms[-1].key] = sorted(
-            (RivalFit(other, against(best, other, filters), (other.cost - best.cost) / base.rows) for other in found),
+            (RivalFit.of(one, against(best, one, filters), (one.cost - best.cost) / base.rows) for one in found),
             key=lambda rival: rival.evidence,
         )
+        found = []  # their residuals are not needed any more
         best, needed = _pruned(best, reference)
         # to convergence: the residual of an unfinished fit resembles other mechanisms
         base = revised(claimed(best.refit(_ENDED, slopes=best.jacobian)))
@@ -154,7 +162,6 @@ def explain(data: Dataset, progress: Progress = lambda text: None, deadline_s: f
     not_tried = tuple(effect for effect in BY_ID if effect not in present) if stopped_at else ()
     rivals = {key: value for key, value in rivals.items() if key in kept}
     owner, nominal, final = (fit.without_deadline() for fit in (owner, nominal, final))
-    rivals = {key: [replace(rival, fit=rival.fit.without_deadline()) for rival in rivals[key]] for key in rivals}
     return Explanation(owner, nominal, final, rivals, needed, tuple(first), stopped_at, not_tried)
 
 

@@ -104,6 +104,7 @@ class _Race:
         # the best so far, and the first of the score test, which may converge slowly
         better = sorted(started, key=lambda fit: fit.cost)[:_CONTINUED]
         second = in_parallel([partial(self._second_fit, fit) for fit in _unique([*started[:2], *better])])
+        del started, better  # derivatives of long recordings take much memory
         ranked = sorted(second, key=lambda fit: fit.cost)
         leader = _finish(ranked[0])
         others = [fit for fit in _unique([*second[:2], *ranked[:_FINISHED]]) if fit is not ranked[0]]

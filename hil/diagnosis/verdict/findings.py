@@ -16,7 +16,7 @@ from hil.diagnosis.search.initial_values import claimable
 from hil.diagnosis.verdict.cross_validation import Ablation
 from hil.diagnosis.verdict.event_windows import describe_event
 from hil.diagnosis.verdict.judge import confidence
-from hil.diagnosis.wording import sentence, title
+from hil.diagnosis.wording import sentence, title, unit_in
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.inference import standard_errors
@@ -59,13 +59,13 @@ def findings(
             continue
         errors = deviations[final.hypothesis.columns(index)]
         rivals = rivals_of(explanation, term)
-        tied = [rival.fit.terms[-1].effect for rival in rivals if rival.tied]
+        tied = [rival.terms[-1].effect for rival in rivals if rival.tied]
         if ambiguous(term):
             tied += [
                 name for name in SAME if name != term.effect and claimable(replace(term, effect=name), bench, runs)
             ]
         margin = min(
-            (rival.evidence for rival in rivals if rival.fit.terms[-1].effect not in tied),
+            (rival.evidence for rival in rivals if rival.terms[-1].effect not in tied),
             default=explanation.needed.get(_key(explanation, term), math.inf),
         )
         event = describe_event(final, index, held_out) if term.windows else None
@@ -77,9 +77,7 @@ def findings(
                     variant=BY_ID[term.effect].forms[term.variant],
                     confidence=confidence(left, _factor(ablation), margin),
                     equivalents=tuple(dict.fromkeys(tied)),
-                    rivals=tuple(
-                        Rival(effect=rival.fit.terms[-1].effect, evidence=_text(rival, term)) for rival in rivals
-                    ),
+                    rivals=tuple(Rival(effect=rival.terms[-1].effect, evidence=_text(rival, term)) for rival in rivals),
                     parameters=event.parameters if event else _values(term, errors, bench),
                     windows=event.windows if event else (),
                     train=event.train if event else None,
@@ -139,9 +137,7 @@ def _normal(term: Term) -> Term:
 
 def _values(term: Term, errors: Sequence[float], bench: Bench) -> dict[str, Value]:
     return {
-        parameter.name: Value(
-            value=value, std=error, unit=parameter.dimension.unit(bench.axis.linear, bench.axis.turns)
-        )
+        parameter.name: Value(value=value, std=error, unit=unit_in(bench, parameter))
         for parameter, value, error in zip(BY_ID[term.effect].parameters, _normal(term).values, errors, strict=True)
     }
 
@@ -163,7 +159,7 @@ def rivals_of(explanation: Explanation, term: Term) -> list[RivalFit]:
     """Other mechanisms than the term's own, each in its best variant, the strongest first."""
     best: dict[str, RivalFit] = {}
     for rival in sorted(explanation.rivals.get(_key(explanation, term), []), key=lambda found: found.evidence):
-        other = rival.fit.terms[-1]
+        other = rival.terms[-1]
         if other.effect != term.effect and not (ambiguous(other) and ambiguous(term)):
             best.setdefault(other.effect, rival)
     return list(best.values())
@@ -175,9 +171,9 @@ def _text(rival: RivalFit, term: Term) -> str:
             f"not distinguishable from {title(term.effect)} by this motion: evidence against it is "
             f"{digits(rival.evidence)}, and its residuals differ by less than the model accuracy"
         )
-    size = math.sqrt(rival.fit.reduced)
-    parameters = BY_ID[rival.fit.terms[-1].effect].parameters
-    at = rival.fit.terms[-1].values
+    size = math.sqrt(rival.reduced)
+    parameters = BY_ID[rival.terms[-1].effect].parameters
+    at = rival.terms[-1].values
     stuck = [
         parameter.name
         for parameter, value in zip(parameters, at, strict=True)

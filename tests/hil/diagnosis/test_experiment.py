@@ -39,7 +39,7 @@ NONE = dataset([], OWNER)
 
 def designed(right: Fit, *others: Fit, tied: bool = False) -> Experiment:
     """The experiment for a fit and its rivals, as evidence on these recordings has them, or taken as tied."""
-    rivals = [RivalFit(other, 0.0 if tied else against(right, other)) for other in others]
+    rivals = [RivalFit.of(other, 0.0 if tied else against(right, other)) for other in others]
     found = separating(Explanation(right, right, right, {right.terms[-1].key: rivals}), right, NONE)
     assert found is not None
     return found

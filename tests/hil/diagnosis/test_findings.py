@@ -33,7 +33,7 @@ def test_friction_that_differs_with_speed_is_no_constant_load() -> None:
     truth, load = Term("asymmetric_friction", 1, (0.15,)), Term("constant_load", 0, (0.1,))
     train, held_out = runs(truth), runs(truth, seed=2)
     plain, right, rival = fitted(train), fitted(train, truth), fitted(train, load)
-    explanation = Explanation(plain, plain, right, {truth.key: [RivalFit(rival, 500.0)]}, {truth.key: 900.0})
+    explanation = Explanation(plain, plain, right, {truth.key: [RivalFit.of(rival, 500.0)]}, {truth.key: 900.0})
     final = renamed(right)
     (found,) = findings(explanation, final, cross_validate(plain, final, held_out).ablations, {}, held_out)
     assert (found.effect, found.variant, found.equivalents) == ("asymmetric_friction", "with speed", ())

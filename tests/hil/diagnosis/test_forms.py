@@ -40,7 +40,7 @@ def judged(
     )
     proof = cross_validate(plain, right, held_out)
     tied = {
-        key: [RivalFit(fitted(Hypothesis(OWNER, (rival,)), train, evaluations=1), 0.0)]
+        key: [RivalFit.of(fitted(Hypothesis(OWNER, (rival,)), train, evaluations=1), 0.0)]
         for key, rival in (rivals or {}).items()
     }
     explanation = Explanation(plain, plain, right, tied, {term.key: 900.0 for term in terms})

@@ -155,7 +155,9 @@ def test_a_term_that_held_out_recordings_do_not_show_may_stay() -> None:
 def test_a_constant_load_is_called_by_its_commoner_name_and_both_are_listed() -> None:
     train = runs(LOAD)
     plain, loaded = believed(train), fitted(Hypothesis(OWNER, (LOAD,)), train, evaluations=8)
-    explanation = Explanation(plain, plain, loaded, {LOAD.key: [RivalFit(plain_with(train), 500.0)]}, {LOAD.key: 900.0})
+    explanation = Explanation(
+        plain, plain, loaded, {LOAD.key: [RivalFit.of(plain_with(train), 500.0)]}, {LOAD.key: 900.0}
+    )
     final = renamed(loaded)
     proof = cross_validate(plain, final, runs(LOAD, seed=2))
     (found,) = findings(explanation, proof.final, proof.ablations, {}, runs(LOAD, seed=2))

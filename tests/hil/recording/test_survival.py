@@ -310,6 +310,23 @@ def test_a_disk_that_does_not_answer_does_not_hold_the_loop(
     assert "writers_replaced" not in read_recording(run.path).metadata
 
 
+@pytest.mark.parametrize("torn", [0, 9])
+def test_a_block_written_but_not_counted_is_neither_lost_nor_doubled(tmp_path: Path, torn: int) -> None:
+    """As of a writer killed between both; with a torn one behind it."""
+    run = recorder(tmp_path, 100)
+    os.kill(run.keeper_pid, signal.SIGSTOP)
+    os.kill(run.writer_pid, signal.SIGKILL)
+    wait_for(lambda: state_of(run.writer_pid) == "Z")
+    for k in range(100, 300):
+        run.record(row(k))
+    schema = pa.schema([pa.field(name, pa.float64(), nullable=False) for name in CHANNELS])
+    with run.stream_path.open("ab") as file:
+        file.write(encode(np.array([row(k) for k in range(100, 150)]), 100, schema))
+        file.write(encode(np.array([row(k) for k in range(150, 160)]), 150, schema)[:torn])
+    os.kill(run.keeper_pid, signal.SIGCONT)
+    assert_holds(run.close(), np.arange(300))
+
+
 def test_a_file_that_was_cut_while_its_writer_was_replaced_keeps_what_is_left(tmp_path: Path) -> None:
     run = recorder(tmp_path, 100)
     for k in range(100, 200):

@@ -10,10 +10,12 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 import pytest
 from processes import DEADLINE_S, is_over, wait_for
 
 from hil.errors import HilError, InputError
+from hil.recording.blocks import encode
 from hil.recording.recording import read_recording
 from hil.recording.writer import Recorder, run_metadata
 
@@ -107,20 +109,29 @@ def test_without_lossless_the_loop_never_waits_and_the_recording_marks_its_gap(t
 
 
 def test_after_a_loss_rows_are_taken_again_when_half_of_the_ring_is_free(tmp_path: Path) -> None:
-    """Blocks of 40 rows into a ring of 64: what does not fit is lost, and so is what comes before half is free."""
+    """A ring of 64 rows, full: 24 to its end reach the disk, which are not enough; then all."""
     run = recorder(tmp_path, ring_rows=64)
+    rows = np.array([row(k) for k in range(200)])
+    run.record_block(rows[:40])
+    wait_for(lambda: run.rows_on_disk == 40)
     no_room(run)
-    block = np.array([row(k) for k in range(80)])
-    run.record_block(block)
-    assert run.gaps == [(64, 16)]
-    run.record_block(block[:10])
-    assert run.gaps == [(64, 26)]
-    room(run)
+    run.record_block(rows[40:114])
+    assert run.rows_recorded == 104
+    assert run.gaps == [(104, 10)]
+    schema = pa.schema([pa.field(name, pa.float64(), nullable=False) for name in CHANNELS])
+    bytes_of_24 = len(encode(rows[40:64], 40, schema))
+    wait_for(lambda: "File too large" in run.error)
+    size = run.stream_path.stat().st_size
+    resource.prlimit(run.writer_pid, resource.RLIMIT_FSIZE, (size + bytes_of_24, resource.RLIM_INFINITY))
     wait_for(lambda: run.rows_on_disk == 64)
-    run.record_block(block[:10])
-    assert run.rows_recorded == 74
+    run.record_block(rows[114:124])
+    assert run.gaps == [(104, 20)]
+    room(run)
+    wait_for(lambda: run.rows_on_disk == 104)
+    run.record_block(rows[124:184])
+    assert run.rows_recorded == 164
     run.close()
-    assert run.rows_lost == 26
+    assert run.gaps == [(104, 20)]
 
 
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP])

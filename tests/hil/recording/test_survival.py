@@ -9,6 +9,7 @@ import random
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -21,6 +22,7 @@ from processes import DEADLINE_S, is_over, state_of, wait_for
 from hil.errors import HilError, InputError
 from hil.recording import ring
 from hil.recording.blocks import StreamBlock, encode, read_head, whole_blocks
+from hil.recording.keeper import HUNG_S
 from hil.recording.recording import read_recording
 from hil.recording.recover import remains, unfinished
 from hil.recording.writer import Recorder
@@ -348,6 +350,20 @@ def test_a_file_that_was_cut_while_its_writer_was_replaced_keeps_what_is_left(tm
         run.close()
     recover(tmp_path)
     assert_holds(tmp_path / "run.parquet", np.r_[0:300])  # the ring still has them
+
+
+@pytest.mark.long
+def test_a_writer_that_waits_for_the_disk_is_not_replaced(freezable_disk: Path) -> None:
+    run = recorder(freezable_disk, 100)
+    subprocess.run(["fsfreeze", "--freeze", str(freezable_disk)], check=True)
+    try:
+        run.record(row(100))
+        wait_for(lambda: state_of(run.writer_pid) == "D")
+        time.sleep(HUNG_S + 1.0)  # longer than a writer may be silent
+    finally:
+        subprocess.run(["fsfreeze", "--unfreeze", str(freezable_disk)], check=True)
+    assert_holds(run.close(), np.arange(101))
+    assert "writers_replaced" not in read_recording(run.path).metadata
 
 
 # -- damaged files ----------------------------------------------------------------------------------------------------

@@ -33,6 +33,7 @@ from hil.identification.terms import Term
 from hil.quantities import reading_unit
 from hil.twin.library import BY_ID
 from hil.twin.mechanism import Picture
+from hil.twin.parameter import Role
 
 if TYPE_CHECKING:
     from hil.diagnosis.diagnose import Diagnosis
@@ -135,7 +136,8 @@ def _within_period(diagnosis: Diagnosis, view: View) -> FloatArray:
 def _friction_over_position(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:
     """Draw friction over position, folded to one period if the travel holds many."""
     travel = max(float(np.ptp(position(diagnosis, view))) for view in views)
-    folded = 1e3 * views[0].term.values[1] < travel / FOLDED_FROM
+    period_m = BY_ID[views[0].term.effect].named(Role.PERIOD, views[0].term.values)
+    folded = period_m is not None and 1e3 * period_m < travel / FOLDED_FROM
     label, x_of, bins = ("position within the period", _within_period, 40) if folded else ("position", position, BINS)
     return _residual_over(label, x_of, "mm", bins=bins, against_motion=True)(diagnosis, views)
 

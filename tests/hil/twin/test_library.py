@@ -24,6 +24,7 @@ TABLE = {
     "stribeck_friction": ("motor_side", ["static_torque_n_m", "stribeck_velocity_rad_s"]),
     "presliding_hysteresis": ("motor_side", ["stiffness_n_m_rad"]),
     "position_dependent_friction": ("motor_side", ["fraction", "period_m"]),
+    "friction_gradient": ("motor_side", ["slope_1_m"]),
     "nonlinear_viscous_friction": ("motor_side", ["quadratic_n_m_s2_rad2"]),
     "friction_drift": ("motor_side", ["fraction", "time_constant_s"]),
     "table_side_friction": ("table", ["share"]),

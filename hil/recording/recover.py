@@ -148,8 +148,12 @@ def _ring_of(stream: Path) -> Ring | None:
         try:
             fcntl.flock(ring.descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
+            pid = ring[Counter.WRITER_PID]
             ring.release()
-            raise InputError(f"{stream}: its recorder still works; wait until the run is over") from None
+            raise InputError(
+                f"{stream}: its recorder still works (process {pid}); wait until the run is over, or end a process "
+                "that hangs"
+            ) from None
     return found
 
 

@@ -148,7 +148,7 @@ def _screw(draft: BenchDraft, plant: PlantValues, deflection: Estimate | None, l
     if deflection is None:
         draft.axis.append(_value("mass_kg", mass, "kg", inertia))
     else:
-        half = mass.scaled(0.5)
+        half = _guess(mass.scaled(0.5))
         draft.axis += [
             _value("motor_mass_kg", half, "kg", f"half of {digits(mass.value)} kg: the split is not told"),
             _value("table_mass_kg", half, "kg", f"the other half; {inertia}"),
@@ -197,7 +197,7 @@ def _turning(draft: BenchDraft, plant: PlantValues, deflection: Estimate | None,
     if deflection is None:
         draft.axis.append(_value("inertia_kg_m2", plant.inertia, "kg m^2 at the motor"))
     else:
-        motor = plant.inertia.scaled(0.5)
+        motor = _guess(plant.inertia.scaled(0.5))
         load = motor.scaled(gear.value**2)
         draft.axis += [
             _value("motor_inertia_kg_m2", motor, "kg m^2 at the motor", "half of the sum: the split is not told"),
@@ -209,6 +209,11 @@ def _turning(draft: BenchDraft, plant: PlantValues, deflection: Estimate | None,
             "motor and load inertia over stiffness"
         )
     _rotary_friction(draft, plant)
+
+
+def _guess(half: Estimate) -> Estimate:
+    """Half of a sum whose split is not told: the other half may be all or nothing."""
+    return replace(half, std_error=half.value)
 
 
 def _gear(measured: Estimate) -> Estimate:

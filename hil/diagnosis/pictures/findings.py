@@ -128,6 +128,17 @@ def _residual_over(
     return picture
 
 
+def _over_turn(per_torque: bool = False) -> Drawer:
+    """Make a picture over the motor angle, or over the position where no revolution is known."""
+
+    def picture(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:
+        known = diagnosis.owner.axis.physics().turn_known
+        label, x_of, unit = ("motor angle", angle, "deg") if known else ("position", position, "mm")
+        return _residual_over(label, x_of, unit, bins=240, per_torque=per_torque)(diagnosis, views)
+
+    return picture
+
+
 def _within_period(diagnosis: Diagnosis, view: View) -> FloatArray:
     """Position within the term's period [mm]."""
     return np.asarray(np.mod(position(diagnosis, view), 1e3 * view.term.values[1]))
@@ -216,8 +227,8 @@ PICTURES: dict[Picture, Drawer] = {
     Picture.FRICTION_ALONG_TRAVEL: _friction_over_position,
     Picture.POSITION: _residual_over("position", position, "mm"),
     Picture.POSITION_TABLE: _residual_over("position", position, "mm", "table"),
-    Picture.MOTOR_ANGLE: _residual_over("motor angle", angle, "deg", bins=240),
-    Picture.MOTOR_ANGLE_PER_TORQUE: _residual_over("motor angle", angle, "deg", bins=240, per_torque=True),
+    Picture.MOTOR_ANGLE: _over_turn(),
+    Picture.MOTOR_ANGLE_PER_TORQUE: _over_turn(per_torque=True),
     Picture.MOTOR_ANGLE_TABLE: _residual_over("motor angle", angle, "deg", "table"),
     Picture.SCREW_ANGLE: _residual_over("screw angle", angle, "deg", "table"),
     Picture.SIGNAL_PERIOD: _residual_over(

@@ -47,5 +47,6 @@ class Scene:
     friction_periods: list[float]  # [m]
     scale_periods: list[float]  # of the table residual [m]
     window: tuple[float, float, float]  # start, end, level [N m]
+    rest_m: float  # position at which a straight line through the disturbance torque over the position is 0
     stretch: float  # table against motor [m], typical
     most_stretch: float  # and largest

@@ -118,8 +118,7 @@ class CanopenDrive(CanopenNode, Drive):
         self._moved_counts = ((raw - self._raw_counts + 0x80000000) & 0xFFFFFFFF) - 0x80000000
         self._counts += self._moved_counts
         self._raw_counts = raw
-        self._answered = self._master.syncs
-        self._sample_time_s = self._master.sync_time_s
+        self._take_answer(now_s)
 
     def _latch(self, emergency: Emergency) -> None:
         if emergency.active:

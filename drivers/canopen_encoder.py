@@ -84,8 +84,7 @@ class CanopenEncoder(CanopenNode, Encoder):
             self.malformed_frames += 1
             return
         self._unwrapper.update(_POSITION.unpack(data)[0])
-        self._answered = self._master.syncs
-        self._sample_time_s = self._master.sync_time_s
+        self._take_answer(now_s)
 
     def _latch(self, emergency: Emergency) -> None:
         # An EMCY with error code 0 ends the alarm; an encoder needs no acknowledgement.

@@ -45,10 +45,18 @@ class CanopenNode:
         """Reset after a set-up: no answer and no heartbeat yet."""
         self._answered = self._set_up_at = self._master.syncs  # number of the SYNC answered last
         self._latched = 0  # Condition bits; an int: the truth test of an IntFlag runs Python code, which is slow
-        self._heartbeat_deadline_s = math.inf  # until the first heartbeat
+        self._heartbeat_deadline_s = math.inf  # until the first answered SYNC
 
     def _on_tpdo(self, can_id: int, data: bytes, now_s: float) -> None:
         raise NotImplementedError
+
+    def _take_answer(self, now_s: float) -> None:
+        """Note that the latest SYNC is answered. From the first answer on heartbeats are awaited: CiA 301 begins with
+        the first heartbeat, but the node was told to send them (0x1017), and one that never does is not supervised."""
+        if self._answered == self._set_up_at:
+            self._heartbeat_deadline_s = now_s + 3 * self.settings.heartbeat_s
+        self._answered = self._master.syncs
+        self._sample_time_s = self._master.sync_time_s
 
     def _on_emergency(self, can_id: int, data: bytes, now_s: float) -> None:
         emergency = decode_emergency(data, now_s)

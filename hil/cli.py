@@ -28,6 +28,7 @@ from hil.commands.investigate import investigate
 from hil.commands.latency import latency
 from hil.commands.paper import paper
 from hil.commands.prove import prove
+from hil.commands.recover import recover
 from hil.commands.run import run
 from hil.commands.validate import validate
 from hil.commands.warm_up import warm_up
@@ -61,6 +62,7 @@ def _options(
 COMMANDS: tuple[tuple[str, Callable[..., Any]], ...] = (
     ("demo", demo),
     ("run", run),
+    ("recover", recover),
     ("import", import_),
     ("identify", identify),
     ("compare", compare),
@@ -100,7 +102,7 @@ def main() -> None:
         print(error, file=sys.stderr)
         sys.exit(error.exit_code)
     except OSError as error:
-        if error.errno not in (errno.ENOSPC, errno.EPIPE):
+        if error.errno not in (errno.ENOSPC, errno.EPIPE, errno.EIO):  # EIO: a terminal that is closed
             raise
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what is buffered cannot be written
         if error.errno == errno.ENOSPC:

@@ -151,13 +151,14 @@ class OneMass(BenchSection):
 
     def physics(self) -> Physics:
         """The nominal physics of the twin."""
-        angle = 2.0 * pi / self.screw_lead_m if self.screw_lead_m else 1.0
+        angle = 2.0 * pi / (self.screw_lead_m or 1.0)  # without a lead orders are counted per metre
         return Physics(
             one_mass(self.mass_kg, LINEAR_LEAD_M),
             self.coulomb_force_n,
             self.viscous_force_n_s_m,
             linear=True,
             angle_per_unit=angle,
+            turn_known=self.screw_lead_m is not None,
         )
 
 

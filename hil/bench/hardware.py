@@ -75,6 +75,9 @@ class DriveSection(BenchSection):
     overrun_s: Positive = Field(0.05, description="lateness at which the axis is stopped [s]")
     supervision: SupervisionSection = SupervisionSection()
     bus_load: Share = Field(0.7, description="largest share of the bus's time at which the drive is armed")
+    over_budget: Literal["refuse", "arm"] = Field(
+        "refuse", description="jitter_p99 or bus_load exceeded: arm or not; the recording says so"
+    )
 
     @model_validator(mode="after")
     def _consistent(self) -> DriveSection:

@@ -72,5 +72,5 @@ def say(result: RunResult, virtual: bool) -> None:
     for note in (*result.notes, *result.doubts):
         err.print(f"note: {note}")
     if not virtual:
-        out.print(f"lateness of the ticks: {result.jitter.text}")
+        out.print(f"lateness of the ticks: {result.jitter.text}, {result.outcome.skipped} left out")
     out.print(f"{result.outcome.rows} rows: {result.recording}")

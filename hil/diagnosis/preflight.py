@@ -2,7 +2,8 @@
 
     torque = J a + D v + Fc sign(v) + T0      by least squares over the measured motion
 
-A negative J shows a wrong sign; J and Fc that both deviate from the bench by a large factor show a wrong unit.
+A negative J without positive friction Fc shows a wrong sign; J and Fc that both deviate from the bench by a large
+factor show a wrong unit.
 """
 
 import math
@@ -179,8 +180,8 @@ def _torque_problems(run: Measured, bench: Bench) -> Iterator[str]:
     measured = regress(run)
     if measured is None:
         return
-    (j, _, coulomb, _), errors = measured
-    if j < -3.0 * errors[0]:
+    (j, _, coulomb, *_), errors = measured
+    if _turned(measured) and _turned(regress(run, spring=True)):
         yield (
             f"{names.torque} has the wrong sign: its regression gives a negative inertia, {j:.3g} ± {errors[0]:.1g}; "
             "correct the sign of the channel, or of the encoder"
@@ -197,8 +198,17 @@ def _torque_problems(run: Measured, bench: Bench) -> Iterator[str]:
         yield f"{names.torque}: {_factor(factor, units | _TORQUE_UNITS, against)}"
 
 
-def regress(run: Measured) -> tuple[list[float], list[float]] | None:
-    """Fit J, D, Fc, T0 of the module's equation, with standard errors [motor units]; None without sliding motion."""
+def _turned(found: tuple[list[float], list[float]] | None) -> bool:
+    """True for a negative inertia; friction has the sign of the torque too."""
+    values, errors = found or ([0.0, 0.0, 0.0], [0.0, 0.0, 0.0])
+    return values[0] < -3.0 * errors[0] and values[2] < 3.0 * errors[2]
+
+
+def regress(run: Measured, spring: bool = False) -> tuple[list[float], list[float]] | None:
+    """Fit J, D, Fc, T0 of the module's equation, with standard errors [motor units]; None without sliding motion.
+
+    With `spring` a torque over the position is fitted too, as a fifth value.
+    """
     window = max(round(_SMOOTH_S / run.period_s) | 1, 5)
     if run.motor.size < 4 * window:
         return None
@@ -209,13 +219,13 @@ def regress(run: Measured) -> tuple[list[float], list[float]] | None:
     rows[:window] = rows[-window:] = False
     if rows.sum() < 4 * window:
         return None
-    basis = np.stack([acceleration, velocity, np.sign(velocity), np.ones_like(velocity)], axis=1)[rows]
+    basis = np.stack([acceleration, velocity, np.sign(velocity), np.ones_like(velocity), run.motor], axis=1)[rows]
+    basis = basis if spring else basis[:, :4]
     if np.ptp(basis[:, 2]) == 0.0:
         basis[:, 3] = 0.0  # one direction only: offset and Coulomb friction are not separable
     solution, *_ = np.linalg.lstsq(basis, torque[rows], rcond=None)
     left = torque[rows] - basis @ solution
-    # smoothing leaves one independent sample per window
-    variance = float(left @ left) / max(rows.sum() / window - 4.0, 1.0)
+    variance = float(left @ left) / max(rows.sum() / window - 4.0, 1.0)  # one independent sample per window
     covariance = np.linalg.pinv(basis.T @ basis) * variance
     return [float(value) for value in solution], [float(np.sqrt(value)) for value in np.diag(covariance)]
 

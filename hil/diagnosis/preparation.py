@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from hil.bench.bench_file import Bench
 from hil.diagnosis.law_check import LawCheck, check_law, replayable
 from hil.diagnosis.preflight import prepare
-from hil.diagnosis.split import same, split
+from hil.diagnosis.split import held_out_note, same, split
 from hil.diagnosis.usable_parts import usable_parts
 from hil.errors import InputError
 from hil.identification.completion import completed, reduced
@@ -26,7 +26,7 @@ class Prepared:
 
 
 def prepare_diagnosis(train: Sequence[Recording], validate: Sequence[Recording], bench: Bench) -> Prepared:
-    """Prepare recordings, cut at their gaps; without `validate` the last third of each is held out.
+    """Prepare recordings, cut at their gaps; without `validate` a third of each is held out.
 
     Raises InputError with all reasons if the recordings cannot be diagnosed.
     """
@@ -40,10 +40,7 @@ def prepare_diagnosis(train: Sequence[Recording], validate: Sequence[Recording],
     if not validate:
         train, validate = split(train)
         train += whole
-        notes = (
-            *notes,
-            "No held-out recording was given: the last third of each recording is used for validation.",
-        )
+        notes = (*notes, held_out_note(validate))
     twice = [held.name for held in validate for run in train if same(held, run)]
     if twice:
         raise InputError(

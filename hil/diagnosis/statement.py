@@ -8,6 +8,8 @@ from hil.diagnosis.result import Finding, FitFigures, Mode, Result, Verdict
 from hil.diagnosis.wording import title
 from hil.quantities import percent, quantity
 
+LIKELY = 0.5  # confidence from which an effect is more likely there than not
+
 
 def statement(result: Result) -> str:
     """The verdict as one sentence."""
@@ -26,9 +28,12 @@ def statement(result: Result) -> str:
             if found.after_rms < found.best_before_rms
             else (f"does not decrease: {after} instead of {before}")
         )
+        surest = max(one.confidence for one in result.missing)
+        doubt = "" if surest >= LIKELY else f", doubtful by its confidence ({percent(surest)})"
+        where = "held-out" if entry.validate_ else "these"
         return (
-            f"Missing physics: {named} With it the residual of {name} on {'held-out' if entry.validate_ else 'these'} "
-            f"recordings {change} rms; the noise floor is {noise}."
+            f"Missing physics{doubt}: {named} With all of it the residual of {name} on {where} recordings {change} "
+            f"rms; the noise floor is {noise}."
         )
     if result.verdict is Verdict.PARAMETER_ERROR:
         worst = sorted(
@@ -59,7 +64,7 @@ def statement(result: Result) -> str:
 
 def _sentences(found: Sequence[Finding]) -> str:
     """The sentences of findings that are more likely there than not, and the names of the others."""
-    likely = [one for one in found if one.confidence >= 0.5] or found
+    likely = [one for one in found if one.confidence >= LIKELY] or found
     doubtful = ", ".join(f"{title(one.effect)} ({percent(one.confidence)})" for one in found if one not in likely)
     sentences = " ".join(one.sentence for one in likely)
     return f"{sentences} Doubtful, by their confidence: {doubtful}." if doubtful else sentences

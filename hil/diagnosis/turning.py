@@ -13,6 +13,8 @@ _WORDS = {
     "ball screw": "gear",
     "lead": "transmission",
     "table": "load",
+    "Table": "Load",
+    "guideways": "bearings",
     "screw": "motor",
     "mm": "mrad",
     "µm": "µrad",

@@ -8,7 +8,7 @@ from hil.diagnosis.turning import of_load
 from hil.identification.terms import Term
 from hil.quantities import digits, quantity
 from hil.twin.library import BY_ID
-from hil.twin.parameter import Role
+from hil.twin.parameter import Parameter, Role
 
 
 def title(effect: str) -> str:
@@ -21,7 +21,7 @@ def titles(effects: Iterable[str]) -> str:
     return ", ".join(map(title, effects))
 
 
-def label(term: Term) -> str:
+def label(term: Term, bench: Bench) -> str:
     """Name a term, with its period or order if the effect may act more than once."""
     mechanism = BY_ID[term.effect]
     if mechanism.most == 1:
@@ -29,16 +29,32 @@ def label(term: Term) -> str:
     period_m, order = (mechanism.named(role, term.values) for role in (Role.PERIOD, Role.ORDER))
     if period_m is not None:
         return f"{title(term.effect)}, every {quantity(period_m, 'm')}"
-    return title(term.effect) if order is None else f"{title(term.effect)}, {digits(order)} times per revolution"
+    return title(term.effect) if order is None else f"{title(term.effect)}, {_wave(order, bench)}"
+
+
+def _wave(order: float, bench: Bench) -> str:
+    """How often an effect repeats: per revolution, or along the travel where no revolution is known."""
+    if bench.axis.physics().turn_known:
+        return f"{digits(order)} times per revolution"
+    return f"every {quantity(1.0 / order, 'm')} of travel"
+
+
+def unit_in(bench: Bench, parameter: Parameter) -> str:
+    """SI unit of a parameter of a mechanism on the axis of a bench."""
+    if parameter.role is Role.ORDER and not bench.axis.physics().turn_known:
+        return "1/m"
+    return parameter.dimension.unit(bench.axis.linear, bench.axis.turns)
 
 
 def sentence(term: Term, bench: Bench) -> str:
     """Describe a term in a sentence with its values, and its variant in brackets."""
     mechanism, axis = BY_ID[term.effect], bench.axis
     values = {
-        parameter.name: quantity(value, parameter.dimension.unit(axis.linear, axis.turns))
+        parameter.name: quantity(value, unit_in(bench, parameter))
         for parameter, value in zip(mechanism.parameters, term.values, strict=True)
     }
+    order = mechanism.named(Role.ORDER, term.values)
+    values["wave"] = "" if order is None else _wave(order, bench)
     values["viscous_speed"] = quantity(bench.axis.physics().viscous_speed, "m/s" if axis.linear else "rad/s")
     variant = mechanism.variants[term.variant]
     text = of_load(variant.sentence or mechanism.sentence, axis.turns).format(**values)

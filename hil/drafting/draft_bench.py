@@ -13,6 +13,7 @@ from hil.drafting.sensor_values import noise_of
 from hil.drafting.usual_values import ROTARY_LEAD_M, usual_lead
 from hil.errors import InputError
 from hil.identification.completion import with_position
+from hil.identification.coordinates import TRUST
 from hil.quantities import digits
 from hil.recording.importing import STEP
 from hil.recording.quantum import count_of, is_decimal
@@ -24,6 +25,7 @@ LONGEST_LEAD_M = 1.0  # that a bench file takes; a load that turns as far as its
 DIRECT = 0.02  # deviation from equal angles of motor and load up to which there is no gear
 # Least deflection over acceleration that is written: a mode at 5 kHz, beyond any control loop.
 _STIFFEST_S2 = (2.0 * pi * 5e3) ** -2
+_WHOLE = 1e-4  # deviation from a whole gear ratio that is none: play between the encoders biases the measured one by it
 _STEPS_PER_NOISE = sqrt(12.0)  # a count of q has noise of q / sqrt(12)
 
 
@@ -115,7 +117,9 @@ def _lead(recording: Recording, transmission: TransmissionValues | None) -> Esti
 
 
 def _deflection_s2(transmission: TransmissionValues) -> Estimate | None:
-    """Deflection of the transmission over the load's acceleration; where it is not told, its standard error.
+    """Deflection of the transmission over the load's acceleration; where it is not told, below its standard error.
+
+    A diagnosis searches within a factor of `TRUST` of it: the transmission is as soft as the standard error or stiffer.
 
     Two encoders show what a transmission does, which a rigid axis does not have: lead error, play, twist. None: the
     second encoder is late, and no deflection is told beside its delay.
@@ -125,8 +129,8 @@ def _deflection_s2(transmission: TransmissionValues) -> Estimate | None:
         return replace(stretch, how="deflection over acceleration")
     if transmission.delay_s.significant:
         return None
-    how = "not told by this motion: the deflection over acceleration is at most its standard error"
-    return Estimate(max(stretch.value, stretch.std_error, _STIFFEST_S2), stretch.std_error, how)
+    how = "not told by this motion: a third of the standard error of the deflection over acceleration"
+    return Estimate(max(stretch.value, stretch.std_error / TRUST, _STIFFEST_S2), stretch.std_error, how)
 
 
 def _linear(draft: BenchDraft, plant: PlantValues) -> None:
@@ -144,7 +148,7 @@ def _screw(draft: BenchDraft, plant: PlantValues, deflection: Estimate | None, l
     if deflection is None:
         draft.axis.append(_value("mass_kg", mass, "kg", inertia))
     else:
-        half = mass.scaled(0.5)
+        half = _guess(mass.scaled(0.5))
         draft.axis += [
             _value("motor_mass_kg", half, "kg", f"half of {digits(mass.value)} kg: the split is not told"),
             _value("table_mass_kg", half, "kg", f"the other half; {inertia}"),
@@ -188,12 +192,12 @@ def _weight(draft: BenchDraft, plant: PlantValues) -> None:
 
 
 def _turning(draft: BenchDraft, plant: PlantValues, deflection: Estimate | None, lead: Estimate) -> None:
-    gear = Estimate(ROTARY_LEAD_M / lead.value, ROTARY_LEAD_M / lead.value**2 * lead.std_error, lead.how)
+    gear = _gear(Estimate(ROTARY_LEAD_M / lead.value, ROTARY_LEAD_M / lead.value**2 * lead.std_error, lead.how))
     draft.axis.append(_value("gear_ratio", gear, "motor per load"))
     if deflection is None:
         draft.axis.append(_value("inertia_kg_m2", plant.inertia, "kg m^2 at the motor"))
     else:
-        motor = plant.inertia.scaled(0.5)
+        motor = _guess(plant.inertia.scaled(0.5))
         load = motor.scaled(gear.value**2)
         draft.axis += [
             _value("motor_inertia_kg_m2", motor, "kg m^2 at the motor", "half of the sum: the split is not told"),
@@ -205,6 +209,19 @@ def _turning(draft: BenchDraft, plant: PlantValues, deflection: Estimate | None,
             "motor and load inertia over stiffness"
         )
     _rotary_friction(draft, plant)
+
+
+def _guess(half: Estimate) -> Estimate:
+    """Half of a sum whose split is not told: the other half may be all or nothing."""
+    return replace(half, std_error=half.value)
+
+
+def _gear(measured: Estimate) -> Estimate:
+    """The whole number of turns that a measured ratio is very near to, else the ratio."""
+    whole = float(round(measured.value))
+    if whole < 1.0 or measured.value == whole or abs(measured.value / whole - 1.0) > _WHOLE:
+        return measured
+    return replace(measured, value=whole, how=f"{measured.how} ({measured.value:.7g} measured)")
 
 
 def _rotary_friction(draft: BenchDraft, plant: PlantValues) -> None:

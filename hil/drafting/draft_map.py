@@ -1,5 +1,6 @@
 """Draft the map of a foreign file: its clock, and unit, sign and scale of each channel with how it was found."""
 
+import re
 from math import pi
 from pathlib import Path
 
@@ -24,6 +25,8 @@ from hil.recording.complete_rows import complete_rows
 from hil.recording.held_samples import rows_per_sample
 from hil.recording.wraps import unwrapped
 
+_COORDINATE = r"q(pos)?\d*([_ ].*)?"  # joint angle, as robotics writes it: q, q1, q_ref
+_ANGLE = "angle|winkel|theta|phi|rot|joint|gelenk"
 LATE_ROWS = 0.5  # by which a set-point may seem late: its rounding and the sampling of the encoder
 
 
@@ -84,7 +87,8 @@ class _Composer:
             return
         moved = motion(self.live[roles.motor], self.period_s)
         self._units_of_positions()
-        self.kind = AxisKind.LINEAR if is_length(self.units[roles.motor]) else AxisKind.ROTARY
+        linear = is_length(self.units[roles.motor]) and not self._drives_a_table()
+        self.kind = AxisKind.LINEAR if linear else AxisKind.ROTARY
         names = AXIS_CHANNELS[self.kind]
         self._positions(names.motor_position)
         self._velocity_command()
@@ -92,8 +96,7 @@ class _Composer:
         if not (roles.effort or roles.effort_command or roles.table):
             raise InputError(
                 f"{self.draft.table.path}: beside the position {roles.motor} no torque, force, current, voltage or "
-                "second "
-                "encoder is found; record one of them, or write its column into a map: hil import FILE --map MAP.yaml"
+                "second encoder is found; record one, or write its column into a map: hil import FILE --map MAP.yaml"
             )
 
     def _choose(self, column: str, choice: UnitChoice) -> None:
@@ -129,16 +132,26 @@ class _Composer:
 
     def _prefers_length(self, positions: list[str]) -> bool | None:
         effort = self.roles.effort or self.roles.effort_command
-        if effort and self.labels[effort].unit in ("N", "kN"):
+        if self._gives_force():
             return True
         words = " ".join(positions).lower()
-        if any(word in words for word in ("angle", "winkel", "theta", "phi", "rot")):
+        if any(re.fullmatch(_COORDINATE, name.lower()) for name in positions) or re.search(_ANGLE, words):
             return False
         if any(word in words for word in ("weg", "hub", "stroke", "course", "displ", "linear")):
             return True
         if effort and self.labels[effort].unit in ("N m", "mN m"):
             return False
         return None
+
+    def _drives_a_table(self) -> bool:
+        """True with a second encoder, unless the motor gives a force: the transmission between them is then judged."""
+        return (
+            self.roles.table in self.units and is_length(self.units[str(self.roles.table)]) and not self._gives_force()
+        )
+
+    def _gives_force(self) -> bool:
+        effort = self.roles.effort or self.roles.effort_command
+        return effort is not None and self.labels[effort].unit in ("N", "kN")
 
     def _positions(self, channel: str) -> None:
         roles, live = self.roles, self.live
@@ -159,12 +172,16 @@ class _Composer:
             self.kind = AxisKind.ROTARY if motor == "rad" else AxisKind.LINEAR
             channel = AXIS_CHANNELS[self.kind].motor_position
         elif self.kind is AxisKind.ROTARY:
-            if length is not None:
-                factor = abs(relations[length].factor) * UNITS[self.units[length]][1] / UNITS[motor][1]
-                self.draft.lead_m, self.draft.lead_how = (
-                    float(f"{usual_lead(2.0 * pi * factor):.6g}"),
-                    f"travel of {length} per turn of {roles.motor}",
+            if is_length(motor):
+                entry |= {"unit": "rad", "scale": UNITS[motor][1] * 2.0 * pi / LEADS_M[0]}
+                self.draft.lead_m, self.draft.lead_how = LEADS_M[0], "not told; masses at the table scale with it"
+                self.draft.unsure.append(
+                    f"{roles.motor}: is in a length; {1e3 * LEADS_M[0]:g} mm per turn are taken: correct scale and lead"
                 )
+            elif length is not None:
+                factor = abs(relations[length].factor) * UNITS[self.units[length]][1] / UNITS[motor][1]
+                self.draft.lead_m = float(f"{usual_lead(2.0 * pi * factor):.6g}")
+                self.draft.lead_how = f"travel of {length} per turn of {roles.motor}"
             else:
                 self.draft.lead_m = ROTARY_LEAD_M
                 self.draft.lead_how = "a rotary axis: one metre of the load stands for one radian"
@@ -195,10 +212,8 @@ class _Composer:
             mixed = mixed_up(ratio)
             if mixed:
                 raise InputError(
-                    f"{self.draft.table.path}: {name} in {unit} moves {ratio:.4g} times as far as "
-                    f"{self.roles.motor} in "
-                    f"{motor}: one of the two units is wrong ({mixed}?); correct it in the header of the file, or "
-                    "write a map"
+                    f"{self.draft.table.path}: {name} in {unit} moves {ratio:.4g} times as far as {self.roles.motor} "
+                    f"in {motor}: one of the two units is wrong ({mixed}?); correct it in the header, or write a map"
                 )
             if abs(ratio - 1.0) > 2.0 * MATCH and share > 0.9:
                 self.draft.unsure.append(
@@ -220,12 +235,10 @@ class _Composer:
         if length is None or factor is None:
             raise InputError(
                 f"{self.draft.table.path}: {self.roles.motor} is in counts, and no other column tells their size; "
-                "write "
-                "counts_per_rev (or counts_per_m) into a map: hil import FILE --map MAP.yaml"
+                "write counts_per_rev (or counts_per_m) into a map: hil import FILE --map MAP.yaml"
             )
         per_m = 1.0 / (abs(factor) * UNITS[self.units[length]][1])
-        effort = self.roles.effort or self.roles.effort_command
-        if effort and self.labels[effort].unit in ("N", "kN"):
+        if self._gives_force():
             return {"counts_per_m": float(f"{per_m:.8g}")}
         fits = [(counts, lead) for lead in LEADS_M for counts in COUNTS if abs(counts / (lead * per_m) - 1.0) < 0.003]
         if not fits:
@@ -233,15 +246,13 @@ class _Composer:
         counts, lead = fits[0]
         self.draft.lead_m, self.draft.lead_how = lead, f"from the counts per metre of {length}, with usual leads"
         self.draft.unsure.append(
-            f"{self.roles.motor}: {per_m:.6g} counts per m; {counts:g} per revolution and a lead of {1e3 * lead:g} "
-            "mm are "
-            "taken, another pair with the same ratio fits as well"
+            f"{self.roles.motor}: {per_m:.6g} counts per m; {counts:g} per revolution and a lead of "
+            f"{1e3 * lead:g} mm are taken, another pair with the same ratio fits as well"
         )
         return {"counts_per_rev": counts}
 
     def _velocity_command(self) -> None:
-        name = self.roles.velocity_command
-        command = self.roles.command
+        name, command = self.roles.velocity_command, self.roles.command
         if name is None or command is None:
             if name is not None:
                 self.draft.left_out[name] = "a velocity set-point without a position set-point"

@@ -1,6 +1,6 @@
 """Inertia, friction, load and transmission of an axis from its recording.
 
-T = J a + D v + Tc sign(v) + T0 (+ r G sin(r q + q0))        at the motor; r = 1 / gear ratio
+T = J a + D v + Tc sign(v) + T0 (+ r G sin(r q + q0)  or  + k q)        at the motor; r = 1 / gear ratio
 x = r q + c - r tau v - (m_t / k) a - (F_t / k) sign(v)      second encoder against the motor's
 """
 
@@ -21,8 +21,8 @@ CUTOFFS_HZ = (100.0, 50.0, 25.0, 12.0, 6.0)  # of the position filter
 NOISE_SHARE = 0.02  # of noise in the acceleration: it makes the inertia too small by this share
 MOST_OF_RATE = 0.2  # of the sampling rate: the filter must end well below half of it
 LEAST_ROWS = 80  # after decimation: eight per block of the error estimate
-# Residual with gravity over that without, up to which gravity is reported: on LEAST_ROWS white rows two parameters
-# without effect remove 1 %.
+# Residual with a torque over the position over that without, up to which it is reported: on LEAST_ROWS white rows two
+# parameters without effect remove 1 %.
 GRAVITY_GAIN = 0.85
 LEAST_ANGLE_RAD = 0.5  # of the load: over less, a sine is a straight line to 1 %, and gravity is a spring
 
@@ -31,7 +31,8 @@ LEAST_ANGLE_RAD = 0.5  # of the load: over less, a sine is a straight line to 1 
 class PlantValues:
     """Estimates at the motor: kg m^2, N m s/rad, N m (linear axis kg, N s/m, N); `left` is a share of the torque.
 
-    `gravity` is the torque G over the load's angle [N m], `gravity_angle` its q0 [rad], both at the load.
+    `gravity` is the torque G over the load's angle [N m], `gravity_angle` its q0 [rad], both at the load. `spring` is
+    the torque over the motor's position k [N m/rad, N/m].
     """
 
     inertia: Estimate
@@ -41,6 +42,7 @@ class PlantValues:
     left: float
     gravity: Estimate | None
     gravity_angle: Estimate | None
+    spring: Estimate | None
     cutoff_hz: float
 
 
@@ -78,7 +80,7 @@ def plant_values(recording: Recording, load_ratio: float | None = None) -> Plant
     # the highest that noise allows: a lower one cuts acceleration, so that the inertia comes out too large
     cutoff_hz = next((one for one in allowed if _noise_share(recording, one) < NOISE_SHARE), allowed[-1])
     fit = _fit(recording, cutoff_hz, load_ratio)
-    inertia, viscous, coulomb, offset, *weight = fit.estimates
+    inertia, viscous, coulomb, offset, *more = fit.estimates
     if inertia.value <= 0.0:
         raise InputError(
             f"{recording.name}: the inertia comes out as {inertia.value:.3g} +- {inertia.std_error:.2g}, allowed "
@@ -86,8 +88,9 @@ def plant_values(recording: Recording, load_ratio: float | None = None) -> Plant
             "the torque has the wrong sign, or the motion does not separate inertia from a spring or gravity: record "
             "moves of different accelerations"
         )
-    gravity, angle = _gravity(weight[0], weight[1], load_ratio) if weight and load_ratio else (None, None)
-    return PlantValues(inertia, viscous, coulomb, offset, fit.left, gravity, angle, cutoff_hz)
+    gravity, angle = _gravity(more[0], more[1], load_ratio) if len(more) == 2 and load_ratio else (None, None)
+    spring = more[0] if len(more) == 1 else None
+    return PlantValues(inertia, viscous, coulomb, offset, fit.left, gravity, angle, spring, cutoff_hz)
 
 
 def _gravity(sine: Estimate, cosine: Estimate, load_ratio: float) -> tuple[Estimate, Estimate]:
@@ -112,7 +115,10 @@ def _noise_share(recording: Recording, cutoff_hz: float) -> float:
 
 
 def _fit(recording: Recording, cutoff_hz: float, load_ratio: float | None) -> BlockFit:
-    """Fit without gravity, or with it on a load that turns where it leaves clearly less."""
+    """Fit without a torque over the position, or with it where it leaves clearly less.
+
+    It is gravity on a load that turns far, else a spring.
+    """
     # the filter of the decimation, alike for torque and motion, ends where that of the position does, at 40 Hz or below
     rate_hz = 1.0 / recording.period_s
     decimation = max(2, round(0.5 * CORNER * rate_hz / cutoff_hz), round(rate_hz / 100.0))
@@ -125,12 +131,13 @@ def _fit(recording: Recording, cutoff_hz: float, load_ratio: float | None) -> Bl
     columns, torque = inverse_dynamics_columns(recording, cutoff_hz, decimation)
     how = f"least squares of torque over motion, position filtered at {cutoff_hz:g} Hz"
     plain = fit_blocks(list(columns.T), torque, [how] * 4)
-    angle = recording[recording.axis.motor_position] * (load_ratio or 0.0)
+    position = recording[recording.axis.motor_position][CUT_AT_START:]
+    position = position[(position.size - 1) % decimation :: decimation]
+    angle = position * (load_ratio or 0.0)
     if np.ptp(angle) < LEAST_ANGLE_RAD:
-        return plain
-    angle = angle[CUT_AT_START:]
-    angle = angle[(angle.size - 1) % decimation :: decimation]
-    more = fit_blocks([*columns.T, np.sin(angle), np.cos(angle)], torque, [f"{how}, with gravity"] * 6)
+        more = fit_blocks([*columns.T, position], torque, [f"{how}, with a spring"] * 5)
+    else:
+        more = fit_blocks([*columns.T, np.sin(angle), np.cos(angle)], torque, [f"{how}, with gravity"] * 6)
     return more if more.left < GRAVITY_GAIN * plain.left and more.estimates[0].value > 0.0 else plain
 
 

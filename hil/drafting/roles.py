@@ -83,8 +83,7 @@ def _refuse_frozen(where: str, frozen: list[str], columns: dict[str, FloatArray]
         told = f"; constant are {', '.join(frozen)}" if frozen else ""
         raise InputError(
             f"{where}: no column is the measured position of the axis (columns: {', '.join(columns)}{told}); "
-            "record it, or "
-            "write its column into a map: hil import FILE --map MAP.yaml"
+            "record it, or write its column into a map: hil import FILE --map MAP.yaml"
         )
 
 
@@ -109,7 +108,8 @@ def _of_one_axis(
     others = [number for number in both if number != roles.axis]
     if axis is None:
         roles.unsure.append(
-            f"axis: the file holds the axes {', '.join(both)}; {roles.axis} is taken, for another: --axis {others[0]}"
+            f"axis: the file holds the axes {', '.join(both)}; {roles.axis} is taken, for another: --axis {others[0]}; "
+            "what a moving arm does to another is not modelled"
         )
     for name, one in list(labels.items()):
         if one.number and one.number != roles.axis:
@@ -259,8 +259,7 @@ def _velocities(
             if inverse > IS_DERIVATIVE:
                 raise InputError(
                     f"{where}: {roles.motor} is the derivative of {name}: position and velocity are interchanged; "
-                    "correct the "
-                    "names of the columns"
+                    "correct the names of the columns"
                 )
             roles.unsure.append(
                 f"{name}: named a velocity, but it is not the derivative of {roles.motor} (share {share:.2f})"

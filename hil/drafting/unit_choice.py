@@ -1,6 +1,7 @@
 """Choose the units of columns: by their names, by their relations to columns with a unit, else by their size."""
 
 from dataclasses import dataclass
+from math import pi
 
 import numpy as np
 
@@ -14,6 +15,7 @@ LINEAR_SPEEDS = ("m/s", "mm/s", "m/min", "mm/min")
 ANGULAR_SPEEDS = ("rad/s", "deg/s", "rpm", "rev/s")
 # Largest travel read in a unit: axes travel metres at most, joints a few turns
 _LONGEST_M, _MOST_RAD = 5.0, 13.0
+_WHOLE = 1e-5  # relative deviation from whole quarters of a turn: that of six digits
 _LEAST_COUNTS = 200.0  # travel in whole numbers from which they are counts of an encoder
 
 
@@ -60,7 +62,9 @@ def position_unit(
 
 def _by_size(column: str, travel: float, length: bool, why: str) -> UnitChoice:
     small, large, most = ("m", "mm", _LONGEST_M) if length else ("rad", "deg", _MOST_RAD)
-    unit = small if travel < most else large
+    quarters = travel / (0.5 * pi)
+    whole = not length and abs(quarters - round(quarters)) < _WHOLE * quarters  # of a set-point in radians
+    unit = small if travel < most or whole else large
     return UnitChoice(unit, f"{column}: {why}; {unit} is taken for a travel of {travel:.4g}")
 
 

@@ -13,8 +13,10 @@ import numpy as np
 from hil.bench.bench_file import Bench
 from hil.bench.hardware import DriveMode
 from hil.errors import InputError
+from hil.identification.completion import completed, reduced
 from hil.identification.dataset import Dataset, prepare_dataset
 from hil.identification.deviations import (
+    CONTROLLER_BLOCK,
     LOW_PASS_HZ,
     MOTOR_BLOCK,
     TABLE_BLOCK,
@@ -39,6 +41,11 @@ SCHEMA_VERSION = 1
 EXPLAINED: float = FLOOR**0.5  # rms over noise up to which a channel is explained; the threshold of the diagnosis
 # Least noise of table less motor position: error of the integration step and beat of the encoder counts in closed loop.
 TABLE_ACCURACY_M = 0.15e-6
+
+_UNKNOWN_LAW = (
+    "The control law is unknown: the twin is compared block by block, from measured torque to measured motion, and not "
+    "in closed loop."
+)
 
 Progress = Callable[[str, float | None], None]  # name of the step, share that is done or None if unknown
 
@@ -81,7 +88,7 @@ class Comparison:
 
     @property
     def held(self) -> bool:
-        """False if the twin is unstable in closed loop: then all figures are block by block."""
+        """False if the control law is unknown or the twin is unstable with it: all figures are block by block then."""
         return bool(self.channels)
 
     def _block(self, name: str) -> BlockDeviation | None:
@@ -168,10 +175,12 @@ def compare(
     """Compare a recording with the twin of a bench.
 
     With `fit` the nominal parameters are fitted to the recording first. `progress` gets the name of each step. Raises
-    InputError if recording and bench do not belong together, HilError if the fit fails. For a twin that is unstable in
-    closed loop there are figures block by block only.
+    InputError if recording and bench do not belong together, HilError if the fit fails. For an unknown control law, and
+    for a twin that is unstable in closed loop, there are figures block by block only.
     """
-    _ = bench.known_control  # raises: a comparison simulates the closed loop
+    if not bench.law_known:
+        bench = reduced(bench, [recording])
+        recording = completed(recording, bench)
     measured = take(recording, bench)
     data, fitted = prepare_dataset([measured], bench), None
     if fit:
@@ -179,18 +188,23 @@ def compare(
         fitted = fit_nominal(data, partial(_figures_of, measured, data))
         bench = fitted.bench
     progress("simulating", None)
-    channels, datum = _closed_loop(measured, bench)
+    channels, datum = _closed_loop(measured, bench) if bench.law_known else ([], 0.0)
     progress("block by block", None)
     blocks = compare_blocks(Hypothesis(bench), data)
+    if not bench.law_known:
+        blocks = tuple(block for block in blocks if block.deviation.name != CONTROLLER_BLOCK)
     inverse, remarks = _inverse_dynamics(recording) if bench.axis.linear else (None, [])
     notes = (*_notes(measured, bench, fitted, datum), *remarks)
-    notes = notes if channels else (unstable(measured), *notes)
+    if not channels:
+        notes = (unstable(measured) if bench.law_known else _UNKNOWN_LAW, *notes)
     return Comparison(recording, measured, bench, tuple(channels), blocks, fitted, inverse, notes)
 
 
 def _figures_of(measured: Measured, data: Dataset, hypothesis: Hypothesis) -> dict[str, float]:
     """Every rms deviation that a comparison with a hypothesis reports; infinite in closed loop if it is unstable."""
     found = rms_of_channels(hypothesis, data)
+    if not hypothesis.bench.law_known:
+        return found
     channels, _ = _closed_loop(measured, hypothesis.resolved.bench)
     return (
         found

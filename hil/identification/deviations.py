@@ -35,7 +35,7 @@ from hil.twin.stepping.loops import INTEGRATOR_S
 from hil.twin.stepping.stages import stage_of
 
 LOW_PASS_HZ, LOW_PASS_ORDER = 100.0, 4  # as in the inverse-dynamics identification of EMPS
-MOTOR_BLOCK, TABLE_BLOCK = "motor and load", "transmission and table"
+CONTROLLER_BLOCK, MOTOR_BLOCK, TABLE_BLOCK = "controller", "motor and load", "transmission and table"
 _DRIVE = (Stage.CURRENT, Stage.CHANNEL)
 
 
@@ -96,7 +96,7 @@ def compare_blocks(hypothesis: Hypothesis, data: Dataset) -> tuple[BlockDeviatio
         remark = ""
     judged = run.judged
     command = run.torque_command - left["command"]
-    controller = Deviation("controller", f"{name} command", unit, run.torque_command, command, judged)
+    controller = Deviation(CONTROLLER_BLOCK, f"{name} command", unit, run.torque_command, command, judged)
     blocks = [BlockDeviation(controller, "set-points, measured positions", 0.0, remark)]
     if not run.torque_is_command:
         drive = Deviation("drive", name, unit, run.torque, run.torque - left["torque"], judged)

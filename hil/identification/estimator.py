@@ -12,7 +12,7 @@ J, as in scipy's solvers, takes longer than the simulations.
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property
@@ -22,7 +22,7 @@ import numpy as np
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
 from hil.identification.coordinates import EDGE_STEP_S
-from hil.identification.dataset import TORQUE_ACCURACY, Dataset
+from hil.identification.dataset import TORQUE_ACCURACY, Dataset, inertia
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.levenberg_marquardt import broyden, damped_step, robust_loss
 from hil.identification.noise_floor import FLOOR, noise_ratios
@@ -110,6 +110,16 @@ class Fit:
         pairs = zip(self.data.runs, self.noise_ratios, strict=True)
         return float(sum(run.motor[run.judged].size * of(ratio) for run, found in pairs for ratio in found.values()))
 
+    @cached_property
+    def missed_torque(self) -> float:
+        """Sum of squared weighted residuals of the motor, as a torque: times the squared inertia.
+
+        A torque that the twin misses moves a heavier axis less: the residuals of the motor alone may fall for a wrong
+        inertia.
+        """
+        parts = (part for (_, channel), part in self.residuals.parts.items() if channel == "motor")
+        return inertia(self.bench) ** 2 * sum(float(part @ part) for part in parts)
+
     @property
     def at_bound(self) -> tuple[str, ...]:
         """Names of the parameters that ended at a bound."""
@@ -140,9 +150,11 @@ class Fit:
         """Evaluate the hypothesis, not fitted, with another weight of the motor channel and the twin's own steps."""
         return replace(self.estimator, torque_accuracy=torque_accuracy, fast=False).evaluate(self.hypothesis)
 
-    def refit(self, evaluations: int, *, soft: float = 0.0, slopes: FloatArray | None = None) -> "Fit":
+    def refit(
+        self, evaluations: int, *, soft: float = 0.0, slopes: FloatArray | None = None, fixed: Sequence[int] = ()
+    ) -> "Fit":
         """Continue the fit with the same settings."""
-        return self.estimator.fit(self.hypothesis, evaluations=evaluations, soft=soft, slopes=slopes)
+        return self.estimator.fit(self.hypothesis, evaluations=evaluations, soft=soft, slopes=slopes, fixed=fixed)
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,13 +221,17 @@ class Estimator:
         evaluations: int = 30,
         held: FloatArray | None = None,
         slopes: FloatArray | None = None,
+        fixed: Sequence[int] = (),
     ) -> Fit:
         """Fit all parameters of a hypothesis from its x with at most so many `evaluations`.
 
         `soft` > 0 is the residual above which the loss is linear. `held` (m, k) are derivatives by the first k
-        parameters that are kept constant, which saves simulations. `slopes` (m, p) is a first Jacobian from nearby.
+        parameters that are kept constant, which saves simulations. `slopes` (m, p) is a first Jacobian from nearby. The
+        entries `fixed` of x keep their values.
         """
         low, high = hypothesis.bounds
+        for index in fixed:
+            low[index] = high[index] = hypothesis.x[index]
         inside = np.clip(hypothesis.x, low, high)
         at = hypothesis if np.array_equal(inside, hypothesis.x) else hypothesis.moved(inside)
         residuals = self.residuals(at)

@@ -22,7 +22,7 @@ from hil.identification.measured import Measured
 from hil.identification.noise_floor import FLOOR, rms
 from hil.twin.axis import Response
 
-BLOCK, CLOSED = ", block", ", closed loop"  # ends of the names of channels
+BLOCK, CLOSED = " (block by block)", " (in closed loop)"  # ends of the names of channels
 Figures = Mapping[str, float]  # rms of each reported channel; infinite where the twin is unstable
 
 _SHARES = (0.5, 0.25, 0.125, 0.0625)  # of the way to the fit, each half of the one before; less is no refit

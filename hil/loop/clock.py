@@ -4,8 +4,11 @@ Tick k is due at start + k x period, never at now + period: an error of one tick
 that comes too late is left out, as are all that were due meanwhile: set-points sent in a burst would be steps.
 """
 
+from __future__ import annotations
+
 import math
 import time
+from array import array
 from typing import NamedTuple, Protocol
 
 SKIP_FROM = 0.5  # lateness in periods: two SYNCs are never closer than half a period
@@ -71,6 +74,34 @@ class VirtualClock:
 
     def may_wait(self, tick: int, span_s: float) -> bool:
         return False
+
+
+class LatenessLog:
+    """Lateness of the ticks of a run [s], in memory that is there before the loop begins: growing costs page faults."""
+
+    def __init__(self, capacity: int) -> None:
+        self._values = array("d", bytes(8 * capacity))
+        self.ticks = 0
+        self.last_s = 0.0
+
+    def add(self, late_s: float) -> None:
+        """Take the lateness of a tick; ticks beyond the capacity are not kept."""
+        self.last_s = late_s
+        if self.ticks < len(self._values):
+            self._values[self.ticks] = late_s
+            self.ticks += 1
+
+    def begin(self, punctual: int = 0) -> None:
+        """Forget all ticks but the last one; after it came as many that were in time."""
+        self._values[0] = self.last_s
+        self._values[1 : 1 + punctual] = array("d", bytes(8 * punctual))
+        self.ticks = 1 + punctual
+        self.last_s = 0.0 if punctual else self.last_s
+
+    @property
+    def values(self) -> array[float]:
+        """Lateness of each tick."""
+        return self._values[: self.ticks]
 
 
 class DueTick(NamedTuple):

@@ -12,7 +12,7 @@ import math
 import os
 import struct
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -28,7 +28,11 @@ _WAKE_UP = Path("/dev/cpu_dma_latency")  # PM QoS: the longest time that an idle
 
 
 class NotPunctual(HilError):
-    """The machine or the bus cannot keep the period: the drive was not armed."""
+    """The machine or the bus cannot keep the period: the drive was not armed. what: the finding alone."""
+
+    def __init__(self, what: str, advice: str) -> None:
+        super().__init__(f"{what}. The drive was not armed: {advice}, or arm all the same with --force")
+        self.what = what
 
 
 @dataclass(frozen=True)
@@ -50,7 +54,7 @@ class Jitter:
     missed: int  # a period or more late
 
     @classmethod
-    def of(cls, lateness_s: list[float], period_s: float) -> Jitter:
+    def of(cls, lateness_s: Sequence[float], period_s: float) -> Jitter:
         """Compute from the lateness of each tick; nearest-rank percentiles."""
         ordered = sorted(lateness_s) or [0.0]
 
@@ -151,9 +155,9 @@ def check_punctual(jitter: Jitter, p99_limit_s: float) -> None:
     """Raise NotPunctual when the p99 of the lateness exceeds what the bench allows."""
     if jitter.p99_s > p99_limit_s:
         raise NotPunctual(
-            f"drive.jitter_p99_s: the loop is late by {jitter.text}; allowed p99 {1e6 * p99_limit_s:.0f} us. The drive "
-            "was not armed: take load off the machine, give the rights for real-time scheduling (systemd/README.md), "
-            "raise the budget in the bench file, or arm all the same with --force"
+            f"drive.jitter_p99: the loop is late by {jitter.text}; allowed p99 {1e6 * p99_limit_s:.0f} us",
+            "take load off the machine, give the rights for real-time scheduling (systemd/README.md), raise the budget "
+            "in the bench file",
         )
 
 

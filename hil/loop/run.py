@@ -15,9 +15,11 @@ import numpy as np
 from hil.bench.bench_file import Bench
 from hil.bench.hardware import DriveSection
 from hil.errors import FieldError
+from hil.loop import certificate
 from hil.loop.bounds import make_cycle
 from hil.loop.clock import Clock, VirtualClock
 from hil.loop.devices import Devices, Rig, driver_errors, open_devices
+from hil.loop.disturbances import Disturbances
 from hil.loop.notify import Notifier, NotifyingClock
 from hil.loop.realtime import Jitter, NotPunctual, check_punctual, measure_jitter, now_text, real_time, report
 from hil.loop.session import Outcome, Session
@@ -97,8 +99,9 @@ def run_profile(
             planned(trajectory)
         rehearse(bench, trajectory, profile)
         cycle = make_cycle(rig, sample.motor_position_rad, profile.motion_limits)
+        force = force or section.over_budget == "arm"
         doubts = [_refused(force, lambda: _check_bus_load(rig, section))]
-        conditions: dict[str, Any] = {}
+        conditions: dict[str, Any] | None = None
         notifier = Notifier()
         stack.callback(notifier.close)
         clock: Clock = VirtualClock()
@@ -116,16 +119,17 @@ def run_profile(
             start_time=VIRTUAL_START if virtual else now_text(),
         )
         metadata |= {
-            "real_time": conditions,
+            certificate.KEY: (certified := certificate.before_run(gains.period_s, rig.bus_load(), section, conditions)),
             "overridden": [doubt for doubt in doubts if doubt],
             "segments": [run._asdict() for run in trajectory.runs],
             "notes": list(trajectory.notes),
         }
         recorder = Recorder(folder, name, cycle.channels, gains.period_s, metadata, lossless=virtual)
         ended = "failed"
+        ticks = compiled_ticks(rig, recorder) if virtual else None
+        session = Session(rig, cycle, trajectory, profile.motion_limits, clock, recorder, ticks)
+        before = Disturbances.now()
         try:
-            ticks = compiled_ticks(rig, recorder) if virtual else None
-            session = Session(rig, cycle, trajectory, profile.motion_limits, clock, recorder, ticks)
             with _interruptible(session):
                 outcome = session.run()
             ended = f"{outcome.ending}: {outcome.reason}"
@@ -133,18 +137,25 @@ def run_profile(
             ended = f"{type(error).__name__}: {error}"
             raise
         finally:
+            disturbances = None if virtual else Disturbances.now().since(before)
             notifier.send("STOPPING=1", f"STATUS={ended}")  # from here no tick feeds the watchdog
-            recording = recorder.close(ended)
+            run = certificate.of_run(session.late.values, session.skipped, gains.period_s, disturbances)
+            recording = recorder.close(ended, {certificate.KEY: certified | run})
     notes = trajectory.notes
     if recorder.path.stem != name:
         notes += (
             f"{name}.parquet or {name}.arrows of an earlier run is in {folder} and stays; this run is "
             f"{recorder.path.name}",
         )
+    if recorder.rows_lost:
+        notes += (
+            f"{recorder.rows_lost} rows are missing in {len(recorder.gaps)} gaps: the disk took none for longer than "
+            "the memory lasts; use another disk",
+        )
     return RunResult(
         outcome,
         recording,
-        Jitter.of(list(outcome.lateness_s), gains.period_s),
+        Jitter.of(outcome.lateness_s, gains.period_s),
         notes,
         tuple(doubt for doubt in doubts if doubt),
     )
@@ -175,8 +186,8 @@ def _check_bus_load(rig: Devices, section: DriveSection) -> None:
     if load > section.bus_load:
         raise NotPunctual(
             f"drive.bus_load: SYNC, RPDO, TPDO and encoder take {100 * load:.0f} % of the bus at "
-            f"{section.bitrate} bit/s, allowed {100 * section.bus_load:.0f} %. The drive was not armed: "
-            "raise the bit rate or the period, or arm all the same with --force"
+            f"{section.bitrate} bit/s, allowed {100 * section.bus_load:.0f} %",
+            "raise the bit rate or the period",
         )
 
 
@@ -187,7 +198,7 @@ def _refused(force: bool, check: Callable[[], None]) -> str:
     except NotPunctual as error:
         if not force:
             raise
-        return str(error)
+        return f"{error.what}; the drive was armed all the same, as --force or drive.over_budget asks"
     return ""
 
 
@@ -226,17 +237,25 @@ def rehearse(bench: Bench, trajectory: Trajectory, profile: Profile) -> None:
 
 @contextlib.contextmanager
 def _interruptible(session: Session) -> Iterator[None]:
-    """ctrl-C and a request to terminate stop the axis instead of the program."""
+    """ctrl-C, a request to terminate and the end of the terminal stop the axis instead of the program."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
 
     def stop(number: int, frame: FrameType | None) -> None:
+        if (
+            number == signal.SIGHUP
+        ):  # sent by the kernel and by a shell: one request, also while the recording is closed
+            signal.signal(signal.SIGHUP, signal.SIG_IGN)
         session.ask_stop()
 
-    before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
+    numbers = [signal.SIGINT, signal.SIGTERM]
+    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # nohup: the run goes on without its terminal
+        numbers.append(signal.SIGHUP)
+    before = {number: signal.signal(number, stop) for number in numbers}
     try:
         yield
     finally:
         for number, handler in before.items():
-            signal.signal(number, handler)
+            if signal.getsignal(number) is stop:
+                signal.signal(number, handler)

@@ -25,10 +25,10 @@ from typing import Protocol
 
 from drivers.port import Condition, DriveGoal, DriveSample, EncoderSample
 from hil.errors import HilError, StillPowered
-from hil.loop.clock import SKIP_FROM, Clock, next_due
+from hil.loop.clock import SKIP_FROM, Clock, LatenessLog, next_due
 from hil.loop.cycle import Cycle, Samples
 from hil.loop.devices import Devices, driver_errors
-from hil.loop.stopping import plan_stop
+from hil.loop.stopping import LONGEST_STOP_S, plan_stop
 from hil.loop.supervision import Ending, find
 from hil.motion.pieces import MotionLimits
 from hil.motion.time_optimal import MotionState
@@ -39,6 +39,7 @@ SETTLE_S = 0.1  # hold after a controlled stop
 QUICK_STOP_LIMIT_S = 2.0  # longest wait for the end of a quick stop
 AFTERMATH_S = 0.1  # recorded after the power stage is off
 DISARM_TIMEOUT_S = 0.2
+_AROUND_S = ARM_TIMEOUT_S + LONGEST_STOP_S + SETTLE_S + QUICK_STOP_LIMIT_S + AFTERMATH_S + DISARM_TIMEOUT_S
 STOP_SEGMENT = -1  # in the recording: set-points of a stop
 _NO_ENCODER = EncoderSample(0.0, 0, 0.0, 0, Condition.OK)
 
@@ -58,7 +59,7 @@ class Outcome:
     ending: Ending
     reason: str
     rows: int
-    lateness_s: tuple[float, ...]
+    lateness_s: Sequence[float]
     skipped: int = 0
 
 
@@ -108,13 +109,13 @@ class Session:
         self._from_table = gains.position_from_table
         self._now_s = 0.0  # of the tick: tick x period
         self._clock_tick = 0  # ticks since the clock was started; the rows count from the first after arming
-        self._skipped = 0  # ticks left out since the first row
+        self.skipped = 0  # ticks left out since the first row
         self._stops_asked = 0
         self._switching_off = False
         self._phase = LoopPhase.RUN
         self._ending, self._reason = Ending.COMPLETE, "the profile is done"
         self._last_tick = len(trajectory) - 1  # row at which the phase ends
-        self._lateness_s: list[float] = []
+        self.late = LatenessLog(len(trajectory) + self._ticks(_AROUND_S))
 
     def ask_stop(self) -> None:
         """Stop the axis: under control the first time, by the drive's own ramp the second, at once the third. Nothing
@@ -140,7 +141,7 @@ class Session:
             if self._ending is Ending.COMPLETE:
                 self._ending = Ending.DRIVE_FAULT
             self._reason += "; the drive did not follow its controlword: SYNC, heartbeat and set-points were withheld"
-        return Outcome(self._ending, self._reason, rows, tuple(self._lateness_s), self._skipped)
+        return Outcome(self._ending, self._reason, rows, self.late.values, self.skipped)
 
     # -- one tick -------------------------------------------------------------------------------------------------
 
@@ -151,9 +152,9 @@ class Session:
         if lateness_s > self._skip_from_s:
             self._clock_tick, lateness_s, skipped = next_due(self._clock, tick, self._period_s, lateness_s)
             tick = self._clock_tick
-            self._skipped += skipped
+            self.skipped += skipped
         start_s = tick * self._period_s
-        self._lateness_s.append(lateness_s)
+        self.late.add(lateness_s)
         self._master.sync(start_s)
         self._now_s = now_s = start_s + self._response_s
         drive, encoder = self._drive, self._encoder
@@ -197,30 +198,30 @@ class Session:
         cycle, drive, clock, record = self._cycle, self._drive, self._clock, self._recorder.record
         step, row, exchange = cycle.step, cycle.row, self._exchange
         cycle.follow(self._trajectory)
-        lateness = self._lateness_s
-        del lateness[:-1]
+        late = self.late
+        late.begin()
         overrun_s = self._rig.section.overrun_s
         tick, error_code, cycle_s, skipped = 0, 0, 0.0, 0
-        self._skipped = 0
+        self.skipped = 0
         if self._fast_forward is not None:
             tick, sample, seen = self._fast_forward.run(cycle, sample, seen, lambda: self._stops_asked > 0)
-            lateness.extend([0.0] * tick)
+            late.begin(tick)
         while True:
             motor, torque = sample.motor_position_rad, sample.torque_n_m
-            if skipped != self._skipped:
-                cycle.skip(tick + skipped, tick + self._skipped - 1, motor)
-                skipped = self._skipped
+            if skipped != self.skipped:
+                cycle.skip(tick + skipped, tick + self.skipped - 1, motor)
+                skipped = self.skipped
             setpoint, passed = step(tick, Samples(motor, seen.position_m, torque, sample.state, error_code,
-                                                  lateness[-1], cycle_s, sample.age_cycles, seen.age_cycles,
+                                                  late.last_s, cycle_s, sample.age_cycles, seen.age_cycles,
                                                   skipped))  # fmt: skip
             drive.command(self._now_s, setpoint)
             if tick:
                 record(row(tick - 1))
-            late = lateness[-1] > overrun_s
-            if sample.condition or seen.condition or passed or late or self._stops_asked or self._phase:
+            too_late = late.last_s > overrun_s
+            if sample.condition or seen.condition or passed or too_late or self._stops_asked or self._phase:
                 self._supervise(tick + skipped, sample, seen, passed)
                 error_code = drive.error_code
-            cycle_s = clock.since(self._clock_tick) - lateness[-1]
+            cycle_s = clock.since(self._clock_tick) - late.last_s
             if tick + skipped >= self._last_tick:
                 break
             sample, seen = exchange()
@@ -239,7 +240,7 @@ class Session:
                 self._last_tick = min(self._last_tick, tick + self._ticks(AFTERMATH_S))
             return
         stopping = self._phase is LoopPhase.STOP
-        findings = list(find(self._rig, seen, passed, self._lateness_s[-1], self._stops_asked, stopping=stopping))
+        findings = list(find(self._rig, seen, passed, self.late.last_s, self._stops_asked, stopping=stopping))
         quick = any(finding.quick for finding in findings)
         if not findings or (stopping and not quick):  # a controlled stop goes on
             return

@@ -148,7 +148,7 @@ def _fit(page: Page, diagnosis: Diagnosis, folder: Path) -> None:
         ("without", "training", "held out", "kept"),
         [
             (
-                label(ablation.term),
+                label(ablation.term, diagnosis.owner),
                 Number(f"{digits(ablation.train)} ×"),
                 Number(f"{digits(ablation.held_out)} ×" if ablation.held_out is not None else "–"),
                 answer,

@@ -129,7 +129,7 @@ class Mechanism:
     id: str
     block: Block
     element: str  # the part of the axis an engineer would point at
-    sentence: str  # finding in an engineer's words; may name parameters and viscous_speed in braces
+    sentence: str  # finding in an engineer's words; may name parameters, viscous_speed and wave in braces
     equation: str
     source: str
     parameters: tuple[Parameter, ...]
@@ -206,6 +206,8 @@ class Mechanism:
         the sensors can show it."""
         if not self._has_size(values) or self.wavelength_m(values, axis) > axis.travel_m:
             return False
+        if not axis.turn_known and self._once_per_turn:
+            return False
         return self.valid is None or self.valid(values, variant, axis)
 
     def wavelength_m(self, values: Sequence[float], axis: AxisFacts) -> float:
@@ -219,6 +221,10 @@ class Mechanism:
         if not self.indices(Role.PHASE):
             return 0.0
         return 2.0 * math.pi * axis.ratio / (axis.angle_per_unit * (self.named(Role.ORDER, values) or 1.0))
+
+    @property
+    def _once_per_turn(self) -> bool:
+        return bool(self.indices(Role.PHASE)) and not (self.indices(Role.PERIOD) or self.indices(Role.ORDER))
 
     def size(self, values: Sequence[float], axis: AxisFacts) -> float:
         """Distance of the strength from the value without effect, in the unit of the strength."""

@@ -30,6 +30,7 @@ class Physics:
     viscous_n_m_s_rad: float
     linear: bool = False
     angle_per_unit: float = 1.0  # motor angle per motor unit: 1, or 2 pi / screw lead on a linear axis
+    turn_known: bool = True  # False on a linear axis without a lead: there 2 pi of the motor angle are 1 m of travel
 
     @property
     def viscous_speed(self) -> float:

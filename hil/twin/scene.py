@@ -21,6 +21,7 @@ class AxisFacts:
     duration_s: float  # of the longest recording
     travel_m: float = math.inf  # of the longest motion
     lost_m: float = math.inf  # largest range of the table against the motor
+    turn_known: bool = True  # False on a linear axis without a lead
     held_s: Callable[[float], float] = _always  # longest time for which |torque command| is at a level or above
 
     @property
@@ -46,5 +47,6 @@ class Scene:
     friction_periods: list[float]  # [m]
     scale_periods: list[float]  # of the table residual [m]
     window: tuple[float, float, float]  # start, end, level [N m]
+    rest_m: float  # position at which a straight line through the disturbance torque over the position is 0
     stretch: float  # table against motor [m], typical
     most_stretch: float  # and largest

@@ -1,7 +1,4 @@
-"""Hypothesis for the driver tests, and the rig on every kind of bus.
-
-The same examples every run, and no verdict by the speed of the machine.
-"""
+"""The rig on every kind of bus."""
 
 from __future__ import annotations
 
@@ -10,13 +7,9 @@ from typing import Any
 
 import pytest
 from drive_rig import Rig, in_process
-from hypothesis import settings
 
 from drivers.bus import BusConfig, PumpedPort, PythonCanPort, open_bus
 from drivers.modelled_bus import ModelledBus
-
-settings.register_profile("drivers", deadline=None, derandomize=True)
-settings.load_profile("drivers")
 
 
 @pytest.fixture(params=["in-process", "modelled", "virtual"])

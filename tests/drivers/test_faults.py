@@ -126,6 +126,30 @@ def test_a_dead_master_is_noticed_without_any_frame() -> None:
     assert rig.node.state is DriveState.FAULT_REACTION_ACTIVE
 
 
+@pytest.mark.parametrize("node_id", [5, 6])
+def test_a_heartbeat_that_is_never_heard_is_missed_as_one_that_is_lost(node_id: int) -> None:
+    """Drive (5) and encoder (6) were told to send it (0x1017): 60 ms after the first answer to a SYNC without it."""
+    bus = ModelledBus(1_000_000)
+    bus.inject(Fault(FaultKind.DROP, 0x700 + node_id, count=10_000))
+    rig = Rig(bus.port(), bus.port(), reply_s=0.0006, servo=servo())
+    rig.set_up()
+    rig.enable()
+    found = []
+    for _ in range(100):
+        sample = rig.cycle(0.0)
+        condition = sample.condition if node_id == 5 else rig.encoder_sample.condition
+        if condition & Condition.HEARTBEAT_LOST:
+            found.append(rig.tick)
+    assert 60 <= found[0] <= 62
+    if node_id == 5:
+        assert rig.drive.goal is DriveGoal.QUICK_STOP
+        with pytest.raises(DriveFault, match="HEARTBEAT_LOST"):
+            rig.drive.check()
+    else:
+        with pytest.raises(EncoderError, match="HEARTBEAT_LOST"):
+            rig.encoder.check()
+
+
 def test_a_lost_heartbeat_of_the_drive_stops_the_axis() -> None:
     bus, rig = running()
     bus.inject(Fault(FaultKind.DROP, HEARTBEAT, count=10_000))

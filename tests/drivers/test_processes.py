@@ -69,8 +69,9 @@ def test_a_drive_in_another_process_runs_in_wall_clock_time(nodes: subprocess.Po
     start_s = time.monotonic()
     master.start(0.0)
     drive.goal = DriveGoal.ENABLED
-    torques = []
-    for _ in range(100):
+    torques: list[float] = []
+    moved = False
+    while len(torques) < 100 or not moved:  # the devices' time is the wall clock, this loop is as fast as its answers
         master.sync(time.monotonic() - start_s)
         deadline_s = time.monotonic() + 30.0
         while True:
@@ -83,11 +84,12 @@ def test_a_drive_in_another_process_runs_in_wall_clock_time(nodes: subprocess.Po
         drive.command(now_s, 3.0)
         if sample.enabled:
             torques.append(sample.torque_n_m)
+            moved = table.position_m > 1e-3
+            assert len(torques) < 20_000
     assert sample.enabled
     assert not sample.condition & ~Condition.LATE
     assert torques[-1] == pytest.approx(3.0, abs=0.1)  # the plant's torque noise is 0.01 N m rms
     assert table.position_m == pytest.approx(sample.motor_position_rad * 0.01 / 6.283185307179586, abs=20e-6)
-    assert table.position_m > 1e-3
     drive.goal = DriveGoal.DISABLED
     drive.command(now_s, 0.0)
     port.close()

@@ -13,6 +13,7 @@ import pytest
 from compare_runs import bench_with, record
 
 from hil.bench.bench_file import Bench, load_bench
+from hil.bench.control_section import without_law
 from hil.errors import InputError
 from hil.identification.compare import Comparison, compare
 from hil.identification.dataset import prepare_dataset
@@ -183,6 +184,18 @@ def test_an_unstable_twin_is_said_so_with_figures_of_its_blocks(
     assert not numbers["stable_in_closed_loop"]
     assert [name for name, _, _, _ in rows_of(result)] == list(numbers["blocks"])
     assert 0.0 < numbers["blocks"]["motor and load"]["rms"] < 10.0
+
+
+@pytest.mark.parametrize("fit", [False, True])
+def test_without_a_control_law_the_blocks_are_compared(run: Recording, clean: Comparison, fit: bool) -> None:
+    bench = bench_of(run)
+    unknown = bench.model_copy(update={"control": without_law(bench.known_control)})
+    plant = {name: values for name, values in run.columns.items() if "command" not in name}
+    result = compare(replace(run, columns=plant), unknown, fit=fit)
+    assert not result.channels
+    assert "control law is unknown" in verdict(result)
+    assert set(block_rms(result)) == {"motor and load", "transmission and table"}
+    assert block_rms(result)["motor and load"] == pytest.approx(block_rms(clean)["motor and load"], rel=0.1)
 
 
 def test_fitted_values_are_printed_with_those_at_a_bound_marked(tmp_path: Path) -> None:

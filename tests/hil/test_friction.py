@@ -58,7 +58,7 @@ FEEDS = (0.01, -0.01, 0.05, -0.05, 0.12, -0.12, 0.3, -0.3)
 
 
 @given(coulomb=st.floats(0.2, 5), viscous=st.floats(0.001, 0.05), offset=st.floats(-0.5, 0.5))
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 def test_known_friction_is_found_within_the_noise(coulomb: float, viscous: float, offset: float) -> None:
     result = identify_friction(sweep(FEEDS, coulomb, viscous, offset, noise=0.01))
     assert len(result.points) == len(FEEDS)

@@ -10,10 +10,12 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 import pytest
-from processes import DEADLINE_S, is_over, state_of, wait_for
+from processes import DEADLINE_S, is_over, wait_for
 
 from hil.errors import HilError, InputError
+from hil.recording.blocks import encode
 from hil.recording.recording import read_recording
 from hil.recording.writer import Recorder, run_metadata
 
@@ -36,6 +38,16 @@ def assert_rows(path: Path, rows: int) -> None:
     expected = np.array([row(k) for k in range(rows)])
     for index, name in enumerate(CHANNELS):
         assert np.array_equal(recording[name], expected[:, index])
+
+
+def no_room(run: Recorder) -> None:
+    """Let the writer meet the end of its disk (setrlimit(2): File too large); rows then wait in the ring."""
+    resource.prlimit(run.writer_pid, resource.RLIMIT_FSIZE, (run.stream_path.stat().st_size, resource.RLIM_INFINITY))
+
+
+def room(run: Recorder) -> None:
+    wait_for(lambda: "File too large" in run.error)
+    resource.prlimit(run.writer_pid, resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
 
 
 def test_the_loop_s_side_is_light() -> None:
@@ -76,38 +88,72 @@ def test_a_second_run_into_the_same_folder_gets_a_new_name(tmp_path: Path) -> No
     assert (tmp_path / "run.parquet").read_bytes() == before
 
 
-def test_without_lossless_the_loop_never_waits_and_the_recording_has_no_gap(tmp_path: Path) -> None:
-    run = recorder(tmp_path, ring_rows=64)
-    os.kill(run.writer_pid, signal.SIGSTOP)  # a disk that stalls
-    wait_for(lambda: state_of(run.writer_pid) == "T")
-    for k in range(100):
+def test_without_lossless_the_loop_never_waits_and_the_recording_marks_its_gap(tmp_path: Path) -> None:
+    run = recorder(tmp_path, ring_rows=128)
+    no_room(run)
+    for k in range(200):
         run.record(row(k))
-    os.kill(run.writer_pid, signal.SIGCONT)
-    wait_for(lambda: run.rows_on_disk == 64)
-    run.record(row(100))  # there is room again, but it would stand after a gap
+    room(run)
+    wait_for(lambda: run.rows_on_disk == 128)
+    for k in range(200, 300):
+        run.record(row(k))
     path = run.close()
     assert path is not None
-    assert_rows(path, 64)
-    assert run.rows_lost == 37
-    assert read_recording(path).metadata["rows_lost"] == 37
+    assert run.rows_lost == 72
+    recording = read_recording(path)
+    assert recording.metadata["rows_lost"] == 72
+    assert recording.metadata["gaps"] == [{"row": 128, "rows_lost": 72}]
+    before, after = recording.parts()
+    assert np.array_equal(before["position_command_m"], np.arange(128.0))
+    assert np.array_equal(after["position_command_m"], np.arange(200.0, 300.0))
 
 
+def test_after_a_loss_rows_are_taken_again_when_half_of_the_ring_is_free(tmp_path: Path) -> None:
+    """A ring of 64 rows, full: 24 to its end reach the disk, which are not enough; then all."""
+    run = recorder(tmp_path, ring_rows=64)
+    rows = np.array([row(k) for k in range(200)])
+    run.record_block(rows[:40])
+    wait_for(lambda: run.rows_on_disk == 40)
+    no_room(run)
+    run.record_block(rows[40:114])
+    assert run.rows_recorded == 104
+    assert run.gaps == [(104, 10)]
+    schema = pa.schema([pa.field(name, pa.float64(), nullable=False) for name in CHANNELS])
+    bytes_of_24 = len(encode(rows[40:64], 40, schema))
+    wait_for(lambda: "File too large" in run.error)
+    size = run.stream_path.stat().st_size
+    resource.prlimit(run.writer_pid, resource.RLIMIT_FSIZE, (size + bytes_of_24, resource.RLIM_INFINITY))
+    wait_for(lambda: run.rows_on_disk == 64)
+    run.record_block(rows[114:124])
+    assert run.gaps == [(104, 20)]
+    room(run)
+    wait_for(lambda: run.rows_on_disk == 104)
+    run.record_block(rows[124:184])
+    assert run.rows_recorded == 164
+    run.close()
+    assert run.gaps == [(104, 20)]
+
+
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP])
 @pytest.mark.parametrize("lossless", [True, False])
-def test_a_writer_that_is_killed_is_reported(tmp_path: Path, lossless: bool) -> None:
-    run = recorder(tmp_path, lossless=lossless, ring_rows=256)
+def test_a_writer_that_is_killed_or_stopped_is_replaced_and_no_row_is_lost(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], lossless: bool, how: signal.Signals
+) -> None:
+    run = recorder(tmp_path, lossless=lossless, ring_rows=1024)
     for k in range(200):
         run.record(row(k))
     wait_for(lambda: run.rows_on_disk == 200)
-    os.kill(run.writer_pid, signal.SIGKILL)
-
-    def go_on() -> None:
-        for k in range(200, 1000):
-            run.record(row(k))
-        run.close()
-
-    with pytest.raises(HilError, match=r"run\.arrows: the recorder stopped at row 200: its process was killed"):
-        go_on()
-    assert_rows(run.stream_path, 200)
+    first = run.writer_pid
+    os.kill(first, how)
+    for k in range(200, 1000):
+        run.record(row(k))
+    wait_for(lambda: run.rows_on_disk == 1000)  # while the run goes on
+    assert run.writer_pid != first
+    assert is_over(first)
+    path = run.close()
+    assert_rows(path, 1000)
+    assert read_recording(path).metadata["writers_replaced"] == 1
+    assert f"recorder of run.arrows: its process {first} was" in capfd.readouterr().err
     assert run.close() is None
 
 
@@ -146,6 +192,18 @@ def test_a_folder_that_cannot_be_written_is_refused(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match=r"file: cannot be written .* choose another folder"):
         recorder(tmp_path / "file")
+
+
+def test_files_in_the_working_folder_are_no_modules_of_the_recorder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("struct.py", "json.py", "numpy.py"):
+        (tmp_path / name).write_text("raise ImportError\n")
+    monkeypatch.chdir(tmp_path)
+    run = recorder(tmp_path / "out")
+    run.record(row(0))
+    run.close()
+    assert run.path.exists()
 
 
 def test_metadata_tells_versions_and_everything_needed_to_repeat_a_run() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -183,6 +184,29 @@ def test_ctrl_c_stops_within_the_limits_and_leaves_a_recording(tmp_path: Path) -
     assert recording["velocity_command_m_s"][-1] == 0.0
     assert len(recording) < len(plan(MOVE, 1e-3, 0.0))
     assert DriveState.QUICK_STOP_ACTIVE not in recording["drive_state"]
+
+
+@pytest.fixture
+def _hang_ups_as_before() -> Iterator[None]:
+    before = signal.getsignal(signal.SIGHUP)
+    yield
+    signal.signal(signal.SIGHUP, before)
+
+
+@pytest.mark.usefixtures("_hang_ups_as_before")
+def test_hang_ups_of_kernel_and_shell_are_one_request(tmp_path: Path) -> None:
+    hang_up = lambda: os.kill(os.getpid(), signal.SIGHUP)  # noqa: E731
+    ran = run(tmp_path, script=lambda *_: dict.fromkeys((MOVING, MOVING + 5, MOVING + 9), hang_up))
+    assert ran.outcome.ending is Ending.INTERRUPTED
+    assert DriveState.QUICK_STOP_ACTIVE not in ran.recording["drive_state"]
+    assert at_rest(ran)
+
+
+@pytest.mark.usefixtures("_hang_ups_as_before")
+def test_a_run_under_nohup_goes_on(tmp_path: Path) -> None:
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    ran = run(tmp_path, script=lambda *_: {MOVING: lambda: os.kill(os.getpid(), signal.SIGHUP)})
+    assert ran.outcome.ending is Ending.COMPLETE
 
 
 def test_second_ctrl_c_is_a_quick_stop(tmp_path: Path) -> None:

@@ -67,13 +67,11 @@ def test_ten_thousand_random_moves_hold_limits_and_end_where_they_should() -> No
 
 
 @given(position, stroke, limits_of)
-@settings(deadline=None)
 def test_sine_squared_moves(start_m: float, stroke_m: float, limits: MotionLimits) -> None:
     check_move(start_m, stroke_m, limits)
 
 
 @given(position, stroke, st.integers(1, 5), limits_of)
-@settings(deadline=None)
 def test_reversals_turn_at_both_ends_and_come_back(
     start_m: float, stroke_m: float, cycles: int, limits: MotionLimits
 ) -> None:
@@ -125,7 +123,6 @@ def test_a_state_that_ruckig_cannot_solve_stops_first_and_says_so() -> None:
 
 
 @given(st.builds(MotionState, position, st.floats(-3, 3), st.floats(-30, 30)), position, limits_of)
-@settings(deadline=None)
 def test_any_state_stops_and_reaches_a_new_target(state: MotionState, target_m: float, limits: MotionLimits) -> None:
     check_from_any_state(state, target_m, limits)
 
@@ -138,7 +135,7 @@ def test_any_state_stops_and_reaches_a_new_target(state: MotionState, target_m: 
     st.floats(1e-5, 1e-2),
     st.just(0.0) | st.floats(1e-6, 0.05) | st.floats(-0.05, -1e-6),
 )
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 def test_excitations_hold_limits_between_the_samples_too(
     spectrum: Spectrum, sweep: bool, start_hz: float, end_hz: float, amplitude_m: float, feed: float
 ) -> None:

@@ -21,6 +21,7 @@ from hil.twin.parameter import Role
 
 CLAIMED = 0.25  # least share of the energy in one harmonic: a line that dominates the residual
 APART = 1.5  # least ratio of that share to that of the next domain
+LEAST_WAVES = 1.5  # that the motion passes: less is no repetition
 SPEEDS = 1.5  # least ratio of feeds: with less, domains differ by less than the width of a line
 LOWEST_HZ = 4.0  # lowest frequency: the motion itself has its lines below
 HIGHEST_ORDER = 48  # slots or pole passings per revolution of usual motors
@@ -57,12 +58,16 @@ def lock(seen: Sequence[Energy], channel: str, bench: Bench, terms: Sequence[Ter
     # a period that divides the lead is an order of the screw
     spans = [
         float(p)
-        for p in np.geomspace(np.ptp(x) / 60.0, np.ptp(x) / 1.5, 200)
+        for p in np.geomspace(np.ptp(x) / 60.0, np.ptp(x) / LEAST_WAVES, 200)
         if not lead_m or lead_m / p < 0.5 or abs(lead_m / p - round(lead_m / p)) > lead_m / np.ptp(x)
     ]
     found: dict[str, tuple[float, float]] = {
         "order": max(
-            ((_share(2.0 * np.pi * n * x / lead_m, signal), float(n)) for n in range(1, HIGHEST_ORDER + 1)),
+            (
+                (_share(2.0 * np.pi * n * x / lead_m, signal), float(n))
+                for n in range(1, HIGHEST_ORDER + 1)
+                if n * np.ptp(x) > LEAST_WAVES * lead_m
+            ),
             default=(0.0, 0.0),
         )
         if lead_m
@@ -85,8 +90,8 @@ def _named(term: Term, lead_m: float) -> Lock:
     order, period_m = (mechanism.named(role, term.values) for role in (Role.ORDER, Role.PERIOD))
     if order is None and period_m is None and mechanism.indices(Role.PHASE):  # harmonics of the turn: the strongest
         order = 1.0 + float(np.argmax([term.values[index] for index in mechanism.indices(Role.STRENGTH)]))
-    if order is not None:
-        return Lock(period_m=lead_m / order if lead_m else None, order_per_rev=order)
+    if order is not None:  # without a lead counted per metre
+        return Lock(period_m=lead_m / order, order_per_rev=order) if lead_m else Lock(period_m=1.0 / order)
     return Lock(frequency_hz=mechanism.named(Role.FREQUENCY, term.values), period_m=period_m)
 
 

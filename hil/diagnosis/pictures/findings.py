@@ -33,6 +33,7 @@ from hil.identification.terms import Term
 from hil.quantities import reading_unit
 from hil.twin.library import BY_ID
 from hil.twin.mechanism import Picture
+from hil.twin.parameter import Role
 
 if TYPE_CHECKING:
     from hil.diagnosis.diagnose import Diagnosis
@@ -127,6 +128,17 @@ def _residual_over(
     return picture
 
 
+def _over_turn(per_torque: bool = False) -> Drawer:
+    """Make a picture over the motor angle, or over the position where no revolution is known."""
+
+    def picture(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:
+        known = diagnosis.owner.axis.physics().turn_known
+        label, x_of, unit = ("motor angle", angle, "deg") if known else ("position", position, "mm")
+        return _residual_over(label, x_of, unit, bins=240, per_torque=per_torque)(diagnosis, views)
+
+    return picture
+
+
 def _within_period(diagnosis: Diagnosis, view: View) -> FloatArray:
     """Position within the term's period [mm]."""
     return np.asarray(np.mod(position(diagnosis, view), 1e3 * view.term.values[1]))
@@ -135,7 +147,8 @@ def _within_period(diagnosis: Diagnosis, view: View) -> FloatArray:
 def _friction_over_position(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:
     """Draw friction over position, folded to one period if the travel holds many."""
     travel = max(float(np.ptp(position(diagnosis, view))) for view in views)
-    folded = 1e3 * views[0].term.values[1] < travel / FOLDED_FROM
+    period_m = BY_ID[views[0].term.effect].named(Role.PERIOD, views[0].term.values)
+    folded = period_m is not None and 1e3 * period_m < travel / FOLDED_FROM
     label, x_of, bins = ("position within the period", _within_period, 40) if folded else ("position", position, BINS)
     return _residual_over(label, x_of, "mm", bins=bins, against_motion=True)(diagnosis, views)
 
@@ -214,8 +227,8 @@ PICTURES: dict[Picture, Drawer] = {
     Picture.FRICTION_ALONG_TRAVEL: _friction_over_position,
     Picture.POSITION: _residual_over("position", position, "mm"),
     Picture.POSITION_TABLE: _residual_over("position", position, "mm", "table"),
-    Picture.MOTOR_ANGLE: _residual_over("motor angle", angle, "deg", bins=240),
-    Picture.MOTOR_ANGLE_PER_TORQUE: _residual_over("motor angle", angle, "deg", bins=240, per_torque=True),
+    Picture.MOTOR_ANGLE: _over_turn(),
+    Picture.MOTOR_ANGLE_PER_TORQUE: _over_turn(per_torque=True),
     Picture.MOTOR_ANGLE_TABLE: _residual_over("motor angle", angle, "deg", "table"),
     Picture.SCREW_ANGLE: _residual_over("screw angle", angle, "deg", "table"),
     Picture.SIGNAL_PERIOD: _residual_over(

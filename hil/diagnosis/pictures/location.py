@@ -47,10 +47,11 @@ def location_figure(diagnosis: Diagnosis) -> Figure:
     starts = np.arange(0, rows.size, size)
     power = np.maximum(np.add.reduceat(rows, starts), 0.0) / size
     axes["time"].fill_between(run.time_s[starts], power, color=DEVIATION, alpha=0.45, linewidth=0.0, step="post")
-    style_axis(axes["time"], ENERGY, "time [s]", f"Over time: {run.name}; grey: speed set-point")
+    what = "speed set-point" if diagnosis.final.bench.law_known else "speed"  # without a law it may be the measured one
+    style_axis(axes["time"], ENERGY, "time [s]", f"Over time: {run.name}; grey: {what}")
     set_point = axes["time"].twinx()
     set_point.plot(run.time_s, 60.0 * run.velocity_command_m_s, color=COMMAND, linewidth=0.7)
-    set_point.set_ylabel("speed set-point [m/min]")
+    set_point.set_ylabel(f"{what} [m/min]")
     return figure
 
 

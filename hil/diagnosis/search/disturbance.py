@@ -96,6 +96,23 @@ def friction_periods(
     return _periods(x, friction, 1e-4, 1e-3, most)
 
 
+def waves(runs: Sequence[Measured], found: Sequence[Disturbance], ratio: float, most: int = 3) -> list[float]:
+    """Waves per metre of travel with the largest disturbance, best first, where no revolution is known."""
+    x = [ratio * run.motor[d.sliding] for run, d in zip(runs, found, strict=True)]
+    return [1.0 / period for period in _periods(x, [d.torque[d.sliding] for d in found], 1e-4, 5e-4, most)]
+
+
+def rest_position(runs: Sequence[Measured], found: Sequence[Disturbance], ratio: float) -> float:
+    """Position [m] at which a straight line through the disturbance over the position is 0; 0 if there is none."""
+    x = np.concatenate([ratio * run.motor[d.sliding] for run, d in zip(runs, found, strict=True)])
+    torque = np.concatenate([d.torque[d.sliding] for d in found])
+    if x.size < 2 or np.ptp(x) == 0.0:
+        return 0.0
+    centre = float(np.mean(x))
+    slope = float(np.mean((x - centre) * torque)) / float(np.mean((x - centre) ** 2))
+    return centre - float(np.mean(torque)) / slope if slope else 0.0
+
+
 def scale_periods(runs: Sequence[Measured], errors: Sequence[FloatArray], most: int = 2) -> list[float]:
     """Periods [m] below 1 mm in which an error (n,) of the linear encoder repeats, best first."""
     return [

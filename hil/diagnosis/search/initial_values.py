@@ -64,6 +64,7 @@ def axis_facts(bench: Bench, runs: Sequence[Measured] = ()) -> AxisFacts:
         duration_s=max((run.motor.size * run.period_s for run in runs), default=0.0),
         travel_m=max((ratio * float(np.ptp(run.motor)) for run in runs), default=math.inf),
         lost_m=max(apart, default=math.inf),
+        turn_known=physics.turn_known,
         held_s=lambda level: max((_held_s(run, level) for run in runs), default=math.inf),
     )
 
@@ -93,10 +94,13 @@ def scene(runs: Sequence[Measured], bench: Bench, blocks: Sequence[dict[str, Flo
     lead = 2.0 * np.pi * ratio / physics.angle_per_unit
     # a screw-locked effect is periodic in the angle and along the travel: orders and periods start each other
     periods = estimate.friction_periods(runs, found, ratio)
-    orders = estimate.orders(runs, found, physics.angle_per_unit)
+    if physics.turn_known:
+        orders = estimate.orders(runs, found, physics.angle_per_unit)
+    else:
+        orders = estimate.waves(runs, found, ratio)
     turns = [lead / order for order in dict.fromkeys((1.0, 2.0, *orders)) if _SHORTEST_M < lead / order < travel]
     per_lead = [lead / period for period in periods if period < lead]
-    whole = [float(round(order)) for order in per_lead if abs(order - round(order)) < _WHOLE]
+    whole = [float(round(order)) for order in per_lead if abs(order - round(order)) < _WHOLE and physics.turn_known]
     orders = list(dict.fromkeys((*orders, *whole)))
     ripple = [
         d.torque / np.where(np.abs(run.torque) > 0.2 * physics.coulomb_n_m, run.torque, np.inf)
@@ -112,12 +116,13 @@ def scene(runs: Sequence[Measured], bench: Bench, blocks: Sequence[dict[str, Flo
         ratio=ratio,
         lead_m=lead,
         orders=orders,
-        ripple_orders=estimate.orders(runs, found, physics.angle_per_unit, 2, ripple),
+        ripple_orders=estimate.orders(runs, found, physics.angle_per_unit, 2, ripple) if physics.turn_known else [],
         friction_periods=[*periods, *turns],
         scale_periods=(
             estimate.scale_periods(runs, [block["table"] for block in blocks]) if runs[0].table_m.size else []
         ),
         window=(runs[longest].start.time_s + first_s, runs[longest].start.time_s + last_s, level),
+        rest_m=estimate.rest_position(runs, found, ratio),
         stretch=max(stretch, 0.5e-6),
         most_stretch=max(most_stretch, 1e-6),
     )

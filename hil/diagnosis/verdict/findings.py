@@ -16,7 +16,7 @@ from hil.diagnosis.search.initial_values import claimable
 from hil.diagnosis.verdict.cross_validation import Ablation
 from hil.diagnosis.verdict.event_windows import describe_event
 from hil.diagnosis.verdict.judge import confidence
-from hil.diagnosis.wording import sentence, title
+from hil.diagnosis.wording import sentence, title, unit_in
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.inference import standard_errors
@@ -137,9 +137,7 @@ def _normal(term: Term) -> Term:
 
 def _values(term: Term, errors: Sequence[float], bench: Bench) -> dict[str, Value]:
     return {
-        parameter.name: Value(
-            value=value, std=error, unit=parameter.dimension.unit(bench.axis.linear, bench.axis.turns)
-        )
+        parameter.name: Value(value=value, std=error, unit=unit_in(bench, parameter))
         for parameter, value, error in zip(BY_ID[term.effect].parameters, _normal(term).values, errors, strict=True)
     }
 

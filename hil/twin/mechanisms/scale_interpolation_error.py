@@ -23,6 +23,7 @@ _LONGEST_M = 1e-2  # signal period
 # which has no period longer than a millimetre.
 _COUNTING = 1.25 / math.pi
 _LONG_PERIOD_M = 1e-3
+_OF_THE_SCREW = 1e-3  # relative deviation from a harmonic of the lead: nearer is an error of the screw
 
 
 def _starts(s: Scene) -> list[tuple[float, ...]]:
@@ -32,8 +33,11 @@ def _starts(s: Scene) -> list[tuple[float, ...]]:
 
 
 def _valid(values: Sequence[float], variant: int, axis: AxisFacts) -> bool:
-    """Check that the error is more than counting of the linear encoder makes."""
+    """Check that the error is more than counting of the linear encoder makes, and that its period is not the lead."""
     amplitude_m, period_m, _ = values
+    waves = 2.0 * math.pi * axis.ratio / (axis.angle_per_unit * period_m)
+    if any(abs(waves / order - 1.0) < _OF_THE_SCREW for order in (1, 2, 3)):
+        return False
     return not axis.table_count_m or period_m > _LONG_PERIOD_M or amplitude_m > _COUNTING * axis.table_count_m
 
 

@@ -19,8 +19,9 @@ _NEAR = 0.9  # of the reach: a rest position beyond is a constant load
 
 
 def _starts(s: Scene) -> list[tuple[float, ...]]:
-    """Rest positions at the start of the axis, and 20 travels away, where the force is nearly constant."""
-    return [(0.02 * s.coulomb / s.ratio / s.travel_m, f * s.travel_m) for f in (0.0, -20.0, 20.0)]
+    """Rest positions at the start of the axis, 20 travels away, where the force is nearly constant, and as it shows."""
+    stiffness = 0.02 * s.coulomb / s.ratio / s.travel_m
+    return [(stiffness, rest_m) for rest_m in (0.0, -20.0 * s.travel_m, 20.0 * s.travel_m, s.rest_m)]
 
 
 def _valid(values: Sequence[float], variant: int, axis: AxisFacts) -> bool:

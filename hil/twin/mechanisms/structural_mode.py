@@ -99,11 +99,12 @@ def _longer(chain: Chain) -> Chain:
 
 _HIGHEST_HZ = 2000.0
 _NEAR = 0.9  # of the highest frequency: beyond, the structure is a mass
+_NO_PEAK = 1.0 / math.sqrt(2.0)  # damping ratio from which there is no resonance
 
 
 def _valid(values: Sequence[float], variant: int, axis: AxisFacts) -> bool:
-    """Check that the frequency is not at its upper bound."""
-    return values[0] < _NEAR * _HIGHEST_HZ
+    """Check that the frequency is not at its upper bound, and that the structure has a resonance."""
+    return values[0] < _NEAR * _HIGHEST_HZ and values[1] < _NO_PEAK
 
 
 MECHANISM = Mechanism(

@@ -1,11 +1,15 @@
 """Thermal growth: the screw grows while the axis runs."""
 
 import math
+from collections.abc import Sequence
 
 from numba import njit
 
 from hil.twin.mechanism import Block, Mechanism, Moment, Row, Stage, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
+from hil.twin.scene import AxisFacts
+
+_FASTEST_S = 1.5  # near the lower bound: what grows at once is another lead, or another ratio
 
 
 @njit
@@ -14,6 +18,11 @@ def _grown_lead(value: float, at: Moment, parameters: Row, memory: Row) -> float
     if time_constant_s > 0.0:
         growth *= -math.expm1(-at.time_s / time_constant_s)
     return value + growth * at.table_position_m / at.ratio_m
+
+
+def _valid(values: Sequence[float], variant: int, axis: AxisFacts) -> bool:
+    """Check that the growth takes time."""
+    return values[1] > _FASTEST_S
 
 
 MECHANISM = Mechanism(
@@ -30,5 +39,6 @@ MECHANISM = Mechanism(
     variants=(Variant(Stage.TRANSMISSION, _grown_lead),),
     starts=lambda s: [(1e-6 / s.travel_m, f * s.duration_s) for f in (0.2, 1.0, 5.0)],
     typical=lambda a: (50e-6, 1800.0),
+    valid=_valid,
     needs_table=True,
 )

@@ -93,7 +93,7 @@ def test_all_effects_at_once(axis: object) -> None:
     assert np.ptp(rows["table_position_m"]) > 0.02
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.sets(st.sampled_from(sorted(SHOWN))), st.sampled_from([1e-5, 5e-5]))
 def test_any_subset_stays_under_control(names: set[str], step_s: float) -> None:
     rows = run(*(TOGETHER[name] for name in sorted(names)), step_s=step_s)
@@ -101,7 +101,7 @@ def test_any_subset_stays_under_control(names: set[str], step_s: float) -> None:
 
 
 @given(st.permutations(sorted(SHOWN)[:6]))
-@settings(max_examples=5, deadline=None)
+@settings(max_examples=5)
 def test_order_does_not_matter(names: list[str]) -> None:
     rows, again = (run(*(EFFECTS[name] for name in order)) for order in (names, sorted(names)))
     assert np.array_equal(rows["torque_n_m"], again["torque_n_m"])

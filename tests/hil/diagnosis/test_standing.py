@@ -52,6 +52,22 @@ def test_a_wave_longer_than_the_travel_has_no_name(train: Dataset, term: Term, s
     assert claimable(term, OWNER, train.runs) is stands
 
 
+@pytest.mark.parametrize(
+    ("term", "stands"),
+    [
+        (Term("scale_interpolation_error", 0, (2e-6, 2.7e-3, 0.0)), True),
+        (Term("scale_interpolation_error", 0, (2e-6, OWNER.axis.lead_m, 0.0)), False),  # an error of the screw
+        (Term("scale_interpolation_error", 0, (2e-6, 0.5 * OWNER.axis.lead_m, 0.0)), False),
+        (Term("thermal_growth", 0, (5e-5, 20.0)), True),
+        (Term("thermal_growth", 0, (5e-5, 1.0)), False),  # at once: another lead
+        (Term("structural_mode", 0, (40.0, 0.05, 0.1)), True),
+        (Term("structural_mode", 0, (40.0, 0.9, 0.1)), False),  # no resonance
+    ],
+)
+def test_values_that_belong_to_another_cause_have_no_name(train: Dataset, term: Term, stands: bool) -> None:
+    assert claimable(term, OWNER, train.runs) is stands
+
+
 def test_once_per_revolution_is_not_told_by_part_of_one() -> None:
     facts = axis_facts(load_bench("rotary").sampled(1e-3))
     mechanism = BY_ID["encoder_eccentricity"]

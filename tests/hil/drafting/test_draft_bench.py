@@ -99,7 +99,7 @@ def test_a_gear_follows_from_two_angles(tmp_path: Path) -> None:
     columns = {"time_s": AXIS["t"], "motor_angle_rad": AXIS["angle"], "load_angle_rad": AXIS["angle"] / 50.0}
     bench = load_bench(drafted(tmp_path, columns | {"torque_Nm": AXIS["torque"]}))
     assert bench.axis.model == "rotary_two_mass"
-    assert bench.axis.gear_ratio == pytest.approx(50.0, rel=1e-3)
+    assert bench.axis.gear_ratio == 50.0  # the whole number that the measured ratio is within 1e-4 of
     load = bench.axis.load_inertia_kg_m2 / bench.axis.gear_ratio**2
     assert bench.axis.motor_inertia_kg_m2 + load == pytest.approx(INERTIA_KG_M2, rel=0.02)
 
@@ -161,5 +161,15 @@ def test_a_load_over_the_angle_is_said() -> None:
     )
     assert not any("gravity" in note for note in plain.unsure)
     assert any("gravity" in note for note in loaded.unsure)
-    note = next(note for note in loaded.notes if "gravity" in note)
+    note = next(note for note in loaded.notes if "(gravity)" in note)
     assert float(note.split("(gravity) ")[1].split(" N m")[0]) == pytest.approx(0.5, rel=0.05)
+
+
+def test_a_spring_is_said_and_does_not_turn_the_inertia() -> None:
+    columns = {"time_s": AXIS["t"], "motor_position_m": 0.01 * AXIS["angle"], "force_n": 100.0 * AXIS["torque"]}
+    loaded = columns | {"force_n": columns["force_n"] + 2e3 * columns["motor_position_m"]}
+    without, draft = (draft_bench(Recording("log", one, 1e-3)) for one in (columns, loaded))
+    note = next(note for note in draft.notes if "(a spring)" in note)
+    assert float(note.split("(a spring) ")[1].split(" N/m")[0]) == pytest.approx(2e3, rel=0.05)
+    assert draft.axis[0].key == "mass_kg"
+    assert draft.axis[0].value == pytest.approx(without.axis[0].value, rel=0.05)

@@ -182,13 +182,41 @@ def test_only_a_constant_by_its_name_scales_the_torque(
     assert entry.get("gain") == gain
 
 
+def test_a_joint_of_a_robot_is_read_in_rad_and_n_m(tmp_path: Path) -> None:
+    columns = renamed(AXIS, t="stamp", torque="tau")
+    columns |= {"q": AXIS["angle"] / 60.0, "qd": np.gradient(AXIS["angle"] / 60.0, 1e-3)}
+    found = entries(draft_map(write(tmp_path / "arm.csv", columns)))
+    assert found["motor_position_rad"] == {"column": "q", "unit": "rad"}
+    assert found["torque_n_m"] == {"column": "tau", "unit": "N m"}
+
+
+@pytest.mark.parametrize(("turn", "unit"), [(2.0 * np.pi, "rad"), (360.0, "deg")])
+def test_whole_turns_of_a_set_point_tell_its_unit(tmp_path: Path, turn: float, unit: str) -> None:
+    turns = {"theta_ref": AXIS["x_set"] / np.ptp(AXIS["x_set"]), "theta": AXIS["x_act"] / np.ptp(AXIS["x_set"])}
+    columns = renamed(AXIS, t="time", torque="torque") | {name: 5.0 * turn * x for name, x in turns.items()}
+    found = entries(draft_map(write(tmp_path / "turns.csv", columns)))
+    assert found["position_command_m"]["unit"] == found["motor_position_rad"]["unit"] == unit
+
+
+def test_two_encoders_in_mm_are_a_screw_with_a_lead_to_correct(tmp_path: Path) -> None:
+    columns = renamed(AXIS, t="t_s", torque="torque_Nm") | {
+        "PosMotor_mm": AXIS["angle"] * 1e3 * LEAD_M / (2.0 * np.pi),
+        "PosScale_mm": AXIS["x_act"],
+    }
+    draft, recording = imported(write(tmp_path / "two.csv", columns))
+    assert draft.lead_m == 0.010
+    assert any("mm per turn are taken: correct scale and lead" in note for note in draft.unsure)
+    assert recording["motor_position_rad"] == pytest.approx(AXIS["angle"] * LEAD_M / 0.010, abs=1e-3)
+    assert "table_position_m" in recording.columns
+
+
 @pytest.mark.skipif(not SHARED.is_dir(), reason="needs ../shared/recordings, not part of the repository")
 @pytest.mark.parametrize(
     ("folder", "expected"),
     [
         (
             "kuka/axis1_a.csv",
-            {"motor_position_m": "c", "table_position_m": "d", "position_command_m": "b", "force_n": "g"},
+            {"motor_position_rad": "c", "table_position_m": "d", "position_command_m": "b", "torque_n_m": "g"},
         ),
         (
             "rig/null/train_1.csv",

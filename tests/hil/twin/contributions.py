@@ -1,7 +1,6 @@
 """Calls a mechanism's contribution as the stepping kernel does; moments to call it at."""
 
 import numpy as np
-from hypothesis import settings
 from hypothesis import strategies as st
 
 from hil.twin.library import BY_ID
@@ -10,7 +9,6 @@ from hil.twin.mechanism import PARAMETERS, WIDTH, Moment
 PERIOD_S = 1e-3
 RATIO_M = 0.010 / (2.0 * np.pi)
 AT_REST = Moment(0.0, 0.0, PERIOD_S, PERIOD_S / 10, 0.0, 0.0, 0.0, RATIO_M, viscous_speed=160.0)
-PROPERTY = settings(deadline=None, derandomize=True)  # the first call of each contribution compiles it
 
 phases = st.floats(-2.0 * np.pi, 2.0 * np.pi)
 REVOLUTION = np.arange(144) * 2.0 * np.pi / 144  # even steps over one revolution

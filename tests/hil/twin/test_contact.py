@@ -118,7 +118,7 @@ def test_a_closed_loop_ends_where_it_began() -> None:
     before=st.floats(-0.5, 0.5),
     start=st.lists(st.floats(-1.0, 1.0), min_size=contact.ELEMENTS, max_size=contact.ELEMENTS),
 )
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_the_step_solves_its_equation(free, gain, viscous, bound, stiffness, shift, before, start) -> None:
     limits = contact.YIELD_SHARES * bound
     elements = limits * np.array(start)
@@ -144,7 +144,7 @@ def test_the_step_solves_its_equation(free, gain, viscous, bound, stiffness, shi
     before=st.floats(-0.5, 0.5),
     start=st.floats(-1.0, 1.0),
 )
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 def test_so_does_that_of_dahls_contact(free, gain, viscous, bound, stiffness, shift, before, start) -> None:
     pull = start * bound
     torque, after = contact.elastic(

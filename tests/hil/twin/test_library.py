@@ -5,7 +5,7 @@ from string import Formatter
 
 import numpy as np
 import pytest
-from contributions import PERIOD_S, PROPERTY, moments, row
+from contributions import PERIOD_S, moments, row
 from hypothesis import given
 from hypothesis import strategies as st
 from numba import float64, typeof
@@ -24,6 +24,7 @@ TABLE = {
     "stribeck_friction": ("motor_side", ["static_torque_n_m", "stribeck_velocity_rad_s"]),
     "presliding_hysteresis": ("motor_side", ["stiffness_n_m_rad"]),
     "position_dependent_friction": ("motor_side", ["fraction", "period_m"]),
+    "friction_gradient": ("motor_side", ["slope_1_m"]),
     "nonlinear_viscous_friction": ("motor_side", ["quadratic_n_m_s2_rad2"]),
     "friction_drift": ("motor_side", ["fraction", "time_constant_s"]),
     "table_side_friction": ("table", ["share"]),
@@ -120,7 +121,7 @@ def test_bounds_units_and_text(mechanism) -> None:
         assert np.isfinite([parameter.low, parameter.high]).all()
         assert parameter.low < parameter.high
         assert parameter.name.endswith(SUFFIX.get(parameter.dimension, ""))
-    assert fields(mechanism.sentence) <= set(mechanism.names)
+    assert fields(mechanism.sentence) <= {*mechanism.names, *(["wave"] if mechanism.indices(Role.ORDER) else [])}
     assert mechanism.sentence.endswith(".")
     for variant in mechanism.variants:
         if variant.sentence:
@@ -148,7 +149,6 @@ def test_compiles_to_the_one_signature(mechanism) -> None:
 
 @each_stepped
 @given(at=moments)
-@PROPERTY
 def test_neutral_at_zero_strength(mechanism, at) -> None:
     neutral = NEUTRAL.get(mechanism.id, dict.fromkeys(mechanism.names, 0.0))
     for variant in range(len(mechanism.variants)):
@@ -171,7 +171,6 @@ def test_neutral_structure_and_skew() -> None:
 
 @each_stepped
 @given(data=st.data(), at=moments, value=st.floats(-1e3, 1e3))
-@PROPERTY
 def test_finite_within_bounds_and_at_zero(mechanism, data, at, value) -> None:
     strategies = [st.floats(p.low, p.high) | st.sampled_from([0.0, p.low, p.high]) for p in mechanism.parameters]
     variant = data.draw(st.integers(0, len(mechanism.variants) - 1))

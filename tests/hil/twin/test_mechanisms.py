@@ -4,7 +4,7 @@ from math import e, pi
 
 import numpy as np
 import pytest
-from contributions import AT_REST, PERIOD_S, PROPERTY, REVOLUTION, along, call, moments, per_tick, phases
+from contributions import AT_REST, PERIOD_S, REVOLUTION, along, call, moments, per_tick, phases
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
@@ -20,7 +20,6 @@ orders = st.integers(1, 48)
     delay_s=st.floats(0.0, 0.012),
     steps=st.sampled_from([1, 5, 7, 50]),
 )
-@PROPERTY
 def test_transport_delay_holds_and_shifts(commands, delay_s, steps) -> None:
     """A held command late by d: its mean over a period mixes two neighbours by the fraction of d."""
     periods = delay_s / PERIOD_S
@@ -31,7 +30,6 @@ def test_transport_delay_holds_and_shifts(commands, delay_s, steps) -> None:
 
 
 @given(time_constant_s=st.floats(1e-5, 0.05), torque=torques, steps=st.sampled_from([1, 5, 50]))
-@PROPERTY
 def test_current_loop_lag_is_exact_at_any_step(time_constant_s, torque, steps) -> None:
     """A step of the command: mean over period k is u (1 - tau/T (e^{-kT/tau} - e^{-(k+1)T/tau}))."""
     answer = per_tick("current_loop_lag", [0.0] + [torque] * 40, steps, [time_constant_s])
@@ -41,13 +39,11 @@ def test_current_loop_lag_is_exact_at_any_step(time_constant_s, torque, steps) -
 
 
 @given(value=torques, limit=st.floats(1e-3, 20.0))
-@PROPERTY
 def test_torque_saturation_clips(value, limit) -> None:
     assert call("torque_saturation", value, limit_n_m=limit) == np.clip(value, -limit, limit)
 
 
 @given(value=torques, width=st.floats(0.0, 5.0))
-@PROPERTY
 def test_torque_dead_zone_offset_and_gate(value, width) -> None:
     offset, gate = (call("torque_dead_zone", value, variant=variant, half_width_n_m=width) for variant in (0, 2))
     assert offset == pytest.approx(np.sign(value) * max(abs(value) - width, 0.0))
@@ -57,7 +53,6 @@ def test_torque_dead_zone_offset_and_gate(value, width) -> None:
 
 
 @given(value=torques, fraction=st.floats(0.0, 0.5), order=orders, phase=phases)
-@PROPERTY
 def test_torque_ripple_is_a_share_of_the_torque(value, fraction, order, phase) -> None:
     ripple = along("torque_ripple", value, fraction=fraction, cycles_per_rev=order, phase_rad=phase)
     harmonic = np.fft.rfft(ripple) / REVOLUTION.size
@@ -66,7 +61,6 @@ def test_torque_ripple_is_a_share_of_the_torque(value, fraction, order, phase) -
 
 
 @given(value=torques, amplitude=st.floats(0.0, 2.0), order=orders, phase=phases)
-@PROPERTY
 def test_cogging_is_there_whatever_the_torque(value, amplitude, order, phase) -> None:
     cogging = along("cogging_torque", value, amplitude_n_m=amplitude, cycles_per_rev=order, phase_rad=phase) - value
     harmonic = np.fft.rfft(cogging) / REVOLUTION.size
@@ -75,7 +69,6 @@ def test_cogging_is_there_whatever_the_torque(value, amplitude, order, phase) ->
 
 
 @given(value=torques, coefficient=st.floats(1e-6, 1.0))
-@PROPERTY
 def test_torque_constant_falls_with_the_square_of_the_current(value, coefficient) -> None:
     torque = call("torque_constant_saturation", value, coefficient_1_n2_m2=coefficient)
     assert torque == -call("torque_constant_saturation", -value, coefficient_1_n2_m2=coefficient)
@@ -94,13 +87,11 @@ def test_velocity_filter_names_its_time_constant() -> None:
 
 
 @given(load=torques, at=moments)
-@PROPERTY
 def test_constant_load_is_held_by_the_same_motor_torque(load, at) -> None:
     assert call("constant_load", load, at, load_torque_n_m=load) == 0.0
 
 
 @given(offset=st.floats(-1.0, 1.0), level=st.floats(1.0, 3.0), at=moments)
-@PROPERTY
 def test_asymmetric_friction_shifts_the_band(offset, level, at) -> None:
     shift = call("asymmetric_friction", 0.0, at, offset_torque_n_m=offset)
     forward, backward = shift + level, shift - level
@@ -109,7 +100,6 @@ def test_asymmetric_friction_shifts_the_band(offset, level, at) -> None:
 
 
 @given(offset=st.floats(-1.0, 1.0), velocity=st.floats(0.0, 300.0))
-@PROPERTY
 def test_asymmetry_with_speed_is_the_same_torque_both_ways(offset, velocity) -> None:
     def torque(speed):
         return call("asymmetric_friction", 0.0, AT_REST._replace(velocity=speed), variant=1, offset_torque_n_m=offset)
@@ -120,7 +110,6 @@ def test_asymmetry_with_speed_is_the_same_torque_both_ways(offset, velocity) -> 
 
 
 @given(coulomb=st.floats(0.1, 5.0), static=st.floats(0.1, 8.0), stribeck=st.floats(0.01, 20.0))
-@PROPERTY
 def test_stribeck_falls_from_static_to_coulomb(coulomb, static, stribeck) -> None:
     def level(velocity):
         return call(
@@ -137,6 +126,13 @@ def test_stribeck_falls_from_static_to_coulomb(coulomb, static, stribeck) -> Non
     assert level(-0.5 * stribeck) == level(0.5 * stribeck)
 
 
+@given(level=st.floats(0.1, 5.0), slope=st.floats(-20.0, 20.0), position=st.floats(-0.5, 0.5))
+def test_a_friction_gradient_is_straight_and_never_pushes(level, slope, position) -> None:
+    at = AT_REST._replace(table_position_m=position)
+    found = call("friction_gradient", level, at, slope_1_m=slope)
+    assert found == pytest.approx(max(level * (1.0 + slope * position), 0.0), abs=1e-9)
+
+
 @given(
     level=st.floats(0.1, 5.0),
     fraction=st.floats(0.0, 1.0),
@@ -144,7 +140,6 @@ def test_stribeck_falls_from_static_to_coulomb(coulomb, static, stribeck) -> Non
     phase=phases,
     position=st.floats(-0.5, 0.5),
 )
-@PROPERTY
 def test_position_dependent_friction_repeats_and_never_pushes(level, fraction, period, phase, position) -> None:
     here, half, whole = (
         call(
@@ -163,13 +158,11 @@ def test_position_dependent_friction_repeats_and_never_pushes(level, fraction, p
 
 
 @given(stiffness=st.floats(1.0, 1e10), at=moments)
-@PROPERTY
 def test_presliding_gives_the_contact_its_stiffness(stiffness, at) -> None:
     assert call("presliding_hysteresis", 0.0, at, stiffness_n_m_rad=stiffness) == stiffness
 
 
 @given(quadratic=st.floats(-1e-3, 1e-3), velocity=st.floats(-300.0, 300.0))
-@PROPERTY
 def test_quadratic_drag_quadruples_at_double_speed(quadratic, velocity) -> None:
     def drag(speed):
         return call(
@@ -182,7 +175,6 @@ def test_quadratic_drag_quadruples_at_double_speed(quadratic, velocity) -> None:
 
 
 @given(quadratic=st.floats(0.0, 1e-3), velocity=st.floats(0.0, 300.0))
-@PROPERTY
 def test_drag_of_a_thinning_lubricant_rises_with_the_root_of_the_speed(quadratic, velocity) -> None:
     def drag(speed, variant=1):
         return call(
@@ -201,7 +193,6 @@ def test_drag_of_a_thinning_lubricant_rises_with_the_root_of_the_speed(quadratic
 
 
 @given(fraction=st.floats(-0.95, 5.0), tau=st.floats(1.0, 1e4))
-@PROPERTY
 def test_friction_drift_starts_cold_and_settles(fraction, tau) -> None:
     cold, at_tau, warm = (
         call("friction_drift", 1.0, AT_REST._replace(time_s=multiple * tau), fraction=fraction, time_constant_s=tau)

@@ -4,7 +4,7 @@ from math import pi
 
 import numpy as np
 import pytest
-from contributions import AT_REST, PERIOD_S, PROPERTY, REVOLUTION, along, call, moments, phases
+from contributions import AT_REST, PERIOD_S, REVOLUTION, along, call, moments, phases
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -14,7 +14,6 @@ from hil.twin.library import BY_ID
 
 
 @given(share=st.floats(0.0, 1.0), at=moments)
-@PROPERTY
 def test_table_side_friction_is_a_share(share, at) -> None:
     assert call("table_side_friction", 0.0, at, share=share) == share
 
@@ -25,7 +24,6 @@ def test_table_side_friction_is_a_share(share, at) -> None:
     length=st.floats(0.0, 0.02),
     step_s=st.sampled_from([1e-3, 2e-4, 3e-5]),
 )
-@PROPERTY
 def test_external_force_has_the_impulse_of_its_window(force, start, length, step_s) -> None:
     pushes = [
         call(
@@ -43,7 +41,6 @@ def test_external_force_has_the_impulse_of_its_window(force, start, length, step
 
 
 @given(stiffness=st.floats(0.0, 1e5), rest=st.floats(-1.0, 1.0), offset=st.floats(-1.0, 1.0))
-@PROPERTY
 def test_spring_load_pulls_to_rest(stiffness, rest, offset) -> None:
     force = call(
         "spring_load",
@@ -60,7 +57,6 @@ def test_spring_load_pulls_to_rest(stiffness, rest, offset) -> None:
     angle=st.floats(-3.0, 3.0),
     from_down=st.floats(-3.0, 3.0),
 )
-@PROPERTY
 def test_gravity_pulls_an_arm_down(torque, angle, from_down) -> None:
     def weight(seen_from_down):
         at = AT_REST._replace(table_position_m=seen_from_down - angle)
@@ -76,7 +72,6 @@ def test_gravity_pulls_an_arm_down(torque, angle, from_down) -> None:
 
 
 @given(amplitude=st.floats(0.0, 0.01), phase=phases, value=st.floats(-100.0, 100.0))
-@PROPERTY
 def test_encoder_eccentricity_once_per_revolution(amplitude, phase, value) -> None:
     error = along("encoder_eccentricity", value, amplitude_rad=amplitude, phase_rad=phase) - value
     harmonic = np.fft.rfft(error) / REVOLUTION.size
@@ -85,7 +80,6 @@ def test_encoder_eccentricity_once_per_revolution(amplitude, phase, value) -> No
 
 
 @given(amplitude=st.floats(0.0, 1e-5), period=st.floats(1e-5, 1e-3), phase=phases, position=st.floats(-0.5, 0.5))
-@PROPERTY
 def test_scale_interpolation_error_within_its_signal_period(amplitude, period, phase, position) -> None:
     quarters = [
         call(
@@ -106,7 +100,6 @@ def test_scale_interpolation_error_within_its_signal_period(amplitude, period, p
 
 
 @given(delay_s=st.floats(-0.01, 0.01), variant=st.integers(0, 2))
-@PROPERTY
 def test_channel_time_skew_delays_the_one_channel(delay_s, variant) -> None:
     """A smooth motion is delayed, the mean torque of a period as that of a command held over it."""
     time_s = np.arange(100) * PERIOD_S
@@ -129,7 +122,6 @@ def test_channel_time_skew_delays_the_one_channel(delay_s, variant) -> None:
 
 
 @given(periods=st.integers(1, 20), seed=st.integers(0, 99))
-@PROPERTY
 def test_a_delayed_channel_is_continued_by_point_reflection_and_keeps_its_noise(periods, seed) -> None:
     """Interpolation at half a row would halve the energy of white noise, which a fit takes for evidence."""
     late = BY_ID["channel_time_skew"].variants[2].contribution

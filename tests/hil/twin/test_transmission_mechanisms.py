@@ -4,7 +4,7 @@ from math import e, pi
 
 import numpy as np
 import pytest
-from contributions import AT_REST, PROPERTY, RATIO_M, call
+from contributions import AT_REST, RATIO_M, call
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import brentq
@@ -33,7 +33,6 @@ def unloaded_table(effect, angle_rad, *, time_s=0.0, variant=0, **parameters):
 @given(
     angle=st.floats(-600.0, 600.0), amplitude=st.floats(0.0, 1e-4), phase=st.floats(-pi, pi), third=st.floats(0.0, 1e-5)
 )
-@PROPERTY
 def test_periodic_lead_error_moves_the_table_with_the_angle(angle, amplitude, phase, third) -> None:
     x = unloaded_table(
         "periodic_lead_error",
@@ -50,14 +49,12 @@ def test_periodic_lead_error_moves_the_table_with_the_angle(angle, amplitude, ph
 
 
 @given(angle=st.floats(-600.0, 600.0), slope=st.floats(-1e-3, 1e-3))
-@PROPERTY
 def test_cumulative_lead_error_grows_along_the_travel(angle, slope) -> None:
     ahead = unloaded_table("cumulative_lead_error", angle, slope_m_m=slope) - RATIO_M * angle
     assert ahead == pytest.approx(slope * RATIO_M * angle, rel=2e-3, abs=1e-12)
 
 
 @given(angle=st.floats(-600.0, 600.0), growth=st.floats(-1e-3, 1e-3), tau=st.floats(1.0, 1e4))
-@PROPERTY
 def test_thermal_growth_starts_cold_and_settles(angle, growth, tau) -> None:
     cold, at_tau, warm = (
         unloaded_table("thermal_growth", angle, time_s=multiple * tau, relative_growth=growth, time_constant_s=tau)
@@ -69,7 +66,6 @@ def test_thermal_growth_starts_cold_and_settles(angle, growth, tau) -> None:
 
 
 @given(deflection=deflections, gap=lengths)
-@PROPERTY
 def test_backlash_is_lost_motion(deflection, gap) -> None:
     bent = call("backlash", deflection, gap_m=gap)
     assert RATIO_M * abs(bent) == pytest.approx(max(RATIO_M * abs(deflection) - gap / 2.0, 0.0), abs=1e-15)
@@ -77,14 +73,12 @@ def test_backlash_is_lost_motion(deflection, gap) -> None:
 
 
 @given(deflection=deflections, zone=lengths)
-@PROPERTY
 def test_preload_loss_without_any_stiffness_left_is_backlash(deflection, zone) -> None:
     soft = call("preload_loss", deflection, zone_m=zone, stiffness_ratio=0.0)
     assert soft == pytest.approx(call("backlash", deflection, gap_m=zone), abs=1e-15)
 
 
 @given(a=deflections, b=deflections, zone=lengths, ratio=st.floats(0.0, 1.0))
-@PROPERTY
 def test_preload_loss_is_continuous_with_the_two_stiffnesses(a, b, zone, ratio) -> None:
     low, high = sorted((a, b))
     bent = [call("preload_loss", q, zone_m=zone, stiffness_ratio=ratio) for q in (low, high)]
@@ -97,7 +91,6 @@ def test_preload_loss_is_continuous_with_the_two_stiffnesses(a, b, zone, ratio) 
 
 
 @given(slope=st.floats(-10.0, 10.0), x=positions)
-@PROPERTY
 def test_position_dependent_stiffness_is_nominal_at_zero_and_never_negative(slope, x) -> None:
     def factor(position):
         return call(
@@ -125,7 +118,6 @@ def with_structure(chain, frequency_hz, damping_ratio, mass_ratio):
 
 
 @given(chain=chains, frequency=frequencies, ratio=ratios)
-@PROPERTY
 def test_structural_mode_absorbs_the_table_at_its_own_frequency(chain, frequency, ratio) -> None:
     """Den Hartog: a harmonic force on the table does not move it at the clamped frequency of the mass."""
     longer = with_structure(chain, frequency, 0.01, ratio)
@@ -143,7 +135,6 @@ def test_structural_mode_absorbs_the_table_at_its_own_frequency(chain, frequency
     ratio=ratios,
     damping=st.floats(1e-4, 0.9),
 )
-@PROPERTY
 def test_structural_mode_adds_one_mode_and_keeps_the_rest(chain, frequency, ratio, damping) -> None:
     longer = with_structure(chain, frequency, damping, ratio)
     modes, before = modal(longer), modal(chain)
@@ -163,7 +154,6 @@ def test_structural_mode_adds_one_mode_and_keeps_the_rest(chain, frequency, rati
 
 
 @given(frequency=frequencies, ratio=ratios)
-@PROPERTY
 def test_a_yielding_base_has_the_modes_of_the_chain_seen_from_the_ground(frequency: float, ratio: float) -> None:
     """Motor, table and base in absolute coordinates: the nut pulls table and base together, a spring holds the base."""
     motor, table, stiffness = 335.0, 384.0, 5.64e7

@@ -178,9 +178,10 @@ def _closest(word: str, choices: list[str], otherwise: str) -> str:
 
 def _entries(node: yaml.MappingNode) -> dict[str, tuple[yaml.Node, yaml.Node]]:
     """Key and value of a mapping by the text of the key, made once: a file may have thousands of unknown keys."""
-    if not hasattr(node, "entries"):
-        node.entries = {key.value: (key, value) for key, value in node.value if isinstance(key, yaml.ScalarNode)}
-    entries: dict[str, tuple[yaml.Node, yaml.Node]] = node.entries
+    kept = vars(node)
+    if "entries" not in kept:
+        kept["entries"] = {key.value: (key, value) for key, value in node.value if isinstance(key, yaml.ScalarNode)}
+    entries: dict[str, tuple[yaml.Node, yaml.Node]] = kept["entries"]
     return entries
 
 

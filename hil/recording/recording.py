@@ -24,13 +24,15 @@ from hil.files import csv_columns
 from hil.files.input_file import check_file
 from hil.recording.arrow_files import (
     FORMATS,
-    METADATA_KEY as METADATA_KEY,
     MOST_BYTES,
     numbers,
     read_parquet,
     read_stream,
     stored_metadata,
     stored_unit,
+)
+from hil.recording.arrow_files import (
+    METADATA_KEY as METADATA_KEY,
 )
 from hil.recording.stamps import CLOCK_TOLERANCE, RegularRows, check_finite, regular_rows
 
@@ -255,4 +257,3 @@ def _known(path: Path, names: tuple[str, ...]) -> list[str]:
 def _unknown(names: tuple[str, ...]) -> dict[str, Any]:
     unknown = [name for name in names if name not in CHANNELS]
     return {"unknown_columns": unknown} if unknown else {}
-

@@ -59,7 +59,9 @@ def _many(h: Handles) -> int:
 
 
 def _corrupt(can_id: int, size: int) -> Callable[[Handles], None]:
-    return lambda h: h.bus.inject(Fault(FaultKind.CORRUPT, can_id, count=h.rng.randint(1, 3), byte=h.rng.randrange(size)))
+    return lambda h: h.bus.inject(
+        Fault(FaultKind.CORRUPT, can_id, count=h.rng.randint(1, 3), byte=h.rng.randrange(size))
+    )
 
 
 def _late(can_id: int) -> Callable[[Handles], None]:

@@ -18,14 +18,11 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any, NamedTuple
 
-sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[2])]
+sys.path.insert(0, str(Path(__file__).parents[2]))
+sys.path.insert(0, str(Path(__file__).parent))
 
-from hil.compiled.kernel_cache import provide_kernel_cache
-
-provide_kernel_cache()  # before numba is imported
-
-from fault_kinds import COMPLETE, DRIVE, KINDS, MOVING_CYCLES, Kind
-from observed_run import ACCELERATION_M_S2, JERK_M_S3, PERIOD_S, SPEED_M_S, Observed, Stage, bench_with, observe
+from fault_kinds import COMPLETE, DRIVE, KINDS, Kind
+from observed_run import ACCELERATION_M_S2, JERK_M_S3, SPEED_M_S, Observed, Stage, bench_with, observe
 from set_up_faults import SET_UP, run_set_up
 
 from drivers.cia402 import DriveState
@@ -131,7 +128,7 @@ def _commands(seen: Observed) -> list[str]:
     late = [k for k in range(tripped + 1, len(seen.ticks)) if seen.ticks[k].motion_commands]
     if late:
         wrong.append(f"motion command {late[-1] - tripped} cycles after the trip")
-    if any(tick.state is ENABLED and not seen.ticks[k - 1].state is ENABLED
+    if any(tick.state is ENABLED and seen.ticks[k - 1].state is not ENABLED
            for k, tick in enumerate(seen.ticks) if k > tripped + 1):  # fmt: skip
         wrong.append("enabled again after the trip")
     return wrong
@@ -174,7 +171,9 @@ def main() -> int:
             for run in pool.map(one_run, range(begin, min(begin + 200, given.seed + given.runs)), chunksize=10):
                 runs.append(run)
                 if run.wrong:
-                    print(f"seed {run.seed}: {run.fault} in {run.state} ({run.about}): {'; '.join(run.wrong)}", flush=True)
+                    print(
+                        f"seed {run.seed}: {run.fault} in {run.state} ({run.about}): {'; '.join(run.wrong)}", flush=True
+                    )
     print(table(runs))
     return int(any(run.wrong for run in runs))
 

@@ -83,8 +83,10 @@ class Observed:
     def detected(self) -> int | None:
         """Index of the first tick from the fault on at which the loop stops the axis."""
         for index, tick in enumerate(self.ticks):
-            if self.injected is not None and index > self.injected and (
-                tick.phase is not LoopPhase.RUN or tick.goal is not DriveGoal.ENABLED
+            if (
+                self.injected is not None
+                and index > self.injected
+                and (tick.phase is not LoopPhase.RUN or tick.goal is not DriveGoal.ENABLED)
             ):
                 return index
         return None
@@ -111,8 +113,8 @@ class Stage:
                 session.ask_stop()
             else:
                 rig.nodes.drive.trip(0x2310, 0x03, tick * PERIOD_S)
-        return self._provoked is not None and tick > self._provoked and (
-            state is self.state or tick > self._provoked + 60
+        return (
+            self._provoked is not None and tick > self._provoked and (state is self.state or tick > self._provoked + 60)
         )
 
 

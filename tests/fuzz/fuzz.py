@@ -25,11 +25,8 @@ from pathlib import Path
 from types import FrameType
 from typing import Any, NamedTuple
 
-sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[2])]
-
-from hil.compiled.kernel_cache import provide_kernel_cache
-
-provide_kernel_cache()  # before numba is imported
+sys.path.insert(0, str(Path(__file__).parents[2]))
+sys.path.insert(0, str(Path(__file__).parent))
 
 from targets import EXPECTED, TARGETS, WEIGHTS, rehearse_all
 
@@ -131,7 +128,10 @@ def batches(inputs: int, seed: int, only: str | None) -> Iterator[tuple[str, lis
 
 def table(results: dict[str, list[Tried]]) -> str:
     """The counts as a Markdown table."""
-    lines = ["| target | inputs | accepted | refused | failures | slowest s | growth MB |", "|---|---|---|---|---|---|---|"]
+    lines = [
+        "| target | inputs | accepted | refused | failures | slowest s | growth MB |",
+        "|---|---|---|---|---|---|---|",
+    ]
     for target, tried in results.items():
         failed, accepted = sum(bool(one.failure) for one in tried), sum(one.accepted for one in tried)
         lines.append(

@@ -196,10 +196,13 @@ def test_what_would_leave_its_place_is_refused(
 
 def test_a_program_that_the_sandbox_hides_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sys.executable", "/home/me/.venv/bin/python")
-    ran, root = install(tmp_path)
+    ran = hil(tmp_path, "install-service", str(bench_file(tmp_path)), "--profile", PROFILE, "--dry-run")
     assert ran.returncode == InputError.exit_code
     assert "/home/me/.venv/bin: the service cannot see programs in /home" in ran.stderr
-    assert not root.exists()
+    ran, root = install(tmp_path)  # an image may have the programs elsewhere
+    assert ran.returncode == 0
+    assert "Note: /home/me/.venv/bin: the service cannot see" in ran.stderr
+    assert root.exists()
 
 
 def test_a_bus_that_the_sandbox_does_not_reach_is_refused() -> None:

@@ -35,6 +35,8 @@ def friction_law(p: Any, velocity: float, position_m: float, time_s: float) -> t
     if p.position_dependent_friction.on:
         e = p.position_dependent_friction
         bound *= 1.0 + e.fraction * sin(2.0 * pi * position_m / e.period_m + e.phase_rad)
+    if p.friction_gradient.on:
+        bound *= max(1.0 + p.friction_gradient.slope_1_m * position_m, 0.0)
     if p.novel_friction_bump.on:
         b = p.novel_friction_bump
         bound *= 1.0 + b.fraction * bell((position_m - b.centre_m) / b.width_m)

@@ -56,6 +56,8 @@ CATALOGUE: Mapping[str, Definition] = MappingProxyType({
     "position_dependent_friction": Definition(
         "Coulomb and static friction times 1 + fraction sin(2 pi x / period + phase)",
         {"fraction": ParameterRange(-1.0, 1.0), "period_m": _POSITIVE, "phase_rad": _PHASE_0}),
+    "friction_gradient": Definition(
+        "Coulomb and static friction times 1 + slope x, at least 0", {"slope_1_m": _ANY}),
     "nonlinear_viscous_friction": Definition("drag quadratic v |v|", {"quadratic_n_m_s2_rad2": _AT_LEAST_0}),
     "friction_drift": Definition(
         "all friction times 1 + fraction (1 - exp(-t / time_constant))",

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from hil.report.console import out
+from hil.report.console import err, out
 
 if TYPE_CHECKING:
     from hil.bench.bench_file import Bench
@@ -55,6 +55,10 @@ def install_service(
         texts = unit_files() | bench_files(loaded, name, cores)
     except FieldError as error:
         raise located(source, error) from None
+    if hidden := _hidden_programs():
+        if root == Path("/"):
+            raise InputError(hidden)
+        err.print(f"Note: {hidden}", markup=False)
     here = Path("etc/hil") / name
     texts |= {here / "bench.yaml": source.read_text("utf-8"), here / "profile.yaml": profile.read_text("utf-8")}
     texts |= {here / eds: eds.read_text("utf-8") for eds in _device_files(loaded, source)}
@@ -77,21 +81,24 @@ def install_service(
 
 
 def unit_files() -> dict[Path, str]:
-    """Return the files that all benches share, by their path below the root. Raises InputError for a program in a
-    folder that the sandbox hides."""
-    from hil.errors import InputError
-
+    """Return the files that all benches share, by their path below the root."""
     programs = Path(sys.executable).parent
-    if any(programs.is_relative_to(hidden) for hidden in _HIDDEN):
-        raise InputError(
-            f"{programs}: the service cannot see programs in {', '.join(_HIDDEN)}; install hil-servo elsewhere, as "
-            "README says for /opt/hil-servo, and run its hil install-service"
-        )
     text = {unit.name: unit.read_text("utf-8").replace("@BIN@", str(programs)) for unit in _shipped()}
     return {UNITS / unit: text[unit] for unit in text if unit.startswith("hil-bench")} | {
         Path("etc/sysusers.d/hil.conf"): text["hil-sysusers.conf"],
         Path("etc/udev/rules.d/70-hil.rules"): text["hil-udev.rules"],
     }
+
+
+def _hidden_programs() -> str:
+    """Sentence on programs in a folder that the sandbox hides; empty for others."""
+    programs = Path(sys.executable).parent
+    if not any(programs.is_relative_to(hidden) for hidden in _HIDDEN):
+        return ""
+    return (
+        f"{programs}: the service cannot see programs in {', '.join(_HIDDEN)}; install hil-servo elsewhere, as "
+        "README says for /opt/hil-servo, and run its hil install-service"
+    )
 
 
 def bench_files(bench: Bench, name: str, cores: str) -> dict[Path, str]:

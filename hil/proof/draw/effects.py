@@ -15,8 +15,10 @@ from hil.twin.library import BY_ID
 from hil.twin.parameter import Role
 
 FormAndParameters = tuple[str, dict[str, float]]
+# Not drawn: what came after the first sealed proofs. The same seeds give the same cases.
+NOT_DRAWN = ("friction_gradient",)
 # drawn axes move a table: an effect of a load that turns is not among theirs
-LIBRARY: tuple[str, ...] = tuple(name for name in CATALOGUE if not BY_ID[name].turning)
+LIBRARY: tuple[str, ...] = tuple(name for name in CATALOGUE if not BY_ID[name].turning and name not in NOT_DRAWN)
 NEED_TABLE = frozenset(name for name in LIBRARY if BY_ID[name].needs_table)
 _SOFTEST = 0.8  # share of the stiffness that may be lost over the travel: the spring stays positive
 

@@ -47,6 +47,7 @@ SHOWN = {
     "external_force": {"force_n": 300.0, "start_s": 0.4, "end_s": 0.8},
     "spring_load": {"stiffness_n_m": 3000.0, "rest_position_m": 0.0},
     "gravity_torque": {"gravity_torque_n_m": 300.0, "angle_rad": 1.0},
+    "friction_gradient": {"slope_1_m": 3.0},
 }
 EFFECTS = {name: Effect(name, parameters) for name, parameters in SHOWN.items()}
 # together with all loads the drive needs more than the limit that shows alone
@@ -64,7 +65,7 @@ def test_catalogue_holds_exactly_the_interface() -> None:
         for name, definition in CATALOGUE.items()
     }
     assert required == {name: set(parameters) for name, parameters in SHOWN.items()}
-    assert len(CATALOGUE) == 29
+    assert len(CATALOGUE) == 30
 
 
 @pytest.mark.parametrize("name", SHOWN)

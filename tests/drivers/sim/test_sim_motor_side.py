@@ -90,6 +90,12 @@ def test_position_dependent_friction_varies_along_the_travel() -> None:
         assert friction_n_m(effect, 10.0, x) == pytest.approx(expected, rel=1e-6)
 
 
+def test_a_friction_gradient_is_straight_along_the_travel() -> None:
+    for x in (0.0, 0.1, -0.2):
+        expected = 1.1 * (1.0 + 2.0 * x) + 0.064
+        assert friction_n_m(Effect("friction_gradient", {"slope_1_m": 2.0}), 10.0, x) == pytest.approx(expected)
+
+
 def test_nonlinear_viscous_friction_is_odd_and_quadratic() -> None:
     effect = Effect("nonlinear_viscous_friction", {"quadratic_n_m_s2_rad2": 1e-5})
     for speed in (200.0, -200.0):

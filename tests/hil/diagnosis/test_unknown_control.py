@@ -14,7 +14,7 @@ from hil.bench.bench_file import Bench, load_bench
 from hil.bench.control_section import UnknownControl
 from hil.diagnosis.diagnose import diagnose
 from hil.diagnosis.result import Result
-from hil.errors import FieldError, InputError
+from hil.errors import InputError
 from hil.identification.compare import compare
 from hil.identification.completion import completed
 from hil.identification.terms import Term
@@ -123,8 +123,7 @@ def test_a_bench_file_says_what_is_unknown(tmp_path: Path, control: str) -> None
     found = load_bench(path)
     assert not found.law_known
     assert found.sampled(0.002).gains.period_s == 0.002
-    with pytest.raises(FieldError, match="given no control law"):
-        compare(laps(), found)
+    assert not compare(laps(), found).channels  # block by block only
 
 
 def test_a_mistyped_key_beside_an_unknown_value_is_refused(tmp_path: Path) -> None:

@@ -74,10 +74,14 @@ class Observed:
 
     @property
     def ended(self) -> str:
-        """Ending, or the kind of the exception."""
+        """Ending, or the kind of the exception; where power stayed on, that of the run before."""
         if self.outcome is not None:
             return str(self.outcome.ending)
-        return type(self.error.__cause__ if self.still_powered and self.error.__cause__ else self.error).__name__
+        if not self.still_powered or self.error is None:
+            return type(self.error).__name__
+        cause = self.error.__cause__
+        ended = str(self.error).rsplit("The run ended by ", 1)[-1].split(":")[0]
+        return ended if cause is None else type(cause).__name__
 
     @property
     def detected(self) -> int | None:
@@ -86,7 +90,7 @@ class Observed:
             if (
                 self.injected is not None
                 and index > self.injected
-                and (tick.phase is not LoopPhase.RUN or tick.goal is not DriveGoal.ENABLED)
+                and (tick.phase is not LoopPhase.RUN or tick.goal is DriveGoal.QUICK_STOP)
             ):
                 return index
         return None
@@ -207,7 +211,7 @@ def observe(bench: Bench, stage: Stage, fault: Callable[[Handles], None], rng: r
             seen.outcome = session.run()
         except StillPowered as error:
             seen.error, seen.still_powered = error, True
-        except Exception as error:
+        except (Exception, KeyboardInterrupt) as error:  # the third request to stop is one
             seen.error = error
         _settle(seen, rig)
     finally:

@@ -61,6 +61,7 @@ def read_stream(path: Path) -> StreamRows:
     batches, problem = [], ""
     with parsing(path, "Arrow stream", _UNWRITTEN), pa.OSFile(str(path)) as file, pa.ipc.open_stream(file) as stream:
         schema = stream.schema
+        _ = schema.names  # raises for names that are no text
         rows = 0
         try:
             for batch in stream:

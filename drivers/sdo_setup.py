@@ -243,8 +243,9 @@ class DeviceSetup:
                 advice="See the device's manual for what it accepts in this state.",
             ) from error  # fmt: skip
         except SdoCommunicationError as error:
+            silent = "No SDO response" in str(error)
             raise ResponseTimeout(
-                f"no usable SDO answer ({error})", where=self._where(index, subindex),
+                "no SDO answer" if silent else f"no usable SDO answer ({error})", where=self._where(index, subindex),
                 given=f"{RESPONSE_TIMEOUT_S} s",
                 advice="Is the device powered, its node-ID and bit rate right, the bus terminated?",
             ) from error  # fmt: skip

@@ -15,11 +15,14 @@ def check_file(path: Path, allowed: str, most_bytes: int | None = None) -> None:
     """
     try:
         found = path.stat()
+    except FileNotFoundError:
+        raise InputError(f"{path}: there is no such file; give {allowed}") from None
     except (OSError, ValueError) as error:  # ValueError: a null byte in the path
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"{path}: cannot be read ({reason}); give {allowed}") from None
     if not stat.S_ISREG(found.st_mode):
-        raise InputError(f"{path}: is no regular file but a folder, pipe or device; give {allowed}")
+        kind = "Is a directory" if stat.S_ISDIR(found.st_mode) else "a pipe or device"
+        raise InputError(f"{path}: is no regular file ({kind}); give {allowed}")
     if most_bytes is not None and found.st_size > most_bytes:
         raise InputError(f"{path}: given {found.st_size} bytes, allowed {most_bytes}; give {allowed}")
 

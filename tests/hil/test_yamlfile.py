@@ -148,7 +148,7 @@ def test_all_findings_come_in_the_order_of_lines_and_are_cut_when_many(tmp_path:
 
 
 def test_unreadable_files(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="No such file"):
+    with pytest.raises(InputError, match="there is no such file"):
         load_model(tmp_path / "absent.yaml", Machine)
     with pytest.raises(InputError, match="Is a directory"):
         load_model(tmp_path, Machine)

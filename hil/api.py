@@ -150,7 +150,7 @@ def diagnose(
     """Find the physics that the twin of a bench lacks: where it acts, its parameters, and a proof.
 
     recordings: to learn from, of one axis. bench: as its owner describes it; wrong parameters are estimated. held_out:
-    recordings of another motion that nothing is fitted to; without any, the last third of each recording. progress:
+    recordings of another motion that nothing is fitted to; without any, a third of each recording. progress:
     called with a text at each step. budget_s: time after which the search ends with the best explanation so far,
     marked in `result.time_budget`; without it from some seconds to some minutes.
 

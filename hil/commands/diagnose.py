@@ -21,7 +21,7 @@ def diagnose(
         typer.Option(
             "--validate",
             help="Held-out recording of another motion, on which the result is validated; may be given several times. "
-            "Default: the last third of each recording.",
+            "Default: a third of each recording.",
         ),
     ] = None,
     bench: RecordedBench = None,

@@ -30,7 +30,7 @@ def investigate(
         typer.Option(
             "--validate",
             help="Profile of another motion, on which the result is validated; may be given several times. "
-            "Default: the last third of each recording.",
+            "Default: a third of each recording.",
         ),
     ] = None,
     rounds: Annotated[int, typer.Option(min=1, max=10, help="Largest number of rounds.")] = 3,

@@ -114,7 +114,7 @@ def diagnose(
 ) -> Diagnosis:
     """Diagnose recordings of one axis against its bench, and validate the result on recordings of another motion.
 
-    Without `validate` the last third of each recording is held out. `progress` gets the name of each step and the time
+    Without `validate` a third of each recording is held out. `progress` gets the name of each step and the time
     left. After `budget_s` the search ends with the best explanation so far; the rest takes some seconds more. Raises
     InputError with all reasons if the recordings cannot be diagnosed.
     """

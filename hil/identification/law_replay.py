@@ -111,7 +111,7 @@ def position_loop(gains: Gains, rows: LawRows) -> FloatArray:
 
 
 def residuals(rows: LawRows, settings: Settings, twin: Twin, cut: int, weight: float) -> Parts:
-    """What is recorded less what the law gives, at the judged rows of a recording without its first `cut` rows.
+    """Residuals of a control law: recorded less computed values at the judged rows, without the first `cut` rows.
 
     `twin` has the mechanisms on the inputs of the controller. `weight` is the velocity gain with which a deviation of
     the speed set-point counts as one of the command.
@@ -146,7 +146,7 @@ def _finite(values: FloatArray) -> FloatArray:
 
 
 def to_explain(rows: LawRows, gains: Gains) -> FloatArray:
-    """What a law has to explain of the command, in the units of `residuals`.
+    """Part of the command that a law has to explain, in the units of `residuals`.
 
     It is what passes the integrator that follows the command: a slow one is followed without any law.
     """

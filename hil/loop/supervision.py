@@ -31,7 +31,7 @@ class Ending(StrEnum):
 
 
 class Reaction(StrEnum):
-    """What stops the axis: the loop within the limits of the profile, or the drive by its own ramp."""
+    """How the axis is stopped: by the loop within the limits of the profile, or by the drive with its own ramp."""
 
     STOP = "controlled stop"
     QUICK_STOP = "quick stop"

@@ -1,4 +1,4 @@
-"""Make a recording of what is left of a run that was not closed: whole blocks of its stream, rows still in memory."""
+"""Recover a run that was not closed: join the whole blocks of its file and the rows that are still in memory."""
 
 from __future__ import annotations
 
@@ -27,8 +27,11 @@ from hil.recording.writer import RowGap
 
 @dataclass(frozen=True)
 class Remains:
-    """What is left of a run. rows (n, channels); from_memory: rows of them that were not on the disk; damaged_bytes: of
-    the file, in no whole block; metadata: of the run, with its end where the run told it."""
+    """Rows recovered of a run.
+
+    rows (n, channels); from_memory: how many of them were not on the disk; damaged_bytes: of the file, in no whole
+    block; metadata: of the run, with its end where the run told it.
+    """
 
     channels: tuple[str, ...]
     rows: FloatArray
@@ -51,7 +54,7 @@ class Remains:
 
     @property
     def text(self) -> str:
-        """What was found, in one line."""
+        """Summary of the recovered rows in one line."""
         lost = sum(gap.rows_lost for gap in self.gaps)
         parts = [f"{len(self.rows)} rows, {self.from_memory} of them from memory"]
         parts += [f"{self.damaged_bytes} bytes of the file are damaged and left out"] if self.damaged_bytes else []
@@ -62,8 +65,9 @@ class Remains:
 
 @contextmanager
 def remains(stream: Path) -> Iterator[Remains]:
-    """Read what is left of the run of an Arrow stream. What is in memory is removed when the block ends without error.
+    """Read the rows of a run from its Arrow stream and from memory.
 
+    The memory is removed when the block ends without error.
     Raises InputError if there is no such file, if it is no stream of a run, or if its recorder still works; HilError
     if no row is left.
     """

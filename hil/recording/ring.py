@@ -90,7 +90,7 @@ class Ring:
 
     @property
     def task(self) -> dict[str, Any]:
-        """What is recorded: path of the stream, channels, metadata, lossless."""
+        """Description of the recording: path of the stream, channels, metadata, lossless."""
         task: dict[str, Any] = json.loads(os.pread(self.descriptor, self[Counter.TASK_BYTES], self._task_at))
         return task
 

@@ -8,6 +8,7 @@ Faults are bits of `DriveSample.condition`. A condition of TRIPPING sets the goa
 import math
 from typing import Final
 
+from drivers.acting_setpoint import MORE_CYCLES, ActingSetpoint
 from drivers.canopen_master import CanopenMaster
 from drivers.canopen_node import CanopenNode, condition_names
 from drivers.cia402 import (
@@ -42,7 +43,7 @@ __all__ = ["TRIPPING", "CanopenDrive", "DriveInfo", "DriveSettings", "HomingRun"
 # Conditions that stop the axis.
 TRIPPING: Final = (
     Condition.STALE | Condition.HEARTBEAT_LOST | Condition.EMERGENCY | Condition.FAULT | Condition.DISABLED
-    | Condition.BUS_OFF | Condition.NOT_OPERATIONAL | Condition.UNANSWERED
+    | Condition.BUS_OFF | Condition.NOT_OPERATIONAL | Condition.UNANSWERED | Condition.OTHER_SETPOINT
 )  # fmt: skip
 # Bound once: a look-up of an enumeration member takes time in the loop.
 _OK, _ENABLED_STATE, _ENABLED = Condition.OK, DriveState.OPERATION_ENABLED, DriveGoal.ENABLED
@@ -65,6 +66,8 @@ class CanopenDrive(CanopenNode, Drive):
         self.controlword_bits = 0  # mode-specific bits (homing start), or-ed in while enabled
         self._send, self._rpdo_id = master.port.send, 0x200 + settings.node_id
         self._unpack = layout(FEEDBACK).unpack
+        self._acting: ActingSetpoint | None = None
+        master.port.listen(0x280 + settings.node_id, self._on_demand)
         self._take_mode(settings.mode)
         self._rad_per_count = self._n_m_per_mille = self._target_per_unit = 0.0
         self._statusword = 0
@@ -97,6 +100,13 @@ class CanopenDrive(CanopenNode, Drive):
         self._n_m_per_mille = info.torque_resolution_n_m
         in_torque = self.settings.mode is OperationMode.CYCLIC_SYNC_TORQUE
         self._target_per_unit = 1 / (info.torque_resolution_n_m if in_torque else info.rad_per_count)
+        self._acting = None
+        if info.reports_demand:
+            cycles, counts_per_rev = self.settings.missed_answers_allowed + MORE_CYCLES, 1 / info.rad_per_count
+            torque_limit = info.max_torque_n_m / info.torque_resolution_n_m
+            self._acting = ActingSetpoint(
+                self.settings.mode, cycles, self.settings.travel_per_rev * counts_per_rev, torque_limit
+            )
         self._raw_counts = self._counts = answer.counts
         self._statusword = answer.statusword
         self._begin()
@@ -119,6 +129,17 @@ class CanopenDrive(CanopenNode, Drive):
         self._counts += self._moved_counts
         self._raw_counts = raw
         self._take_answer(now_s)
+
+    def _on_demand(self, can_id: int, data: bytes, now_s: float) -> None:
+        acting = self._acting
+        if acting is None:
+            return
+        if len(data) != acting.size:
+            self.malformed_frames += 1
+            return
+        enabled = STATE_BY_STATUS[self._statusword & 0x7F] is _ENABLED_STATE and self.goal is _ENABLED
+        if enabled and acting.differs(data):
+            self._latched |= Condition.OTHER_SETPOINT
 
     def _latch(self, emergency: Emergency) -> None:
         if emergency.active:
@@ -183,6 +204,8 @@ class CanopenDrive(CanopenNode, Drive):
                 self._reset_requested = False
             target = self._raw_counts if self._holds_position else 0
         self._controlword = controlword
+        if self._acting is not None:
+            self._acting.sent.append(target)
         self._send(self._rpdo_id, self._pack(controlword, target), now_s)
 
     def _await_stop(self, state: DriveState, now_s: float) -> None:
@@ -222,6 +245,8 @@ class CanopenDrive(CanopenNode, Drive):
         """Clear the latched fault; send one rising edge of its reset bit to a drive in FAULT. Goal: DISABLED."""
         self.goal = DriveGoal.DISABLED
         self._latched, self.tripped = 0, Condition.OK
+        if self._acting is not None:
+            self._acting.text = ""
         # without a fault nothing is requested, which could reset a later one
         state = STATE_BY_STATUS[self._statusword & 0x7F]
         self._reset_requested = state in (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE)
@@ -244,7 +269,7 @@ class CanopenDrive(CanopenNode, Drive):
         raise DriveFault(
             f"tripped: {condition_names(self.tripped)}",
             where=self._name,
-            given=self._cause(),
+            given=self._acting.text if self._acting is not None and self._acting.text else self._cause(),
             advice="Remove the cause, then reset the fault.",
         )
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final, NamedTuple
 
+from drivers.acting_setpoint import DEMAND
 from drivers.canopen_master import NMT_PRE_OPERATIONAL, CanopenMaster
 from drivers.cia402 import FAULT_RESET, POWERED, DriveState, OperationMode, state_of
 from drivers.object_index import ObjectIndex as Index
@@ -56,6 +57,7 @@ class DriveSettings:
     quick_stop_rad_s2: float | None = None  # 0x6085; None: as the drive has it
     command_deadline_s: float = 0.05  # without an RPDO for longer, the drive stops by itself (0x1400:5); in whole ms
     command_transmission: int = EVENT_DRIVEN  # RPDO: acts at once (255) or at the next SYNC (1)
+    watch_setpoint: bool = True  # the demand of the mode in a second TPDO, if the EDS has it
     homing: HomingSettings | None = None  # for OperationMode.HOMING; None: as the drive has it
     travel_per_rev: float = 2 * math.pi  # rad per revolution; linear drives: m per "revolution" of 0x608F
 
@@ -71,6 +73,7 @@ class DriveInfo:
     quick_stop_rad_s2: float  # 0x6085 as the drive has it after the set-up
     supervises_commands: bool  # it has a deadline of the RPDO (0x1400:5)
     max_torque_n_m: float  # 0x6072, to which the drive limits its torque
+    reports_demand: bool = False  # the set-point that acts is in a second TPDO
 
 
 NO_INFO: Final = DriveInfo(0.0, 0.0, 0.0, 0.0, math.inf, False, math.inf)
@@ -114,6 +117,10 @@ def set_up_drive(master: CanopenMaster, settings: DriveSettings) -> DriveAnswer:
         commands = (CONTROLWORD, TARGET[settings.mode])
         device.map_pdo(Index.RPDO_COMMUNICATION, commands, settings.command_transmission, 0x200 + node_id)
         device.map_pdo(Index.TPDO_COMMUNICATION, FEEDBACK, EVERY_SYNC, 0x180 + node_id)
+        demand = DEMAND.get(settings.mode) if settings.watch_setpoint else None
+        if demand is not None and device.has(demand.index) and device.has(Index.TPDO_COMMUNICATION + 1, 1):
+            device.map_pdo(Index.TPDO_COMMUNICATION + 1, [demand], EVERY_SYNC, 0x280 + node_id)
+            info = replace(info, reports_demand=True)
         statusword = device.read(Index.STATUSWORD)
         if state_of(statusword) in POWERED:
             raise ConfigurationError(
@@ -180,7 +187,7 @@ def _write_watchdogs(device: DeviceSetup, master: CanopenMaster, settings: Drive
     supervised = device.has(Index.RPDO_COMMUNICATION, RPDO_EVENT_TIMER)
     if supervised:
         deadline_s = max(settings.command_deadline_s, _DEADLINE_PERIODS * settings.period_s)
-        device.write(Index.RPDO_COMMUNICATION, RPDO_EVENT_TIMER, math.ceil(round(1000 * deadline_s, 6)))
+        device.write(Index.RPDO_COMMUNICATION, RPDO_EVENT_TIMER, max(1, math.floor(round(1000 * deadline_s, 6))))
     deceleration = device.read(Index.QUICK_STOP_DECELERATION) * info.rad_per_count
     return replace(info, quick_stop_rad_s2=deceleration, supervises_commands=supervised)
 

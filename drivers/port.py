@@ -98,6 +98,7 @@ class Condition(IntFlag):
     CORRUPT = 512  # encoder: frames with a wrong checksum since the last read
     LINE_LOST = 1024  # encoder: the serial line is gone
     DISABLED = 2048  # the drive left OPERATION ENABLED by itself
+    OTHER_SETPOINT = 8192  # the set-point that acts in the drive is none of those commanded
     UNANSWERED = 4096  # the drive did not follow a stop command; the master has cut it off
 
 

@@ -1,8 +1,11 @@
 """State machine of CiA 402 in the drive: next state after a controlword, and the statusword of each state."""
 
+from collections.abc import Callable
 from typing import Final
 
 from drivers.cia402 import Controlword, DriveState, Statusword
+from drivers.object_index import ObjectIndex as Index
+from drivers.sim.sdo_server import AbortCode, SdoAbort
 
 _S = DriveState
 
@@ -56,3 +59,12 @@ def next_state(state: DriveState, controlword: int, previous: int, *, cause_gone
         rising = controlword & ~previous & Controlword.FAULT_RESET
         return _S.SWITCH_ON_DISABLED if rising and cause_gone else _S.FAULT
     return _TRANSITIONS.get((state, _command(controlword)), state)
+
+
+def interpolation_time_s(number: Callable[[int, int], int], subindex: int, value: int) -> float:
+    """0x60C2 after a write of `value`: sub-index 1 x 10^(sub-index 2) seconds. SdoAbort for 0."""
+    units = value if subindex == 1 else number(Index.INTERPOLATION_TIME, 1)
+    exponent = number(Index.INTERPOLATION_TIME, 2) if subindex == 1 else value
+    if units == 0:
+        raise SdoAbort(AbortCode.INVALID_VALUE)
+    return float(units * 10**exponent) if exponent >= 0 else units / 10**-exponent

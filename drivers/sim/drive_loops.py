@@ -1,9 +1,11 @@
 """Motion inside a simulated drive: its control loops on the plant, stop ramps, and homing step by step."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import IntEnum
 
+from drivers.object_index import ObjectIndex as Index
 from drivers.port import PlantLike, ServoLike, ServoTarget
 
 _LOOP_PERIOD_S = 0.001  # of the servo, if the SYNC period is longer
@@ -83,6 +85,12 @@ class Homing:
     reference: int = 0
     attained: bool = False
     done: bool = False
+
+
+def new_homing(number: Callable[..., int], counts_per_rev: int) -> Homing:
+    """Begin a homing run as the objects 0x6098, 0x6099:2 and 0x609A say; number: reads an object."""
+    method, speed = HomingMethod(number(Index.HOMING_METHOD)), number(Index.HOMING_SPEEDS, 2)
+    return Homing(method, speed, number(Index.HOMING_ACCELERATION), counts_per_rev)
 
 
 def step_homing(run: Homing, counts: int, previous_counts: int, period_s: float) -> Homing:

@@ -14,8 +14,8 @@ from drivers.cia402 import Controlword, DriveState, OperationMode, Statusword
 from drivers.object_index import ObjectIndex as Index
 from drivers.port import PlantLike, ServoLike, ServoTarget
 from drivers.sim.can_node import EDS_FOLDER, SimulatedDevice
-from drivers.sim.cia402_device import REMOTE, STATUS, next_state
-from drivers.sim.drive_loops import DriveLoops, Homing, HomingMethod, step_homing
+from drivers.sim.cia402_device import REMOTE, STATUS, interpolation_time_s, next_state
+from drivers.sim.drive_loops import DriveLoops, Homing, HomingMethod, new_homing, step_homing
 from drivers.sim.object_dictionary import key_of
 from drivers.sim.sdo_server import AbortCode, SdoAbort
 
@@ -25,7 +25,8 @@ _POSITION, _VELOCITY = key_of(Index.POSITION_ACTUAL), key_of(Index.VELOCITY_ACTU
 _TORQUE = key_of(Index.TORQUE_ACTUAL)
 _MAX_TORQUE = key_of(Index.MAX_TORQUE)
 _TARGET_TORQUE, _TARGET_VELOCITY = key_of(Index.TARGET_TORQUE), key_of(Index.TARGET_VELOCITY)
-_TARGET_POSITION = key_of(Index.TARGET_POSITION)
+_TARGET_POSITION, _TORQUE_DEMAND = key_of(Index.TARGET_POSITION), key_of(Index.TORQUE_DEMAND)
+_VELOCITY_DEMAND, _POSITION_DEMAND = key_of(Index.VELOCITY_DEMAND), key_of(Index.POSITION_DEMAND)
 _ERROR_CODE, _QUICK_STOP_DECELERATION = key_of(Index.ERROR_CODE), key_of(Index.QUICK_STOP_DECELERATION)
 _FOLLOWING_ERROR, _FOLLOWING_ERROR_WINDOW = key_of(Index.FOLLOWING_ERROR_ACTUAL), key_of(Index.FOLLOWING_ERROR_WINDOW)
 
@@ -105,7 +106,7 @@ class SimulatedDrive(SimulatedDevice):
         self._direct = enabled and self.values[_MODE] == OperationMode.CYCLIC_SYNC_TORQUE
         self._idle = not enabled and self.state not in _STOPPING
         if not self._direct:
-            self._torque_n_m = 0.0
+            self._torque_n_m, self.values[_TORQUE_DEMAND] = 0.0, 0
         self._homing = None
         self._last_target = self.values[_POSITION]
         follows = enabled and self.values[_MODE] != OperationMode.HOMING
@@ -125,6 +126,7 @@ class SimulatedDrive(SimulatedDevice):
             elif torque < -limit:
                 torque = -limit
             self._torque_n_m = torque * self._n_m_per_mille
+            values[_TORQUE_DEMAND] = torque  # output of the torque limit, CiA 402-2
 
     def _take_controlword(self, now_s: float) -> None:
         controlword, previous = self.dictionary.number(Index.CONTROLWORD), self._controlword
@@ -142,9 +144,7 @@ class SimulatedDrive(SimulatedDevice):
         if not start:
             self._homing = None
         elif self._homing is None:
-            number = self.dictionary.number
-            method, speed = HomingMethod(number(Index.HOMING_METHOD)), number(Index.HOMING_SPEEDS, 2)
-            self._homing = Homing(method, speed, number(Index.HOMING_ACCELERATION), self._counts_per_rev)
+            self._homing = new_homing(self.dictionary.number, self._counts_per_rev)
             self._status(0)
 
     def trip(self, code: int, register: int, now_s: float, *, lasting: bool = False) -> None:
@@ -201,12 +201,7 @@ class SimulatedDrive(SimulatedDevice):
             raise SdoAbort(AbortCode.INVALID_VALUE)
 
     def _on_interpolation_time(self, index: int, subindex: int, value: int) -> None:
-        number = self.dictionary.number
-        units = value if subindex == 1 else number(Index.INTERPOLATION_TIME, 1)
-        exponent = number(Index.INTERPOLATION_TIME, 2) if subindex == 1 else value
-        if units == 0:
-            raise SdoAbort(AbortCode.INVALID_VALUE)
-        self._set_period(units * 10**exponent if exponent >= 0 else units / 10**-exponent)
+        self._set_period(interpolation_time_s(self.dictionary.number, subindex, value))
 
     def _set_period(self, period_s: float) -> None:
         self.period_s, self._syncs_per_s = period_s, 1 / period_s
@@ -233,10 +228,12 @@ class SimulatedDrive(SimulatedDevice):
             self.tick(now_s)
 
     def _catch_up(self, now_s: float) -> None:
-        periods = round((now_s - self._moved_s) * self._syncs_per_s)
-        self._moved_s += periods * self.period_s
-        for _ in range(periods):
-            self._move(now_s)
+        for _ in range(round((now_s - self._moved_s) * self._syncs_per_s)):
+            self._moved_s += self.period_s
+            time_s = min(self._moved_s, now_s)
+            if time_s >= self._last_s and time_s >= min(self._timer_s, self.pdo.deadline_s):
+                super().tick(time_s)  # its watchdogs act when they run out, not when a frame comes
+            self._move(time_s)
 
     def _move(self, now_s: float) -> None:
         """Move the plant by one period and measure."""
@@ -274,6 +271,8 @@ class SimulatedDrive(SimulatedDevice):
             target = self._position_target(now_s)
         elif mode == OperationMode.HOMING and self._homing is not None:
             target = self._homing_target(self._homing)
+        values[_VELOCITY_DEMAND] = round(target.velocity_rad_s * self._counts_per_rad)
+        values[_POSITION_DEMAND] = values[_TARGET_POSITION if target.position_rad is not None else _POSITION]
         return loops.advance(target, self.period_s, values[_MAX_TORQUE] * self._n_m_per_mille)
 
     def _position_target(self, now_s: float) -> ServoTarget:

@@ -61,6 +61,11 @@ class DriveSection(BenchSection):
         None, description="object 0x6076, whose 1/1000 is the resolution of torque; absent: as the drive says [N m, N]"
     )
     heartbeat_s: Positive = 0.02
+    watch_setpoint: bool = Field(
+        True,
+        description="compare the set-point that acts in the drive (object 0x6074, 0x606B or 0x6062 in a second "
+        "TPDO, if the EDS has it) with those commanded",
+    )
     encoder: EncoderConnection = EncoderConnection()
     travel_m: tuple[float, float] | None = Field(None, description="the axis is stopped outside [m]")
     limits: SetPointLimits | None = Field(
@@ -72,7 +77,16 @@ class DriveSection(BenchSection):
     response: Share = Field(0.4, description="share of the period within which the answers to a SYNC are awaited")
     missed_answers: Annotated[int, Field(ge=0, le=100)] = Field(3, description="in a row, before data count as stale")
     jitter_p99: Share = Field(0.5, description="share of the period; lateness beyond: not armed")
-    overrun_s: Positive = Field(0.05, description="lateness at which the axis is stopped [s]")
+    overrun_s: Positive = Field(
+        0.05,
+        description="lateness at which the axis is stopped; at most the deadline of the "
+        "set-points less two periods [s]",
+    )
+    command_deadline_s: Positive | None = Field(
+        None,
+        description="without a set-point for longer the drive stops by itself (object 0x1400:5); absent: in cst "
+        "the time in which the torque limit moves the axis by following_error_m, at most 0.05; else 0.05 [s]",
+    )
     supervision: SupervisionSection = SupervisionSection()
     bus_load: Share = Field(0.7, description="largest share of the bus's time at which the drive is armed")
     over_budget: Literal["refuse", "arm"] = Field(

@@ -28,8 +28,8 @@ class SupervisionSection(BenchSection):
         "absent: a tenth of encoder_difference_m, at least 4 counts",
     )
     frozen_torque: Positive | None = Field(
-        None, description="change of the torque command while the motor encoder repeats its value: more than stiction; "
-        "absent: half of the torque limit [N m, N]"
+        None, description="change of the measured torque while the motor encoder repeats its value: more than "
+        "stiction; absent: half of the torque limit [N m, N]"
     )  # fmt: skip
     velocity_m_s: Positive | None = Field(
         None, description="of the motor at the table; absent: 1.5 x the limit of the profile + what the position loop "

@@ -67,22 +67,24 @@ class Memory(IntEnum):
     PRIMED = 0
     MOTOR_START = 1
     TABLE_START = 2
-    COMMAND_START = 3  # position set-point of the first tick
+    TORQUE_COMMAND = 3  # of the tick before
     MOTOR = 4  # last fresh sample
     TABLE = 5
     MOTOR_PERIODS = 6  # since the last fresh sample
     TABLE_PERIODS = 7
     TABLE_AT_MOTOR = 8  # position of the table encoder when the motor encoder changed last
     MOTOR_AT_TABLE = 9
-    TORQUE_AT_MOTOR = 10  # torque command when the motor encoder changed last
+    TORQUE_AT_MOTOR = 10  # measured torque when the motor encoder changed last
     VELOCITY = 11  # smoothed
-    TORQUE_COMMAND = 12  # of the tick before
+    COMMAND_ALIKE = 12  # position set-point at MOTOR_ALIKE
     TWIN_TORQUE = 13  # of the tick before
     TORQUE_TICKS = 14  # in a row beyond the bound
     TORQUE_GAP = 15  # measured less commanded torque, smoothed
     HEAT = 16  # mean square of the torque over the thermal time
     SKIPPED = 17
     RESIDUAL_TICKS = 18  # in a row beyond a threshold
+    MOTOR_ALIKE = 19  # where both encoders had last moved by frozen_m into the same direction
+    TABLE_ALIKE = 20
 
 
 class Facts(NamedTuple):
@@ -167,11 +169,10 @@ def check(bounds, memory, facts):  # type: ignore[no-untyped-def]
     if not total < math.inf:
         return _NOT_FINITE
     if m[_M.PRIMED] == 0.0:
-        m[_M.PRIMED], m[_M.COMMAND_START] = 1.0, f.position_m
-        m[_M.MOTOR_START] = m[_M.MOTOR] = m[_M.MOTOR_AT_TABLE] = f.motor_m
-        m[_M.TABLE_START] = m[_M.TABLE] = m[_M.TABLE_AT_MOTOR] = f.table_m
-        m[_M.TORQUE_AT_MOTOR] = m[_M.TORQUE_COMMAND] = f.command
-        m[_M.TWIN_TORQUE] = f.torque
+        m[_M.PRIMED], m[_M.COMMAND_ALIKE], m[_M.TORQUE_COMMAND] = 1.0, f.position_m, f.command
+        m[_M.MOTOR_START] = m[_M.MOTOR] = m[_M.MOTOR_AT_TABLE] = m[_M.MOTOR_ALIKE] = f.motor_m
+        m[_M.TABLE_START] = m[_M.TABLE] = m[_M.TABLE_AT_MOTOR] = m[_M.TABLE_ALIKE] = f.table_m
+        m[_M.TORQUE_AT_MOTOR] = m[_M.TWIN_TORQUE] = f.torque
     passed = 0
     periods = 1.0 + f.skipped - m[_M.SKIPPED]
     m[_M.SKIPPED] = f.skipped
@@ -189,8 +190,8 @@ def check(bounds, memory, facts):  # type: ignore[no-untyped-def]
         m[_M.VELOCITY] += SMOOTHING * (moved / span_s - m[_M.VELOCITY])
         m[_M.MOTOR], m[_M.MOTOR_PERIODS] = f.motor_m, 0.0
         if moved != 0.0:
-            m[_M.TABLE_AT_MOTOR], m[_M.TORQUE_AT_MOTOR] = f.table_m, f.command
-        elif b.commands_torque and abs(f.command - m[_M.TORQUE_AT_MOTOR]) > b.frozen_torque:
+            m[_M.TABLE_AT_MOTOR], m[_M.TORQUE_AT_MOTOR] = f.table_m, f.torque
+        elif b.commands_torque and abs(f.torque - m[_M.TORQUE_AT_MOTOR]) > b.frozen_torque:
             passed |= _MOTOR_FROZEN
     velocity = m[_M.VELOCITY]
     if abs(velocity) > b.velocity_m_s:
@@ -219,10 +220,14 @@ def _compare(b, m, f, apart_m):  # type: ignore[no-untyped-def]
         passed |= _MOTOR_FROZEN
     if abs(f.motor_m - m[_M.MOTOR_AT_TABLE]) > b.frozen_m + apart_m:
         passed |= _TABLE_FROZEN
+    motor, table = f.motor_m - m[_M.MOTOR_ALIKE], f.table_m - m[_M.TABLE_ALIKE]
+    if min(abs(motor), abs(table)) > b.frozen_m + apart_m:
+        if motor * table > 0.0:
+            m[_M.MOTOR_ALIKE], m[_M.TABLE_ALIKE], m[_M.COMMAND_ALIKE] = f.motor_m, f.table_m, f.position_m
+        else:
+            follows = motor * (f.position_m - m[_M.COMMAND_ALIKE]) > 0.0
+            passed |= _TABLE_REVERSED if follows else _MOTOR_REVERSED
     motor, table = f.motor_m - m[_M.MOTOR_START], f.table_m - m[_M.TABLE_START]
-    if motor * table < 0.0 and min(abs(motor), abs(table)) > b.frozen_m + apart_m:
-        follows = motor * (f.position_m - m[_M.COMMAND_START]) > 0.0
-        passed |= _TABLE_REVERSED if follows else _MOTOR_REVERSED
     if abs(motor - table) > b.encoder_difference_m + apart_m:
         passed |= _ENCODER_DIFFERENCE
     return passed

@@ -7,6 +7,7 @@ Another protocol is a subclass of `Devices` and one line in `PROTOCOLS`.
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import cached_property
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -25,6 +26,7 @@ from hil.bench.bench_file import Bench
 from hil.bench.hardware import DriveMode, DriveSection
 from hil.errors import FieldError, HilError
 from hil.loop.simulated_bench import SimulatedNodes
+from hil.loop.stall import command_deadline_s, late_limit_s
 
 MODES = {
     DriveMode.CST: OperationMode.CYCLIC_SYNC_TORQUE,
@@ -58,6 +60,11 @@ class Devices:
             self.drive.set_up()
             if self.encoder is not None:
                 self.encoder.set_up()
+
+    @cached_property
+    def late_limit_s(self) -> float:
+        """Lateness of a tick at which the axis is stopped."""
+        return late_limit_s(self.bench)
 
     def bus_load(self) -> float:
         """Share of the bus's time used in each period; 0 where the protocol has no limit."""
@@ -112,8 +119,9 @@ class Rig(Devices):
                 raise
 
     def bus_load(self) -> float:
-        """Share of the bus's time that SYNC, RPDO, TPDO and encoder take, with the longest bit stuffing."""
-        frames = [0, 2 + _TARGET_BYTES[self.section.mode], 8]
+        """Share of the bus's time that SYNC, RPDO, TPDOs and encoder take, with the longest bit stuffing."""
+        target = _TARGET_BYTES[self.section.mode]
+        frames = [0, 2 + target, 8] + [target] * self.drive.info.reports_demand
         if isinstance(self.encoder, CanopenEncoder):
             frames.append(4)
         return sum(map(frame_bits, frames)) / (self.section.bitrate * self.bench.gains.period_s)
@@ -148,7 +156,8 @@ class Rig(Devices):
             node_id=section.node_id, mode=MODES[section.mode], period_s=self.bench.gains.period_s,
             eds=Path(section.eds) if section.eds else EDS_FOLDER / "servo_drive.eds",
             serial_number=section.serial_number, heartbeat_s=section.heartbeat_s,
-            missed_answers_allowed=section.missed_answers, rated_torque_n_m=section.rated_torque_n_m)  # fmt: skip
+            missed_answers_allowed=section.missed_answers, rated_torque_n_m=section.rated_torque_n_m,
+            command_deadline_s=command_deadline_s(self.bench), watch_setpoint=section.watch_setpoint)  # fmt: skip
 
     def _open_encoder(self) -> CanopenEncoder | SerialEncoder:
         connection, table = self.section.encoder, self.bench.encoders.table

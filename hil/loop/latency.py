@@ -17,7 +17,8 @@ import sys
 import tempfile
 import time
 from array import array
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -39,6 +40,11 @@ class Latencies:
     """How often each latency occurred, by its size [s]; larger ones than cyclictest resolves count as its largest."""
 
     counts: dict[float, int]
+
+    @classmethod
+    def of(cls, values_s: Iterable[float]) -> Latencies:
+        """Count latencies [s], rounded to 0.1 us."""
+        return cls(dict(Counter(round(float(value_s), 7) for value_s in values_s)))
 
     @property
     def total(self) -> int:
@@ -91,7 +97,7 @@ def measure(period_s: float, seconds: float, core: int | None = None) -> Series:
     sleeping, spinning = WallClock(period_s, 0.0), WallClock(period_s)
     done = 0
     late_s, woke_s = array("d", bytes(8 * ticks)), array("d", bytes(8 * ticks))  # a list would take memory per tick
-    with _cyclictest(period_s, seconds, core) as reference, real_time(core) as grants:
+    with cyclictest(period_s, seconds, core) as reference, real_time(core) as grants:
         # full seconds are the phase of cyclictest; the loop is half a period away
         start_s = math.ceil(time.perf_counter() + _LEAD_S) + 1.0 + 0.5 * period_s
         time.sleep(max(0.0, start_s - 2.0 * SPIN_S - time.perf_counter()))
@@ -108,7 +114,9 @@ def measure(period_s: float, seconds: float, core: int | None = None) -> Series:
             done += 1
         disturbances = Disturbances.now().since(before)
     found, why_not = reference()
-    return Series(period_s, _counted(late_s[:done]), _counted(woke_s[:done]), found, why_not, grants, disturbances)
+    return Series(
+        period_s, Latencies.of(late_s[:done]), Latencies.of(woke_s[:done]), found, why_not, grants, disturbances
+    )
 
 
 @contextmanager
@@ -124,7 +132,7 @@ def load() -> Iterator[int]:
             process.wait()
 
 
-class _Reference:
+class Cyclictest:
     """Result of a run of cyclictest, when it has ended."""
 
     def __init__(self, process: subprocess.Popen[str] | None, results: Path) -> None:
@@ -154,19 +162,19 @@ class _Reference:
 
 
 @contextmanager
-def _cyclictest(period_s: float, seconds: float, core: int) -> Iterator[_Reference]:
-    """Run cyclictest beside the block, if it is installed."""
+def cyclictest(period_s: float, seconds: float, core: int, priority: int = PRIORITY) -> Iterator[Cyclictest]:
+    """Run cyclictest beside the block, if it is installed; its result is known after the block."""
     program = shutil.which("cyclictest")
     with tempfile.TemporaryDirectory(prefix="hil-latency-") as folder:
         results = Path(folder) / "cyclictest.json"
         process = None
         if program is not None:
             process = subprocess.Popen(
-                [program, "--quiet", "--mlockall", f"--priority={PRIORITY}", f"--affinity={core}", "--secaligned",
+                [program, "--quiet", "--mlockall", f"--priority={priority}", f"--affinity={core}", "--secaligned",
                  f"--interval={round(1e6 * period_s)}", f"--loops={max(1, round(seconds / period_s))}",
                  f"--histogram={_HISTOGRAM_US}", f"--json={results}"],
                 stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)  # fmt: skip
-        reference = _Reference(process, results)
+        reference = Cyclictest(process, results)
         try:
             yield reference
             reference.finish()
@@ -179,11 +187,3 @@ def _cyclictest(period_s: float, seconds: float, core: int) -> Iterator[_Referen
 def _spin_until(time_s: float) -> None:
     while time.perf_counter() < time_s:
         pass
-
-
-def _counted(values_s: array[float]) -> Latencies:
-    counts: dict[float, int] = {}
-    for value_s in values_s:
-        rounded_s = round(value_s, 7)  # 0.1 us
-        counts[rounded_s] = counts.get(rounded_s, 0) + 1
-    return Latencies(counts)

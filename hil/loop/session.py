@@ -13,8 +13,6 @@ Every failure stops the drive as follows; the recording stays readable:
     following error, travel limit, loop too late, ctrl-C                -> STOP; a second time -> QUICK_STOP
     exception in the loop                                               -> QUICK_STOP unrecorded, then the exception
     stop command without answer                                         -> SYNC, heartbeat, RPDO withheld, NMT stop
-
-The same code runs on the wall clock and in virtual time.
 """
 
 import contextlib
@@ -28,6 +26,7 @@ from hil.errors import HilError, StillPowered
 from hil.loop.clock import SKIP_FROM, Clock, LatenessLog, next_due
 from hil.loop.cycle import Cycle, Samples
 from hil.loop.devices import Devices, driver_errors
+from hil.loop.stall import NO_STALL, Stall
 from hil.loop.stopping import LONGEST_STOP_S, plan_stop
 from hil.loop.supervision import Ending, find
 from hil.motion.pieces import MotionLimits
@@ -107,14 +106,17 @@ class Session:
         self._response_s = rig.section.response * gains.period_s
         self._skip_from_s = SKIP_FROM * gains.period_s
         self._from_table = gains.position_from_table
+        self._stall = NO_STALL  # the last time that ticks were left out
         self._now_s = 0.0  # of the tick: tick x period
         self._clock_tick = 0  # ticks since the clock was started; the rows count from the first after arming
-        self.skipped = 0  # ticks left out since the first row
+        self.skipped = 0  # ticks left out between the rows
+        self._left_out = 0  # ticks left out since the first row, also while the power is switched off
         self._stops_asked = 0
         self._switching_off = False
         self._phase = LoopPhase.RUN
         self._ending, self._reason = Ending.COMPLETE, "the profile is done"
         self._last_tick = len(trajectory) - 1  # row at which the phase ends
+        cycle.follow(trajectory)  # not when the axis is armed: a long one takes memory and time
         self.late = LatenessLog(len(trajectory) + self._ticks(_AROUND_S))
 
     def ask_stop(self) -> None:
@@ -152,7 +154,7 @@ class Session:
         if lateness_s > self._skip_from_s:
             self._clock_tick, lateness_s, skipped = next_due(self._clock, tick, self._period_s, lateness_s)
             tick = self._clock_tick
-            self.skipped += skipped
+            self._left_out += skipped
         start_s = tick * self._period_s
         self.late.add(lateness_s)
         self._master.sync(start_s)
@@ -197,27 +199,27 @@ class Session:
         """Run from tick 0, whose samples are given, to the end. Returns the number of recorded rows."""
         cycle, drive, clock, record = self._cycle, self._drive, self._clock, self._recorder.record
         step, row, exchange = cycle.step, cycle.row, self._exchange
-        cycle.follow(self._trajectory)
         late = self.late
         late.begin()
-        overrun_s = self._rig.section.overrun_s
+        late_limit_s = self._rig.late_limit_s
         tick, error_code, cycle_s, skipped = 0, 0, 0.0, 0
-        self.skipped = 0
+        self.skipped = self._left_out = 0
         if self._fast_forward is not None:
             tick, sample, seen = self._fast_forward.run(cycle, sample, seen, lambda: self._stops_asked > 0)
             late.begin(tick)
         while True:
             motor, torque = sample.motor_position_rad, sample.torque_n_m
-            if skipped != self.skipped:
-                cycle.skip(tick + skipped, tick + self.skipped - 1, motor)
-                skipped = self.skipped
+            if skipped != self._left_out:
+                cycle.skip(tick + skipped, tick + self._left_out - 1, motor)
+                self._stall = Stall(late.last_s, tick + self._left_out)
+                skipped = self.skipped = self._left_out
             setpoint, passed = step(tick, Samples(motor, seen.position_m, torque, sample.state, error_code,
                                                   late.last_s, cycle_s, sample.age_cycles, seen.age_cycles,
                                                   skipped))  # fmt: skip
             drive.command(self._now_s, setpoint)
             if tick:
                 record(row(tick - 1))
-            too_late = late.last_s > overrun_s
+            too_late = late.last_s > late_limit_s
             if sample.condition or seen.condition or passed or too_late or self._stops_asked or self._phase:
                 self._supervise(tick + skipped, sample, seen, passed)
                 error_code = drive.error_code
@@ -240,7 +242,8 @@ class Session:
                 self._last_tick = min(self._last_tick, tick + self._ticks(AFTERMATH_S))
             return
         stopping = self._phase is LoopPhase.STOP
-        findings = list(find(self._rig, seen, passed, self.late.last_s, self._stops_asked, stopping=stopping))
+        findings = list(find(self._rig, seen, passed, self.late.last_s, self._stops_asked, stopping=stopping,
+                             stall_s=self._stall.acts_s(tick, self._rig.bench.gains)))  # fmt: skip
         quick = any(finding.quick for finding in findings)
         if not findings or (stopping and not quick):  # a controlled stop goes on
             return
@@ -265,7 +268,7 @@ class Session:
         return plan_stop(state, self._limits, self._cycle.bounds, self._period_s)
 
     def _position_m(self, sample: DriveSample, seen: EncoderSample) -> float:
-        """Return the position of the axis from the encoder of the position loop."""
+        """Position of the axis from the encoder of the position loop."""
         return seen.position_m if self._from_table else self._ratio * sample.motor_position_rad
 
     def _power_off(self, goal: DriveGoal, ended: str, cause: BaseException | None = None) -> None:

@@ -45,6 +45,7 @@ class LoopSign(IntFlag):
     NONE = 0
     ASKED = 1  # by the user
     LATE = 2
+    STALLED = 4  # a short time ago: the axis did not get the set-points of the ticks left out
 
 
 class Rule(NamedTuple):
@@ -71,15 +72,23 @@ class StopCause(NamedTuple):
     rule: str
 
 
+# Bounds that an axis breaks to which set-points did not come; those that compare encoders are none
+AFTER_STALL = (Limit.FOLLOWING_ERROR | Limit.VELOCITY | Limit.TORQUE | Limit.STOPPING_DISTANCE | Limit.ACTING_TORQUE
+               | Limit.RESIDUAL_ENCODER | Limit.RESIDUAL_DRIVE | Limit.RESIDUAL_LOAD)  # fmt: skip
+
 _E, _R, _L, _C = Ending, Reaction, Limit, Condition
 _STALE = "missed_answers + 2"
 _BEAT = "heartbeat time-out + 1"
 
 RULES: tuple[Rule, ...] = (
     # first, because a late loop has the drive trip by its own watchdog
-    Rule("loop late", _E.OVERRUN, "lateness > overrun_s", _R.STOP, "1",
-         "the loop was {lateness_s:.3f} s late, allowed {overrun_s} s (drive.overrun_s): take load off the machine",
-         loop=LoopSign.LATE),
+    Rule("loop late", _E.OVERRUN, "lateness > overrun_s, or > deadline of the RPDO less two periods", _R.STOP, "1",
+         "the loop was {lateness_s:.3f} s late, allowed {late_limit_s:.3f} s (drive.overrun_s, "
+         "drive.command_deadline_s): take load off the machine", loop=LoopSign.LATE),
+    Rule("after a stall", _E.OVERRUN, "ticks were left out less than three time constants of the position loop ago, "
+         "and a bound that they can break is passed", _R.TWICE, "1",
+         "the axis did not follow because the loop had been {stall_s:.3f} s late: take load off the machine",
+         loop=LoopSign.STALLED),
     Rule("drive bus-off", _E.DRIVE_FAULT, "the controller left the bus", _R.QUICK_STOP, "1", "{text}",
          drive=_C.BUS_OFF),
     Rule("drive heartbeat lost", _E.DRIVE_FAULT, "no heartbeat of the drive", _R.QUICK_STOP, _BEAT, "{text}",
@@ -94,6 +103,8 @@ RULES: tuple[Rule, ...] = (
          drive=_C.DISABLED),
     Rule("drive unanswered", _E.DRIVE_FAULT, "does not follow its controlword", _R.QUICK_STOP, "1", "{text}",
          drive=_C.UNANSWERED),
+    Rule("drive set-point", _E.DRIVE_FAULT, "the set-point that acts (0x6074, 0x606B, 0x6062) is none of those of the "
+         "last missed_answers + 3 cycles", _R.QUICK_STOP, "missed_answers + 4", "{text}", drive=_C.OTHER_SETPOINT),
     Rule("drive stale", _E.DRIVE_FAULT, "SYNC or answers lost: more than missed_answers in a row", _R.QUICK_STOP,
          _STALE, "{text}", drive=_C.STALE),
     Rule("table encoder bus-off", _E.ENCODER_FAULT, "the controller left the bus", _R.BY_FEEDBACK, "1", "{text}",
@@ -115,15 +126,17 @@ RULES: tuple[Rule, ...] = (
     Rule("table encoder jump", _E.ENCODER_FAULT, "step > velocity bound x time + frozen_m", _R.BY_FEEDBACK, "1",
          "the table encoder jumped further than the axis can move: check encoder and cable", _L.TABLE_JUMP),
     Rule("motor encoder frozen", _E.ENCODER_FAULT,
-         "value repeats; table moved > frozen_m or torque command changed > frozen_torque", _R.QUICK_STOP, "1",
-         "the motor encoder is frozen, or the axis blocked: its value repeats while table or torque command change",
+         "value repeats; table moved > frozen_m or measured torque changed > frozen_torque (CST)", _R.QUICK_STOP, "1",
+         "the motor encoder is frozen, or the axis blocked: its value repeats while table or torque change",
          _L.MOTOR_FROZEN),
     Rule("table encoder frozen", _E.ENCODER_FAULT, "value repeats; motor moved > frozen_m", _R.BY_FEEDBACK, "1",
          "the table encoder is frozen: its value repeats while the motor moves", _L.TABLE_FROZEN),
-    Rule("motor encoder reversed", _E.ENCODER_FAULT, "against the table and the set-points by > frozen_m",
-         _R.QUICK_STOP, "1", "the motor encoder counts against the table encoder and the set-points: correct its "
+    Rule("motor encoder reversed", _E.ENCODER_FAULT, "against the table and the set-points by > "
+         "frozen_m, since they agreed", _R.QUICK_STOP, "1",
+         "the motor encoder counts against the table encoder and the set-points: correct its "
          "direction", _L.MOTOR_REVERSED),
-    Rule("table encoder reversed", _E.ENCODER_FAULT, "against the motor by > frozen_m", _R.BY_FEEDBACK, "1",
+    Rule("table encoder reversed", _E.ENCODER_FAULT, "against the motor by > frozen_m, since they agreed",
+         _R.BY_FEEDBACK, "1",
          "the table encoder counts against the motor encoder: correct encoders.table.direction", _L.TABLE_REVERSED),
     Rule("encoder difference", _E.ENCODER_FAULT, "motor and table differ by > encoder_difference_m", _R.BY_FEEDBACK,
          "1", "motor encoder and table encoder differ by more than the transmission allows "
@@ -160,14 +173,24 @@ _ENCODER_LOST = Condition(sum(rule.encoder for rule in RULES))
 
 
 def find(
-    rig: Devices, seen: EncoderSample, passed: int, lateness_s: float, stops_asked: int, *, stopping: bool
+    rig: Devices,
+    seen: EncoderSample,
+    passed: int,
+    lateness_s: float,
+    stops_asked: int,
+    *,
+    stopping: bool,
+    stall_s: float = 0.0,
 ) -> Iterator[StopCause]:
-    """Yield the faults, the gravest first. passed: the `Limit`s; lateness_s of the tick; stopping: under control."""
+    """Yield the faults, the gravest first. passed: the `Limit`s; lateness_s of the tick; stopping: under control;
+    stall_s: lateness for which ticks were left out a short time ago."""
     section, tripped = rig.section, rig.drive.tripped
     lost = seen.condition & _ENCODER_LOST if rig.encoder is not None else Condition.OK
     loop = LoopSign.ASKED if stops_asked else LoopSign.NONE
-    if lateness_s > section.overrun_s:
+    if lateness_s > rig.late_limit_s:
         loop |= LoopSign.LATE
+    if stall_s and passed & AFTER_STALL:
+        loop |= LoopSign.STALLED
     for rule in RULES:
         if not (rule.limit & passed or rule.drive & tripped or rule.encoder & lost or rule.loop & loop):
             continue
@@ -177,9 +200,9 @@ def find(
         elif rule.encoder and rig.encoder is not None:
             text = _text(rig.encoder.check)
         reason = rule.reason.format(
-            text=text, lateness_s=lateness_s, overrun_s=section.overrun_s, travel_m=section.travel_m,
+            text=text, lateness_s=lateness_s, late_limit_s=rig.late_limit_s, stall_s=stall_s, travel_m=section.travel_m,
             following_error_m=section.following_error_m)  # fmt: skip
-        again = stops_asked > 1 if rule.loop else stopping
+        again = stops_asked > 1 if rule.loop & LoopSign.ASKED else stopping
         quick = {
             Reaction.STOP: False,
             Reaction.QUICK_STOP: True,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -10,9 +11,11 @@ from drivers.canopen_drive import CanopenDrive, DriveSettings
 from drivers.canopen_encoder import CanopenEncoder, EncoderSettings
 from drivers.canopen_master import CanopenMaster
 from drivers.inprocess import InProcessBus
-from drivers.port import DriveGoal, DriveSample, ServoLike
+from drivers.modelled_bus import ModelledBus
+from drivers.port import Condition, DriveGoal, DriveSample, ServoLike
 from drivers.sim.drive_node import SimulatedDrive
 from drivers.sim.encoder_node import SimulatedEncoder
+from drivers.sim.servo import DriveServo, Servo
 
 
 @dataclass
@@ -92,3 +95,22 @@ def in_process(**options: Any) -> Rig:
     """A rig on a bus within the process."""
     bus = InProcessBus()
     return Rig(bus.port(), bus.port(), **options)
+
+
+def servo() -> DriveServo:
+    """Loops inside the drive."""
+    return DriveServo(
+        Servo(velocity_gain_n_m_s_rad=1.0, velocity_integral_time_s=0.02, position_every=1), 0.01 / (2 * math.pi)
+    )
+
+
+def running(**options: Any) -> tuple[ModelledBus, Rig]:
+    """Enabled and turning at about 10 rad/s."""
+    bus = ModelledBus(1_000_000)
+    rig = Rig(bus.port(), bus.port(), reply_s=0.0006, servo=servo(), **options)
+    rig.set_up()
+    rig.enable()
+    for _ in range(50):
+        rig.cycle(2.0)
+    assert rig.cycle(0.0).condition is Condition.OK
+    return bus, rig

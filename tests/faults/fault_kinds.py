@@ -7,6 +7,7 @@ the time until the move can pass it is added (`MOVING_CYCLES`). None: nothing ha
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -14,6 +15,7 @@ from typing import Any
 from observed_run import Handles
 
 from drivers.bus import BusState
+from drivers.cia402 import DriveState
 from drivers.modelled_bus import Fault, FaultKind
 from drivers.port import BusError
 from hil.errors import HilError
@@ -27,6 +29,8 @@ DEADLINE_CYCLES = 50 + 16 + 1  # of the RPDO in the drive, or the smoothing of t
 MOVING_CYCLES = 160  # the whole move: an encoder that deviates is seen once the axis has moved by its bound
 COMPLETE = "complete"
 DRIVE, ENCODER, HIL = "drive fault", "encoder fault", "HilError"
+SETTLING_CYCLES = 40 + 82 + 2  # a stall that passes, three time constants of the position loop
+SETPOINT_CYCLES = 3 + 4  # missed_answers + 4
 FOLLOWING, LATE, ASKED, NAN = "following error", "loop too late", "interrupted", "not a number"
 MEASURED = frozenset({ENCODER, FOLLOWING, "velocity", "torque", DRIVE, "travel limit"})
 
@@ -44,6 +48,7 @@ class Kind:
     cycles: int | None = None
     hears: bool = True
     coasts: bool = False  # power goes off at once: friction alone stops the axis
+    stalls: bool = False  # the loop does nothing for a time: the way counts from the fault
 
 
 def _bus(kind: FaultKind, can_id: int, count: Callable[[Handles], int], **more: Any) -> Callable[[Handles], None]:
@@ -176,6 +181,49 @@ def _recorder(h: Handles) -> None:
     h.rows.fail = HilError("the recorder process ended")
 
 
+def _wall_clock(h: Handles) -> None:
+    """CLOCK_REALTIME steps by up to a year and back again and again, for all that reads it in Python."""
+    names = ("time", "time_ns", "clock_gettime", "clock_gettime_ns")
+    kept = {name: getattr(time, name) for name in names}
+    steps = {"s": 0.0}
+
+    def stepped(name: str) -> Callable[..., Any]:
+        read, unit = kept[name], 1e9 if name.endswith("_ns") else 1.0
+
+        def now(*clock: int) -> Any:
+            shift = steps["s"] if not clock or clock[0] == time.CLOCK_REALTIME else 0.0
+            return read(*clock) + type(read(*clock))(unit * shift)
+
+        return now
+
+    h.each.append(lambda: steps.update(s=h.rng.choice((-1.0, 1.0)) * 10.0 ** h.rng.uniform(-3.0, 7.5)))
+    for name in names:
+        setattr(time, name, stepped(name))
+    h.undo.append(lambda: [setattr(time, name, kept[name]) for name in names] and None)
+
+
+def _other_setpoint(h: Handles) -> None:
+    """An offset left in the drive (0x60B2, 0x60B1, 0x60B0) adds half the rated torque, 3 rev/s or a fifth of a turn."""
+    drive, sign = h.drive, h.rng.choice((-1, 1))
+    turn = drive._counts_per_rev
+
+    received = drive.process_rpdo
+
+    def shift(now_s: float) -> None:
+        received(now_s)
+        if drive.state is not DriveState.OPERATION_ENABLED:
+            return
+        if drive._direct:
+            drive.values[0x6074_00] = drive.values[0x6071_00] + sign * 500
+            drive._torque_n_m = drive.values[0x6074_00] * drive._n_m_per_mille
+        else:
+            drive.values[0x60FF_00] += sign * 3 * turn
+            drive.values[0x607A_00] += sign * turn // 5
+
+    drive.pdo._received = shift
+    drive.pdo.configure(operational=drive.nmt_state == 5)
+
+
 def _interrupt(h: Handles) -> None:
     h.session.ask_stop()
 
@@ -206,11 +254,11 @@ KINDS: tuple[Kind, ...] = (
       (("RPDO", RPDO), ("TPDO of the drive", DRIVE_TPDO), ("TPDO of the encoder", ENCODER_TPDO))),
     *(Kind(f"{name} reordered", _reordered(i), _PASSES) for name, i in
       (("RPDO", RPDO), ("TPDO of the drive", DRIVE_TPDO), ("TPDO of the encoder", ENCODER_TPDO))),
-    Kind("RPDO corrupted", _corrupt(RPDO, 4), MEASURED | _PASSES, coasts=True),
-    Kind("TPDO of the drive corrupted", _corrupt(DRIVE_TPDO, 8), MEASURED | _PASSES),
-    Kind("TPDO of the encoder corrupted", _corrupt(ENCODER_TPDO, 4), MEASURED | _PASSES),
+    Kind("RPDO corrupted", _corrupt(RPDO, 4), MEASURED | _PASSES, 3 + SETPOINT_CYCLES, coasts=True),
+    Kind("TPDO of the drive corrupted", _corrupt(DRIVE_TPDO, 8), MEASURED | _PASSES, 3 + 2),
+    Kind("TPDO of the encoder corrupted", _corrupt(ENCODER_TPDO, 4), MEASURED | _PASSES, 3 + 2),
     Kind("RPDO cut", _bus(FaultKind.TRUNCATE, RPDO, _few), _D, 3),
-    Kind("ENOBUFS, 1 to 6 frames", _no_buffer, _ends(COMPLETE, DRIVE)),
+    Kind("ENOBUFS, 1 to 6 frames", _no_buffer, _ends(COMPLETE, DRIVE), 6 + STALE_CYCLES),
     Kind("receive exception", _receive, _ends(HIL), 1),
     Kind("bus passive", _passive, _PASSES),
     Kind("bus-off", _bus(FaultKind.BUS_OFF, SYNC, _few), _D, 1, False),
@@ -232,8 +280,10 @@ KINDS: tuple[Kind, ...] = (
       (("motor", "drive"), ("table", "encoder"))),
     *(Kind(f"{name} encoder gives NaN or infinity", _sensor(d, _nan), _ends(NAN), 2) for name, d in
       (("motor", "drive"), ("table", "encoder"))),
-    Kind("cycle late, 1 to 40 ms", _late_cycle(0.001, 0.04), _ends(COMPLETE, DRIVE)),
-    Kind("cycle late, 51 to 300 ms", _late_cycle(0.051, 0.3), _ends(LATE), 2, coasts=True),
+    Kind("cycle late, 1 to 40 ms", _late_cycle(0.001, 0.04), _ends(COMPLETE, LATE), SETTLING_CYCLES, stalls=True),
+    Kind("cycle late, 51 to 300 ms", _late_cycle(0.051, 0.3), _ends(LATE), 2, stalls=True),
+    Kind("wall clock steps", _wall_clock, _PASSES),
+    Kind("another set-point acts", _other_setpoint, _D, SETPOINT_CYCLES),
     Kind("recorder dead", _recorder, _ends(HIL), 2),
     Kind("stop asked", _interrupt, _ends(ASKED), 2),
 )  # fmt: skip

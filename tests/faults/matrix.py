@@ -22,7 +22,8 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 sys.path.insert(0, str(Path(__file__).parent))
 
 from fault_kinds import COMPLETE, DRIVE, KINDS, Kind
-from observed_run import ACCELERATION_M_S2, JERK_M_S3, SPEED_M_S, Observed, Stage, bench_with, observe
+from observed_run import END_M, Observed, Stage, bench_with, observe
+from reach import stopping_m
 from set_up_faults import SET_UP, run_set_up
 
 from drivers.cia402 import DriveState
@@ -36,11 +37,7 @@ STATES = (
 )  # fmt: skip
 ARMING = (DriveState.SWITCH_ON_DISABLED, DriveState.READY_TO_SWITCH_ON, DriveState.SWITCHED_ON)
 MODES = (("cst", "motor"), ("cst", "table"), ("csv", "motor"), ("csv", "table"), ("csp", "motor"))
-RAMP_M_S2 = 160 * 0.01  # 0x6085 of the simulated drive, 160 rev/s^2, on a lead of 10 mm
-WATCHDOG_S = 0.1  # heartbeat time-out of 60 ms, the heartbeat before it, and an answer
 REST_M_S = 1e-3
-ALONE_M_S2 = 1.0  # friction of the axis without power, and the deceleration of a stop that has begun
-PEAK_M_S = 0.2  # what a false position may make of SPEED_M_S until it is detected
 
 
 class Run(NamedTuple):
@@ -101,23 +98,19 @@ def verdict(kind: Kind, state: DriveState, seen: Observed) -> list[str]:
     detected = seen.detected
     if seen.ended not in kind.endings:
         wrong.append(f"ended by {seen.ended}, allowed {', '.join(sorted(kind.endings))}")
-    if kind.cycles is not None and COMPLETE not in kind.endings:
+    if kind.cycles is not None and seen.ended != COMPLETE:
         took = len(seen.ticks) - seen.injected if detected is None else detected - seen.injected
         if took > kind.cycles + 1:  # the tick that was due is looked at before its samples are
             wrong.append(f"detected after {took} cycles, allowed {kind.cycles + 1}")
+    assert seen.rig is not None
     if seen.ended != COMPLETE:
-        allowed_m = stopping_m(kind)
-        if seen.travel_m > allowed_m:
-            wrong.append(f"travelled {1e3 * seen.travel_m:.1f} mm, allowed {1e3 * allowed_m:.1f} mm")
+        allowed_m = stopping_m(kind, seen.rig, seen)
+        travel_m = seen.travel_from_fault_m if kind.stalls else seen.travel_m
+        if travel_m > allowed_m:
+            wrong.append(f"travelled {1e3 * travel_m:.1f} mm, allowed {1e3 * allowed_m:.1f} mm")
+    elif abs(seen.end_m - END_M) > seen.rig.section.following_error_m:
+        wrong.append(f"complete, but at rest {1e3 * abs(seen.end_m - END_M):.1f} mm from the end of the move")
     return wrong
-
-
-def stopping_m(kind: Kind) -> float:
-    """Longest way from detection to rest: the ramp, and the way until it begins where no command is heard."""
-    speed_m_s = PEAK_M_S if "encoder" in kind.name or "corrupted" in kind.name else 1.05 * SPEED_M_S
-    deceleration = min(RAMP_M_S2, ACCELERATION_M_S2, ALONE_M_S2 if kind.coasts else RAMP_M_S2)
-    begins_s = (0.01 if kind.hears else WATCHDOG_S) + 2.0 * ACCELERATION_M_S2 / JERK_M_S3
-    return speed_m_s * begins_s + speed_m_s**2 / (2.0 * deceleration) + 0.002
 
 
 def _commands(seen: Observed) -> list[str]:

@@ -22,13 +22,14 @@ from hil.motion.trajectory import plan
 
 PERIOD_S = 1e-3
 SPEED_M_S, ACCELERATION_M_S2, JERK_M_S3 = 0.1, 2.2, 100.0
+END_M = 0.02  # of the move
 MOVE = Profile.model_validate(
     {
         "schema_version": 1,
         "limits": {"velocity_m_s": 0.6, "acceleration_m_s2": ACCELERATION_M_S2, "jerk_m_s3": JERK_M_S3},
         "segments": [
             {"kind": "dwell", "duration_s": 0.02},
-            {"kind": "sine_squared", "to_m": 0.02, "feed_m_s": SPEED_M_S},
+            {"kind": "sine_squared", "to_m": END_M, "feed_m_s": SPEED_M_S},
             {"kind": "dwell", "duration_s": 0.05},
         ],
     }
@@ -37,8 +38,9 @@ LONGEST_TICKS = 6000  # of the clock: no run needs more
 
 
 def bench_with(**changes: dict[str, Any]) -> Bench:
-    """The reference bench with other values in its sections."""
+    """The reference bench with the default deadline of the drive and other values in its sections."""
     data = load_simulated("reference").model_dump()
+    data["drive"]["command_deadline_s"] = None
     for section, values in changes.items():
         data[section] |= values
     return Bench.model_validate(data)
@@ -56,6 +58,7 @@ class Tick:
     table_m: float  # of the plant itself
     motor_m: float
     motion_commands: int
+    held_torque_n_m: float  # command in force in the drive, CST
 
 
 @dataclass
@@ -70,6 +73,8 @@ class Observed:
     powered_at_end: bool = False
     speed_at_end_m_s: float = 0.0
     travel_m: float = 0.0  # after detection, or after injection where nothing is detected
+    travel_from_fault_m: float = 0.0
+    end_m: float = 0.0  # where the table rests
     rig: Rig | None = None
 
     @property
@@ -151,10 +156,11 @@ class Handles:
     bus: ModelledBus
     rig: Rig
     session: Session
-    rows: _Rows
+    rows: Any  # the recorder
     tick: int
     late_s: dict[int, float] = field(default_factory=dict)
     each: list[Callable[[], None]] = field(default_factory=list)  # called at every tick from now on
+    undo: list[Callable[[], None]] = field(default_factory=list)  # called after the run
 
     @property
     def drive(self) -> Any:
@@ -162,11 +168,19 @@ class Handles:
         return self.rig.nodes.drive
 
 
-def observe(bench: Bench, stage: Stage, fault: Callable[[Handles], None], rng: random.Random) -> Observed:
-    """Run MOVE on the bench with a fault; return what happened, whatever it ended with."""
+def observe(
+    bench: Bench,
+    stage: Stage,
+    fault: Callable[[Handles], None],
+    rng: random.Random,
+    make_rows: Callable[[tuple[str, ...]], Any] = lambda channels: _Rows(),
+) -> Observed:
+    """Run MOVE on the bench with a fault; return what happened, whatever it ended with. make_rows: channels ->
+    recorder."""
     bus, seen = ModelledBus(), Observed()
     rig = seen.rig = Rig(bench, bus=bus)
     commands = [0]
+    handles: list[Handles] = []
 
     def on_rpdo(can_id: int, data: bytes, now_s: float) -> None:
         commands[0] += len(data) >= 2 and data[0] & ENABLE_OPERATION == ENABLE_OPERATION
@@ -182,10 +196,9 @@ def observe(bench: Bench, stage: Stage, fault: Callable[[Handles], None], rng: r
         rig.drive._send = counted
         limits = MOVE.motion_limits
         cycle = make_cycle(rig, rig.drive.read(0.0).motor_position_rad, limits)
-        clock, rows = _Clock(), _Rows()
+        clock, rows = _Clock(), make_rows(cycle.channels)
         session = Session(rig, cycle, plan(MOVE, PERIOD_S, 0.0), limits, clock, rows)
         ratio = bench.gains.ratio_m_rad
-        handles: list[Handles] = []
 
         def look(tick: int) -> float:
             if tick > LONGEST_TICKS:
@@ -193,7 +206,8 @@ def observe(bench: Bench, stage: Stage, fault: Callable[[Handles], None], rng: r
             plant = rig.nodes.plant
             seen.ticks.append(
                 Tick(tick, rig.nodes.drive.state, session._phase, rig.drive.goal, rig.master.silent,
-                     plant.table_position_m, ratio * plant.motor_position_rad, commands[0])
+                     plant.table_position_m, ratio * plant.motor_position_rad, commands[0],
+                     rig.nodes.drive._torque_n_m)
             )  # fmt: skip
             commands[0] = 0
             if seen.injected is None and stage.due(tick, rig, session):
@@ -215,6 +229,8 @@ def observe(bench: Bench, stage: Stage, fault: Callable[[Handles], None], rng: r
             seen.error = error
         _settle(seen, rig)
     finally:
+        for undo in (undo for handle in handles for undo in handle.undo):
+            undo()
         rig.close()
     return seen
 
@@ -232,4 +248,6 @@ def _settle(seen: Observed, rig: Rig) -> None:
     for k in range(301, 351):
         drive.tick(end_s + 2 * k * PERIOD_S)
     seen.speed_at_end_m_s = abs(plant.table_position_m - before_m) / (100 * PERIOD_S)
-    seen.travel_m = abs(plant.table_position_m - start_m)
+    seen.travel_m, seen.end_m = abs(plant.table_position_m - start_m), plant.table_position_m
+    if seen.injected is not None:
+        seen.travel_from_fault_m = abs(plant.table_position_m - seen.ticks[seen.injected].table_m)

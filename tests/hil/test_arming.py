@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ from hil.errors import HilError
 from hil.loop.devices import Rig
 from hil.loop.run import run_profile
 from hil.loop.session import Session
+from hil.loop.stall import command_deadline_s
 from hil.loop.supervision import Ending
 
 RPDO, DRIVE_TPDO = 0x205, 0x185
@@ -139,7 +141,7 @@ def test_quick_stop_keeps_to_the_torque_limit(at: FaultyBench) -> None:
 def test_dead_man_times_and_stop_reactions_are_in_the_drive(at: FaultyBench) -> None:
     def events(rig: Rig, _: Session) -> dict[int, Callable[[], Any]]:
         number = rig.nodes.drive.dictionary.number
-        assert number(0x1400, 5) == 50
+        assert number(0x1400, 5) == math.floor(1e3 * command_deadline_s(bench_with()))
         assert number(0x1016, 1) == 1 << 16 | 60
         assert number(0x1017) == 20
         assert number(0x1006) == 1000

@@ -20,6 +20,7 @@ from processes import DEADLINE_S, wait_for
 from hil.loop.clock import LatenessLog
 from hil.loop.realtime import NotPunctual
 from hil.loop.run import run_profile
+from hil.loop.stall import late_limit_s
 from hil.recording.recording import Recording, read_recording
 
 PROFILE = Path(__file__).parents[2] / "profiles" / "friction_sweep.yaml"
@@ -37,7 +38,7 @@ def test_a_run_by_the_wall_clock_carries_the_certificate(tmp_path: Path) -> None
     assert found["clock"] == "wall"
     assert found["period_s"] == 0.001
     assert found["budget"] == {"jitter_p99_s": 0.0005, "bus_load": 0.7}
-    assert found["bus_load"] == pytest.approx(0.38, abs=0.01)  # SYNC 55, RPDO 95, TPDO 135, encoder 95 bits at 1 kHz
+    assert found["bus_load"] == pytest.approx(0.455, abs=0.01)  # SYNC 55, RPDO 95, TPDOs 135 and 75, encoder 95 bits
     assert {"kernel", "preempt_rt", "governor", "cores"} <= set(found["machine"])
     assert found["jitter_before_arming"]["ticks"] > 0
     run = found["run"]
@@ -113,7 +114,7 @@ def running(tmp_path: Path) -> Iterator[tuple[subprocess.Popen[bytes], int, Path
 
 def assert_stopped_under_control(path: Path) -> Recording:
     recording = read_recording(path)
-    if recording.metadata["real_time"]["run"]["max_s"] > 0.05:  # drive.overrun_s of the bench
+    if recording.metadata["real_time"]["run"]["max_s"] > late_limit_s(bench_with()):  # the loop was too late
         pytest.skip(f"this machine stood still: {recording.metadata['ended']}")
     assert recording.metadata["ended"] == "interrupted: stopped by the user"
     assert recording["segment"][-1] == -1

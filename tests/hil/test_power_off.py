@@ -57,13 +57,24 @@ def test_lost_set_points_stop_the_axis_within_deadline_and_ramp(at: FaultyBench,
 
 @pytest.mark.parametrize("mode", ["cst", "csv", "csp"])
 def test_without_a_deadline_in_the_drive_the_unanswered_quick_stop_cuts_it_off(at: FaultyBench, mode: str) -> None:
-    bench = bench_with(drive={"mode": mode, "eds": without_deadline(at.folder)})
+    bench = bench_with(drive={"mode": mode, "eds": without_deadline(at.folder), "watch_setpoint": False})
     ran = at.run(bench, lambda *_: {MOVING: lambda: at.lose(RPDO)})
     assert not ran.rig.drive.info.supervises_commands
     assert ran.rig.drive.tripped & Condition.UNANSWERED
     assert "did not follow its controlword" in ran.outcome.reason
     # torque is compared with its command at once, position with its set-point only once it is far away
     assert ran.outcome.ending is (Ending.DRIVE_FAULT if mode == "cst" else Ending.FOLLOWING_ERROR)
+    assert ran.rig.nodes.drive.state is DriveState.FAULT
+    assert at.speed_m_s() < 1e-4
+
+
+@pytest.mark.parametrize("mode", ["cst", "csv", "csp"])
+def test_a_drive_that_reports_its_demand_is_seen_to_get_no_set_points(at: FaultyBench, mode: str) -> None:
+    bench = bench_with(drive={"mode": mode, "eds": without_deadline(at.folder)})
+    ran = at.run(bench, lambda *_: {MOVING: lambda: at.lose(RPDO)})
+    assert ran.outcome.ending is Ending.DRIVE_FAULT
+    assert ran.rig.drive.tripped & Condition.OTHER_SETPOINT
+    assert "acts, commanded were" in ran.outcome.reason
     assert ran.rig.nodes.drive.state is DriveState.FAULT
     assert at.speed_m_s() < 1e-4
 

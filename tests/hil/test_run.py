@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from bench_runs import MOVE, bench_with
 from hil.bench.bench_file import Bench, shipped_benches
 from hil.errors import FieldError, HilError, InputError
 from hil.identification.friction import identify_friction
+from hil.loop.clock import WallClock
 from hil.loop.run import run_profile
 from hil.loop.simulated_bench import load_simulated
 from hil.loop.supervision import Ending
@@ -57,6 +59,23 @@ def test_wall_clock_gives_the_same_motion_and_a_jitter_certificate(tmp_path: Pat
     assert conditions["jitter_before_arming"]["ticks"] > 0
     assert "machine" in conditions
     assert (recording["cycle_s"] > 0.0).all()
+
+
+@pytest.mark.parametrize("drive", [{}, {"interface": "virtual", "channel": "threads", "missed_answers": 50}])
+def test_the_loop_has_the_only_thread_of_its_process(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, drive: dict[str, Any]
+) -> None:
+    """Bus, devices, recorder and command line start no Python thread that could take the interpreter from the loop."""
+    seen, wait = set[int](), WallClock.wait
+
+    def counted(self: WallClock, tick: int) -> float:
+        seen.add(threading.active_count())
+        return wait(self, tick)
+
+    before = threading.active_count()  # those of the test runner
+    monkeypatch.setattr(WallClock, "wait", counted)
+    run_profile(bench_with(drive=drive), MOVE, tmp_path, "run", force=True)
+    assert seen == {before}
 
 
 @pytest.mark.parametrize("interface", ["virtual", "udp_multicast"])

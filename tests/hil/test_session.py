@@ -76,6 +76,16 @@ def test_loops_inside_the_drive(tmp_path: Path, mode: str) -> None:
     assert abs(error[-1]) < 20e-6
 
 
+def test_the_set_points_are_in_memory_before_the_drive_is_armed(tmp_path: Path) -> None:
+    rows: list[int] = []
+
+    def script(rig: Rig, session: Session) -> dict:
+        return {1: lambda: rows.append(len(session._cycle.setpoints))}  # the drive is switched on at the fifth tick
+
+    run(tmp_path, script=script)
+    assert rows == [len(plan(MOVE, 1e-3, 0.0))]
+
+
 def test_seed_decides_the_recording(tmp_path: Path) -> None:
     first, again, other = (run(tmp_path, bench_with(simulation={"seed": seed})).recording for seed in (7, 7, 8))
     for name in first.columns:

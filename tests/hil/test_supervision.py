@@ -194,6 +194,19 @@ def test_a_stall_leaves_a_gap_and_no_burst(tmp_path: Path, stall_ticks: int) -> 
     assert np.abs(recording["table_position_m"] - recording["twin_table_position_m"]).max() < 1e-3
 
 
+def test_a_stall_after_the_last_row_leaves_no_gap(tmp_path: Path) -> None:
+    def ticks_of(folder: Path, script: Any = None) -> tuple[Ran, list[int]]:
+        sent: list[float] = []
+        bus = InProcessBus()
+        bus.port().listen(0x080, lambda can_id, data, now_s: sent.append(now_s))
+        return run(folder, bus=bus, script=script), [round(time_s / 1e-3) for time_s in sent]
+
+    last = ticks_of(tmp_path / "usual")[1][-1]
+    ran, ticks = ticks_of(tmp_path / "stalled", lambda *_: {last: lambda: 8e-3})
+    assert ticks[-1] >= last + 8
+    assert (ran.outcome.skipped, ran.outcome.ending) == (0, Ending.COMPLETE)
+
+
 def test_ticks_too_late_are_passed_to_the_next_one_in_time() -> None:
     class Stalled(VirtualClock):
         def wait(self, tick: int) -> float:

@@ -56,8 +56,9 @@ class Ran:
 
 
 def bench_with(**changes: dict[str, Any]) -> Bench:
-    """The reference bench with other values in its sections."""
+    """The reference bench with the default deadline of the drive and other values in its sections."""
     data = load_simulated("reference").model_dump()
+    data["drive"]["command_deadline_s"] = None
     for section, values in changes.items():
         data[section] |= values
     return Bench.model_validate(data)

@@ -18,7 +18,8 @@ from hil.recording.ring import Counter, Ring
 
 WATCH_S = 0.05  # how often the writer is looked at; its end is told by the kernel at once
 SILENT_S = 2.0  # without a sign of life the user is told; a disk that syncs for longer is in trouble
-HUNG_S = 10.0  # and the writer is replaced; a start of pyarrow on a loaded machine takes seconds, the ring lasts longer
+HUNG_S = 10.0  # and the writer is replaced; the ring lasts longer
+START_S = 30.0  # instead, before its first sign of life: importing pyarrow on a slow, loaded machine takes 20 s
 
 
 class Keeper:
@@ -46,7 +47,7 @@ class Keeper:
 
     def _watch(self, writer: subprocess.Popen[bytes]) -> str:
         """Wait for the end of a writer; kill it if it is stopped or hangs, and return which."""
-        fate, beat, beat_s = "", self._ring[Counter.BEAT], time.monotonic()
+        fate, beat, beat_s, limit_s = "", self._ring[Counter.BEAT], time.monotonic(), START_S
         while True:
             signal.sigtimedwait({signal.SIGCHLD}, WATCH_S)
             if end_if_stopped(writer):
@@ -55,9 +56,10 @@ class Keeper:
                 return fate
             ended = self._ring[Counter.END_BYTES] > 0  # then a Parquet file is made of it, which takes its time
             if self._ring[Counter.BEAT] != beat or ended:
+                limit_s = HUNG_S
                 beat, beat_s = self._ring[Counter.BEAT], time.monotonic()
             silent_s = time.monotonic() - beat_s
-            if silent_s > HUNG_S and not _waits_for_disk(writer.pid):
+            if silent_s > limit_s and not _waits_for_disk(writer.pid):
                 fate = "hung"
                 writer.kill()
             self._tell_trouble("the disk does not answer" if silent_s > SILENT_S else "")
@@ -79,6 +81,8 @@ class Keeper:
 
 def end_if_stopped(child: subprocess.Popen[bytes]) -> bool:
     """Kill a child that is stopped, as by SIGSTOP, and return True; set the return code of one that has ended."""
+    if child.returncode is not None:  # Popen.kill has seen its end: it looks before it sends the signal
+        return False
     pid, status = os.waitpid(child.pid, os.WNOHANG | os.WUNTRACED)
     if pid and os.WIFSTOPPED(status):
         child.kill()

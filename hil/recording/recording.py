@@ -146,7 +146,9 @@ def read_recording(path: str | Path) -> Recording:
             "import a foreign file with: hil import FILE --map MAP.yaml"
         )
     check_file(path, FORMATS, MOST_BYTES)
-    return readers[path.suffix.lower()](path)
+    recording = readers[path.suffix.lower()](path)
+    pa.default_memory_pool().release_unused()  # else it keeps what the table took: twice the recording
+    return recording
 
 
 def clock_metadata(rows: RegularRows) -> dict[str, Any]:

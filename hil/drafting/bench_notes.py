@@ -24,31 +24,13 @@ def told(
     notes, unsure = list[str](), list[str]()
     names, linear = recording.axis, recording.kind is AxisKind.LINEAR
     effort, noise_unit = ("force", "N") if linear else ("voltage", unit) if unit else ("torque", "N m")
-    over_position = "spring" if plant.spring else "gravity" if plant.gravity else ""
-    explained = f"inertia, friction and {over_position}" if over_position else "inertia and friction"
-    if not plant.inertia.significant:
-        unsure.append("the inertia is not identifiable from this motion: record moves with more acceleration")
-    if plant.left > MUCH_LEFT:
+    if names.torque in recording.columns:
+        _of_torque(recording, plant, effort, noise_unit, notes, unsure)
+    else:
         unsure.append(
-            f"{explained} leave {100 * plant.left:.2g} % of the {effort}: something else acts "
-            "(a flexible load, gravity, a late channel), and their values may be off by more than their errors"
+            "masses and friction are assumed: no torque is recorded; two encoders tell the transmission, and of masses "
+            "and stiffness their ratio"
         )
-    notes.append(f"{explained} leave {100 * plant.left:.2g} % of the {effort} (share of its standard deviation)")
-    sure = "" if plant.offset.significant else ", not distinguishable from 0"
-    notes.append(
-        f"constant {effort} {plant.offset.value:.3g} {noise_unit} +-{plant.offset.std_error:.2g}{sure}: a load, or "
-        "friction that differs by direction"
-    )
-    if plant.gravity is not None:
-        sure = "" if plant.gravity.significant else ", not distinguishable from 0"
-        size = f"{plant.gravity.value:.3g} {noise_unit} +-{plant.gravity.std_error:.2g}"
-        notes.append(f"{effort} over the angle (gravity) {size} at the load{sure}")
-        if plant.gravity.significant:
-            unsure.append("the load follows the sine of its angle, as gravity does; see mechanisms")
-    if plant.spring is not None:
-        rate = f"{plant.spring.value:.3g} {'N/m' if linear else 'N m/rad'} +-{plant.spring.std_error:.2g} at the motor"
-        notes.append(f"{effort} over the position (a spring) {rate}, not in the bench: hil diagnose names it")
-    notes.append(f"noise of {names.torque}: {noise_of(recording, names.torque):.3g} {noise_unit} rms")
     notes.append(
         f"noise of {names.motor_position}: {noise_of(recording, names.motor_position):.3g} "
         f"{'m' if linear else 'rad'} rms"
@@ -87,3 +69,35 @@ def told(
         f"+-{feeds.offset_std_error:.2g}"
     )
     return notes, unsure
+
+
+def _of_torque(
+    recording: Recording, plant: PlantValues, effort: str, noise_unit: str, notes: list[str], unsure: list[str]
+) -> None:
+    """Add what the torque tells beside inertia and friction."""
+    names, linear = recording.axis, recording.kind is AxisKind.LINEAR
+    over_position = "spring" if plant.spring else "gravity" if plant.gravity else ""
+    explained = f"inertia, friction and {over_position}" if over_position else "inertia and friction"
+    if not plant.inertia.significant:
+        unsure.append("the inertia is not identifiable from this motion: record moves with more acceleration")
+    if plant.left > MUCH_LEFT:
+        unsure.append(
+            f"{explained} leave {100 * plant.left:.2g} % of the {effort}: something else acts "
+            "(a flexible load, gravity, a late channel), and their values may be off by more than their errors"
+        )
+    notes.append(f"{explained} leave {100 * plant.left:.2g} % of the {effort} (share of its standard deviation)")
+    sure = "" if plant.offset.significant else ", not distinguishable from 0"
+    notes.append(
+        f"constant {effort} {plant.offset.value:.3g} {noise_unit} +-{plant.offset.std_error:.2g}{sure}: a load, or "
+        "friction that differs by direction"
+    )
+    if plant.gravity is not None:
+        sure = "" if plant.gravity.significant else ", not distinguishable from 0"
+        size = f"{plant.gravity.value:.3g} {noise_unit} +-{plant.gravity.std_error:.2g}"
+        notes.append(f"{effort} over the angle (gravity) {size} at the load{sure}")
+        if plant.gravity.significant:
+            unsure.append("the load follows the sine of its angle, as gravity does; see mechanisms")
+    if plant.spring is not None:
+        rate = f"{plant.spring.value:.3g} {'N/m' if linear else 'N m/rad'} +-{plant.spring.std_error:.2g} at the motor"
+        notes.append(f"{effort} over the position (a spring) {rate}, not in the bench: hil diagnose names it")
+    notes.append(f"noise of {names.torque}: {noise_of(recording, names.torque):.3g} {noise_unit} rms")

@@ -58,6 +58,8 @@ _TORQUE_UNIT = {
 }
 _SHORT_UNIT = {"i": "A", "iq": "A", "cur": "A", "curr": "A", "amp": "A", "iqs": "A", "isq": "A", "u": "V"}
 LEAST_WITHIN = 4  # letters of a word that is looked for within a token: shorter ones occur in others by chance
+_WHOLE = ("twin", "mode", "flag")  # whole tokens all the same: istwinkel
+_PREFIXES = ("ist", "act", "ref", "cmd", "set")
 
 
 @dataclass(frozen=True)
@@ -124,14 +126,19 @@ def _tokens(name: str) -> list[str]:
 
 
 def _split_suffix(token: str) -> list[str]:
-    """xsoll -> x, soll; vist -> v, ist."""
+    """xsoll -> x, soll; vist -> v, ist; istwinkel -> ist, winkel."""
     for ending in ("sollwert", "istwert", "soll", "ist", "ref", "cmd", "act", "set"):
         if token.endswith(ending) and 0 < len(token) - len(ending) <= 3:
             return [token[: -len(ending)], ending]
+    for prefix in _PREFIXES:
+        rest = token.removeprefix(prefix)
+        if rest != token and any(_any([rest], known) for known in _QUANTITIES.values()):
+            return [prefix, rest]
     return [token]
 
 
 def _any(words: list[str], known: str) -> bool:
     return any(
-        one in words or (len(one) >= LEAST_WITHIN and any(one in word for word in words)) for one in known.split()
+        one in words or (len(one) >= LEAST_WITHIN and one not in _WHOLE and any(one in word for word in words))
+        for one in known.split()
     )

@@ -41,7 +41,9 @@ def find_dialect(path: Path) -> CsvDialect:
         # lines such as "SampleTime;1;SampleTime;1" are half numbers
         first = next(i for i in range(first, len(lines)) if _starts_with_number(lines[i], delimiter, point))
         given |= {"skip_lines": first, "column_names": paired}
-        return CsvDialect(CsvOptions.model_validate(given), paired, ("",) * width, comments)
+        return CsvDialect(
+            CsvOptions.model_validate(given), paired, _paired_units(lines[:first], delimiter, width), comments
+        )
     unit_row: tuple[str, ...] = ()
     header = None
     for index in reversed(above[-4:]):
@@ -83,6 +85,15 @@ def _paired_names(above: list[str], delimiter: str, width: int) -> tuple[str, ..
         if len(fields) == width > 2 and width % 2 == 0 and {one.lower() for one in fields[::2]} == {"name"}:
             return tuple(name for index, channel in enumerate(fields[1::2], 1) for name in (f"time{index}", channel))
     return ()
+
+
+def _paired_units(above: list[str], delimiter: str, width: int) -> tuple[str, ...]:
+    """Units of such a file, from a line "Unit;mm;Unit;N m"; empty for each column without one."""
+    for line in above:
+        fields = _fields(line, delimiter)
+        if len(fields) == width and {one.lower() for one in fields[::2]} <= {"unit", "units", "einheit"}:
+            return tuple(text for unit in fields[1::2] for text in ("", unit))
+    return ("",) * width
 
 
 def number_of(text: str, decimal_point: str) -> float:

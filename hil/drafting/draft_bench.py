@@ -4,6 +4,7 @@ from dataclasses import dataclass, field, replace
 from math import hypot, log2, pi, sqrt
 
 from hil.channels import AxisKind
+from hil.drafting.assumed_plant import plant_or_assumed
 from hil.drafting.bench_notes import told
 from hil.drafting.estimate import BenchValue, Estimate
 from hil.drafting.loop_values import loop_values
@@ -26,6 +27,7 @@ DIRECT = 0.02  # deviation from equal angles of motor and load up to which there
 # Least deflection over acceleration that is written: a mode at 5 kHz, beyond any control loop.
 _STIFFEST_S2 = (2.0 * pi * 5e3) ** -2
 _WHOLE = 1e-4  # deviation from a whole gear ratio that is none: play between the encoders biases the measured one by it
+_SURE_TURNS = 0.05  # standard error of a ratio below which the next whole number is seldom near by chance
 _STEPS_PER_NOISE = sqrt(12.0)  # a count of q has noise of q / sqrt(12)
 
 
@@ -49,7 +51,8 @@ class BenchDraft:
 def draft_bench(recording: Recording) -> BenchDraft:
     """Draft the bench of the axis of a recording; with gaps in time, from its longest part that tells enough.
 
-    Raises InputError if masses and friction cannot be told: no torque, one direction, too short, a wrong sign.
+    Raises InputError if masses and friction cannot be told: neither torque nor a second encoder, one direction, too
+    short, a wrong sign.
     """
     recording = with_position(recording)
     parts = sorted(recording.parts(), key=len, reverse=True)
@@ -76,7 +79,10 @@ def draft_bench(recording: Recording) -> BenchDraft:
         ratio = lead.value / (2.0 * pi)
         deflection = None if transmission is None else _deflection_s2(transmission)
         turns = recording.metadata.get("lead_m") == ROTARY_LEAD_M or lead.value > LONGEST_LEAD_M
-        plant = plant_values(recording, ratio if turns else None)
+        plant = plant_or_assumed(recording, transmission, ratio if turns else None)
+        if plant.gravity_angle is not None and transmission is not None:  # it bends what the ratio is measured over
+            transmission = transmission_values(recording, plant.gravity_angle.value)
+            lead = _lead(recording, transmission)
         stiff = deflection is None or not deflection.significant
         volts = turns and stiff and _in_volts(recording) and plant.viscous.significant
         model = {(True, True): "rotary_two_mass", (True, False): "rotary", (False, True): "two_mass"}.get(
@@ -87,7 +93,7 @@ def draft_bench(recording: Recording) -> BenchDraft:
             draft.model = "dc_motor"
             _dc_motor(draft, plant, lead)
         elif turns:
-            _turning(draft, plant, deflection, lead)
+            _turning(draft, plant, transmission, lead)
         else:
             _screw(draft, plant, deflection, lead)
     draft.control, draft.control_why = loop_values(recording, ratio)
@@ -191,7 +197,8 @@ def _weight(draft: BenchDraft, plant: PlantValues) -> None:
         ]
 
 
-def _turning(draft: BenchDraft, plant: PlantValues, deflection: Estimate | None, lead: Estimate) -> None:
+def _turning(draft: BenchDraft, plant: PlantValues, transmission: TransmissionValues | None, lead: Estimate) -> None:
+    deflection = None if transmission is None else _deflection_s2(transmission)
     gear = _gear(Estimate(ROTARY_LEAD_M / lead.value, ROTARY_LEAD_M / lead.value**2 * lead.std_error, lead.how))
     draft.axis.append(_value("gear_ratio", gear, "motor per load"))
     if deflection is None:
@@ -202,7 +209,7 @@ def _turning(draft: BenchDraft, plant: PlantValues, deflection: Estimate | None,
         draft.axis += [
             _value("motor_inertia_kg_m2", motor, "kg m^2 at the motor", "half of the sum: the split is not told"),
             _value("load_inertia_kg_m2", load, "kg m^2 at the load", "the other half"),
-            _value("stiffness_n_m_rad", _stiffness(load, deflection), "N m/rad"),
+            _value("stiffness_n_m_rad", _sagging(plant, transmission) or _stiffness(load, deflection), "N m/rad"),
         ]
         draft.unsure.append(
             "motor_inertia_kg_m2, load_inertia_kg_m2, stiffness_n_m_rad: told are the sum of the inertias at the "
@@ -219,7 +226,9 @@ def _guess(half: Estimate) -> Estimate:
 def _gear(measured: Estimate) -> Estimate:
     """The whole number of turns that a measured ratio is very near to, else the ratio."""
     whole = float(round(measured.value))
-    if whole < 1.0 or measured.value == whole or abs(measured.value / whole - 1.0) > _WHOLE:
+    apart = abs(measured.value - whole)
+    near = apart < _WHOLE * whole or (apart < 2.0 * measured.std_error and measured.std_error < _SURE_TURNS)
+    if whole < 1.0 or not apart or not near:
         return measured
     return replace(measured, value=whole, how=f"{measured.how} ({measured.value:.7g} measured)")
 
@@ -234,6 +243,16 @@ def _rotary_friction(draft: BenchDraft, plant: PlantValues) -> None:
 def _stiffness(mass: Estimate, deflection: Estimate) -> Estimate:
     stiffness = mass.value / deflection.value
     return Estimate(stiffness, stiffness * deflection.std_error / deflection.value, deflection.how)
+
+
+def _sagging(plant: PlantValues, transmission: TransmissionValues | None) -> Estimate | None:
+    """Stiffness from the deflection under gravity [N m/rad]; None where one of the two is not told."""
+    weight, sag = plant.gravity, transmission.sag_m if transmission else None
+    if weight is None or sag is None or not (weight.significant and sag.significant):
+        return None
+    error = hypot(weight.std_error / weight.value, sag.std_error / sag.value)
+    stiffness = weight.value / sag.value
+    return Estimate(stiffness, error * stiffness, "deflection under gravity")
 
 
 def _error(estimate: Estimate) -> str:

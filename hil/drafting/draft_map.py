@@ -1,6 +1,5 @@
 """Draft the map of a foreign file: its clock, and unit, sign and scale of each channel with how it was found."""
 
-import re
 from math import pi
 from pathlib import Path
 
@@ -11,22 +10,33 @@ from hil.channels import AXIS_CHANNELS, AxisKind
 from hil.drafting.clock import find_clock
 from hil.drafting.column_names import Label, label
 from hil.drafting.effort import effort_entry
+from hil.drafting.encoder_counts import CountSize, assumed, from_length, from_speed
 from hil.drafting.even_rows import even_rows, filled_in, find_wraps, with_rate, without_duplicates
 from hil.drafting.foreign_table import read_table
 from hil.drafting.map_draft import DraftedChannel, MapDraft
 from hil.drafting.oddities import refuse_damage, refuse_missing
 from hil.drafting.relations import MotionColumns, derivative_of, driven, lateness_s, motion, proportional
 from hil.drafting.roles import SAME_POSITION, Roles, find_roles
-from hil.drafting.unit_choice import MATCH, UnitChoice, are_counts, is_length, misfit, position_unit, velocity_unit
-from hil.drafting.usual_values import COUNTS, LEADS_M, ROTARY_LEAD_M, mixed_up, screw_units, usual_lead
+from hil.drafting.unit_choice import (
+    MATCH,
+    UnitChoice,
+    are_counts,
+    gives_force,
+    is_length,
+    misfit,
+    position_unit,
+    prefers_length,
+    unit_by_convention,
+    velocity_unit,
+)
+from hil.drafting.usual_values import LEADS_M, ROTARY_LEAD_M, mixed_up, screw_units, usual_lead
 from hil.errors import InputError
 from hil.quantities import UNITS
 from hil.recording.complete_rows import complete_rows
 from hil.recording.held_samples import rows_per_sample
 from hil.recording.wraps import unwrapped
 
-_COORDINATE = r"q(pos)?\d*([_ ].*)?"  # joint angle, as robotics writes it: q, q1, q_ref
-_ANGLE = "angle|winkel|theta|phi|rot|joint|gelenk"
+SAME_COUNTS = 1e-3  # deviation of the factor between motor and set-point, both in counts: following errors are below
 LATE_ROWS = 0.5  # by which a set-point may seem late: its rounding and the sampling of the encoder
 
 
@@ -79,6 +89,7 @@ class _Composer:
         self.units: dict[str, str] = {}
         self.kind = AxisKind.ROTARY
         self.motor_sign = 1
+        self.per_count = 1.0  # SI units of the motor per count, if it is in counts
 
     def compose(self) -> None:
         roles = self.roles
@@ -107,15 +118,17 @@ class _Composer:
     def _units_of_positions(self) -> None:
         roles, labels, live = self.roles, self.labels, self.live
         positions = [name for name in (roles.command, roles.table, roles.motor) if name]
-        prefers = self._prefers_length(positions)
+        prefers = prefers_length(positions, self._effort)
+        by_convention = unit_by_convention(self._effort)
+        self.draft.unsure += [by_convention.note] if by_convention else []
         far, motor = next((name for name in (roles.table, roles.command) if name), None), roles.motor
         if far and motor and "counts" not in (labels[far].unit, labels[motor].unit) and not are_counts(live[motor]):
             relation = proportional(live[far], live[motor])
-            told = screw_units(relation.factor, labels[far].unit, labels[motor].unit)
-            if told and relation.share > SAME_POSITION and None in (labels[far].unit, labels[motor].unit):
-                note = f"{far} in {told[0]} and {motor} in {told[1]}: with them the travel per turn is a usual lead"
-                self._choose(far, UnitChoice(told[0], note))
-                self._choose(motor, UnitChoice(told[1]))
+            pair = screw_units(relation.factor, labels[far].unit, labels[motor].unit)
+            if pair and relation.share > SAME_POSITION and None in (labels[far].unit, labels[motor].unit):
+                note = f"{far} in {pair[0]} and {motor} in {pair[1]}: with them the travel per turn is a usual lead"
+                self._choose(far, UnitChoice(pair[0], note))
+                self._choose(motor, UnitChoice(pair[1]))
         # columns with a unit first: they are the hints for the others
         for column in sorted(set(positions) - set(self.units), key=lambda name: labels[name].unit is None):
             hints = [
@@ -128,20 +141,13 @@ class _Composer:
                     relation = proportional(motion(live[column], self.period_s).velocity, live[name])
                     if relation.share > SAME_POSITION:
                         hints.append((relation.factor / UNITS[one.unit][1], UNITS[one.unit][0].removesuffix("/s")))
-            self._choose(column, position_unit(column, live[column], labels[column].unit, hints, prefers))
+            told = labels[column].unit or (by_convention.unit if by_convention else None)
+            self._choose(column, position_unit(column, live[column], told, hints, prefers))
 
-    def _prefers_length(self, positions: list[str]) -> bool | None:
-        effort = self.roles.effort or self.roles.effort_command
-        if self._gives_force():
-            return True
-        words = " ".join(positions).lower()
-        if any(re.fullmatch(_COORDINATE, name.lower()) for name in positions) or re.search(_ANGLE, words):
-            return False
-        if any(word in words for word in ("weg", "hub", "stroke", "course", "displ", "linear")):
-            return True
-        if effort and self.labels[effort].unit in ("N m", "mN m"):
-            return False
-        return None
+    @property
+    def _effort(self) -> Label | None:
+        name = self.roles.effort or self.roles.effort_command
+        return self.labels[name] if name else None
 
     def _drives_a_table(self) -> bool:
         """True with a second encoder, unless the motor gives a force: the transmission between them is then judged."""
@@ -150,8 +156,7 @@ class _Composer:
         )
 
     def _gives_force(self) -> bool:
-        effort = self.roles.effort or self.roles.effort_command
-        return effort is not None and self.labels[effort].unit in ("N", "kN")
+        return gives_force(self._effort)
 
     def _positions(self, channel: str) -> None:
         roles, live = self.roles, self.live
@@ -167,11 +172,13 @@ class _Composer:
             self.draft.unsure.append(f"{roles.motor}: falls while {reference} grows; its sign is turned")
         length = next((name for name in trusted if is_length(self.units[name])), None)
         if motor == "counts":
-            entry |= self._counts(length, relations[length].factor if length else None)
-            motor = "rad" if "counts_per_rev" in entry else "m"
+            size = self._count_size(length, relations[length].factor if length else 0.0)
+            entry |= size.entry
+            self.draft.unsure += [size.note] if size.note else []
+            motor, self.per_count = size.unit, size.per_count
             self.kind = AxisKind.ROTARY if motor == "rad" else AxisKind.LINEAR
             channel = AXIS_CHANNELS[self.kind].motor_position
-        elif self.kind is AxisKind.ROTARY:
+        if self.kind is AxisKind.ROTARY:
             if is_length(motor):
                 entry |= {"unit": "rad", "scale": UNITS[motor][1] * 2.0 * pi / LEADS_M[0]}
                 self.draft.lead_m, self.draft.lead_how = LEADS_M[0], "not told; masses at the table scale with it"
@@ -179,8 +186,8 @@ class _Composer:
                     f"{roles.motor}: is in a length; {1e3 * LEADS_M[0]:g} mm per turn are taken: correct scale and lead"
                 )
             elif length is not None:
-                factor = abs(relations[length].factor) * UNITS[self.units[length]][1] / UNITS[motor][1]
-                self.draft.lead_m = float(f"{usual_lead(2.0 * pi * factor):.6g}")
+                per_turn = abs(relations[length].factor) * UNITS[self.units[length]][1] / self.per_count
+                self.draft.lead_m = float(f"{usual_lead(2.0 * pi * per_turn / UNITS[motor][1]):.6g}")
                 self.draft.lead_how = f"travel of {length} per turn of {roles.motor}"
             else:
                 self.draft.lead_m = ROTARY_LEAD_M
@@ -227,29 +234,22 @@ class _Composer:
                     "stamps are late, or the drive leads it; the control law cannot be judged with it as it is"
                 )
         if unit == "counts":  # of the motor's encoder, as in the set-points of a drive
-            entry |= {"unit": motor, "scale": float(f"{1.0 / abs(factor):.8g}")}
+            same = abs(abs(factor) - 1.0) < SAME_COUNTS
+            entry |= {"unit": motor, "scale": float(f"{self.per_count / (1.0 if same else abs(factor)):.8g}")}
         self.draft.channels.append(DraftedChannel(channel, entry, self._how(name, what)))
 
-    def _counts(self, length: str | None, factor: float | None) -> dict[str, object]:
-        """Counts per revolution or metre of the motor's encoder."""
-        if length is None or factor is None:
-            raise InputError(
-                f"{self.draft.table.path}: {self.roles.motor} is in counts, and no other column tells their size; "
-                "write counts_per_rev (or counts_per_m) into a map: hil import FILE --map MAP.yaml"
-            )
-        per_m = 1.0 / (abs(factor) * UNITS[self.units[length]][1])
-        if self._gives_force():
-            return {"counts_per_m": float(f"{per_m:.8g}")}
-        fits = [(counts, lead) for lead in LEADS_M for counts in COUNTS if abs(counts / (lead * per_m) - 1.0) < 0.003]
-        if not fits:
-            return {"counts_per_m": float(f"{per_m:.8g}")}
-        counts, lead = fits[0]
-        self.draft.lead_m, self.draft.lead_how = lead, f"from the counts per metre of {length}, with usual leads"
-        self.draft.unsure.append(
-            f"{self.roles.motor}: {per_m:.6g} counts per m; {counts:g} per revolution and a lead of "
-            f"{1e3 * lead:g} mm are taken, another pair with the same ratio fits as well"
-        )
-        return {"counts_per_rev": counts}
+    def _count_size(self, length: str | None, factor: float) -> CountSize:
+        """Size of a count of the motor's encoder; `factor` is length over counts."""
+        motor, live = str(self.roles.motor), self.live
+        speeds = [one for one in self.labels.values() if one.quantity == "velocity" and one.unit and not one.command]
+        moved = motion(live[motor], self.period_s)
+        for one in speeds:
+            relation = derivative_of(live[one.column], moved, self.period_s) if one.column in live else None
+            if relation and relation.share > SAME_POSITION:
+                return from_speed(1.0 / relation.factor, str(one.unit))
+        if length:
+            return from_length(motor, 1.0 / factor, self.units[length], length, self._gives_force())
+        return assumed(motor)
 
     def _velocity_command(self) -> None:
         name, command = self.roles.velocity_command, self.roles.command

@@ -1,13 +1,13 @@
 """Inertia, friction, load and transmission of an axis from its recording.
 
 T = J a + D v + Tc sign(v) + T0 (+ r G sin(r q + q0)  or  + k q)        at the motor; r = 1 / gear ratio
-x = r q + c - r tau v - (m_t / k) a - (F_t / k) sign(v)      second encoder against the motor's
+x = r q + c - r tau v - (m_t / k) a - (F_t / k) sign(v) - (G / k) sin(x + q0)      second encoder over the motor's
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.signal import butter, filtfilt
+from scipy.signal import butter, sosfiltfilt
 
 from hil.arrays import FloatArray
 from hil.drafting.estimate import BlockFit, Estimate, fit_blocks
@@ -17,13 +17,17 @@ from hil.identification.inverse_dynamics import CORNER, CUT_AT_START, inverse_dy
 from hil.identification.noise import white_noise
 from hil.recording.recording import Recording
 
-CUTOFFS_HZ = (100.0, 50.0, 25.0, 12.0, 6.0)  # of the position filter
+CUTOFFS_HZ = (100.0, 50.0, 25.0, 12.0, 6.0, 3.0)  # of the position filter
 NOISE_SHARE = 0.02  # of noise in the acceleration: it makes the inertia too small by this share
 MOST_OF_RATE = 0.2  # of the sampling rate: the filter must end well below half of it
 LEAST_ROWS = 80  # after decimation: eight per block of the error estimate
 # Residual with a torque over the position over that without, up to which it is reported: on LEAST_ROWS white rows two
 # parameters without effect remove 1 %.
 GRAVITY_GAIN = 0.85
+# Least low-passed sign of the velocity of a row that is fitted: below, the filter mixes the friction of both directions
+# and of rest, and its change near a reversal, where the acceleration is largest, looks like an inertia.
+SLIDES = 0.9
+WRONG_SIGN = 3.0  # standard errors by which a negative inertia is none that the motion does not tell
 LEAST_ANGLE_RAD = 0.5  # of the load: over less, a sine is a straight line to 1 %, and gravity is a spring
 
 
@@ -48,13 +52,17 @@ class PlantValues:
 
 @dataclass(frozen=True)
 class TransmissionValues:
-    """Second encoder against the motor's: ratio [m/rad], delay [s], -m_t / k [s^2], lost motion [m], rms left [m]."""
+    """Second encoder against the motor's: ratio [m/rad], delay [s], -m_t / k [s^2], lost motion [m], rms left [m].
+
+    `sag_m` is the deflection G / k under gravity over the angle of a load that turns, None where it is not seen.
+    """
 
     ratio: Estimate
     delay_s: Estimate
     compliance_s2: Estimate
     friction_m: Estimate
     left_m: float
+    sag_m: Estimate | None = None
 
 
 def plant_values(recording: Recording, load_ratio: float | None = None) -> PlantValues:
@@ -81,13 +89,15 @@ def plant_values(recording: Recording, load_ratio: float | None = None) -> Plant
     cutoff_hz = next((one for one in allowed if _noise_share(recording, one) < NOISE_SHARE), allowed[-1])
     fit = _fit(recording, cutoff_hz, load_ratio)
     inertia, viscous, coulomb, offset, *more = fit.estimates
-    if inertia.value <= 0.0:
+    if inertia.value <= -WRONG_SIGN * inertia.std_error:
         raise InputError(
             f"{recording.name}: the inertia comes out as {inertia.value:.3g} +- {inertia.std_error:.2g}, allowed "
             "above 0; "
             "the torque has the wrong sign, or the motion does not separate inertia from a spring or gravity: record "
             "moves of different accelerations"
         )
+    if inertia.value <= inertia.std_error:
+        inertia = replace(inertia, value=inertia.std_error, how=f"{inertia.how}; not told by this motion: its error")
     gravity, angle = _gravity(more[0], more[1], load_ratio) if len(more) == 2 and load_ratio else (None, None)
     spring = more[0] if len(more) == 1 else None
     return PlantValues(inertia, viscous, coulomb, offset, fit.left, gravity, angle, spring, cutoff_hz)
@@ -109,7 +119,7 @@ def _noise_share(recording: Recording, cutoff_hz: float) -> float:
     """
     position, period_s = recording[recording.axis.motor_position], recording.period_s
     noise = 2.0 * period_s * white_noise(position) ** 2 * (2.0 * np.pi) ** 4 * cutoff_hz**5 / 5.0
-    filtered = filtfilt(*butter(4, 2.0 * cutoff_hz * period_s), position)
+    filtered = sosfiltfilt(butter(4, 2.0 * cutoff_hz * period_s, output="sos"), position)
     total = float(np.var(np.diff(filtered, 2))) / period_s**4
     return float(noise) / total if total > 0.0 else np.inf
 
@@ -129,10 +139,13 @@ def _fit(recording: Recording, cutoff_hz: float, load_ratio: float | None) -> Bl
             "give a longer recording"
         )
     columns, torque = inverse_dynamics_columns(recording, cutoff_hz, decimation)
-    how = f"least squares of torque over motion, position filtered at {cutoff_hz:g} Hz"
-    plain = fit_blocks(list(columns.T), torque, [how] * 4)
     position = recording[recording.axis.motor_position][CUT_AT_START:]
     position = position[(position.size - 1) % decimation :: decimation]
+    slides = np.abs(columns[:, 2]) > SLIDES
+    if np.count_nonzero(slides) >= LEAST_ROWS:
+        columns, torque, position = columns[slides], torque[slides], position[slides]
+    how = f"least squares of torque over motion, position filtered at {cutoff_hz:g} Hz"
+    plain = fit_blocks(list(columns.T), torque, [how] * 4)
     angle = position * (load_ratio or 0.0)
     if np.ptp(angle) < LEAST_ANGLE_RAD:
         more = fit_blocks([*columns.T, position], torque, [f"{how}, with a spring"] * 5)
@@ -141,22 +154,29 @@ def _fit(recording: Recording, cutoff_hz: float, load_ratio: float | None) -> Bl
     return more if more.left < GRAVITY_GAIN * plain.left and more.estimates[0].value > 0.0 else plain
 
 
-def transmission_values(recording: Recording) -> TransmissionValues | None:
-    """Fit the second encoder over the motor's; None without one."""
+def transmission_values(recording: Recording, gravity_angle: float | None = None) -> TransmissionValues | None:
+    """Fit the second encoder over the motor's; with `gravity_angle` [rad] also the deflection under gravity.
+
+    None without a second encoder.
+    """
     names = recording.axis
     if names.table_position not in recording.columns:
         return None
     period_s = recording.period_s
     moved = motion(recording[names.motor_position], period_s)
-    table = smoothed(recording[names.table_position], period_s)
     edge = slice(CUT_AT_START, -CUT_AT_START)
+    table = smoothed(recording[names.table_position], period_s)[edge]
     parts = (moved.position, moved.velocity, moved.acceleration, direction(moved.velocity))
-    columns: list[FloatArray] = [*(part[edge] for part in parts), np.ones(table[edge].size)]
-    fit = fit_blocks(columns, table[edge], ["second encoder over the motor's"] * 5)
-    ratio, velocity, acceleration, friction, _ = fit.estimates
+    columns: list[FloatArray] = [*(part[edge] for part in parts), np.ones(table.size)]
+    if gravity_angle is not None:
+        weight = -np.sin(table + gravity_angle)
+        columns += [weight, np.sign(weight)]  # deflection, and play whose flank the weight chooses
+    fit = fit_blocks(columns, table, ["second encoder over the motor's"] * len(columns))
+    sag = fit.estimates[5] if gravity_angle is not None else None
+    ratio, velocity, acceleration, friction = fit.estimates[:4]
     delay = velocity.scaled(-1.0 / ratio.value)
     # a pure delay adds r tau^2 / 2 to the factor of the acceleration
     straight = Estimate(
         acceleration.value - 0.5 * ratio.value * delay.value**2, acceleration.std_error, acceleration.how
     ).scaled(1.0 / ratio.value)
-    return TransmissionValues(ratio, delay, straight, friction, fit.left * float(np.std(table[edge])))
+    return TransmissionValues(ratio, delay, straight, friction, fit.left * float(np.std(table)), sag)

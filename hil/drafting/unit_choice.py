@@ -1,11 +1,13 @@
 """Choose the units of columns: by their names, by their relations to columns with a unit, else by their size."""
 
+import re
 from dataclasses import dataclass
 from math import pi
 
 import numpy as np
 
 from hil.arrays import FloatArray
+from hil.drafting.column_names import Label
 from hil.quantities import UNITS
 
 MATCH = 0.02  # relative deviation of a factor between two columns from that of two units: above following errors
@@ -17,6 +19,10 @@ ANGULAR_SPEEDS = ("rad/s", "deg/s", "rpm", "rev/s")
 _LONGEST_M, _MOST_RAD = 5.0, 13.0
 _WHOLE = 1e-5  # relative deviation from whole quarters of a turn: that of six digits
 _LEAST_COUNTS = 200.0  # travel in whole numbers from which they are counts of an encoder
+_COORDINATE = r"q(pos)?\d*([_ ].*)?"  # joint angle, as robotics writes it: q, q1, q_ref
+_ANGLE = "angle|winkel|theta|phi|rot|joint|gelenk"
+_LENGTH = "weg|hub|stroke|course|displ|linear"
+_JOINT_STATE = r"(^|[^a-z])effort\W*\d*\W*$"  # effort, effort[0], .effort0
 
 
 @dataclass(frozen=True)
@@ -34,6 +40,30 @@ def is_length(unit: str) -> bool:
 def are_counts(values: FloatArray) -> bool:
     """True for whole numbers that travel far."""
     return bool(np.ptp(values) > _LEAST_COUNTS and np.all(values == np.round(values)))
+
+
+def gives_force(effort: Label | None) -> bool:
+    """True if the motor gives a force."""
+    return effort is not None and effort.unit in ("N", "kN")
+
+
+def prefers_length(positions: list[str], effort: Label | None) -> bool | None:
+    """True or False if names of the positions or the unit of the effort tell a length or an angle, else None."""
+    words = " ".join(positions).lower()
+    if gives_force(effort):
+        return True
+    if any(re.fullmatch(_COORDINATE, name.lower()) for name in positions) or re.search(_ANGLE, words):
+        return False
+    if re.search(_LENGTH, words):
+        return True
+    return False if effort and effort.unit in ("N m", "mN m") else None
+
+
+def unit_by_convention(effort: Label | None) -> UnitChoice | None:
+    """rad where a torque without a unit is called effort, as in sensor_msgs/JointState of ROS."""
+    if effort is None or effort.unit or not re.search(_JOINT_STATE, effort.column.lower()):
+        return None
+    return UnitChoice("rad", f"{effort.column}: named as in a joint state of ROS; rad and N m are taken")
 
 
 def position_unit(

@@ -42,7 +42,7 @@ _SPELLINGS = {
     "mV": "mv",
     "%": "% percent pct prozent",
     "permille": "‰ permille promille 0.1%",
-    "counts": "counts count cts inc incs inkr inkremente increments ticks pulses impulse lsb",
+    "counts": "counts count cts cnt cnts inc incs inkr inkremente increments ticks pulses impulse lsb",
 }
 _UNIT_OF = {spelling: unit for unit, spellings in _SPELLINGS.items() for spelling in spellings.split()}
 _KIND = {
@@ -55,6 +55,7 @@ _KIND = {
 QUANTITY_OF_UNIT = {unit: kind for kind, units in _KIND.items() for unit in units}
 # one letter at the end of a name is a unit only after a word: x_m may be in metres, q_m of the motor
 _BRACKETS = re.compile(r"[\[(<{]\s*([^\])>}]*)\s*[\])>}]\s*$")
+_BITS = re.compile(r"(?<=[a-z])\d+(bit)?$")  # counts16bit
 _SLASH = re.compile(r"^\s*[^/\s]+\s*/\s*(\S+)\s*$")  # DIN 461: x/mm
 _WORD_IN = re.compile(r"\bin\s+(\S+)\s*$")  # Weg in mm
 
@@ -63,7 +64,10 @@ def unit_named(text: str) -> str | None:
     """Unit of a map for a spelling in a file; None for an unknown one."""
     key = unicodedata.normalize("NFKC", text).strip().lower().replace("μ", "µ")
     key = re.sub(r"[\s·*⋅.]+", "", key)
-    return "%" if key.startswith("%") else _UNIT_OF.get(key)  # % of what is told by no spelling
+    if key.startswith("%"):  # % of what is told by no spelling
+        return "%"
+    counts = _UNIT_OF.get(_BITS.sub("", key)) == "counts"
+    return "counts" if counts else _UNIT_OF.get(key)
 
 
 def split_unit(name: str) -> tuple[str, str | None, bool]:

@@ -27,7 +27,7 @@ Therefore sign(v) is taken at the full rate and low-passed with the other column
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import butter, cheby1, filtfilt
+from scipy.signal import butter, cheby1, sosfiltfilt
 
 from hil.arrays import FloatArray
 from hil.channels import AxisKind
@@ -93,7 +93,7 @@ def inverse_dynamics_columns(
     Raises InputError if the record does not move both ways.
     """
     position, force = recording[recording.axis.motor_position], recording[recording.axis.torque]
-    butterworth = butter(BUTTERWORTH_ORDER, 2 * cutoff_hz * recording.period_s)
+    butterworth = butter(BUTTERWORTH_ORDER, 2 * cutoff_hz * recording.period_s, output="sos")
     velocity = np.gradient(_forwards_and_backwards(butterworth, position), recording.period_s)
     acceleration = np.gradient(velocity, recording.period_s)
     if not (velocity.min() < 0 < velocity.max()):
@@ -109,15 +109,14 @@ def inverse_dynamics_columns(
     return regressors, _decimate(force[settled], decimation)
 
 
-def _forwards_and_backwards(coefficients: tuple[FloatArray, FloatArray], values: FloatArray) -> FloatArray:
-    """Filter without phase, the ends padded by three times the order of the filter."""
-    numerator, denominator = coefficients
-    return np.asarray(filtfilt(numerator, denominator, values, padlen=3 * (len(denominator) - 1)), dtype=np.float64)
+def _forwards_and_backwards(sections: FloatArray, values: FloatArray) -> FloatArray:
+    """Filter without phase, the ends padded by three times the order of the filter, an even one."""
+    return np.asarray(sosfiltfilt(sections, values, padlen=6 * len(sections)), dtype=np.float64)
 
 
 def _decimate(values: FloatArray, decimation: int) -> FloatArray:
     """Low-pass and decimate values (n,), counted from the end so that the last sample is kept."""
-    chebyshev = cheby1(CHEBYSHEV_ORDER, RIPPLE_DB, CORNER / decimation)
+    chebyshev = cheby1(CHEBYSHEV_ORDER, RIPPLE_DB, CORNER / decimation, output="sos")
     return _forwards_and_backwards(chebyshev, values)[(values.size - 1) % decimation :: decimation]
 
 

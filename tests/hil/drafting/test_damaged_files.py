@@ -1,104 +1,37 @@
-"""A damaged or odd file gives one sentence that names what is wrong (exit code 2), or is imported with a note."""
+"""A damaged file gives one sentence that names what is wrong, and exit code 2."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from foreign_axis import axis, csv_text, renamed, write
+from damaged_files import (
+    AXIS,
+    GOOD,
+    HALF,
+    LINES,
+    RANDOM,
+    TEXT,
+    Make,
+    content,
+    cut,
+    every_fourth,
+    field,
+    in_rows,
+    shuffled,
+    table,
+    text,
+    two_rates,
+    unequal,
+    with_lines,
+)
+from foreign_axis import csv_text, renamed, write
 
 from hil.commands.import_ import import_
-from hil.drafting.draft_map import draft_map
 from hil.errors import InputError
-from hil.recording.recording import read_recording
 
-AXIS = axis(rows=3000)
-NAMES = {"t": "time_s", "x_set": "position_setpoint_mm", "angle": "motor_angle_rad", "torque": "torque_Nm"}
-GOOD = renamed(AXIS, **NAMES)
-TEXT = csv_text(GOOD)
-LINES = TEXT.splitlines()
-HALF = len(AXIS["t"]) // 2
-Make = Callable[[Path], Any]
-
-
-def changed(**columns: Any) -> dict[str, np.ndarray]:
-    """The good columns, some replaced by their short name; None leaves one out."""
-    merged = AXIS | {name: values for name, values in columns.items() if values is not None}
-    return renamed(merged, **{short: long for short, long in NAMES.items() if columns.get(short, 0) is not None})
-
-
-def table(**columns: Any) -> Make:
-    return lambda path: write(path, changed(**columns))
-
-
-def text(content: str) -> Make:
-    return lambda path: path.write_text(content)
-
-
-def content(content: bytes) -> Make:
-    return lambda path: path.write_bytes(content)
-
-
-def with_lines(*at: tuple[int, str]) -> Make:
-    """The good text with lines replaced."""
-    lines = list(LINES)
-    for index, line in at:
-        lines[index] = line
-    return text("\n".join(lines) + "\n")
-
-
-def in_rows(name: str, rows: slice, value: Any) -> dict[str, Any]:
-    values = AXIS[name].copy()
-    values[rows] = value(values[rows]) if callable(value) else value
-    return {name: values}
-
-
-def field(row: int, index: int, value: str) -> tuple[int, str]:
-    fields = LINES[row].split(",")
-    fields[index] = value
-    return row, ",".join(fields)
-
-
-def shuffled() -> dict[str, np.ndarray]:
-    order = np.random.default_rng(3).permutation(len(AXIS["t"]))
-    return {name: values[order] for name, values in GOOD.items()}
-
-
-def cut(ending: str, share: float) -> Make:
-    def make(path: Path) -> None:
-        write(path, GOOD)
-        whole = path.read_bytes()
-        path.write_bytes(whole[: int(share * len(whole))])
-
-    assert ending
-    return make
-
-
-def two_rates() -> dict[str, np.ndarray]:
-    rows = np.r_[0:HALF, HALF : len(AXIS["t"]) : 4]
-    return {name: values[rows] for name, values in GOOD.items()}
-
-
-def unequal(path: Path) -> None:
-    from scipy.io import savemat
-
-    savemat(path, {**GOOD, "torque_Nm": GOOD["torque_Nm"][::4], "motor_angle_rad": GOOD["motor_angle_rad"][::4]})
-
-
-def every_fourth(name: str) -> str:
-    """Text in which a column has a number in every fourth row only."""
-    index = list(NAMES.values()).index(name)
-    return (
-        "\n".join(line if row % 4 == 1 or row == 0 else field(row, index, "")[1] for row, line in enumerate(LINES))
-        + "\n"
-    )
-
-
-RANDOM = np.random.default_rng(4)
 REFUSED: dict[str, tuple[str, Make, str]] = {
     "empty": ("csv", text(""), "empty"),
     "blank lines only": ("csv", text("\n\n  \n"), "empty"),
@@ -219,16 +152,6 @@ REFUSED: dict[str, tuple[str, Make, str]] = {
         ),
         "interchanged",
     ),
-    "counts without a scale": (
-        "csv",
-        lambda path: write(
-            path,
-            renamed(
-                AXIS | {"angle": np.round(1000 * AXIS["angle"])}, t="t", angle="encoder [counts]", torque="torque_Nm"
-            ),
-        ),
-        "counts_per_rev",
-    ),
     "a name twice": ("csv", with_lines((0, "time_s,motor_angle_rad,motor_angle_rad,torque_Nm")), "names two columns"),
     "a truncated .mat": ("mat", cut("mat", 0.5), "damaged"),
     "a .mat of a few bytes": ("mat", content(b"MATLAB 5.0 MAT-file"), "damaged|no readable"),
@@ -261,50 +184,6 @@ def test_a_damaged_file_is_refused_in_one_sentence(tmp_path: Path, case: str) ->
     assert str(path) in str(caught.value)
     assert "\n" not in str(caught.value)
     assert not (tmp_path / "out.parquet").exists()
-
-
-NOTED: dict[str, tuple[Make, str]] = {
-    "the torque has the other sign": (table(torque=-AXIS["torque"]), "its sign is turned"),
-    "the motor counts the other way": (table(angle=-AXIS["angle"]), "its sign is turned"),
-    "stamps with too few digits": (table(t=np.floor(AXIS["t"] * 500) / 500), "too few digits"),
-    "milliseconds called seconds": (table(t=1e3 * AXIS["t"]), "no rate of a recording"),
-    "a torque that is another axis's": (table(torque=np.sin(7 * AXIS["t"])), "explain only"),
-    "a set-point that is not followed": (table(x_set=RANDOM.normal(size=len(AXIS["t"])).cumsum()), "does not follow"),
-    "NaN in the position": (table(**in_rows("angle", slice(900, 903), np.nan)), "rows have no value of"),
-    "an empty field": (with_lines(field(700, 3, "")), "rows have no value of"),
-    "an angle that wraps": (table(angle=np.mod(AXIS["angle"], 2 * np.pi), x_set=None), "wraps at 6.28319"),
-    "a gap": (lambda path: write(path, {n: np.delete(v, slice(500, 600)) for n, v in GOOD.items()}), "a gap of"),
-    "a duplicate row": (with_lines((1000, LINES[999])), "duplicate rows: 1"),
-    "numbers in quotes": (
-        text("\n".join([LINES[0], *(",".join(f'"{f}"' for f in line.split(",")) for line in LINES[1:])]) + "\n"),
-        "",
-    ),
-    "a trailing delimiter": (text("\n".join(f"{line}," for line in LINES) + "\n"), ""),
-    "a blank line at the end": (text(TEXT + "\n\n"), ""),
-    "Windows line ends": (content(TEXT.replace("\n", "\r\n").encode()), ""),
-    "a clock that starts late": (table(t=AXIS["t"] + 1000.0), ""),
-    "a status column of text": (
-        text("\n".join(f"{line},{'status' if i == 0 else 'OK'}" for i, line in enumerate(LINES)) + "\n"),
-        "",
-    ),
-    "a constant column beside": (
-        lambda path: write(
-            path, GOOD | {"temperature": np.full(len(AXIS["t"]), 20.0), "spare": np.zeros(len(AXIS["t"]))}
-        ),
-        "",
-    ),
-}
-
-
-@pytest.mark.parametrize("case", NOTED)
-def test_an_odd_file_is_imported_and_the_oddity_named(tmp_path: Path, case: str) -> None:
-    make, says = NOTED[case]
-    path = tmp_path / "log.csv"
-    make(path)
-    notes = draft_map(path).unsure
-    assert any(says in note for note in notes) if says else notes == []
-    import_(path, None, tmp_path / "out.parquet", None, None)
-    assert len(read_recording(tmp_path / "out.parquet")) > 0.9 * len(AXIS["t"])
 
 
 def test_there_are_sixty_damaged_files_and_more() -> None:

@@ -123,7 +123,7 @@ def test_the_step_of_a_quantised_channel_is_found_and_none_in_a_smooth_one() -> 
     [
         ({"torque": -AXIS["torque"]}, "wrong sign"),
         ({"angle": np.abs(AXIS["t"]) * 10.0}, "one direction"),
-        ({"torque": None}, "not recorded"),
+        ({"torque": None, "x_act": None}, "not recorded"),
     ],
 )
 def test_what_cannot_be_told_is_refused(change: dict[str, np.ndarray | None], says: str) -> None:
@@ -148,7 +148,8 @@ def test_the_text_is_a_bench_file_with_comments() -> None:
 def _recording(columns: dict[str, np.ndarray]) -> Recording:
     names = {"t": "time_s", "angle": "motor_position_rad", "x_act": "table_position_m", "torque": "torque_n_m"}
     channels = {names[name]: values for name, values in columns.items() if name in names}
-    channels["table_position_m"] = 1e-3 * channels["table_position_m"]
+    if "table_position_m" in channels:
+        channels["table_position_m"] = 1e-3 * channels["table_position_m"]
     return Recording("log", channels, 1e-3)
 
 
@@ -173,3 +174,43 @@ def test_a_spring_is_said_and_does_not_turn_the_inertia() -> None:
     assert float(note.split("(a spring) ")[1].split(" N/m")[0]) == pytest.approx(2e3, rel=0.05)
     assert draft.axis[0].key == "mass_kg"
     assert draft.axis[0].value == pytest.approx(without.axis[0].value, rel=0.05)
+
+
+def joint(gear: float, stiffness: float, play_rad: float) -> dict[str, np.ndarray]:
+    """A joint under gravity: its link lags by deflection and play; the torque carries weight, inertia and friction."""
+    random, t = np.random.default_rng(2), np.arange(20_000) / 500.0
+    load = 0.6 * np.sin(0.5 * t) + 0.3 * np.sin(1.7 * t + 1.0)
+    speed = 0.3 * np.cos(0.5 * t) + 0.51 * np.cos(1.7 * t + 1.0)
+    acceleration = -0.15 * np.sin(0.5 * t) - 0.867 * np.sin(1.7 * t + 1.0)
+    weight = 30.0 * np.sin(load)
+    torque = (weight + 0.5 * acceleration + 4.0 * np.sign(speed)) / gear
+    motor = gear * (load + weight / stiffness + 0.5 * play_rad * np.sign(weight))
+    return {
+        "time_s": t,
+        "motor_angle_rad": motor + random.normal(0.0, 2e-5, t.size),
+        "link_angle_rad": np.round(load / 1e-6) * 1e-6,
+        "motor_torque_Nm": torque + random.normal(0.0, 0.003, t.size),
+    }
+
+
+def test_the_ratio_of_a_joint_under_gravity_leaves_out_its_deflection(tmp_path: Path) -> None:
+    bench = load_bench(drafted(tmp_path, joint(50.0, 9e3, 4e-4)))
+    assert bench.axis.model == "rotary_two_mass"
+    assert bench.axis.gear_ratio == pytest.approx(50.0, rel=1e-5)
+    assert bench.axis.stiffness_n_m_rad == pytest.approx(9e3, rel=0.15)
+    (entry,) = bench.mechanisms
+    assert entry.parameters["gravity_torque_n_m"] == pytest.approx(30.0, rel=0.02)
+
+
+def test_two_encoders_without_a_torque_make_a_bench_of_the_transmission(tmp_path: Path) -> None:
+    path = drafted(tmp_path, {name: values for name, values in SCREW.items() if name != "torque_Nm"})
+    bench = load_bench(path)
+    assert bench.axis.model == "two_mass"
+    assert bench.axis.lead_m == pytest.approx(LEAD_M, rel=1e-4)
+    assert "no torque is recorded" in path.read_text()
+
+
+def test_a_recording_at_20_khz_tells_its_inertia(tmp_path: Path) -> None:
+    fast = renamed(axis(rows=60_000, rate_hz=20_000.0), t="time_s", angle="motor_angle_rad", torque="torque_Nm")
+    bench = load_bench(drafted(tmp_path, fast))
+    assert bench.axis.inertia_kg_m2 == pytest.approx(INERTIA_KG_M2, rel=0.05)

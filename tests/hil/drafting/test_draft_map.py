@@ -11,6 +11,7 @@ import pytest
 from foreign_axis import LEAD_M, axis, csv_text, renamed, write
 
 from hil.commands.import_ import import_
+from hil.drafting.column_names import label
 from hil.drafting.draft_map import draft_map
 from hil.drafting.map_draft import MapDraft
 from hil.recording.recording import Recording, read_recording
@@ -194,3 +195,38 @@ def test_a_wrong_unit_of_the_stamps_is_corrected_and_named(tmp_path: Path) -> No
     draft = draft_map(write(tmp_path / "log.csv", renamed(AXIS, **(NAMES | {"t": "time [ms]"}))))
     assert draft.clock.unit == "s"
     assert any("no rate of a recording" in note for note in draft.unsure)
+
+
+@pytest.mark.parametrize("unit", ["Counts16Bit", "cnt", "inc"])
+def test_the_size_of_a_count_follows_from_a_speed(tmp_path: Path, unit: str) -> None:
+    """Set-points of the drive are in the same counts."""
+    counts = {"angle": np.round(AXIS["angle"] * 65536 / (2 * np.pi)), "speed": AXIS["speed"] * 60 / (2 * np.pi)}
+    counts["x_set"] = 1e-3 * AXIS["x_set"] / LEAD_M * 65536
+    names = {"angle": f"Position Feedback ({unit})", "speed": "Velocity Feedback (rpm)", "torque": "Torque (Nm)"}
+    columns = renamed(AXIS | counts, t="Time (s)", x_set=f"Position Command ({unit})", **names)
+    draft = draft_map(write(tmp_path / "log.csv", columns))
+    found = channels(draft)
+    assert found["motor_position_rad"]["counts_per_rev"] == 65536
+    assert found["position_command_m"]["scale"] == pytest.approx(2 * np.pi / 65536, rel=1e-6)
+    assert draft.lead_m == pytest.approx(2 * np.pi)
+
+
+def test_columns_of_a_joint_state_are_in_rad(tmp_path: Path) -> None:
+    columns = renamed(AXIS, t="secs", angle="position", speed="velocity", torque="effort")
+    draft = draft_map(write(tmp_path / "log.csv", columns))
+    assert channels(draft)["motor_position_rad"]["unit"] == "rad"
+    assert any("joint state" in note for note in draft.unsure)
+
+
+def test_units_of_a_scope_with_a_time_beside_each_channel_are_read(tmp_path: Path) -> None:
+    head = "Name;ActPos;Name;ActTorque\nUnit;deg;Unit;Nm\nSampletime[ms];1;Sampletime[ms];1\n\n"
+    rows = zip(1e3 * AXIS["t"], np.rad2deg(AXIS["angle"]), AXIS["torque"], strict=True)
+    path = tmp_path / "log.csv"
+    path.write_text(head + "".join(f"{t:.0f};{angle:.6f};{t:.0f};{torque:.5f}\n" for t, angle, torque in rows))
+    found = channels(draft_map(path))
+    assert (found["motor_position_rad"]["unit"], found["torque_n_m"]["unit"]) == ("deg", "N m")
+
+
+@pytest.mark.parametrize("name", ["Istwinkel [Grad]", "istposition [mm]", "ActPos"])
+def test_a_measured_position_is_told_by_its_name(name: str) -> None:
+    assert label(name).quantity == "position"

@@ -1,0 +1,21 @@
+"""Inertia and friction of a bench where no torque is recorded: two encoders tell the transmission without them."""
+
+from hil.drafting.estimate import Estimate
+from hil.drafting.plant_values import PlantValues, TransmissionValues, plant_values
+from hil.recording.recording import Recording
+
+# A servo motor of a kilowatt; without a torque a diagnosis uses the ratio of stiffness and mass alone.
+_INERTIA_KG_M2, _COULOMB_N_M, _VISCOUS_N_M_S_RAD = 1e-3, 0.1, 1e-3
+ASSUMED = "assumed: no torque is recorded, which would tell it"
+
+
+def plant_or_assumed(
+    recording: Recording, transmission: TransmissionValues | None, load_ratio: float | None
+) -> PlantValues:
+    """Values by `plant_values`; those of a usual motor, with errors as large, where two encoders are recorded alone."""
+    if recording.axis.torque in recording.columns or transmission is None:
+        return plant_values(recording, load_ratio)
+    inertia, viscous, coulomb = (
+        Estimate(value, value, ASSUMED) for value in (_INERTIA_KG_M2, _VISCOUS_N_M_S_RAD, _COULOMB_N_M)
+    )
+    return PlantValues(inertia, viscous, coulomb, Estimate(0.0, 0.0, ASSUMED), 0.0, None, None, None, 0.0)

@@ -22,7 +22,7 @@ from hil.identification.measured import Measured, take
 from hil.quantities import digits, misread_factors
 from hil.recording.recording import Recording
 
-SHORTEST_S = 2.0  # a motion there and back, and its settling
+SHORTEST_S = 0.8  # settling, and LEAST_MOVING_S of motion: a part of a recording of three seconds
 LEAST_TRAVEL_COUNTS = 50  # of the motor encoder: below, counting is 2 % of the motion
 LEAST_MOVING_S = 0.5  # a few hundred moving rows: below, the parameters are not determined
 # Nominal parameters may be wrong by a factor of three (`hil.identification.hypothesis`), wrong units exceed that.

@@ -5,36 +5,48 @@ from dataclasses import replace
 
 import numpy as np
 
+from hil.arrays import FloatArray
 from hil.recording.recording import Recording
 
-TRAINED = 2.0 / 3.0  # share of a recording for training if none is held out: a common split
+# Share of the motion before the cut, and whether the part after it is held out; the first that fits is taken. Two
+# thirds for training is a common split.
+CUTS = ((2.0 / 3.0, True), (1.0 / 3.0, False), (0.5, True), (0.5, False))
 _COVERED = 0.8  # least top speed in training over that held out: beyond, friction and inertia would be extrapolated
+_BOTH_WAYS = 0.1  # of the travel, forwards and backwards: less tells no lost motion and no load from friction
 _FIRST, _LAST = "first part", "last part"
+_STARTED = 0.01  # of the travel: above noise and drift of an axis at rest
+_LONG_REST = 0.2  # of the recording: a third keeps less than half of its motion
 _SPEED_S = 0.02  # time over which a speed is averaged: many counts of an encoder
 
 
 def split(recordings: Sequence[Recording]) -> tuple[list[Recording], list[Recording]]:
-    """Split each recording into two thirds for training and one third that is held out; both keep their time.
+    """Split each recording into a part of its motion for training and one that is held out, as `CUTS` order them.
 
-    The last third is held out, or the first one where only the last one is fast.
+    Both keep their time. The training part is as fast as the other, which moves both ways, where a cut makes it so.
     """
     train, rest = [], []
     for recording in recordings:
-        cut = _standstill(recording, round(TRAINED * len(recording)))
-        parts = _part(recording, slice(0, cut), _FIRST), _part(recording, slice(cut, None), _LAST)
-        if not _covers(*parts):
-            cut = _standstill(recording, round((1.0 - TRAINED) * len(recording)))
-            other = _part(recording, slice(cut, None), _LAST), _part(recording, slice(0, cut), _FIRST)
-            parts = other if _covers(*other) else parts
+        begin, end = _moving(recording)
+        travel = float(np.ptp(_position(recording)))
+        found = [_cut(recording, begin + round(share * (end - begin)), last) for share, last in CUTS]
+        fast = [parts for parts in found if _covers(*parts)] or found[:1]
+        parts = next((one for one in fast if _moves_both_ways(one[1], travel)), fast[0])
         train.append(parts[0])
         rest.append(parts[1])
     return train, rest
 
 
+def _cut(recording: Recording, row: int, last: bool) -> tuple[Recording, Recording]:
+    """Return the part for training and the one held out, cut at rest near a row; `last`: the last one is held out."""
+    cut = _standstill(recording, row)
+    parts = _part(recording, slice(0, cut), _FIRST), _part(recording, slice(cut, None), _LAST)
+    return parts if last else (parts[1], parts[0])
+
+
 def held_out_note(held_out: Sequence[Recording]) -> str:
     """Sentence on the parts that `split` holds out."""
     first = [one.name for one in held_out if one.name.endswith(f"({_FIRST})")]
-    text = "No held-out recording was given: the last third of each recording is used for validation"
+    text = "No held-out recording was given: the last part of each recording is used for validation"
     return f"{text}, but {', '.join(first)}, since only the rest reaches the full speed." if first else f"{text}."
 
 
@@ -45,17 +57,42 @@ def same(one: Recording, other: Recording) -> bool:
     )
 
 
+def _moving(recording: Recording) -> tuple[int, int]:
+    """First row and end of the motion, where a long rest before or after it would be most of a third."""
+    position = _position(recording)
+    away = np.abs(position - position[0]) > _STARTED * np.ptp(position)
+    back = np.abs(position - position[-1]) > _STARTED * np.ptp(position)
+    begin, rest = int(np.argmax(away)), int(np.argmax(back[::-1]))
+    return (begin, len(recording) - rest) if max(begin, rest) > _LONG_REST * len(recording) else (0, len(recording))
+
+
+def _position(recording: Recording) -> FloatArray:
+    """Position (n,) of the motor, or of the table without it; zeros without both."""
+    names = recording.axis
+    given = (recording.columns.get(name) for name in (names.motor_position, names.table_position))
+    return next((values for values in given if values is not None), np.zeros(len(recording)))
+
+
 def _covers(train: Recording, held_out: Recording) -> bool:
     """True if the training part is about as fast as the part that is held out."""
     return _top_speed(train) >= _COVERED * _top_speed(held_out)
 
 
+def _moves_both_ways(part: Recording, travel: float) -> bool:
+    """True if a part moves forwards and backwards by a share of the travel (in the unit of the position)."""
+    position = _position(part)
+    if not position.size:
+        return False
+    forwards = float(np.max(position - np.minimum.accumulate(position)))
+    backwards = float(np.max(np.maximum.accumulate(position) - position))
+    return min(forwards, backwards) > _BOTH_WAYS * travel
+
+
 def _top_speed(recording: Recording) -> float:
     """Largest speed of the motor, or of the table without it, averaged over some rows [1/s]."""
-    names = recording.axis
-    position = recording.columns.get(names.motor_position, recording.columns.get(names.table_position))
+    position = _position(recording)
     rows = max(round(_SPEED_S / recording.period_s), 1)
-    if position is None or position.size <= rows:
+    if position.size <= rows:
         return 0.0
     return float(np.max(np.abs(position[rows:] - position[:-rows]))) / (rows * recording.period_s)
 

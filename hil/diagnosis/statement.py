@@ -1,8 +1,7 @@
 """The verdict of a diagnosis as one sentence."""
 
+import math
 from collections.abc import Sequence
-
-import numpy as np
 
 from hil.diagnosis.result import Finding, FitFigures, Mode, Result, Verdict
 from hil.diagnosis.wording import title
@@ -36,15 +35,9 @@ def statement(result: Result) -> str:
             f"rms; the noise floor is {noise}."
         )
     if result.verdict is Verdict.PARAMETER_ERROR:
-        worst = sorted(
-            result.parameter_corrections.items(),
-            key=lambda item: -abs(np.log(max(item[1].value, 1e-300) / max(item[1].nominal, 1e-300))),
-        )
-        changes = ", ".join(
-            f"{name} {100.0 * (entry.value / entry.nominal - 1.0):+.1f} %"
-            for name, entry in worst[:3]
-            if entry.nominal > 0.0
-        )
+        shares = {name: one.value / one.nominal for name, one in result.parameter_corrections.items() if one.nominal}
+        worst = sorted(shares.items(), key=lambda item: -abs(math.log(max(item[1], 1e-300))))
+        changes = ", ".join(f"{name} {100.0 * (share - 1.0):+.1f} %" for name, share in worst[:3])
         if not changes:
             return "No physics is missing, but parameters of the bench file are wrong; this motion does not tell them."
         return f"No physics is missing; parameters of the bench file are wrong: {changes}."

@@ -10,6 +10,8 @@ from hil.quantities import digits, quantity
 from hil.twin.library import BY_ID
 from hil.twin.parameter import Parameter, Role
 
+_LITTLE = 0.01  # of the largest strength of a mechanism: a harmonic below is not told by its own value
+
 
 def title(effect: str) -> str:
     """Replace the underscores of an id by spaces: "constant_load" -> "constant load"."""
@@ -49,15 +51,20 @@ def unit_in(bench: Bench, parameter: Parameter) -> str:
 def sentence(term: Term, bench: Bench) -> str:
     """Describe a term in a sentence with its values, and its variant in brackets."""
     mechanism, axis = BY_ID[term.effect], bench.axis
-    values = {
-        parameter.name: quantity(value, unit_in(bench, parameter))
-        for parameter, value in zip(mechanism.parameters, term.values, strict=True)
-    }
+    variant = mechanism.variants[term.variant]
+    text, given = variant.sentence or mechanism.sentence, list(term.values)
+    if given[mechanism.strength] < 0.0 and mechanism.reversed and not variant.sentence:
+        text, given[mechanism.strength] = mechanism.reversed, -given[mechanism.strength]
+    values = {}
+    least = _LITTLE * max((abs(given[place]) for place in mechanism.indices(Role.STRENGTH)), default=0.0)
+    for parameter, value in zip(mechanism.parameters, given, strict=True):
+        little = parameter.role is Role.STRENGTH and abs(value) < least
+        told = quantity(least if little else value, unit_in(bench, parameter))
+        values[parameter.name] = f"less than {told}" if little else told
     order = mechanism.named(Role.ORDER, term.values)
     values["wave"] = "" if order is None else _wave(order, bench)
     values["viscous_speed"] = quantity(bench.axis.physics().viscous_speed, "m/s" if axis.linear else "rad/s")
-    variant = mechanism.variants[term.variant]
-    text = of_load(variant.sentence or mechanism.sentence, axis.turns).format(**values)
+    text = of_load(text, axis.turns).format(**values)
     return f"{text.removesuffix('.')} ({variant.name})." if variant.name else text
 
 

@@ -1,9 +1,12 @@
 """Coordinates of the parameter vector of a hypothesis: scales, bounds and steps of the forward difference."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from hil.bench.bench_file import MechanismEntry
+from hil.twin.library import BY_ID
 from hil.twin.parameter import Parameter, Role
 
 # Steps of the forward difference for the edges of a window: first wide, to reach the edge, at last one tick at 1 kHz.
@@ -28,7 +31,7 @@ class Coordinate:
     logarithmic: bool
     low: float
     high: float
-    parameter: Parameter | None = None  # of a mechanism; None for a nominal parameter
+    parameter: Parameter | None = None  # of a mechanism; None for one of the axis
 
     def value(self, x: float) -> float:
         """Physical value of x."""
@@ -52,3 +55,42 @@ class Coordinate:
     def edge(self) -> bool:
         """True for an instant at which a window begins or ends."""
         return self.role is Role.EDGE
+
+
+def coordinate_of(name: str, parameter: Parameter, start: float) -> Coordinate:
+    """The coordinate of a mechanism's parameter, scaled by its starting value."""
+    positive = parameter.low > 0.0
+    scale = start if positive else abs(start) or 1.0
+    return Coordinate(name, scale, positive, parameter.low, parameter.high, parameter)
+
+
+def known_values(entries: Sequence[MechanismEntry]) -> list[tuple[int, str, float]]:
+    """Index of the entry, name and value of each parameter that a bench file gives for its mechanisms, but for events.
+
+    In the order of the entries; of one entry in the order of its mechanism's parameters.
+    """
+    return [
+        (index, name, entry.parameters[name])
+        for index, entry in enumerate(entries)
+        for name in BY_ID[entry.effect].names
+        if name in entry.parameters and BY_ID[entry.effect].over_time is None
+    ]
+
+
+def known_coordinates(entries: Sequence[MechanismEntry]) -> tuple[Coordinate, ...]:
+    """Coordinates of `known_values`, named EFFECT.PARAMETER, of the second entry of an effect EFFECT_2.PARAMETER."""
+    found = []
+    for index, name, value in known_values(entries):
+        effect = entries[index].effect
+        number = sum(other.effect == effect for other in entries[: index + 1])
+        parameter = next(one for one in BY_ID[effect].parameters if one.name == name)
+        found.append(coordinate_of(f"{effect}_{number}.{name}" if number > 1 else f"{effect}.{name}", parameter, value))
+    return tuple(found)
+
+
+def with_values(entries: Sequence[MechanismEntry], values: Sequence[float]) -> tuple[MechanismEntry, ...]:
+    """The mechanisms of a bench file with other `known_values`."""
+    changed = [dict(entry.parameters) for entry in entries]
+    for (index, name, _), value in zip(known_values(entries), values, strict=True):
+        changed[index][name] = value
+    return tuple(entry.model_copy(update={"parameters": given}) for entry, given in zip(entries, changed, strict=True))

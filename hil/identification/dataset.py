@@ -13,6 +13,7 @@ from hil.errors import InputError
 from hil.identification.command_timing import unknown_share
 from hil.identification.measured import Measured
 from hil.identification.noise import Laps
+from hil.identification.rest import creeping
 from hil.twin.axis import Response, Start
 from hil.twin.stepping.loops import LEAST_TICKS
 
@@ -137,7 +138,7 @@ def scales(
             found[name] = np.sqrt(found[name] ** 2 + np.convolve(unknown**2, response**2)[: rows[0]])
     if run.noise.coarse:
         held = bench.axis.physics().coulomb_n_m * observer_s**2 / inertia(bench)
-        found["motor"] = np.hypot(found["motor"], np.where(run.creeping, held, 0.0))
+        found["motor"] = np.hypot(found["motor"], np.where(creeping(run), held, 0.0))
     return found
 
 

@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.signal import butter, filtfilt
+from scipy.signal import butter, sosfiltfilt
 
 from hil.arrays import FloatArray
 from hil.identification.dataset import Dataset, inertia
@@ -137,7 +137,7 @@ def held_on_motor(hypothesis: Hypothesis, run: Measured, observer_s: float) -> t
 def low_pass(values: FloatArray, period_s: float) -> FloatArray:
     """Low-pass values (n,) forwards and backwards; the corner is at most 0.4 of the sampling rate."""
     corner = min(2.0 * LOW_PASS_HZ * period_s, 0.8)
-    return np.asarray(filtfilt(*butter(LOW_PASS_ORDER, corner), values), dtype=np.float64)
+    return np.asarray(sosfiltfilt(butter(LOW_PASS_ORDER, corner, output="sos"), values), dtype=np.float64)
 
 
 def motion_channels(measured: Measured, position: FloatArray, simulated: FloatArray) -> list[Deviation]:

@@ -19,12 +19,12 @@ from functools import cached_property
 
 import numpy as np
 
-from hil.arrays import FloatArray
+from hil.arrays import FloatArray, SingleArray
 from hil.bench.bench_file import Bench
 from hil.identification.coordinates import EDGE_STEP_S
 from hil.identification.dataset import TORQUE_ACCURACY, Dataset, inertia
 from hil.identification.hypothesis import Hypothesis
-from hil.identification.levenberg_marquardt import broyden, damped_step, robust_loss
+from hil.identification.levenberg_marquardt import broyden, damped_step, normal_equations, robust_loss
 from hil.identification.noise_floor import FLOOR, noise_ratios
 from hil.identification.parallel import POOL
 from hil.identification.residuals import Residuals
@@ -192,7 +192,7 @@ class Estimator:
         """Steps (p,) of the forward differences."""
         return hypothesis.steps(self.data.travel_m, self.edge_step_s)
 
-    def jacobian(self, hypothesis: Hypothesis, held: FloatArray | None = None) -> FloatArray:
+    def jacobian(self, hypothesis: Hypothesis, held: FloatArray | SingleArray | None = None) -> FloatArray:
         """Derivative of the weighted residuals (m, p) by forward differences, columns in parallel.
 
         The first columns are `held` (m, k) if given.
@@ -219,15 +219,15 @@ class Estimator:
         *,
         soft: float = 0.0,
         evaluations: int = 30,
-        held: FloatArray | None = None,
-        slopes: FloatArray | None = None,
+        held: FloatArray | SingleArray | None = None,
+        slopes: FloatArray | SingleArray | None = None,
         fixed: Sequence[int] = (),
     ) -> Fit:
         """Fit all parameters of a hypothesis from its x with at most so many `evaluations`.
 
         `soft` > 0 is the residual above which the loss is linear. `held` (m, k) are derivatives by the first k
-        parameters that are kept constant, which saves simulations. `slopes` (m, p) is a first Jacobian from nearby. The
-        entries `fixed` of x keep their values.
+        parameters that are kept constant, which saves simulations. `slopes` (m, p) is a first Jacobian from nearby,
+        none if it is empty. The entries `fixed` of x keep their values.
         """
         low, high = hypothesis.bounds
         for index in fixed:
@@ -235,17 +235,14 @@ class Estimator:
         inside = np.clip(hypothesis.x, low, high)
         at = hypothesis if np.array_equal(inside, hypothesis.x) else hypothesis.moved(inside)
         residuals = self.residuals(at)
-        fresh = slopes is None
-        if slopes is None:
-            slopes = self.jacobian(at, held)
+        fresh = slopes is None or not slopes.size
+        slopes = self.jacobian(at, held) if slopes is None or fresh else slopes.astype(np.float64, order="F")
         damping, growth = _FIRST_DAMPING, 2.0
         size = np.zeros(at.x.size)
         used, converged = 1, False
         while used < evaluations and not self.expired:
             loss, weights = robust_loss(residuals.vector, soft)
-            weighted = slopes if weights is None else slopes * weights[:, None]
-            normal = weighted.T @ weighted
-            descent = weighted.T @ (residuals.vector if weights is None else residuals.vector * weights)
+            normal, descent = normal_equations(slopes, residuals.vector, weights)
             size = np.maximum(size, np.sqrt(np.diag(normal)))
             step = damped_step(normal, descent, damping, size, low - at.x, high - at.x)
             promised = -float(step @ (2.0 * descent + normal @ step))
@@ -253,6 +250,7 @@ class Estimator:
                 if fresh:
                     converged = True
                     break
+                del slopes
                 slopes, fresh = self.jacobian(at), True
                 continue
             moved = at.moved(at.x + step)
@@ -261,7 +259,8 @@ class Estimator:
             gained = loss - robust_loss(there.vector, soft)[0]
             if gained > 0.0:
                 fresh = held is not None or abs(gained / promised - 1.0) > _AGREES
-                slopes = slopes if fresh else broyden(slopes, there.vector - residuals.vector, step, size)
+                if not fresh:
+                    broyden(slopes, there.vector - residuals.vector, step, size)
                 at, residuals = moved, there
                 damping *= max(1.0 / 3.0, 1.0 - (2.0 * gained / promised - 1.0) ** 3)
                 growth = 2.0
@@ -269,6 +268,7 @@ class Estimator:
                 damping *= growth
                 growth *= 2.0
             if fresh == (gained > 0.0):  # after a failed step with a new Jacobian only the damping changes
+                del slopes
                 slopes, fresh = self.jacobian(at, held), True
                 if 0.0 < gained <= _LEAST_GAIN * loss:
                     converged = True

@@ -15,10 +15,22 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench, MechanismEntry
-from hil.identification.coordinates import CHATTER_STEP, DELAY, EDGE_STEP_S, MOST_DELAY, TRUST, Coordinate
+from hil.identification.coordinates import (
+    CHATTER_STEP,
+    DELAY,
+    EDGE_STEP_S,
+    MOST_DELAY,
+    TRUST,
+    Coordinate,
+    coordinate_of,
+    known_coordinates,
+    known_values,
+    with_values,
+)
 from hil.identification.dataset import FASTEST_OBSERVER_S, Dataset
 from hil.identification.measured import Measured
 from hil.identification.residuals import Residuals, differences
+from hil.identification.rest import resting
 from hil.identification.terms import Term, push_n, repeats
 from hil.twin.axis import COARSE_STEP_S, FINE_STEP_S, Response, Twin
 from hil.twin.library import BY_ID
@@ -50,7 +62,7 @@ class Hypothesis:
     bench: Bench
     terms: tuple[Term, ...] = ()
     x: FloatArray = field(default_factory=lambda: np.empty(0))
-    _known: dict[tuple[Dataset, bool, bool], Residuals] = field(default_factory=dict, init=False, repr=False)
+    _done: dict[tuple[Dataset, bool, bool], Residuals] = field(default_factory=dict, init=False, repr=False)
 
     def __post_init__(self) -> None:
         if not self.x.size:
@@ -104,8 +116,11 @@ class Hypothesis:
 
     @property
     def nominal(self) -> tuple[str, ...]:
-        """Names of the nominal parameters: of the axis, and the delay of the torque where the bench leaves it open."""
-        return self.bench.axis.NOMINAL if self.bench.torque_delay_s is None else (*self.bench.axis.NOMINAL, DELAY)
+        """Names of the nominal parameters: of the axis, of the delay of the torque where the bench leaves it open, and
+        of the bench's mechanisms (`known_coordinates`).
+        """
+        delay = () if self.bench.torque_delay_s is None else (DELAY,)
+        return (*self.bench.axis.NOMINAL, *delay, *(coordinate.name for coordinate in self._known))
 
     @property
     def free(self) -> int:
@@ -131,23 +146,34 @@ class Hypothesis:
         if DELAY in self.nominal:
             period_s = self.bench.period_s
             found.append(Coordinate(DELAY, period_s, False, -MOST_DELAY * period_s, MOST_DELAY * period_s))
+        found += self._known
         for index, term in enumerate(self.terms):
             for parameter, start in zip(BY_ID[term.effect].parameters, term.values, strict=True):
-                positive = parameter.low > 0.0
-                scale = start if positive else abs(start) or 1.0
-                found.append(
-                    Coordinate(f"{index}.{parameter.name}", scale, positive, parameter.low, parameter.high, parameter)
-                )
+                found.append(coordinate_of(f"{index}.{parameter.name}", parameter, start))
         return tuple(found)
 
     @cached_property
+    def _known(self) -> tuple[Coordinate, ...]:
+        return known_coordinates(self.bench.mechanisms)
+
+    @property
+    def given(self) -> list[float]:
+        """Nominal parameters (`nominal_count`,) as the bench has them."""
+        delay_s = self.bench.torque_delay_s
+        return [
+            *(float(getattr(self.bench.axis, name)) for name in self.bench.axis.NOMINAL),
+            *([] if delay_s is None else [delay_s]),
+            *(value for _, _, value in known_values(self.bench.mechanisms)),
+        ]
+
+    @cached_property
     def _initial(self) -> FloatArray:
-        starts = [float(getattr(self.bench.axis, name)) or None for name in self.bench.axis.NOMINAL]
-        starts += [self.bench.torque_delay_s] if DELAY in self.nominal else []
-        values = [*starts, *(value for term in self.terms for value in term.values)]
-        return np.array(
-            [c.x(c.scale if value is None else value) for c, value in zip(self.coordinates, values, strict=True)]
-        )
+        of_axis = len(self.bench.axis.NOMINAL)
+        starts = [
+            value or coordinate.scale for value, coordinate in zip(self.given[:of_axis], self.coordinates, strict=False)
+        ]
+        values = [*starts, *self.given[of_axis:], *(value for term in self.terms for value in term.values)]
+        return np.array([c.x(value) for c, value in zip(self.coordinates, values, strict=True)])
 
     @property
     def bounds(self) -> tuple[FloatArray, FloatArray]:
@@ -159,9 +185,10 @@ class Hypothesis:
         """Steps (p,) of x for forward differences."""
         step = CHATTER_STEP if self._chatters else 1e-4
         angle_rad = travel_m / self.bench.axis.ratio_m_rad * self.bench.axis.physics().angle_per_unit
-        starts = [value for term in self.terms for value in term.values]
-        found = [max(step, 1e-3) if name in ("damping_ratio", DELAY) else step for name in self.nominal]
-        for coordinate, start in zip(self.coordinates[self.nominal_count :], starts, strict=True):
+        of_axis = self.nominal_count - len(self._known)
+        found = [max(step, 1e-3) if name in ("damping_ratio", DELAY) else step for name in self.nominal[:of_axis]]
+        starts = [*self.given[of_axis:], *(value for term in self.terms for value in term.values)]
+        for coordinate, start in zip(self.coordinates[of_axis:], starts, strict=True):
             own = step
             if coordinate.role is Role.PERIOD:
                 own = 0.01 * start / (2.0 * np.pi * max(travel_m, start))
@@ -193,7 +220,11 @@ class Hypothesis:
         terms = tuple(
             replace(term, values=tuple(self.values[self.columns(index)])) for index, term in enumerate(self.terms)
         )
-        changed: dict[str, object] = {"axis": self.bench.axis.model_copy(update=nominal)}
+        known = self.values[self.nominal_count - len(self._known) : self.nominal_count]
+        changed: dict[str, object] = {
+            "axis": self.bench.axis.model_copy(update=nominal),
+            "mechanisms": with_values(self.bench.mechanisms, known),
+        }
         if DELAY in self.nominal:
             delay_s = self.values[len(self.bench.axis.NOMINAL)]
             changed["control"] = self.bench.control.model_copy(update={DELAY: delay_s})
@@ -204,14 +235,12 @@ class Hypothesis:
         """Mechanisms of the bench that no term replaces."""
         kept = []
         taken = [term.effect for term in self.terms]
-        for entry in self.bench.mechanisms:
+        for entry in self.resolved.bench.mechanisms:
             again = any(repeats(entry.active(), term) for term in self.terms)
             if not again and taken.count(entry.effect) < BY_ID[entry.effect].most:
                 kept.append(entry)
                 taken.append(entry.effect)
         return tuple(kept)
-
-    # --- simulation ---
 
     def twin(self, observer_s: float = FASTEST_OBSERVER_S, fast: bool = False, run: Measured | None = None) -> Twin:
         """The twin, with the time constant of its observer and the events of a run.
@@ -230,16 +259,21 @@ class Hypothesis:
         _ = self.bench.known_control  # raises
         return self.twin(run=run).simulate(run.position_command_m, run.velocity_command_m_s, run.start, run.table_m)
 
-    def blocks(self, run: Measured, observer_s: float, fast: bool = False) -> dict[str, FloatArray]:
-        """Measured less twin with each block fed measured inputs, per channel (n,); 0 for channels that are unseen."""
+    def blocks(
+        self, run: Measured, observer_s: float, fast: bool = False, rests: Measured | None = None
+    ) -> dict[str, FloatArray]:
+        """Measured less twin with each block fed measured inputs, per channel (n,); 0 for channels that are unseen.
+
+        The motor rests where it does in `rests`, by default in the run.
+        """
         twin = self.twin(observer_s, fast, run)
         measured = twin.undelayed(run.response)
         if DELAY in self.nominal:
             periods = (self.resolved.bench.torque_delay_s or 0.0) / run.period_s
             command, torque = (delayed_mean(values, periods) for values in (measured.torque_command, measured.torque))
             measured = measured._replace(torque_command=command, torque=torque)
-        resting = run.creeping if run.noise.coarse else None
-        predicted = twin.observe(run.position_command_m, run.velocity_command_m_s, measured, run.start, resting)
+        rest = resting(rests or run, twin.slow_velocity)
+        predicted = twin.observe(run.position_command_m, run.velocity_command_m_s, measured, run.start, rest)
         found = differences(measured, predicted, self.bench, run.judged)
         found["command"] = measured.torque_command - predicted.torque_command
         return found | {name: np.zeros(run.motor.size) for name in run.unseen}
@@ -247,8 +281,8 @@ class Hypothesis:
     def residuals(self, data: Dataset, closed: bool = False, fast: bool = False) -> Residuals:
         """Residuals on a data set, block by block or in closed loop; `fast`: with the steps of a search."""
         key = (data, closed, fast)
-        if key not in self._known:
-            self._known[key] = Residuals(
+        if key not in self._done:
+            self._done[key] = Residuals(
                 data,
                 tuple(
                     differences(run.response, self.respond(run), self.bench, run.judged)
@@ -257,7 +291,7 @@ class Hypothesis:
                     for run in data.runs
                 ),
             )
-        return self._known[key]
+        return self._done[key]
 
 
 def effects(terms: Sequence[Term]) -> list[tuple[str, int]]:

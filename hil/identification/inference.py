@@ -8,6 +8,7 @@ independent, and a small ripple is weighted by the residual density at its frequ
 estimated from the residual of the better hypothesis.
 """
 
+import math
 from collections.abc import Sequence
 from itertools import pairwise
 
@@ -42,9 +43,10 @@ def _prediction_error_filter(part: FloatArray) -> Filter:
 
 def whitened(values: FloatArray, splits: Sequence[int], filters: Sequence[Filter]) -> FloatArray:
     """Filter values (m,) or (m, k) part by part."""
-    return np.concatenate(
-        [lfilter(taps, [1.0], part, axis=0) for part, taps in zip(np.split(values, splits), filters, strict=True)]
-    )
+    found = np.empty_like(values)
+    for (begin, end), taps in zip(pairwise((0, *splits, len(values))), filters, strict=True):
+        found[begin:end] = lfilter(taps, [1.0], values[begin:end], axis=0)
+    return found
 
 
 def against(better: Fit, worse: Fit, filters: Sequence[Filter] | None = None) -> float:
@@ -124,7 +126,11 @@ def _with_covariance(part: FloatArray, columns: FloatArray) -> FloatArray:
 
 
 def sandwich(slopes: FloatArray, residuals: Residuals) -> FloatArray:
-    """Standard errors (k,) by the equation of `standard_errors` of k values with derivatives (m, k)."""
+    """Standard errors (k,) by the equation of `standard_errors` of k values with derivatives (m, k), without bounds."""
+    return _largest(_covariances(slopes, residuals))
+
+
+def _covariances(slopes: FloatArray, residuals: Residuals) -> list[FloatArray]:
     scale = np.linalg.norm(slopes, axis=0)
     scale[scale == 0.0] = 1.0
     slope = slopes / scale
@@ -135,9 +141,25 @@ def sandwich(slopes: FloatArray, residuals: Residuals) -> FloatArray:
     left = np.zeros_like(inverse)
     for part, own in zip(residuals.parts.values(), np.split(slope, residuals.splits), strict=True):
         left += own.T @ _with_covariance(part, own)
-    covariances = (inverse @ middle @ inverse for middle in (score.T @ score, left))
-    largest = np.maximum.reduce([np.diag(one) for one in covariances] + [np.zeros(scale.size)])
-    return np.asarray(_WIDENED * np.sqrt(largest) / scale, dtype=np.float64)
+    size = np.outer(scale, scale) / _WIDENED**2
+    return [inverse @ middle @ inverse / size for middle in (score.T @ score, left)]
+
+
+def _largest(covariances: Sequence[FloatArray]) -> FloatArray:
+    return np.asarray(np.sqrt(np.maximum.reduce([np.maximum(np.diag(one), 0.0) for one in covariances])))
+
+
+def _within(covariance: FloatArray, width: FloatArray) -> FloatArray:
+    """Covariance (k, k) given that the first parameters lie within bounds `width` (n,) apart.
+
+    The bounds count as an independent measurement with the variance of a uniform distribution, width^2 / 12.
+    """
+    number, known = width.size, np.maximum(width, 1e-12) / math.sqrt(12.0)
+    if not number:
+        return covariance
+    gain = covariance[:, :number] / known
+    both = covariance[:number, :number] / np.outer(known, known) + np.eye(number)
+    return np.asarray(covariance - gain @ np.linalg.solve(both, gain.T), dtype=np.float64)
 
 
 def standard_errors(found: Fit) -> list[float]:
@@ -148,11 +170,14 @@ def standard_errors(found: Fit) -> list[float]:
         B = sum over parts of  J^T C J,   C: autocovariance of the residual                     (Newey and West 1987)
 
     the larger of both, multiplied by `_WIDENED`. The second holds for residuals that are correlated over more than a
-    block. A controller replayed bit-identically leaves no noise; then the error is
+    block. Nominal parameters lie within their bounds: what is told only together with one, as a delay with that of the
+    recorded torque, is told to within these. A controller replayed bit-identically leaves no noise; then the error is
     1/100 of the step of the forward difference.
     """
-    errors = sandwich(found.jacobian, found.residuals)
     hypothesis = found.hypothesis
+    low, high = hypothesis.bounds
+    width = (high - low)[: hypothesis.nominal_count]
+    errors = _largest([_within(one, width) for one in _covariances(found.jacobian, found.residuals)])
     steps = found.estimator.steps(hypothesis)
     return [
         float(max(error, _LEAST * step) * (abs(value) if coordinate.logarithmic else abs(coordinate.scale)))

@@ -14,7 +14,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
-from scipy.ndimage import maximum_filter1d
 
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
@@ -30,7 +29,6 @@ from hil.twin.axis import Response, Start
 
 Channels = tuple[FloatArray, FloatArray, FloatArray, FloatArray]  # as control.replay takes them
 
-CREEP_S = 0.008  # time constant of the slowest observer
 SETTLE_S = 0.05  # not evaluated at the start: several time constants of the observer, for errors of the initial state
 SETTLE_IN_MOTION_S = 0.3  # modes of a machine axis have decayed
 _REPLAYED_ROWS = 200  # to find the phase of the position loop: many of its ticks
@@ -66,17 +64,6 @@ class Measured:
         The torque changes between them at a time that is not known: the mean is uniform between both values.
         """
         return np.asarray(np.abs(np.diff(self.torque_command, append=self.torque_command[-1])) / np.sqrt(12.0))
-
-    @cached_property
-    def creeping(self) -> NDArray[np.bool_]:
-        """Rows (n,) at which the motor passes less than a step of its recorded position within `CREEP_S`.
-
-        The state of friction is not known there: an observer may rest anywhere within the band in which friction holds
-        it.
-        """
-        rows = max(round(CREEP_S / self.period_s), 1)
-        passed = np.abs(np.convolve(np.gradient(self.motor), np.ones(rows), mode="same"))
-        return np.asarray(maximum_filter1d(passed < np.sqrt(12.0) * self.noise.motor, 8 * rows + 1), dtype=np.bool_)
 
     @property
     def time_s(self) -> FloatArray:

@@ -144,6 +144,6 @@ def _noise_amplification(hypothesis: Hypothesis, run: Measured, table: FloatArra
     The input of the table block is the measured motion of the motor: a lightly damped resonance amplifies its noise.
     """
     noise = run.motor_noise * np.random.default_rng(0).standard_normal(run.motor.size)
-    noisy = hypothesis.blocks(replace(run, motor=run.motor + noise), observer_s)["table"]
+    noisy = hypothesis.blocks(replace(run, motor=run.motor + noise), observer_s, rests=run)["table"]
     added = float(np.var((noisy - table)[run.judged]))
     return added - float(np.mean((hypothesis.bench.axis.ratio_m_rad * run.motor_noise[run.judged]) ** 2))

@@ -9,6 +9,7 @@ import numpy as np
 
 from hil.bench.bench_file import Bench
 from hil.errors import HilError
+from hil.identification.coordinates import DELAY
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Estimator, Fit, FitStatus
 from hil.identification.honest_refit import Figures, never_worse, rms_at_floor, rms_of_channels
@@ -84,11 +85,11 @@ def fit_nominal(data: Dataset, figures: Callable[[Hypothesis], Figures] | None =
     require_finite(found)
     refit = never_worse(found, figures or partial(rms_of_channels, data=data), rms_at_floor(data))
     found = refit.fit
-    axis = data.bench.axis
+    hypothesis = found.hypothesis
+    entries = zip(hypothesis.nominal, hypothesis.given, hypothesis.values, standard_errors(found), strict=False)
     parameters = tuple(
-        FittedParameter(name, float(getattr(axis, name)), value, error, name in found.at_bound)
-        for name, value, error in zip(  # a delay of the torque that is left open follows them
-            axis.NOMINAL, found.hypothesis.values, standard_errors(found), strict=False
-        )
+        FittedParameter(name, before, value, error, name in found.at_bound)
+        for name, before, value, error in entries
+        if name != DELAY
     )
     return FitResult(found.bench, parameters, found.status, refit.note)

@@ -9,6 +9,7 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.twin.library import BY_ID, LIBRARY
+from hil.twin.mechanism import Stage
 from hil.twin.parameter import Role
 from hil.twin.physics import Active
 
@@ -77,18 +78,28 @@ class Term:
 
 def push_n(terms: Sequence[Term], run: str, time_s: FloatArray, period_s: float) -> FloatArray:
     """Force on the table [N] of the events of a run, mean over each tick (n,); empty without events."""
-    forces = [
-        over_time(time_s, period_s, values)
-        for term in terms
-        if (over_time := BY_ID[term.effect].over_time) is not None
-        for values in term.windows_of(run)
-    ]
-    return np.sum(forces, axis=0) if forces else np.empty(0)
+    push = np.empty(0)
+    for term in terms:
+        over_time = BY_ID[term.effect].over_time
+        if over_time is None:
+            continue
+        for window in term.windows:
+            if window.run == run:
+                push = push if push.size else np.zeros(time_s.size)
+                start_s, end_s = term.edges(window)
+                rows = slice(*np.searchsorted(time_s, (start_s - period_s, end_s)))  # there may be hundreds of windows
+                push[rows] += over_time(time_s[rows], period_s, term.at(window))
+    return push
 
 
 def ambiguous(one: Term | Active) -> bool:
     """True for constant load and asymmetric Coulomb friction, which no motion distinguishes."""
     return one.effect in SAME and one.variant == 0
+
+
+def is_load(term: Term) -> bool:
+    """True for a force that does not depend on the speed: an event, a weight, a spring, gravity."""
+    return ambiguous(term) or BY_ID[term.effect].variants[term.variant].stage is Stage.TABLE_FORCE
 
 
 def repeats(one: Term | Active, other: Term | Active) -> bool:

@@ -2,13 +2,17 @@
 
 The answer of the axis to an edge is over before the next one, since each block forgets: one simulation with all starts
 shifted gives the derivatives by every start, each from the rows after it until the next (Curtis, Powell and Reid 1974).
-So an iteration costs three simulations however many windows there are.
+So an iteration costs three simulations however many windows there are, and the derivatives are a sparse matrix with
+three values in a row.
 """
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
+from itertools import product
 
 import numpy as np
+from scipy.sparse import csc_array
 
 from hil.arrays import FloatArray
 from hil.identification.coordinates import LAST_EDGE_STEP_S
@@ -21,6 +25,9 @@ from hil.twin.library import BY_ID
 
 _SHIFT_S = 0.01  # largest shift of an edge in one step: residuals are linear over an observer's time constant
 _FACTOR_STEP = 1e-3
+_SHIFTS_S = (0.01, 0.02, 0.05, 0.1, 0.2, 0.4)  # of an edge that are tried
+_BESIDE_S = 0.05  # rows beside a shifted edge: several time constants of the observer
+_SEEN = 9.0  # growth of the energy in units of noise^2: three standard errors
 _LEAST_GAIN = 1e-6  # relative to the cost, as for other fits
 
 
@@ -38,10 +45,12 @@ def fit_windows(found: Fit, evaluations: int = 8, others: bool = True) -> Fit:
     free = [column for column in range(at.x.size) if column not in range(at.x.size)[at.columns(index)]]
     free = free if others else []
     residuals, damping = estimator.residuals(at), 1e-3
-    size = np.zeros(0)
+    among = slopes.T @ slopes
     for _ in range(evaluations):
-        both = np.hstack([slopes, _window_slopes(estimator, at, index)])
-        normal, descent = both.T @ both, both.T @ residuals.vector
+        edges = _window_slopes(estimator, at, index)
+        across = edges.T @ slopes
+        normal = np.block([[among, across.T], [across, (edges.T @ edges).toarray()]])
+        descent = np.concatenate([slopes.T @ residuals.vector, edges.T @ residuals.vector])
         size = np.sqrt(np.diag(normal))
         low, high = _limits(at, len(inside), free)
         while damping < 1e6:
@@ -61,14 +70,49 @@ def fit_windows(found: Fit, evaluations: int = 8, others: bool = True) -> Fit:
 
 
 def window_errors(found: Fit, index: int) -> FloatArray:
-    """Standard errors (w, 3) of start, end and strength of the windows of a term in the runs of a fit."""
+    """Standard errors (w, 3) of start, end and strength of the windows of a term in the runs of a fit.
+
+    An edge at rest, where friction holds the force, may lie anywhere there: its error is at least `_free_shifts`.
+    """
     at = found.hypothesis.rebased
     inside = _inside(found.estimator, at.terms[index])
-    both = np.hstack([_other_slopes(found.estimator, at, index), _window_slopes(found.estimator, at, index)])
+    edges = _window_slopes(found.estimator, at, index).toarray()
+    both = np.hstack([_other_slopes(found.estimator, at, index), edges])
     errors = sandwich(both, found.residuals)[-3 * len(inside) :].reshape(3, -1).T
     term = at.resolved.terms[index]
     strength = abs(term.values[BY_ID[term.effect].strength])
+    errors[:, :2] = np.maximum(errors[:, :2], _free_shifts(found.estimator, at, index))
     return np.asarray(np.maximum(errors, [0.01 * LAST_EDGE_STEP_S] * 2 + [0.0]) * [1.0, 1.0, strength])
+
+
+def _free_shifts(estimator: Estimator, at: Hypothesis, index: int) -> FloatArray:
+    """Largest shifts (w, 2) [s] of start and end that worsen the residuals about them by less than `_SEEN`."""
+    term, inside = at.terms[index], _inside(estimator, at.terms[index])
+    base = estimator.residuals(at)
+    runs = {run.name: run for run in estimator.data.runs}
+    found = np.zeros((len(inside), 2))
+    for edge, sign in product((0, 1), (-1.0, 1.0)):
+        free = np.ones(len(inside), dtype=bool)
+        for shift_s in (sign * size_s for size_s in _SHIFTS_S):
+            later = (shift_s, 0.0) if edge == 0 else (0.0, shift_s)
+            moved = estimator.residuals(_with(at, index, partial(_later, by_s=later)))
+            for place, number in enumerate(inside):
+                window = term.windows[number]
+                run, at_s = runs[window.run], term.edges(window)[edge]
+                span_s = min(at_s, at_s + shift_s) - _BESIDE_S, max(at_s, at_s + shift_s) + _BESIDE_S
+                rows = slice(*np.searchsorted(run.time_s[run.judged], span_s))
+                change = sum(
+                    float(np.sum(part[rows] ** 2 - base.parts[key][rows] ** 2))
+                    for key, part in moved.parts.items()
+                    if estimator.data.runs[key[0]] is run
+                )
+                free[place] &= change < _SEEN
+            found[free, edge] = np.maximum(found[free, edge], abs(shift_s))
+    return found
+
+
+def _later(_: int, window: Window, by_s: tuple[float, float]) -> Window:
+    return window._replace(later_s=window.later_s + by_s[0], end_later_s=window.end_later_s + by_s[1])
 
 
 def _event(found: Fit) -> int | None:
@@ -97,19 +141,19 @@ def _with(at: Hypothesis, index: int, change: Callable[[int, Window], Window]) -
     return Hypothesis(at.bench, terms, at.x)
 
 
-def _window_slopes(estimator: Estimator, at: Hypothesis, index: int) -> FloatArray:
+def _window_slopes(estimator: Estimator, at: Hypothesis, index: int) -> csc_array:
     """Derivatives (m, 3 w) by starts, ends and factors of the windows in the runs of the data."""
     term, inside = at.terms[index], _inside(estimator, at.terms[index])
     base = estimator.residuals(at)
     runs = estimator.data.runs
-    times = [(run.name, run.time_s[run.judged]) for run, _ in ((runs[run], name) for run, name in base.parts)]
+    times = [(runs[run].name, runs[run].time_s[runs[run].judged]) for run, _ in base.parts]
     step = LAST_EDGE_STEP_S
     changes: tuple[tuple[float, Callable[[int, Window], Window], int], ...] = (
         (step, lambda _, one: one._replace(later_s=one.later_s + step), 0),
         (step, lambda _, one: one._replace(end_later_s=one.end_later_s + step), 1),
         (_FACTOR_STEP, lambda _, one: one._replace(factor=one.factor + _FACTOR_STEP), 0),
     )
-    slopes = np.zeros((base.vector.size, 3 * len(inside)))
+    values, rows, columns = [np.zeros(0)], [np.zeros(0, dtype=np.intp)], [np.zeros(0, dtype=np.intp)]
     for kind, (size, change, edge) in enumerate(changes):
         change_of = (estimator.residuals(_with(at, index, change)).vector - base.vector) / size
         begin = 0
@@ -119,15 +163,15 @@ def _window_slopes(estimator: Estimator, at: Hypothesis, index: int) -> FloatArr
                 for place, number in enumerate(inside)
                 if term.windows[number].run == name
             )
-            if not own:
-                begin += time_s.size
-                continue
-            starts = np.searchsorted(time_s, [at_s - 2.0 * step for at_s, _ in own])
-            for (_, place), first, last in zip(own, starts, [*starts[1:], time_s.size], strict=True):
-                rows = slice(begin + first, begin + last)
-                slopes[rows, kind * len(inside) + place] = change_of[rows]
+            if own:
+                first = np.searchsorted(time_s, [at_s - 2.0 * step for at_s, _ in own])
+                places = np.array([place for _, place in own])
+                rows.append(begin + np.arange(first[0], time_s.size))
+                columns.append(kind * len(inside) + np.repeat(places, np.diff([*first, time_s.size])))
+                values.append(change_of[rows[-1]])
             begin += time_s.size
-    return slopes
+    triplets = np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))
+    return csc_array(triplets, shape=(base.vector.size, 3 * len(inside)))
 
 
 def _limits(at: Hypothesis, count: int, free: list[int]) -> tuple[FloatArray, FloatArray]:

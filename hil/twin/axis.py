@@ -98,6 +98,11 @@ class Twin:
         arrays.constants["any_active"] |= self.push_n.size > 0
         return arrays
 
+    @property
+    def slow_velocity(self) -> float:
+        """Speed of the motor [rad/s, m/s] below which it rests for the observer of the table."""
+        return float(self._arrays[0][0]["slow_velocity"])
+
     @cached_property
     def loop_gains(self) -> cascade.Gains:
         """Gains, with the velocity filter of an active mechanism."""
@@ -163,7 +168,7 @@ class Twin:
         setpoints = loops.Setpoints(position_command_m, velocity_command_m_s)
         if resting is None:
             passed = np.abs(np.diff(measured.motor_position, prepend=measured.motor_position[:1]))
-            resting = passed <= self._arrays[0][0]["slow_velocity"] * self.gains.period_s
+            resting = passed <= self.slow_velocity * self.gains.period_s
         channels = loops.observe(
             self.loop_gains,
             self._controller(start),

@@ -137,6 +137,8 @@ class Mechanism:
     starts: Callable[[Scene], Points] | None = None  # parameter values at which a search begins
     typical: Callable[[AxisFacts], tuple[float, ...]] | None = None  # values that an engineer calls a defect
     valid: Callable[[Sequence[float], int, AxisFacts], bool] | None = None  # (values, variant, axis): name applies
+    # id and values of the mechanism that it is where its values are not valid, of (values, axis); without: none
+    beyond: Callable[[Sequence[float], AxisFacts], tuple[str, tuple[float, ...]]] | None = None
     proportional: bool = True  # the change is proportional to the strength
     neutral_at_zero: bool = True  # without effect where the strength is zero
     neutral: Callable[[AxisFacts], float] | None = None  # strength without effect, if it is finite and not 0
@@ -145,6 +147,7 @@ class Mechanism:
     # force on the table [N], mean over each tick that begins at times (n,) [s], of (times, period, values): an event of
     # the recording in which it is found, not expected in another one
     over_time: Callable[[FloatArray, float, Sequence[float]], FloatArray] | None = None
+    reversed: str = ""  # sentence of a negative strength, which it gives without the sign; without: `sentence`
     repeated: str = ""  # sentence of several such events; may also name count
     periodic: str = ""  # sentence of several at equal intervals; may also name count, width and period
     softens: bool = False  # changes the stiffness of a spring of the chain
@@ -154,6 +157,7 @@ class Mechanism:
     same_as: str = ""  # id of a less common cause whose first variant is the same torque as this one's
     hidden_starts: tuple[tuple[float, ...], ...] = ()  # starts where refitted springs hide it; the first value is in
     # units of the largest stretch of the transmission
+    beside: str = ""  # id of a mechanism without which this one is seldom seen: fitted together if it leaves more
     picture: Picture = Picture.TIME
 
     @property

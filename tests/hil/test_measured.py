@@ -5,11 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from diagnosis_runs import bench, recorded
+from scipy.signal import lfilter
 
 from hil.errors import InputError
 from hil.identification.dataset import prepare_dataset
 from hil.identification.measured import take
-from hil.identification.noise import _jitter_s, white_noise
+from hil.identification.noise import _jitter_s, _of_drive, white_noise
+from hil.identification.rest import resting
 
 PERIOD_S = 1e-3
 
@@ -84,3 +86,30 @@ def test_a_torque_without_noise_has_that_of_its_digits_and_one_of_zero_is_refuse
     zero.columns["torque_command_n_m"] = zero["torque_n_m"]
     with pytest.raises(InputError, match="torque: given 0 throughout"):
         prepare_dataset([take(zero, bench())], bench())
+
+
+@pytest.mark.parametrize("late_rows", [0, 3])
+def test_the_noise_of_a_torque_leaves_out_delay_lag_and_gain(late_rows: int) -> None:
+    rng = np.random.default_rng(4)
+    command = np.cumsum(rng.normal(0.0, 0.1, 8000))
+    command -= np.linspace(0.0, command[-1], command.size)
+    answer = lfilter([0.3], [1.0, -0.7], 0.95 * np.r_[np.full(late_rows, command[0]), command][: command.size])
+    noise = _of_drive(command, answer + rng.normal(0.0, 0.02, command.size))
+    assert noise == pytest.approx(0.02, rel=0.05)
+
+
+def test_rest_is_seen_beside_the_noise_of_the_encoder() -> None:
+    """At 1 kHz the noise moves the motor by 40 mrad/s from row to row, the axis rests below 2 mrad/s."""
+    owner = bench()
+    quiet = take(recorded(owner), owner)
+    rng = np.random.default_rng(5)
+    noisy = replace(
+        quiet,
+        motor=quiet.motor + rng.normal(0.0, 3e-5, quiet.motor.size),
+        noise=replace(quiet.noise, motor=3e-5),
+    )
+    still, seen = resting(quiet, 0.02), resting(noisy, 0.002)
+    assert 0.0 < np.mean(still) < 1.0
+    assert np.mean(seen[still]) > 0.9
+    fast = np.abs(np.gradient(quiet.motor)) > 0.05 * quiet.period_s
+    assert not seen[fast].any()

@@ -18,7 +18,7 @@ from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.inference import against
 from hil.identification.measured import Measured
-from hil.identification.terms import Term, Window
+from hil.identification.terms import Term, Window, is_load
 from hil.identification.window_fit import fit_windows, window_errors
 from hil.twin.library import BY_ID, LIBRARY
 from hil.twin.parameter import Role
@@ -81,15 +81,19 @@ def detect(found: Fit) -> list[Event]:
     ]
 
 
-def beside_events(nominal: Fit, found: Fit) -> Fit:
-    """Fit the nominal parameters beside the events of another fit: what permanent terms are measured against.
+def beside_loads(nominal: Fit, found: Fit) -> Fit:
+    """Fit the nominal parameters beside the loads of another fit (events, weight, spring, gravity): what the other
+    terms are measured against. A load does not move with the speed, so nothing that it leaves is friction.
 
-    Returns `nominal` without events.
+    Returns `nominal` without loads.
     """
-    index = _index(found)
-    if index is None:
+    loads = [term for term in found.terms if is_load(term)]
+    if not loads:
         return nominal
-    return nominal.estimator.fit(nominal.hypothesis.with_term(found.terms[index]), evaluations=6)
+    hypothesis = nominal.hypothesis
+    for term in loads:
+        hypothesis = hypothesis.with_term(term)
+    return nominal.estimator.fit(hypothesis, evaluations=6)
 
 
 def revised(found: Fit) -> Fit:

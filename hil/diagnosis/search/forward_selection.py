@@ -6,54 +6,32 @@ that are no longer needed are removed: a first term may have imitated two causes
 
 import math
 import time
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
 
-from hil.diagnosis.search.events import beside_events, constant_inside, revised
-from hil.diagnosis.search.initial_values import claimable
-from hil.diagnosis.search.restart import from_owner, may_hide, unbent
+from hil.diagnosis.search.events import beside_loads, revised
+from hil.diagnosis.search.initial_values import axis_facts, claimable
+from hil.diagnosis.search.next_term import CLEAR, MATERIAL, MOST, NEEDED, Progress, gain, next_term
 from hil.diagnosis.search.score_test import Candidate, screen_library
-from hil.diagnosis.search.successive_halving import race
 from hil.identification.coordinates import LAST_EDGE_STEP_S
 from hil.identification.dataset import Dataset
-from hil.identification.estimator import Fit
+from hil.identification.estimator import Fit, FitStatus
 from hil.identification.hypothesis import effects
 from hil.identification.inference import against, whitening
-from hil.identification.noise_floor import REPEATS, unrepeated
 from hil.identification.nominal_fit import fit_nominal_parameters, require_finite
 from hil.identification.parallel import in_parallel
-from hil.identification.terms import FRICTION, Key, Term
+from hil.identification.terms import FRICTION, Key, Term, compatible, free_slot
 from hil.twin.library import BY_ID
-
-Progress = Callable[[str], None]
+from hil.twin.physics import Active
 
 MOST_TERMS = 8  # at once: more than an engineer can act on; limits the duration of a search
-# BIC differences. "Very strong" evidence is 10 (Kass and Raftery 1995); the search looks at some 45 variants at some
-# 90 starts, which costs 2 log 90 = 9 more.
-NEEDED = 20.0
-TIED = 10.0  # a rival closer than this is not refuted
-# Ablation fits stop early when the cost without the term is > 1.43 x (1 / 0.7) the cost with it; others are iterated to
-# convergence. A term that removes less may be the remainder of a hidden effect, which restarts look for.
-_CLEAR = 0.7
-# Least energy that a term removes per row, in units of noise^2: 14 % of the noise in rms. The model discrepancy of two
-# simulations of one axis is below that.
-MATERIAL = 0.02
-# Energy above the noise floor per row, in units of noise^2, below which nothing is left to explain: half of MATERIAL.
-_NOTHING = 0.5 * MATERIAL
-# Least share of the energy above the noise that a term removes: many terms of less are a series expansion of another
-# effect.
-WORTH = 0.02
-# Terms that together leave more than this share of the energy above the floor do not explain the mismatch. After
-# `_IN_VAIN` such terms the search ends.
-MOST, _IN_VAIN = 0.5, 3
+TIED = 10.0  # BIC difference: a rival closer than this is not refuted. "Very strong" evidence (Kass and Raftery 1995)
+# After this many terms that leave more than `MOST` of the energy above the floor the search ends.
+_IN_VAIN = 3
+_NEAR = 1.1  # cost over that of the chosen explanation, up to which the fit of a rival is ended before it is compared
 _ENDED = 40  # evaluations: a fit that starts near its minimum converges within them
-# Share of the energy that a term removed from a channel, 1/20 in rms, below which the remainder may be due to another
-# form of the same law and not to a second mechanism.
-FORM = 0.0025
-
 # Difference in energy per row up to which a rival is not refuted, whatever the evidence: a quarter of MATERIAL, 7 % of
 # the noise in rms. The model discrepancy of two simulations of one axis is as large.
 ALIKE = 0.25 * MATERIAL
@@ -129,8 +107,8 @@ def explain(data: Dataset, progress: Progress = lambda text: None, deadline_s: f
             break
         candidates = screen_library(base)
         first = first or candidates
-        reference = beside_events(nominal, base)
-        found, best = _next_term(base, owner, nominal, reference, candidates, step)
+        reference = beside_loads(nominal, base)
+        found, best = next_term(base, owner, nominal, reference, candidates, step)
         fitted = {fit.terms[-1].effect for fit in found if not base.estimator.expired}
         if best is None:
             break
@@ -139,6 +117,7 @@ def explain(data: Dataset, progress: Progress = lambda text: None, deadline_s: f
         if not best.jacobian.size:  # only evaluated so far, since the fitted ones were rejected
             best = replace(best.estimator, edge_step_s=LAST_EDGE_STEP_S).fit(best.hypothesis)
         filters = whitening(best)
+        found = [ended(one) if one.cost < _NEAR * best.cost else one for one in found]
         rivals[best.terms[-1].key] = sorted(
             (RivalFit.of(one, against(best, one, filters), (one.cost - best.cost) / base.rows) for one in found),
             key=lambda rival: rival.evidence,
@@ -165,61 +144,6 @@ def explain(data: Dataset, progress: Progress = lambda text: None, deadline_s: f
     return Explanation(owner, nominal, final, rivals, needed, tuple(first), stopped_at, not_tried)
 
 
-def _next_term(
-    base: Fit, owner: Fit, nominal: Fit, reference: Fit, candidates: Sequence[Candidate], step: Progress
-) -> tuple[list[Fit], Fit | None]:
-    """Fit the base with one more term; return the fits and the first one with sufficient evidence, if any.
-
-    `reference` is the nominal fit beside the events of the base.
-    """
-    bits = 1.0 - float(np.exp(-NEEDED / base.rows))  # share of white residuals whose removal gives evidence of NEEDED
-    promising = [one for one in candidates if one.share > bits and one.share * base.cost > MATERIAL * base.rows]
-    found: list[Fit] = []
-    if promising:
-        step("fitting " + ", ".join(one.term.effect for one in promising[:3]))
-        found = _claimable(race(base, promising))
-    best = _worthwhile(found, base, reference)
-    unfinished = (best is None or best.cost > _CLEAR * base.cost) and not base.estimator.expired
-    if unfinished and not owner.at_floor and base.excess > _NOTHING * base.rows and may_hide(base):
-        step("fitting a lost preload from the springs of the bench file")
-        found = sorted([*found, unbent(base)], key=lambda other: other.cost)
-        best = _worthwhile(found, base, reference)
-    if best is None and not base.at_floor and base.excess > MOST * nominal.excess and not base.estimator.expired:
-        step("searching again beside the parameters of the bench file")
-        found = _claimable(from_owner(base))
-        best = _worthwhile(found, base, reference)
-    return found, best
-
-
-def _claimable(found: Sequence[Fit]) -> list[Fit]:
-    return [other for other in found if claimable(other.terms[-1], other.bench, other.data.runs)]
-
-
-def _worthwhile(found: Sequence[Fit], base: Fit, nominal: Fit) -> Fit | None:
-    """Return the first fit whose last term has evidence and material energy, repeats over laps, and is well formed."""
-    enough = max(MATERIAL * base.rows, WORTH * base.excess)
-    differs = unrepeated(base.hypothesis, base.data)
-    return next(
-        (
-            other
-            for other in found
-            if against(other, base) >= NEEDED
-            and gain(base, other, nominal) >= enough
-            and REPEATS * unrepeated(other.hypothesis, other.data) <= differs
-            and constant_inside(other)
-        ),
-        None,
-    )
-
-
-def gain(without: Fit, found: Fit, nominal: Fit) -> float:
-    """Energy that a term removes, by channel, less the share that may be due to the form of the terms before it."""
-    parts = (fit.residuals.parts.values() for fit in (without, found, nominal))
-    return sum(
-        max(float(a @ a - b @ b) - FORM * max(float(n @ n - a @ a), 0.0), 0.0) for a, b, n in zip(*parts, strict=True)
-    )
-
-
 def _simplest(tied: list[Fit]) -> Fit:
     """Return the explanation with the fewest parameters of those that the evidence does not separate.
 
@@ -235,15 +159,42 @@ def _without(found: Fit, index: int) -> Fit:
     return found.estimator.fit(found.hypothesis.without(index), evaluations=6, slopes=slopes)
 
 
+def ended(found: Fit) -> Fit:
+    """The fit, continued if it ran out of steps: only then its cost refutes it."""
+    return found.refit(_ENDED, slopes=found.jacobian) if found.status is FitStatus.OUT_OF_STEPS else found
+
+
 def claimed(found: Fit) -> Fit:
-    """Remove the terms whose values are not valid for their mechanism."""
+    """Remove the terms whose values are not valid for their mechanism; where these are another's, that takes its place.
+
+    A spring that rests out of reach is a weight.
+    """
     while True:
         terms, bench, runs = found.terms, found.bench, found.data.runs
         lost = next((index for index, term in enumerate(terms) if not claimable(term, bench, runs)), None)
         if lost is None:
             return found
-        rest = _without(found, lost)
-        found = rest.refit(_ENDED, slopes=rest.jacobian)
+        other = _beyond(found, lost)
+        if other is None:
+            rest = _without(found, lost)
+            found = rest.refit(_ENDED, slopes=rest.jacobian)
+        else:
+            found = found.estimator.fit(found.hypothesis.replaced(lost, other), evaluations=_ENDED)
+
+
+def _beyond(found: Fit, index: int) -> Term | None:
+    """The mechanism that a term is outside of its own valid values; None if it cannot stand beside the others."""
+    term, mechanism = found.terms[index], BY_ID[found.terms[index].effect]
+    if mechanism.beyond is None:
+        return None
+    others: list[Term | Active] = [
+        *found.terms[:index],
+        *found.terms[index + 1 :],
+        *(entry.active() for entry in found.hypothesis.kept),
+    ]
+    effect, values = mechanism.beyond(term.values, axis_facts(found.bench, found.data.runs))
+    other = Term(effect, 0, values, slot=free_slot(effect, found.terms))
+    return other if compatible([*others, other]) else None
 
 
 def _pruned(found: Fit, nominal: Fit) -> tuple[Fit, dict[Key, float]]:
@@ -251,7 +202,7 @@ def _pruned(found: Fit, nominal: Fit) -> tuple[Fit, dict[Key, float]]:
 
     def ablated(index: int) -> tuple[float, Fit]:
         other = _without(found, index)
-        if found.cost > _CLEAR * other.cost:
+        if found.cost > CLEAR * other.cost:
             other = other.refit(_ENDED, slopes=other.jacobian)
         return against(found, other, filters), other
 

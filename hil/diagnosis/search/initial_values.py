@@ -30,8 +30,8 @@ from hil.twin.scene import AxisFacts, Scene
 class StartPoint:
     """Parameter values of one variant, and the indices of strength and phase (-1: no phase).
 
-    There are `harmonics` consecutive pairs of strength and phase. Without a phase, strengths are counted from the
-    `known` strength of the bench. With `instead`, the start replaces a mechanism of the bench.
+    There are `harmonics` consecutive pairs of strength and phase. With `instead`, the start replaces another variant of
+    a mechanism of the bench.
     """
 
     effect: str
@@ -40,7 +40,6 @@ class StartPoint:
     strength: int = 0
     phase: int = -1
     harmonics: int = 1
-    known: float = 0.0  # strength of the same mechanism in the bench
     instead: bool = False
     windows: tuple[Window, ...] = ()
 

@@ -7,12 +7,15 @@ of the mismatch remains, the library is screened again at the parameters of the 
 A nut without preload is softer within its gap. A refit of other springs in series and of their damping absorbs most of
 that, and the local score test finds no descent direction. So preload loss is fitted from the springs of the bench file.
 With a single spring it is equal to a softer spring.
+
+Some mechanisms are seldom alone: a table with play stays where it is by its own friction, and without it coasts through
+the gap. Each of the two alone fits worse than a wrong one, so they are fitted together (`Mechanism.beside`).
 """
 
 from dataclasses import replace
 from functools import partial
 
-from hil.diagnosis.search.initial_values import stretches
+from hil.diagnosis.search.initial_values import axis_facts, stretches
 from hil.diagnosis.search.score_test import screen_library
 from hil.diagnosis.search.successive_halving import LONG, SEARCH_ACCURACY, owner_points, race
 from hil.identification.coordinates import LAST_EDGE_STEP_S
@@ -21,7 +24,7 @@ from hil.identification.estimator import Fit
 from hil.identification.nominal_fit import SOFT
 from hil.identification.parallel import in_parallel
 from hil.identification.terms import Term, compatible
-from hil.twin.library import LIBRARY
+from hil.twin.library import BY_ID, LIBRARY
 
 _EFFECT, _STARTS = next((mechanism.id, mechanism.hidden_starts) for mechanism in LIBRARY if mechanism.hidden_starts)
 _FIRST, _SECOND = 8, 20  # evaluations: a fit starts farther from its minimum than those of a race
@@ -34,6 +37,26 @@ def from_owner(base: Fit) -> list[Fit]:
     owner = base.estimator.evaluate(base.hypothesis.moved(owner_points(base)[-1]))
     promising = screen_library(owner)
     return race(owner, promising) if promising else []
+
+
+def companion(base: Fit, found: Fit) -> Term | None:
+    """The mechanism to fit together with the last term of a fit; None without one that the base can take."""
+    effect = BY_ID[found.terms[-1].effect].beside
+    if not effect:
+        return None
+    term = Term(effect, 0, BY_ID[effect].typical_values(axis_facts(base.bench, base.data.runs)))
+    known = [entry.active() for entry in base.hypothesis.kept]
+    return term if compatible((*found.terms, term, *known)) else None
+
+
+def together(base: Fit, found: Fit, other: Term) -> list[Fit]:
+    """Fit mechanisms like the last term of a fit beside another term, from the parameters of the bench; best first."""
+    owner = base.hypothesis.moved(owner_points(base)[0]).with_term(other)
+    beside = base.estimator.fit(owner, evaluations=_SECOND, fixed=range(owner.nominal_count))
+    likely = [
+        one for one in screen_library(beside) if BY_ID[one.term.effect].beside == other.effect and one.share > 0.0
+    ]
+    return race(beside, likely) if likely else []
 
 
 def may_hide(base: Fit) -> bool:

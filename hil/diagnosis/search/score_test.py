@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import qr
 
 from hil.arrays import FloatArray
 from hil.diagnosis.search.events import detect, event_term
@@ -68,7 +69,7 @@ def _view(base: Fit, white: bool) -> _View:
     if filters is not None and slopes.size:
         slopes = whitened(slopes, residuals.splits, filters)
     weights = np.concatenate([_weights(part) for part in residuals.split(seen)])
-    nuisance, _ = np.linalg.qr(weights[:, None] * slopes)
+    nuisance, _ = qr(weights[:, None] * slopes, mode="economic", overwrite_a=True, check_finite=False)
     residual = weights * seen
     return _View(weights, nuisance, residual - nuisance @ (nuisance.T @ residual), residuals.splits, filters)
 
@@ -89,7 +90,7 @@ def screen_library(base: Fit) -> list[Candidate]:
     residuals = hypothesis.residuals(base.data)
     known = scene(base.data.runs, base.bench, residuals.channels, base.data.observer_s)
     points = [
-        _from_known(start, hypothesis)
+        _beside_known(start, hypothesis)
         for start in (*starts(known, hypothesis.bench, base.data.runs), *_events(base))
         if offered(start.term(), hypothesis, terms)
     ]
@@ -132,20 +133,22 @@ def _events(base: Fit) -> list[StartPoint]:
 
 
 def offered(new: Term, hypothesis: Hypothesis, terms: Sequence[Term]) -> bool:
-    """True if a mechanism is compatible with the terms; it replaces mechanisms of the bench that it repeats."""
+    """True if a mechanism is compatible with the terms, and is none of the bench's, whose values are fitted already.
+
+    It may replace another variant of a mechanism of the bench.
+    """
     known = [entry.active() for entry in hypothesis.kept]
+    fitted = BY_ID[new.effect].over_time is None
+    if fitted and any(repeats(new, other) and new.variant == other.variant for other in known):
+        return False
     return compatible((*terms, new, *(other for other in known if not repeats(new, other))))
 
 
-def _from_known(start: StartPoint, hypothesis: Hypothesis) -> StartPoint:
-    """Count the strength of a start from that of the mechanism of the bench that it replaces, if any."""
+def _beside_known(start: StartPoint, hypothesis: Hypothesis) -> StartPoint:
+    """Mark a start that replaces a mechanism of the bench."""
     new = start.term()
-    taken = [entry.active() for entry in hypothesis.kept if repeats(new, entry.active())]
-    if start.strength < 0 or not taken:
-        return start
-    if start.phase >= 0 or taken[0].variant != start.variant:
-        return replace(start, instead=True)
-    return replace(start, known=taken[0].values[start.strength])
+    replaces = start.strength >= 0 and any(repeats(new, entry.active()) for entry in hypothesis.kept)
+    return replace(start, instead=replaces)
 
 
 def _tuned(base: Fit, best: Candidate, views: Sequence[_View]) -> Candidate:
@@ -213,9 +216,7 @@ def _pairs(start: StartPoint) -> list[tuple[int, int]]:
 def _directions(start: StartPoint) -> list[tuple[float, ...]]:
     """Parameter values that span the effect of a start: its strength, or sine and cosine of each harmonic."""
     if start.phase < 0:
-        values = list(start.values)
-        values[start.strength] += start.known
-        return [tuple(values)]
+        return [start.values]
     found = []
     for strength, phase in _pairs(start):
         for angle in (0.0, np.pi / 2.0):
@@ -242,5 +243,5 @@ def _scaled(start: StartPoint, coefficients: FloatArray) -> tuple[float, ...]:
             wanted = max(wanted, smallest)
         elif abs(wanted) < smallest:
             wanted = smallest
-        values[strength] = min(max(start.known + wanted, parameter.low), parameter.high)
+        values[strength] = min(max(wanted, parameter.low), parameter.high)
     return tuple(values)

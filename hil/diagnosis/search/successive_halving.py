@@ -6,10 +6,11 @@ Losing candidates are not converged; only their ranking is used.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from hil.arrays import FloatArray
+from hil.arrays import FloatArray, SingleArray
 from hil.bench.bench_file import Bench
 from hil.diagnosis.search.initial_values import likenesses, observable
 from hil.diagnosis.search.score_test import Candidate, offered
@@ -24,6 +25,8 @@ from hil.identification.parallel import POOL, in_parallel
 from hil.identification.terms import Term, compatible
 from hil.identification.window_fit import fit_windows
 from hil.twin.library import BY_ID
+
+_Item = TypeVar("_Item")
 
 # Torque accuracy of the motor channel in a search: its higher weight makes the cost of stick-slip smoother.
 SEARCH_ACCURACY = 0.2
@@ -74,6 +77,18 @@ def owner_points(base: Fit) -> list[FloatArray]:
     return [owner, hidden]
 
 
+class _FirstFit(NamedTuple):
+    """A first fit without its Jacobian, its derivatives `own` (m, q) by the last term, and those of the base, shared.
+
+    A forward difference has fewer digits than single precision, and these derivatives of a long recording take most
+    of the memory of a diagnosis.
+    """
+
+    fit: Fit
+    own: SingleArray
+    held: SingleArray
+
+
 @dataclass(frozen=True, eq=False)
 class _Race:
     """One race: a base, its candidates, and the data shared by their fits."""
@@ -92,23 +107,24 @@ class _Race:
         return owner_points(self.base)
 
     @cached_property
-    def derivatives(self) -> dict[tuple[float, ...], FloatArray]:
+    def derivatives(self) -> dict[tuple[float, ...], SingleArray]:
         """Jacobian of the base by the point at which it was taken."""
         points = (self.base.hypothesis.x, *self.owner)
-        return {tuple(x): self.search.jacobian(self.base.hypothesis.moved(x)) for x in points}
+        return {tuple(x): self.search.jacobian(self.base.hypothesis.moved(x)).astype(np.float32) for x in points}
 
     def run(self) -> list[Fit]:
         """Return the best fit of each mechanism, best first."""
         self.derivatives  # noqa: B018  computed before the threads start
         started = in_parallel([partial(self._first_fit, one) for one in self.candidates])
         # the best so far, and the first of the score test, which may converge slowly
-        better = sorted(started, key=lambda fit: fit.cost)[:_CONTINUED]
-        second = in_parallel([partial(self._second_fit, fit) for fit in _unique([*started[:2], *better])])
+        better = sorted(started, key=lambda one: one.fit.cost)[:_CONTINUED]
+        second = in_parallel([partial(_second_fit, fit) for fit in _unique([*started[:2], *better])])
         del started, better  # derivatives of long recordings take much memory
         ranked = sorted(second, key=lambda fit: fit.cost)
         leader = _finish(ranked[0])
         others = [fit for fit in _unique([*second[:2], *ranked[:_FINISHED]]) if fit is not ranked[0]]
         results = [leader, *self._followers(leader, ranked[0], others)]
+        del second, ranked, others
         best = min(results, key=lambda fit: fit.cost)
         if not self.search.expired:
             results += [*self._variants(best), *self._equivalents(best)]
@@ -119,7 +135,7 @@ class _Race:
                 found[effect] = fit
         return sorted(found.values(), key=lambda fit: fit.cost)
 
-    def _first_fit(self, candidate: Candidate) -> Fit:
+    def _first_fit(self, candidate: Candidate) -> _FirstFit:
         """Fit a candidate briefly with the derivatives of the base, at the base or at the bench's parameters.
 
         The first candidates also start with the variant preferred by the score test: another variant may have a lower
@@ -132,16 +148,13 @@ class _Race:
             if begun[0].terms[-1].variant != candidate.term.variant:
                 same = tuple(term for term in candidate.others if term.variant == candidate.term.variant)
                 begun.append(self._best_start(replace(candidate, others=same), here))
-        fits = [
-            self.search.fit(
-                start.hypothesis,
-                soft=SOFT,
-                evaluations=_FIRST,
-                held=self.derivatives[tuple(start.hypothesis.x[: here.size])],
-            )
-            for start in begun
-        ]
-        return min(fits, key=_soft)
+        fits = []
+        for start in begun:
+            held = self.derivatives[tuple(start.hypothesis.x[: here.size])]
+            fit = self.search.fit(start.hypothesis, soft=SOFT, evaluations=_FIRST, held=held)
+            own = fit.jacobian[:, here.size :].astype(np.float32)
+            fits.append(_FirstFit(replace(fit, jacobian=fit.jacobian[:, :0].copy()), own, held))
+        return min(fits, key=lambda one: _soft(one.fit))
 
     def _best_start(self, candidate: Candidate, x: FloatArray) -> Fit:
         """Return the start of a candidate with the least cost at x."""
@@ -153,9 +166,6 @@ class _Race:
     def _owner_start(self, candidate: Candidate) -> Fit:
         """Return the best start of a candidate at the parameters of the bench."""
         return min((self._best_start(candidate, x) for x in self.owner), key=_soft)
-
-    def _second_fit(self, fit: Fit) -> Fit:
-        return fit.refit(SECOND, soft=SOFT, slopes=fit.jacobian)
 
     def _followers(self, leader: Fit, before: Fit, others: Sequence[Fit]) -> list[Fit]:
         """Evaluate the second fits, and converge those with a cost near that of the leader.
@@ -204,6 +214,14 @@ class _Race:
 
     def _gain(self, fit: Fit) -> float:
         return self.base.cost - fit.cost
+
+
+def _second_fit(first: _FirstFit) -> Fit:
+    fit, slopes = first.fit, np.hstack([first.held, first.own])
+    found = fit.estimator.fit(fit.hypothesis, evaluations=SECOND, soft=SOFT, slopes=slopes)
+    if found.terms[-1].windows:  # a new Jacobian costs a simulation for each edge
+        return found
+    return replace(found, jacobian=found.jacobian[:, :0].copy())  # few fits are continued, and memory is dear
 
 
 def _fit_fast_first(last: Estimator, hypothesis: Hypothesis) -> Fit:
@@ -255,6 +273,6 @@ def _soft(fit: Fit) -> float:
     return robust_loss(fit.residuals.vector, SOFT)[0]
 
 
-def _unique(fits: Sequence[Fit]) -> list[Fit]:
-    """Each fit once, in order."""
-    return list({id(fit): fit for fit in fits}.values())
+def _unique(items: Sequence[_Item]) -> list[_Item]:
+    """Each item once, in order."""
+    return list({id(item): item for item in items}.values())

@@ -4,8 +4,7 @@
 
 Both hypotheses are fitted to the training recordings, so that the gain has no penalty for parameters. Repeated motion
 is a second test: a term whose effect differs from lap to lap must reduce the measured differences between laps. A term
-also falls if its strength is within its standard error, or if a channel of a training recording is worse with it than
-without it or with the bench file.
+also falls if its strength is within its standard error, or if it worsens a channel of a training recording, see `harm`.
 """
 
 from dataclasses import dataclass
@@ -14,20 +13,18 @@ from functools import partial
 import numpy as np
 
 from hil.diagnosis.search.forward_selection import TIED, claimed
+from hil.diagnosis.search.harm import refuting
 from hil.diagnosis.search.initial_values import axis_facts
 from hil.diagnosis.verdict.fit_table import channel_names
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.inference import against, standard_errors
-from hil.identification.noise_floor import FLOOR, REPEATS, unrepeated
+from hil.identification.noise_floor import REPEATS, unrepeated
 from hil.identification.parallel import in_parallel
 from hil.identification.terms import Term
 from hil.twin.library import BY_ID
 from hil.twin.parameter import Role
 
-# Growth of the mean square of a channel, 10 % in rms, from which a term harms it: less is a trade between channels
-# within the model discrepancy.
-WORSE = 1.1**2
 _ACTS = 0.1  # least change of the held-out residual per row, over that in training, from which a term acts there
 
 
@@ -162,15 +159,9 @@ def _clear(found: Fit) -> list[bool]:
 
 
 def _worse(found: Fit, without: Fit, owner: Fit) -> tuple[str, ...]:
-    """Channels that are above their noise in a training recording, and worse with a term than without or by the bench
-    file: there the fit pays with this channel for another."""
-    names = {
-        channel
-        for ratios, *others in zip(found.noise_ratios, without.noise_ratios, owner.noise_ratios, strict=True)
-        for channel, ratio in ratios.items()
-        if ratio > max(FLOOR, WORSE * min(other[channel] for other in others))
-    }
-    return tuple(sorted(channel_names(found.bench, found.data.runs[0])[name] for name in names))
+    """Names of the channels by which a term is refuted."""
+    names = channel_names(found.bench, found.data.runs[0])
+    return tuple(sorted(names[channel] for channel in refuting(found, without, owner)))
 
 
 def _gain(found: Fit, without: Fit) -> float:

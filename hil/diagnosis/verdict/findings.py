@@ -17,6 +17,7 @@ from hil.diagnosis.verdict.cross_validation import Ablation
 from hil.diagnosis.verdict.event_windows import describe_event
 from hil.diagnosis.verdict.judge import confidence
 from hil.diagnosis.wording import sentence, title, unit_in
+from hil.identification.coordinates import DELAY
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.inference import standard_errors
@@ -96,14 +97,21 @@ def corrections(owner: Bench, found: Fit) -> dict[str, Correction]:
     """Nominal parameters of the bench file and as fitted; without a torque only the damping of the transmission.
 
     Motion alone gives the ratio of stiffness and mass, and nothing of the motor side. A parameter that ended at the
-    bound of the allowed range, or was left as it is, has no correction.
+    bound of the allowed range, or was left as it is, has no correction. Values of the
+    bench's mechanisms are among them.
     """
-    deviations = standard_errors(found)
-    told = ("damping_ratio",) if any("motor" in run.unseen for run in found.data.runs) else owner.axis.NOMINAL
+    hypothesis = found.hypothesis
+    told = ("damping_ratio",) if any("motor" in run.unseen for run in found.data.runs) else hypothesis.nominal
+    entries = zip(hypothesis.given, hypothesis.coordinates, hypothesis.values, standard_errors(found), strict=False)
     return {
-        name: Correction(nominal=float(getattr(owner.axis, name)), value=value, std=std, unit=unit_of(name))
-        for name, value, std in zip(owner.axis.NOMINAL, found.hypothesis.values, deviations, strict=False)
-        if name in told and name not in found.at_bound and not math.isclose(value, getattr(owner.axis, name))
+        one.name: Correction(
+            nominal=before,
+            value=value,
+            std=std,
+            unit=unit_of(one.name) if one.parameter is None else unit_in(owner, one.parameter),
+        )
+        for before, one, value, std in entries
+        if one.name in told and one.name not in (*found.at_bound, DELAY) and not math.isclose(value, before)
     }
 
 

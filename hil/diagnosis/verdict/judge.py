@@ -21,8 +21,8 @@ from dataclasses import replace
 import numpy as np
 
 from hil.diagnosis.result import Verdict
-from hil.diagnosis.search.forward_selection import MATERIAL, MOST, NEEDED
 from hil.diagnosis.search.initial_values import axis_facts, judged, observable
+from hil.diagnosis.search.next_term import MATERIAL, MOST, NEEDED
 from hil.diagnosis.verdict.cross_validation import explained_share
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from hil.arrays import FloatArray
-from hil.diagnosis.search.forward_selection import MATERIAL
 from hil.diagnosis.search.initial_values import StartPoint, starts
+from hil.diagnosis.search.next_term import MATERIAL
 from hil.diagnosis.search.score_test import Candidate, screen_library
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hil.arrays import FloatArray
-from hil.diagnosis.search.forward_selection import MATERIAL
+from hil.diagnosis.search.next_term import MATERIAL
 from hil.identification.measured import Measured
 from hil.proof.peers.case import PeerCase
 from hil.proof.peers.terms import MAKERS, Effects

@@ -17,7 +17,7 @@ from scipy.signal import correlate
 from scipy.stats import norm
 
 from hil.arrays import FloatArray
-from hil.diagnosis.search.forward_selection import MATERIAL
+from hil.diagnosis.search.next_term import MATERIAL
 from hil.identification.measured import Measured
 from hil.proof.peers.case import PeerCase
 from hil.proof.peers.regressors import Equation, equations

@@ -31,6 +31,7 @@ MECHANISM = Mechanism(
     block=Block.MOTOR_SIDE,
     element="ball nut, seals and guideways",
     sentence="Friction in positive direction is {offset_torque_n_m} above the mean of both directions.",
+    reversed="Friction in positive direction is {offset_torque_n_m} below the mean of both directions.",
     equation="T_f = Fc sign(v) + T_0; at rest T_0 - Fc <= T_f <= T_0 + Fc; with speed: T_0 |v| / v_r, v_r = Fc / c",
     source="Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30 (1994) 1083, direction dependence; its "
     "slope over speed differs by direction too: Armstrong-Hélouvry, Control of Machines with Friction (1991)",

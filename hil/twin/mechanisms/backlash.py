@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from numba import njit
 
 from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, Stage, Variant
+from hil.twin.mechanisms import table_side_friction
 from hil.twin.parameter import Dimension, Parameter, Role
 from hil.twin.scene import AxisFacts
 
@@ -44,6 +45,7 @@ MECHANISM = Mechanism(
     valid=_valid,
     proportional=False,
     needs_table=True,
+    beside=table_side_friction.MECHANISM.id,
     picture=Picture.LOST_MOTION,
     softens=True,
 )

@@ -60,6 +60,7 @@ MECHANISM = Mechanism(
     block=Block.SENSOR,
     element="time stamps of a channel",
     sentence="The channel is recorded {delay_s} late against the others.",
+    reversed="The channel is recorded {delay_s} early against the others.",
     equation="y_recorded(t) = y(t - delay)",
     source="Laakso et al., IEEE Signal Processing Magazine 13 (1996) 30, fractional delay",
     parameters=(Parameter("delay_s", Dimension.TIME, -0.01, 0.01, role=Role.STRENGTH),),

@@ -17,6 +17,7 @@ MECHANISM = Mechanism(
     block=Block.TRANSMISSION,
     element="ball screw",
     sentence="The lead is wrong: the table goes {slope_m_m} too far for each metre of travel.",
+    reversed="The lead is wrong: the table goes {slope_m_m} too little for each metre of travel.",
     equation="x = (1 + s) r theta",
     source="ISO 3408-3:2006, mean travel deviation",
     parameters=(Parameter("slope_m_m", Dimension.RATIO, -5e-3, 5e-3, role=Role.STRENGTH),),

@@ -31,7 +31,7 @@ MECHANISM = Mechanism(
     id="external_force",
     block=Block.TABLE,
     element="surroundings of the table",
-    sentence="From {start_s} to {end_s} a force of {force_n} pushes the table in positive direction.",
+    sentence="From {start_s} to {end_s} a force of {force_n} acts on the table (positive forwards).",
     equation="F_table = F for start <= t < end, else 0",
     source="Newton's second law; such as the pneumatic cylinder that loads the table of the source's test bench",
     parameters=(
@@ -44,8 +44,8 @@ MECHANISM = Mechanism(
     typical=lambda a: (0.2 * a.friction / a.ratio, 0.5 * a.duration_s, 0.5 * a.duration_s + 1.0),
     over_time=_pushes,
     picture=Picture.FORCE,
-    repeated="In {count} windows from {start_s} to {end_s} forces of up to {force_n} push the table in positive "
-    "direction.",
-    periodic="From {start_s} to {end_s} a force of {force_n} pushes the table in positive direction {count} times, for "
+    repeated="In {count} windows from {start_s} to {end_s} forces of up to {force_n} act on the table (positive "
+    "forwards).",
+    periodic="From {start_s} to {end_s} a force of {force_n} (positive forwards) acts on the table {count} times, for "
     "{width_s} every {period_s}.",
 )

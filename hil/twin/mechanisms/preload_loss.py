@@ -5,8 +5,11 @@ from collections.abc import Sequence
 from numba import njit
 
 from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, Stage, Variant
+from hil.twin.mechanisms import table_side_friction
 from hil.twin.parameter import Dimension, Parameter, Role
 from hil.twin.scene import AxisFacts
+
+_PLAY = 0.05  # stiffness left below which the zone is play: a nut that has lost its preload keeps a tenth to a half
 
 
 @njit
@@ -20,8 +23,8 @@ def _soft_zone(value: float, at: Moment, parameters: Row, memory: Row) -> float:
 
 
 def _valid(values: Sequence[float], variant: int, axis: AxisFacts) -> bool:
-    """Check that the transmission leaves the zone: a wider one is a softer spring."""
-    return values[0] <= axis.lost_m
+    """Check that the transmission leaves the zone, and that a spring is left in it: else it is softer, or has play."""
+    return values[0] <= axis.lost_m and values[1] >= _PLAY
 
 
 MECHANISM = Mechanism(
@@ -43,8 +46,8 @@ MECHANISM = Mechanism(
     valid=_valid,
     proportional=False,
     needs_table=True,
+    beside=table_side_friction.MECHANISM.id,
     picture=Picture.LOST_MOTION,
     softens=True,
-    # a nut that has lost its preload keeps a tenth to a half of its stiffness
     hidden_starts=((1.0, 0.15), (1.0, 0.4), (0.5, 0.15)),
 )

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from numba import njit
 
 from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, Stage, Variant
+from hil.twin.mechanisms.constant_load import MECHANISM as LOAD
 from hil.twin.parameter import Dimension, Parameter, Role
 from hil.twin.scene import AxisFacts, Scene
 
@@ -44,5 +45,6 @@ MECHANISM = Mechanism(
     starts=_starts,
     typical=lambda a: (0.5 * a.friction / a.ratio, 0.0),
     valid=_valid,
+    beyond=lambda values, a: (LOAD.id, (-values[0] * values[1] * a.ratio,)),
     picture=Picture.POSITION,
 )

@@ -9,7 +9,7 @@ import pytest
 from diagnosis_runs import bench, evaluated, recorded
 
 from hil.bench.bench_file import Bench, MechanismEntry, load_bench
-from hil.diagnosis.search import forward_selection
+from hil.diagnosis.search import next_term
 from hil.diagnosis.search.forward_selection import explain
 from hil.diagnosis.search.restart import from_owner, may_hide, unbent
 from hil.diagnosis.search.score_test import screen_library
@@ -82,7 +82,7 @@ def test_where_a_screen_beside_the_refit_finds_nothing_the_owners_values_are_sea
     base = fit_nominal_parameters(prepare_dataset([run], owner))
     first = from_owner(base)[0]
     assert first.cost < 1.1 * base.rows < 0.1 * base.cost
-    monkeypatch.setattr(forward_selection, "race", lambda base, candidates: [])
+    monkeypatch.setattr(next_term, "race", lambda base, candidates: [])
     (spring,) = explain(prepare_dataset([run], owner)).terms
     assert spring.effect == "spring_load"
     assert spring.values == pytest.approx(pulled.values, rel=0.02)

@@ -107,7 +107,18 @@ def test_edges_and_forces_of_all_windows_are_fitted_together() -> None:
     first, second = windows(found)
     assert first == pytest.approx((0.5, 0.7, 150.0), rel=1e-3)
     assert second == pytest.approx((0.95, 1.25, -75.0), rel=1e-3)
-    assert window_errors(found, 0).shape == (2, 3)
+    errors = window_errors(found, 0)
+    assert errors.shape == (2, 3)
+    assert errors[:, :2].max() < EDGE_S
+
+
+def test_an_edge_of_a_force_that_nothing_shows_may_lie_anywhere() -> None:
+    found = fit_windows(recorded_twice(), 20)
+    (term,) = found.hypothesis.terms
+    weak = replace(term, windows=(term.windows[0], term.windows[1]._replace(factor=1e-6)))
+    errors = window_errors(found.estimator.evaluate(found.hypothesis.replaced(0, weak)), 0)
+    assert errors[0, :2].max() < EDGE_S
+    assert errors[1, :2].min() >= 0.4
 
 
 def test_windows_alone_leave_the_other_parameters() -> None:

@@ -106,6 +106,15 @@ def test_the_fast_moves_are_in_training(slow_first: Recording) -> None:
     assert held_out_note([held_out]).endswith("validation.")
 
 
+def test_the_part_held_out_moves_both_ways() -> None:
+    """A third is one slow feed: friction and a load would be one offset in it."""
+    feeds = moved([(0.15, 0.02), (0.15, 0.06)])
+    (train,), (held_out,) = split([feeds])
+    position = held_out["motor_position_m"]
+    assert np.max(position) - position[-1] > 0.1 * np.ptp(position)
+    assert len(train) > 0.4 * len(feeds)
+
+
 def test_friction_that_varies_is_no_wrong_sign() -> None:
     """On a slow move the force follows the cogging, not the acceleration; of a wrong sign friction is negative."""
     slow = moved([(0.15, 0.06)])

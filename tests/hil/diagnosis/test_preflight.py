@@ -61,7 +61,7 @@ def test_the_regression_finds_inertia_and_friction(run: Recording) -> None:
 
 
 def test_too_short(run: Recording) -> None:
-    assert "too short: given 1 s, allowed 2 s" in refused(part(run, slice(0, 1000)))
+    assert "too short: given 0.7 s, allowed 0.8 s" in refused(part(run, slice(0, 700)))
 
 
 def test_no_recording() -> None:

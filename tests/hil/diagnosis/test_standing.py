@@ -19,7 +19,7 @@ from hil.diagnosis.verdict.findings import corrections
 from hil.diagnosis.verdict.refit import reported_refit
 from hil.identification.dataset import Dataset
 from hil.identification.hypothesis import Hypothesis
-from hil.identification.inference import standard_errors
+from hil.identification.inference import _within, standard_errors
 from hil.identification.measured import take
 from hil.identification.terms import Term
 from hil.recording.recording import Recording
@@ -173,3 +173,16 @@ def test_the_late_encoder_of_a_robot_axis_is_found_and_nothing_else() -> None:
     assert motor.train.before_rms <= motor.train.owner_rms
     assert max(motor.train.before_rms, motor.train.owner_rms or 0.0) < 1e-4  # it was 6e39 rad
     assert result.torque_left is not None
+
+
+def test_bounds_of_a_nominal_parameter_tell_what_is_confounded_with_it() -> None:
+    """Only the sum of two values is known, to 0.1; the first lies within bounds 1.2 apart."""
+    known, width = 0.1, 1.2
+    unknown = 1e4
+    covariance = np.array([[unknown, -unknown], [-unknown, unknown + known**2]])
+    within = _within(covariance, np.array([width]))
+    assert within[0, 0] == pytest.approx(width**2 / 12.0, rel=1e-4)
+    assert within[1, 1] == pytest.approx(width**2 / 12.0 + known**2, rel=1e-4)
+    precise = np.diag([1e-6, 2e-6])
+    assert _within(precise, np.array([width])) == pytest.approx(precise, rel=1e-4, abs=1e-12)
+    assert np.array_equal(_within(precise, np.zeros(0)), precise)

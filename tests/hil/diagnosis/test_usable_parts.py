@@ -49,7 +49,7 @@ def test_the_usable_parts_are_taken_and_the_others_named() -> None:
 
 
 def test_the_parts_are_diagnosed_as_recordings_of_one_axis() -> None:
-    prepared = prepare_diagnosis([cut((ROWS // 2, ROWS // 2 + 300))], [], BENCH)
+    prepared = prepare_diagnosis([cut((1800, 2100), (3900, ROWS))], [], BENCH)
     assert [run.name for run in prepared.train.runs] == ["cut (part 1)"]
     assert [run.name for run in prepared.held_out.runs] == ["cut (part 2)"]
     assert any("gaps in time" in note for note in prepared.notes)
@@ -57,13 +57,13 @@ def test_the_parts_are_diagnosed_as_recordings_of_one_axis() -> None:
 
 
 def test_of_a_long_part_a_third_is_held_out_and_a_short_one_is_trained_on() -> None:
-    prepared = prepare_diagnosis([cut((2500, 2700))], [], BENCH)
+    prepared = prepare_diagnosis([cut((1800, 2000))], [], BENCH)
     assert [run.name for run in prepared.train.runs] == ["cut (part 2) (first part)", "cut (part 1)"]
     assert [run.name for run in prepared.held_out.runs] == ["cut (part 2) (last part)"]
 
 
 def test_a_recording_of_short_parts_is_refused_with_the_reason() -> None:
-    starts = range(1000, ROWS, 1000)
+    starts = range(700, ROWS, 900)
     with pytest.raises(InputError, match=r"none usable: cut \(part \d+\): too short"):
         usable_parts([cut(*((start, start + 200) for start in starts))], BENCH, to_split=True)
 

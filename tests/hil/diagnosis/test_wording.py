@@ -1,0 +1,31 @@
+"""Sentences of findings."""
+
+import pytest
+
+from hil.bench.bench_file import load_bench
+from hil.diagnosis.wording import sentence
+from hil.identification.terms import Term
+from hil.twin.library import LIBRARY
+
+
+def test_a_negative_delay_is_early() -> None:
+    bench = load_bench("reference")
+    for delay_s, said in ((-7.45e-6, "7.45 µs early"), (7.45e-6, "7.45 µs late")):
+        text = sentence(Term("channel_time_skew", 0, (delay_s,)), bench)
+        assert text.startswith(f"The channel is recorded {said}")
+
+
+@pytest.mark.parametrize("mechanism", [one for one in LIBRARY if one.reversed], ids=lambda one: one.id)
+def test_the_sentence_of_a_negative_strength_has_the_same_values(mechanism) -> None:
+    values = [0.5 * parameter.high for parameter in mechanism.parameters]
+    forwards = sentence(Term(mechanism.id, 0, tuple(values)), load_bench("reference"))
+    values[mechanism.strength] *= -1.0
+    backwards = sentence(Term(mechanism.id, 0, tuple(values)), load_bench("reference"))
+    assert forwards != backwards
+    assert len(set(forwards.split()) ^ set(backwards.split())) <= 3
+    assert "-" not in backwards
+
+
+def test_a_harmonic_far_below_the_largest_is_told_by_its_bound() -> None:
+    text = sentence(Term("periodic_lead_error", 0, (7e-6, 0.0, 1e-9, 0.0, 3e-7, 0.0)), load_bench("reference"))
+    assert "by 7.00 µm once, less than 0.0700 µm twice and 0.300 µm three times" in text

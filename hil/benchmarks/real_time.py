@@ -1,0 +1,82 @@
+"""The loop with its simulated axis by the wall clock, beside cyclictest on the same core and a busy process on each.
+
+    python -m hil.benchmarks.real_time [--rates 250,1000] [--seconds 600] [--no-busy]
+
+The whole loop is measured: bus, drive, encoders, controller, twin, supervision and recorder; the simulated devices are
+in its process. cyclictest has a lower priority than the loop and wakes at other times: it meets the same disturbances,
+may wait for a tick of the loop, and never delays it. A missed cycle is a period or more late.
+"""
+
+import os
+import tempfile
+from contextlib import ExitStack, nullcontext
+from functools import partial
+from typing import Annotated
+
+import typer
+
+from hil.benchmarks.diagnosis import repeated
+from hil.loop.latency import Latencies, Reference, cyclictest, load
+from hil.loop.realtime import PRIORITY, loop_core
+from hil.loop.run import run_profile
+from hil.loop.simulated_bench import load_simulated
+from hil.proof.draw.demo import PROVE
+from hil.recording.recording import read_recording
+from hil.report.console import err, out, table
+
+# as slow as a loop of 250 Hz allows: those of the reference bench are for a velocity loop of 1 kHz
+_GAINS = {"position_gain_1_s": 15.0, "velocity_gain_ma_rpm": 10.0, "velocity_integral_time_ms": 30.0}
+
+
+def measure(
+    rates: Annotated[str, typer.Option(help="Rates of the loop [Hz], with commas.")] = "250,1000",
+    seconds: Annotated[float, typer.Option(help="Duration at each rate [s].")] = 600.0,
+    busy: Annotated[bool, typer.Option(help="Keep every core busy with an ordinary process.")] = True,
+) -> None:
+    """Print lateness, missed cycles, page faults and collections of the loop, and cyclictest's latencies."""
+    rows, said = list[tuple[str, ...]](), list[str]()
+    with load() if busy else nullcontext(0) as processes:
+        for rate_hz in (float(rate) for rate in rates.split(",")):
+            err.print(
+                f"{seconds:g} s at {rate_hz:g} Hz beside {processes} busy processes, load {os.getloadavg()[0]:.1f} ..."
+            )
+            ended, loop, reference, certificate = _run(rate_hz, seconds)
+            rows += [_row(f"loop, {rate_hz:g} Hz", loop, 1.0 / rate_hz)]
+            rows += [_row("cyclictest", reference, 1.0 / rate_hz)] if reference is not None else []
+            counts = ", ".join(f"{name.replace('_', ' ')} {value}" for name, value in certificate.items())
+            said.append(f"{rate_hz:g} Hz: {ended}; {counts}")
+    table(("", "ticks", "missed", "p50", "p99.9", "largest"), rows)
+    for line in said:
+        out.print(line)
+
+
+def _run(rate_hz: float, seconds: float) -> tuple[str, Latencies, Latencies | None, dict[str, int]]:
+    """Ending, lateness of the loop's ticks, of cyclictest, and what disturbed the loop between arming and its end."""
+    period_s = 1.0 / rate_hz
+    bench = load_simulated("reference")
+    periods = {"position_period_s": period_s, "velocity_period_s": period_s}
+    bench = bench.model_copy(update={"control": bench.control.model_copy(update=periods | _GAINS)})
+    profile = repeated(PROVE, seconds, period_s)
+    with tempfile.TemporaryDirectory() as folder:
+        with ExitStack() as stack:
+            beside = partial(cyclictest, period_s, seconds, loop_core(), PRIORITY - 1)
+            started = list[Reference]()
+            result = run_profile(
+                bench, profile, folder, "run", force=True,
+                planned=lambda _: started.append(stack.enter_context(beside())),
+            )  # fmt: skip
+        assert result.recording is not None
+        recording = read_recording(result.recording)
+    certificate = recording.metadata["real_time"]["run"]
+    counted = {name: certificate[name] for name in ("skipped", "page_faults", "preemptions", "collections", "threads")}
+    ended = f"{result.outcome.ending}: {result.outcome.reason}"
+    return ended, Latencies.of(recording["lateness_s"]), started[0]()[0], counted
+
+
+def _row(name: str, found: Latencies, period_s: float) -> tuple[str, ...]:
+    times = (found.quantile(0.5), found.quantile(0.999), found.largest_s)
+    return (name, f"{found.total}", f"{found.missed(period_s)}", *(f"{1e6 * time_s:.0f} us" for time_s in times))
+
+
+if __name__ == "__main__":
+    typer.run(measure)

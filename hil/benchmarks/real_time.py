@@ -16,7 +16,7 @@ from typing import Annotated
 import typer
 
 from hil.benchmarks.diagnosis import repeated
-from hil.loop.latency import Latencies, Reference, cyclictest, load
+from hil.loop.latency import Cyclictest, Latencies, cyclictest, load
 from hil.loop.realtime import PRIORITY, loop_core
 from hil.loop.run import run_profile
 from hil.loop.simulated_bench import load_simulated
@@ -60,7 +60,7 @@ def _run(rate_hz: float, seconds: float) -> tuple[str, Latencies, Latencies | No
     with tempfile.TemporaryDirectory() as folder:
         with ExitStack() as stack:
             beside = partial(cyclictest, period_s, seconds, loop_core(), PRIORITY - 1)
-            started = list[Reference]()
+            started = list[Cyclictest]()
             result = run_profile(
                 bench, profile, folder, "run", force=True,
                 planned=lambda _: started.append(stack.enter_context(beside())),

@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from hil.bench.bench_file import Bench
     from hil.bench.hardware import SimulatedEffect, SimulationSection
     from hil.diagnosis.result import Result
+    from hil.motion.profile import Profile
+    from hil.motion.trajectory import Trajectory
     from hil.recording.recording import Recording
 
 
@@ -71,37 +73,46 @@ def demo(
 
 
 def _record(bench: Bench, folder: Path, virtual: bool) -> list[Recording]:
-    """Record the two runs of the demo."""
+    """Record the two runs of the demo; in virtual time if the machine does not keep wall-clock time."""
     from hil.errors import HilError
-    from hil.loop.run import run_profile
-    from hil.loop.supervision import Ending
     from hil.proof.draw.demo import LEARN, PROVE
     from hil.recording.recording import read_recording
 
     recordings = []
     for name, profile in (("learn", LEARN), ("prove", PROVE)):
-        # a late tick harms nothing on a simulated bench: a busy machine is reported, not refused
-        result = run_profile(
-            bench,
-            profile,
-            folder,
-            name,
-            virtual=virtual,
-            force=True,
-            planned=lambda trajectory, what=profile.description: err.print(  # type: ignore[misc]
-                f"{trajectory.duration_s:.1f} s over the simulated CANopen bus, once kernels are compiled: {what} ..."
-            ),
-        )
-        if result.outcome.ending is Ending.OVERRUN:
-            err.print("This machine is too busy for wall-clock time; the same moves again in virtual time.")
+        path, why = _run(bench, profile, folder, name, virtual)
+        if path is None and not virtual:
+            err.print(f"Stopped in wall-clock time, as on a busy machine: {why}\nThe same moves again in virtual time.")
             virtual = True
-            result = run_profile(bench, profile, folder, name, virtual=True)
-        if not virtual:
-            out.print(f"lateness of the ticks: {result.jitter.text}")
-        if not result.complete or result.recording is None:
-            raise HilError(f"stopped: {result.outcome.ending}: {result.outcome.reason}")
-        recordings.append(read_recording(result.recording))
+            path, why = _run(bench, profile, folder, name, virtual)
+        if path is None:
+            raise HilError(f"stopped: {why}")
+        recordings.append(read_recording(path))
     return recordings
+
+
+def _run(bench: Bench, profile: Profile, folder: Path, name: str, virtual: bool) -> tuple[Path | None, str]:
+    """Return the recording, or None and why the run stopped; HilError if the user stopped it."""
+    from hil.errors import HilError
+    from hil.loop.run import run_profile
+    from hil.loop.supervision import Ending
+
+    def planned(trajectory: Trajectory) -> None:
+        err.print(
+            f"{trajectory.duration_s:.1f} s over the simulated CANopen bus, once kernels are compiled: "
+            f"{profile.description} ..."
+        )
+
+    try:
+        # a late tick harms nothing on a simulated bench: a busy machine is reported, not refused
+        result = run_profile(bench, profile, folder, name, virtual=virtual, force=True, planned=planned)
+    except HilError as error:  # while arming
+        return None, str(error)
+    if result.outcome.ending is Ending.INTERRUPTED:
+        raise HilError(f"stopped: {result.outcome.ending}: {result.outcome.reason}")
+    if not virtual:
+        out.print(f"lateness of the ticks: {result.jitter.text}")
+    return (result.recording if result.complete else None), f"{result.outcome.ending}: {result.outcome.reason}"
 
 
 def _say(result: Result, truth: SimulationSection, believed: Bench) -> None:

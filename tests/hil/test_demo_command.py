@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import json
+import signal
+import subprocess
+import sys
+import threading
 from pathlib import Path
 
 import pytest
@@ -44,3 +48,31 @@ def test_the_demo_finds_each_of_its_effects(tmp_path: Path, effect: str) -> None
 def test_the_demo_refuses_an_effect_that_it_does_not_know(tmp_path: Path) -> None:
     message = refused(tmp_path, "demo", "--effect", "ghost")
     assert message.startswith("--effect: given ghost, allowed periodic_lead_error, backlash")
+
+
+def test_a_machine_that_stalls_gets_the_demo_in_virtual_time(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "hil.cli", "demo", "--effect", "backlash", "--seed", "7", "--out", "demo"]
+    with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as demo:
+        assert demo.stderr is not None
+        kept = threading.Event()
+
+        def stall() -> None:
+            while not kept.wait(0.2):
+                demo.send_signal(signal.SIGSTOP)
+                kept.wait(0.2)
+                demo.send_signal(signal.SIGCONT)
+
+        stalling = threading.Thread(target=stall)
+        said = ""
+        for line in demo.stderr:
+            said += line
+            if "simulated CANopen bus" in line and not stalling.ident:
+                stalling.start()
+            if "again in virtual time" in line:
+                break
+        kept.set()
+        stalling.join()
+        stdout, rest = demo.communicate()
+    assert demo.returncode == 0, said + rest
+    assert said.count("Stopped in wall-clock time") == 1
+    assert "It found what was concealed." in stdout

@@ -76,26 +76,26 @@ def _record(bench: Bench, folder: Path, virtual: bool) -> list[Recording]:
     """Record the two runs of the demo; in virtual time if the machine does not keep wall-clock time."""
     from hil.errors import HilError
     from hil.proof.draw.demo import LEARN, PROVE
-    from hil.recording.recording import read_recording
 
     recordings = []
     for name, profile in (("learn", LEARN), ("prove", PROVE)):
-        path, why = _run(bench, profile, folder, name, virtual)
-        if path is None and not virtual:
-            err.print(f"Stopped in wall-clock time, as on a busy machine: {why}\nThe same moves again in virtual time.")
+        recording, why = _run(bench, profile, folder, name, virtual)
+        if recording is None and not virtual:
+            err.print(f"Failed in wall-clock time, as on a busy machine: {why}\nThe same moves again in virtual time.")
             virtual = True
-            path, why = _run(bench, profile, folder, name, virtual)
-        if path is None:
-            raise HilError(f"stopped: {why}")
-        recordings.append(read_recording(path))
+            recording, why = _run(bench, profile, folder, name, virtual)
+        if recording is None:
+            raise HilError(why)
+        recordings.append(recording)
     return recordings
 
 
-def _run(bench: Bench, profile: Profile, folder: Path, name: str, virtual: bool) -> tuple[Path | None, str]:
-    """Return the recording, or None and why the run stopped; HilError if the user stopped it."""
+def _run(bench: Bench, profile: Profile, folder: Path, name: str, virtual: bool) -> tuple[Recording | None, str]:
+    """Return the recording, or None and why there is none without a gap; HilError if the user stopped the run."""
     from hil.errors import HilError
     from hil.loop.run import run_profile
     from hil.loop.supervision import Ending
+    from hil.recording.recording import read_recording
 
     def planned(trajectory: Trajectory) -> None:
         err.print(
@@ -108,11 +108,16 @@ def _run(bench: Bench, profile: Profile, folder: Path, name: str, virtual: bool)
         result = run_profile(bench, profile, folder, name, virtual=virtual, force=True, planned=planned)
     except HilError as error:  # while arming
         return None, str(error)
+    stopped = f"stopped: {result.outcome.ending}: {result.outcome.reason}"
     if result.outcome.ending is Ending.INTERRUPTED:
-        raise HilError(f"stopped: {result.outcome.ending}: {result.outcome.reason}")
+        raise HilError(stopped)
     if not virtual:
         out.print(f"lateness of the ticks: {result.jitter.text}")
-    return (result.recording if result.complete else None), f"{result.outcome.ending}: {result.outcome.reason}"
+    if not result.complete or result.recording is None:
+        return None, stopped
+    recording = read_recording(result.recording)
+    gaps = len(recording.parts()) - 1
+    return (None, f"the loop was late, which left {gaps} gaps in the recording") if gaps else (recording, "")
 
 
 def _say(result: Result, truth: SimulationSection, believed: Bench) -> None:

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import math
 import struct
 
 import pytest
-from drive_rig import running
+from drive_rig import Mass, running, servo
 
 from drivers.acting_setpoint import ActingSetpoint
-from drivers.canopen_drive import DriveSettings
+from drivers.canopen_drive import CanopenDrive, DriveSettings
+from drivers.canopen_master import CanopenMaster
 from drivers.cia402 import OperationMode
+from drivers.inprocess import InProcessBus
 from drivers.modelled_bus import Fault, FaultKind
 from drivers.port import Condition, DriveFault, DriveGoal
+from drivers.sim.drive_node import SimulatedDrive
 
 RPDO = 0x205
 CST, CSV, CSP = (
@@ -89,3 +93,24 @@ def test_a_demand_of_another_length_is_malformed() -> None:
     rig.node.port.send(0x285, b"\0\0\0\0", rig.now_s)
     assert rig.cycle().condition is Condition.OK
     assert rig.drive.malformed_frames == 1
+
+
+@pytest.mark.parametrize("travel_per_rev", [2 * math.pi, 0.02])
+def test_the_tolerance_of_a_position_is_a_share_of_the_revolution(travel_per_rev: float) -> None:
+    bus = InProcessBus()
+    port, master = bus.port(), CanopenMaster(bus.port())
+    SimulatedDrive(bus.port(), Mass(), servo=servo(), counts_per_rev=1_000_000, travel_per_rev=travel_per_rev)
+    drive = CanopenDrive(master, DriveSettings(mode=CSP, travel_per_rev=travel_per_rev))
+    drive.set_up()
+    master.start(0.0)
+    drive.goal = DriveGoal.ENABLED
+    for tick in range(30):
+        master.sync(tick * 0.001)
+        master.poll(tick * 0.001)
+        sample = drive.read(tick * 0.001)
+        drive.command(tick * 0.001, 0.0)
+    assert sample.enabled
+    for counts, differs in ((1000, False), (1001, True)):
+        port.send(0x285, struct.pack("<i", counts), 0.03)
+        master.poll(0.03)
+        assert bool(drive.read(0.03).condition & Condition.OTHER_SETPOINT) is differs

@@ -11,7 +11,7 @@ from drive_rig import Mass, Rig, in_process
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.canopen_drive import CanopenDrive, DriveSettings, HomingRun, HomingSettings
+from drivers.canopen_drive import TRIPPING, CanopenDrive, DriveSettings, HomingRun, HomingSettings
 from drivers.canopen_master import CanopenMaster
 from drivers.cia402 import DriveState, HomingPhase, OperationMode
 from drivers.inprocess import InProcessBus
@@ -229,6 +229,31 @@ def test_torque_beyond_the_limit_is_limited_not_wrapped() -> None:
     for command in (1e6, -1e6):
         rig.cycle(command)
         assert rig.cycle().torque_n_m == math.copysign(6.0, command)
+
+
+@pytest.mark.parametrize("mille", [32767, 32768, -32768, -32769])
+def test_targets_around_the_range_of_their_object_are_limited(mille: int) -> None:
+    rig = in_process()
+    rig.set_up()
+    rig.enable()
+    resolution_n_m = rig.drive.info.torque_resolution_n_m
+    rig.cycle(mille * resolution_n_m)
+    assert rig.node.values[0x6071_00] == max(-32768, min(mille, 32767))
+
+
+def test_what_stops_the_axis() -> None:
+    """A damaged or late frame does not."""
+    assert set(TRIPPING) == {
+        Condition.STALE,
+        Condition.HEARTBEAT_LOST,
+        Condition.EMERGENCY,
+        Condition.FAULT,
+        Condition.DISABLED,
+        Condition.BUS_OFF,
+        Condition.NOT_OPERATIONAL,
+        Condition.UNANSWERED,
+        Condition.OTHER_SETPOINT,
+    }
 
 
 def test_the_drive_says_what_it_is() -> None:

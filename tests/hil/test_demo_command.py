@@ -74,5 +74,5 @@ def test_a_machine_that_stalls_gets_the_demo_in_virtual_time(tmp_path: Path) -> 
         stalling.join()
         stdout, rest = demo.communicate()
     assert demo.returncode == 0, said + rest
-    assert said.count("Stopped in wall-clock time") == 1
+    assert said.count("Failed in wall-clock time") == 1
     assert "It found what was concealed." in stdout

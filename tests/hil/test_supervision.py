@@ -23,7 +23,7 @@ from hil.loop.clock import VirtualClock, next_due
 from hil.loop.devices import Rig
 from hil.loop.session import STOP_SEGMENT, Session
 from hil.loop.stopping import plan_stop
-from hil.loop.supervision import RULES, Ending, find, rules_table
+from hil.loop.supervision import AFTER_STALL, RULES, Ending, find, rules_table
 from hil.motion.time_optimal import MotionState
 from hil.motion.trajectory import plan
 
@@ -48,6 +48,20 @@ def altered(device: str, change: Change) -> Callable[[Rig, Session], dict]:
         return {MOVING: lambda: setattr(getattr(rig, device), "read", faulty)}
 
     return script
+
+
+def test_bounds_that_a_stall_explains() -> None:
+    """Those that a missing set-point breaks; an encoder that jumps, freezes or counts wrong is none."""
+    assert set(AFTER_STALL) == {
+        Limit.FOLLOWING_ERROR,
+        Limit.VELOCITY,
+        Limit.TORQUE,
+        Limit.STOPPING_DISTANCE,
+        Limit.ACTING_TORQUE,
+        Limit.RESIDUAL_ENCODER,
+        Limit.RESIDUAL_DRIVE,
+        Limit.RESIDUAL_LOAD,
+    }
 
 
 def quick(ran: Ran) -> bool:

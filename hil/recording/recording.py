@@ -228,10 +228,11 @@ def _from_table(path: Path, table: pa.Table, notes: dict[str, Any]) -> Recording
             raise InputError(f"{path}: {name}: given in {unit}, allowed {own}; import it with a map")
     # an empty value becomes NaN, which the check refuses with its row
     columns = {name: numbers(path, table, name) for name in known}
-    rows = regular_rows(columns, lambda row: f"{path}: row {row + 1}")
     metadata = stored_metadata(path, table)
     metadata.pop(PARTS, None)  # the rows tell
-    stored_s = metadata.pop("period_s", rows.period_s)
+    stored_s = metadata.pop("period_s", None)
+    rows = regular_rows(columns, lambda row: f"{path}: row {row + 1}", period_s=stored_s)
+    stored_s = rows.period_s if stored_s is None else stored_s
     period_s = rows.period_s if rows.rate_hz else stored_s
     if abs(period_s - rows.period_s) > CLOCK_TOLERANCE * rows.period_s:
         raise InputError(f"{path}: period_s: given {period_s} s, the rows have {rows.period_s:g} s; it is damaged")

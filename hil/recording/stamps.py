@@ -58,13 +58,15 @@ def regular_rows(
     place: Callable[[int], str],
     rate_hz: float | None = None,
     judged_by: Collection[str] = (),
+    period_s: float | None = None,
 ) -> RegularRows:
     """Cut columns (n,) at gaps of their `time_s` and give each part equal steps.
 
     Stamps that are regular within 1 % stay as they are, single missing rows are interpolated; stamps with too few
     digits get equal steps. Else either the stamps jitter and the rows do not, or the rows were taken at these times:
     the one is right in which the channels are smoother. Rows taken at uneven times are interpolated, to `rate_hz` or
-    the mean rate. `judged_by` are the columns that decide, by default all.
+    the mean rate. `judged_by` are the columns that decide, by default all. `period_s` of the ticks, if it is known:
+    rows of a loop that was late lie at whole multiples of it.
 
     `place` as in `check_finite`. Raises InputError: NaN, time that repeats or runs back, two rates, too few rows.
     """
@@ -76,7 +78,9 @@ def regular_rows(
     few_digits = bool(time_s.size >= LEAST_ROWS and np.mean(steps == 0.0) > REPEATS and steps.max() > 0.0)
     _refuse_order(time_s, steps, few_digits, place)
     typical = float(np.median(steps[steps > 0.0]))
-    if not few_digits:
+    if period_s is not None and _at_ticks(steps, period_s):
+        typical = period_s
+    elif not few_digits:
         _refuse_two_rates(steps, place)
     first = np.r_[0, np.flatnonzero(steps > GAP_STEPS * typical) + 1]
     pieces = [slice(int(a), int(b)) for a, b in zip(first, np.r_[first[1:], time_s.size], strict=True)]
@@ -121,6 +125,14 @@ def regular_rows(
     rate_hz = float(f"{1.0 / mean_s:.9g}")
     parts = [_interpolated(columns, piece, rate_hz) for piece in kept]
     return _joined(parts, time_s[0], round(1.0 / rate_hz, 12), rate_hz, notes)
+
+
+def _at_ticks(steps: FloatArray, period_s: float) -> bool:
+    """Return True if every step is a multiple of the period, and the shortest is one period."""
+    if not period_s > 0.0:
+        return False
+    ticks = np.round(steps / period_s)
+    return bool(ticks.min() == 1.0 and np.all(np.abs(steps - ticks * period_s) <= CLOCK_TOLERANCE * period_s))
 
 
 def _slope(time_s: FloatArray, kept: list[slice]) -> float:

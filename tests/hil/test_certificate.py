@@ -15,13 +15,14 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from bench_runs import MOVE, bench_with
+from patient_bench import patient_bench, patient_bench_file
 from processes import DEADLINE_S, wait_for
 
+from drivers.cia402 import DriveState
 from hil.loop.clock import LatenessLog
 from hil.loop.realtime import NotPunctual
 from hil.loop.run import run_profile
-from hil.loop.stall import late_limit_s
-from hil.recording.recording import Recording, read_recording
+from hil.recording.recording import read_recording
 
 PROFILE = Path(__file__).parents[2] / "profiles" / "friction_sweep.yaml"
 
@@ -32,7 +33,7 @@ def certificate(recording: Path | None) -> dict[str, Any]:
 
 
 def test_a_run_by_the_wall_clock_carries_the_certificate(tmp_path: Path) -> None:
-    ran = run_profile(bench_with(), MOVE, tmp_path, "run", force=True)
+    ran = run_profile(patient_bench(), MOVE, tmp_path, "run", force=True)
     found = certificate(ran.recording)
     lateness_s = pq.read_table(ran.recording).column("lateness_s").to_numpy()  # without rows that a reader interpolates
     assert found["clock"] == "wall"
@@ -101,25 +102,31 @@ def test_lateness_is_kept_in_memory_that_does_not_grow() -> None:
 def running(tmp_path: Path) -> Iterator[tuple[subprocess.Popen[bytes], int, Path]]:
     """`hil run` in a terminal of its own, moving; the process, the terminal's other end, its stream."""
     ours, theirs = pty.openpty()
-    start = "import os, sys; os.login_tty(int(sys.argv[1])); os.execv(sys.executable, [sys.executable, *sys.argv[2:]])"
-    command = ["-m", "hil.cli", "run", str(PROFILE), "--bench", "reference", "--force", "--out", str(tmp_path)]
+    # SIGHUP as in a terminal, also where the tests run under nohup
+    start = (
+        "import os, signal, sys; signal.signal(signal.SIGHUP, signal.SIG_DFL); os.login_tty(int(sys.argv[1])); "
+        "os.execv(sys.executable, [sys.executable, *sys.argv[2:]])"
+    )
+    bench = str(patient_bench_file(tmp_path))
+    command = ["-m", "hil.cli", "run", str(PROFILE), "--bench", bench, "--force", "--out", str(tmp_path)]
     process = subprocess.Popen([sys.executable, "-c", start, str(theirs), *command], pass_fds=[theirs])
     os.close(theirs)
-    stream = tmp_path / "friction_sweep.arrows"
-    wait_for(lambda: stream.exists() and stream.stat().st_size > 100_000)
-    yield process, ours, tmp_path / "friction_sweep.parquet"
-    process.kill()
-    process.wait()
+    try:
+        stream = tmp_path / "friction_sweep.arrows"
+        wait_for(lambda: stream.exists() and stream.stat().st_size > 100_000)
+        yield process, ours, tmp_path / "friction_sweep.parquet"
+    finally:
+        process.kill()
+        process.wait()
 
 
-def assert_stopped_under_control(path: Path) -> Recording:
+def assert_stopped_under_control(path: Path) -> None:
     recording = read_recording(path)
-    if recording.metadata["real_time"]["run"]["max_s"] > late_limit_s(bench_with()):  # the loop was too late
-        pytest.skip(f"this machine stood still: {recording.metadata['ended']}")
     assert recording.metadata["ended"] == "interrupted: stopped by the user"
     assert recording["segment"][-1] == -1
-    assert np.ptp(recording["table_position_m"][-20:]) < 1e-5
-    return recording
+    assert DriveState.QUICK_STOP_ACTIVE not in recording["drive_state"]
+    # the set-points are at rest; the axis follows some time after a stall of the machine
+    assert np.ptp(recording["position_command_m"][-20:]) < 1e-5
 
 
 def test_sighup_stops_the_axis_under_control(running: tuple[subprocess.Popen[bytes], int, Path]) -> None:

@@ -13,11 +13,11 @@ from pathlib import Path
 
 import pytest
 from bench_runs import MOVE
+from patient_bench import patient_bench
 from processes import is_over, wait_for
 
 from hil.loop.notify import FEEDS, Notifier, NotifyingClock
 from hil.loop.run import run_profile
-from hil.loop.simulated_bench import load_simulated
 from hil.recording.recording import read_recording
 
 
@@ -106,7 +106,7 @@ def test_the_watchdog_is_fed_only_while_ticks_advance(manager: Manager) -> None:
 def test_a_run_tells_its_phases(manager: Manager, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NOTIFY_SOCKET", manager.address)
     monkeypatch.setenv("WATCHDOG_USEC", "400000")
-    ran = run_profile(load_simulated("reference"), MOVE, tmp_path, "run", force=True)
+    ran = run_profile(patient_bench(), MOVE, tmp_path, "run", force=True)
     told = manager.received()
     assert [states[0] for states in told[:1] + told[-1:]] == ["READY=1", "STOPPING=1"]
     assert told[-1][1].startswith(f"STATUS={ran.outcome.ending}")

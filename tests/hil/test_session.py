@@ -198,7 +198,7 @@ def test_ctrl_c_stops_within_the_limits_and_leaves_a_recording(tmp_path: Path) -
 
 @pytest.fixture
 def _hang_ups_as_before() -> Iterator[None]:
-    before = signal.getsignal(signal.SIGHUP)
+    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)  # as in a terminal, also under nohup
     yield
     signal.signal(signal.SIGHUP, before)
 

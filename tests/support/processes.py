@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-DEADLINE_S = 60.0  # a hang, not a measure of speed
+DEADLINE_S = 300.0  # a hang, not a measure of speed: a machine may stand still for seconds
 
 
 def wait_for(condition: Callable[[], bool], deadline_s: float = DEADLINE_S) -> None:

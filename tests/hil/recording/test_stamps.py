@@ -5,10 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 import pytest
 
 from hil.errors import InputError
-from hil.recording.recording import Recording, read_recording, write_parquet
+from hil.recording.recording import Recording, arrow_schema, read_recording, write_parquet, write_table
 from hil.recording.stamps import LEAST_ROWS, RegularRows, regular_rows
 
 RANDOM = np.random.default_rng(11)
@@ -77,6 +78,26 @@ def test_a_rate_that_changes_for_good_is_refused() -> None:
     time_s = np.r_[TICKS_S[:1500], TICKS_S[1500::4]]
     with pytest.raises(InputError, match="two sampling rates"):
         made(time_s, position(time_s))
+
+
+@pytest.mark.parametrize("late", [slice(0, 800, 2), slice(0, 2400, 2)])
+def test_a_loop_that_was_late_for_long_has_one_rate(late: slice, tmp_path: Path) -> None:
+    kept = np.r_[np.arange(ROWS)[late], late.stop : ROWS]
+    columns = {"time_s": TICKS_S[kept], "motor_position_rad": position(TICKS_S[kept]), "torque_n_m": np.ones(kept.size)}
+    write_parquet(Recording("run", columns, PERIOD_S, {}), tmp_path / "run.parquet")
+    recording = read_recording(tmp_path / "run.parquet")
+    assert recording.period_s == PERIOD_S
+    np.testing.assert_allclose(recording["time_s"], TICKS_S, atol=1e-12)
+    assert f"{ROWS - kept.size} single rows are missing at a period of 0.001 s" in recording.metadata["clock_notes"][0]
+
+
+@pytest.mark.parametrize("period_s", [0.0005, 0.0, -0.001, float("nan")])
+def test_a_stored_period_that_is_none_of_the_rows_is_damaged(period_s: float, tmp_path: Path) -> None:
+    columns = {"time_s": TICKS_S, "motor_position_rad": position(TICKS_S), "torque_n_m": np.ones(ROWS)}
+    schema = arrow_schema(columns, {"period_s": period_s})
+    write_table(pa.Table.from_arrays(list(columns.values()), schema=schema), tmp_path / "run.parquet")
+    with pytest.raises(InputError, match=r"damaged|period_s"):
+        read_recording(tmp_path / "run.parquet")
 
 
 def _csv(path: Path, kept: np.ndarray) -> Path:

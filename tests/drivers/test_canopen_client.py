@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import threading
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import canopen
 import pytest
 from canopen.sdo import SdoAbortedError
 from drive_rig import Mass
+from processes import wait_for
 
 from drivers.bus import BusConfig, PythonCanPort, open_bus
 from drivers.inprocess import AsBusABC, InProcessBus
@@ -19,14 +19,6 @@ from drivers.sim.encoder_node import SimulatedEncoder
 from drivers.sim.node import serve
 
 DRIVE, ENCODER = str(EDS_FOLDER / "servo_drive.eds"), str(EDS_FOLDER / "linear_encoder.eds")
-
-
-def wait_for(condition: Callable[[], bool]) -> None:
-    """Until something that another thread does has happened; fails after five seconds."""
-    deadline = time.monotonic() + 5.0
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.001)
 
 
 @pytest.fixture(params=["virtual", "in-process"])

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from processes import DEADLINE_S
 
 from drivers.bus import BusConfig, PythonCanPort, open_bus
 from drivers.canopen_drive import CanopenDrive, DriveSettings
@@ -57,13 +58,13 @@ def nodes() -> Iterator[subprocess.Popen[str]]:
 
 def test_a_drive_in_another_process_runs_in_wall_clock_time(nodes: subprocess.Popen[str]) -> None:
     port = PythonCanPort(open_bus(BusConfig("udp_multicast", GROUP)))
-    master = CanopenMaster(port, heartbeat_s=0.05)
+    master = CanopenMaster(port, heartbeat_s=1.0)
     # A busy machine may hold the other process up: what is tested is that the frames are right, not how fast they are.
     drive = CanopenDrive(
         master,
-        DriveSettings(period_s=0.005, heartbeat_s=0.2, missed_answers_allowed=200, command_deadline_s=0.6),
+        DriveSettings(period_s=0.005, heartbeat_s=5.0, missed_answers_allowed=200, command_deadline_s=5.0),
     )
-    encoder = CanopenEncoder(master, EncoderSettings(heartbeat_s=0.2, missed_answers_allowed=200))
+    encoder = CanopenEncoder(master, EncoderSettings(heartbeat_s=5.0, missed_answers_allowed=200))
     drive.set_up()
     encoder.set_up()
     start_s = time.monotonic()
@@ -73,7 +74,7 @@ def test_a_drive_in_another_process_runs_in_wall_clock_time(nodes: subprocess.Po
     moved = False
     while len(torques) < 100 or not moved:  # the devices' time is the wall clock, this loop is as fast as its answers
         master.sync(time.monotonic() - start_s)
-        deadline_s = time.monotonic() + 30.0
+        deadline_s = time.monotonic() + DEADLINE_S
         while True:
             now_s = time.monotonic() - start_s
             master.poll(now_s, 0.005)

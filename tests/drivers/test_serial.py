@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Iterator
 from itertools import pairwise
 
@@ -11,6 +10,7 @@ import pytest
 from drive_rig import Mass
 from hypothesis import given
 from hypothesis import strategies as st
+from processes import wait_for
 
 from drivers.port import Condition, EncoderError, EncoderSample
 from drivers.serial_encoder import SerialEncoder, SerialFormat, SerialSettings
@@ -121,10 +121,7 @@ class Line:
         self.put(self.simulated.frame(now_s, status))
 
     def read(self, now_s: float) -> EncoderSample:
-        deadline = time.monotonic() + 5.0
-        while self.reader._line.in_waiting < self.underway:
-            assert time.monotonic() < deadline
-            time.sleep(0.0001)
+        wait_for(lambda: self.reader._line.in_waiting >= self.underway, step_s=0.0001)
         self.underway = 0
         return self.reader.read(now_s)
 

@@ -18,6 +18,8 @@ import pytest
 import yaml
 from command_line import hil, process, refused
 from compare_runs import bench_with, record
+from patient_bench import patient_bench_file
+from processes import DEADLINE_S
 
 from hil.report.compare_report import write_bench
 
@@ -255,15 +257,16 @@ def test_ctrl_c_ends_with_130_and_leaves_nothing(folder: Path) -> None:
     assert ran.stderr is not None
     assert ran.stderr.readline() == "computing the paper ...\n"
     ran.send_signal(signal.SIGINT)
-    _, errors = ran.communicate(timeout=60)
+    _, errors = ran.communicate(timeout=DEADLINE_S)
     assert ran.returncode == 130
     assert errors == "stopped by ctrl-C\n"
     assert not [path for path in folder.iterdir() if "interrupted" in path.name]
 
 
 def test_ctrl_c_during_a_run_stops_the_axis_and_keeps_the_recording(folder: Path) -> None:
+    bench = str(patient_bench_file(folder))
     ran = subprocess.Popen(
-        [sys.executable, "-m", "hil.cli", "run", str(SWEEP), "--force", "--out", "stopped"],
+        [sys.executable, "-m", "hil.cli", "run", str(SWEEP), "--bench", bench, "--force", "--out", "stopped"],
         cwd=folder,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
@@ -273,7 +276,7 @@ def test_ctrl_c_during_a_run_stops_the_axis_and_keeps_the_recording(folder: Path
     while ran.poll() is None and not (stream.exists() and stream.stat().st_size > 20_000):  # in the middle of it
         time.sleep(0.05)
     ran.send_signal(signal.SIGINT)
-    _, errors = ran.communicate(timeout=60)
+    _, errors = ran.communicate(timeout=DEADLINE_S)
     assert ran.returncode == 130, errors
     assert "stopped by ctrl-C" in errors
     assert "Traceback" not in errors

@@ -9,13 +9,12 @@ from hil.loop.clock import VirtualClock, WallClock
 
 def test_no_tick_comes_early_and_lateness_does_not_add_up() -> None:
     clock = WallClock(0.002)
+    start_s = time.perf_counter()  # before the clock's own start
     clock.start()
-    start_s = time.perf_counter()
     for tick in range(1, 50):
         late_s = clock.wait(tick)
         assert late_s >= 0.0
-        # the start was taken a little after the clock's: a tick may seem early by that, never by a period
-        assert time.perf_counter() - start_s >= tick * 0.002 - 0.001
+        assert time.perf_counter() - start_s >= tick * 0.002
 
 
 def test_a_late_tick_keeps_the_deadlines_of_those_after_it() -> None:

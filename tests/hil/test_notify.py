@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from bench_runs import MOVE
 from patient_bench import patient_bench
-from processes import is_over, wait_for
+from processes import DEADLINE_S, is_over, wait_for
 
 from hil.loop.notify import FEEDS, Notifier, NotifyingClock
 from hil.loop.run import run_profile
@@ -110,7 +110,6 @@ def test_a_run_tells_its_phases(manager: Manager, tmp_path: Path, monkeypatch: p
     told = manager.received()
     assert [states[0] for states in told[:1] + told[-1:]] == ["READY=1", "STOPPING=1"]
     assert told[-1][1].startswith(f"STATUS={ran.outcome.ending}")
-    assert len(told) > 4
     assert {states[0] for states in told[1:-1]} == {"WATCHDOG=1"}
 
 
@@ -126,7 +125,9 @@ print(recorder.writer_pid, flush=True)
 os.kill(recorder.writer_pid, signal.SIGABRT)
 os.kill(os.getpid(), signal.SIGABRT)
 """
-    killed = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=60)
+    killed = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=DEADLINE_S
+    )
     assert killed.returncode == -6
     wait_for(lambda: is_over(int(killed.stdout)))
     assert len(read_recording(tmp_path / "run.arrows")["time_s"]) == 1000

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 import yaml
 from own_recordings import COGGING_LEARN, COGGING_PROVE
+from processes import DEADLINE_S
 from typer.testing import CliRunner
 
 import hil
@@ -65,18 +66,16 @@ MOVE = hil.Profile.model_validate(
 
 def fresh(code: str) -> str:
     """Output of the code in a new interpreter."""
-    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, timeout=60, check=True)
+    ran = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, timeout=DEADLINE_S, check=True
+    )
     return ran.stdout
 
 
-def test_import_is_fast_and_loads_nothing_heavy() -> None:
-    code = (
-        "import sys, time, json; begin = time.perf_counter(); import hil; took = time.perf_counter() - begin; "
-        f"dir(hil); print(json.dumps([took, [name for name in {HEAVY} if name in sys.modules]]))"
+def test_import_loads_nothing_heavy() -> None:
+    assert not json.loads(
+        fresh(f"import hil, sys, json; dir(hil); print(json.dumps([n for n in {HEAVY} if n in sys.modules]))")
     )
-    answers = [json.loads(fresh(code)) for _ in range(3)]
-    assert [loaded for _, loaded in answers] == [[]] * 3
-    assert min(took for took, _ in answers) < 0.1  # the best of three: other processes may slow one down
 
 
 def test_the_errors_load_nothing_heavy() -> None:

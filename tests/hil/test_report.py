@@ -15,6 +15,7 @@ from compare_runs import bench_with, record
 from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.image import imread
+from processes import DEADLINE_S
 
 from hil.bench.bench_file import Bench, load_bench
 from hil.errors import InputError
@@ -50,7 +51,7 @@ def rendered(page: Path, profile: Path) -> str:
         ],
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=DEADLINE_S,
         check=True,
     )
     errors = [line for line in ran.stderr.splitlines() if "CONSOLE" in line and "[bokeh" not in line]

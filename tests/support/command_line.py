@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import pytest
+from processes import DEADLINE_S
 
 from hil.cli import main
 
@@ -42,7 +43,7 @@ def process(folder: Path, *arguments: str) -> Ran:
         cwd=folder,
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=DEADLINE_S,
         check=False,
     )
     return Ran(ran.returncode, ran.stdout, ran.stderr)

@@ -9,12 +9,12 @@ from pathlib import Path
 DEADLINE_S = 300.0  # a hang, not a measure of speed: a machine may stand still for seconds
 
 
-def wait_for(condition: Callable[[], bool], deadline_s: float = DEADLINE_S) -> None:
-    """Wait until it is true; fails after `deadline_s`."""
+def wait_for(condition: Callable[[], bool], deadline_s: float = DEADLINE_S, step_s: float = 0.005) -> None:
+    """Wait until it is true, asking every `step_s`; fails after `deadline_s`."""
     end = time.monotonic() + deadline_s
     while not condition():
         assert time.monotonic() < end, "waited in vain"
-        time.sleep(0.005)
+        time.sleep(step_s)
 
 
 def state_of(pid: int) -> str:

@@ -266,10 +266,12 @@ class CanopenDrive(CanopenNode, Drive):
         """Raise DriveFault if something tripped the drive since the last `reset_fault`."""
         if not self.tripped:
             return
+        texts = [self._cause()] if self.tripped & ~Condition.OTHER_SETPOINT else []
+        texts += [self._acting.text] if self._acting is not None and self._acting.text else []
         raise DriveFault(
             f"tripped: {condition_names(self.tripped)}",
             where=self._name,
-            given=self._acting.text if self._acting is not None and self._acting.text else self._cause(),
+            given="; ".join(texts),
             advice="Remove the cause, then reset the fault.",
         )
 

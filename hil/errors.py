@@ -2,6 +2,7 @@
 
 HilError          1   something went wrong that the user can act on
 ├── StillPowered  3   the drive does not confirm that its power stage is off
+├── StoppedByUser 130 ctrl-C or a signal before anything moved
 └── InputError    2   a file or an argument is wrong; the message says what, where, what is allowed
     └── FieldError    the same, at one field of a model whose file is known to the caller only
 """
@@ -21,6 +22,12 @@ class StillPowered(HilError):
     """The power stage of the drive is on, or may be: nothing this program can send has confirmed that it is off."""
 
     exit_code = 3
+
+
+class StoppedByUser(HilError):
+    """The user asked for a stop before there was anything to record."""
+
+    exit_code = 130
 
 
 class InputError(HilError):

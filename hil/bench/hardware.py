@@ -82,10 +82,11 @@ class DriveSection(BenchSection):
         description="lateness at which the axis is stopped; at most the deadline of the "
         "set-points less two periods [s]",
     )
-    command_deadline_s: Positive | None = Field(
+    command_deadline_s: Annotated[float, Field(gt=0.0, le=65.535)] | None = Field(
         None,
         description="without a set-point for longer the drive stops by itself (object 0x1400:5); absent: in cst "
-        "the time in which the torque limit moves the axis by following_error_m, at most 0.05; else 0.05 [s]",
+        "the time in which the torque limit moves the axis by following_error_m, at most 0.05 (without a torque limit "
+        "three periods); else 0.05 [s]",
     )
     supervision: SupervisionSection = SupervisionSection()
     bus_load: Share = Field(0.7, description="largest share of the bus's time at which the drive is armed")

@@ -29,7 +29,7 @@ class SupervisionSection(BenchSection):
     )
     frozen_torque: Positive | None = Field(
         None, description="change of the measured torque while the motor encoder repeats its value: more than "
-        "stiction; absent: half of the torque limit [N m, N]"
+        "stiction; absent: half of the torque limit, or of the drive's if it is lower [N m, N]"
     )  # fmt: skip
     velocity_m_s: Positive | None = Field(
         None, description="of the motor at the table; absent: 1.5 x the limit of the profile + what the position loop "

@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     from hil.recording.recording import Recording
 
 
+_LEFT_OUT = 0.01  # of the ticks: what a reader interpolates is not measured
+
+
 def demo(
     effect: Annotated[str | None, typer.Option(help="Effect to conceal, such as backlash; default: drawn")] = None,
     seed: Annotated[
@@ -91,10 +94,9 @@ def _record(bench: Bench, folder: Path, virtual: bool) -> list[Recording]:
 
 
 def _run(bench: Bench, profile: Profile, folder: Path, name: str, virtual: bool) -> tuple[Recording | None, str]:
-    """Return the recording, or None and why there is none without a gap; HilError if the user stopped the run."""
-    from hil.errors import HilError
+    """Return the recording, or None and why the machine gave none that is worth reading; HilError for anything else."""
+    from hil.errors import HilError, InputError, StillPowered, StoppedByUser
     from hil.loop.run import run_profile
-    from hil.loop.supervision import Ending
     from hil.recording.recording import read_recording
 
     def planned(trajectory: Trajectory) -> None:
@@ -106,18 +108,20 @@ def _run(bench: Bench, profile: Profile, folder: Path, name: str, virtual: bool)
     try:
         # a late tick harms nothing on a simulated bench: a busy machine is reported, not refused
         result = run_profile(bench, profile, folder, name, virtual=virtual, force=True, planned=planned)
+    except (InputError, StillPowered, StoppedByUser):
+        raise
     except HilError as error:  # while arming
         return None, str(error)
     stopped = f"stopped: {result.outcome.ending}: {result.outcome.reason}"
-    if result.outcome.ending is Ending.INTERRUPTED:
-        raise HilError(stopped)
+    if result.outcome.stop_asked:
+        raise StoppedByUser(stopped)
     if not virtual:
         out.print(f"lateness of the ticks: {result.jitter.text}")
     if not result.complete or result.recording is None:
         return None, stopped
-    recording = read_recording(result.recording)
-    gaps = len(recording.parts()) - 1
-    return (None, f"the loop was late, which left {gaps} gaps in the recording") if gaps else (recording, "")
+    if result.outcome.skipped > _LEFT_OUT * result.outcome.rows:
+        return None, f"the loop left out {result.outcome.skipped} of {result.outcome.rows} ticks"
+    return read_recording(result.recording), ""
 
 
 def _say(result: Result, truth: SimulationSection, believed: Bench) -> None:

@@ -15,7 +15,7 @@ FROZEN_COUNTS = 4.0  # noise of a quantised position is below
 SPEED_MARGIN = 1.5  # overshoot of the velocity beyond the limit of the set-points
 TORQUE_MARGIN = 1.5  # measured peaks beyond the limit of the command
 ACTING_SHARE = 0.3  # of the torque limit: error of a torque constant, ripple and offset are below
-FROZEN_TORQUE_SHARE = 0.5  # of the torque limit: stiction of a usable axis is below
+FROZEN_TORQUE_SHARE = 0.5  # of the torque that can act: stiction of a usable axis is below
 
 
 def make_bounds(rig: Devices, limits: MotionLimits | None) -> Bounds:
@@ -27,6 +27,7 @@ def make_bounds(rig: Devices, limits: MotionLimits | None) -> Bounds:
     velocity_m_s = SPEED_MARGIN * allowed.velocity_m_s + gains.position_gain_1_s * error_m if allowed else math.inf
     difference_m = given.encoder_difference_m or error_m
     table, residual = rig.bench.encoders.table, given.residual
+    drive_torque = rig.drive.info.max_torque_n_m if isinstance(rig, Rig) else math.inf
     count_m = table.resolution_m if table is not None else 0.0
     return Bounds(
         has_table=rig.encoder is not None,
@@ -39,10 +40,10 @@ def make_bounds(rig: Devices, limits: MotionLimits | None) -> Bounds:
         velocity_m_s=given.velocity_m_s or velocity_m_s,
         encoder_difference_m=difference_m,
         frozen_m=given.frozen_m or max(FROZEN_SHARE * difference_m, FROZEN_COUNTS * count_m),
-        frozen_torque=given.frozen_torque or FROZEN_TORQUE_SHARE * torque,
+        frozen_torque=given.frozen_torque or FROZEN_TORQUE_SHARE * min(torque, drive_torque),
         torque=given.torque or TORQUE_MARGIN * torque,
         torque_difference=given.torque_difference or ACTING_SHARE * torque,
-        drive_torque=rig.drive.info.max_torque_n_m if isinstance(rig, Rig) else math.inf,
+        drive_torque=drive_torque,
         continuous_torque=given.continuous_torque or math.inf,
         thermal_time_s=given.thermal_time_s,
         residual_motor_m=residual.motor_m if residual else math.inf,

@@ -105,18 +105,20 @@ class LatenessLog:
 
 
 class DueTick(NamedTuple):
-    """A tick that is due now, its lateness or that of the first one left out [s], and how many were left out."""
+    """A tick that is due now, its lateness, counted from the first one left out [s], and how many were left out."""
 
     tick: int
     lateness_s: float
     skipped: int
 
 
-def next_due(clock: Clock, tick: int, period_s: float, late_s: float) -> DueTick:
-    """Wait for the first tick after `tick`, which came late_s too late, that is met within SKIP_FROM periods."""
-    first, worst_s = tick, late_s
-    while late_s > SKIP_FROM * period_s:
+def next_due(clock: Clock, tick: int, period_s: float, late_s: float, limit_s: float = math.inf) -> DueTick:
+    """Wait for the first tick after `tick`, which came late_s too late, that is met within SKIP_FROM periods.
+
+    From limit_s after `tick` on the next one is taken, however late: the loop must act.
+    """
+    first = tick
+    while late_s > SKIP_FROM * period_s and (tick - first) * period_s <= limit_s:
         tick += math.ceil(late_s / period_s)
         late_s = clock.wait(tick)
-        worst_s = max(worst_s, late_s)
-    return DueTick(tick, worst_s, tick - first)
+    return DueTick(tick, (tick - first) * period_s + late_s, tick - first)

@@ -29,7 +29,7 @@ from hil.loop.disturbances import Disturbances
 from hil.loop.realtime import PRIORITY, Grant, loop_core, real_time
 
 HALF_DECADES = (1e-6, 2e-6, 5e-6, 1e-5, 2e-5, 5e-5, 1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2, 0.1)
-_HISTOGRAM_US = 100_000  # longest latency that cyclictest resolves
+_HISTOGRAM_US = 1_000_000  # longest latency that cyclictest resolves
 _LEAD_S = 0.3  # from the start of cyclictest to its first wake-up at a full second
 # A busy process: arithmetic and copies of more memory than a core's cache holds.
 _BUSY = "import os, sys; os.sched_setaffinity(0, {int(sys.argv[1])}); a = bytearray(1 << 24)\nwhile True: bytes(a)"
@@ -37,7 +37,8 @@ _BUSY = "import os, sys; os.sched_setaffinity(0, {int(sys.argv[1])}); a = bytear
 
 @dataclass(frozen=True)
 class Latencies:
-    """How often each latency occurred, by its size [s]; larger ones than cyclictest resolves count as its largest."""
+    """How often each latency occurred, by its size [s]; of those that cyclictest does not resolve the largest is
+    known, the others count as the longest that it does."""
 
     counts: dict[float, int]
 
@@ -155,7 +156,9 @@ class Cyclictest:
             thread = json.loads(self._results.read_text())["thread"]["0"]
             counts = {int(us) / 1e6: count for us, count in thread["histogram"].items()}
             if beyond := thread["cycles"] - sum(counts.values()):
-                counts[max(thread["max"], _HISTOGRAM_US) / 1e6] = beyond
+                counts[max(thread["max"], _HISTOGRAM_US + 1) / 1e6] = 1
+                if beyond > 1:
+                    counts[_HISTOGRAM_US / 1e6] = beyond - 1
             self.found = Latencies(counts), ""
         except (OSError, ValueError, KeyError):
             self.found = None, f"cyclictest failed: {' '.join(said) or 'without a message'}"

@@ -187,7 +187,7 @@ def _check_bus_load(rig: Devices, section: DriveSection) -> None:
         raise NotPunctual(
             f"drive.bus_load: SYNC, RPDO, TPDO and encoder take {100 * load:.0f} % of the bus at "
             f"{section.bitrate} bit/s, allowed {100 * section.bus_load:.0f} %",
-            "raise the bit rate or the period",
+            "raise the bit rate or the period, or say drive.watch_setpoint: false",
         )
 
 

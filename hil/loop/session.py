@@ -22,11 +22,11 @@ from enum import IntEnum
 from typing import Protocol
 
 from drivers.port import Condition, DriveGoal, DriveSample, EncoderSample
-from hil.errors import HilError, StillPowered
+from hil.errors import HilError, StillPowered, StoppedByUser
 from hil.loop.clock import SKIP_FROM, Clock, LatenessLog, next_due
 from hil.loop.cycle import Cycle, Samples
 from hil.loop.devices import Devices, driver_errors
-from hil.loop.stall import NO_STALL, Stall
+from hil.loop.stall import NO_STALL, stalled
 from hil.loop.stopping import LONGEST_STOP_S, plan_stop
 from hil.loop.supervision import Ending, find
 from hil.motion.pieces import MotionLimits
@@ -53,13 +53,15 @@ class LoopPhase(IntEnum):
 
 @dataclass(frozen=True)
 class Outcome:
-    """Ending of a run, its reason in words, number of rows, lateness of its ticks [s], and ticks left out."""
+    """Ending of a run, its reason in words, number of rows, lateness of its ticks [s], ticks left out, and whether the
+    user asked for a stop, for whatever reason it ended."""
 
     ending: Ending
     reason: str
     rows: int
     lateness_s: Sequence[float]
     skipped: int = 0
+    stop_asked: bool = False
 
 
 class Rows(Protocol):
@@ -106,6 +108,8 @@ class Session:
         self._response_s = rig.section.response * gains.period_s
         self._skip_from_s = SKIP_FROM * gains.period_s
         self._from_table = gains.position_from_table
+        self._late_limit_s = rig.late_limit_s
+        self._own_late_s = 0.0  # of the tick, without those left out before it
         self._stall = NO_STALL  # the last time that ticks were left out
         self._now_s = 0.0  # of the tick: tick x period
         self._clock_tick = 0  # ticks since the clock was started; the rows count from the first after arming
@@ -143,19 +147,19 @@ class Session:
             if self._ending is Ending.COMPLETE:
                 self._ending = Ending.DRIVE_FAULT
             self._reason += "; the drive did not follow its controlword: SYNC, heartbeat and set-points were withheld"
-        return Outcome(self._ending, self._reason, rows, self.late.values, self.skipped)
+        return Outcome(self._ending, self._reason, rows, self.late.values, self.skipped, self._stops_asked > 0)
 
     # -- one tick -------------------------------------------------------------------------------------------------
 
     def _exchange(self) -> tuple[DriveSample, EncoderSample]:
         """Wait for the next tick that can be in time, send SYNC, take in the answers."""
         tick = self._clock_tick = self._clock_tick + 1
-        lateness_s = self._clock.wait(tick)
+        lateness_s, period_s, skipped = self._clock.wait(tick), self._period_s, 0
         if lateness_s > self._skip_from_s:
-            self._clock_tick, lateness_s, skipped = next_due(self._clock, tick, self._period_s, lateness_s)
-            tick = self._clock_tick
+            tick, lateness_s, skipped = next_due(self._clock, tick, period_s, lateness_s, self._late_limit_s)
+            self._clock_tick = tick
             self._left_out += skipped
-        start_s = tick * self._period_s
+        start_s, self._own_late_s = tick * period_s, lateness_s - skipped * period_s
         self.late.add(lateness_s)
         self._master.sync(start_s)
         self._now_s = now_s = start_s + self._response_s
@@ -174,13 +178,16 @@ class Session:
         self._drive.goal = DriveGoal.ENABLED
         for _ in range(self._ticks(ARM_TIMEOUT_S)):
             sample, seen = self._exchange()
+            if self._drive.tripped and (late_s := max(self.late.values)) > self._late_limit_s:
+                raise HilError(f"the loop was {late_s:.3f} s late while the drive was armed, which stops the drive "
+                               f"(allowed: {self._late_limit_s:.3f} s): take load off the machine")  # fmt: skip
             self._drive.check()
             if sample.enabled and not sample.age_cycles:
                 self._check_start(sample, seen)
                 return sample, seen
             self._drive.command(self._now_s, 0.0)
             if self._stops_asked:
-                raise HilError("interrupted while the drive was armed; nothing moved")
+                raise StoppedByUser("interrupted while the drive was armed; nothing moved")
         raise HilError(
             f"the drive did not enable within {ARM_TIMEOUT_S:.0f} s: it is {self._drive.status}; check its enable "
             "input and safe torque off"
@@ -201,7 +208,7 @@ class Session:
         step, row, exchange = cycle.step, cycle.row, self._exchange
         late = self.late
         late.begin()
-        late_limit_s = self._rig.late_limit_s
+        late_limit_s, bench = self._late_limit_s, self._rig.bench
         tick, error_code, cycle_s, skipped = 0, 0, 0.0, 0
         self.skipped = self._left_out = 0
         if self._fast_forward is not None:
@@ -211,7 +218,9 @@ class Session:
             motor, torque = sample.motor_position_rad, sample.torque_n_m
             if skipped != self._left_out:
                 cycle.skip(tick + skipped, tick + self._left_out - 1, motor)
-                self._stall = Stall(late.last_s, tick + self._left_out)
+                self._stall = stalled(
+                    bench, late.last_s, tick + self._left_out, cycle.setpoint(tick + self._left_out)[1]
+                )
                 skipped = self.skipped = self._left_out
             setpoint, passed = step(tick, Samples(motor, seen.position_m, torque, sample.state, error_code,
                                                   late.last_s, cycle_s, sample.age_cycles, seen.age_cycles,
@@ -223,7 +232,7 @@ class Session:
             if sample.condition or seen.condition or passed or too_late or self._stops_asked or self._phase:
                 self._supervise(tick + skipped, sample, seen, passed)
                 error_code = drive.error_code
-            cycle_s = clock.since(self._clock_tick) - late.last_s
+            cycle_s = clock.since(self._clock_tick) - self._own_late_s
             if tick + skipped >= self._last_tick:
                 break
             sample, seen = exchange()
@@ -242,8 +251,9 @@ class Session:
                 self._last_tick = min(self._last_tick, tick + self._ticks(AFTERMATH_S))
             return
         stopping = self._phase is LoopPhase.STOP
+        stall = self._stall if self._stall.acts(tick, self._rig.bench.gains) else NO_STALL
         findings = list(find(self._rig, seen, passed, self.late.last_s, self._stops_asked, stopping=stopping,
-                             stall_s=self._stall.acts_s(tick, self._rig.bench.gains)))  # fmt: skip
+                             stall=stall))  # fmt: skip
         quick = any(finding.quick for finding in findings)
         if not findings or (stopping and not quick):  # a controlled stop goes on
             return

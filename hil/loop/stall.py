@@ -18,18 +18,26 @@ SETTLING_TIMES = 3.0  # of the position loop, 1 / gain, until 95 % of a step of 
 
 
 class Stall(NamedTuple):
-    """Lateness for which ticks were left out [s], and the first row after them."""
+    """Time without set-points [s], how far the axis may have left them meanwhile [m], and the first row after it."""
 
     lateness_s: float
+    deviation_m: float
     row: int
 
-    def acts_s(self, row: int, gains: Gains) -> float:
-        """Lateness if a loop with these gains may still show it at a row, else 0."""
+    def acts(self, row: int, gains: Gains) -> bool:
+        """Return True if a loop with these gains may still show it at a row."""
         settling_s = SETTLING_TIMES / gains.position_gain_1_s if gains.position_gain_1_s > 0.0 else 0.0
-        return self.lateness_s if (row - self.row) * gains.period_s <= self.lateness_s + settling_s else 0.0
+        return (row - self.row) * gains.period_s <= self.lateness_s + settling_s
 
 
-NO_STALL = Stall(0.0, 0)
+NO_STALL = Stall(0.0, 0.0, 0)
+
+
+def stalled(bench: Bench, lateness_s: float, row: int, velocity_m_s: float) -> Stall:
+    """Return the stall before a row with this set-point: the drive held its last torque (CST), velocity or position."""
+    held_torque = (bench.drive or DriveSection()).mode is DriveMode.CST
+    acceleration_m_s2 = full_torque_acceleration_m_s2(bench) if held_torque else 0.0
+    return Stall(lateness_s, abs(velocity_m_s) * lateness_s + acceleration_m_s2 * lateness_s**2 / 2.0, row)
 
 
 def full_torque_acceleration_m_s2(bench: Bench) -> float:
@@ -39,16 +47,19 @@ def full_torque_acceleration_m_s2(bench: Bench) -> float:
 
 
 def command_deadline_s(bench: Bench) -> float:
-    """Time without an RPDO after which the drive stops by itself: `drive.command_deadline_s`, or as the module says."""
+    """Time without an RPDO after which the drive stops by itself: `drive.command_deadline_s`, or as the module says.
+
+    Whole milliseconds, as the object counts: rounded down, but never below SHORTEST_PERIODS.
+    """
     section, period_s = bench.drive or DriveSection(), bench.gains.period_s
     deadline_s = section.command_deadline_s or LONGEST_S
     if section.command_deadline_s is None and section.mode is DriveMode.CST:
         moved_s = math.sqrt(2.0 * section.following_error_m / full_torque_acceleration_m_s2(bench))
         deadline_s = min(LONGEST_S, moved_s)
-    return max(deadline_s, SHORTEST_PERIODS * period_s)
+    return 1e-3 * max(math.floor(round(1e3 * deadline_s, 6)), math.ceil(round(1e3 * SHORTEST_PERIODS * period_s, 6)))
 
 
 def late_limit_s(bench: Bench) -> float:
-    """Lateness of a tick at which the axis is stopped: before the drive's deadline does it, at most overrun_s."""
+    """Time without set-points at which the axis is stopped: before the drive does it, at most overrun_s."""
     section = bench.drive or DriveSection()
     return min(section.overrun_s, command_deadline_s(bench) - ANSWER_PERIODS * bench.gains.period_s)

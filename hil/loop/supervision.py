@@ -10,8 +10,10 @@ from enum import IntFlag, StrEnum
 from typing import NamedTuple
 
 from drivers.port import Condition, DriverError, EncoderSample
+from hil.bench.hardware import DriveSection
 from hil.loop.checks import Limit
 from hil.loop.devices import Devices
+from hil.loop.stall import NO_STALL, Stall
 
 
 class Ending(StrEnum):
@@ -73,8 +75,10 @@ class StopCause(NamedTuple):
 
 
 # Bounds that an axis breaks to which set-points did not come; those that compare encoders are none
-AFTER_STALL = (Limit.FOLLOWING_ERROR | Limit.VELOCITY | Limit.TORQUE | Limit.STOPPING_DISTANCE | Limit.ACTING_TORQUE
-               | Limit.RESIDUAL_ENCODER | Limit.RESIDUAL_DRIVE | Limit.RESIDUAL_LOAD)  # fmt: skip
+_RESIDUAL = Limit.RESIDUAL_ENCODER | Limit.RESIDUAL_DRIVE | Limit.RESIDUAL_LOAD
+AFTER_STALL = (Limit.FOLLOWING_ERROR | Limit.VELOCITY | Limit.TORQUE | Limit.TRAVEL | Limit.STOPPING_DISTANCE
+               | Limit.ACTING_TORQUE | _RESIDUAL)  # fmt: skip
+STALL_SHARE = 0.2  # of a bound: a stall that moves the axis by less is not why it is passed
 
 _E, _R, _L, _C = Ending, Reaction, Limit, Condition
 _STALE = "missed_answers + 2"
@@ -85,8 +89,8 @@ RULES: tuple[Rule, ...] = (
     Rule("loop late", _E.OVERRUN, "lateness > overrun_s, or > deadline of the RPDO less two periods", _R.STOP, "1",
          "the loop was {lateness_s:.3f} s late, allowed {late_limit_s:.3f} s (drive.overrun_s, "
          "drive.command_deadline_s): take load off the machine", loop=LoopSign.LATE),
-    Rule("after a stall", _E.OVERRUN, "ticks were left out less than three time constants of the position loop ago, "
-         "and a bound that they can break is passed", _R.TWICE, "1",
+    Rule("after a stall", _E.OVERRUN, "ticks were left out less than three time constants of the position loop ago; "
+         "only bounds are passed that this can break, and it moved the axis by a fifth of them or more", _R.TWICE, "1",
          "the axis did not follow because the loop had been {stall_s:.3f} s late: take load off the machine",
          loop=LoopSign.STALLED),
     Rule("drive bus-off", _E.DRIVE_FAULT, "the controller left the bus", _R.QUICK_STOP, "1", "{text}",
@@ -180,16 +184,16 @@ def find(
     stops_asked: int,
     *,
     stopping: bool,
-    stall_s: float = 0.0,
+    stall: Stall = NO_STALL,
 ) -> Iterator[StopCause]:
     """Yield the faults, the gravest first. passed: the `Limit`s; lateness_s of the tick; stopping: under control;
-    stall_s: lateness for which ticks were left out a short time ago."""
+    stall: a short time ago."""
     section, tripped = rig.section, rig.drive.tripped
     lost = seen.condition & _ENCODER_LOST if rig.encoder is not None else Condition.OK
     loop = LoopSign.ASKED if stops_asked else LoopSign.NONE
     if lateness_s > rig.late_limit_s:
         loop |= LoopSign.LATE
-    if stall_s and passed & AFTER_STALL:
+    if not tripped and not lost and _explains(stall, passed, section):
         loop |= LoopSign.STALLED
     for rule in RULES:
         if not (rule.limit & passed or rule.drive & tripped or rule.encoder & lost or rule.loop & loop):
@@ -200,8 +204,8 @@ def find(
         elif rule.encoder and rig.encoder is not None:
             text = _text(rig.encoder.check)
         reason = rule.reason.format(
-            text=text, lateness_s=lateness_s, late_limit_s=rig.late_limit_s, stall_s=stall_s, travel_m=section.travel_m,
-            following_error_m=section.following_error_m)  # fmt: skip
+            text=text, lateness_s=lateness_s, late_limit_s=rig.late_limit_s, stall_s=stall.lateness_s,
+            travel_m=section.travel_m, following_error_m=section.following_error_m)  # fmt: skip
         again = stops_asked > 1 if rule.loop & LoopSign.ASKED else stopping
         quick = {
             Reaction.STOP: False,
@@ -210,6 +214,14 @@ def find(
             Reaction.TWICE: again,
         }[rule.reaction]
         yield StopCause(rule.ending, reason, quick, rule.name)
+
+
+def _explains(stall: Stall, passed: int, section: DriveSection) -> bool:
+    """Return True if a stall breaks bounds of this kind, and no others are passed."""
+    bounds_m = [section.following_error_m]
+    if passed & _RESIDUAL and (residual := section.supervision.residual):
+        bounds_m += [residual.motor_m, residual.table_m or residual.motor_m]
+    return bool(passed) and not passed & ~AFTER_STALL and stall.deviation_m >= STALL_SHARE * min(bounds_m)
 
 
 def rules_table() -> str:

@@ -109,9 +109,11 @@ def regular_rows(
     told = f"clock: steps from {within.min():.4g} to {within.max():.4g} s, typically {typical:.4g} s"
     if rate_hz is None and whole:
         mean_s = float(np.sum(within) / np.sum(missing + 1.0))
+        places = np.count_nonzero(missing)
         notes = (
             *notes,
-            f"clock: {missing.sum():.0f} single rows are missing at a period of {mean_s:.6g} s; they are interpolated",
+            f"clock: {missing.sum():.0f} rows are missing in {places} place{'s'[: places > 1]} at a period of "
+            f"{mean_s:.6g} s; they are interpolated",
         )
     elif rate_hz is None and within.max() < _DROPPED * typical and _counts_better(judged, kept, mean_s):
         period_s = _slope(time_s, kept)

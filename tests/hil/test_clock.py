@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import time
 
+import pytest
+
+from hil.loop import clock as clock_module
 from hil.loop.clock import VirtualClock, WallClock
 
 
@@ -15,6 +18,32 @@ def test_no_tick_comes_early_and_lateness_does_not_add_up() -> None:
         late_s = clock.wait(tick)
         assert late_s >= 0.0
         assert time.perf_counter() - start_s >= tick * 0.002
+
+
+class SlowToWake:
+    """Time of a machine that wakes 50 us after the end of a sleep; reading it takes 1 us."""
+
+    def __init__(self) -> None:
+        self.now_ns = 0
+
+    def perf_counter_ns(self) -> int:
+        self.now_ns += 1_000
+        return self.now_ns
+
+    def sleep(self, span_s: float) -> None:
+        assert span_s > 0.0
+        self.now_ns += round(span_s * 1e9) + 50_000
+
+
+@pytest.mark.parametrize(("spin_s", "late_s"), [(0.0, 50e-6), (100e-6, 0.0), (20e-6, 30e-6)])
+def test_a_late_wake_up_within_the_spun_time_is_no_late_tick(
+    monkeypatch: pytest.MonkeyPatch, spin_s: float, late_s: float
+) -> None:
+    monkeypatch.setattr(clock_module, "time", SlowToWake())
+    clock = WallClock(0.002, spin_s)
+    clock.start()
+    for tick in range(1, 50):
+        assert 0.0 <= clock.wait(tick) - late_s <= 2e-6
 
 
 def test_a_late_tick_keeps_the_deadlines_of_those_after_it() -> None:

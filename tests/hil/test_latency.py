@@ -19,8 +19,8 @@ from hil.loop.disturbances import Disturbances
 from hil.loop.latency import HALF_DECADES, Latencies, Series, load, measure
 from hil.loop.suitability import RATES_HZ, Suitability, beside, judge
 
-# What cyclictest 2.4 writes for 4 wake-ups, one of them beyond its histogram.
-RESULTS = {"thread": {"0": {"histogram": {"15": 2, "1200": 1}, "cycles": 4, "max": 250000}}}
+# What cyclictest 2.4 writes for 6 wake-ups, three of them beyond its histogram.
+RESULTS = {"thread": {"0": {"histogram": {"15": 2, "1200": 1}, "cycles": 6, "max": 2500000}}}
 
 
 def series(latencies_s: dict[float, int], period_s: float = 0.001) -> Series:
@@ -95,7 +95,7 @@ def test_missed_periods_are_laid_on_the_machine_only_if_cyclictest_missed_them_t
     assert beside(calm, late, 0.001) == "periods missed: loop 0, cyclictest 3"
 
 
-def test_no_tick_is_early_and_the_tick_comes_after_the_wake_up() -> None:
+def test_no_tick_and_no_wake_up_is_early() -> None:
     found = measure(0.002, 0.1)
     assert found.tick.total == found.wake_up.total
     assert found.tick.total + found.tick.missed(0.002) >= 50
@@ -103,7 +103,6 @@ def test_no_tick_is_early_and_the_tick_comes_after_the_wake_up() -> None:
     assert min(found.tick.counts) >= 0.0
     assert min(found.wake_up.counts) >= 0.0
     assert found.disturbances.collections == 0
-    assert found.tick.quantile(0.5) <= found.wake_up.quantile(0.5)  # the rest of the way is spun
 
 
 def cyclictest(folder: Path, monkeypatch: pytest.MonkeyPatch, script: str) -> None:
@@ -121,7 +120,7 @@ def test_the_histogram_of_cyclictest_is_read(tmp_path: Path, monkeypatch: pytest
         f"echo \"$@\" > {tmp_path}/asked",
     )  # fmt: skip
     found = measure(0.002, 0.1)
-    assert found.reference == Latencies({15e-6: 2, 1200e-6: 1, 0.25: 1})
+    assert found.reference == Latencies({15e-6: 2, 1200e-6: 1, 1.0: 2, 2.5: 1})
     asked = (tmp_path / "asked").read_text().split()
     assert {"--interval=2000", "--loops=50", "--priority=80", "--mlockall", "--secaligned"} <= set(asked)
 

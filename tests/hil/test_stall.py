@@ -12,7 +12,14 @@ from drivers.modelled_bus import Fault, FaultKind, ModelledBus
 from drivers.port import Condition
 from hil.loop.devices import Rig
 from hil.loop.session import Session
-from hil.loop.stall import LONGEST_S, NO_STALL, Stall, command_deadline_s, full_torque_acceleration_m_s2, late_limit_s
+from hil.loop.stall import (
+    LONGEST_S,
+    Stall,
+    command_deadline_s,
+    full_torque_acceleration_m_s2,
+    late_limit_s,
+    stalled,
+)
 from hil.loop.supervision import Ending, Limit, find
 
 ENABLING = 4  # tick at which the last controlword of the arming is on its way
@@ -28,7 +35,9 @@ def test_full_torque_moves_the_whole_axis() -> None:
 def test_in_the_deadline_full_torque_moves_the_axis_by_its_following_error() -> None:
     bench = bench_with(drive={"mode": "cst", "following_error_m": 0.002})
     deadline_s = command_deadline_s(bench)
-    assert full_torque_acceleration_m_s2(bench) * deadline_s**2 / 2.0 == pytest.approx(0.002)
+    moved_m = full_torque_acceleration_m_s2(bench) * deadline_s**2 / 2.0
+    assert 0.9 * 0.002 < moved_m <= 0.002
+    assert 1e3 * deadline_s == pytest.approx(round(1e3 * deadline_s))  # whole ms, as 0x1400:5
     assert late_limit_s(bench) == pytest.approx(deadline_s - 0.002)
 
 
@@ -49,10 +58,17 @@ def test_the_drive_has_the_deadline_of_the_bench() -> None:
 def test_a_stall_shows_until_the_position_loop_has_settled() -> None:
     gains = bench_with().gains
     settled = 100 + math.floor((0.02 + 3.0 / gains.position_gain_1_s) / gains.period_s)
-    stall = Stall(0.02, 100)
-    assert stall.acts_s(100, gains) == stall.acts_s(settled, gains) == 0.02
-    assert stall.acts_s(settled + 1, gains) == 0.0
-    assert NO_STALL.acts_s(0, gains) == 0.0
+    stall = Stall(0.02, 0.001, 100)
+    assert stall.acts(100, gains)
+    assert stall.acts(settled, gains)
+    assert not stall.acts(settled + 1, gains)
+
+
+@pytest.mark.parametrize(("mode", "held"), [("cst", True), ("csv", False)])
+def test_a_stall_moves_the_axis_by_its_speed_and_by_a_torque_that_is_held(mode: str, held: bool) -> None:
+    bench = bench_with(drive={"mode": mode})
+    by_torque_m = full_torque_acceleration_m_s2(bench) * 0.02**2 / 2.0 if held else 0.0
+    assert stalled(bench, 0.02, 7, -0.1) == (0.02, pytest.approx(0.1 * 0.02 + by_torque_m), 7)
 
 
 @pytest.mark.parametrize(
@@ -60,15 +76,20 @@ def test_a_stall_shows_until_the_position_loop_has_settled() -> None:
     [
         (Limit.FOLLOWING_ERROR, Ending.OVERRUN),
         (Limit.VELOCITY, Ending.OVERRUN),
+        (Limit.TRAVEL, Ending.OVERRUN),
         (Limit.TABLE_JUMP, Ending.ENCODER_FAULT),
+        (Limit.FOLLOWING_ERROR | Limit.TABLE_JUMP, Ending.ENCODER_FAULT),
     ],
 )
 def test_after_a_stall_only_bounds_that_it_explains_are_told_as_a_late_loop(passed: Limit, ending: Ending) -> None:
     with Rig(bench_with()) as rig:
         seen = rig.encoder.read(0.0)._replace(condition=Condition.OK)
-        cause = next(iter(find(rig, seen, passed, 0.0, 0, stopping=False, stall_s=0.03)))
+        stall = Stall(0.03, rig.section.following_error_m, 0)
+        cause = next(iter(find(rig, seen, passed, 0.0, 0, stopping=False, stall=stall)))
         assert cause.ending is ending
         assert ("0.030 s late" in cause.reason) == (ending is Ending.OVERRUN)
+        harmless = stall._replace(deviation_m=0.1 * rig.section.following_error_m)
+        assert next(iter(find(rig, seen, passed, 0.0, 0, stopping=False, stall=harmless))).ending is not Ending.OVERRUN
         assert next(iter(find(rig, seen, passed, 0.0, 0, stopping=False))).ending is not Ending.OVERRUN
 
 

@@ -56,6 +56,7 @@ def test_bounds_that_a_stall_explains() -> None:
         Limit.FOLLOWING_ERROR,
         Limit.VELOCITY,
         Limit.TORQUE,
+        Limit.TRAVEL,
         Limit.STOPPING_DISTANCE,
         Limit.ACTING_TORQUE,
         Limit.RESIDUAL_ENCODER,
@@ -202,7 +203,7 @@ def test_a_stall_leaves_a_gap_and_no_burst(tmp_path: Path, stall_ticks: int) -> 
     assert sorted(set(np.diff(ticks))) == [1, stall_ticks + 1]
     trajectory = plan(MOVE, 1e-3, 0.0)
     assert np.array_equal(stored["position_command_m"].to_numpy(), trajectory.position_m[ticks])
-    assert f"{stall_ticks} single rows are missing" in recording.metadata["clock_notes"][0]
+    assert f"{stall_ticks} rows are missing in 1 place at" in recording.metadata["clock_notes"][0]
     usual = run(tmp_path / "usual").recording
     assert np.abs(recording["torque_command_n_m"]).max() < np.abs(usual["torque_command_n_m"]).max() + 2.0
     assert np.abs(recording["table_position_m"] - recording["twin_table_position_m"]).max() < 1e-3
@@ -226,8 +227,16 @@ def test_ticks_too_late_are_passed_to_the_next_one_in_time() -> None:
         def wait(self, tick: int) -> float:
             return {10: 0.0029, 13: 0.0006}.get(tick, 0.0)
 
-    assert next_due(Stalled(), 10, 1e-3, 0.0029) == (14, 0.0029, 4)
+    assert next_due(Stalled(), 10, 1e-3, 0.0029) == (14, 0.004, 4)  # late since tick 10, though 14 is in time
     assert next_due(Stalled(), 11, 1e-3, 0.0) == (11, 0.0, 0)
+
+
+def test_a_loop_that_is_always_late_acts_at_its_limit() -> None:
+    class AlwaysLate(VirtualClock):
+        def wait(self, tick: int) -> float:
+            return 0.0009
+
+    assert next_due(AlwaysLate(), 10, 1e-3, 0.0009, 0.003) == (14, pytest.approx(0.0049), 4)
 
 
 def test_a_stop_is_planned_only_from_a_plausible_state() -> None:

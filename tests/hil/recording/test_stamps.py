@@ -48,7 +48,7 @@ def test_single_missing_rows_are_interpolated_and_the_others_stay() -> None:
     assert len(rows.parts) == 1
     np.testing.assert_allclose(rows.columns["time_s"], TICKS_S, atol=1e-12)
     np.testing.assert_allclose(rows.columns["x"][kept], position(TICKS_S)[kept], atol=1e-12)
-    assert "3 single rows are missing" in rows.notes[0]
+    assert "3 rows are missing in 2 places" in rows.notes[0]
 
 
 def test_jitter_of_the_stamps_is_told_from_jitter_of_the_rows() -> None:
@@ -88,7 +88,9 @@ def test_a_loop_that_was_late_for_long_has_one_rate(late: slice, tmp_path: Path)
     recording = read_recording(tmp_path / "run.parquet")
     assert recording.period_s == PERIOD_S
     np.testing.assert_allclose(recording["time_s"], TICKS_S, atol=1e-12)
-    assert f"{ROWS - kept.size} single rows are missing at a period of 0.001 s" in recording.metadata["clock_notes"][0]
+    missing = ROWS - kept.size
+    note = f"{missing} rows are missing in {missing} places at a period of 0.001 s"
+    assert note in recording.metadata["clock_notes"][0]
 
 
 @pytest.mark.parametrize("period_s", [0.0005, 0.0, -0.001, float("nan")])

@@ -112,7 +112,7 @@ def regular_rows(
         places = np.count_nonzero(missing)
         notes = (
             *notes,
-            f"clock: {missing.sum():.0f} rows are missing in {places} place{'s'[: places > 1]} at a period of "
+            f"clock: {missing.sum():.0f} rows are missing in {places} place{'s' if places > 1 else ''} at a period of "
             f"{mean_s:.6g} s; they are interpolated",
         )
     elif rate_hz is None and within.max() < _DROPPED * typical and _counts_better(judged, kept, mean_s):

@@ -4,9 +4,10 @@
 
 The whole loop is measured: bus, drive, encoders, controller, twin, supervision and recorder; the simulated devices are
 in its process. cyclictest has a lower priority than the loop and wakes at other times: it meets the same disturbances,
-may wait for a tick of the loop, and never delays it. A missed cycle is a period or more late. The lateness is that of
-the ticks themselves: a reader of the recording interpolates rows that were left out. The deadlines of the drive are
-wide, so that a stall of the machine does not end the measurement.
+may wait for a tick of the loop, and never delays it. Left out are the cycles that the loop's rule leaves out
+(`clock.SKIP_FROM`: more than half a period late), counted for cyclictest by the same rule. The lateness is that of the
+ticks themselves: a reader of the recording interpolates rows that were left out. The deadlines of the drive are wide,
+so that a stall of the machine does not end the measurement.
 """
 
 import os
@@ -46,7 +47,7 @@ def measure(
     seconds: Annotated[float, typer.Option(help="Duration at each rate [s].")] = 600.0,
     busy: Annotated[bool, typer.Option(help="Keep every core busy with an ordinary process.")] = True,
 ) -> None:
-    """Print lateness, missed cycles, page faults and collections of the loop, and cyclictest's latencies."""
+    """Print lateness, cycles left out, page faults and collections of the loop, and cyclictest's latencies."""
     rows, said = list[tuple[str, ...]](), list[str]()
     with load() if busy else nullcontext(0) as processes:
         for rate_hz in (float(rate) for rate in rates.split(",")):
@@ -54,11 +55,11 @@ def measure(
                 f"{seconds:g} s at {rate_hz:g} Hz beside {processes} busy processes, load {os.getloadavg()[0]:.1f} ..."
             )
             ended, loop, reference, certificate = _run(rate_hz, seconds)
-            rows += [_row(f"loop, {rate_hz:g} Hz", loop, 1.0 / rate_hz)]
-            rows += [_row("cyclictest", reference, 1.0 / rate_hz)] if reference is not None else []
+            rows += [_row(f"loop, {rate_hz:g} Hz", loop, certificate["skipped"])]
+            rows += [_row("cyclictest", reference, reference.left_out(1.0 / rate_hz))] if reference else []
             counts = ", ".join(f"{name.replace('_', ' ')} {value}" for name, value in certificate.items())
             said.append(f"{rate_hz:g} Hz: {ended}; {counts}")
-    table(("", "ticks", "missed", "p50", "p99.9", "largest"), rows)
+    table(("", "ticks", "left out", "p50", "p99.9", "largest"), rows)
     for line in said:
         out.print(line)
 
@@ -88,9 +89,9 @@ def _run(rate_hz: float, seconds: float) -> tuple[str, Latencies, Latencies | No
     return ended, Latencies.of(result.outcome.lateness_s), started[0]()[0], counted
 
 
-def _row(name: str, found: Latencies, period_s: float) -> tuple[str, ...]:
+def _row(name: str, found: Latencies, left_out: int) -> tuple[str, ...]:
     times = (found.quantile(0.5), found.quantile(0.999), found.largest_s)
-    return (name, f"{found.total}", f"{found.missed(period_s)}", *(f"{1e6 * time_s:.0f} us" for time_s in times))
+    return (name, f"{found.total}", f"{left_out}", *(f"{1e6 * time_s:.0f} us" for time_s in times))
 
 
 if __name__ == "__main__":

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
-from hil.loop.clock import SPIN_S, WallClock
+from hil.loop.clock import SKIP_FROM, SPIN_S, WallClock
 from hil.loop.disturbances import Disturbances
 from hil.loop.realtime import PRIORITY, Grant, loop_core, real_time
 
@@ -69,6 +69,11 @@ class Latencies:
     def missed(self, period_s: float) -> int:
         """Return the periods that passed without a cycle: a latency of 3.2 periods misses three."""
         return sum(count * int(latency_s / period_s) for latency_s, count in self.counts.items())
+
+    def left_out(self, period_s: float) -> int:
+        """Return the ticks that a loop leaves out at these latencies: as `clock.next_due` does."""
+        late = ((latency_s / period_s, count) for latency_s, count in self.counts.items())
+        return sum(count * math.ceil(periods) for periods, count in late if periods > SKIP_FROM)
 
     def bins(self) -> list[int]:
         """Counts below each of HALF_DECADES, and above the last."""

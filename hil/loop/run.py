@@ -21,8 +21,9 @@ from hil.loop.clock import Clock, VirtualClock
 from hil.loop.devices import Devices, Rig, driver_errors, open_devices
 from hil.loop.disturbances import Disturbances
 from hil.loop.notify import Notifier, NotifyingClock
+from hil.loop.outcome import Outcome
 from hil.loop.realtime import Jitter, NotPunctual, check_punctual, measure_jitter, now_text, real_time, report
-from hil.loop.session import Outcome, Session
+from hil.loop.session import Session
 from hil.loop.simulated_bench import make_plant, simulated_copy
 from hil.loop.supervision import Ending
 from hil.loop.virtual import compiled_ticks

@@ -17,7 +17,6 @@ Every failure stops the drive as follows; the recording stays readable:
 
 import contextlib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from enum import IntEnum
 from typing import Protocol
 
@@ -26,6 +25,7 @@ from hil.errors import HilError, StillPowered, StoppedByUser
 from hil.loop.clock import SKIP_FROM, Clock, LatenessLog, next_due
 from hil.loop.cycle import Cycle, Samples
 from hil.loop.devices import Devices, driver_errors
+from hil.loop.outcome import Outcome
 from hil.loop.stall import NO_STALL, stalled
 from hil.loop.stopping import LONGEST_STOP_S, plan_stop
 from hil.loop.supervision import Ending, find
@@ -49,19 +49,6 @@ class LoopPhase(IntEnum):
     RUN = 0
     STOP = 1
     QUICK_STOP = 2
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """Ending of a run, its reason in words, number of rows, lateness of its ticks [s], ticks left out, and whether the
-    user asked for a stop, for whatever reason it ended."""
-
-    ending: Ending
-    reason: str
-    rows: int
-    lateness_s: Sequence[float]
-    skipped: int = 0
-    stop_asked: bool = False
 
 
 class Rows(Protocol):

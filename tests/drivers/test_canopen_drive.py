@@ -11,9 +11,10 @@ from drive_rig import Mass, Rig, in_process
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.canopen_drive import TRIPPING, CanopenDrive, DriveSettings, HomingRun, HomingSettings
+from drivers.canopen_drive import TRIPPING, CanopenDrive, DriveSettings, HomingSettings
 from drivers.canopen_master import CanopenMaster
 from drivers.cia402 import DriveState, HomingPhase, OperationMode
+from drivers.homing import HomingRun
 from drivers.inprocess import InProcessBus
 from drivers.port import Condition, ConfigurationError, DriveGoal
 from drivers.sim.drive_node import SimulatedDrive

@@ -15,8 +15,9 @@ from hil.bench.bench_file import Bench
 from hil.errors import FieldError, HilError
 from hil.loop import devices
 from hil.loop.bounds import make_cycle
+from hil.loop.outcome import Outcome
 from hil.loop.run import run_profile
-from hil.loop.session import Outcome, Session
+from hil.loop.session import Session
 from hil.loop.supervision import Ending
 from hil.motion.trajectory import plan
 from hil.recording.recording import Recording, read_recording

@@ -15,7 +15,8 @@ from hil.errors import StillPowered
 from hil.loop.bounds import make_cycle
 from hil.loop.clock import VirtualClock
 from hil.loop.devices import Rig
-from hil.loop.session import LoopPhase, Outcome, Session
+from hil.loop.outcome import Outcome
+from hil.loop.session import LoopPhase, Session
 from hil.loop.simulated_bench import load_simulated
 from hil.motion.profile import Profile
 from hil.motion.trajectory import plan

@@ -12,8 +12,9 @@ from hil.bench.bench_file import Bench
 from hil.loop.bounds import make_cycle
 from hil.loop.clock import VirtualClock
 from hil.loop.devices import Rig
+from hil.loop.outcome import Outcome
 from hil.loop.run import _interruptible
-from hil.loop.session import Outcome, Session
+from hil.loop.session import Session
 from hil.loop.simulated_bench import load_simulated
 from hil.loop.virtual import compiled_ticks
 from hil.motion.profile import Profile

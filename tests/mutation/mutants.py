@@ -55,7 +55,7 @@ def mutants_of(source: str) -> list[Mutant]:
             continue
         operator = get_operator(name)()
         places = [place for node in ast_nodes(tree) for place in operator.mutation_positions(node)]
-        for occurrence, (begin, end) in enumerate(places):
+        for occurrence, (begin, _) in enumerate(places):
             annotated = any(first <= begin < last for first, last in spans)
             line = source.splitlines()[begin[0] - 1]
             if not annotated and not line.startswith("@njit"):

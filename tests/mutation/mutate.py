@@ -13,6 +13,7 @@ Each run is a fork of this process, which has imported the libraries but nothing
 from __future__ import annotations
 
 import argparse
+import contextlib
 import importlib
 import os
 import random
@@ -27,7 +28,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import pytest
-from mutants import Mutant, mutants_of
+from mutants import mutants_of
 
 ROOT = Path(__file__).parents[2]
 LIBRARIES = ("hypothesis", "numba", "pyarrow.parquet", "pydantic", "canopen", "serial", "ruckig", "scipy.signal",
@@ -137,10 +138,8 @@ def run_tests(copy: Path, suite: Suite, limit_s: float, *, keep_bytecode: bool =
         if ended or time.monotonic() - began_s > HANG_TIMES * limit_s / LIMIT_TIMES:
             break
         time.sleep(0.02)
-    try:
+    with contextlib.suppress(ProcessLookupError):
         os.killpg(pid, signal.SIGKILL)  # also processes that the tests left
-    except ProcessLookupError:
-        pass
     if not ended:
         _, _, usage = os.wait4(pid, 0)
     lines = output.read_text(encoding="utf-8", errors="replace").splitlines()

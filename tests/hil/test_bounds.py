@@ -72,7 +72,9 @@ def test_limits_of_the_profile_come_before_those_of_the_bench() -> None:
     with Rig(bench) as rig:
         assert make_bounds(rig, LIMITS).deceleration_m_s2 == 2.0
         assert make_bounds(rig, None).deceleration_m_s2 == 1.0
-        assert make_bounds(rig, None).velocity_m_s == pytest.approx(1.5 * 0.2 + GAIN_1_S * rig.section.following_error_m)
+        assert make_bounds(rig, None).velocity_m_s == pytest.approx(
+            1.5 * 0.2 + GAIN_1_S * rig.section.following_error_m
+        )
         assert (make_bounds(rig, None).travel_low_m, make_bounds(rig, None).travel_high_m) == (-math.inf, math.inf)
     with Rig(bench_with(drive={"limits": None})) as rig:
         assert (make_bounds(rig, None).velocity_m_s, make_bounds(rig, None).deceleration_m_s2) == (math.inf, math.inf)

@@ -52,11 +52,11 @@ MODULES = {
     "drivers/cia402.py": Suite(_DRIVE),
     "drivers/canopen_drive.py": Suite(_DRIVE),
     "hil/loop/checks.py": Suite(_tests("hil", "checks", "encoder_checks"), compiled=False),
-    "hil/loop/stall.py": Suite(_tests("hil", "stall", "supervision")),
-    "hil/loop/stopping.py": Suite(_tests("hil", "supervision", "session")),
-    "hil/loop/bounds.py": Suite(_tests("hil", "encoder_checks", "stall", "supervision")),
-    "hil/loop/supervision.py": Suite(_tests("hil", "encoder_checks", "stall", "supervision", "session")),
-    "hil/loop/session.py": Suite(_tests("hil", "session", "arming", "power_off", "stall", "supervision")),
+    "hil/loop/stall.py": Suite(_tests("hil", "stall")),
+    "hil/loop/stopping.py": Suite(_tests("hil", "bounds")),
+    "hil/loop/bounds.py": Suite(_tests("hil", "bounds")),
+    "hil/loop/supervision.py": Suite(_tests("hil", "rules", "stall")),
+    "hil/loop/session.py": Suite(_tests("hil", "session", "arming", "power_off", "supervision")),
 }
 LIMIT_TIMES, LIMIT_S = 4.0, 20.0  # processor time allowed: as many times that without a mutant, and so much more
 HANG_TIMES = 40.0  # of the same, by the wall clock: waits for something that does not come

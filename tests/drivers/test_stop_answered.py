@@ -1,4 +1,4 @@
-"""How long a stop may go without its effect, the question whether power is off, and what the drive reports of itself."""
+"""How long a stop may go without effect, the question whether power is off, what the drive reports of itself."""
 
 from __future__ import annotations
 

@@ -47,16 +47,17 @@ def _tests(folder: str, *names: str) -> tuple[str, ...]:
 
 
 _DRIVE = _tests("drivers", "cia402", "faults_devices", "faults_watchdogs", "acting_setpoint", "faults_frames",
-                "canopen_drive")  # fmt: skip
+                "stop_answered", "canopen_drive")  # fmt: skip
 MODULES = {
-    "drivers/cia402.py": Suite(_DRIVE),
+    "drivers/cia402.py": Suite(_tests("drivers", "cia402")),
+    "drivers/homing.py": Suite(_tests("drivers", "stop_answered", "canopen_drive")),
     "drivers/canopen_drive.py": Suite(_DRIVE),
     "hil/loop/checks.py": Suite(_tests("hil", "checks", "encoder_checks"), compiled=False),
     "hil/loop/stall.py": Suite(_tests("hil", "stall")),
     "hil/loop/stopping.py": Suite(_tests("hil", "bounds")),
     "hil/loop/bounds.py": Suite(_tests("hil", "bounds")),
     "hil/loop/supervision.py": Suite(_tests("hil", "rules", "stall")),
-    "hil/loop/session.py": Suite(_tests("hil", "session", "arming", "power_off", "supervision")),
+    "hil/loop/session.py": Suite(_tests("hil", "session", "session_times", "arming", "power_off", "supervision")),
 }
 LIMIT_TIMES, LIMIT_S = 4.0, 20.0  # processor time allowed: as many times that without a mutant, and so much more
 HANG_TIMES = 40.0  # of the same, by the wall clock: waits for something that does not come

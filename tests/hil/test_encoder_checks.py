@@ -86,3 +86,36 @@ def test_the_torque_counts_since_the_motor_encoder_changed() -> None:
         assert checked.tick(motor_m=k * STEP_M, torque=0.1 * k) == Limit.NONE
     assert checked.tick(motor_m=99 * STEP_M, torque=9.9 + 1.99) == Limit.NONE
     assert checked.tick(motor_m=99 * STEP_M, torque=9.9 + 2.01) == Limit.MOTOR_FROZEN
+
+
+@BOTH
+@pytest.mark.parametrize(
+    ("name", "motor", "table", "found"),
+    [
+        ("frozen_m", 1.0, 0.0, Limit.TABLE_FROZEN),
+        ("frozen_m", 1.0, -1.0, Limit.TABLE_REVERSED),
+        ("encoder_difference_m", 1.0, 0.0, Limit.ENCODER_DIFFERENCE),
+    ],
+)
+def test_the_bound_and_the_way_of_two_periods_may_be_reached(
+    sign: float, name: str, motor: float, table: float, found: Limit
+) -> None:
+    """A step of 2^-12 m: the smoothed velocity is an eighth of it, two periods of that a quarter of the step."""
+    step_m = sign * 2.0**-12
+    tick = {"position_m": step_m, "motor_m": motor * step_m, "table_m": table * step_m}
+    assert Checked(**{name: 0.75 * 2.0**-12}).tick(**tick) == Limit.NONE
+    assert Checked(**{name: 0.7499 * 2.0**-12}).tick(**tick) == found
+
+
+@BOTH
+def test_while_the_set_points_rest_the_motor_encoder_is_the_one_that_is_wrong(sign: float) -> None:
+    """Of two that move against each other: the position loop follows it away from the set-point."""
+    step_m = sign * 2.0**-12
+    assert Checked(frozen_m=0.5 * 2.0**-12).tick(motor_m=step_m, table_m=-step_m) == Limit.MOTOR_REVERSED
+
+
+@BOTH
+def test_a_motor_encoder_that_stands_may_be_left_by_the_bound(sign: float) -> None:
+    checked = Checked(frozen_m=FROZEN_M)
+    ticks = [{"table_m": sign * k * STEP_M} for k in range(1, 100)]
+    assert checked.ticks_until_passed(ticks) == (round(FROZEN_M / STEP_M) + 1, Limit.MOTOR_FROZEN)

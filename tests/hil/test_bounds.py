@@ -122,7 +122,7 @@ def test_no_stop_is_planned_from_a_value_that_is_no_number(place: int, value: fl
 @pytest.mark.parametrize(
     ("velocity_m_s", "acceleration_m_s2", "limit_m_s2", "limit_m_s3", "planned"),
     [
-        (0.5, 0.0, 0.064, 0.064, True),  # 7.8 s at the limit and twice 1 s of jerk: 9.8 s
+        (0.5, 0.0, 0.0625, 0.0625, True),  # 8 s at the limit and twice 1 s of jerk: 10 s
         (-0.5, 0.0, 0.0616, 0.0616, False),  # 8.1 s and 2 s
         (0.5, 0.0, 0.064, 0.055, False),  # 7.8 s and 2.3 s
         (0.5, 0.01, 0.064, 0.064, True),  # 0.16 s more to take the acceleration back

@@ -18,6 +18,7 @@ from drivers.port import Condition, DriveGoal
 from hil.errors import HilError
 from hil.loop.devices import Rig
 from hil.loop.session import Session
+from hil.loop.stall import stalled
 from hil.loop.supervision import Ending
 from hil.motion.trajectory import plan
 
@@ -201,7 +202,7 @@ def test_late_answers_are_waited_for_within_the_time_of_the_bench(
 ) -> None:
     """A drive and an encoder whose answers are there at the second and third look at the bus."""
     asked: list[tuple[int, float]] = []
-    looks = {"drive": 0, "encoder": 0}
+    looks, waited_s = {"drive": 0, "encoder": 0}, list[float]()
 
     def may_wait(_: ScriptedClock, tick: int, span_s: float) -> bool:
         asked.append((tick, span_s))
@@ -218,13 +219,48 @@ def test_late_answers_are_waited_for_within_the_time_of_the_bench(
 
             return lambda: setattr(getattr(rig, device), "read", faulty)
 
+        poll = rig.master.poll
+        rig.master.poll = lambda now_s, timeout_s=0.0: waited_s.append(timeout_s) or poll(now_s)
         return {MOVING: late("drive", 1), MOVING + 10: late("encoder", 2)}
 
     monkeypatch.setattr(ScriptedClock, "may_wait", may_wait)
     ran = run(tmp_path, script=script)
+    assert [wait_s for wait_s in waited_s if wait_s] == [0.1 * PERIOD_S] * 3  # a tenth of a period at a time
     assert ran.outcome.ending is Ending.COMPLETE
     assert [tick for tick, _ in asked] == [MOVING, MOVING + 10, MOVING + 10]
     assert {span_s for _, span_s in asked} == {bench_with().drive.response * PERIOD_S}
+
+
+def test_the_drive_hears_the_master_from_the_first_ticks_on(at: FaultyBench) -> None:
+    heard: dict[int, list[float]] = {0x080: [], 0x701: []}
+
+    def events(rig: Rig, _: Session) -> dict[int, Callable[[], Any]]:
+        for can_id, times in heard.items():
+            rig.nodes.drive.port.listen(can_id, lambda can_id, data, now_s, times=times: times.append(now_s))
+        return {}
+
+    at.run(bench_with(), events)
+    assert heard[0x080][0] == pytest.approx(PERIOD_S, abs=0.2e-3)
+    assert heard[0x701][0] < 0.021
+    assert np.diff(heard[0x701]).max() < 0.022  # drive.heartbeat_s of 20 ms
+
+
+def test_a_stall_is_kept_with_its_time_its_row_and_the_speed_of_the_set_points(tmp_path: Path) -> None:
+    sessions: list[Session] = []
+
+    def script(rig: Rig, session: Session) -> dict[int, Callable[[], Any]]:
+        sessions.append(session)
+        return {MOVING: lambda: 0.0078, MOVING - 50: lambda: 0.0016}
+
+    bench = bench_with(drive={"mode": "csv"})
+    ran = run(tmp_path, bench, script=script)
+    assert (ran.outcome.ending, ran.outcome.skipped) == (Ending.COMPLETE, 2 + 8)
+    stored = pq.read_table(tmp_path / "run.parquet")
+    ticks = np.round(stored["time_s"].to_numpy() / PERIOD_S).astype(int)
+    row = int(ticks[np.argmax(np.diff(ticks) == 9) + 1])
+    assert sessions[0]._stall == stalled(bench, 0.008, row, float(plan(MOVE, PERIOD_S, 0.0).velocity_m_s[row]))
+    # a step of the twin more or less would be 0.1 mm; the drive holds its speed meanwhile
+    assert np.abs(stored["table_position_m"].to_numpy() - stored["twin_table_position_m"].to_numpy()).max() < 5e-5
 
 
 def test_a_bench_without_a_table_encoder_runs(tmp_path: Path) -> None:

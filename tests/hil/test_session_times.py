@@ -153,7 +153,11 @@ def test_two_answers_in_a_row_say_that_power_is_off(tmp_path: Path, powered: lis
 
         def faulty(now_s: float) -> Any:
             sample = read(now_s)
-            return sample._replace(powered=next(said)) if rig.drive.goal is DriveGoal.DISABLED else sample
+            return (
+                sample._replace(powered=(on := next(said)), enabled=on)
+                if rig.drive.goal is DriveGoal.DISABLED
+                else sample
+            )
 
         rig.drive.read = faulty
         rig.drive.confirm_off = lambda now_s: bool(questions.append(now_s)) or True

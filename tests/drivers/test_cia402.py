@@ -136,6 +136,14 @@ def test_a_quick_stop_never_enables(state: DriveState, previous: int, enable: bo
     assert next_state(state, word, previous) is not S.OPERATION_ENABLED
 
 
+@pytest.mark.parametrize("enable", [True, False])
+@pytest.mark.parametrize("state", S)
+def test_a_quick_stop_brakes_what_is_under_power_and_else_disables(state: DriveState, enable: bool) -> None:
+    """An undefined state may be under power."""
+    braked = state in (S.OPERATION_ENABLED, S.QUICK_STOP_ACTIVE, S.UNKNOWN)
+    assert next_controlword(state, enable=enable, quick_stop=True) == (QUICK_STOP if braked else DISABLE_VOLTAGE)
+
+
 @given(st.sampled_from(list(S)), st.integers(0, 0xFFFF), st.booleans())
 def test_fault_reset_bit_is_an_edge_and_only_in_fault(state: DriveState, previous: int, enable: bool) -> None:
     word = next_controlword(state, enable=enable, reset_fault=True, previous=previous)

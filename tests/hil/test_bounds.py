@@ -66,6 +66,13 @@ def test_an_encoder_of_few_counts_is_frozen_only_after_four_of_them() -> None:
     assert bounds.frozen_m == pytest.approx(4e-4)
 
 
+def test_a_bench_without_a_table_encoder_has_bounds_all_the_same() -> None:
+    with Rig(bench_with(encoders={"table": None}, drive={"following_error_m": 0.002})) as rig:
+        bounds = make_bounds(rig, LIMITS)
+    assert not bounds.has_table
+    assert bounds.frozen_m == pytest.approx(0.1 * 0.002)
+
+
 def test_limits_of_the_profile_come_before_those_of_the_bench() -> None:
     limits = {"velocity_m_s": 0.2, "acceleration_m_s2": 1.0, "jerk_m_s3": 50.0}
     bench = bench_with(drive={"limits": limits, "travel_m": None})

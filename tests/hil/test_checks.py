@@ -196,6 +196,13 @@ def test_a_residual_must_last_and_be_of_fresh_samples() -> None:
     assert Checked(**RESIDUAL).ticks_until_passed(repeat(beyond | {"motor_age": 1}, 99)) == (0, Limit.NONE)
 
 
+def test_a_residual_is_told_as_long_as_it_lasts() -> None:
+    checked = Checked(**RESIDUAL)
+    passed = [checked.tick(twin_table_m=2.2e-4) for _ in range(30)]
+    assert passed == [Limit.NONE] * 19 + [Limit.RESIDUAL_ENCODER] * 11
+    assert checked.tick() == Limit.NONE
+
+
 def test_without_a_table_encoder_the_load_is_the_suspect() -> None:
     checked = Checked(has_table=False, **RESIDUAL | {"residual_table_m": math.inf})
     assert checked.ticks_until_passed(repeat({"twin_motor_m": 1.1e-4}, 60)) == (20, Limit.RESIDUAL_LOAD)

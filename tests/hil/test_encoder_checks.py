@@ -21,9 +21,13 @@ def moving(ticks: int, sign: float = 1.0, **others: float) -> list[dict[str, flo
 @BOTH
 @pytest.mark.parametrize(("turned", "found"), [("motor", Limit.MOTOR_REVERSED), ("table", Limit.TABLE_REVERSED)])
 def test_an_encoder_that_turns_round_in_motion_is_found_where_it_turned(sign: float, turned: str, found: Limit) -> None:
-    """After 15 mm in which both agreed: the way since then counts, not the way since the start."""
+    """After 15 mm in which both agreed: the way since then counts, not the way since the start. The table is 2 % ahead
+    or behind there: that is no other direction."""
     checked = Checked(frozen_m=FROZEN_M)
-    assert checked.ticks_until_passed(moving(1900, sign)) == (0, Limit.NONE)
+    ahead = [tick | {"table_m": 1.02 * tick["motor_m"]} for tick in moving(900, sign)]
+    behind = [tick | {"table_m": tick["motor_m"] + sign * 18 * STEP_M * (1900 - k) / 1000}
+              for k, tick in enumerate(moving(1900, sign)[900:], 901)]  # fmt: skip
+    assert checked.ticks_until_passed([*ahead, *behind]) == (0, Limit.NONE)
     turn = moving(1900, sign)[-1]["motor_m"]
     back = [there | {f"{turned}_m": 2.0 * turn - there[f"{turned}_m"]} for there in moving(2300, sign)[1900:]]
     count, passed = checked.ticks_until_passed(back)

@@ -3,8 +3,8 @@
     python tests/mutation/mutate.py [--sample N] [--seed S] [--only PART]     from the root; as make mutation does
 
 The operators of cosmic-ray change one operator, number, keyword or condition of a module in a copy of the project, and
-the tests of that module run there. A mutant is killed if a test fails, or if the tests take four times their usual
-processor time, which a busy machine does not change. The tests run without a mutant before and after those of each
+the tests of that module run there. A mutant is killed if a test fails, or if one takes TEST_S of processor time, which
+a busy machine does not change. The tests run without a mutant before and after those of each
 module and must pass. It prints each mutant, then a line for each module. `mutants.py` says which mutants are left out.
 
 Each run is a fork of this process, which has imported the libraries but nothing of the project.
@@ -59,8 +59,9 @@ MODULES = {
     "hil/loop/supervision.py": Suite(_tests("hil", "rules", "stall")),
     "hil/loop/session.py": Suite(_tests("hil", "session", "session_times", "arming", "power_off", "supervision")),
 }
-LIMIT_TIMES, LIMIT_S = 4.0, 20.0  # processor time allowed: as many times that without a mutant, and so much more
-HANG_TIMES = 40.0  # of the same, by the wall clock: waits for something that does not come
+TEST_S = 20  # processor time of a test: the slowest takes 3 s
+BROKEN = 70  # exit code where pytest itself could not be run
+HANG_S = 1200.0  # of all tests by the wall clock: one waits for something that does not come
 
 
 class Run(NamedTuple):
@@ -93,14 +94,15 @@ def mutate(copy: Path, module: str, sample: int, seed: int) -> str:
     """Run mutants of one module; returns its line of the table."""
     suite, source = MODULES[module], copy / module
     text, status = source.read_text(encoding="utf-8"), source.stat()
-    usual_s = unmutated(copy, suite)
-    limit_s = LIMIT_TIMES * usual_s + LIMIT_S
+    unmutated(copy, suite)
     mutants = mutants_of(text)
     drawn = random.Random(seed).sample(mutants, min(sample or len(mutants), len(mutants)))
     killed = by_time = 0
     for mutant in drawn:
         source.write_text(mutant.text(text), encoding="utf-8")
-        run = run_tests(copy, suite, limit_s)
+        run = run_tests(copy, suite)
+        if run.code == BROKEN:
+            raise SystemExit("the tests could not be run")
         by_time += run.code is None or run.code < 0
         killed += run.code != 0
         print(f"{'survived' if run.code == 0 else 'killed'} {module} {mutant.change(text)} [{run.failed}, "
@@ -111,24 +113,22 @@ def mutate(copy: Path, module: str, sample: int, seed: int) -> str:
     return f"| `{module}` | {len(mutants)} | {len(drawn)} | {killed} | {by_time} | {len(drawn) - killed} |"
 
 
-def unmutated(copy: Path, suite: Suite) -> float:
-    """Run the tests without a mutant, compiling what is missing; returns their processor time."""
-    run = run_tests(copy, suite, 1000.0, keep_bytecode=True)
+def unmutated(copy: Path, suite: Suite) -> None:
+    """Run the tests without a mutant; the first run compiles. Raises SystemExit if one fails."""
+    run = run_tests(copy, suite, mutated=False)
+    print(f"without a mutant: exit code {run.code}, {run.processor_s:.0f} s", flush=True)
     if run.code != 0:
-        raise SystemExit(f"the tests fail without a mutant: {run.failed}, exit code {run.code}")
-    return run.processor_s
+        raise SystemExit(f"the tests fail without a mutant: {run.failed}")
 
 
-def run_tests(copy: Path, suite: Suite, limit_s: float, *, keep_bytecode: bool = False) -> Run:
-    """Run the tests in a fork until the first one fails, for at most so much processor time."""
-    output = copy.parent / "output.txt"
-    began_s = time.monotonic()
+def run_tests(copy: Path, suite: Suite, *, mutated: bool = True) -> Run:
+    """Run the tests in a fork until the first one fails."""
+    output, began_s = copy.parent / "output.txt", time.monotonic()
     if (pid := os.fork()) == 0:
-        code = 70
+        code = BROKEN
         try:
             os.setpgid(0, 0)
-            resource.setrlimit(resource.RLIMIT_CPU, (round(limit_s), round(limit_s) + 5))
-            code = in_fork(copy, suite, output, keep_bytecode)
+            code = in_fork(copy, suite, output, mutated)
         except BaseException:
             traceback.print_exc()
         finally:
@@ -136,7 +136,7 @@ def run_tests(copy: Path, suite: Suite, limit_s: float, *, keep_bytecode: bool =
             os._exit(code)
     while True:
         ended, status, usage = os.wait4(pid, os.WNOHANG)
-        if ended or time.monotonic() - began_s > HANG_TIMES * limit_s / LIMIT_TIMES:
+        if ended or time.monotonic() - began_s > HANG_S:
             break
         time.sleep(0.02)
     with contextlib.suppress(ProcessLookupError):
@@ -148,19 +148,28 @@ def run_tests(copy: Path, suite: Suite, limit_s: float, *, keep_bytecode: bool =
     return Run(os.waitstatus_to_exitcode(status) if ended else None, failed, usage.ru_utime + usage.ru_stime)
 
 
-def in_fork(copy: Path, suite: Suite, output: Path, keep_bytecode: bool) -> int:
+class Limit:
+    """Plugin of pytest: each test may take TEST_S of processor time."""
+
+    def pytest_runtest_setup(self) -> None:
+        used = resource.getrusage(resource.RUSAGE_SELF)
+        _, hard = resource.getrlimit(resource.RLIMIT_CPU)
+        resource.setrlimit(resource.RLIMIT_CPU, (round(used.ru_utime + used.ru_stime) + TEST_S, hard))
+
+
+def in_fork(copy: Path, suite: Suite, output: Path, mutated: bool) -> int:
     """Run pytest in the copy; its output goes to a file."""
     with output.open("wb") as file:
         os.dup2(file.fileno(), 1)
         os.dup2(file.fileno(), 2)
     os.chdir(copy)
-    sys.dont_write_bytecode = not keep_bytecode
+    sys.dont_write_bytecode = mutated
     options = ["-q", "-x", "-p", "no:cacheprovider", "-W", "ignore::pytest.PytestAssertRewriteWarning"]  # of a library
     if not suite.compiled:
         os.environ["NUMBA_DISABLE_JIT"] = "1"
         sys.modules["numba"].config.DISABLE_JIT = 1
         options.append("--noconftest")  # which compiles kernels
-    return int(pytest.main([*options, *suite.tests]))
+    return int(pytest.main([*options, *suite.tests], plugins=[Limit()] if mutated else []))
 
 
 if __name__ == "__main__":

@@ -58,6 +58,21 @@ def test_a_quick_stop_may_take_one_and_a_half_times_its_ramp_and_a_tenth_of_a_se
     assert cycles_until_cut(rig) == pytest.approx(1000 * (1.5 * speed_rad_s / 100.0 + 0.1), abs=2)
 
 
+def test_a_long_ramp_is_not_cut_off() -> None:
+    """The time allowed follows from the speed at its begin, not from that which is left."""
+    rig = in_process(servo=servo(), settings=DriveSettings(quick_stop_rad_s2=20.0))
+    rig.set_up()
+    rig.enable()
+    for _ in range(50):
+        rig.cycle(2.0)
+    speed_rad_s = rig.plant.velocity_rad_s
+    rig.drive.goal = DriveGoal.QUICK_STOP
+    cycles = next(k for k in range(2000) if rig.cycle().state is DriveState.SWITCH_ON_DISABLED)
+    assert cycles > 0.9 * 1000 * speed_rad_s / 20.0 > 400
+    assert not rig.master.silent
+    assert rig.drive.tripped is Condition.OK
+
+
 def test_a_stop_is_timed_from_its_own_command() -> None:
     """Not from an earlier one that the drive obeyed."""
     rig = in_process()
@@ -144,6 +159,46 @@ def test_a_set_point_is_sent_in_the_unit_of_its_object() -> None:
         rig.enable()
         rig.cycle(0.5)
         assert rig.node.values[index] == round(0.5 / (unit or rig.drive.info.rad_per_count))
+
+
+@pytest.mark.parametrize(("target", "counts"), [
+    (2**31 - 1, 2**31 - 1), (2**31, -(2**31)), (2**31 + 5, -(2**31) + 5), (-(2**31), -(2**31)),
+    (-(2**31) - 1, 2**31 - 1)])  # fmt: skip
+def test_a_position_beyond_the_range_of_its_object_wraps(target: int, counts: int) -> None:
+    rig = in_process(settings=DriveSettings(mode=OperationMode.CYCLIC_SYNC_POSITION), servo=servo())
+    rig.set_up()
+    rig.enable()
+    rig.cycle(target * rig.drive.info.rad_per_count)
+    assert rig.node.values[0x607A_00] == counts
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_homing_is_done_when_the_measured_speed_is_that_of_standstill(sign: float) -> None:
+    """Two samples 2 ms apart at t = 5 s: the speed is their difference over 2 ms, in rad/s."""
+    rig = in_process(settings=DriveSettings(mode=OperationMode.HOMING), servo=servo())
+    rig.set_up()
+    enabled = rig.enable()
+    run = HomingRun(rig.drive, standstill_rad_s=0.05)
+    time_s, position_rad = 5.0, 0.0
+
+    def step(speed_rad_s: float, bits: int) -> HomingPhase:
+        nonlocal time_s, position_rad
+        time_s, position_rad = time_s + 0.002, position_rad + 0.002 * sign * speed_rad_s
+        word = enabled.statusword & ~0x3400 | bits
+        return run.step(enabled._replace(time_s=time_s, motor_position_rad=position_rad, statusword=word))
+
+    for _ in range(3):
+        step(1.0, 0)
+    assert run.phase is HomingPhase.RUNNING
+    assert rig.drive.controlword_bits == 0x10
+    assert step(0.06, 0x1400) is HomingPhase.RUNNING  # attained and reached, but faster
+    before = enabled._replace(
+        time_s=time_s - 0.01, motor_position_rad=position_rad, statusword=enabled.statusword | 0x1400
+    )
+    assert run.step(before) is HomingPhase.RUNNING  # time that does not go on tells no speed
+    time_s -= 0.01
+    assert step(0.04, 0x1400) is HomingPhase.DONE
+    assert rig.drive.controlword_bits == 0
 
 
 def test_homing_goes_on_over_a_sample_that_is_late() -> None:

@@ -8,6 +8,7 @@ from drive_rig import Rig, in_process, running, servo
 from drivers.canopen_drive import DriveSettings
 from drivers.cia402 import DriveState, HomingPhase, OperationMode
 from drivers.homing import HomingRun
+from drivers.modelled_bus import Fault, FaultKind
 from drivers.port import Condition, DriveFault, DriveGoal, ServoTarget
 
 
@@ -89,6 +90,16 @@ def test_a_stop_is_timed_from_its_own_command() -> None:
     assert cycles_until_cut(rig) == 10
 
 
+def test_a_drive_that_enables_by_itself_is_cut_off_as_one_that_stays_enabled() -> None:
+    rig = in_process()
+    rig.set_up()
+    for _ in range(5):
+        rig.cycle()
+    deaf(rig)
+    rig.node._set_state(DriveState.OPERATION_ENABLED)
+    assert cycles_until_cut(rig) == 10
+
+
 def test_after_the_cut_no_set_point_is_sent() -> None:
     rig = in_process()
     rig.set_up()
@@ -116,6 +127,59 @@ def test_power_off_is_confirmed_by_sdo_only_if_the_drive_says_so() -> None:
     deaf(rig)
     assert not rig.drive.confirm_off(rig.now_s)
     assert rig.drive.status == f"OPERATION_ENABLED, statusword 0x{rig.node.values[0x6041_00]:04X}"
+
+
+@pytest.mark.parametrize("watch", [True, False])
+def test_what_a_reset_cleared_is_not_told_with_a_later_fault(watch: bool) -> None:
+    bus, rig = running(settings=DriveSettings(watch_setpoint=watch))
+    if watch:
+        bus.inject(Fault(FaultKind.DROP, 0x205, count=10))
+        for k in range(10):
+            rig.cycle(0.2 * k)
+        with pytest.raises(DriveFault, match="acts, commanded were"):
+            rig.drive.check()
+    rig.drive.reset_fault()
+    rig.drive.check()
+    rig.node.emergency(0x4310, 0x09, rig.now_s)
+    rig.cycle()
+    with pytest.raises(DriveFault, match="0x4310") as caught:
+        rig.drive.check()
+    assert "acts, commanded were" not in str(caught.value)
+
+
+def reset_bits(rig: Rig, cycles: int) -> list[bool]:
+    """Return which of the next controlwords have the bit of a fault reset."""
+    sent: list[bool] = []
+    rig.node_port.listen(0x205, lambda can_id, data, now_s: sent.append(bool(data[0] & 0x80)))
+    for _ in range(cycles):
+        rig.cycle()
+    return sent
+
+
+def test_a_request_to_reset_a_fault_is_used_up_by_one_edge() -> None:
+    """A cause that goes away later does not end the fault without another request."""
+    rig = in_process()
+    rig.set_up()
+    rig.enable()
+    rig.node.trip(0x4310, 0x08, rig.now_s, lasting=True)
+    rig.cycle()
+    rig.drive.reset_fault()
+    assert reset_bits(rig, 10) == [True] + [False] * 9
+    rig.node.clear_cause()
+    assert not any(reset_bits(rig, 10))
+    assert rig.node.state is DriveState.FAULT
+
+
+def test_a_second_request_waits_until_its_edge_can_rise() -> None:
+    rig = in_process()
+    rig.set_up()
+    rig.enable()
+    rig.node.trip(0x4310, 0x08, rig.now_s, lasting=True)
+    rig.cycle()
+    rig.drive.reset_fault()
+    assert reset_bits(rig, 1) == [True]
+    rig.drive.reset_fault()
+    assert reset_bits(rig, 4) == [False, True, False, False]
 
 
 def test_the_last_emergency_is_the_error_code() -> None:

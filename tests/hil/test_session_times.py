@@ -142,10 +142,13 @@ def test_a_quick_stop_that_does_not_end_is_waited_for_two_seconds(tmp_path: Path
     assert int((ran.recording["segment"] == -1).sum()) == pytest.approx(2000, abs=3)
 
 
-@pytest.mark.parametrize(("powered", "asked"), [
-    ([False], False), ([True, False, False], False), ([True, False], True), ([True], True)])  # fmt: skip
-def test_two_answers_in_a_row_say_that_power_is_off(tmp_path: Path, powered: list[bool], asked: bool) -> None:
-    """Else the drive is asked by another way, after a fifth of a second."""
+@pytest.mark.parametrize(("powered", "enabled", "asked_after"), [
+    ([False], False, 0), ([True, False, False], True, 0),
+    ([True, False], True, 200), ([True], True, 200), ([True], False, 2200)])  # fmt: skip
+def test_two_answers_in_a_row_say_that_power_is_off(
+    tmp_path: Path, powered: list[bool], enabled: bool, asked_after: int
+) -> None:
+    """Else the drive is asked by another way, after 0.2 s; after 2 s more if it brakes: under power, not enabled."""
     questions: list[float] = []
 
     def script(rig: Rig, _: Session) -> dict[int, Callable[[], Any]]:
@@ -153,11 +156,10 @@ def test_two_answers_in_a_row_say_that_power_is_off(tmp_path: Path, powered: lis
 
         def faulty(now_s: float) -> Any:
             sample = read(now_s)
-            return (
-                sample._replace(powered=(on := next(said)), enabled=on)
-                if rig.drive.goal is DriveGoal.DISABLED
-                else sample
-            )
+            if rig.drive.goal is not DriveGoal.DISABLED:
+                return sample
+            on = next(said)
+            return sample._replace(powered=on, enabled=on and enabled)
 
         rig.drive.read = faulty
         rig.drive.confirm_off = lambda now_s: bool(questions.append(now_s)) or True
@@ -165,13 +167,13 @@ def test_two_answers_in_a_row_say_that_power_is_off(tmp_path: Path, powered: lis
 
     ran = run(tmp_path, script=script)
     assert ran.outcome.ending is Ending.COMPLETE
-    assert bool(questions) == asked
-    if asked:
+    assert bool(questions) == bool(asked_after)
+    if asked_after:
         armed = 4  # ticks before the first row
-        assert questions[0] / PERIOD_S - ROWS - armed == pytest.approx(200, abs=3)
+        assert questions[0] / PERIOD_S - ROWS - armed == pytest.approx(asked_after, abs=3)
 
 
-def test_the_lateness_of_every_tick_of_the_longest_run_is_kept() -> None:
+def test_the_lateness_of_every_tick_of_the_longest_run_is_kept(tmp_path: Path) -> None:
     """Arming 2 s, stop 10 s, hold 0.1 s, quick stop 2 s, aftermath 0.1 s, switching off 0.2 s."""
     sessions: list[Session] = []
 
@@ -180,7 +182,7 @@ def test_the_lateness_of_every_tick_of_the_longest_run_is_kept() -> None:
         raise ZeroDivisionError
 
     with pytest.raises(ZeroDivisionError):
-        run(Path("unused"), script=script)
+        run(tmp_path, script=script)
     for _ in range(30_000):
         sessions[0].late.add(0.0)
     assert sessions[0].late.ticks == ROWS + 14_400

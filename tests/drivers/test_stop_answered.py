@@ -49,8 +49,8 @@ def test_a_quick_stop_may_take_one_and_a_half_times_its_ramp_and_a_tenth_of_a_se
     rig = in_process(servo=servo(), settings=DriveSettings(quick_stop_rad_s2=100.0))
     rig.set_up()
     rig.enable()
-    for _ in range(50):
-        rig.cycle(sign * 2.0)
+    for _ in range(48):
+        rig.cycle(sign * 2.0)  # 9.6 rad/s
     for _ in range(2):
         rig.cycle(0.0)
     speed_rad_s = abs(rig.plant.velocity_rad_s)
@@ -147,6 +147,26 @@ def test_what_a_reset_cleared_is_not_told_with_a_later_fault(watch: bool) -> Non
     assert "acts, commanded were" not in str(caught.value)
 
 
+def test_a_drive_is_enabled_again_right_after_a_reset() -> None:
+    """That it was enabled before is no sign that it switched off by itself."""
+    _, rig = running()
+    rig.node.emergency(0x4310, 0x09, rig.now_s)
+    for _ in range(400):
+        rig.cycle()
+    rig.drive.reset_fault()
+    rig.drive.goal = DriveGoal.ENABLED
+    assert rig.drive.read(rig.now_s).condition is Condition.OK
+    assert rig.enable().enabled
+
+
+@pytest.mark.parametrize("length", [0, 1, 3])
+def test_a_demand_of_any_other_length_is_malformed(length: int) -> None:
+    _, rig = running()
+    rig.node.port.send(0x285, bytes(length), rig.now_s)
+    assert rig.cycle().condition is Condition.OK
+    assert rig.drive.malformed_frames == 1
+
+
 def reset_bits(rig: Rig, cycles: int) -> list[bool]:
     """Return which of the next controlwords have the bit of a fault reset."""
     sent: list[bool] = []
@@ -236,14 +256,15 @@ def test_a_position_beyond_the_range_of_its_object_wraps(target: int, counts: in
     assert rig.node.values[0x607A_00] == counts
 
 
+@pytest.mark.parametrize("start_s", [0.0, 5.0])
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_homing_is_done_when_the_measured_speed_is_that_of_standstill(sign: float) -> None:
-    """Two samples 2 ms apart at t = 5 s: the speed is their difference over 2 ms, in rad/s."""
+def test_homing_is_done_when_the_measured_speed_is_that_of_standstill(sign: float, start_s: float) -> None:
+    """Two samples 2 ms apart: the speed is their difference over 2 ms, in rad/s."""
     rig = in_process(settings=DriveSettings(mode=OperationMode.HOMING), servo=servo())
     rig.set_up()
     enabled = rig.enable()
     run = HomingRun(rig.drive, standstill_rad_s=0.05)
-    time_s, position_rad = 5.0, 0.0
+    time_s, position_rad = start_s, 0.0
 
     def step(speed_rad_s: float, bits: int) -> HomingPhase:
         nonlocal time_s, position_rad

@@ -77,12 +77,15 @@ def test_a_controlled_stop_is_held_for_a_tenth_of_a_second(tmp_path: Path) -> No
     assert len(ran.recording) == ran.outcome.rows <= len(ran.outcome.lateness_s)
 
 
-def test_a_stop_begins_at_the_set_point_of_its_tick(tmp_path: Path) -> None:
-    """Position, velocity and acceleration go on: jerk within its limit, also across the begin of the stop."""
-    recording = run(tmp_path, script=stops).recording
+@pytest.mark.parametrize("tick", [130, MOVING])
+def test_a_stop_begins_at_the_set_point_of_its_tick(tmp_path: Path, tick: int) -> None:
+    """Position, velocity and acceleration go on, in the acceleration and at constant feed: the jerk keeps its limit."""
+    recording = run(tmp_path, script=lambda _, session: {tick: session.ask_stop}).recording
     first = int(np.argmax(recording["segment"] == -1))
     usual = plan(MOVE, PERIOD_S, 0.0)
     assert np.array_equal(recording["position_command_m"][:first], usual.position_m[:first])
+    assert recording["position_command_m"][first] == pytest.approx(usual.position_m[first], abs=1e-7)
+    assert recording["velocity_command_m_s"][first] == pytest.approx(usual.velocity_m_s[first], abs=1e-4)
     jerk = np.diff(recording["acceleration_command_m_s2"][first - 3 : first + 50]) / PERIOD_S
     assert np.abs(jerk).max() < 1.05 * 100.0
 
@@ -98,6 +101,8 @@ def test_a_stop_for_a_following_error_begins_where_the_axis_is(tmp_path: Path) -
     assert abs(error_m[first]) < 0.0002
     speed_m_s = np.gradient(recording["motor_position_rad"], PERIOD_S) * 0.01 / (2.0 * np.pi)
     assert recording["velocity_command_m_s"][first] == pytest.approx(speed_m_s[first], abs=0.02)
+    # the acceleration was not measured: it begins with none
+    assert abs(recording["acceleration_command_m_s2"][first]) < 0.2
 
 
 def test_the_first_reason_is_kept(tmp_path: Path) -> None:

@@ -203,6 +203,13 @@ def test_a_residual_is_told_as_long_as_it_lasts() -> None:
     assert checked.tick() == Limit.NONE
 
 
+def test_a_drive_with_loops_of_its_own_is_not_suspected_for_a_torque_that_was_not_commanded() -> None:
+    checked = Checked(commands_torque=False, **RESIDUAL | {"residual_torque": 0.5})
+    checked.tick(twin_torque=1.1, command=5.0)
+    ticks = repeat({"twin_torque": 1.1, "command": 5.0}, 60)
+    assert checked.ticks_until_passed(ticks) == (20, Limit.RESIDUAL_LOAD)
+
+
 def test_without_a_table_encoder_the_load_is_the_suspect() -> None:
     checked = Checked(has_table=False, **RESIDUAL | {"residual_table_m": math.inf})
     assert checked.ticks_until_passed(repeat({"twin_motor_m": 1.1e-4}, 60)) == (20, Limit.RESIDUAL_LOAD)

@@ -196,6 +196,12 @@ def test_a_residual_must_last_and_be_of_fresh_samples() -> None:
     assert Checked(**RESIDUAL).ticks_until_passed(repeat(beyond | {"motor_age": 1}, 99)) == (0, Limit.NONE)
 
 
+def test_a_residual_is_the_distance_of_axis_and_twin_wherever_they_are() -> None:
+    where = {"motor_m": 0.1, "table_m": 0.3, "torque": 3.0}
+    twin = {"twin_motor_m": 0.1, "twin_table_m": 0.3, "twin_torque": 3.0, "command": 3.0}
+    assert Checked(STILL._replace(**where, **twin), **RESIDUAL).ticks_until_passed(repeat({}, 60)) == (0, Limit.NONE)
+
+
 def test_a_residual_is_told_as_long_as_it_lasts() -> None:
     checked = Checked(**RESIDUAL)
     passed = [checked.tick(twin_table_m=2.2e-4) for _ in range(30)]

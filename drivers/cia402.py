@@ -29,21 +29,11 @@ POWERED: Final = (
 
 
 class Statusword(IntFlag):
-    """Object 0x6041. Bits 12 and 13 depend on the mode; bit 10 means target reached."""
+    """Object 0x6041, the bits above those of the state (`state_of`). Bits 12 and 13 depend on the mode."""
 
-    READY_TO_SWITCH_ON = 1 << 0
-    SWITCHED_ON = 1 << 1
-    OPERATION_ENABLED = 1 << 2
-    FAULT = 1 << 3
-    VOLTAGE_ENABLED = 1 << 4
-    QUICK_STOP = 1 << 5  # 0 while a quick stop is active
-    SWITCH_ON_DISABLED = 1 << 6
-    WARNING = 1 << 7
     REMOTE = 1 << 9
     TARGET_REACHED = 1 << 10
-    INTERNAL_LIMIT_ACTIVE = 1 << 11
     FOLLOWS_COMMAND = 1 << 12  # CSP, CSV, CST: the drive follows the command value
-    FOLLOWING_ERROR = 1 << 13  # CSP
     HOMING_ATTAINED = 1 << 12  # homing mode
     HOMING_ERROR = 1 << 13  # homing mode
 
@@ -57,7 +47,6 @@ class Controlword(IntFlag):
     ENABLE_OPERATION = 1 << 3
     HOMING_START = 1 << 4  # homing mode: rising edge starts, 0 interrupts
     FAULT_RESET = 1 << 7  # rising edge
-    HALT = 1 << 8
 
 
 class OperationMode(IntEnum):

@@ -37,7 +37,7 @@ ARM_TIMEOUT_S = 2.0
 SETTLE_S = 0.1  # hold after a controlled stop
 QUICK_STOP_LIMIT_S = 2.0  # longest wait for the end of a quick stop
 AFTERMATH_S = 0.1  # recorded after the power stage is off
-DISARM_TIMEOUT_S = 0.2
+DISARM_TIMEOUT_S = 0.2  # beside a ramp of the drive
 _AROUND_S = ARM_TIMEOUT_S + LONGEST_STOP_S + SETTLE_S + QUICK_STOP_LIMIT_S + AFTERMATH_S + DISARM_TIMEOUT_S
 STOP_SEGMENT = -1  # in the recording: set-points of a stop
 _NO_ENCODER = EncoderSample(0.0, 0, 0.0, 0, Condition.OK)
@@ -269,19 +269,21 @@ class Session:
         return seen.position_m if self._from_table else self._ratio * sample.motor_position_rad
 
     def _power_off(self, goal: DriveGoal, ended: str, cause: BaseException | None = None) -> None:
-        """Switch the power stage off, unrecorded: by its controlword, then by another way (`Drive.confirm_off`).
-
-        Nothing that fails here ends it before the drive was asked. Raises StillPowered from `cause` if it does not say
-        in two fresh answers, or to that question, that its power is off. ended: how the run ended, for the message.
+        """Switch the power stage off, unrecorded: by its controlword, then by another way (`Drive.confirm_off`), which
+        would end a ramp. Nothing that fails here ends it before the drive was asked. Raises StillPowered from `cause`
+        if it does not say in two fresh answers, or to that question, that its power is off. ended: how the run ended.
         """
         drive, self._switching_off = self._drive, True
-        drive.goal, confirmed = goal, 0
-        for _ in range(self._ticks(DISARM_TIMEOUT_S)):
+        drive.goal, confirmed, braking = goal, 0, False
+        for tick in range(self._ticks(DISARM_TIMEOUT_S + QUICK_STOP_LIMIT_S)):
             with contextlib.suppress(Exception):
                 sample, _ = self._exchange()
                 confirmed = 0 if sample.powered or sample.age_cycles else confirmed + 1
+                braking = braking if sample.age_cycles else sample.powered and not sample.enabled
             if confirmed == 2:
                 return
+            if tick >= self._ticks(DISARM_TIMEOUT_S) and not braking:
+                break
             with contextlib.suppress(Exception):
                 drive.command(self._now_s, 0.0)
         said = f"The drive still reports {drive.status}"

@@ -10,11 +10,14 @@ from drivers.cia402 import (
     DISABLE_VOLTAGE,
     ENABLE_OPERATION,
     FAULT_RESET,
+    POWERED,
     QUICK_STOP,
     SHUTDOWN,
     SWITCH_ON,
+    Controlword,
     DriveState,
     HomingPhase,
+    OperationMode,
     Statusword,
     next_controlword,
     next_homing_phase,
@@ -48,6 +51,23 @@ def test_the_drive_reports_each_state_as_the_client_reads_it() -> None:
     assert {state_of(bits) for bits in STATUS.values()} == set(CODING)
     for state, bits in STATUS.items():
         assert state_of(bits | 0x1E80 & ~0x40) is state  # bits 7 and 9..12 say nothing about the state
+
+
+def test_words_and_modes_are_coded_as_in_the_standard() -> None:
+    """Client and simulated drive have these names in common: a wrong number would be wrong on both sides."""
+    commands = (DISABLE_VOLTAGE, QUICK_STOP, SHUTDOWN, SWITCH_ON, ENABLE_OPERATION, FAULT_RESET)
+    assert commands == (0x00, 0x02, 0x06, 0x07, 0x0F, 0x80)
+    assert [bit.value for bit in Controlword] == [0x01, 0x02, 0x04, 0x08, 0x10, 0x80]
+    assert {name: bit.value for name, bit in Statusword.__members__.items()} == {
+        "REMOTE": 0x0200, "TARGET_REACHED": 0x0400, "FOLLOWS_COMMAND": 0x1000, "HOMING_ATTAINED": 0x1000,
+        "HOMING_ERROR": 0x2000}  # fmt: skip
+    assert [mode.value for mode in OperationMode] == [0, 6, 8, 9, 10]
+
+
+def test_states_are_recorded_by_the_number_of_the_standard() -> None:
+    """`drive_state` of a recording; UNKNOWN counts as under power."""
+    assert [state.value for state in S] == list(range(-1, 8))
+    assert set(POWERED) == {S.OPERATION_ENABLED, S.QUICK_STOP_ACTIVE, S.FAULT_REACTION_ACTIVE, S.UNKNOWN}
 
 
 @pytest.mark.parametrize(
@@ -114,6 +134,14 @@ def test_a_quick_stop_never_enables(state: DriveState, previous: int, enable: bo
     if state not in (S.FAULT, S.FAULT_REACTION_ACTIVE):
         assert word in (QUICK_STOP, DISABLE_VOLTAGE)
     assert next_state(state, word, previous) is not S.OPERATION_ENABLED
+
+
+@pytest.mark.parametrize("enable", [True, False])
+@pytest.mark.parametrize("state", S)
+def test_a_quick_stop_brakes_what_is_under_power_and_else_disables(state: DriveState, enable: bool) -> None:
+    """An undefined state may be under power."""
+    braked = state in (S.OPERATION_ENABLED, S.QUICK_STOP_ACTIVE, S.UNKNOWN)
+    assert next_controlword(state, enable=enable, quick_stop=True) == (QUICK_STOP if braked else DISABLE_VOLTAGE)
 
 
 @given(st.sampled_from(list(S)), st.integers(0, 0xFFFF), st.booleans())

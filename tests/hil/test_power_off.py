@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from bench_runs import MOVE, MOVING, bench_with
+from bench_runs import MOVE, MOVING, bench_with, run
 from faulty_bench import FaultyBench
 from typer.testing import CliRunner
 
@@ -20,6 +20,7 @@ from hil.errors import StillPowered
 from hil.loop.devices import Rig
 from hil.loop.session import Session
 from hil.loop.supervision import Ending
+from hil.motion.profile import Profile
 from hil.motion.trajectory import plan
 
 RPDO = 0x205
@@ -145,6 +146,31 @@ def test_a_drive_that_stays_on_is_an_error(at: FaultyBench, mode: str, end: str)
     assert caught.value.exit_code == 3
     assert (Ending.COMPLETE if end == "profile" else "ZeroDivisionError: a bug") in str(caught.value)
     assert at.ended == "StillPowered"
+
+
+@pytest.mark.parametrize("requests", [0, 3])
+def test_the_ramp_of_the_drive_is_not_cut_off_by_the_end_of_a_run(tmp_path: Path, requests: int) -> None:
+    """An exception, or a third ctrl-C, at 0.5 m/s: the ramp takes 0.3 s. Without power the axis would coast."""
+    rigs: list[Rig] = []
+    motion = MOVE.model_dump()
+    motion["segments"][1].update(to_m=0.3, feed_m_s=0.5)
+
+    def script(rig: Rig, session: Session) -> dict[int, Callable[[], Any]]:
+        def fail() -> None:
+            for _ in range(requests):
+                session.ask_stop()
+            raise ZeroDivisionError
+
+        rigs.append(rig)
+        return {500: fail}
+
+    with pytest.raises(KeyboardInterrupt if requests else ZeroDivisionError):
+        run(tmp_path, script=script, profile=Profile.model_validate(motion))
+    plant = rigs[0].nodes.plant
+    before_m = plant.table_position_m
+    plant.advance(0.0, 0.001)
+    assert abs(plant.table_position_m - before_m) < 0.01 * 0.001  # 10 mm/s: the end of the ramp
+    assert rigs[0].nodes.drive.state is DriveState.SWITCH_ON_DISABLED
 
 
 def test_a_drive_that_reports_no_state_any_more_is_not_taken_for_off(at: FaultyBench) -> None:

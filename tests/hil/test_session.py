@@ -48,6 +48,7 @@ def test_complete_run_follows_set_points_and_twin(tmp_path: Path) -> None:
     assert np.abs(recording["table_position_m"] - recording["twin_table_position_m"]).max() < 2e-6
     assert np.std(recording["torque_n_m"] - recording["twin_torque_n_m"]) < 0.015  # noise is 0.01
     assert set(recording["drive_state"]) == {DriveState.OPERATION_ENABLED}
+    assert set(recording["drive_error_code"]) == {0}
     assert ran.rig.nodes.drive.state is DriveState.READY_TO_SWITCH_ON
 
 

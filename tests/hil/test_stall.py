@@ -10,6 +10,7 @@ from bench_runs import MOVING, bench_with, run
 
 from drivers.modelled_bus import Fault, FaultKind, ModelledBus
 from drivers.port import Condition
+from hil.bench.hardware import DriveSection
 from hil.loop.devices import Rig
 from hil.loop.session import Session
 from hil.loop.stall import (
@@ -62,6 +63,39 @@ def test_a_stall_shows_until_the_position_loop_has_settled() -> None:
     assert stall.acts(100, gains)
     assert stall.acts(settled, gains)
     assert not stall.acts(settled + 1, gains)
+
+
+def test_without_a_position_loop_a_stall_shows_while_it_lasts() -> None:
+    gains = bench_with().gains._replace(position_gain_1_s=0.0)
+    assert Stall(0.02, 0.001, 100).acts(119, gains)
+    assert not Stall(0.02, 0.001, 100).acts(121, gains)
+
+
+def test_a_deadline_is_whole_milliseconds_and_at_least_three_periods() -> None:
+    fast = {"velocity_period_s": 0.00025, "position_period_s": 0.001}
+    deadlines_s = [
+        command_deadline_s(bench_with(control=fast, drive={"mode": "cst", "command_deadline_s": given_s}))
+        for given_s in (1e-4, 1.9e-3, 0.029, 0.0299999)
+    ]
+    assert deadlines_s == pytest.approx([0.001, 0.001, 0.029, 0.029], abs=1e-9)
+    slow = {"velocity_period_s": 0.0015, "position_period_s": 0.006}
+    assert command_deadline_s(bench_with(control=slow, drive={"command_deadline_s": 1e-4})) == pytest.approx(0.005)
+
+
+def test_the_axis_is_stopped_two_periods_before_the_deadline_or_at_the_overrun() -> None:
+    drive = {"mode": "cst", "command_deadline_s": 0.03}
+    assert late_limit_s(bench_with(drive=drive | {"overrun_s": 0.05})) == pytest.approx(0.028)
+    assert late_limit_s(bench_with(drive=drive | {"overrun_s": 0.02})) == pytest.approx(0.02)
+    slow = {"velocity_period_s": 0.004, "position_period_s": 0.004}
+    assert late_limit_s(bench_with(control=slow, drive=drive | {"overrun_s": 0.05})) == pytest.approx(0.022)
+
+
+def test_a_bench_without_a_drive_has_the_values_of_the_default() -> None:
+    bench = bench_with()
+    bare, default = bench.model_copy(update={"drive": None}), bench.model_copy(update={"drive": DriveSection()})
+    assert command_deadline_s(bare) == command_deadline_s(default)
+    assert late_limit_s(bare) == late_limit_s(default)
+    assert stalled(bare, 0.02, 7, 0.1) == stalled(default, 0.02, 7, 0.1)
 
 
 @pytest.mark.parametrize(("mode", "held"), [("cst", True), ("csv", False)])

@@ -17,14 +17,10 @@ from drivers.inprocess import InProcessBus
 from drivers.modelled_bus import Fault, FaultKind, ModelledBus
 from drivers.port import Condition
 from hil.identification.residual_thresholds import learn
-from hil.loop.bounds import make_bounds
-from hil.loop.checks import Limit
 from hil.loop.clock import VirtualClock, next_due
 from hil.loop.devices import Rig
 from hil.loop.session import STOP_SEGMENT, Session
-from hil.loop.stopping import plan_stop
-from hil.loop.supervision import AFTER_STALL, RULES, Ending, find, rules_table
-from hil.motion.time_optimal import MotionState
+from hil.loop.supervision import Ending
 from hil.motion.trajectory import plan
 
 RATIO = 0.01 / (2.0 * math.pi)
@@ -48,21 +44,6 @@ def altered(device: str, change: Change) -> Callable[[Rig, Session], dict]:
         return {MOVING: lambda: setattr(getattr(rig, device), "read", faulty)}
 
     return script
-
-
-def test_bounds_that_a_stall_explains() -> None:
-    """Those that a missing set-point breaks; an encoder that jumps, freezes or counts wrong is none."""
-    assert set(AFTER_STALL) == {
-        Limit.FOLLOWING_ERROR,
-        Limit.VELOCITY,
-        Limit.TORQUE,
-        Limit.TRAVEL,
-        Limit.STOPPING_DISTANCE,
-        Limit.ACTING_TORQUE,
-        Limit.RESIDUAL_ENCODER,
-        Limit.RESIDUAL_DRIVE,
-        Limit.RESIDUAL_LOAD,
-    }
 
 
 def quick(ran: Ran) -> bool:
@@ -239,24 +220,6 @@ def test_a_loop_that_is_always_late_acts_at_its_limit() -> None:
     assert next_due(AlwaysLate(), 10, 1e-3, 0.0009, 0.003) == (14, pytest.approx(0.0049), 4)
 
 
-def test_a_stop_is_planned_only_from_a_plausible_state() -> None:
-    rig = Rig(bench_with())
-    try:
-        rig.set_up()
-        limits = MOVE.motion_limits
-        bounds = make_bounds(rig, limits)
-        stop = plan_stop(MotionState(0.0, 0.5, 0.0), limits, bounds, 1e-3)
-        assert stop is not None
-        assert stop.velocity_m_s[-1] == 0.0
-        for velocity in (950.0, -7900.0, math.nan, math.inf):
-            assert plan_stop(MotionState(0.0, velocity, 0.0), limits, bounds, 1e-3) is None
-        assert plan_stop(MotionState(math.nan, 0.0, 0.0), limits, bounds, 1e-3) is None
-        slow = limits.__class__(0.6, 1e-6, 1.0)
-        assert plan_stop(MotionState(0.0, 0.5, 0.0), slow, bounds, 1e-3) is None
-    finally:
-        rig.close()
-
-
 def test_third_ctrl_c_ends_the_loop(tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt):
         run(tmp_path, script=lambda _, session: {MOVING + k: session.ask_stop for k in range(3)})
@@ -286,26 +249,3 @@ def test_encoder_heartbeat_lost_on_the_bus(tmp_path: Path) -> None:
     ran = run(tmp_path, bus=bus, script=lambda *_: {MOVING: lambda: bus.inject(lost)})
     assert ran.outcome.ending is Ending.ENCODER_FAULT
     assert "HEARTBEAT_LOST" in ran.outcome.reason
-
-
-def test_every_limit_has_one_rule() -> None:
-    limits = [rule.limit for rule in RULES if rule.limit]
-    assert sorted(limits) == sorted(limit for limit in Limit if limit)
-    assert len({rule.name for rule in RULES}) == len(RULES)
-
-
-def test_each_bit_gives_its_own_rule() -> None:
-    rig = Rig(bench_with())
-    try:
-        seen = rig.encoder.read(0.0)._replace(condition=Condition.OK)
-        for rule in RULES:
-            if rule.limit:
-                causes = list(find(rig, seen, rule.limit, 0.0, 0, stopping=False))
-                assert [cause.rule for cause in causes] == [rule.name]
-    finally:
-        rig.close()
-
-
-def test_document_and_table_agree() -> None:
-    text = (Path(__file__).parents[2] / "ARCHITECTURE.md").read_text(encoding="utf-8")
-    assert rules_table() in text

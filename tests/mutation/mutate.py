@@ -2,36 +2,74 @@
 
     python tests/mutation/mutate.py [--sample N] [--seed S] [--only PART]     from the root; as make mutation does
 
-cosmic-ray changes an operator, a number, a keyword or a condition of a copy of the project, one at a time, and runs the
-tests of that module there. A mutant is killed if a test fails or takes too long. `--sample` draws so many of each
-module. It prints the diff of each survivor, then a line for each module.
+The operators of cosmic-ray change one operator, number, keyword or condition of a module in a copy of the project, and
+the tests of that module run there. A mutant is killed if a test fails, or if one takes TEST_S of processor time, which
+a busy machine does not change. The tests run without a mutant before and after those of each
+module and must pass. It prints each mutant, then a line for each module. `mutants.py` says which mutants are left out.
+
+Each run is a fork of this process, which has imported the libraries but nothing of the project.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
+import contextlib
+import importlib
+import os
 import random
+import resource
 import shutil
-import sqlite3
-import subprocess
+import signal
 import sys
 import tempfile
+import time
+import traceback
 from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+from mutants import mutants_of
 
 ROOT = Path(__file__).parents[2]
-LOOP = ("session", "supervision", "stall", "arming", "power_off", "encoder_checks")
-DRIVE = ("cia402", "canopen_drive", "acting_setpoint", "faults_watchdogs", "faults_devices", "faults_frames")
+LIBRARIES = ("hypothesis", "numba", "pyarrow.parquet", "pydantic", "canopen", "serial", "ruckig", "scipy.signal",
+             "scipy.optimize", "typer.testing", "rich.console", "msgpack", "yaml")  # fmt: skip
+
+
+class Suite(NamedTuple):
+    """Tests of a module, those that end soonest first. compiled: with numba; else the module runs as plain Python."""
+
+    tests: tuple[str, ...]
+    compiled: bool = True
+
+
+def _tests(folder: str, *names: str) -> tuple[str, ...]:
+    return tuple(f"tests/{folder}/test_{name}.py" for name in names)
+
+
+_DRIVE = _tests("drivers", "cia402", "faults_devices", "faults_watchdogs", "acting_setpoint", "faults_frames",
+                "stop_answered", "canopen_drive")  # fmt: skip
 MODULES = {
-    "drivers/cia402.py": ("drivers", DRIVE),
-    "drivers/canopen_drive.py": ("drivers", DRIVE),
-    "hil/loop/stall.py": ("hil", ("stall", "supervision")),
-    "hil/loop/stopping.py": ("hil", ("session", "supervision")),
-    "hil/loop/bounds.py": ("hil", ("supervision", "encoder_checks", "stall")),
-    "hil/loop/supervision.py": ("hil", ("supervision", "encoder_checks", "stall", "session")),
-    "hil/loop/session.py": ("hil", LOOP),
+    "drivers/cia402.py": Suite(_tests("drivers", "cia402")),
+    "drivers/homing.py": Suite(_tests("drivers", "stop_answered", "canopen_drive")),
+    "drivers/canopen_drive.py": Suite(_DRIVE),
+    "hil/loop/checks.py": Suite(_tests("hil", "checks", "encoder_checks"), compiled=False),
+    "hil/loop/stall.py": Suite(_tests("hil", "stall")),
+    "hil/loop/stopping.py": Suite(_tests("hil", "bounds")),
+    "hil/loop/bounds.py": Suite(_tests("hil", "bounds")),
+    "hil/loop/supervision.py": Suite(_tests("hil", "rules", "stall")),
+    "hil/loop/session.py": Suite(_tests("hil", "session", "session_times", "arming", "power_off", "supervision")),
 }
-TIMEOUT_S = 300.0
+TEST_S = 20  # processor time of a test: the slowest takes 3 s
+BROKEN = 70  # exit code where pytest itself could not be run
+HANG_S = 1200.0  # of all tests by the wall clock: one waits for something that does not come
+
+
+class Run(NamedTuple):
+    """End of a run of the tests: exit code of pytest, negative: the signal, None: it hung; the first failed test."""
+
+    code: int | None
+    failed: str
+    processor_s: float
 
 
 def main() -> None:
@@ -41,61 +79,97 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", default="", help="only modules whose path contains this")
     options = parser.parse_args()
+    for name in LIBRARIES:
+        importlib.import_module(name)
     with tempfile.TemporaryDirectory(prefix="hil-mutants-") as folder:
         copy = Path(folder) / "project"
-        ignored = shutil.ignore_patterns(".git", ".venv", "build", "runs", "__pycache__", ".*_cache", "*.egg-info")
+        ignored = shutil.ignore_patterns(".git", ".venv", "build", "runs", ".*_cache", "*.egg-info")
         shutil.copytree(ROOT, copy, ignore=ignored)
         lines = [mutate(copy, module, options.sample, options.seed) for module in MODULES if options.only in module]
-    print("\n".join(["| module | mutants | run | killed | survived |", "|---|---|---|---|---|", *lines]))
+    print("\n".join(["| module | mutants | run | killed | of those by time | survived |", "|---|---|---|---|---|---|",
+                     *lines]))  # fmt: skip
 
 
 def mutate(copy: Path, module: str, sample: int, seed: int) -> str:
-    """Run the mutants of one module; returns its line of the table."""
-    place, names = MODULES[module]
-    tests = " ".join(f"tests/{place}/test_{name}.py" for name in names)
-    config, session = copy.parent / "config.toml", copy.parent / f"{Path(module).stem}.sqlite"
-    command = f"{sys.executable} -m pytest -q -x -p no:cacheprovider {tests}"
-    config.write_text(
-        f'[cosmic-ray]\nmodule-path = "{module}"\ntimeout = {TIMEOUT_S}\nexcluded-modules = []\n'
-        f'test-command = "{command}"\n[cosmic-ray.distributor]\nname = "local"\n'
-    )
-    run(copy, "init", str(config), str(session))
-    made = drawn(session, sample, seed)
-    run(copy, "exec", str(config), str(session))
-    killed, survivors = 0, []
-    for line in run(copy, "dump", str(session)).splitlines():
-        _, result = json.loads(line)
-        if result is None:
-            continue
-        if result["test_outcome"] == "survived":
-            survivors.append(result["diff"])
-        else:
-            killed += 1
-    for diff in survivors:
-        print(f"survived:\n{diff}\n", flush=True)
-    return f"| `{module}` | {made} | {killed + len(survivors)} | {killed} | {len(survivors)} |"
+    """Run mutants of one module; returns its line of the table."""
+    suite, source = MODULES[module], copy / module
+    text, status = source.read_text(encoding="utf-8"), source.stat()
+    unmutated(copy, suite)
+    mutants = mutants_of(text)
+    drawn = random.Random(seed).sample(mutants, min(sample or len(mutants), len(mutants)))
+    killed = by_time = 0
+    for mutant in drawn:
+        source.write_text(mutant.text(text), encoding="utf-8")
+        run = run_tests(copy, suite)
+        if run.code == BROKEN:
+            raise SystemExit("the tests could not be run")
+        by_time += run.code is None or run.code < 0
+        killed += run.code != 0
+        print(f"{'survived' if run.code == 0 else 'killed'} {module} {mutant.change(text)} [{run.failed}, "
+              f"{run.processor_s:.0f} s]", flush=True)  # fmt: skip
+    source.write_text(text, encoding="utf-8")
+    os.utime(source, ns=(status.st_atime_ns, status.st_mtime_ns))
+    unmutated(copy, suite)
+    return f"| `{module}` | {len(mutants)} | {len(drawn)} | {killed} | {by_time} | {len(drawn) - killed} |"
 
 
-def drawn(session: Path, sample: int, seed: int) -> int:
-    """Keep a random sample of the mutants of a session; returns how many there were."""
-    with sqlite3.connect(session) as database:
-        jobs = [job for (job,) in database.execute("SELECT job_id FROM work_items ORDER BY job_id")]
-        kept = set(random.Random(seed).sample(jobs, min(sample or len(jobs), len(jobs))))
-        for job in jobs:
-            if job not in kept:
-                database.execute("DELETE FROM mutation_specs WHERE job_id = ?", (job,))
-                database.execute("DELETE FROM work_items WHERE job_id = ?", (job,))
-    return len(jobs)
+def unmutated(copy: Path, suite: Suite) -> None:
+    """Run the tests without a mutant; the first run compiles. Raises SystemExit if one fails."""
+    run = run_tests(copy, suite, mutated=False)
+    print(f"without a mutant: exit code {run.code}, {run.processor_s:.0f} s", flush=True)
+    if run.code != 0:
+        raise SystemExit(f"the tests fail without a mutant: {run.failed}")
 
 
-def run(copy: Path, *arguments: str) -> str:
-    """Run cosmic-ray in the copy; returns what it prints."""
-    done = subprocess.run(
-        [sys.executable, "-m", "cosmic_ray.cli", *arguments], cwd=copy, capture_output=True, text=True, check=False
-    )
-    if done.returncode:
-        raise SystemExit(f"cosmic-ray {arguments[0]} failed:\n{done.stderr.strip()}")
-    return done.stdout
+def run_tests(copy: Path, suite: Suite, *, mutated: bool = True) -> Run:
+    """Run the tests in a fork until the first one fails."""
+    output, began_s = copy.parent / "output.txt", time.monotonic()
+    if (pid := os.fork()) == 0:
+        code = BROKEN
+        try:
+            os.setpgid(0, 0)
+            code = in_fork(copy, suite, output, mutated)
+        except BaseException:
+            traceback.print_exc()
+        finally:
+            sys.stdout.flush()
+            os._exit(code)
+    while True:
+        ended, status, usage = os.wait4(pid, os.WNOHANG)
+        if ended or time.monotonic() - began_s > HANG_S:
+            break
+        time.sleep(0.02)
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(pid, signal.SIGKILL)  # also processes that the tests left
+    if not ended:
+        _, _, usage = os.wait4(pid, 0)
+    lines = output.read_text(encoding="utf-8", errors="replace").splitlines()
+    failed = next((line.split()[1].split("::")[-1] for line in lines if line.startswith(("FAILED ", "ERROR "))), "")
+    return Run(os.waitstatus_to_exitcode(status) if ended else None, failed, usage.ru_utime + usage.ru_stime)
+
+
+class Limit:
+    """Plugin of pytest: each test may take TEST_S of processor time."""
+
+    def pytest_runtest_setup(self) -> None:
+        used = resource.getrusage(resource.RUSAGE_SELF)
+        _, hard = resource.getrlimit(resource.RLIMIT_CPU)
+        resource.setrlimit(resource.RLIMIT_CPU, (round(used.ru_utime + used.ru_stime) + TEST_S, hard))
+
+
+def in_fork(copy: Path, suite: Suite, output: Path, mutated: bool) -> int:
+    """Run pytest in the copy; its output goes to a file."""
+    with output.open("wb") as file:
+        os.dup2(file.fileno(), 1)
+        os.dup2(file.fileno(), 2)
+    os.chdir(copy)
+    sys.dont_write_bytecode = mutated
+    options = ["-q", "-x", "-p", "no:cacheprovider", "-W", "ignore::pytest.PytestAssertRewriteWarning"]  # of a library
+    if not suite.compiled:
+        os.environ["NUMBA_DISABLE_JIT"] = "1"
+        sys.modules["numba"].config.DISABLE_JIT = 1
+        options.append("--noconftest")  # which compiles kernels
+    return int(pytest.main([*options, *suite.tests], plugins=[Limit()] if mutated else []))
 
 
 if __name__ == "__main__":

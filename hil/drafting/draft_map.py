@@ -9,7 +9,7 @@ from hil.arrays import FloatArray
 from hil.channels import AXIS_CHANNELS, AxisKind
 from hil.drafting.clock import find_clock
 from hil.drafting.column_names import Label, label
-from hil.drafting.effort import effort_entry
+from hil.drafting.effort import effort_entry, signs_of
 from hil.drafting.encoder_counts import CountSize, assumed, from_length, from_speed
 from hil.drafting.even_rows import even_rows, filled_in, find_wraps, with_rate, without_duplicates
 from hil.drafting.foreign_table import read_table
@@ -272,20 +272,21 @@ class _Composer:
 
     def _efforts(self, moved: MotionColumns) -> None:
         names = AXIS_CHANNELS[self.kind]
-        for column, channel in ((self.roles.effort, names.torque), (self.roles.effort_command, names.torque_command)):
-            if column is not None:
-                cause = driven(self.live[column], moved, self.period_s)
-                entry, notes = effort_entry(
-                    self.labels[column], self.kind, self.draft.table.scalars, cause, moved, self.motor_sign
-                )
-                self.draft.unsure += notes
-                how = self._how(column, f"inertia and friction explain {100 * max(cause.share, 0):.0f} % of it")
-                self.draft.channels.append(DraftedChannel(channel, entry, how))
+        pairs = ((self.roles.effort, names.torque), (self.roles.effort_command, names.torque_command))
+        given = [(column, channel) for column, channel in pairs if column is not None]
+        efforts = [self.live[column] for column, _ in given]
+        causes = [driven(values, moved, self.period_s) for values in efforts]
+        for (column, channel), cause, sign in zip(given, causes, signs_of(efforts, causes, moved), strict=True):
+            told, scalars = self.labels[column], self.draft.table.scalars
+            entry, notes = effort_entry(told, self.kind, scalars, cause, sign * self.motor_sign)
+            self.draft.unsure += notes
+            how = self._how(column, f"inertia and friction explain {100 * max(cause.share, 0):.0f} % of it")
+            self.draft.channels.append(DraftedChannel(channel, entry, how))
 
     def _velocity_only(self) -> None:
         """A recording with velocity in place of position."""
         name = self.roles.motor_velocity
-        assert name is not None
+        assert name
         choice = velocity_unit(name, self.labels[name].unit, 1.0, "rad")
         self._choose(name, choice)
         self.kind = AxisKind.LINEAR if is_length(choice.unit) else AxisKind.ROTARY
@@ -293,8 +294,7 @@ class _Composer:
         self.draft.channels.append(
             DraftedChannel(channel, {"column": name, "unit": choice.unit}, self._how(name, "no position is recorded"))
         )
-        position = np.cumsum(self.live[name]) * self.period_s
-        self._efforts(motion(position, self.period_s))
+        self._efforts(motion(np.cumsum(self.live[name]) * self.period_s, self.period_s))
 
     def _how(self, column: str, what: str) -> str:
         return f"{what}; {self.roles.how[column]}" if column in self.roles.how else what

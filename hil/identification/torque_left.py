@@ -82,11 +82,13 @@ def _innovation(hypothesis: Hypothesis, run: Measured, observer_s: float) -> Flo
 
 
 def _share(missing: Sequence[FloatArray], data: Dataset, slowest: float) -> float | None:
+    if not all(np.isfinite(values).all() for values in missing):  # the twin does not hold the motion
+        return None
     rows = [_sliding(run, slowest) for run in data.runs]
     every = list(zip(missing, data.runs, rows, strict=True))
     left = np.concatenate([_smooth(values, run)[own] for values, run, own in every])
     torque = np.concatenate([_smooth(run.torque, run)[own] for _, run, own in every])
-    if torque.size == 0 or np.ptp(torque) == 0.0 or not np.isfinite(left).all():
+    if torque.size == 0 or np.ptp(torque) == 0.0:
         return None
     return float(np.sqrt(np.mean(left**2)) / np.std(torque))
 

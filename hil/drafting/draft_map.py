@@ -14,7 +14,7 @@ from hil.drafting.encoder_counts import CountSize, assumed, from_length, from_sp
 from hil.drafting.even_rows import even_rows, filled_in, find_wraps, with_rate, without_duplicates
 from hil.drafting.foreign_table import read_table
 from hil.drafting.map_draft import DraftedChannel, MapDraft
-from hil.drafting.oddities import refuse_damage, refuse_missing
+from hil.drafting.oddities import jumps_told, refuse_damage, refuse_missing
 from hil.drafting.relations import MotionColumns, derivative_of, driven, lateness_s, motion, proportional
 from hil.drafting.roles import SAME_POSITION, Roles, find_roles
 from hil.drafting.unit_choice import (
@@ -52,30 +52,30 @@ def draft_map(path: Path, rate_hz: float | None = None, axis: str | None = None)
     wraps = find_wraps(columns, labels)
     columns |= {name: unwrapped(columns[name], size) for name, size in wraps.items()}
     filled = {n: filled_in(values, clock.time_s) for n, values in columns.items() if np.isfinite(values).any()}
-    first = even_rows(path, filled, clock.time_s)
-    roles = find_roles(str(path), first.columns, labels, first.period_s, axis)
+    live = even_rows(path, filled, clock.time_s)
+    roles = find_roles(str(path), live.columns, labels, live.period_s, axis)
     used = {name: columns[name] for name in roles.used}
     refuse_missing(path, used, table.texts)
-    # only now is it known which columns must be complete, and which repeat when a sample does
+    # only now it is known which columns must be complete, and which repeat when a sample does
     ratio = rows_per_sample({name: filled[name] for name in used})
     complete = complete_rows(used | {"time_s": clock.time_s}, ratio if ratio > 1.0 else None)
     kept = {name: values[complete.rows] for name, values in filled.items()}
     even = even_rows(path, kept, complete.columns["time_s"], judged_by=[n for n in used if n != roles.unfollowed])
+    jumps = [note for n in (roles.motor, roles.table) if n for note in jumps_told(n, filled[n], clock.time_s)]
     refuse_damage(path, {name: filled[name] for name in used}, clock.time_s, even.columns, roles, even.period_s)
     clock = with_rate(clock, even)
-    notes = [*doubled, *clock.unsure, *complete.notes, *even.notes]
-    notes += [f"{name}: wraps at {wraps[name]:g}; it is unwrapped" for name in used if name in wraps]
+    unwraps = [f"{name}: wraps at {wraps[name]:g}; it is unwrapped" for name in used if name in wraps]
+    notes = [*doubled, *clock.unsure, *complete.notes, *even.notes, *jumps, *unwraps]
     draft = MapDraft(table, clock, unsure=[*notes, *roles.unsure], left_out=dict(roles.left_out))
-    draft.left_out |= {remark.split(": ", 1)[0]: remark.split(": ", 1)[1] for remark in table.remarks}
+    draft.left_out |= dict(remark.split(": ", 1) for remark in table.remarks)
     draft.unsure += [
         f"{one.column}: its unit is not known" for one in labels.values() if one.odd_unit and one.column in used
     ]
     _Composer(draft, labels, roles, even.columns, even.period_s).compose()
     draft.missing = any(np.isnan(values).any() for values in used.values())
     draft.rows_per_sample = ratio if ratio > 1.0 else None
-    for one in draft.channels:
-        if one.entry["column"] in wraps:
-            one.entry["wraps_at"] = wraps[str(one.entry["column"])]
+    for entry in (one.entry for one in draft.channels if one.entry["column"] in wraps):
+        entry["wraps_at"] = wraps[str(entry["column"])]
     return draft
 
 

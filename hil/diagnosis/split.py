@@ -22,9 +22,7 @@ _SPEED_S = 0.02  # time over which a speed is averaged: many counts of an encode
 def split(recordings: Sequence[Recording]) -> tuple[list[Recording], list[Recording]]:
     """Split each recording into a part of its motion for training and one that is held out, as `CUTS` order them.
 
-    Both keep their time. The training part is as fast as the other and moves both ways, and so does the other, where a
-    cut makes it so. Where none does, as in one move there and back, the other has the largest range of speeds: a slow
-    end needs hardly any torque, and proves nothing.
+    Both keep their time. The training part is as fast as the other, which moves both ways, where a cut makes it so.
     """
     train, rest = [], []
     for recording in recordings:
@@ -32,9 +30,7 @@ def split(recordings: Sequence[Recording]) -> tuple[list[Recording], list[Record
         travel = float(np.ptp(_position(recording)))
         found = [_cut(recording, begin + round(share * (end - begin)), last) for share, last in CUTS]
         fast = [parts for parts in found if _covers(*parts)] or found[:1]
-        told = [parts for parts in fast if _moves_both_ways(parts[0], travel)] or fast
-        both = next((parts for parts in told if _moves_both_ways(parts[1], travel)), None)
-        parts = both or max(told, key=lambda one: _speeds(one[1]))
+        parts = next((one for one in fast if _moves_both_ways(one[1], travel)), fast[0])
         train.append(parts[0])
         rest.append(parts[1])
     return train, rest
@@ -51,7 +47,7 @@ def held_out_note(held_out: Sequence[Recording]) -> str:
     """Sentence on the parts that `split` holds out."""
     first = [one.name for one in held_out if one.name.endswith(f"({_FIRST})")]
     text = "No held-out recording was given: the last part of each recording is used for validation"
-    return f"{text}; but {', '.join(first)}, by speeds and directions of the parts." if first else f"{text}."
+    return f"{text}, but {', '.join(first)}, since only the rest reaches the full speed." if first else f"{text}."
 
 
 def same(one: Recording, other: Recording) -> bool:
@@ -94,19 +90,11 @@ def _moves_both_ways(part: Recording, travel: float) -> bool:
 
 def _top_speed(recording: Recording) -> float:
     """Largest speed of the motor, or of the table without it, averaged over some rows [1/s]."""
-    return float(np.max(np.abs(_speed(recording)), initial=0.0))
-
-
-def _speeds(recording: Recording) -> float:
-    """Range of the speed, from the largest backwards to the largest forwards [1/s]."""
-    return float(np.ptp(_speed(recording))) if _speed(recording).size else 0.0
-
-
-def _speed(recording: Recording) -> FloatArray:
-    """Speed (m,) of the motor, or of the table without it, averaged over some rows [1/s]; empty for fewer rows."""
     position = _position(recording)
     rows = max(round(_SPEED_S / recording.period_s), 1)
-    return (position[rows:] - position[:-rows]) / (rows * recording.period_s)
+    if position.size <= rows:
+        return 0.0
+    return float(np.max(np.abs(position[rows:] - position[:-rows]))) / (rows * recording.period_s)
 
 
 def _standstill(recording: Recording, row: int) -> int:

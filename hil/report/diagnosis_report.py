@@ -169,7 +169,7 @@ def torque_line(left: TorqueLeft) -> str:
         "plain least squares": left.plain,
     }
     given = ", ".join(f"{name} {percent(share)}" for name, share in shares.items() if share is not None)
-    return f"Torque left on held-out motion, of its standard deviation: {given}."
+    return f"Torque left on held-out motion, of the torque's standard deviation: {given}."
 
 
 def _corrections(page: Page, result: Result) -> None:

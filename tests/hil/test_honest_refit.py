@@ -16,7 +16,7 @@ from hil.identification.hypothesis import Hypothesis
 from hil.identification.measured import take
 from hil.identification.nominal_fit import fit_nominal
 from hil.identification.terms import Term
-from hil.identification.torque_left import fit_plain, left_by_plain, left_by_twin
+from hil.identification.torque_left import fit_plain, left_by_plain, left_by_twin, torque_deviation
 
 HEAVY = 1.3 * 384.0
 
@@ -80,6 +80,11 @@ def test_the_torque_left_is_compared_with_a_plain_model() -> None:
     inertia = 719.0 * owner.axis.ratio_m_rad**2
     assert plain.coefficients[0] == pytest.approx(inertia, rel=0.05)
     by_plain = left_by_plain(plain, held_out)
+    deviation = torque_deviation([held_out], plain.slowest)
+    assert left_by_plain(plain, held_out, 2.0 * deviation) == pytest.approx(0.5 * (by_plain or 0.0))
+    assert min(deviation, torque_deviation([train], plain.slowest)) <= torque_deviation(
+        (train, held_out), plain.slowest
+    )
     by_owner, by_truth = (
         left_by_twin(hypothesis, held_out, plain.slowest)
         for hypothesis in (Hypothesis(owner), Hypothesis(bench(), (cogging,)))

@@ -115,19 +115,6 @@ def test_the_part_held_out_moves_both_ways() -> None:
     assert len(train) > 0.4 * len(feeds)
 
 
-def test_the_part_held_out_is_no_slow_end() -> None:
-    """One move there and back, with a slow end: no third moves both ways, and the last one needs hardly any force."""
-    feeds = moved([(0.15, 0.06)])
-    time_s = np.arange(len(feeds)) * PERIOD_S
-    share = np.minimum(time_s / (0.8 * time_s[-1]), 1.0)
-    position = 0.05 * (1.0 - np.cos(2.0 * np.pi * share)) + 5e-4 * time_s
-    once = replace(feeds, columns=feeds.columns | {"motor_position_m": position})
-    (train,), (held_out,) = split([once])
-    assert np.ptp(np.diff(held_out["motor_position_m"])) > 0.9 * np.max(np.diff(position))
-    back = np.diff(train["motor_position_m"])
-    assert np.min(back) < -0.5 * np.max(back)  # both ways
-
-
 def test_friction_that_varies_is_no_wrong_sign() -> None:
     """On a slow move the force follows the cogging, not the acceleration; of a wrong sign friction is negative."""
     slow = moved([(0.15, 0.06)])

@@ -144,8 +144,8 @@ class Hypothesis:
             scale = value if value > 0.0 else 1e-3
             found.append(Coordinate(name, scale, True, scale / TRUST, scale * TRUST))
         if DELAY in self.nominal:
-            period_s = self.bench.period_s
-            found.append(Coordinate(DELAY, period_s, False, -MOST_DELAY * period_s, MOST_DELAY * period_s))
+            delay_s, most_s = self.bench.torque_delay_s or 0.0, MOST_DELAY * self.bench.period_s
+            found.append(Coordinate(DELAY, self.bench.period_s, False, delay_s - most_s, delay_s + most_s))
         found += self._known
         for index, term in enumerate(self.terms):
             for parameter, start in zip(BY_ID[term.effect].parameters, term.values, strict=True):

@@ -16,7 +16,7 @@ from hil.diagnosis.experiment import Experiment, separating, showing
 from hil.diagnosis.location.locate import locate
 from hil.diagnosis.notes import at_bound, ended, notes_on, on_torque, stopped
 from hil.diagnosis.preparation import prepare_diagnosis
-from hil.diagnosis.result import Location, Mode, NextExperiment, Result, TimeBudget, Unexplained, Verdict
+from hil.diagnosis.result import AT_FLOOR, Location, Mode, NextExperiment, Result, TimeBudget, Unexplained, Verdict
 from hil.diagnosis.search.events import with_events_of
 from hil.diagnosis.search.forward_selection import Explanation, explain
 from hil.diagnosis.statement import statement
@@ -211,7 +211,7 @@ def _unexplained(
                 worst[names[name]] = max(worst.get(names[name], 0.0), ratio)
     above = {name: float(np.sqrt(ratio)) for name, ratio in worst.items() if ratio > FLOOR}
     if not above:
-        return Unexplained(share=share, description="Every channel is at its noise floor.")
+        return Unexplained(share=share, description=AT_FLOOR)
     text = ", ".join(f"{name} at {digits(above[name])} × noise rms" for name in sorted(above, key=lambda n: -above[n]))
     if verdict is Verdict.UNEXPLAINED and not final.terms and location is not None:
         text += f"; {where_in_short(location, final.bench.axis.turns)}"

@@ -10,6 +10,7 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.diagnosis.result import EventWindow, PulseTrain, Value
+from hil.diagnosis.turning import of_load
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.measured import Measured
@@ -80,7 +81,8 @@ def describe_event(final: Fit, index: int, held_out: Dataset) -> EventReport:
     words["count"] = str(train.count if train else _different(seen))
     if train is not None:
         words |= {"width_s": quantity(train.width_s, "s"), "period_s": quantity(train.period_s, "s")}
-    return EventReport(windows, train, text.format(**words), parameters)
+    text = of_load(text, final.bench.axis.turns).format(**words)
+    return EventReport(windows, train, text, parameters)
 
 
 def _edges(term: Term) -> list[int]:

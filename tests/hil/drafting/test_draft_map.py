@@ -230,3 +230,21 @@ def test_units_of_a_scope_with_a_time_beside_each_channel_are_read(tmp_path: Pat
 @pytest.mark.parametrize("name", ["Istwinkel [Grad]", "istposition [mm]", "ActPos"])
 def test_a_measured_position_is_told_by_its_name(name: str) -> None:
     assert label(name).quantity == "position"
+
+
+@pytest.mark.parametrize("turned", [(), ("torque_command_Nm",), ("torque_measured_Nm",)])
+def test_torque_and_command_get_signs_that_agree(tmp_path: Path, turned: tuple[str, ...]) -> None:
+    """Another axis pushes this one: alone, the measured torque seems to accelerate backwards."""
+    random = np.random.default_rng(2)
+    from_other = 6.5e-4 * np.gradient(AXIS["speed"], AXIS["t"]) + random.normal(0.0, 0.5, AXIS["t"].size)
+    friction = 1.2 * np.sign(AXIS["speed"])
+    columns = {
+        "time_s": AXIS["t"],
+        "motor_angle_rad": AXIS["angle"],
+        "torque_command_Nm": friction,
+        "torque_measured_Nm": friction - np.convolve(from_other, np.ones(21) / 21, "same"),
+    }
+    changed = {name: -part if name in turned else part for name, part in columns.items()}
+    found = channels(draft_map(write(tmp_path / "log.csv", changed)))
+    assert found["torque_command_n_m"].get("sign", 1) == (-1 if "torque_command_Nm" in turned else 1)
+    assert found["torque_n_m"].get("sign", 1) == (-1 if "torque_measured_Nm" in turned else 1)

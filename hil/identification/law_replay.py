@@ -195,9 +195,9 @@ def closed_form(runs: Sequence[LawRows], base: Settings, cuts: Sequence[int]) ->
 
 
 def _tables(runs: Sequence[LawRows], base: Settings, cuts: Sequence[int]) -> tuple[FloatArray, FloatArray]:
-    """Columns of both loops with what they give as the last: (n, 2 k + 1) of the command, (n, 3) of the speed set-point.
+    """Columns of both loops, what they give as the last: (n, 2 k + 1) of the command, (n, 3) of the speed set-point.
 
-    The second is empty where no speed set-point is recorded.
+    The second table is empty where no speed set-point is recorded.
     """
     gains = base.gains
     of_command, of_speed = [], []

@@ -34,7 +34,7 @@ from hil.identification.rest import resting
 from hil.identification.terms import Term, push_n, repeats
 from hil.twin.axis import COARSE_STEP_S, FINE_STEP_S, Response, Twin
 from hil.twin.library import BY_ID
-from hil.twin.mechanisms.channel_time_skew import delayed_mean
+from hil.twin.mechanisms.channel_time_skew import delayed
 from hil.twin.parameter import Role
 from hil.twin.physics import Active
 
@@ -270,7 +270,7 @@ class Hypothesis:
         measured = twin.undelayed(run.response)
         if DELAY in self.nominal:
             periods = (self.resolved.bench.torque_delay_s or 0.0) / run.period_s
-            command, torque = (delayed_mean(values, periods) for values in (measured.torque_command, measured.torque))
+            command, torque = (delayed(values, periods) for values in (measured.torque_command, measured.torque))
             measured = measured._replace(torque_command=command, torque=torque)
         rest = resting(rests or run, twin.slow_velocity)
         predicted = twin.observe(run.position_command_m, run.velocity_command_m_s, measured, run.start, rest)

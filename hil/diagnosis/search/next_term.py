@@ -93,7 +93,7 @@ def _worthwhile(found: Sequence[Fit], base: Fit, nominal: Fit, owner: Fit) -> Fi
         if against(other, base) >= NEEDED
         and gain(base, other, nominal) >= enough
         and REPEATS * unrepeated(other.hypothesis, other.data) <= differs
-        and constant_inside(other)
+        and constant_inside(other, base)
     ]
     return next((other for other in good if not harmed(other, base, owner)), good[0] if good else None)
 

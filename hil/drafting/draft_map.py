@@ -118,10 +118,10 @@ class _Composer:
     def _units_of_positions(self) -> None:
         roles, labels, live = self.roles, self.labels, self.live
         positions = [name for name in (roles.command, roles.table, roles.motor) if name]
-        prefers = prefers_length(positions, self._effort)
-        by_convention = unit_by_convention(self._effort)
+        prefers, by_convention = prefers_length(positions, self._effort), unit_by_convention(self._effort)
         self.draft.unsure += [by_convention.note] if by_convention else []
-        far, motor = next((name for name in (roles.table, roles.command) if name), None), roles.motor
+        guessed = () if by_convention else (roles.table, roles.command)
+        far, motor = next((name for name in guessed if name), None), roles.motor
         if far and motor and "counts" not in (labels[far].unit, labels[motor].unit) and not are_counts(live[motor]):
             relation = proportional(live[far], live[motor])
             pair = screw_units(relation.factor, labels[far].unit, labels[motor].unit)

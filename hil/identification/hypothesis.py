@@ -34,7 +34,7 @@ from hil.identification.rest import resting
 from hil.identification.terms import Term, push_n, repeats
 from hil.twin.axis import COARSE_STEP_S, FINE_STEP_S, Response, Twin
 from hil.twin.library import BY_ID
-from hil.twin.mechanisms.channel_time_skew import delayed_mean
+from hil.twin.mechanisms.channel_time_skew import delayed
 from hil.twin.parameter import Role
 from hil.twin.physics import Active
 
@@ -262,7 +262,7 @@ class Hypothesis:
     def undelayed(self, twin: Twin, run: Measured) -> Response:
         """Measured channels without the lateness that terms, and a delay of the torque, give them."""
         found, periods = twin.undelayed(run.response), (self.resolved.bench.torque_delay_s or 0.0) / run.period_s
-        command, torque = (delayed_mean(part, periods) for part in (found.torque_command, found.torque))
+        command, torque = (delayed(part, periods) for part in (found.torque_command, found.torque))
         return found._replace(torque_command=command, torque=torque) if periods else found
 
     def blocks(

@@ -4,13 +4,14 @@
 # make net      diagnose the fixed cases of tests/net again and print what changed (up to 40 min);
 #               continues a stopped run of this commit; NET=FOLDER for changes without a commit
 # make fuzz, make fault-matrix: 20 000 damaged inputs; 10 000 runs with a fault (10 to 20 min each)
-# make mutation run the tests against mutants of the safety code, SAMPLE of each module (an hour and more)
+# make mutation run the tests against mutants of the safety code, SAMPLE of each module (an hour)
 # make vm-test  boot a PREEMPT_RT kernel in a virtual machine and disturb the bench there (as root)
 # make test-long, make peers, make clean
 PYTHON ?= python3.11
 BIN := .venv/bin
 INSTALLED := .venv/.installed
 SAMPLE ?= 25
+SEED ?= 1
 # one folder holds the answers of one state of the code
 NET ?= runs/net-$(shell git rev-parse --short HEAD 2>/dev/null)
 
@@ -46,7 +47,7 @@ fault-matrix: setup
 
 mutation: setup
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check cosmic-ray==8.7.0
-	$(BIN)/python tests/mutation/mutate.py --sample $(SAMPLE)
+	$(BIN)/python tests/mutation/mutate.py --sample $(SAMPLE) --seed $(SEED)
 
 vm-test: setup
 	$(BIN)/python tests/vm/vm.py

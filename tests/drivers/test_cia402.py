@@ -164,6 +164,7 @@ def homing(*words: int, speeds: tuple[float, ...] = ()) -> HomingPhase:
 
 def test_homing_is_done_when_attained_reached_and_at_rest() -> None:
     assert homing(ENABLED, ENABLED, DONE) is HomingPhase.DONE
+    assert homing(ENABLED, ENABLED, DONE, speeds=(1.0, 1.0, -0.1)) is HomingPhase.DONE  # the speed of standstill itself
 
 
 @pytest.mark.parametrize(

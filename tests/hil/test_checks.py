@@ -196,11 +196,24 @@ def test_a_residual_must_last_and_be_of_fresh_samples() -> None:
     assert Checked(**RESIDUAL).ticks_until_passed(repeat(beyond | {"motor_age": 1}, 99)) == (0, Limit.NONE)
 
 
+def test_a_residual_is_the_distance_of_axis_and_twin_wherever_they_are() -> None:
+    where = {"motor_m": 0.1, "table_m": 0.3, "torque": 3.0}
+    twin = {"twin_motor_m": 0.1, "twin_table_m": 0.3, "twin_torque": 3.0, "command": 3.0}
+    assert Checked(STILL._replace(**where, **twin), **RESIDUAL).ticks_until_passed(repeat({}, 60)) == (0, Limit.NONE)
+
+
 def test_a_residual_is_told_as_long_as_it_lasts() -> None:
     checked = Checked(**RESIDUAL)
     passed = [checked.tick(twin_table_m=2.2e-4) for _ in range(30)]
     assert passed == [Limit.NONE] * 19 + [Limit.RESIDUAL_ENCODER] * 11
     assert checked.tick() == Limit.NONE
+
+
+def test_a_drive_with_loops_of_its_own_is_not_suspected_for_a_torque_that_was_not_commanded() -> None:
+    checked = Checked(commands_torque=False, **RESIDUAL | {"residual_torque": 0.5})
+    checked.tick(twin_torque=1.1, command=5.0)
+    ticks = repeat({"twin_torque": 1.1, "command": 5.0}, 60)
+    assert checked.ticks_until_passed(ticks) == (20, Limit.RESIDUAL_LOAD)
 
 
 def test_without_a_table_encoder_the_load_is_the_suspect() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -148,9 +149,9 @@ def test_a_drive_that_stays_on_is_an_error(at: FaultyBench, mode: str, end: str)
     assert at.ended == "StillPowered"
 
 
-@pytest.mark.parametrize("requests", [0, 3])
-def test_the_ramp_of_the_drive_is_not_cut_off_by_the_end_of_a_run(tmp_path: Path, requests: int) -> None:
-    """An exception, or a third ctrl-C, at 0.5 m/s: the ramp takes 0.3 s. Without power the axis would coast."""
+@pytest.mark.parametrize(("requests", "slower"), [(0, 1), (3, 1), (0, 4)])
+def test_the_ramp_of_the_drive_is_not_cut_off_by_the_end_of_a_run(tmp_path: Path, requests: int, slower: int) -> None:
+    """An exception, or a third ctrl-C, at 0.5 m/s: the ramp takes 0.3 or 1.2 s. Without power it would coast."""
     rigs: list[Rig] = []
     motion = MOVE.model_dump()
     motion["segments"][1].update(to_m=0.3, feed_m_s=0.5)
@@ -162,6 +163,8 @@ def test_the_ramp_of_the_drive_is_not_cut_off_by_the_end_of_a_run(tmp_path: Path
             raise ZeroDivisionError
 
         rigs.append(rig)
+        rig.nodes.drive.values[0x6085_00] //= slower
+        rig.drive.info = replace(rig.drive.info, quick_stop_rad_s2=rig.drive.info.quick_stop_rad_s2 / slower)
         return {500: fail}
 
     with pytest.raises(KeyboardInterrupt if requests else ZeroDivisionError):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,8 @@ from bench_runs import bench_with, run
 
 from hil.errors import HilError
 from hil.loop import virtual
+from hil.loop.devices import Rig
+from hil.loop.session import STOP_SEGMENT, Session
 from hil.loop.simulated_bench import load_simulated
 from hil.loop.supervision import Ending
 
@@ -55,3 +58,22 @@ def test_seven_dof_bench(tmp_path: Path) -> None:
 def test_stop_asked_while_arming_moves_nothing(tmp_path: Path) -> None:
     with pytest.raises(HilError, match="nothing moved"):
         run(tmp_path, compiled=True, script=lambda _, session: {2: session.ask_stop})
+
+
+def test_a_stop_asked_between_two_blocks_begins_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(virtual, "SNAPSHOT_TICKS", 150)
+
+    def script(rig: Rig, session: Session) -> dict[int, Callable[[], Any]]:
+        recorder = session._recorder
+        record = recorder.record_block
+
+        def record_and_ask(block: Any) -> None:
+            record(block)
+            session.ask_stop()
+
+        monkeypatch.setattr(recorder, "record_block", record_and_ask)
+        return {}
+
+    ran = run(tmp_path, compiled=True, script=script)
+    assert ran.outcome.ending is Ending.INTERRUPTED
+    assert int(np.argmax(ran.recording["segment"] == STOP_SEGMENT)) in (150, 151)

@@ -53,9 +53,11 @@ def sentence(term: Term, bench: Bench) -> str:
     """Describe a term in a sentence with its values, and its variant in brackets."""
     mechanism, axis = BY_ID[term.effect], bench.axis
     variant = mechanism.variants[term.variant]
-    text, given = variant.sentence or mechanism.sentence, list(term.values)
-    if given[mechanism.strength] < 0.0 and mechanism.reversed and not variant.sentence:
-        text, given[mechanism.strength] = mechanism.reversed, -given[mechanism.strength]
+    told_by = variant if variant.sentence else mechanism
+    text, opposite = told_by.sentence, told_by.reversed
+    given = list(term.values)
+    if given[mechanism.strength] < 0.0 and opposite:
+        text, given[mechanism.strength] = opposite, -given[mechanism.strength]
     values = {}
     least = _LITTLE * max((abs(given[place]) for place in mechanism.indices(Role.STRENGTH)), default=0.0)
     for parameter, value in zip(mechanism.parameters, given, strict=True):

@@ -108,7 +108,8 @@ class Variant:
     contribution: Callable[..., Any]
     name: str = ""
     sentence: str = ""  # if it differs from the mechanism's
-    element: str = ""  # likewise
+    reversed: str = ""  # that sentence for a negative strength
+    element: str = ""  # if it differs from the mechanism's
     starts: Callable[[Scene], Points] | None = None  # if they differ from the mechanism's
     proportional: bool = True  # the change is proportional to the strength
     needs_table: bool = False  # not observable without a linear encoder

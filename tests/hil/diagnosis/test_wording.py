@@ -28,6 +28,11 @@ def test_the_sentence_of_a_negative_strength_has_the_same_values(mechanism) -> N
     assert "-" not in backwards
 
 
+def test_a_negative_strength_of_a_form_with_its_own_sentence_is_below() -> None:
+    text = sentence(Term("asymmetric_friction", 1, (-0.5,)), load_bench("reference"))
+    assert "it is 0.500 N m below the mean" in text
+
+
 def test_a_harmonic_far_below_the_largest_is_told_by_its_bound() -> None:
     text = sentence(Term("periodic_lead_error", 0, (7e-6, 0.0, 1e-9, 0.0, 3e-7, 0.0)), load_bench("reference"))
     assert "by 7.00 µm once, less than 0.0700 µm twice and 0.300 µm three times" in text

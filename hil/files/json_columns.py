@@ -67,7 +67,7 @@ def _flat(row: dict[str, Any]) -> dict[str, Any]:
 
     NAME are the texts of a list `name` of the same length. An object of seconds and nanoseconds is one stamp [s].
     """
-    names = next((row[key] for key in _NAME_KEYS if isinstance(row.get(key), list)), [])
+    names: list[Any] = next((row[key] for key in _NAME_KEYS if isinstance(row.get(key), list)), [])
     flat: dict[str, Any] = {}
     for key, value in row.items():
         if isinstance(value, dict):

@@ -235,7 +235,7 @@ def _one_law(found: FloatArray, table: FloatArray) -> FloatArray:
     than 1 decides: P (s + Kv)(s + Ki / Kp) / s is symmetric. If both leave the same, that of the faster velocity loop
     is taken.
     """
-    small: FloatArray = np.asarray(np.linalg.qr(table, mode="r"))
+    small = np.asarray(np.linalg.qr(table, mode="r"), dtype=np.float64)
     both, forward, kp, product_, _ = _least_squares(small[:, :5], small[:, -1])[0]
     if kp <= 0.0 or forward <= 0.0 or both <= 0.0:
         return found

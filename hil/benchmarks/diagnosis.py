@@ -1,6 +1,6 @@
 """Time and memory of a diagnosis over the length of a recording and the number of masses.
 
-    python -m hil.benchmarks.diagnosis [--lengths 25,50,100,200] [--masses 2,7,20]
+    python -m hil.benchmarks.diagnosis [--cases 2x25,2x50,2x100,2x200,7x25,20x25,7x200]
 
 The simulated bench repeats the motion of `hil demo` with concealed cogging. An axis of n masses is a chain: the motor
 of the reference axis, its table in n - 1 equal parts, and its compliance in n - 1 equal springs.
@@ -31,19 +31,18 @@ from hil.report.console import table
 from hil.twin.mechanisms import cogging_torque
 
 _HIL = (sys.executable, "-c", "from hil.cli import main; main()")
-_SHORT_S = 25.0
+_CASES = "2x25,2x50,2x100,2x200,7x25,20x25,7x200"
 _COGGING = cogging_torque.MECHANISM
 _VALUES = (0.1, 12.0, 1.0)  # N m, per revolution, rad
 _EFFECT = SimulatedEffect(effect=_COGGING.id, parameters=dict(zip(_COGGING.names, _VALUES, strict=True)))
 
 
 def measure(
-    lengths: Annotated[str, typer.Option(help="Seconds of a recording of two masses, with commas.")] = "25,50,100,200",
-    masses: Annotated[str, typer.Option(help="Numbers of masses of a recording of 25 s, with commas.")] = "2,7,20",
+    cases: Annotated[str, typer.Option(help="MASSESxSECONDS of each recording, with commas.")] = _CASES,
 ) -> None:
-    """Print time and memory of a diagnosis, cold, for each length and each number of masses."""
-    rows = [_row(2, float(length)) for length in lengths.split(",") if length]
-    rows += [_row(int(number), _SHORT_S) for number in masses.split(",") if number]
+    """Print time and memory of a diagnosis, in a new process, for each number of masses and length."""
+    wanted = [case.split("x") for case in cases.split(",")]
+    rows = [_row(int(masses), float(length_s)) for masses, length_s in wanted]
     table(("masses", "recording at 1 kHz", "diagnosis", "processor", "memory", "named"), rows)
 
 

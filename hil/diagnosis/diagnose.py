@@ -16,7 +16,7 @@ from hil.diagnosis.experiment import Experiment, separating, showing
 from hil.diagnosis.location.locate import locate
 from hil.diagnosis.notes import at_bound, ended, notes_on, on_torque, stopped
 from hil.diagnosis.preparation import prepare_diagnosis
-from hil.diagnosis.result import Location, Mode, NextExperiment, Result, TimeBudget, Unexplained, Verdict
+from hil.diagnosis.result import AT_FLOOR, Location, Mode, NextExperiment, Result, TimeBudget, Unexplained, Verdict
 from hil.diagnosis.search.events import with_events_of
 from hil.diagnosis.search.forward_selection import Explanation, explain
 from hil.diagnosis.statement import statement
@@ -24,6 +24,7 @@ from hil.diagnosis.time_left import with_time_left
 from hil.diagnosis.turning import labelled
 from hil.diagnosis.untold import untold
 from hil.diagnosis.verdict.cross_validation import CrossValidation, cross_validate
+from hil.diagnosis.verdict.each_alone import changed_between
 from hil.diagnosis.verdict.findings import corrections, diagnosed_bench, findings, form_of, renamed
 from hil.diagnosis.verdict.fit_table import channel_names, channel_residuals, closed_loop_held, fit_table
 from hil.diagnosis.verdict.judge import explains_most, judge, not_testable, unexplained_share
@@ -190,7 +191,9 @@ def diagnose(
         runtime_s=time.monotonic() - begin,
     )
     told = statement(result.model_copy(update={"verdict": of_plant}))
-    result = result.model_copy(update={"statement": f"{law.advice} {told}".strip()})
+    changed = changed_between(nominal) if of_plant is Verdict.UNEXPLAINED and not explanation.stopped_at else ""
+    said = " ".join(text for text in (law.advice, changed, told) if text)
+    result = result.model_copy(update={"statement": said})
     after = bench if of_plant is Verdict.NO_MISMATCH else diagnosed_bench(bench, final)
     if not bench.law_known:  # what was set aside stays in the file
         after = after.model_copy(update={"control": believed.control})
@@ -211,7 +214,7 @@ def _unexplained(
                 worst[names[name]] = max(worst.get(names[name], 0.0), ratio)
     above = {name: float(np.sqrt(ratio)) for name, ratio in worst.items() if ratio > FLOOR}
     if not above:
-        return Unexplained(share=share, description="Every channel is at its noise floor.")
+        return Unexplained(share=share, description=AT_FLOOR)
     text = ", ".join(f"{name} at {digits(above[name])} × noise rms" for name in sorted(above, key=lambda n: -above[n]))
     if verdict is Verdict.UNEXPLAINED and not final.terms and location is not None:
         text += f"; {where_in_short(location, final.bench.axis.turns)}"

@@ -93,5 +93,6 @@ def on_torque(left: TorqueLeft | None) -> list[str]:
         return []
     return [
         f"On held-out motion the twin leaves {percent(left.final)} of the torque's standard deviation, more than plain "
-        f"least squares of inertia, friction and offset ({percent(left.plain)}): it lacks or misjudges what these hold."
+        f"least squares of inertia, friction and offset ({percent(left.plain)}): torques that no term describes act on "
+        "the axis, such as gravity or another arm, and the fit to its motion takes them for inertia or friction."
     ]

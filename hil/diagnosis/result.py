@@ -151,6 +151,9 @@ class ChannelFit(_Part):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, populate_by_name=True)
 
 
+AT_FLOOR = "Every channel is at its noise floor."
+
+
 class Unexplained(_Part):
     """Residuals above the noise floor."""
 
@@ -159,7 +162,10 @@ class Unexplained(_Part):
 
 
 class TorqueLeft(_Part):
-    """Torque left on held-out recordings, predicted from the measured motion, over its standard deviation."""
+    """Torque left on held-out recordings, predicted from the measured motion, over its standard deviation.
+
+    The deviation is that of all recordings, training and held-out together.
+    """
 
     owner: NotNegative | None = Field(description="parameters of the bench file; null where it cannot be computed")
     refitted: NotNegative | None = Field(description="nominal parameters refitted, no new physics")

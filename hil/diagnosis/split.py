@@ -22,7 +22,8 @@ _SPEED_S = 0.02  # time over which a speed is averaged: many counts of an encode
 def split(recordings: Sequence[Recording]) -> tuple[list[Recording], list[Recording]]:
     """Split each recording into a part of its motion for training and one that is held out, as `CUTS` order them.
 
-    Both keep their time. The training part is as fast as the other, which moves both ways, where a cut makes it so.
+    Both keep their time. The training part is as fast as the other, and both move both ways, where a cut makes it so;
+    else the training part does: of motion in one direction friction and a load are one offset.
     """
     train, rest = [], []
     for recording in recordings:
@@ -30,7 +31,8 @@ def split(recordings: Sequence[Recording]) -> tuple[list[Recording], list[Record
         travel = float(np.ptp(_position(recording)))
         found = [_cut(recording, begin + round(share * (end - begin)), last) for share, last in CUTS]
         fast = [parts for parts in found if _covers(*parts)] or found[:1]
-        parts = next((one for one in fast if _moves_both_ways(one[1], travel)), fast[0])
+        told = [parts for parts in fast if _moves_both_ways(parts[0], travel)] or fast
+        parts = next((parts for parts in told if _moves_both_ways(parts[1], travel)), told[0])
         train.append(parts[0])
         rest.append(parts[1])
     return train, rest

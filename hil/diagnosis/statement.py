@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 
-from hil.diagnosis.result import Finding, FitFigures, Mode, Result, Verdict
+from hil.diagnosis.result import AT_FLOOR, Finding, FitFigures, Mode, Result, Verdict
 from hil.diagnosis.wording import title
 from hil.quantities import percent, quantity
 
@@ -32,7 +32,7 @@ def statement(result: Result) -> str:
         where = "held-out" if entry.validate_ else "these"
         return (
             f"Missing physics{doubt}: {named} With all of it the residual of {name} on {where} recordings {change} "
-            f"rms; the noise floor is {noise}."
+            f"rms; the noise floor is {noise}.{_left(result)}"
         )
     if result.verdict is Verdict.PARAMETER_ERROR:
         shares = {name: one.value / one.nominal for name, one in result.parameter_corrections.items() if one.nominal}
@@ -53,6 +53,12 @@ def statement(result: Result) -> str:
             f"noise: {part} {result.unexplained.description}"
         )
     return f"The mismatch is not explained by any mechanism of the library: {result.unexplained.description}"
+
+
+def _left(result: Result) -> str:
+    """What remains beside the named effects, as a sentence; empty at the noise floor."""
+    told = result.unexplained.description
+    return "" if told == AT_FLOOR else f" Not explained: {told[0].lower()}{told[1:]}"
 
 
 def _sentences(found: Sequence[Finding]) -> str:

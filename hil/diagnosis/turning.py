@@ -18,7 +18,10 @@ _WORDS = {
     "screw": "motor",
     "mm": "mrad",
     "µm": "µrad",
-    "m/min": "rad/min",
+    "force": "torque",
+    "forces": "torques",
+    "Force": "Torque",
+    "[N]": "[N m]",
     "m/s²": "rad/s²",
 }
 _ANY = re.compile(rf"(?<![\w/])({'|'.join(map(re.escape, _WORDS))})(?![\w/])")
@@ -27,6 +30,11 @@ _ANY = re.compile(rf"(?<![\w/])({'|'.join(map(re.escape, _WORDS))})(?![\w/])")
 def of_load(text: str, turns: bool) -> str:
     """The text in the words of a load that turns, if it does."""
     return _ANY.sub(lambda match: _WORDS[match[1]], text) if turns else text
+
+
+def speed_unit(turns: bool) -> tuple[float, str]:
+    """Factor and unit in which speeds of the table [m/s], or of a load that turns [rad/s], are read."""
+    return (1.0, "rad/s") if turns else (60.0, "m/min")
 
 
 def labelled(figure: Figure, turns: bool) -> Figure:

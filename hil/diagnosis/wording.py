@@ -4,12 +4,13 @@ from collections.abc import Iterable
 
 from hil.bench.bench_file import Bench
 from hil.diagnosis.result import Location
-from hil.diagnosis.turning import of_load
+from hil.diagnosis.turning import of_load, speed_unit
 from hil.identification.terms import Term
 from hil.quantities import digits, quantity
 from hil.twin.library import BY_ID
 from hil.twin.parameter import Parameter, Role
 
+_SEEN = {"measured": "the measured torque shows it", "hidden": "the measured torque does not show it"}
 _LITTLE = 0.01  # of the largest strength of a mechanism: a harmonic below is not told by its own value
 
 
@@ -52,9 +53,11 @@ def sentence(term: Term, bench: Bench) -> str:
     """Describe a term in a sentence with its values, and its variant in brackets."""
     mechanism, axis = BY_ID[term.effect], bench.axis
     variant = mechanism.variants[term.variant]
-    text, given = variant.sentence or mechanism.sentence, list(term.values)
-    if given[mechanism.strength] < 0.0 and mechanism.reversed and not variant.sentence:
-        text, given[mechanism.strength] = mechanism.reversed, -given[mechanism.strength]
+    told_by = variant if variant.sentence else mechanism
+    text, opposite = told_by.sentence, told_by.reversed
+    given = list(term.values)
+    if given[mechanism.strength] < 0.0 and opposite:
+        text, given[mechanism.strength] = opposite, -given[mechanism.strength]
     values = {}
     least = _LITTLE * max((abs(given[place]) for place in mechanism.indices(Role.STRENGTH)), default=0.0)
     for parameter, value in zip(mechanism.parameters, given, strict=True):
@@ -64,8 +67,15 @@ def sentence(term: Term, bench: Bench) -> str:
     order = mechanism.named(Role.ORDER, term.values)
     values["wave"] = "" if order is None else _wave(order, bench)
     values["viscous_speed"] = quantity(bench.axis.physics().viscous_speed, "m/s" if axis.linear else "rad/s")
-    text = of_load(text, axis.turns).format(**values)
-    return f"{text.removesuffix('.')} ({variant.name})." if variant.name else text
+    told = of_load(text, axis.turns).format(**values, variant=variant.name)
+    if not variant.name or "{variant}" in text:
+        return told
+    return f"{told.removesuffix('.')} ({_in_words(variant.name)})."
+
+
+def _in_words(variant: str) -> str:
+    """The name of a variant, with what it says of the measured torque in words."""
+    return "; ".join(_SEEN.get(word, word) for word in variant.split()) if variant.split()[0] in _SEEN else variant
 
 
 def where(location: Location, turns: bool) -> dict[str, str]:
@@ -81,7 +91,8 @@ def where(location: Location, turns: bool) -> dict[str, str]:
     if location.position_m:
         found["position"] = "{:.1f} to {:.1f} mm".format(*(1e3 * value for value in location.position_m))
     if location.speed_m_s:
-        found["speed"] = "{:.3g} to {:.3g} m/min".format(*(60.0 * value for value in location.speed_m_s))
+        factor, unit = speed_unit(turns)
+        found["speed"] = "{:.3g} to {:.3g}".format(*(factor * value for value in location.speed_m_s)) + f" {unit}"
     if location.order_per_rev:
         found["repetition"] = f"{digits(location.order_per_rev)} times per revolution of the screw"
     elif location.period_m:

@@ -5,6 +5,7 @@ from hil.drafting.plant_values import PlantValues, TransmissionValues
 from hil.drafting.sensor_values import noise_of, torque_delay_s
 from hil.errors import InputError
 from hil.identification.friction import identify_friction
+from hil.identification.law_fit import sure
 from hil.recording.recording import Recording
 
 MUCH_LEFT = 0.3  # share of the torque unexplained, from which it is as large as a usual friction
@@ -41,7 +42,7 @@ def told(
     if transmission is not None:
         micro = "urad" if turns else "um"
         late = transmission.delay_s
-        if late.significant:
+        if sure(late.value / recording.period_s, late.std_error / recording.period_s):
             notes.append(
                 f"second encoder {'late' if late.value > 0 else 'early'} by {1e3 * abs(late.value):.3g} ms "
                 f"+-{1e3 * late.std_error:.2g}, from its difference over the velocity"

@@ -86,12 +86,14 @@ class Label:
 def label(column: str, unit_text: str = "") -> Label:
     """Read the name of a column, and the unit that stands beside it in the file (empty without one)."""
     name, unit, odd = split_unit(column.strip())
+    if unit is None and not odd:
+        name, unit = _unit_after_blank(name)
     if unit_text and unit is None:
         unit, odd = unit_named(unit_text), unit_named(unit_text) is None
     tokens = _tokens(name)
-    words = [word for token in tokens for word in _split_suffix(re.sub(r"\d+$", "", token)) if word]
+    words = _words(tokens)
     number = next((match[1] for token in reversed(tokens) if (match := re.search(r"(\d+)$", token))), "")
-    quantity = next((kind for kind, known in _QUANTITIES.items() if _any(words, known)), Quantity.UNKNOWN)
+    quantity = _quantity(words)
     of_unit = QUANTITY_OF_UNIT.get(unit or "")
     if of_unit == "effort" and unit == "N m" and quantity is Quantity.POSITION and not _any(words, "moment"):
         unit = "nm"
@@ -115,6 +117,26 @@ def label(column: str, unit_text: str = "") -> Label:
         electric if quantity is Quantity.EFFORT else None,
         len(name.strip()) == 1 and quantity is not Quantity.TIME,
     )
+
+
+def _unit_after_blank(name: str) -> tuple[str, str | None]:
+    """Name without the unit that is its last word or two (Kraft kN); a letter is one after a word of its quantity."""
+    words = name.split()
+    for take in (2, 1):
+        last, rest = " ".join(words[-take:]), " ".join(words[:-take])
+        unit = unit_named(last) if rest else None
+        of_unit = QUANTITY_OF_UNIT.get(unit or "")
+        if unit and of_unit and (len(last) > 1 or not last.isalpha() or of_unit == _quantity(_words(_tokens(rest)))):
+            return rest, unit
+    return name, None
+
+
+def _words(tokens: list[str]) -> list[str]:
+    return [word for token in tokens for word in _split_suffix(re.sub(r"\d+$", "", token)) if word]
+
+
+def _quantity(words: list[str]) -> Quantity:
+    return next((kind for kind, known in _QUANTITIES.items() if _any(words, known)), Quantity.UNKNOWN)
 
 
 def _tokens(name: str) -> list[str]:

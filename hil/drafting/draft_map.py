@@ -9,12 +9,12 @@ from hil.arrays import FloatArray
 from hil.channels import AXIS_CHANNELS, AxisKind
 from hil.drafting.clock import find_clock
 from hil.drafting.column_names import Label, label
-from hil.drafting.effort import effort_entry
+from hil.drafting.effort import effort_entry, signs_of
 from hil.drafting.encoder_counts import CountSize, assumed, from_length, from_speed
 from hil.drafting.even_rows import even_rows, filled_in, find_wraps, with_rate, without_duplicates
 from hil.drafting.foreign_table import read_table
 from hil.drafting.map_draft import DraftedChannel, MapDraft
-from hil.drafting.oddities import refuse_damage, refuse_missing
+from hil.drafting.oddities import jumps_told, refuse_damage, refuse_missing
 from hil.drafting.relations import MotionColumns, derivative_of, driven, lateness_s, motion, proportional
 from hil.drafting.roles import SAME_POSITION, Roles, find_roles
 from hil.drafting.unit_choice import (
@@ -52,30 +52,30 @@ def draft_map(path: Path, rate_hz: float | None = None, axis: str | None = None)
     wraps = find_wraps(columns, labels)
     columns |= {name: unwrapped(columns[name], size) for name, size in wraps.items()}
     filled = {n: filled_in(values, clock.time_s) for n, values in columns.items() if np.isfinite(values).any()}
-    first = even_rows(path, filled, clock.time_s)
-    roles = find_roles(str(path), first.columns, labels, first.period_s, axis)
+    live = even_rows(path, filled, clock.time_s)
+    roles = find_roles(str(path), live.columns, labels, live.period_s, axis)
     used = {name: columns[name] for name in roles.used}
     refuse_missing(path, used, table.texts)
-    # only now is it known which columns must be complete, and which repeat when a sample does
+    # only now it is known which columns must be complete, and which repeat when a sample does
     ratio = rows_per_sample({name: filled[name] for name in used})
     complete = complete_rows(used | {"time_s": clock.time_s}, ratio if ratio > 1.0 else None)
     kept = {name: values[complete.rows] for name, values in filled.items()}
     even = even_rows(path, kept, complete.columns["time_s"], judged_by=[n for n in used if n != roles.unfollowed])
+    jumps = [note for n in (roles.motor, roles.table) if n for note in jumps_told(n, filled[n], clock.time_s)]
     refuse_damage(path, {name: filled[name] for name in used}, clock.time_s, even.columns, roles, even.period_s)
     clock = with_rate(clock, even)
-    notes = [*doubled, *clock.unsure, *complete.notes, *even.notes]
-    notes += [f"{name}: wraps at {wraps[name]:g}; it is unwrapped" for name in used if name in wraps]
+    unwraps = [f"{name}: wraps at {wraps[name]:g}; it is unwrapped" for name in used if name in wraps]
+    notes = [*doubled, *clock.unsure, *complete.notes, *even.notes, *jumps, *unwraps]
     draft = MapDraft(table, clock, unsure=[*notes, *roles.unsure], left_out=dict(roles.left_out))
-    draft.left_out |= {remark.split(": ", 1)[0]: remark.split(": ", 1)[1] for remark in table.remarks}
+    draft.left_out |= dict(remark.split(": ", 1) for remark in table.remarks)
     draft.unsure += [
         f"{one.column}: its unit is not known" for one in labels.values() if one.odd_unit and one.column in used
     ]
     _Composer(draft, labels, roles, even.columns, even.period_s).compose()
     draft.missing = any(np.isnan(values).any() for values in used.values())
     draft.rows_per_sample = ratio if ratio > 1.0 else None
-    for one in draft.channels:
-        if one.entry["column"] in wraps:
-            one.entry["wraps_at"] = wraps[str(one.entry["column"])]
+    for entry in (one.entry for one in draft.channels if one.entry["column"] in wraps):
+        entry["wraps_at"] = wraps[str(entry["column"])]
     return draft
 
 
@@ -118,10 +118,10 @@ class _Composer:
     def _units_of_positions(self) -> None:
         roles, labels, live = self.roles, self.labels, self.live
         positions = [name for name in (roles.command, roles.table, roles.motor) if name]
-        prefers = prefers_length(positions, self._effort)
-        by_convention = unit_by_convention(self._effort)
+        prefers, by_convention = prefers_length(positions, self._effort), unit_by_convention(self._effort)
         self.draft.unsure += [by_convention.note] if by_convention else []
-        far, motor = next((name for name in (roles.table, roles.command) if name), None), roles.motor
+        guessed = () if by_convention else (roles.table, roles.command)
+        far, motor = next((name for name in guessed if name), None), roles.motor
         if far and motor and "counts" not in (labels[far].unit, labels[motor].unit) and not are_counts(live[motor]):
             relation = proportional(live[far], live[motor])
             pair = screw_units(relation.factor, labels[far].unit, labels[motor].unit)
@@ -272,20 +272,21 @@ class _Composer:
 
     def _efforts(self, moved: MotionColumns) -> None:
         names = AXIS_CHANNELS[self.kind]
-        for column, channel in ((self.roles.effort, names.torque), (self.roles.effort_command, names.torque_command)):
-            if column is not None:
-                cause = driven(self.live[column], moved, self.period_s)
-                entry, notes = effort_entry(
-                    self.labels[column], self.kind, self.draft.table.scalars, cause, moved, self.motor_sign
-                )
-                self.draft.unsure += notes
-                how = self._how(column, f"inertia and friction explain {100 * max(cause.share, 0):.0f} % of it")
-                self.draft.channels.append(DraftedChannel(channel, entry, how))
+        pairs = ((self.roles.effort, names.torque), (self.roles.effort_command, names.torque_command))
+        given = [(column, channel) for column, channel in pairs if column is not None]
+        efforts = [self.live[column] for column, _ in given]
+        causes = [driven(values, moved, self.period_s) for values in efforts]
+        for (column, channel), cause, sign in zip(given, causes, signs_of(efforts, causes, moved), strict=True):
+            told, scalars = self.labels[column], self.draft.table.scalars
+            entry, notes = effort_entry(told, self.kind, scalars, cause, sign * self.motor_sign)
+            self.draft.unsure += notes
+            how = self._how(column, f"inertia and friction explain {100 * max(cause.share, 0):.0f} % of it")
+            self.draft.channels.append(DraftedChannel(channel, entry, how))
 
     def _velocity_only(self) -> None:
         """A recording with velocity in place of position."""
         name = self.roles.motor_velocity
-        assert name is not None
+        assert name
         choice = velocity_unit(name, self.labels[name].unit, 1.0, "rad")
         self._choose(name, choice)
         self.kind = AxisKind.LINEAR if is_length(choice.unit) else AxisKind.ROTARY
@@ -293,8 +294,7 @@ class _Composer:
         self.draft.channels.append(
             DraftedChannel(channel, {"column": name, "unit": choice.unit}, self._how(name, "no position is recorded"))
         )
-        position = np.cumsum(self.live[name]) * self.period_s
-        self._efforts(motion(position, self.period_s))
+        self._efforts(motion(np.cumsum(self.live[name]) * self.period_s, self.period_s))
 
     def _how(self, column: str, what: str) -> str:
         return f"{what}; {self.roles.how[column]}" if column in self.roles.how else what

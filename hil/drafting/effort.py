@@ -7,9 +7,10 @@ import numpy as np
 from hil.arrays import FloatArray
 from hil.channels import AxisKind
 from hil.drafting.column_names import Label
-from hil.drafting.relations import EffortCause, MotionColumns
+from hil.drafting.relations import EffortCause, MotionColumns, proportional
 
 CAUSED = 0.3  # share of an effort explained by its motion from which its sign can be judged
+TOGETHER = 0.25  # share of the variance that torque and command have in common, from which they have one cause
 PART = 0.1  # of the effort: the inertia's part must exceed it, else the sign of friction decides
 # names of a torque or force constant without underscores and digits; others ("torque_limit", "tau_filter") are none
 _CONSTANT_NAMES = "gtau ktau kt km kf km torqueconstant forceconstant motorconstant drehmomentkonstante kraftkonstante"
@@ -20,25 +21,38 @@ def effort_entry(
     kind: AxisKind,
     scalars: dict[str, float],
     cause: EffortCause,
-    moved: MotionColumns,
-    motor_sign: int,
+    sign: int,
 ) -> tuple[dict[str, object], list[str]]:
     """Entry of the map, and notes on what is unsure.
 
-    `cause` is what `relations.driven` gives for it.
+    `cause` is what `relations.driven` gives for it, `sign` what `signs_of` does.
     """
     entry, notes = _unit(told, kind, scalars)
-    sign = _sign(cause.coefficients, moved) * motor_sign
     if cause.share < CAUSED:
         notes.append(
             f"{told.column}: inertia and friction of the motion explain only {100 * max(cause.share, 0.0):.0f} % "
             "of it; check that "
             "it drives this axis"
         )
-    elif sign < 0:
+    if sign < 0:
         entry["sign"] = -1
         notes.append(f"{told.column}: positive values accelerate backwards; its sign is turned")
     return entry, notes
+
+
+def signs_of(efforts: list[FloatArray], causes: list[EffortCause], moved: MotionColumns) -> list[int]:
+    """Signs with which efforts (n,) of one axis accelerate forwards.
+
+    A measured torque and its command have one cause: the motion decides on the sign of the one that it explains better,
+    and their relation on that of the other. What another axis does to this one may turn the sign of one of them.
+    """
+    signs = [_sign(cause.coefficients, moved) if cause.share >= CAUSED else 1 for cause in causes]
+    if len(efforts) == 2:
+        relation = proportional(*efforts)
+        if relation.share > TOGETHER:
+            first = int(np.argmax([cause.share for cause in causes]))
+            signs[1 - first] = signs[first] * int(np.sign(relation.factor))
+    return signs
 
 
 def _sign(coefficients: FloatArray, moved: MotionColumns) -> int:

@@ -147,7 +147,7 @@ def _best(rows: LawRows, ratio_m_rad: float, period_s: float) -> LawFit | None:
             start = Settings(
                 _gains(ratio_m_rad, period_s, ticks, integral, mean), 1.0, *(delays if late else (0.0, 0.0))
             )
-            base = closed_form([rows], start, [first_tick(rows, start)]).settings
+            base = closed_form([rows], start, [first_tick(rows, start)])
             if base is not None:  # the start is too far off to tell which variant is right
                 tried.append((late, fit_settings([rows], base, twin, delays=late, start=base, most=_FIRST_STEPS)))
     if not tried:

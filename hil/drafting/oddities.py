@@ -1,4 +1,7 @@
-"""Refuse columns that are damaged: many values missing, spikes, jumps, a sign that turns, rows out of order."""
+"""Refuse columns that are damaged: many values missing, spikes, jumps, a sign that turns, rows out of order.
+
+Jumps that are small beside the travel, as of a potentiometer that passes its gap, are told.
+"""
 
 from pathlib import Path
 
@@ -14,7 +17,11 @@ from hil.recording.stamps import GAP_STEPS
 NO_ORDER = 1.0  # roughness from which rows have no order: 1.4 for white noise, below 0.3 for a motion
 JUMP = 0.2  # of the travel in one row: no axis moves so far between two samples
 FEW_VALUES = 20  # counts of an encoder at rest, where each count is a jump
+_LISTED = 8  # jumps whose time is told
 SUDDEN = 20.0  # times the change of the rows around: a fast motion is fast for more than one row
+# A row in which a position moves so many times as far as in 95 % of the rows in motion, and the row before or after it
+# less than half as far in this direction, is one of the sensor: an axis speeds up and brakes over several rows.
+FAR, TOP, ALONE = 5.0, 0.95, 0.5
 TOLD = 0.8  # share of the torque that the motion of each half must explain before its sign is judged
 
 
@@ -54,6 +61,28 @@ def refuse_damage(
         _refuse_turned(path, position, even[position], roles.motor, even[roles.motor])
     for effort in filter(None, (roles.effort, roles.effort_command)):
         _refuse_turned_effort(path, effort, even[effort], roles.motor, even[roles.motor], period_s)
+
+
+def jumps_told(name: str, values: FloatArray, time_s: FloatArray) -> list[str]:
+    """Note on rows (n,) of a position that its axis cannot have reached; none where there are none."""
+    change, pause = np.diff(values), np.diff(time_s)
+    change[pause > GAP_STEPS * np.median(pause)] = 0.0
+    size = np.abs(change)
+    moving = size[size > 0.0]
+    if np.unique(values).size < FEW_VALUES or moving.size < FEW_VALUES:
+        return []
+    usual, way = float(np.quantile(moving, TOP)), np.sign(change)
+    beside = np.minimum(way * np.r_[0.0, change[:-1]], way * np.r_[change[1:], 0.0])
+    rows = np.flatnonzero((size > FAR * usual) & (beside < ALONE * size))
+    if not rows.size:
+        return []
+    times = ", ".join(dict.fromkeys(f"{time_s[row] - time_s[0]:.1f}" for row in rows[:_LISTED]))
+    more = " and later" if rows.size > _LISTED else ""
+    return [
+        f"{name}: jumps by up to {size[rows].max():.3g} in one row, after {times} s{more}, "
+        f"{size[rows].max() / usual:.0f} times as far as in nearly all others: its sensor, not the axis; leave its "
+        "values around there empty, or cut the file there"
+    ]
 
 
 def _refuse_missing(path: Path, name: str, values: FloatArray) -> None:

@@ -93,8 +93,8 @@ def plant_values(recording: Recording, load_ratio: float | None = None) -> Plant
         raise InputError(
             f"{recording.name}: the inertia comes out as {inertia.value:.3g} +- {inertia.std_error:.2g}, allowed "
             "above 0; "
-            "the torque has the wrong sign, or the motion does not separate inertia from a spring or gravity: record "
-            "moves of different accelerations"
+            "the torque has the wrong sign, or the motion does not separate inertia from a spring, gravity or another "
+            "moving arm: record moves of different accelerations"
         )
     if inertia.value <= inertia.std_error:
         inertia = replace(inertia, value=inertia.std_error, how=f"{inertia.how}; not told by this motion: its error")

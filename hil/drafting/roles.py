@@ -106,10 +106,11 @@ def _of_one_axis(
         return labels
     roles.axis = axis or both[0]
     others = [number for number in both if number != roles.axis]
-    if axis is None:
+    if others:
+        another = "" if axis else f", for another: --axis {others[0]}"
         roles.unsure.append(
-            f"axis: the file holds the axes {', '.join(both)}; {roles.axis} is taken, for another: --axis {others[0]}; "
-            "what a moving arm does to another is not modelled"
+            f"axis: the file holds the axes {', '.join(both)}; {roles.axis} is taken{another}; what another moving arm "
+            "does to it is not modelled, and may look like a spring, a force or friction"
         )
     for name, one in list(labels.items()):
         if one.number and one.number != roles.axis:

@@ -22,7 +22,7 @@ _LEAST_COUNTS = 200.0  # travel in whole numbers from which they are counts of a
 _COORDINATE = r"q(pos)?\d*([_ ].*)?"  # joint angle, as robotics writes it: q, q1, q_ref
 _ANGLE = "angle|winkel|theta|phi|rot|joint|gelenk"
 _LENGTH = "weg|hub|stroke|course|displ|linear"
-_JOINT_STATE = r"(^|[^a-z])effort\W*\d*\W*$"  # effort, effort[0], .effort0
+_JOINT_STATE = r"(^|[^a-z])effort(\W|\d|$)"  # effort, effort[0], .effort0, effort.elbow
 
 
 @dataclass(frozen=True)

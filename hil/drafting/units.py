@@ -75,7 +75,7 @@ def split_unit(name: str) -> tuple[str, str | None, bool]:
     for pattern in (_BRACKETS, _SLASH, _WORD_IN):
         match = pattern.search(name)
         if match:
-            unit = unit_named(match[1])
+            unit = unit_named(match[1]) or ("in" if match[1].strip().lower() == "in" else None)  # elsewhere a word
             rest = name[: match.start()].strip() if pattern is not _SLASH else name.split("/")[0].strip()
             if unit or pattern is _BRACKETS:
                 return rest, unit, unit is None and match[1].strip() not in ("", "-", "1")

@@ -3,6 +3,7 @@
 {"t": [0, 1], "x": [0.1, 0.2], "rate": 1000}         lists by name, scalars beside them
 {"signals": {"t": [...]}, "units": {"t": "s"}}       the same one level deeper, with units
 [{"t": 0, "x": 0.1}, {"t": 1, "x": 0.2}]             a record per row
+[{"stamp": {"secs": 1, "nsecs": 5}, "name": ["a"], "position": [0.1]}, ...]     a message per row, as of ROS
 {"columns": ["t", "x"], "data": [[0, 0.1], ...]}     a table
 [{"name": "x", "unit": "mm", "values": [...]}, ...]  an object per channel
 """
@@ -18,6 +19,7 @@ from hil.arrays import FloatArray
 from hil.errors import InputError
 
 _NAME_KEYS, _VALUE_KEYS = ("name", "channel", "id"), ("values", "data", "samples")  # of an object per channel
+_STAMP_KEYS = (("secs", "sec"), ("nsecs", "nanosec", "nsec"))
 
 
 @dataclass(frozen=True)
@@ -60,6 +62,28 @@ def _first(row: dict[str, Any], keys: tuple[str, ...], kind: type) -> Any:
     return next((row[key] for key in keys if isinstance(row.get(key), kind)), None)
 
 
+def _flat(row: dict[str, Any]) -> dict[str, Any]:
+    """Values of a record by path: fields of objects as KEY.FIELD, elements of lists as KEY.NAME or KEY.0, KEY.1, ...
+
+    NAME are the texts of a list `name` of the same length. An object of seconds and nanoseconds is one stamp [s].
+    """
+    names: list[Any] = next((row[key] for key in _NAME_KEYS if isinstance(row.get(key), list)), [])
+    flat: dict[str, Any] = {}
+    for key, value in row.items():
+        if isinstance(value, dict):
+            parts = [_first(value, keys, int) for keys in _STAMP_KEYS]
+            if None in parts:
+                flat |= {f"{key}.{field}": inner for field, inner in _flat(value).items()}
+            else:
+                flat[key] = parts[0] + 1e-9 * parts[1]
+        elif isinstance(value, list) and value is not names:
+            named = len(names) == len(value)
+            flat |= {f"{key}.{names[index] if named else index}": one for index, one in enumerate(value)}
+        elif value is not names:
+            flat[key] = value
+    return flat
+
+
 def _collect(data: Any, lists: dict[str, list[Any]], scalars: dict[str, float], units: dict[str, str]) -> None:
     if isinstance(data, list) and data and all(isinstance(row, dict) for row in data):
         channels = [(_first(row, _NAME_KEYS, str), _first(row, _VALUE_KEYS, list), row.get("unit")) for row in data]
@@ -67,8 +91,9 @@ def _collect(data: Any, lists: dict[str, list[Any]], scalars: dict[str, float], 
             lists.update({name: values for name, values, _ in channels})
             units.update({name: unit for name, _, unit in channels if isinstance(unit, str)})
         else:  # a record per row
-            for key in dict.fromkeys(key for row in data for key in row):
-                lists[key] = [row.get(key) for row in data]
+            flat = [_flat(row) for row in data]
+            for key in dict.fromkeys(key for row in flat for key in row):
+                lists[key] = [row.get(key) for row in flat]
     elif isinstance(data, dict):
         names, rows = data.get("columns"), data.get("data", data.get("rows"))
         if isinstance(names, list) and isinstance(rows, list) and all(isinstance(row, list) for row in rows):

@@ -226,7 +226,7 @@ def _fitted(
     if y.size:
         low, high = law.bounds
         near = law.base if start is None else start
-        learnt = closed_form(runs, near, cuts).settings if law.gains else None
+        learnt = closed_form(runs, near, cuts) if law.gains else None
         starts = [np.clip(law.at(one), low, high) for one in (law.base, near, learnt) if one is not None]
         first = starts[0] if len(starts) == 1 else min(starts, key=lambda one: float(np.sum(stacked(one) ** 2)))
         fit = least_squares(stacked, first, jac, bounds=(low, high), max_nfev=most)

@@ -134,6 +134,8 @@ def scales(
     }
     if run.sampled:
         unknown = unknown_torque(run, bench)
+        if run.torque_is_command:  # its noise drives the twin too
+            unknown = np.hypot(unknown, run.noise.torque)
         for name, response in impulse_responses(run, bench, observer_s).items():
             found[name] = np.sqrt(found[name] ** 2 + np.convolve(unknown**2, response**2)[: rows[0]])
     if run.noise.coarse:

@@ -127,7 +127,7 @@ def held_on_motor(hypothesis: Hypothesis, run: Measured, observer_s: float) -> t
     Mechanisms of the drive and of the recorded channels are omitted: the measured torque already contains them.
     """
     twin = hypothesis.twin(observer_s, run=run)
-    measured = twin.undelayed(run.response)
+    measured = hypothesis.undelayed(twin, run)
     mechanical = tuple(active for active in twin.active if stage_of(BY_ID[active.effect], active.variant) not in _DRIVE)
     inputs = measured._replace(torque_command=measured.torque)
     held = replace(twin, active=mechanical).observe(run.position_command_m, run.velocity_command_m_s, inputs, run.start)

@@ -34,7 +34,7 @@ from hil.identification.rest import resting
 from hil.identification.terms import Term, push_n, repeats
 from hil.twin.axis import COARSE_STEP_S, FINE_STEP_S, Response, Twin
 from hil.twin.library import BY_ID
-from hil.twin.mechanisms.channel_time_skew import delayed_mean
+from hil.twin.mechanisms.channel_time_skew import delayed
 from hil.twin.parameter import Role
 from hil.twin.physics import Active
 
@@ -144,8 +144,8 @@ class Hypothesis:
             scale = value if value > 0.0 else 1e-3
             found.append(Coordinate(name, scale, True, scale / TRUST, scale * TRUST))
         if DELAY in self.nominal:
-            period_s = self.bench.period_s
-            found.append(Coordinate(DELAY, period_s, False, -MOST_DELAY * period_s, MOST_DELAY * period_s))
+            delay_s, most_s = self.bench.torque_delay_s or 0.0, MOST_DELAY * self.bench.period_s
+            found.append(Coordinate(DELAY, self.bench.period_s, False, delay_s - most_s, delay_s + most_s))
         found += self._known
         for index, term in enumerate(self.terms):
             for parameter, start in zip(BY_ID[term.effect].parameters, term.values, strict=True):
@@ -259,6 +259,12 @@ class Hypothesis:
         _ = self.bench.known_control  # raises
         return self.twin(run=run).simulate(run.position_command_m, run.velocity_command_m_s, run.start, run.table_m)
 
+    def undelayed(self, twin: Twin, run: Measured) -> Response:
+        """Measured channels without the lateness that terms, and a delay of the torque, give them."""
+        found, periods = twin.undelayed(run.response), (self.resolved.bench.torque_delay_s or 0.0) / run.period_s
+        command, torque = (delayed(part, periods) for part in (found.torque_command, found.torque))
+        return found._replace(torque_command=command, torque=torque) if periods else found
+
     def blocks(
         self, run: Measured, observer_s: float, fast: bool = False, rests: Measured | None = None
     ) -> dict[str, FloatArray]:
@@ -267,12 +273,7 @@ class Hypothesis:
         The motor rests where it does in `rests`, by default in the run.
         """
         twin = self.twin(observer_s, fast, run)
-        measured = twin.undelayed(run.response)
-        if DELAY in self.nominal:
-            periods = (self.resolved.bench.torque_delay_s or 0.0) / run.period_s
-            command, torque = (delayed_mean(values, periods) for values in (measured.torque_command, measured.torque))
-            measured = measured._replace(torque_command=command, torque=torque)
-        rest = resting(rests or run, twin.slow_velocity)
+        measured, rest = self.undelayed(twin, run), resting(rests or run, twin.slow_velocity)
         predicted = twin.observe(run.position_command_m, run.velocity_command_m_s, measured, run.start, rest)
         found = differences(measured, predicted, self.bench, run.judged)
         found["command"] = measured.torque_command - predicted.torque_command

@@ -15,7 +15,7 @@ from itertools import product
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import minimize
+from scipy.optimize import least_squares, minimize
 from scipy.signal import lfilter
 
 from hil.arrays import FloatArray
@@ -29,6 +29,7 @@ SETPOINT_ROWS, FEEDBACK_ROWS = 40.0, 12.0
 _SCANNED = 6000  # rows in which delays are looked for: seconds of motion at a usual rate
 _EACH = 8.0  # rows: delays that are tried one by one, longer ones by two
 _BEFORE = 50  # rows before the first judged one
+_SAME = 0.01  # relative difference of the squares that two solutions leave, up to which they count as equal
 
 
 class Settings(NamedTuple):
@@ -159,19 +160,44 @@ def high_pass(values: FloatArray, period_s: float) -> FloatArray:
     return np.asarray(lfilter([1.0, -1.0], [1.0, -keep], values - values[:1], axis=0))
 
 
-class ClosedForm(NamedTuple):
-    """Settings, None if a gain is not positive, and the share of command and speed set-point (rms) that they leave."""
-
-    settings: Settings | None
-    left: float
-
-
-def closed_form(runs: Sequence[LawRows], base: Settings, cuts: Sequence[int]) -> ClosedForm:
-    """Gains from linear least squares with the delays of `base`.
+def closed_form(runs: Sequence[LawRows], base: Settings, cuts: Sequence[int]) -> Settings | None:
+    """Settings with gains from least squares of the rows alone, with the delays of `base`; None if one is not positive.
 
     T = Kp x + Ki integral(x) with x = Kv e / r + ff v_c / r - v is linear in Kp Kv, Kp ff, Kp and Ki Kv, Ki ff, Ki; all
     pass the high-pass of an integrator that follows the command. A recorded speed set-point takes the place of e and
     v_c, which then give it. The integral is left out if `base` has none.
+    """
+    gains, (of_command, of_speed) = base.gains, _tables(runs, base, cuts)
+    k = (of_command.shape[1] - 1) // 2
+    integral, chained = gains.integral_gain_n_m_rad > 0.0, not of_speed.size
+    columns = of_command[:, :-1] if integral else of_command[:, :k]
+    found = _least_squares(columns, of_command[:, -1])[0]
+    if chained and integral:
+        found = _one_law(found, of_command)
+    if chained and found[1] < 0.0:  # the feed-forward
+        kept = np.arange(columns.shape[1]) % k != 1
+        found[kept] = _least_squares(columns[:, kept], of_command[:, -1])[0]
+        found[~kept] = 0.0
+    kp, ki = float(found[k - 1]), float(found[-1]) if integral else 0.0
+    scale, outer = 1.0, found[:2]
+    if of_speed.size:
+        outer = _least_squares(of_speed[:, :2], of_speed[:, 2])[0]
+        scale, outer = float(found[0]) / kp if kp else 0.0, outer * found[0]
+    if kp <= 0.0 or ki < 0.0 or outer[0] <= 0.0 or scale <= 0.0:
+        return None
+    learnt = gains._replace(
+        position_gain_1_s=float(outer[0] / kp),
+        velocity_feedforward=max(float(outer[1] / kp), 0.0),
+        velocity_gain_n_m_s_rad=kp,
+        integral_gain_n_m_rad=ki,
+    )
+    return base._replace(gains=learnt, scale=scale)
+
+
+def _tables(runs: Sequence[LawRows], base: Settings, cuts: Sequence[int]) -> tuple[FloatArray, FloatArray]:
+    """Columns of both loops, what they give as the last: (n, 2 k + 1) of the command, (n, 3) of the speed set-point.
+
+    The second table is empty where no speed set-point is recorded.
     """
     gains = base.gains
     of_command, of_speed = [], []
@@ -189,29 +215,42 @@ def closed_form(runs: Sequence[LawRows], base: Settings, cuts: Sequence[int]) ->
         x = np.column_stack([inputs[step:] / gains.ratio_m_rad, -speed])
         both = np.column_stack([x, np.cumsum(x, axis=0) * gains.period_s, law.measured.torque_command[step:]])
         of_command.append(high_pass(both, gains.period_s)[keep])
-    table = np.concatenate(of_command)
-    k = (table.shape[1] - 1) // 2
-    columns = table[:, :-1] if gains.integral_gain_n_m_rad > 0.0 else table[:, :k]
-    found, left = _least_squares(columns, table[:, -1])
-    if not of_speed and found[1] < 0.0:  # the feed-forward
-        kept = np.arange(columns.shape[1]) % k != 1
-        found[kept], left = _least_squares(columns[:, kept], table[:, -1])
-        found[~kept] = 0.0
-    kp, ki = float(found[k - 1]), float(found[-1]) if gains.integral_gain_n_m_rad > 0.0 else 0.0
-    scale, outer = 1.0, found[:2]
-    if of_speed:
-        table = np.concatenate(of_speed)
-        outer, of_outer = _least_squares(table[:, :2], table[:, 2])
-        scale, outer, left = float(found[0]) / kp if kp else 0.0, outer * found[0], float(np.hypot(left, of_outer))
-    if kp <= 0.0 or ki < 0.0 or outer[0] <= 0.0 or scale <= 0.0:
-        return ClosedForm(None, left)
-    learnt = gains._replace(
-        position_gain_1_s=float(outer[0] / kp),
-        velocity_feedforward=max(float(outer[1] / kp), 0.0),
-        velocity_gain_n_m_s_rad=kp,
-        integral_gain_n_m_rad=ki,
-    )
-    return ClosedForm(base._replace(gains=learnt, scale=scale), left)
+    return np.concatenate(of_command), np.concatenate(of_speed) if of_speed else np.empty((0, 3))
+
+
+def _left(runs: Sequence[LawRows], base: Settings, cuts: Sequence[int]) -> float:
+    """Share of command and speed set-point (rms) that the columns of both loops leave with the delays of `base`."""
+    of_command, of_speed = _tables(runs, base, cuts)
+    last = -1 if base.gains.integral_gain_n_m_rad > 0.0 else (of_command.shape[1] - 1) // 2
+    left = _least_squares(of_command[:, :last], of_command[:, -1])[1]
+    return float(np.hypot(left, _least_squares(of_speed[:, :2], of_speed[:, 2])[1])) if of_speed.size else left
+
+
+def _one_law(found: FloatArray, table: FloatArray) -> FloatArray:
+    """Coefficients (6,) of one law, from those of a free fit of the columns of `table`, of which the last is T.
+
+    They are Kp (Kv, ff, 1) and Ki (Kv, ff, 1), four values. A free fit does not tell all six: e / r is the integral of
+    v_c / r - v, but for ticks at which the position loop does not run. Without the last column they are Kp Kv + Ki,
+    Kp ff, Kp, Ki Kv, Ki (ff - 1). The first and fourth give two values of Ki, between which only a feed-forward other
+    than 1 decides: P (s + Kv)(s + Ki / Kp) / s is symmetric. If both leave the same, that of the faster velocity loop
+    is taken.
+    """
+    small = np.asarray(np.linalg.qr(table, mode="r"), dtype=np.float64)
+    both, forward, kp, product_, _ = _least_squares(small[:, :5], small[:, -1])[0]
+    if kp <= 0.0 or forward <= 0.0 or both <= 0.0:
+        return found
+    half, away = 0.5 * both, np.sqrt(max(0.25 * both**2 - product_ * kp, 0.0))
+
+    def coefficients(law: FloatArray) -> FloatArray:
+        outer = law[0] * np.array([law[1], law[2], 1.0])
+        return np.concatenate([outer, law[3] * outer])
+
+    def rest(law: FloatArray) -> FloatArray:
+        return np.asarray(small[:, -1] - small[:, :-1] @ coefficients(law))
+
+    starts = [np.array([kp, (both - ki) / kp, forward / kp, ki / kp]) for ki in (half + away, half - away)]
+    faster, slower = (least_squares(rest, start, method="lm", x_scale="jac") for start in starts)
+    return coefficients((slower if slower.cost < (1.0 - _SAME) * faster.cost else faster).x)
 
 
 def _least_squares(columns: FloatArray, values: FloatArray) -> tuple[FloatArray, float]:
@@ -222,7 +261,7 @@ def _least_squares(columns: FloatArray, values: FloatArray) -> tuple[FloatArray,
 
 def first_tick(run: LawRows, start: Settings) -> int:
     """First row of the position loop: that at which a closed form leaves least."""
-    return min(range(start.gains.position_ticks), key=lambda cut: closed_form([run], start, [cut]).left)
+    return min(range(start.gains.position_ticks), key=lambda cut: _left([run], start, [cut]))
 
 
 def find_delays(run: LawRows, base: Settings) -> tuple[float, float]:
@@ -233,7 +272,7 @@ def find_delays(run: LawRows, base: Settings) -> tuple[float, float]:
     short = run.since(max(run.judged - _BEFORE, 0)).until(_SCANNED)
 
     def left(late: float, old: float, cut: int) -> float:
-        return closed_form([short], base._replace(setpoint_rows=late, feedback_rows=old), [cut]).left
+        return _left([short], base._replace(setpoint_rows=late, feedback_rows=old), [cut])
 
     cuts = range(base.gains.position_ticks)
     each = np.arange(-SETPOINT_ROWS, SETPOINT_ROWS + 1.0)

@@ -2,6 +2,9 @@
 
     left = rms(T - T_model) / std(T)      over the rows in which the axis slides, up to some 20 Hz
 
+The residual is that of held-out motion, the deviation that of all recordings: a held-out part that is one slow end
+needs hardly any torque of its own.
+
 The twin is held on the measured motion by its observer and fed the measured torque. Its innovation e tells the torque
 that its mechanics lack. The scale is that of the twin itself: its innovation is computed a second time, with a constant
 torque added. Nothing is simulated in closed loop, where a controller hides what a model lacks. The plain model
@@ -51,19 +54,32 @@ def fit_plain(data: Dataset) -> PlainModel | None:
     return PlainModel(np.asarray(solution, dtype=np.float64), slowest)
 
 
-def left_by_plain(model: PlainModel, data: Dataset) -> float | None:
-    """Share of the torque's standard deviation that the plain model leaves on a data set; None where nothing slides."""
+def torque_deviation(every: Sequence[Dataset], slowest: float) -> float:
+    """Standard deviation of the torque of data sets where the motor is faster than `slowest`; 0 where nothing is."""
+    runs = [run for data in every for run in data.runs]
+    torque = np.concatenate([_smooth(run.torque, run)[_sliding(run, slowest)] for run in runs])
+    return float(np.std(torque)) if torque.size else 0.0
+
+
+def left_by_plain(model: PlainModel, data: Dataset, deviation: float | None = None) -> float | None:
+    """Share of the torque's standard `deviation` that the plain model leaves on a data set; None where nothing slides.
+
+    Without a deviation it is that of the data set.
+    """
     found = []
     for run in data.runs:
         missing = run.torque - _regressors(run) @ model.coefficients
         a = run.period_s / data.observer_s
         seen = lfilter([0.0, a * a], [1.0, -(2.0 - 2.0 * a - a * a), 1.0 - 2.0 * a], missing)
         found.append(np.asarray(seen, dtype=np.float64))
-    return _share(found, data, model.slowest)
+    return _share(found, data, model.slowest, deviation)
 
 
-def left_by_twin(hypothesis: Hypothesis, data: Dataset, slowest: float) -> float | None:
-    """Share of the torque's standard deviation that a twin leaves where the motor is faster than `slowest`, or None."""
+def left_by_twin(hypothesis: Hypothesis, data: Dataset, slowest: float, deviation: float | None = None) -> float | None:
+    """Share of the torque's standard `deviation` that a twin leaves where the motor is faster than `slowest`, or None.
+
+    Without a deviation it is that of the data set.
+    """
     found = []
     for run in data.runs:
         rows = _sliding(run, slowest)
@@ -72,7 +88,7 @@ def left_by_twin(hypothesis: Hypothesis, data: Dataset, slowest: float) -> float
         moved = _innovation(hypothesis, replace(run, torque=run.torque + added), data.observer_s) - innovation
         scale = float(np.median(moved[rows])) if rows.any() else 0.0
         found.append(innovation * added / scale if scale else np.full(run.motor.size, np.nan))
-    return _share(found, data, slowest)
+    return _share(found, data, slowest, deviation)
 
 
 def _innovation(hypothesis: Hypothesis, run: Measured, observer_s: float) -> FloatArray:
@@ -81,14 +97,13 @@ def _innovation(hypothesis: Hypothesis, run: Measured, observer_s: float) -> Flo
     return np.asarray(measured.motor_position - held.motor_position, dtype=np.float64)
 
 
-def _share(missing: Sequence[FloatArray], data: Dataset, slowest: float) -> float | None:
-    rows = [_sliding(run, slowest) for run in data.runs]
-    every = list(zip(missing, data.runs, rows, strict=True))
-    left = np.concatenate([_smooth(values, run)[own] for values, run, own in every])
-    torque = np.concatenate([_smooth(run.torque, run)[own] for _, run, own in every])
-    if torque.size == 0 or np.ptp(torque) == 0.0 or not np.isfinite(left).all():
+def _share(missing: Sequence[FloatArray], data: Dataset, slowest: float, deviation: float | None) -> float | None:
+    if not all(np.isfinite(values).all() for values in missing):  # the twin does not hold the motion
         return None
-    return float(np.sqrt(np.mean(left**2)) / np.std(torque))
+    pairs = zip(missing, data.runs, strict=True)
+    left = np.concatenate([_smooth(values, run)[_sliding(run, slowest)] for values, run in pairs])
+    deviation = torque_deviation([data], slowest) if deviation is None else deviation
+    return float(np.sqrt(np.mean(left**2)) / deviation) if left.size and deviation > 0.0 else None
 
 
 def _regressors(run: Measured) -> FloatArray:

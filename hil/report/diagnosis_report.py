@@ -90,7 +90,7 @@ def _finding(page: Page, diagnosis: Diagnosis, index: int, folder: Path) -> None
     name = title(finding.effect)
     name = f"Explains a part: {name}" if diagnosis.result.partial else name.capitalize()
     turns = diagnosis.owner.axis.turns
-    page.heading(f"{index + 1}. {name}: {of_load(mechanism.element, turns)}")
+    page.heading(f"{index + 1}. {name}: {of_load(mechanism.element_of(term.variant), turns)}")
     figure, caption = finding_figure(diagnosis, term)
     again = f"_{term.slot + 1}" if term.slot else ""
     page.picture(save(figure, folder / f"{term.effect}{again}.png"), of_load(caption, turns))
@@ -169,7 +169,7 @@ def torque_line(left: TorqueLeft) -> str:
         "plain least squares": left.plain,
     }
     given = ", ".join(f"{name} {percent(share)}" for name, share in shares.items() if share is not None)
-    return f"Torque left on held-out motion, of its standard deviation: {given}."
+    return f"Torque left on held-out motion, of the torque's standard deviation: {given}."
 
 
 def _corrections(page: Page, result: Result) -> None:

@@ -108,6 +108,8 @@ class Variant:
     contribution: Callable[..., Any]
     name: str = ""
     sentence: str = ""  # if it differs from the mechanism's
+    reversed: str = ""  # that sentence for a negative strength
+    element: str = ""  # if it differs from the mechanism's
     starts: Callable[[Scene], Points] | None = None  # if they differ from the mechanism's
     proportional: bool = True  # the change is proportional to the strength
     needs_table: bool = False  # not observable without a linear encoder
@@ -129,7 +131,7 @@ class Mechanism:
     id: str
     block: Block
     element: str  # the part of the axis an engineer would point at
-    sentence: str  # finding in an engineer's words; may name parameters, viscous_speed and wave in braces
+    sentence: str  # finding in an engineer's words; may name parameters, viscous_speed, wave, variant in braces
     equation: str
     source: str
     parameters: tuple[Parameter, ...]
@@ -204,6 +206,10 @@ class Mechanism:
     def typical_values(self, axis: AxisFacts) -> tuple[float, ...]:
         """Values that an engineer would call a defect."""
         return self.typical(axis) if self.typical else self._inside([default_typical(p, axis) for p in self.parameters])
+
+    def element_of(self, variant: int) -> str:
+        """The part of the axis that a variant points at."""
+        return self.variants[variant].element or self.element
 
     def is_valid(self, values: Sequence[float], variant: int, axis: AxisFacts) -> bool:
         """Check that the effect has a size, that the motion passes a whole wave of it, that its name applies, and that

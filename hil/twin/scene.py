@@ -9,6 +9,10 @@ def _always(level: float) -> float:
     return math.inf
 
 
+def _all(level: float) -> float:
+    return 1.0
+
+
 @dataclass(frozen=True)
 class AxisFacts:
     """Facts of an axis that typical values and limits of validity are scaled by; motor units."""
@@ -23,6 +27,8 @@ class AxisFacts:
     lost_m: float = math.inf  # largest range of the table against the motor
     turn_known: bool = True  # False on a linear axis without a lead
     held_s: Callable[[float], float] = _always  # longest time for which |torque command| is at a level or above
+    # share of the rows in which the axis moves whose |torque command| is above a level
+    driven: Callable[[float], float] = _all
 
     @property
     def friction(self) -> float:

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 import pytest
 from diagnosis_runs import bench, dataset, evaluated, fitted, recorded
 
+from hil.bench.control_section import UnknownControl
 from hil.identification.dataset import Dataset
 from hil.identification.honest_refit import holds, never_worse, rms_at_floor, rms_of_channels
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.measured import take
 from hil.identification.nominal_fit import fit_nominal
 from hil.identification.terms import Term
-from hil.identification.torque_left import fit_plain, left_by_plain, left_by_twin
+from hil.identification.torque_left import fit_plain, left_by_plain, left_by_twin, torque_deviation
 
 HEAVY = 1.3 * 384.0
 
@@ -78,6 +80,11 @@ def test_the_torque_left_is_compared_with_a_plain_model() -> None:
     inertia = 719.0 * owner.axis.ratio_m_rad**2
     assert plain.coefficients[0] == pytest.approx(inertia, rel=0.05)
     by_plain = left_by_plain(plain, held_out)
+    deviation = torque_deviation([held_out], plain.slowest)
+    assert left_by_plain(plain, held_out, 2.0 * deviation) == pytest.approx(0.5 * (by_plain or 0.0))
+    assert min(deviation, torque_deviation([train], plain.slowest)) <= torque_deviation(
+        (train, held_out), plain.slowest
+    )
     by_owner, by_truth = (
         left_by_twin(hypothesis, held_out, plain.slowest)
         for hypothesis in (Hypothesis(owner), Hypothesis(bench(), (cogging,)))
@@ -88,3 +95,25 @@ def test_the_torque_left_is_compared_with_a_plain_model() -> None:
     assert by_truth < 0.2 * by_plain
     # 115 kg too much: a sixth of the inertia
     assert by_owner > by_plain
+
+
+def test_a_twin_that_the_torque_does_not_move_has_no_torque_left(data: Dataset) -> None:
+    plain = fit_plain(data)
+    assert plain is not None
+    idle = Term("torque_dead_zone", 1, (100.0,))
+    assert left_by_twin(Hypothesis(data.bench, (idle,)), data, plain.slowest) is None
+
+
+def test_the_torque_left_is_that_of_the_undelayed_torque() -> None:
+    """The known delay of a recorded torque is undone before the twin gets it."""
+    unknown = UnknownControl(law="unknown", velocity_period_s=1e-3)
+    now, late = (
+        bench().model_copy(update={"control": unknown.model_copy(update={"torque_delay_s": delay_s})})
+        for delay_s in (0.0, 6e-3)
+    )
+    data = dataset([take(recorded(bench()), now)], now)
+    early = data.over([replace(data.runs[0], torque=np.roll(data.runs[0].torque, -6))])
+    by_now, by_late = (left_by_twin(Hypothesis(one), early, 1.0) for one in (now, late))
+    assert by_now is not None
+    assert by_late is not None
+    assert by_late < 0.5 * by_now

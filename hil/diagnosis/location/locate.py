@@ -61,7 +61,7 @@ def locate(found: Fit, final: Fit) -> Location:
     block, element = BLOCKS[strongest[0]]
     if terms:
         mechanism = BY_ID[terms[0].effect]
-        block, element = mechanism.block.value, mechanism.element
+        block, element = mechanism.block.value, mechanism.element_of(terms[0].variant)
     elif found is final and strongest[0] in ("motor", "table"):  # no refit removes it
         block, element = acting(found) or (block, element)
     # with findings the energy is that of their effect, which has no noise

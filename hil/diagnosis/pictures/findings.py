@@ -199,7 +199,7 @@ def _over_time(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:
     factor, unit = reading_unit(unit_of_channel(diagnosis, channel), float(np.abs(measured[view.run.judged]).max()))
     figure = Figure(figsize=(10.0, 6.4), layout="constrained")
     axes = figure.subplots(2, 1)
-    middle = int(np.argmax(np.abs(modelled)))
+    middle = view.run.judged.start + int(np.argmax(np.abs(modelled[view.run.judged])))
     for axis, rows in zip(axes, (slice(view.run.judged.start, None), around(middle, view.run, 0.3)), strict=True):
         chosen = thin((measured[rows], modelled[rows]), DRAWN_ROWS)
         time = view.run.time_s[rows][chosen]

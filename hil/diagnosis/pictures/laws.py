@@ -12,6 +12,7 @@ from scipy.signal import savgol_filter
 
 from hil.arrays import FloatArray
 from hil.diagnosis.pictures.view import Captioned, Curve, View, around, binned, longest, three_curves, unit_of_channel
+from hil.diagnosis.turning import speed_unit
 from hil.figures.drawing import style_axis
 from hil.figures.panels import COMMAND, DEVIATION, MEASURED, SIMULATED
 from hil.identification.dataset import inertia
@@ -29,7 +30,8 @@ REVERSAL_S, STEEPEST_S = 0.4, 0.05  # shown before and after: a reversal with it
 def friction_over_speed(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:
     """Draw motor torque - J a over speed, measured and of the twin, beside the friction laws."""
     final = diagnosis.final
-    to_m_min = 60.0 * diagnosis.owner.axis.ratio_m_rad
+    factor, unit_of_speed = speed_unit(diagnosis.owner.axis.turns)
+    to_read = factor * diagnosis.owner.axis.ratio_m_rad
     fastest = max(float(np.abs(view.torque.velocity).max()) for view in views)
     edges = np.geomspace(1e-3 * fastest, fastest, 45)
     figure = Figure(figsize=(10.0, 5.6), layout="constrained")
@@ -43,21 +45,21 @@ def friction_over_speed(diagnosis: Diagnosis, views: Sequence[View]) -> Captione
         speed, friction, spread = binned(*_one_direction(measured, sign), edges)
         label = f"measured, {name} direction"
         axis.errorbar(
-            speed * to_m_min, friction, spread, fmt=marker, color=colour, markersize=5, linewidth=0.8, label=label
+            speed * to_read, friction, spread, fmt=marker, color=colour, markersize=5, linewidth=0.8, label=label
         )
         speed, friction, _ = binned(*_one_direction(simulated, sign), edges)
         label = f"twin with the findings, {name}"
-        axis.plot(speed * to_m_min, friction, color=SIMULATED, marker=".", linestyle=dash, linewidth=1.8, label=label)
+        axis.plot(speed * to_read, friction, color=SIMULATED, marker=".", linestyle=dash, linewidth=1.8, label=label)
     for name, fit, dash in (
         ("bench file", diagnosis.explanation.owner, ":"),
         ("nominal twin, refitted", diagnosis.explanation.nominal, "-."),
     ):
         physics = fit.bench.axis.physics()
         law = physics.coulomb_n_m + physics.viscous_n_m_s_rad * edges
-        axis.plot(edges * to_m_min, law, color=COMMAND, linestyle=dash, label=name)
+        axis.plot(edges * to_read, law, color=COMMAND, linestyle=dash, label=name)
     axis.set_xscale("log")
     unit = "N" if diagnosis.owner.axis.linear else "N m"
-    style_axis(axis, f"friction [{unit}]", "speed of the table [m/min]", "Friction over speed")
+    style_axis(axis, f"friction [{unit}]", f"speed of the table [{unit_of_speed}]", "Friction over speed")
     axis.legend(frameon=False, ncols=2)
     how = "simulated from the same set-points" if final.bench.law_known else "held on the measured motion"
     return Captioned(

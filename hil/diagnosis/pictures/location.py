@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from hil.arrays import FloatArray
 from hil.diagnosis.location.locate import BLOCKS, block_shares, mismatch_energies, phase_shares
 from hil.diagnosis.result import Verdict
+from hil.diagnosis.turning import speed_unit
 from hil.diagnosis.verdict.fit_table import channel_names
 from hil.diagnosis.wording import title
 from hil.figures.drawing import style_axis
@@ -37,11 +38,12 @@ def location_figure(diagnosis: Diagnosis) -> Figure:
     _shares(axes["phase"], {title(phase.kind): phase.share for phase in phase_shares(seen)}, "Phase of motion")
     excess = np.concatenate([energy.rows for energy in seen])
     position = np.concatenate([1e3 * energy.run.position_command_m for energy in seen])
-    speed = np.concatenate([60.0 * np.abs(energy.run.velocity_command_m_s) for energy in seen])
+    factor, unit = speed_unit(diagnosis.owner.axis.turns)
+    speed = np.concatenate([factor * np.abs(energy.run.velocity_command_m_s) for energy in seen])
     _density(axes["position"], position, excess)
     style_axis(axes["position"], ENERGY, "position of the table [mm]", "Mean over the travel")
     _density(axes["speed"], speed, excess)
-    style_axis(axes["speed"], ENERGY, "speed of the table [m/min]", "Mean over the speed")
+    style_axis(axes["speed"], ENERGY, f"speed of the table [{unit}]", "Mean over the speed")
     run, rows = seen[0].run, seen[0].rows
     size = max(round(TIME_BIN_S / run.period_s), 1)
     starts = np.arange(0, rows.size, size)
@@ -50,8 +52,8 @@ def location_figure(diagnosis: Diagnosis) -> Figure:
     what = "speed set-point" if diagnosis.final.bench.law_known else "speed"  # without a law it may be the measured one
     style_axis(axes["time"], ENERGY, "time [s]", f"Over time: {run.name}; grey: {what}")
     set_point = axes["time"].twinx()
-    set_point.plot(run.time_s, 60.0 * run.velocity_command_m_s, color=COMMAND, linewidth=0.7)
-    set_point.set_ylabel(f"{what} [m/min]")
+    set_point.plot(run.time_s, factor * run.velocity_command_m_s, color=COMMAND, linewidth=0.7)
+    set_point.set_ylabel(f"{what} [{unit}]")
     return figure
 
 

@@ -130,6 +130,6 @@ def position(diagnosis: Diagnosis, view: View) -> FloatArray:
 
 
 def around(row: int, run: Measured, half_s: float) -> slice:
-    """Rows within +- `half_s` of a row."""
+    """Evaluated rows within +- `half_s` of a row."""
     half = round(half_s / run.period_s)
-    return slice(max(row - half, 0), min(row + half, run.motor.size))
+    return slice(max(row - half, run.judged.start), min(row + half, run.motor.size))

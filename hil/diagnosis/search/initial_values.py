@@ -25,6 +25,8 @@ from hil.twin.mechanism import Block, Mechanism, Variant
 from hil.twin.parameter import Dimension, Role
 from hil.twin.scene import AxisFacts, Scene
 
+_MOVES = 0.01  # of the largest step of the motor in a row: above rest and noise
+
 
 @dataclass(frozen=True)
 class StartPoint:
@@ -65,7 +67,17 @@ def axis_facts(bench: Bench, runs: Sequence[Measured] = ()) -> AxisFacts:
         lost_m=max(apart, default=math.inf),
         turn_known=physics.turn_known,
         held_s=lambda level: max((_held_s(run, level) for run in runs), default=math.inf),
+        driven=lambda level: _driven(runs, level),
     )
+
+
+def _driven(runs: Sequence[Measured], level: float) -> float:
+    """Share of the rows in which the motor moves whose |torque command| is above a level [motor unit]."""
+    steps = [np.abs(np.diff(run.motor, append=run.motor[-1])) for run in runs]
+    rows = [
+        np.abs(run.torque_command[step > _MOVES * step.max()]) > level for run, step in zip(runs, steps, strict=True)
+    ]
+    return float(np.mean(np.concatenate(rows))) if any(part.size for part in rows) else 1.0
 
 
 def _held_s(run: Measured, level: float) -> float:

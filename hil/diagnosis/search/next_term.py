@@ -46,8 +46,11 @@ def next_term(
 ) -> tuple[list[Fit], Fit | None]:
     """Fit the base with one more term; return the fits and the first one with sufficient evidence, if any.
 
-    `reference` is the nominal fit beside the loads of the base.
+    `reference` is the nominal fit beside the loads of the base. A sampled torque drives the twin with its noise: terms
+    that pass less of it leave less than the noise, so that below the floor nothing is evidence.
     """
+    if base.at_floor and any(run.sampled for run in base.data.runs):
+        return [], None
     bits = 1.0 - float(np.exp(-NEEDED / base.rows))  # share of white residuals whose removal gives evidence of NEEDED
     promising = [one for one in candidates if one.share > bits and one.share * base.cost > MATERIAL * base.rows]
     found: list[Fit] = []
@@ -90,7 +93,7 @@ def _worthwhile(found: Sequence[Fit], base: Fit, nominal: Fit, owner: Fit) -> Fi
         if against(other, base) >= NEEDED
         and gain(base, other, nominal) >= enough
         and REPEATS * unrepeated(other.hypothesis, other.data) <= differs
-        and constant_inside(other)
+        and constant_inside(other, base)
     ]
     return next((other for other in good if not harmed(other, base, owner)), good[0] if good else None)
 

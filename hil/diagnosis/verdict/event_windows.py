@@ -10,10 +10,11 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.diagnosis.result import EventWindow, PulseTrain, Value
+from hil.diagnosis.turning import of_load
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.measured import Measured
-from hil.identification.terms import Term
+from hil.identification.terms import Term, Window
 from hil.identification.window_fit import window_errors
 from hil.quantities import quantity
 from hil.twin.library import BY_ID
@@ -80,7 +81,8 @@ def describe_event(final: Fit, index: int, held_out: Dataset) -> EventReport:
     words["count"] = str(train.count if train else _different(seen))
     if train is not None:
         words |= {"width_s": quantity(train.width_s, "s"), "period_s": quantity(train.period_s, "s")}
-    return EventReport(windows, train, text.format(**words), parameters)
+    text = of_load(text, final.bench.axis.turns).format(**words)
+    return EventReport(windows, train, text, parameters)
 
 
 def _edges(term: Term) -> list[int]:
@@ -93,8 +95,14 @@ def _seen(fit: Fit, index: int) -> list[_Seen]:
     inside = [window for window in term.windows if window.run in runs]
     if not inside:
         return []
+
+    def edges(window: Window) -> tuple[float, float]:  # one before the first row is not told
+        first, *_, last = runs[window.run].time_s.tolist()
+        start, end = term.edges(window)
+        return min(max(start, first), last), min(max(end, first), last)
+
     return [
-        _Seen(runs[window.run], (*term.edges(window), term.at(window)[strength]), (row[0], row[1], row[2]))
+        _Seen(runs[window.run], (*edges(window), term.at(window)[strength]), (row[0], row[1], row[2]))
         for window, row in zip(inside, window_errors(fit, index).tolist(), strict=True)
     ]
 

@@ -5,7 +5,7 @@ from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.honest_refit import BLOCK, CLOSED, Refit, never_worse, rms_at_floor, rms_of_channels
 from hil.identification.hypothesis import Hypothesis
-from hil.identification.torque_left import fit_plain, left_by_plain, left_by_twin
+from hil.identification.torque_left import fit_plain, left_by_plain, left_by_twin, torque_deviation
 
 
 def reported_refit(nominal: Fit) -> Refit:
@@ -31,11 +31,14 @@ def torque_left(owner: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> Torq
     if not held_out.runs or any("motor" in run.unseen for run in held_out.runs):
         return None
     plain = fit_plain(nominal.data)
-    by_plain = None if plain is None else left_by_plain(plain, held_out)
-    if plain is None or by_plain is None:
+    if plain is None:
+        return None
+    deviation = torque_deviation((nominal.data, held_out), plain.slowest)
+    by_plain = left_by_plain(plain, held_out, deviation)
+    if by_plain is None:
         return None
     of = {
-        name: left_by_twin(fit.hypothesis, held_out, plain.slowest)
+        name: left_by_twin(fit.hypothesis, held_out, plain.slowest, deviation)
         for name, fit in (("owner", owner), ("refitted", nominal), ("final", final))
     }
     return TorqueLeft(plain=by_plain, **of)

@@ -46,6 +46,10 @@ MECHANISM = Mechanism(
                 "Friction differs by direction, the more the faster: at {viscous_speed}, where viscous friction "
                 "equals Coulomb friction, it is {offset_torque_n_m} above the mean of both in positive direction."
             ),
+            reversed=(
+                "Friction differs by direction, the more the faster: at {viscous_speed}, where viscous friction "
+                "equals Coulomb friction, it is {offset_torque_n_m} below the mean of both in positive direction."
+            ),
         ),
     ),
     starts=lambda s: [(0.05 * s.coulomb,)],

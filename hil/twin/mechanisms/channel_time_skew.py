@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 
@@ -15,12 +16,12 @@ Channels = tuple[FloatArray, ...]  # motor position, table position, torque comm
 
 def _late_motor(channels: Channels, parameters: Sequence[float], period_s: float) -> Channels:
     motor, table, command, torque = channels
-    return _delayed(motor, parameters[0] / period_s), table, command, torque
+    return delayed(motor, parameters[0] / period_s), table, command, torque
 
 
 def _late_table(channels: Channels, parameters: Sequence[float], period_s: float) -> Channels:
     motor, table, command, torque = channels
-    return motor, _delayed(table, parameters[0] / period_s), command, torque
+    return motor, delayed(table, parameters[0] / period_s), command, torque
 
 
 def _late_torque(channels: Channels, parameters: Sequence[float], period_s: float) -> Channels:
@@ -38,7 +39,21 @@ def delayed_mean(means: FloatArray, periods: float) -> FloatArray:
     )
 
 
-def _delayed(samples: FloatArray, periods: float) -> FloatArray:
+@lru_cache(maxsize=64)
+def _odd_length(least: int) -> int:
+    """Smallest odd length from `least` on that has no prime factor above 7: its spectrum is quick to compute."""
+    length = least | 1
+    while True:
+        rest = length
+        for prime in (3, 5, 7):
+            while rest % prime == 0:
+                rest //= prime
+        if rest == 1:
+            return length
+        length += 2
+
+
+def delayed(samples: FloatArray, periods: float) -> FloatArray:
     """Delay samples (n,) by a number of periods, by the phase of their spectrum.
 
     Interpolation between neighbours would average their noise, which a fit would take for evidence. The ends are
@@ -47,7 +62,8 @@ def _delayed(samples: FloatArray, periods: float) -> FloatArray:
     if periods == 0.0:
         return samples
     ends = min(_ENDS + math.ceil(abs(periods)), samples.size - 1)
-    longer = np.pad(samples, (ends, ends + (samples.size + 1) % 2), mode="reflect", reflect_type="odd")
+    more = _odd_length(samples.size + 2 * ends) - samples.size - ends
+    longer = np.pad(samples, (ends, more), mode="reflect", reflect_type="odd")
     slope = (longer[-1] - longer[0]) / (longer.size - 1)
     line = slope * np.arange(longer.size)
     turn = np.exp(-2j * np.pi * periods * np.fft.rfftfreq(longer.size))
@@ -59,8 +75,8 @@ MECHANISM = Mechanism(
     id="channel_time_skew",
     block=Block.SENSOR,
     element="time stamps of a channel",
-    sentence="The channel is recorded {delay_s} late against the others.",
-    reversed="The channel is recorded {delay_s} early against the others.",
+    sentence="The channel {variant} is recorded {delay_s} late against the others.",
+    reversed="The channel {variant} is recorded {delay_s} early against the others.",
     equation="y_recorded(t) = y(t - delay)",
     source="Laakso et al., IEEE Signal Processing Magazine 13 (1996) 30, fractional delay",
     parameters=(Parameter("delay_s", Dimension.TIME, -0.01, 0.01, role=Role.STRENGTH),),

@@ -100,11 +100,13 @@ def _longer(chain: Chain) -> Chain:
 _HIGHEST_HZ = 2000.0
 _NEAR = 0.9  # of the highest frequency: beyond, the structure is a mass
 _NO_PEAK = 1.0 / math.sqrt(2.0)  # damping ratio from which there is no resonance
+_LEAST_DAMPING = 1e-4
+_TONE = 1.1 * _LEAST_DAMPING  # damping ratio up to which a fit has found a tone, since every structure damps
 
 
 def _valid(values: Sequence[float], variant: int, axis: AxisFacts) -> bool:
-    """Check that the frequency is not at its upper bound, and that the structure has a resonance."""
-    return values[0] < _NEAR * _HIGHEST_HZ and values[1] < _NO_PEAK
+    """Check that the frequency is not at its upper bound, and that the structure has a resonance of some width."""
+    return values[0] < _NEAR * _HIGHEST_HZ and _TONE < values[1] < _NO_PEAK
 
 
 MECHANISM = Mechanism(
@@ -117,7 +119,7 @@ MECHANISM = Mechanism(
     source="Den Hartog, Mechanical Vibrations, 4th ed. (1956), auxiliary mass on a spring",
     parameters=(
         Parameter("frequency_hz", Dimension.FREQUENCY, 1.0, _HIGHEST_HZ, role=Role.FREQUENCY),
-        Parameter("damping_ratio", Dimension.RATIO, 1e-4, 0.9),
+        Parameter("damping_ratio", Dimension.RATIO, _LEAST_DAMPING, 0.9),
         Parameter("mass_ratio", Dimension.RATIO, 1e-3, 10.0, role=Role.STRENGTH),
     ),
     variants=(
@@ -135,9 +137,10 @@ MECHANISM = Mechanism(
             Stage.CHAIN,
             _with_flexible_load,
             "flexible load",
+            element="load on an elastic arm, shaft or belt",
             sentence=(
-                "The load is flexible: {mass_ratio} of the rest of the inertia swings at {frequency_hz} where the "
-                "motor is held, damped by {damping_ratio}."
+                "The load is flexible: an inertia {mass_ratio} as large as the rest of the axis swings at "
+                "{frequency_hz} where the motor is held, damped by {damping_ratio}."
             ),
             # an arm or a bar swings at some hertz; behind a belt or a gear it may be most of the inertia
             starts=lambda s: [(f, 0.03, ratio) for f in np.geomspace(1.5, 100.0, 13) for ratio in (0.3, 3.0)],

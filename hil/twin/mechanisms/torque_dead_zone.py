@@ -1,9 +1,12 @@
 """Torque dead zone: the drive answers small commands with no torque."""
 
+from collections.abc import Sequence
+
 from numba import njit
 
 from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, Stage, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
+from hil.twin.scene import AxisFacts
 
 
 @njit
@@ -17,6 +20,11 @@ def _dead_zone(value: float, at: Moment, parameters: Row, memory: Row) -> float:
 @njit
 def _gate(value: float, at: Moment, parameters: Row, memory: Row) -> float:
     return 0.0 if abs(value) <= parameters[0] else value
+
+
+def _valid(values: Sequence[float], variant: int, axis: AxisFacts) -> bool:
+    """Check that the drive gives a torque most of the time in which the axis moves."""
+    return axis.driven(values[0]) > 0.5
 
 
 MECHANISM = Mechanism(
@@ -37,4 +45,5 @@ MECHANISM = Mechanism(
     typical=lambda a: (0.05 * a.friction,),
     proportional=False,
     picture=Picture.DRIVE_LAW,
+    valid=_valid,
 )

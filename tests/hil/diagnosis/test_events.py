@@ -11,7 +11,7 @@ from emps_windows import PERIOD_S, Push, emps_recording, irregular, pushed, regu
 
 from hil.bench.bench_file import load_bench
 from hil.diagnosis.diagnose import Diagnosis, diagnose
-from hil.diagnosis.search.events import detect, event_term, with_events_of
+from hil.diagnosis.search.events import constant_inside, detect, event_term, with_events_of
 from hil.diagnosis.split import split
 from hil.diagnosis.verdict.findings import diagnosed_bench
 from hil.identification.dataset import prepare_dataset
@@ -80,6 +80,37 @@ def test_a_window_has_the_force_of_the_mechanism_with_the_same_values() -> None:
     window = Hypothesis(OWNER, (replace(PUSHES[0], windows=(Window("run"),)),)).blocks(run, 0.002)
     for name, values in everywhere.items():
         assert window[name] == pytest.approx(values, abs=1e-9 * max(np.abs(values).max(), 1.0))
+
+
+def blows(*starts_s: float) -> Term:
+    """Half a sine of 1500 N over 0.06 s from each start, in steps."""
+    steps, width_s = 12, 0.06
+    shifts = [
+        (start_s - starts_s[0] + k * width_s / steps, float(np.sin(np.pi * (k + 0.5) / steps)))
+        for start_s in starts_s
+        for k in range(steps)
+    ]
+    windows = tuple(Window("run", later_s, later_s, factor) for later_s, factor in shifts)
+    return Term("external_force", 0, (1500.0, starts_s[0], starts_s[0] + width_s / steps), windows=windows)
+
+
+def test_a_single_blow_of_any_form_is_a_force_and_repeated_ones_are_not() -> None:
+    for starts_s in ((0.52,), (0.52, 0.68)):
+        quiet = take(recorded(OWNER), OWNER)
+        answer = Hypothesis(OWNER, (blows(*starts_s),)).respond(quiet)
+        change = Hypothesis(OWNER).respond(quiet)
+        run = replace(
+            quiet,
+            motor=quiet.motor + answer.motor_position - change.motor_position,
+            table_m=quiet.table_m + answer.table_position_m - change.table_position_m,
+            torque=quiet.torque + answer.torque - change.torque,
+            torque_command=quiet.torque_command + answer.torque_command - change.torque_command,
+        )
+        base = evaluated(Hypothesis(OWNER), [run])
+        windows = tuple(Window("run", start_s - starts_s[0], start_s - starts_s[0]) for start_s in starts_s)
+        constant = Term("external_force", 0, (1000.0, starts_s[0] + 0.01, starts_s[0] + 0.05), windows=windows)
+        found = fit_windows(evaluated(Hypothesis(OWNER, (constant,)), [run]))
+        assert constant_inside(found, base) == (len(starts_s) == 1)
 
 
 def test_the_diagnosed_bench_expects_no_event() -> None:

@@ -115,6 +115,18 @@ def test_the_part_held_out_moves_both_ways() -> None:
     assert len(train) > 0.4 * len(feeds)
 
 
+def test_training_moves_both_ways() -> None:
+    """There and back once, with a turn on the way back: its second half alone would move one way."""
+    feeds = moved([(0.15, 0.06)])
+    turns_m = 0.3 * np.array([0.0, 0.0, 0.1, 0.3, 0.5, 0.3, 0.1, 0.13, 0.1, 0.0, 0.0])
+    rows = np.linspace(0.0, 1.0, len(feeds))
+    position = np.interp(rows, np.linspace(0.0, 1.0, turns_m.size), turns_m)
+    (train,), (held_out,) = split([replace(feeds, columns=feeds.columns | {"motor_position_m": position})])
+    forwards, backwards = (np.sum(np.diff(side * train["motor_position_m"]).clip(0.0)) for side in (1.0, -1.0))
+    assert min(forwards, backwards) > 0.1 * np.ptp(position)
+    assert held_out.start_s > train.start_s
+
+
 def test_friction_that_varies_is_no_wrong_sign() -> None:
     """On a slow move the force follows the cogging, not the acceleration; of a wrong sign friction is negative."""
     slow = moved([(0.15, 0.06)])

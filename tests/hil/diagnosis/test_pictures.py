@@ -9,6 +9,7 @@ from diagnosis_runs import bench, dataset, evaluated, recorded
 
 from hil.diagnosis.diagnose import Diagnosis
 from hil.diagnosis.pictures.findings import finding_figure
+from hil.diagnosis.pictures.view import around
 from hil.diagnosis.result import Result, Unexplained, Verdict
 from hil.diagnosis.search.forward_selection import Explanation
 from hil.diagnosis.search.initial_values import axis_facts
@@ -49,6 +50,12 @@ def diagnosis_of(effect: str, times: float = 3.0) -> Diagnosis:
         runtime_s=0.0,
     )
     return Diagnosis(result, OWNER, OWNER, data, dataset([], OWNER), explanation, proof, right)
+
+
+def test_only_evaluated_rows_are_enlarged() -> None:
+    run = take(recorded(OWNER), OWNER)
+    assert run.judged.start > 0
+    assert around(0, run, 0.3).start == run.judged.start
 
 
 @pytest.mark.parametrize("effect", BY_ID)

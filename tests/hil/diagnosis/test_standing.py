@@ -75,6 +75,13 @@ def test_once_per_revolution_is_not_told_by_part_of_one() -> None:
     assert not mechanism.is_valid((1e-3, 0.0), 0, replace(facts, travel_m=6.0))  # less than 2 pi
 
 
+def test_a_dead_zone_lets_the_drive_move_the_axis(train: Dataset) -> None:
+    run = train.runs[0]
+    usual = float(np.median(np.abs(run.torque_command[np.abs(np.diff(run.motor, append=run.motor[-1])) > 1e-4])))
+    for share, stands in ((0.1, True), (2.0, False)):
+        assert claimable(Term("torque_dead_zone", 1, (share * usual,)), OWNER, train.runs) is stands
+
+
 @pytest.mark.parametrize(("limit_n_m", "stands"), [(2.0, True), (4.0, False)])
 def test_a_torque_limit_is_seen_as_a_plateau(limit_n_m: float, stands: bool) -> None:
     """A command above 2 N m for 100 ms at a time and above 4 N m for 5 ms."""
@@ -172,7 +179,9 @@ def test_the_late_encoder_of_a_robot_axis_is_found_and_nothing_else() -> None:
     motor = result.fit["motor_position_rad"]
     assert motor.train.before_rms <= motor.train.owner_rms
     assert max(motor.train.before_rms, motor.train.owner_rms or 0.0) < 1e-4  # it was 6e39 rad
+    assert "Not explained: residuals above the noise" in result.statement
     assert result.torque_left is not None
+    assert result.torque_left.final < result.torque_left.plain < 0.5  # of the torque of the whole move
 
 
 def test_bounds_of_a_nominal_parameter_tell_what_is_confounded_with_it() -> None:

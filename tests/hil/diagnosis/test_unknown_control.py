@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,10 +14,14 @@ from scipy.interpolate import CubicSpline
 from hil.bench.bench_file import Bench, load_bench
 from hil.bench.control_section import UnknownControl
 from hil.diagnosis.diagnose import diagnose
+from hil.diagnosis.preparation import prepare_diagnosis
 from hil.diagnosis.result import Result
+from hil.diagnosis.search.next_term import next_term
+from hil.diagnosis.search.score_test import Candidate
 from hil.errors import InputError
 from hil.identification.compare import compare
 from hil.identification.completion import completed
+from hil.identification.nominal_fit import fit_nominal_parameters
 from hil.identification.terms import Term
 from hil.recording.recording import Recording
 from hil.report.diagnosis_report import write_diagnosis
@@ -135,3 +140,14 @@ def test_a_mistyped_key_beside_an_unknown_value_is_refused(tmp_path: Path) -> No
     )
     with pytest.raises(InputError, match=r"axis\.yaml:7: control\.torque_limit: given an unknown key"):
         load_bench(path)
+
+
+def test_the_noise_of_a_sampled_torque_is_no_evidence() -> None:
+    """An axis without any effect whose torque was only measured: a delay of half a row would average its noise."""
+    recording = changed(recorded(KNOWN, times=2, torque_noise_n_m=0.05), torque_command_n_m=None)
+    recording = replace(recording, metadata={**recording.metadata, "source": "log.csv"})
+    found = fit_nominal_parameters(prepare_diagnosis([recording], [], OWNER).train)
+    delay_s = found.hypothesis.values[found.hypothesis.nominal.index("torque_delay_s")]
+    assert abs(delay_s) < 0.1 * recording.period_s
+    candidates = [Candidate(COGGING, 0.9)]
+    assert next_term(found, found, found, found, candidates, print) == ([], None)

@@ -183,6 +183,46 @@ def test_json_in_the_forms_that_tools_write(tmp_path: Path, content: Any) -> Non
     check(imported(path))
 
 
+def test_a_message_per_row_is_a_joint_state_of_ros(tmp_path: Path) -> None:
+    """Stamps are seconds and nanoseconds, positions and efforts lists in the order of the names; rad and N m."""
+    angle, torque = AXIS["angle"], AXIS["torque"]
+    messages = [
+        {
+            "header": {"seq": index, "stamp": {"secs": 1_700_000_000 + int(t), "nsecs": round(1e9 * (t % 1.0))}},
+            "name": ["joint_motor", "joint_link"],
+            "position": [angle[index], 0.01 * angle[index]],
+            "effort": [torque[index], 0.0],
+        }
+        for index, t in enumerate(AXIS["t"])
+    ]
+    path = tmp_path / "joint.json"
+    path.write_text(json.dumps(messages))
+    recording = imported(path)
+    assert recording.period_s == pytest.approx(float(AXIS["t"][1] - AXIS["t"][0]), rel=1e-4)
+    np.testing.assert_allclose(recording["motor_position_rad"], angle, atol=1e-6)
+    np.testing.assert_allclose(recording["table_position_m"], 0.01 * angle, atol=1e-6)
+    np.testing.assert_allclose(recording["torque_n_m"], torque, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("column", "unit", "quantity"),
+    [
+        ("Kraft kN", "kN", "effort"),
+        ("Torque N m", "N m", "effort"),
+        ("Drehzahl 1/min", "rpm", "velocity"),
+        ("Time s", "s", "time"),
+        ("Strom A", "A", "effort"),
+        ("Encoder A", None, "position"),
+        ("Position actual value", None, "position"),
+        ("Position [in]", "in", "position"),
+        ("position in", None, "position"),
+    ],
+)
+def test_a_unit_after_a_blank_is_read(column: str, unit: str | None, quantity: str) -> None:
+    read = label(column)
+    assert (read.unit, read.quantity.value, read.odd_unit) == (unit, quantity, False)
+
+
 def test_a_rate_is_taken_from_a_comment_or_the_user(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     columns = renamed(AXIS, **{k: v for k, v in NAMES.items() if k != "t"})
@@ -230,3 +270,21 @@ def test_units_of_a_scope_with_a_time_beside_each_channel_are_read(tmp_path: Pat
 @pytest.mark.parametrize("name", ["Istwinkel [Grad]", "istposition [mm]", "ActPos"])
 def test_a_measured_position_is_told_by_its_name(name: str) -> None:
     assert label(name).quantity == "position"
+
+
+@pytest.mark.parametrize("turned", [(), ("torque_command_Nm",), ("torque_measured_Nm",)])
+def test_torque_and_command_get_signs_that_agree(tmp_path: Path, turned: tuple[str, ...]) -> None:
+    """Another axis pushes this one: alone, the measured torque seems to accelerate backwards."""
+    random = np.random.default_rng(2)
+    from_other = 6.5e-4 * np.gradient(AXIS["speed"], AXIS["t"]) + random.normal(0.0, 0.5, AXIS["t"].size)
+    friction = 1.2 * np.sign(AXIS["speed"])
+    columns = {
+        "time_s": AXIS["t"],
+        "motor_angle_rad": AXIS["angle"],
+        "torque_command_Nm": friction,
+        "torque_measured_Nm": friction - np.convolve(from_other, np.ones(21) / 21, "same"),
+    }
+    changed = {name: -part if name in turned else part for name, part in columns.items()}
+    found = channels(draft_map(write(tmp_path / "log.csv", changed)))
+    assert found["torque_command_n_m"].get("sign", 1) == (-1 if "torque_command_Nm" in turned else 1)
+    assert found["torque_n_m"].get("sign", 1) == (-1 if "torque_measured_Nm" in turned else 1)

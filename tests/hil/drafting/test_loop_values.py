@@ -68,3 +68,25 @@ def test_the_law_of_emps_is_drafted() -> None:
     assert values["velocity_feedforward"] == pytest.approx(0.0, abs=1e-3)
     assert values["velocity_estimate"] == "two_sample_mean"
     assert "velocity_integral_time_s" not in values
+
+
+@pytest.mark.parametrize("time_s", [0.02, 0.2])
+@pytest.mark.parametrize("feedforward", [1.0, 0.4])
+def test_loops_of_one_period_are_told_apart(time_s: float, feedforward: float) -> None:
+    """The position error is the integral of set less measured speed there, so the closed form has one column less."""
+    gain = 1.0 / (2.0 * max(time_s, 0.05))
+    changes = {
+        "position_period_s": OWNER.period_s,
+        "velocity_integral_time_s": time_s,
+        "velocity_integral_time_ms": None,
+        "velocity_feedforward": feedforward,
+        "position_gain_1_s": gain,
+    }
+    owner = OWNER.model_copy(update={"control": OWNER.known_control.model_copy(update=changes)})
+    recording = changed(servo_run(owner), velocity_reference_m_s=None, torque_command_n_m=None)
+    values = {entry.key: entry.value for entry in loop_values(recording, RATIO_M_RAD).values}
+    assert values["position_gain_1_s"] == pytest.approx(gain, rel=0.05)
+    assert values["velocity_gain_n_m_s_rad"] == pytest.approx(OWNER.gains.velocity_gain_n_m_s_rad, rel=0.02)
+    assert values["velocity_integral_time_s"] == pytest.approx(time_s, rel=0.05)
+    assert values["velocity_feedforward"] == pytest.approx(feedforward, abs=0.02)
+    assert values["position_period_s"] == OWNER.period_s

@@ -32,6 +32,10 @@ NOTED: dict[str, tuple[Make, str]] = {
     "NaN in the position": (table(**in_rows("angle", slice(900, 903), np.nan)), "rows have no value of"),
     "an empty field": (with_lines(field(700, 3, "")), "rows have no value of"),
     "an angle that wraps": (table(angle=np.mod(AXIS["angle"], 2 * np.pi), x_set=None), "wraps at 6.28319"),
+    "a sensor that jumps by a fraction of the travel": (
+        table(**in_rows("angle", slice(2000, 2003), AXIS["angle"][2000] + 5.0)),
+        "its sensor, not the axis",
+    ),
     "a gap": (lambda path: write(path, {n: np.delete(v, slice(500, 600)) for n, v in GOOD.items()}), "a gap of"),
     "a duplicate row": (with_lines((1000, LINES[999])), "duplicate rows: 1"),
     "numbers in quotes": (

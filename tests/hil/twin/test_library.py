@@ -121,12 +121,14 @@ def test_bounds_units_and_text(mechanism) -> None:
         assert np.isfinite([parameter.low, parameter.high]).all()
         assert parameter.low < parameter.high
         assert parameter.name.endswith(SUFFIX.get(parameter.dimension, ""))
-    assert fields(mechanism.sentence) <= {*mechanism.names, *(["wave"] if mechanism.indices(Role.ORDER) else [])}
+    known = {*mechanism.names, *(["wave"] if mechanism.indices(Role.ORDER) else [])}
+    assert fields(mechanism.sentence) <= known | ({"variant"} if all(mechanism.forms) else set())
     assert mechanism.sentence.endswith(".")
     for variant in mechanism.variants:
         if variant.sentence:
             assert fields(variant.sentence) <= {*mechanism.names, "viscous_speed"}
             assert variant.sentence.endswith(".")
+            assert not variant.reversed or fields(variant.reversed) == fields(variant.sentence)
             assert len(mechanism.variants) > 1
     assert mechanism.element
     assert mechanism.equation

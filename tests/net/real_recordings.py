@@ -1,0 +1,70 @@
+"""Real recordings, each from its raw file to a diagnosis by the three commands of the README, nothing corrected.
+
+    python tests/net/real_recordings.py OUT [--only PART]     from the root of the repository, recordings beside it
+
+It prints for each the wall and processor seconds of `hil import`, `hil identify` and `hil diagnose`, the verdict with
+names and confidences, and the torque left on held-out motion beside that of plain least squares. Reports are kept in
+OUT; a recording that has one is not diagnosed again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+RECORDINGS = Path(__file__).parents[3] / "shared" / "recordings"
+PENDULUM = ("joint1_open_loop", "swingup_a", "swingup_b", "pendubot_friction_compensated")
+FILES = {
+    "emps": ("emps/DATA_EMPS.mat", ""),
+    **{f"kuka {name}": (f"kuka/axis1_{name}.csv", "") for name in ("a", "b")},
+    **{f"bar {name}": (f"flexible-bar/{name}.csv", "") for name in ("prbs", "square", "staircase_up")},
+    **{f"pendulum {name} {axis}": (f"double-pendulum/{name}.csv", axis) for axis in ("1", "2") for name in PENDULUM},
+    **{f"rig {name}": (f"rig/{name}/train_1.csv", "") for name in ("null", "stribeck", "backlash", "lead")},
+}
+FROZEN = "pendulum joint1_open_loop 2"  # a joint that does not move
+
+
+def main() -> None:
+    """Run the commands for each recording and print its line."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("out", type=Path, help="folder for maps, benches and reports")
+    parser.add_argument("--only", default="", help="only recordings whose name contains this")
+    options = parser.parse_args()
+    for name, (file, axis) in FILES.items():
+        if options.only in name and name != FROZEN:
+            print(f"{name}: {answer(options.out / name.replace(' ', '_'), RECORDINGS / file, axis)}", flush=True)
+
+
+def answer(place: Path, source: Path, axis: str) -> str:
+    """Seconds and result of the three commands on one file, as a line."""
+    place.mkdir(parents=True, exist_ok=True)
+    run, bench, report = (str(place / name) for name in ("run.parquet", "axis.yaml", "report"))
+    commands = [
+        ["import", str(source), "--out", run, *(["--axis", axis] if axis else [])],
+        ["identify", run, "--out", bench],
+        ["diagnose", run, "--bench", bench, "--out", report],
+    ]
+    told = place / "report" / "diagnosis.json"
+    seconds = []
+    for command in commands if not told.exists() else []:
+        begin, used = time.monotonic(), os.times()
+        done = subprocess.run(["hil", *command], capture_output=True, text=True, check=False)
+        now = os.times()
+        cpu_s = now.children_user + now.children_system - used.children_user - used.children_system
+        seconds.append(f"{command[0]} {time.monotonic() - begin:.1f} s (processor {cpu_s:.1f} s)")
+        if done.returncode:
+            return f"{', '.join(seconds)}: {done.stderr.strip().splitlines()[-1]}"
+    result = json.loads(told.read_text(encoding="utf-8"))
+    found = [f"{one['effect']} {one['confidence']:.2f}" for one in (*result["missing"], *result["partial"])]
+    left = result["torque_left"] or {}
+    shares = [f"{name} {100.0 * left[name]:.1f} %" for name in ("final", "plain") if left.get(name) is not None]
+    return f"{', '.join(seconds)}: {result['verdict']} [{', '.join(found)}] torque left {', '.join(shares)}"
+
+
+if __name__ == "__main__":
+    sys.exit(main())

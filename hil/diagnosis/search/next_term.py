@@ -46,10 +46,11 @@ def next_term(
 ) -> tuple[list[Fit], Fit | None]:
     """Fit the base with one more term; return the fits and the first one with sufficient evidence, if any.
 
-    `reference` is the nominal fit beside the loads of the base. A sampled torque drives the twin with its noise: terms
-    that pass less of it leave less than the noise, so that below the floor nothing is evidence.
+    `reference` is the nominal fit beside the loads of the base. A torque that is sampled, or the only one recorded,
+    drives the twin with its error: terms that pass less of it leave less than the noise, so that nothing below the
+    floor is evidence.
     """
-    if base.at_floor and any(run.sampled for run in base.data.runs):
+    if base.at_floor and any(run.sampled or run.torque_is_command for run in base.data.runs):
         return [], None
     bits = 1.0 - float(np.exp(-NEEDED / base.rows))  # share of white residuals whose removal gives evidence of NEEDED
     promising = [one for one in candidates if one.share > bits and one.share * base.cost > MATERIAL * base.rows]

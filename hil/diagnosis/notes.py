@@ -93,6 +93,7 @@ def on_torque(left: TorqueLeft | None) -> list[str]:
         return []
     return [
         f"On held-out motion the twin leaves {percent(left.final)} of the torque's standard deviation, more than plain "
-        f"least squares of inertia, friction and offset ({percent(left.plain)}): torques that no term describes act on "
-        "the axis, such as gravity or another arm, and the fit to its motion takes them for inertia or friction."
+        f"least squares of inertia, friction and offset ({percent(left.plain)}): no term describes a "
+        "torque on the axis, such as friction of another form, gravity or another arm, and the fit to the motion "
+        "takes it for inertia or friction."
     ]

@@ -56,7 +56,7 @@ def statement(result: Result) -> str:
 
 
 def _left(result: Result) -> str:
-    """What remains beside the named effects, as a sentence; empty at the noise floor."""
+    """Return the residuals above the noise floor as a sentence; empty if there are none."""
     told = result.unexplained.description
     return "" if told == AT_FLOOR else f" Not explained: {told[0].lower()}{told[1:]}"
 

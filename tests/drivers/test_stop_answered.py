@@ -167,6 +167,17 @@ def test_a_demand_of_any_other_length_is_malformed(length: int) -> None:
     assert rig.drive.malformed_frames == 1
 
 
+def in_lasting_fault() -> Rig:
+    """A drive with a fault whose cause lasts, asked once to reset it."""
+    rig = in_process()
+    rig.set_up()
+    rig.enable()
+    rig.node.trip(0x4310, 0x08, rig.now_s, lasting=True)
+    rig.cycle()
+    rig.drive.reset_fault()
+    return rig
+
+
 def reset_bits(rig: Rig, cycles: int) -> list[bool]:
     """Return which of the next controlwords have the bit of a fault reset."""
     sent: list[bool] = []
@@ -178,12 +189,7 @@ def reset_bits(rig: Rig, cycles: int) -> list[bool]:
 
 def test_a_request_to_reset_a_fault_is_used_up_by_one_edge() -> None:
     """A cause that goes away later does not end the fault without another request."""
-    rig = in_process()
-    rig.set_up()
-    rig.enable()
-    rig.node.trip(0x4310, 0x08, rig.now_s, lasting=True)
-    rig.cycle()
-    rig.drive.reset_fault()
+    rig = in_lasting_fault()
     assert reset_bits(rig, 10) == [True] + [False] * 9
     rig.node.clear_cause()
     assert not any(reset_bits(rig, 10))
@@ -191,12 +197,7 @@ def test_a_request_to_reset_a_fault_is_used_up_by_one_edge() -> None:
 
 
 def test_a_second_request_waits_until_its_edge_can_rise() -> None:
-    rig = in_process()
-    rig.set_up()
-    rig.enable()
-    rig.node.trip(0x4310, 0x08, rig.now_s, lasting=True)
-    rig.cycle()
-    rig.drive.reset_fault()
+    rig = in_lasting_fault()
     assert reset_bits(rig, 1) == [True]
     rig.drive.reset_fault()
     assert reset_bits(rig, 4) == [False, True, False, False]

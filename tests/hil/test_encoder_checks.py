@@ -113,7 +113,7 @@ def test_the_bound_and_the_way_of_two_periods_may_be_reached(
 
 @BOTH
 def test_while_the_set_points_rest_the_motor_encoder_is_the_one_that_is_wrong(sign: float) -> None:
-    """Of two that move against each other: the position loop follows it away from the set-point."""
+    """The position loop drives the axis away from resting set-points if the motor encoder counts the wrong way."""
     step_m = sign * 2.0**-12
     assert Checked(frozen_m=0.5 * 2.0**-12).tick(motor_m=step_m, table_m=-step_m) == Limit.MOTOR_REVERSED
 

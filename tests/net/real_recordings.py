@@ -53,7 +53,7 @@ def answer(place: Path, source: Path, axis: str) -> str:
     seconds = []
     for command in commands if not told.exists() else []:
         begin, used = time.monotonic(), os.times()
-        done = subprocess.run(["hil", *command], capture_output=True, text=True, check=False)
+        done = subprocess.run([sys.executable, "-m", "hil.cli", *command], capture_output=True, text=True, check=False)
         now = os.times()
         cpu_s = now.children_user + now.children_system - used.children_user - used.children_system
         seconds.append(f"{command[0]} {time.monotonic() - begin:.1f} s (processor {cpu_s:.1f} s)")

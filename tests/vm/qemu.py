@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-MEMORY_MB = 2048  # kernels are compiled in it
+MEMORY_MB = 3072  # kernels are compiled in it
 CORES = 2  # one for the loop, one for the rest, as `hil install-service` divides them
 _RESULTS_BYTES = 1 << 29
 SPOKEN = "vm: "  # lines of the guest's console that are for the user

@@ -26,7 +26,7 @@ from hil.loop.simulated_bench import SimulatedNodes, load_simulated
 COLUMNS = ("monotonic_s", "state", "velocity_m_s", "position_m")
 MOST_ROWS = 500_000  # five minutes at 250 Hz, each SYNC and each answer a row
 PRIORITY = 60  # SCHED_FIFO: a device keeps its time, whatever the computer does
-_LOCK_ALL = 3  # MCL_CURRENT | MCL_FUTURE
+_LOCK_ALL = 7  # MCL_CURRENT | MCL_FUTURE | MCL_ONFAULT: reserved memory that is never used takes none
 
 
 class DevicePort(PythonCanPort):

@@ -17,6 +17,7 @@ from contextlib import suppress
 from hil.loop.clock import WallClock
 
 FEEDS = 4  # per time-out of the watchdog: three may be lost
+CLOSING_S = 30.0  # for the recording to be written, on a slow disk, and for the process to end
 
 
 class Notifier:
@@ -43,6 +44,11 @@ class Notifier:
             lines = "\n".join(state.replace("\n", " ") for state in states)  # a line of a text would be another state
             with suppress(OSError):
                 self._socket.sendto(lines.encode(), self._address)
+
+    def stopping(self, status: str) -> None:
+        """Tell that the loop has ended: no tick feeds the watchdog any more, which then allows CLOSING_S."""
+        longer = (f"WATCHDOG_USEC={CLOSING_S * 1e6:.0f}", "WATCHDOG=1") if self.watchdog_s else ()
+        self.send("STOPPING=1", f"STATUS={status}", *longer)
 
     def close(self) -> None:
         """Close the socket."""

@@ -139,7 +139,7 @@ def run_profile(
             raise
         finally:
             disturbances = None if virtual else Disturbances.now().since(before)
-            notifier.send("STOPPING=1", f"STATUS={ended}")  # from here no tick feeds the watchdog
+            notifier.stopping(ended)
             run = certificate.of_run(session.late.values, session.skipped, gains.period_s, disturbances)
             recording = recorder.close(ended, {certificate.KEY: certified | run})
     notes = trajectory.notes

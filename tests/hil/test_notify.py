@@ -110,6 +110,7 @@ def test_a_run_tells_its_phases(manager: Manager, tmp_path: Path, monkeypatch: p
     told = manager.received()
     assert [states[0] for states in told[:1] + told[-1:]] == ["READY=1", "STOPPING=1"]
     assert told[-1][1].startswith(f"STATUS={ran.outcome.ending}")
+    assert told[-1][2:] == ["WATCHDOG_USEC=30000000", "WATCHDOG=1"]  # the recording may take longer than a tick
     assert {states[0] for states in told[1:-1]} == {"WATCHDOG=1"}
 
 

@@ -68,7 +68,8 @@ def regular_rows(
     the mean rate. `judged_by` are the columns that decide, by default all. `period_s` of the ticks, if it is known:
     rows of a loop that was late lie at whole multiples of it.
 
-    `place` as in `check_finite`. Raises InputError: NaN, time that repeats or runs back, two rates, too few rows.
+    `place` as in `check_finite`. Raises InputError: NaN, time that repeats or runs back, two rates, too few rows
+    to tell the clock (with `period_s` three are enough).
     """
     check_finite(columns, place)
     time_s = columns["time_s"]
@@ -78,7 +79,8 @@ def regular_rows(
     few_digits = bool(time_s.size >= LEAST_ROWS and np.mean(steps == 0.0) > REPEATS and steps.max() > 0.0)
     _refuse_order(time_s, steps, few_digits, place)
     typical = float(np.median(steps[steps > 0.0]))
-    if period_s is not None and _at_ticks(steps, period_s):
+    at_ticks = period_s is not None and _at_ticks(steps, period_s)
+    if period_s is not None and at_ticks:
         typical = period_s
     elif not few_digits:
         _refuse_two_rates(steps, place)
@@ -88,7 +90,7 @@ def regular_rows(
     within = np.concatenate([steps[piece.start : piece.stop - 1] for piece in kept] or [np.empty(0)])
     # rounded to 1 ps: the mean of printed stamps is a period with rounding errors
     even = bool(within.size and np.all(np.abs(within - typical) <= CLOCK_TOLERANCE * round(typical, 12)))
-    if not kept or (not even and time_s.size < LEAST_ROWS):
+    if not kept or (not even and not at_ticks and time_s.size < LEAST_ROWS):
         row = int(np.flatnonzero(np.abs(steps - typical) > CLOCK_TOLERANCE * typical)[0]) + 1
         raise InputError(
             f"{place(row)}: time_s: a step of {steps[row - 1]:.6g} s, allowed the period "

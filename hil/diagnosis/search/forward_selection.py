@@ -14,6 +14,7 @@ import numpy as np
 from hil.diagnosis.search.events import beside_loads, revised
 from hil.diagnosis.search.initial_values import axis_facts, claimable
 from hil.diagnosis.search.next_term import CLEAR, MATERIAL, MOST, NEEDED, Progress, gain, next_term
+from hil.diagnosis.search.restart import again
 from hil.diagnosis.search.score_test import Candidate, screen_library
 from hil.identification.coordinates import LAST_EDGE_STEP_S
 from hil.identification.dataset import Dataset
@@ -135,7 +136,7 @@ def explain(data: Dataset, progress: Progress = lambda text: None, deadline_s: f
         if len(base.terms) >= _IN_VAIN and base.excess > MOST * nominal.excess:
             break
     step("fitting the explanation to convergence")
-    final = revised(base).refit(_ENDED)
+    final = ended(again(revised(base).refit(_ENDED), _ENDED))
     kept = {term.key for term in final.terms}
     present = {*fitted, *(term.effect for term in final.terms)}
     not_tried = tuple(effect for effect in BY_ID if effect not in present) if stopped_at else ()

@@ -10,6 +10,9 @@ With a single spring it is equal to a softer spring.
 
 Some mechanisms are seldom alone: a table with play stays where it is by its own friction, and without it coasts through
 the gap. Each of the two alone fits worse than a wrong one, so they are fitted together (`Mechanism.beside`).
+
+A fit that leaves more than noise while a nominal parameter is at its bound may be a local minimum: there the mechanisms
+found are fitted once more, from the parameters of the bench file and typical values, in each form of their laws.
 """
 
 from dataclasses import replace
@@ -57,6 +60,22 @@ def together(base: Fit, found: Fit, other: Term) -> list[Fit]:
         one for one in screen_library(beside) if BY_ID[one.term.effect].beside == other.effect and one.share > 0.0
     ]
     return race(beside, likely) if likely else []
+
+
+def again(found: Fit, evaluations: int) -> Fit:
+    """The fit, or a better one of the same mechanisms from the bench file, if a nominal parameter is at its bound."""
+    stuck = set(found.at_bound).intersection(found.hypothesis.nominal)
+    if not found.terms or not stuck or found.at_floor or found.estimator.expired:
+        return found
+    owner, axis = found.hypothesis.rebased.owner, axis_facts(found.data.bench, found.data.runs)
+    starts = [
+        owner.replaced(index, replace(term, variant=variant, values=BY_ID[term.effect].typical_values(axis)))
+        for index, term in enumerate(found.terms)
+        if not term.windows
+        for variant in range(len(BY_ID[term.effect].variants))
+    ]
+    fits = in_parallel([partial(found.estimator.fit, start, evaluations=evaluations) for start in starts])
+    return min((found, *fits), key=lambda fit: fit.cost)
 
 
 def may_hide(base: Fit) -> bool:

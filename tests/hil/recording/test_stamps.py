@@ -93,6 +93,16 @@ def test_a_loop_that_was_late_for_long_has_one_rate(late: slice, tmp_path: Path)
     assert note in recording.metadata["clock_notes"][0]
 
 
+def test_a_short_recording_of_a_late_loop_is_read_by_its_known_period(tmp_path: Path) -> None:
+    kept = np.r_[0:5, 7, 10:14, 20:40]
+    assert kept.size < LEAST_ROWS
+    columns = {"time_s": TICKS_S[kept], "motor_position_rad": position(TICKS_S[kept]), "torque_n_m": np.ones(kept.size)}
+    write_parquet(Recording("run", columns, PERIOD_S, {}), tmp_path / "run.parquet")
+    np.testing.assert_allclose(read_recording(tmp_path / "run.parquet")["time_s"], TICKS_S[:40], atol=1e-12)
+    with pytest.raises(InputError, match="rows are missing"):  # without the period the clock cannot be told
+        made(TICKS_S[kept], position(TICKS_S[kept]))
+
+
 @pytest.mark.parametrize("period_s", [0.0005, 0.0, -0.001, float("nan")])
 def test_a_stored_period_that_is_none_of_the_rows_is_damaged(period_s: float, tmp_path: Path) -> None:
     columns = {"time_s": TICKS_S, "motor_position_rad": position(TICKS_S), "torque_n_m": np.ones(ROWS)}

@@ -99,6 +99,25 @@ def test_the_cut_takes_place_a_few_cycles_after_the_quick_stop(at: FaultyBench) 
     assert 5 <= stopped[0] <= 15
 
 
+@pytest.mark.parametrize("mode", ["cst", "csv"])
+def test_while_power_is_switched_off_zero_is_commanded(at: FaultyBench, mode: str) -> None:
+    commanded: list[float] = []
+
+    def watch(rig: Rig, session: Session) -> dict[int, Callable[[], Any]]:
+        command = rig.drive.command
+
+        def seen(now_s: float, value: float) -> None:
+            if session._switching_off:
+                commanded.append(value)
+            command(now_s, value)
+
+        return {MOVING: lambda: setattr(rig.drive, "command", seen)}
+
+    assert at.run(bench_with(drive={"mode": mode}), watch).outcome.ending is Ending.COMPLETE
+    assert commanded
+    assert set(commanded) == {0.0}
+
+
 def test_cut_off_master_sends_nothing_that_feeds_a_watchdog(at: FaultyBench) -> None:
     sent: list[int] = []
 

@@ -24,6 +24,7 @@ from hil.twin.parameter import Role
 # its noise leaves, and what real axes leave.
 _SIGMAS, _SHARE = 3.0, 0.05
 _REGULAR_S = 0.005  # largest deviation of an edge from a period: a controlled event repeats more exactly
+_LEAST_ERROR_S = 1e-4  # of an edge in the fit of a period: ten times finer than the rows of a recording at 1 kHz
 _FEWEST = 3  # windows of a train: two always have a period
 _CUT_S = 0.15  # at the cut of a recording: rows at rest or not evaluated
 
@@ -57,6 +58,8 @@ def describe_event(final: Fit, index: int, held_out: Dataset) -> EventReport:
     if common is not None:
         value, error = common
         seen = [replace(one, values=(*one.values[:2], value), errors=(*one.errors[:2], error)) for one in seen]
+    regular = _train(seen) if common is not None else None
+    train, seen = regular if regular is not None else (None, seen)
     names = [mechanism.names[place] for place in (*_edges(term), mechanism.strength)]
     units = [mechanism.parameters[place].dimension.unit(*kind) for place in (*_edges(term), mechanism.strength)]
 
@@ -71,7 +74,6 @@ def describe_event(final: Fit, index: int, held_out: Dataset) -> EventReport:
     strongest = max(seen, key=lambda one: abs(one.values[2]))
     found = dict(zip(names, (value_of(first, 0), value_of(last, 1), value_of(strongest, 2)), strict=True))
     parameters = {name: found[name] for name in mechanism.names}
-    train = _train(seen) if common is not None else None
     text = mechanism.sentence
     if train is not None:
         text = mechanism.periodic
@@ -142,15 +144,28 @@ def _different(seen: Sequence[_Seen]) -> int:
     return 1 + int(np.count_nonzero(np.diff(starts) > _REGULAR_S))
 
 
-def _train(seen: Sequence[_Seen]) -> PulseTrain | None:
-    """The period of windows of equal width; None without one."""
-    if _different(seen) < _FEWEST or _different(seen) != len(seen):
+def _train(seen: Sequence[_Seen]) -> tuple[PulseTrain, list[_Seen]] | None:
+    """The period of windows of equal width, and the windows with its edges; None without one.
+
+    Starts and ends are weighted by their errors: an edge at rest, where friction holds a force, contradicts no period.
+    """
+    told = sum(max(one.errors[:2]) <= _REGULAR_S for one in seen)
+    if told < _FEWEST or _different(seen) != len(seen):
         return None
-    starts, ends = (np.array([one.values[place] for one in seen]) for place in (0, 1))
-    numbers = np.arange(starts.size)
-    period_s, first_s = np.polyfit(numbers, starts, 1)
-    width_s = float(np.median(ends - starts))
-    late = np.abs(starts - first_s - period_s * numbers), np.abs(ends - starts - width_s)
-    if max(float(np.max(one)) for one in late) > _REGULAR_S:
+    edges = np.array([one.values[place] for place in (0, 1) for one in seen])
+    errors = np.maximum([one.errors[place] for place in (0, 1) for one in seen], _LEAST_ERROR_S)
+    first, numbers = np.ones(len(seen)), np.arange(len(seen), dtype=np.float64)
+    # by the first start, the period and the width
+    columns = np.vstack([np.stack([first, numbers, width], axis=1) for width in (0.0 * first, first)])
+    covariance = np.linalg.inv(columns.T @ (columns / errors[:, None] ** 2))
+    solved = covariance @ columns.T @ (edges / errors**2)
+    fitted, spread = columns @ solved, np.sqrt(np.sum(columns @ covariance * columns, axis=1))
+    if np.any(np.abs(edges - fitted) > np.maximum(_REGULAR_S, _SIGMAS * errors)):
         return None
-    return PulseTrain(start_s=float(first_s), width_s=width_s, period_s=float(period_s), count=len(seen))
+    start_s, period_s, width_s = solved.tolist()
+    (starts, ends), (of_start, of_end) = fitted.reshape(2, -1).tolist(), spread.reshape(2, -1).tolist()
+    windows = [
+        replace(one, values=(start, end, one.values[2]), errors=(before, after, one.errors[2]))
+        for one, start, end, before, after in zip(seen, starts, ends, of_start, of_end, strict=True)
+    ]
+    return PulseTrain(start_s=start_s, width_s=width_s, period_s=period_s, count=len(seen)), windows

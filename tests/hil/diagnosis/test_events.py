@@ -11,7 +11,8 @@ from emps_windows import PERIOD_S, Push, emps_recording, irregular, pushed, regu
 
 from hil.bench.bench_file import load_bench
 from hil.diagnosis.diagnose import Diagnosis, diagnose
-from hil.diagnosis.search.events import constant_inside, detect, event_term, with_events_of
+from hil.diagnosis.search.event_detection import detect
+from hil.diagnosis.search.events import constant_inside, event_term, with_events_of
 from hil.diagnosis.split import split
 from hil.diagnosis.verdict.findings import diagnosed_bench
 from hil.identification.dataset import prepare_dataset

@@ -6,6 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from hil.arrays import FloatArray
+from hil.identification.measured import SETTLE_IN_MOTION_S
+from hil.identification.noise import moving
 from hil.recording.recording import Recording
 
 # Share of the motion before the cut, and whether the part after it is held out; the first that fits is taken. Two
@@ -22,8 +24,10 @@ _SPEED_S = 0.02  # time over which a speed is averaged: many counts of an encode
 def split(recordings: Sequence[Recording]) -> tuple[list[Recording], list[Recording]]:
     """Split each recording into a part of its motion for training and one that is held out, as `CUTS` order them.
 
-    Both keep their time. The training part is as fast as the other, and both move both ways, where a cut makes it so;
-    else the training part does: of motion in one direction friction and a load are one offset.
+    Both keep their time. After a cut in motion the last part begins with the rows that settle its start, which are not
+    evaluated (`Measured.judged`): every row is evaluated in one part. The training part is as fast as the other, and
+    both move both ways, where a cut makes it so; else the training part does: of motion in one direction friction and a
+    load are one offset.
     """
     train, rest = [], []
     for recording in recordings:
@@ -41,8 +45,17 @@ def split(recordings: Sequence[Recording]) -> tuple[list[Recording], list[Record
 def _cut(recording: Recording, row: int, last: bool) -> tuple[Recording, Recording]:
     """Return the part for training and the one held out, cut at rest near a row; `last`: the last one is held out."""
     cut = _standstill(recording, row)
-    parts = _part(recording, slice(0, cut), _FIRST), _part(recording, slice(cut, None), _LAST)
+    after = slice(cut - _lead(recording, cut), None)
+    parts = _part(recording, slice(0, cut), _FIRST), _part(recording, after, _LAST)
     return parts if last else (parts[1], parts[0])
+
+
+def _lead(recording: Recording, cut: int) -> int:
+    """Rows before a cut in motion that are simulated before the part after it, where no part would evaluate else."""
+    rows, velocity = round(SETTLE_IN_MOTION_S / recording.period_s), recording.axis.velocity_command
+    if velocity not in recording.columns or not 0 < rows <= min(cut, (len(recording) - cut) // 3):
+        return 0
+    return rows if bool(np.all(moving(recording[velocity])[cut - rows : cut + 1])) else 0
 
 
 def held_out_note(held_out: Sequence[Recording]) -> str:

@@ -1,60 +1,28 @@
-"""Events of a recording: windows in which a constant force acts, from the disturbance torque that a fit leaves.
-
-Disturbance torque = what errors of inertia and friction explain + a constant level in each window. Both are estimated
-in turn. The motion is the measured one: the torque of a loop has the shape of the windows itself.
-"""
+"""Events of a recording as a term of a hypothesis: windows in which a constant force acts, fitted and revised."""
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from itertools import pairwise
 
 import numpy as np
 
 from hil.arrays import FloatArray
-from hil.diagnosis.search.change_points import Segment, joined, segments, standing_out
-from hil.diagnosis.search.disturbance import Disturbance, disturbance
-from hil.identification.dataset import Dataset, inertia
+from hil.diagnosis.search.event_detection import BLOCK_S, EDGE, Event, detect, left_over
+from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.inference import against
-from hil.identification.measured import Measured
 from hil.identification.terms import Term, Window, is_load
 from hil.identification.window_fit import fit_windows, window_errors
 from hil.twin.library import BY_ID, LIBRARY
 from hil.twin.parameter import Role
 
 EVENT = next((mechanism for mechanism in LIBRARY if mechanism.transient), None)
-_BLOCK_S = 0.005  # an edge to be refined by simulation
-_MOST_BLOCKS = 6000  # the time of a partition grows with their square: half a second
-_REVERSAL_S = 0.05  # not used about a reversal, where friction is known least
-_STANDS_OUT = 5.0  # level over the rms of what the windows leave: 1 in 10^6 of Gaussian blocks
-_PENALTY = 20.0  # beside 3 log n of the three values of a window: that of a term in the search (NEEDED)
-_SHORTEST, _EDGE = 3, 6  # blocks of the shortest window; blocks in which the observer follows an edge
-_ALIKE = 0.25  # levels of adjacent windows that differ less are one
 _EVIDENCE = 20.0  # BIC difference for the events of a held-out recording: that of a term in the search (NEEDED)
 _MATERIAL = 0.02  # least energy per row that they remove, in units of noise^2: that of a term in the search (MATERIAL)
 _SIGMAS = 3.0  # standard errors of the force of a window: 0.3 % of Gaussian ones are above without a force
 _OF_CONSTANT = 4.0  # energy per row left inside windows over that outside: twice the rms, for edges between two rows
 _OF_BLOW = 0.25  # of the energy inside a window: the best constant leaves 0.19 of half a sine, 0.25 of a triangle
-_ROUNDS = 3  # windows found in one round do not count as motion in the next; then they stay
-_REWEIGHTED = 40  # iterations of the regression
-_LEAST_USUAL = 0.3  # of the blocks without an event: else which level is none cannot be told
-_SMOOTH_BLOCKS = 8  # the noise of a block is that of means over 40 ms: longer than the observer remembers
-
-
-class Event(NamedTuple):
-    """A window [s] of a run, by its name, and the level in it, in motor units."""
-
-    run: str
-    start_s: float
-    end_s: float
-    level: float
-
-
-def without_events(found: Fit) -> Fit:
-    """Evaluate a fit without its events."""
-    events = [index for index, term in enumerate(found.hypothesis.terms) if term.windows]
-    return found.estimator.evaluate(found.hypothesis.without(*events)) if events else found
 
 
 def event_term(found: Sequence[Event], ratio: float) -> Term:
@@ -68,18 +36,6 @@ def event_term(found: Sequence[Event], ratio: float) -> Term:
         Window(one.run, one.start_s - first.start_s, one.end_s - first.end_s, one.level / first.level) for one in found
     )
     return Term(EVENT.id, 0, tuple(values), windows=windows)
-
-
-def detect(found: Fit) -> list[Event]:
-    """Find the events of all runs of a fit, beside its permanent terms."""
-    bare = without_events(found)
-    pairs = zip(bare.data.runs, bare.residuals.channels, strict=True)
-    return [
-        event
-        for run, channels in pairs
-        if "motor" not in run.unseen
-        for event in _of_run(run, disturbance(run, channels["motor"], inertia(bare.bench), bare.data.observer_s))
-    ]
 
 
 def beside_loads(nominal: Fit, found: Fit) -> Fit:
@@ -108,7 +64,7 @@ def revised(found: Fit) -> Fit:
         other = found.hypothesis.replaced(index, event_term(events, found.bench.axis.ratio_m_rad))
         again = fit_windows(found.estimator.evaluate(other))
         best = again if against(again, best) > 0.0 else best
-    return _trimmed(best if best.cost <= found.cost or against(best, found) > 0.0 else found)
+    return _trimmed(_completed(best if best.cost <= found.cost or against(best, found) > 0.0 else found))
 
 
 def with_events_of(held_out: Dataset, final: Fit) -> Fit:
@@ -132,7 +88,8 @@ def with_events_of(held_out: Dataset, final: Fit) -> Fit:
     best, evidence = final, _EVIDENCE
     for choice in choices:
         longer = at.with_term(choice) if index is None else _joined(at, index, choice)
-        fitted = _trimmed(fit_windows(there.evaluate(longer), others=False), others=False)
+        fitted = _completed(fit_windows(there.evaluate(longer), others=False), others=False)
+        fitted = _trimmed(fitted, others=False)
         if _index(fitted) is None or fitted.hypothesis.x.size != longer.x.size:
             continue
         gain = against(fitted, before)
@@ -158,9 +115,48 @@ def _joined(at: Hypothesis, index: int, more: Term) -> Hypothesis:
         )
         for one in more.windows
     )
-    terms = list(at.terms)
-    terms[index] = replace(terms[index], windows=(*term.windows, *added))
-    return Hypothesis(at.bench, tuple(terms), at.x)
+    return _with_windows(at, index, (*term.windows, *added))
+
+
+def _completed(found: Fit, others: bool = True) -> Fit:
+    """Add the windows that those of a fit leave, and make one of neighbours, where the evidence supports it."""
+    index = _index(found)
+    if index is None:
+        return found
+    more = left_over(found)
+    if more:
+        longer = _joined(found.hypothesis, index, event_term(more, found.bench.axis.ratio_m_rad))
+        again = fit_windows(found.estimator.evaluate(longer), others=others)
+        found = again if against(again, found) > _EVIDENCE * len(more) else found
+    names, refuted = {run.name for run in found.data.runs}, set[tuple[Window, Window]]()
+    while True:
+        term = found.terms[index]
+        ordered = sorted((one for one in term.windows if one.run in names), key=lambda one: (one.run, one.later_s))
+        pairs = [pair for pair in pairwise(ordered) if pair not in refuted and _touch(term, *pair)]
+        if not pairs:
+            return found
+        one, two = pairs[0]
+        whole = max(one, two, key=lambda part: part.end_later_s - part.later_s)
+        whole = whole._replace(later_s=one.later_s, end_later_s=two.end_later_s)
+        rest = (other for other in term.windows if other not in (one, two))
+        single = _with_windows(found.hypothesis, index, (*rest, whole))
+        fitted = fit_windows(found.estimator.evaluate(single), others=others)
+        if against(fitted, found) > 0.0:
+            found = fitted
+        else:
+            refuted.add((one, two))
+
+
+def _touch(term: Term, one: Window, two: Window) -> bool:
+    """True if a window of the same sign begins where another one ends, as far as the observer tells."""
+    gap_s = term.edges(two)[0] - term.edges(one)[1]
+    return one.run == two.run and abs(gap_s) < EDGE * BLOCK_S and one.factor * two.factor > 0.0
+
+
+def _with_windows(at: Hypothesis, index: int, windows: tuple[Window, ...]) -> Hypothesis:
+    """The hypothesis with other windows of one of its events."""
+    terms = (*at.terms[:index], replace(at.terms[index], windows=windows), *at.terms[index + 1 :])
+    return Hypothesis(at.bench, terms, at.x)
 
 
 def _trimmed(found: Fit, others: bool = True) -> Fit:
@@ -182,9 +178,7 @@ def _trimmed(found: Fit, others: bool = True) -> Fit:
         return found
     if not kept:
         return found.estimator.fit(found.hypothesis.without(index))
-    terms = (*found.hypothesis.terms[:index], replace(term, windows=kept), *found.hypothesis.terms[index + 1 :])
-    changed = Hypothesis(found.hypothesis.bench, terms, found.hypothesis.x)
-    return fit_windows(found.estimator.evaluate(changed), others=others)
+    return fit_windows(found.estimator.evaluate(_with_windows(found.hypothesis, index, kept)), others=others)
 
 
 def constant_inside(found: Fit, base: Fit) -> bool:
@@ -216,59 +210,3 @@ def constant_inside(found: Fit, base: Fit) -> bool:
 
 def _index(found: Fit) -> int | None:
     return next((index for index, term in enumerate(found.hypothesis.terms) if term.windows), None)
-
-
-def _of_run(run: Measured, seen: Disturbance) -> list[Event]:
-    block = max(round(_BLOCK_S / run.period_s), -(-run.motor.size // _MOST_BLOCKS), 1)
-    rows = run.motor.size // block * block
-    usable = seen.sliding.copy()
-    usable[: run.judged.start] = False
-    turns = np.diff(np.signbit(seen.velocity), append=np.signbit(seen.velocity[-1])).astype(float)
-    usable &= np.convolve(turns, np.ones(2 * round(_REVERSAL_S / run.period_s) + 1), "same") < 0.5
-
-    def means(values: FloatArray) -> FloatArray:
-        whole = (values * usable)[:rows].reshape(-1, block)
-        return np.asarray(whole.sum(axis=1) / np.maximum(known, 1), dtype=np.float64)
-
-    known = usable[:rows].reshape(-1, block).sum(axis=1)
-    weights = np.asarray(known >= block / 2, dtype=np.float64)
-    values = means(seen.torque)
-    speed = means(seen.velocity) / max(float(np.abs(seen.velocity).max()), 1e-300)
-    acceleration = means(np.gradient(seen.velocity, run.period_s))
-    columns = np.stack([np.ones(speed.size), np.sign(speed), speed, np.abs(speed), acceleration], axis=1)
-    columns /= np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
-    usual = weights
-    for _ in range(_ROUNDS):
-        rest = values - _explained(columns, values, usual)
-        found = standing_out(rest, weights, _windows(rest, weights), _STANDS_OUT, _EDGE)
-        usual = weights.copy()
-        for one in found:
-            usual[one.first : one.last] = 0.0
-        if usual.sum() < _LEAST_USUAL * weights.sum():
-            return []
-    at_s, length_s = run.time_s[0], block * run.period_s
-    return [Event(run.name, at_s + one.first * length_s, at_s + one.last * length_s, one.level) for one in found]
-
-
-def _explained(columns: FloatArray, values: FloatArray, weights: FloatArray) -> FloatArray:
-    """Part of values (n,) that columns (n, k) explain; least absolute deviations, which windows do not shift."""
-    weight = weights
-    for _ in range(_REWEIGHTED):
-        solved, *_ = np.linalg.lstsq(columns * weight[:, None], values * weight, rcond=1e-9)
-        left = np.abs(values - columns @ solved)
-        least = 1e-3 * float(np.median(left[weights > 0.0])) + 1e-300
-        weight = weights / np.sqrt(np.maximum(left, least))
-    return np.asarray(columns @ solved, dtype=np.float64)
-
-
-def _windows(rest: FloatArray, weights: FloatArray) -> list[Segment]:
-    """Windows of constant level in a signal (n,)."""
-    size = rest.size // _SMOOTH_BLOCKS * _SMOOTH_BLOCKS
-    if not size or weights.sum() < 2 * _SMOOTH_BLOCKS:
-        return []
-    smoothed = (rest * weights)[:size].reshape(-1, _SMOOTH_BLOCKS).mean(axis=1)
-    noise = 1.4826 * float(np.median(np.abs(np.diff(smoothed)))) * np.sqrt(_SMOOTH_BLOCKS / 2.0)
-    if noise <= 0.0:
-        return []
-    cut = joined(segments(rest, weights, noise**2, 3.0 * np.log(rest.size) + _PENALTY), weights, _EDGE, _ALIKE)
-    return [one for one in cut if weights[one.first : one.last].sum() >= _SHORTEST]

@@ -15,7 +15,8 @@ import numpy as np
 from scipy.linalg import qr
 
 from hil.arrays import FloatArray
-from hil.diagnosis.search.events import detect, event_term
+from hil.diagnosis.search.event_detection import detect
+from hil.diagnosis.search.events import event_term
 from hil.diagnosis.search.initial_values import StartPoint, claimable, scene, starts
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis

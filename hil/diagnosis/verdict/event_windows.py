@@ -24,6 +24,7 @@ from hil.twin.parameter import Role
 # its noise leaves, and what real axes leave.
 _SIGMAS, _SHARE = 3.0, 0.05
 _REGULAR_S = 0.005  # largest deviation of an edge from a period: a controlled event repeats more exactly
+_LEAST_ERROR_S = 1e-4  # of an edge in the fit of a period: ten times finer than the rows of a recording at 1 kHz
 _FEWEST = 3  # windows of a train: two always have a period
 _CUT_S = 0.15  # at the cut of a recording: rows at rest or not evaluated
 
@@ -57,6 +58,13 @@ def describe_event(final: Fit, index: int, held_out: Dataset) -> EventReport:
     if common is not None:
         value, error = common
         seen = [replace(one, values=(*one.values[:2], value), errors=(*one.errors[:2], error)) for one in seen]
+    regular = None
+    if common is not None and _different(seen) == len(seen):
+        regular = train_of(np.array([one.values[:2] for one in seen]), np.array([one.errors[:2] for one in seen]))
+    if regular is not None:
+        pairs = zip(seen, regular[1].tolist(), regular[2].tolist(), strict=True)
+        seen = [_Seen(one.run, (*at_s, one.values[2]), (*error_s, one.errors[2])) for one, at_s, error_s in pairs]
+    train = regular[0] if regular is not None else None
     names = [mechanism.names[place] for place in (*_edges(term), mechanism.strength)]
     units = [mechanism.parameters[place].dimension.unit(*kind) for place in (*_edges(term), mechanism.strength)]
 
@@ -71,7 +79,6 @@ def describe_event(final: Fit, index: int, held_out: Dataset) -> EventReport:
     strongest = max(seen, key=lambda one: abs(one.values[2]))
     found = dict(zip(names, (value_of(first, 0), value_of(last, 1), value_of(strongest, 2)), strict=True))
     parameters = {name: found[name] for name in mechanism.names}
-    train = _train(seen) if common is not None else None
     text = mechanism.sentence
     if train is not None:
         text = mechanism.periodic
@@ -96,8 +103,8 @@ def _seen(fit: Fit, index: int) -> list[_Seen]:
     if not inside:
         return []
 
-    def edges(window: Window) -> tuple[float, float]:  # one before the first row is not told
-        first, *_, last = runs[window.run].time_s.tolist()
+    def edges(window: Window) -> tuple[float, float]:  # one before the first row that is evaluated is not told
+        first, *_, last = runs[window.run].time_s[runs[window.run].judged].tolist()
         start, end = term.edges(window)
         return min(max(start, first), last), min(max(end, first), last)
 
@@ -122,9 +129,10 @@ def _whole(seen: Sequence[_Seen]) -> list[_Seen]:
 
 
 def _continues(before: _Seen, after: _Seen) -> bool:
-    cut_s = after.run.start.time_s
-    following = before.run is not after.run and abs(before.run.time_s[-1] - cut_s) < 2.0 * after.run.period_s
-    near = abs(before.values[1] - cut_s) < _CUT_S and abs(after.values[0] - cut_s) < _CUT_S
+    last_s, first_s = before.run.time_s[-1], after.run.time_s[after.run.judged.start]
+    cut_s, period_s = after.run.start.time_s, after.run.period_s
+    following = before.run is not after.run and cut_s - 2.0 * period_s < last_s < max(cut_s, first_s) + 2.0 * period_s
+    near = abs(before.values[1] - last_s) < _CUT_S and abs(after.values[0] - first_s) < _CUT_S
     return following and near and before.values[2] * after.values[2] > 0.0
 
 
@@ -142,15 +150,24 @@ def _different(seen: Sequence[_Seen]) -> int:
     return 1 + int(np.count_nonzero(np.diff(starts) > _REGULAR_S))
 
 
-def _train(seen: Sequence[_Seen]) -> PulseTrain | None:
-    """The period of windows of equal width; None without one."""
-    if _different(seen) < _FEWEST or _different(seen) != len(seen):
+def train_of(edges: FloatArray, errors: FloatArray) -> tuple[PulseTrain, FloatArray, FloatArray] | None:
+    """The period of windows with starts and ends (w, 2) in order of time, known to `errors` (w, 2); None without one.
+
+    Returns it with its own edges and their errors. An edge at rest, where friction holds a force, contradicts no
+    period; `_FEWEST` windows are told without those.
+    """
+    count = len(edges)
+    if np.count_nonzero(np.all(errors <= _REGULAR_S, axis=1)) < _FEWEST:
         return None
-    starts, ends = (np.array([one.values[place] for one in seen]) for place in (0, 1))
-    numbers = np.arange(starts.size)
-    period_s, first_s = np.polyfit(numbers, starts, 1)
-    width_s = float(np.median(ends - starts))
-    late = np.abs(starts - first_s - period_s * numbers), np.abs(ends - starts - width_s)
-    if max(float(np.max(one)) for one in late) > _REGULAR_S:
+    seen, error = edges.T.ravel(), np.maximum(errors.T.ravel(), _LEAST_ERROR_S)
+    first, numbers = np.ones(count), np.arange(count, dtype=np.float64)
+    # by the first start, the period and the width
+    columns = np.vstack([np.stack([first, numbers, width], axis=1) for width in (0.0 * first, first)])
+    covariance = np.linalg.inv(columns.T @ (columns / error[:, None] ** 2))
+    solved = covariance @ columns.T @ (seen / error**2)
+    fitted, spread = columns @ solved, np.sqrt(np.sum(columns @ covariance * columns, axis=1))
+    if np.any(np.abs(seen - fitted) > np.maximum(_REGULAR_S, _SIGMAS * error)):
         return None
-    return PulseTrain(start_s=float(first_s), width_s=width_s, period_s=float(period_s), count=len(seen))
+    start_s, period_s, width_s = solved.tolist()
+    train = PulseTrain(start_s=start_s, width_s=width_s, period_s=period_s, count=count)
+    return train, fitted.reshape(2, -1).T, spread.reshape(2, -1).T

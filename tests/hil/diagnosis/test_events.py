@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,8 +12,10 @@ from emps_windows import PERIOD_S, Push, emps_recording, irregular, pushed, regu
 
 from hil.bench.bench_file import load_bench
 from hil.diagnosis.diagnose import Diagnosis, diagnose
-from hil.diagnosis.search.events import constant_inside, detect, event_term, with_events_of
+from hil.diagnosis.search.event_detection import detect
+from hil.diagnosis.search.events import constant_inside, event_term, revised, with_events_of
 from hil.diagnosis.split import split
+from hil.diagnosis.verdict.event_windows import train_of
 from hil.diagnosis.verdict.findings import diagnosed_bench
 from hil.identification.dataset import prepare_dataset
 from hil.identification.estimator import Fit
@@ -40,7 +43,7 @@ def edge_s(at_s: float) -> float:
     return NEAR_REVERSAL_S if np.min(np.abs(reversals_s - at_s)) < 0.05 else EDGE_S
 
 
-def assert_found(found: list[tuple[float, ...]], pushes: list[Push]) -> None:
+def assert_found(found: Sequence[tuple[float, ...]], pushes: list[Push]) -> None:
     assert len(found) == len(pushes)
     for (start_s, end_s, _), push in zip(found, pushes, strict=True):
         assert start_s == pytest.approx(push.start_s, abs=edge_s(push.start_s))
@@ -152,6 +155,17 @@ def test_an_edge_of_a_force_that_nothing_shows_may_lie_anywhere() -> None:
     assert errors[1, :2].min() >= 0.4
 
 
+def test_two_windows_that_touch_with_one_force_are_one() -> None:
+    found = fit_windows(recorded_twice(), 20)
+    (term,) = found.hypothesis.terms
+    first, second = term.windows
+    cut = (first._replace(end_later_s=-0.1), first._replace(later_s=0.1), second)
+    split_up = found.estimator.evaluate(found.hypothesis.replaced(0, replace(term, windows=cut)))
+    one, two = windows(revised(split_up))
+    assert one == pytest.approx((0.5, 0.7, 150.0), rel=1e-3)
+    assert two == pytest.approx((0.95, 1.25, -75.0), rel=1e-3)
+
+
 def test_windows_alone_leave_the_other_parameters() -> None:
     begun = recorded_twice()
     found = fit_windows(begun, 20, others=False)
@@ -167,7 +181,7 @@ def prepared(pushes: list[Push], name: str = "emps_symmetric") -> tuple[Fit, lis
     owner = load_bench(name)
     first, last = ([take(part, owner) for part in parts] for parts in split([pushed(pushes)]))
     data = prepare_dataset(first, owner)
-    cut_s = last[0].start.time_s
+    cut_s = last[0].time_s[last[0].judged.start]
     assert not any(push.start_s < cut_s < push.end_s for push in pushes)
     nominal = fit_nominal_parameters(data)
     there = replace(nominal.estimator, data=data.over(last)).evaluate(nominal.hypothesis)
@@ -207,6 +221,44 @@ def test_windows_of_the_held_out_part_are_found_there() -> None:
     found = with_events_of(there.data, nominal)
     assert_found(windows(found), held_out)
     assert found.cost == pytest.approx(nominal.cost)
+
+
+def test_many_windows_of_any_height_do_not_count_as_noise() -> None:
+    nominal, _, held_out, there = prepared(irregular(30, 5, 17.2, 24.3))
+    found = windows(with_events_of(there.data, nominal))
+    assert len(found) == len(held_out)
+    for (start_s, end_s, force_n), push in zip(found, held_out, strict=True):
+        assert (start_s, end_s) == pytest.approx((push.start_s, push.end_s), abs=0.02)
+        assert force_n == pytest.approx(push.force_n, rel=0.1)
+
+
+def test_a_window_about_a_reversal_is_found_beside_others() -> None:
+    reversal_s = 18.27
+    nominal, _, held_out, there = prepared(
+        [Push(17.4, 17.6, 60.0), Push(reversal_s - 0.04, reversal_s + 0.03, -50.0), Push(20.5, 20.8, 60.0)]
+    )
+    assert [event.level > 0.0 for event in detect(there)] == [True, True]
+    assert_found(windows(with_events_of(there.data, nominal)), held_out)
+
+
+def test_a_row_after_a_cut_in_motion_is_evaluated() -> None:
+    owner = load_bench("emps_symmetric")
+    first, last = [take(part, owner) for (part,) in split([emps_recording()])]
+    assert last.time_s[last.judged.start] == pytest.approx(first.time_s[-1] + PERIOD_S)
+
+
+def test_an_edge_that_nothing_tells_contradicts_no_period() -> None:
+    starts_s = 1.0 + 0.5 * np.arange(5)
+    edges, errors = np.stack([starts_s, starts_s + 0.2], axis=1), np.full((5, 2), 1e-3)
+    edges[2, 1], errors[2, 1] = edges[2, 1] - 0.1, 0.2
+    found = train_of(edges, errors)
+    assert found is not None
+    train, own, told = found
+    assert (train.start_s, train.period_s, train.width_s) == pytest.approx((1.0, 0.5, 0.2), abs=1e-4)
+    assert own[2, 1] == pytest.approx(2.2, abs=1e-4)
+    assert told[2, 1] < 1e-3
+    errors[2, 1] = 1e-3
+    assert train_of(edges, errors) is None
 
 
 def test_without_an_event_the_held_out_part_gets_none() -> None:

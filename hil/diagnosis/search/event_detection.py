@@ -1,0 +1,149 @@
+"""Detect events of a recording: windows in which a constant force acts, from the disturbance torque that a fit leaves.
+
+Disturbance torque = what errors of inertia and friction explain + a constant level in each window. Both are estimated
+in turn, and so is the noise beside the windows. The motion is the measured one: the torque of a loop has the shape of
+the windows itself.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hil.arrays import FloatArray
+from hil.diagnosis.search.change_points import Segment, joined, segments, standing_out
+from hil.diagnosis.search.disturbance import Disturbance, disturbance
+from hil.identification.dataset import inertia
+from hil.identification.estimator import Fit
+from hil.identification.measured import Measured
+
+BLOCK_S = 0.005  # an edge to be refined by simulation
+SHORTEST, EDGE = 3, 6  # blocks of the shortest window; blocks in which the observer follows an edge
+_MOST_BLOCKS = 6000  # the time of a partition grows with their square: half a second
+_REVERSAL_S = 0.05  # about a reversal friction is known least
+_STANDS_OUT = 5.0  # level over the rms of what the windows leave: 1 in 10^6 of Gaussian blocks
+_PENALTY = 20.0  # beside 3 log n of the three values of a window: that of a term in the search (NEEDED)
+_ALIKE = 0.25  # levels of adjacent windows that differ less are one
+_ROUNDS = 3  # windows found in one round do not count as motion or noise in the next; then they stay
+_REWEIGHTED = 40  # iterations of the regression
+_LEAST_USUAL = 0.3  # of the blocks without an event: else which level is none cannot be told
+_SMOOTH_BLOCKS = 8  # the noise of a block is that of means over 40 ms: longer than the observer remembers
+
+
+class Event(NamedTuple):
+    """A window [s] of a run, by its name, and the level in it, in motor units."""
+
+    run: str
+    start_s: float
+    end_s: float
+    level: float
+
+
+def without_events(found: Fit) -> Fit:
+    """Evaluate a fit without its events."""
+    events = [index for index, term in enumerate(found.hypothesis.terms) if term.windows]
+    return found.estimator.evaluate(found.hypothesis.without(*events)) if events else found
+
+
+def detect(found: Fit) -> list[Event]:
+    """Find the events of all runs of a fit, beside its permanent terms; none about a reversal."""
+    return _of_fit(without_events(found), False)
+
+
+def left_over(found: Fit) -> list[Event]:
+    """Find the events that a fit with events leaves, also those about a reversal that stand out against the others."""
+    return _of_fit(found, True)
+
+
+def _of_fit(found: Fit, reversals: bool) -> list[Event]:
+    pairs = zip(found.data.runs, found.residuals.channels, strict=True)
+    axis, observer_s = inertia(found.bench), found.data.observer_s
+    return [
+        event
+        for run, channels in pairs
+        if "motor" not in run.unseen
+        for event in _of_run(run, disturbance(run, channels["motor"], axis, observer_s), reversals)
+    ]
+
+
+def _of_run(run: Measured, seen: Disturbance, reversals: bool) -> list[Event]:
+    block = max(round(BLOCK_S / run.period_s), -(-run.motor.size // _MOST_BLOCKS), 1)
+    rows = run.motor.size // block * block
+    turns = np.diff(np.signbit(seen.velocity), append=np.signbit(seen.velocity[-1])).astype(float)
+    turning = np.convolve(turns, np.ones(2 * round(_REVERSAL_S / run.period_s) + 1), "same") > 0.5
+    usable = seen.sliding if reversals else seen.sliding & ~turning
+    usable = usable & (np.arange(usable.size) >= run.judged.start)
+
+    def means(values: FloatArray) -> FloatArray:
+        whole = (values * usable)[:rows].reshape(-1, block)
+        return np.asarray(whole.sum(axis=1) / np.maximum(known, 1), dtype=np.float64)
+
+    known = usable[:rows].reshape(-1, block).sum(axis=1)
+    weights = np.asarray(known >= block / 2, dtype=np.float64)
+    values = means(seen.torque)
+    speed = means(seen.velocity) / max(float(np.abs(seen.velocity).max()), 1e-300)
+    acceleration = means(np.gradient(seen.velocity, run.period_s))
+    columns = np.stack([np.ones(speed.size), np.sign(speed), speed, np.abs(speed), acceleration], axis=1)
+    columns /= np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+    usual, rest = weights, values
+    for _ in range(_ROUNDS):
+        rest = values - _explained(columns, values, usual)
+        found = standing_out(rest, weights, _windows(rest, weights), _STANDS_OUT, EDGE)
+        usual = weights.copy()
+        for one in found:
+            usual[one.first : one.last] = 0.0
+        if usual.sum() < _LEAST_USUAL * weights.sum():
+            return []
+    near = np.any(turning[:rows].reshape(-1, block), axis=1, keepdims=True)[:, 0]
+    found = [one for one in found if _beyond_reversals(rest, weights, near, one)]
+    at_s, length_s = run.time_s[0], block * run.period_s
+    return [Event(run.name, at_s + one.first * length_s, at_s + one.last * length_s, one.level) for one in found]
+
+
+def _beyond_reversals(rest: FloatArray, weights: FloatArray, near: NDArray[np.bool_], one: Segment) -> bool:
+    """True for a window that stands out against what is left about the other reversals, if most of it is about one."""
+    known = weights[one.first : one.last]
+    if 2.0 * known[near[one.first : one.last]].sum() <= known.sum():
+        return True
+    others = near & (weights > 0.0)
+    others[max(one.first - EDGE, 0) : one.last + EDGE] = False
+    return abs(one.level) > _STANDS_OUT * float(np.sqrt(np.mean(rest[others] ** 2) if others.any() else np.inf))
+
+
+def _explained(columns: FloatArray, values: FloatArray, weights: FloatArray) -> FloatArray:
+    """Part of values (n,) that columns (n, k) explain; least absolute deviations, which windows do not shift."""
+    weight = weights
+    for _ in range(_REWEIGHTED):
+        solved, *_ = np.linalg.lstsq(columns * weight[:, None], values * weight, rcond=1e-9)
+        left = np.abs(values - columns @ solved)
+        least = 1e-3 * float(np.median(left[weights > 0.0])) + 1e-300
+        weight = weights / np.sqrt(np.maximum(left, least))
+    return np.asarray(columns @ solved, dtype=np.float64)
+
+
+def _windows(rest: FloatArray, weights: FloatArray) -> list[Segment]:
+    """Windows of constant level in a signal (n,), and its noise beside them, estimated in turn."""
+    found, beside = list[Segment](), weights
+    for _ in range(_ROUNDS):
+        noise = _noise(rest, beside)
+        if noise <= 0.0:
+            break
+        cut = joined(segments(rest, weights, noise**2, 3.0 * np.log(rest.size) + _PENALTY), weights, EDGE, _ALIKE)
+        before, found = found, [one for one in cut if weights[one.first : one.last].sum() >= SHORTEST]
+        beside = weights.copy()
+        for one in found:
+            beside[one.first : one.last + EDGE] = 0.0
+        if found == before or beside.sum() < _LEAST_USUAL * weights.sum():
+            break
+    return found
+
+
+def _noise(rest: FloatArray, weights: FloatArray) -> float:
+    """Standard deviation of a block of a signal (n,), from the differences of neighbouring means; 0 if not told."""
+    size = rest.size // _SMOOTH_BLOCKS * _SMOOTH_BLOCKS
+    known = weights[:size].reshape(-1, _SMOOTH_BLOCKS).sum(axis=1)
+    total = (rest * weights)[:size].reshape(-1, _SMOOTH_BLOCKS).sum(axis=1)
+    means = (total / np.maximum(known, 1.0))[known >= _SMOOTH_BLOCKS / 2]
+    if means.size < 2:
+        return 0.0
+    return 1.4826 * float(np.median(np.abs(np.diff(means)))) * float(np.sqrt(_SMOOTH_BLOCKS / 2.0))

@@ -127,7 +127,7 @@ def _noise_share(recording: Recording, cutoff_hz: float) -> float:
 def _fit(recording: Recording, cutoff_hz: float, load_ratio: float | None) -> BlockFit:
     """Fit without a torque over the position, or with it where it leaves clearly less.
 
-    It is gravity on a load that turns far, else a spring.
+    It is a spring, or gravity where the load turns far and that leaves less.
     """
     # the filter of the decimation, alike for torque and motion, ends where that of the position does, at 40 Hz or below
     rate_hz = 1.0 / recording.period_s
@@ -138,19 +138,20 @@ def _fit(recording: Recording, cutoff_hz: float, load_ratio: float | None) -> Bl
             f"{recording.name}: given {len(recording)} rows, allowed {CUT_AT_START + LEAST_ROWS * decimation} or more; "
             "give a longer recording"
         )
-    columns, torque = inverse_dynamics_columns(recording, cutoff_hz, decimation)
-    position = recording[recording.axis.motor_position][CUT_AT_START:]
-    position = position[(position.size - 1) % decimation :: decimation]
+    position = recording[recording.axis.motor_position]
+    angle = position * (load_ratio or 0.0)
+    over_position = [position, np.sin(angle), np.cos(angle)]
+    columns, torque = inverse_dynamics_columns(recording, cutoff_hz, decimation, more=over_position)
     slides = np.abs(columns[:, 2]) > SLIDES
     if np.count_nonzero(slides) >= LEAST_ROWS:
-        columns, torque, position = columns[slides], torque[slides], position[slides]
+        columns, torque = columns[slides], torque[slides]
     how = f"least squares of torque over motion, position filtered at {cutoff_hz:g} Hz"
-    plain = fit_blocks(list(columns.T), torque, [how] * 4)
-    angle = position * (load_ratio or 0.0)
-    if np.ptp(angle) < LEAST_ANGLE_RAD:
-        more = fit_blocks([*columns.T, position], torque, [f"{how}, with a spring"] * 5)
-    else:
-        more = fit_blocks([*columns.T, np.sin(angle), np.cos(angle)], torque, [f"{how}, with gravity"] * 6)
+    motion_only, spring, weight = columns[:, :4].T, columns[:, 4], columns[:, 5:].T
+    plain = fit_blocks(list(motion_only), torque, [how] * 4)
+    more = fit_blocks([*motion_only, spring], torque, [f"{how}, with a spring"] * 5)
+    if np.ptp(spring) * (load_ratio or 0.0) >= LEAST_ANGLE_RAD:
+        heavy = fit_blocks([*motion_only, *weight], torque, [f"{how}, with gravity"] * 6)
+        more = heavy if heavy.left < more.left else more
     return more if more.left < GRAVITY_GAIN * plain.left and more.estimates[0].value > 0.0 else plain
 
 

@@ -18,6 +18,7 @@ from hil.drafting.relations import (
     smoothed,
 )
 from hil.errors import InputError
+from hil.quantities import UNITS
 
 SAME_POSITION = 0.98  # share from which a column is another reading of a position: following errors are below 5 %
 FOLLOWED = 0.5  # share of a set-point that a controlled motion follows: less is another axis or no loop
@@ -25,7 +26,7 @@ IS_DERIVATIVE = 0.9  # share from which a column is the velocity of another: cou
 IS_DRIVEN = 0.4  # share of an unnamed effort that one mass with friction explains: gravity and springs may be more
 SAME_COLUMN = 1e-6  # of the travel: a copy in another unit deviates by printed digits, a second sensor by more
 SMOOTH = 0.3  # roughness of a motion; rows without order have 1.4
-_UNIT_RANK = ("N m", "mN m", "N", "kN", "A", "mA", "%", "permille", None, "V", "mV")
+_UNIT_RANK = ("N m", "N", "A", "mA", "%", "permille", None, "V", "mV")  # torques and forces by their SI unit
 
 
 @dataclass
@@ -280,7 +281,8 @@ def _efforts(live: dict[str, FloatArray], labels: dict[str, Label], names: list[
 
     def rank(name: str) -> tuple[bool, int]:
         unit = labels[name].unit or labels[name].electric
-        return labels[name].table, _UNIT_RANK.index(unit if unit in _UNIT_RANK else None)
+        si = UNITS[unit][0] if unit in UNITS else unit
+        return labels[name].table, _UNIT_RANK.index(si if si in _UNIT_RANK else None)
 
     voltage = [name for name in names if (labels[name].unit or labels[name].electric) in ("V", "mV")]
     commands = [name for name in names if labels[name].command or name in voltage]

@@ -24,7 +24,6 @@ Sensitivity of the published figures to each step, changed alone (computed on th
 Therefore sign(v) is taken at the full rate and low-passed with the other columns, and the start of the record is cut.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -87,11 +86,9 @@ def fit_inverse_dynamics(
 
 
 def inverse_dynamics_columns(
-    recording: Recording, cutoff_hz: float, decimation: int, cut_at_end: int = 0, more: Sequence[FloatArray] = ()
+    recording: Recording, cutoff_hz: float, decimation: int, cut_at_end: int = 0
 ) -> tuple[FloatArray, FloatArray]:
     """Regressors (n, 4) for inertia, viscous, Coulomb and offset, and torque or force (n,), filtered and decimated.
-
-    `more` are further regressors at the rate of the recording (rows,), appended as columns.
 
     Raises InputError if the record does not move both ways.
     """
@@ -105,9 +102,9 @@ def inverse_dynamics_columns(
             "both; Coulomb friction and offset are not separable in one direction: record a return move"
         )
 
-    # every column is filtered, the offset too: the filter's gain at low frequencies is 0.989, not 1
+    # the column of the offset is filtered too: the filter's gain at zero frequency is not exactly 1
     settled = slice(CUT_AT_START, len(recording) - cut_at_end)
-    columns = (acceleration, velocity, np.sign(velocity), np.ones_like(velocity), *more)
+    columns = (acceleration, velocity, np.sign(velocity), np.ones_like(velocity))
     regressors = np.column_stack([_decimate(column[settled], decimation) for column in columns])
     return regressors, _decimate(force[settled], decimation)
 

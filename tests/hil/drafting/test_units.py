@@ -2,6 +2,7 @@
 
 import pytest
 
+from hil.drafting.column_names import Quantity, label
 from hil.drafting.units import QUANTITY_OF_UNIT, split_unit, unit_named
 from hil.quantities import si_factor
 
@@ -31,3 +32,11 @@ def test_forces_and_torques_of_other_systems(spelling: str, unit: str, si: float
 )
 def test_a_unit_in_the_name_of_a_column(name: str, rest: str, unit: str) -> None:
     assert split_unit(name) == (rest, unit, False)
+
+
+def test_names_in_italian_and_spanish() -> None:
+    wanted, given = label("posizione comandata [mm]"), label("posición medida [mm]")
+    assert (wanted.quantity, wanted.command, wanted.unit) == (Quantity.POSITION, True, "mm")
+    assert (given.quantity, given.measured, given.command) == (Quantity.POSITION, True, False)
+    assert label("velocità [rpm]").quantity is Quantity.VELOCITY
+    assert label("forza [N]").quantity is Quantity.EFFORT

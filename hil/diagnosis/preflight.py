@@ -17,7 +17,7 @@ from hil.bench.bench_file import Bench
 from hil.channels import AXIS_CHANNELS
 from hil.errors import InputError
 from hil.identification.completion import DERIVED, completed, torque_is_measured
-from hil.identification.measured import Measured, take
+from hil.identification.measured import LEAD_IN, Measured, take
 from hil.quantities import digits, misread_factors
 from hil.recording.recording import Recording
 
@@ -66,7 +66,7 @@ def prepare(recordings: Sequence[Recording], bench: Bench) -> list[Measured]:
 
 
 def _raw_problems(recording: Recording, bench: Bench) -> Iterator[str]:
-    duration = len(recording) * recording.period_s
+    duration = (len(recording) - recording.metadata.get(LEAD_IN, 0)) * recording.period_s
     if duration < SHORTEST_S:
         yield (
             f"{recording.name}: too short: given {duration:.3g} s, allowed {SHORTEST_S:g} s or more; "
@@ -91,7 +91,7 @@ def _problems(run: Measured, bench: Bench, derived: set[str]) -> Iterator[str]:
     names, ratio = AXIS_CHANNELS[run.kind], bench.axis.ratio_m_rad
     command = run.position_command_m
     top = float(np.max(np.abs(run.velocity_command_m_s)))
-    moving = run.moving
+    moving = run.moving & (np.arange(run.motor.size) >= run.lead_in)
     moved = float(np.ptp(run.motor)) * ratio
     if np.ptp(command) == 0.0 or top == 0.0:
         yield (

@@ -123,11 +123,9 @@ def _standstill(recording: Recording, row: int) -> int:
 
 
 def _rests(recording: Recording) -> NDArray[np.bool_]:
-    """Rows (n,) at which the set-points rest, all without set-points; at a turning point they do not."""
+    """Rows (n,) at which the set-points rest, all without set-points."""
     speed = recording.columns.get(recording.axis.velocity_command)
-    still = np.ones(len(recording), dtype=bool) if speed is None else speed == 0.0
-    still[1:] &= still[:-1].copy()
-    return still
+    return np.ones(len(recording), dtype=bool) if speed is None else speed == 0.0
 
 
 def _part(recording: Recording, rows: slice, what: str) -> Recording:

@@ -167,7 +167,7 @@ def prepared(pushes: list[Push], name: str = "emps_symmetric") -> tuple[Fit, lis
     owner = load_bench(name)
     first, last = ([take(part, owner) for part in parts] for parts in split([pushed(pushes)]))
     data = prepare_dataset(first, owner)
-    cut_s = last[0].start.time_s
+    cut_s = last[0].start.time_s + last[0].lead_in * PERIOD_S
     assert not any(push.start_s < cut_s < push.end_s for push in pushes)
     nominal = fit_nominal_parameters(data)
     there = replace(nominal.estimator, data=data.over(last)).evaluate(nominal.hypothesis)

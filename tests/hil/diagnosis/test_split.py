@@ -16,9 +16,9 @@ BENCH = load_bench("emps_symmetric").model_copy(
 
 
 def swinging(rest: bool) -> Recording:
-    """A sine of 1 Hz, with a rest of half a second at two thirds or without."""
+    """A sine of 1 Hz without a row at rest, or with a rest of half a second at two thirds."""
     time_s = np.arange(ROWS) * PERIOD_S
-    position = 0.1 * np.sin(2.0 * np.pi * time_s)
+    position = 0.1 * np.sin(2.0 * np.pi * time_s + 0.01)
     if rest:
         position[4000:4500] = 0.0
     columns = {

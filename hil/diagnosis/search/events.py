@@ -219,10 +219,11 @@ def _index(found: Fit) -> int | None:
 
 
 def _of_run(run: Measured, seen: Disturbance) -> list[Event]:
-    block = max(round(_BLOCK_S / run.period_s), -(-run.motor.size // _MOST_BLOCKS), 1)
-    rows = run.motor.size // block * block
+    seen = Disturbance(seen.torque[run.lead_in :], seen.velocity[run.lead_in :], seen.sliding[run.lead_in :])
+    block = max(round(_BLOCK_S / run.period_s), -(-seen.sliding.size // _MOST_BLOCKS), 1)
+    rows = seen.sliding.size // block * block
     usable = seen.sliding.copy()
-    usable[: run.judged.start] = False
+    usable[: run.judged.start - run.lead_in] = False
     turns = np.diff(np.signbit(seen.velocity), append=np.signbit(seen.velocity[-1])).astype(float)
     usable &= np.convolve(turns, np.ones(2 * round(_REVERSAL_S / run.period_s) + 1), "same") < 0.5
 
@@ -246,7 +247,7 @@ def _of_run(run: Measured, seen: Disturbance) -> list[Event]:
             usual[one.first : one.last] = 0.0
         if usual.sum() < _LEAST_USUAL * weights.sum():
             return []
-    at_s, length_s = run.time_s[0], block * run.period_s
+    at_s, length_s = run.time_s[run.lead_in], block * run.period_s
     return [Event(run.name, at_s + one.first * length_s, at_s + one.last * length_s, one.level) for one in found]
 
 

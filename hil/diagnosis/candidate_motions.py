@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from pydantic import ValidationError
 
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
@@ -65,7 +66,8 @@ def reach(runs: Sequence[Measured], bench: Bench) -> Reach:
 def candidates(found: Reach) -> tuple[list[Profile], list[Profile]]:
     """Candidate motions within a reach: those of up to 15 s, and longer ones.
 
-    Both are empty if the recordings have no acceleration (parts of a constant feed).
+    Motions beyond what a profile may hold are left out, such as those of a load that turns many times. Both are empty
+    if the recordings have no acceleration (parts of a constant feed).
     """
     if not min(found.velocity_m_s, found.acceleration_m_s2, found.jerk_m_s3) > 0.0:
         return [], []
@@ -108,8 +110,9 @@ def candidates(found: Reach) -> tuple[list[Profile], list[Profile]]:
         "short moves between rests": rests,
         "creep, feeds, strokes and the whole travel": [*creep, *feeds, *strokes, *travel],
     }
-    made = [_repeated(found, what, segments, _SHORT_S) for what, segments in motions.items() if segments]
-    made.append(_repeated(found, "several feeds both ways, for a minute", feeds, _LONG_S))
+    wanted = [(what, segments, _SHORT_S) for what, segments in motions.items() if segments]
+    wanted.append(("several feeds both ways, for a minute", feeds, _LONG_S))
+    made = [profile for one in wanted if (profile := _repeated(found, *one)) is not None]
     durations_s = list(map(_duration_s, made))
     return (
         [profile for profile, time_s in zip(made, durations_s, strict=True) if time_s <= _LONG_S / 4],
@@ -117,8 +120,8 @@ def candidates(found: Reach) -> tuple[list[Profile], list[Profile]]:
     )
 
 
-def _repeated(found: Reach, description: str, segments: Segments, least_s: float) -> Profile:
-    """Profile of the segments, repeated to last at least `least_s`."""
+def _repeated(found: Reach, description: str, segments: Segments, least_s: float) -> Profile | None:
+    """Profile of the segments, repeated to last at least `least_s`; None if they are beyond what a profile may hold."""
     limits = {
         "velocity_m_s": found.velocity_m_s,
         "acceleration_m_s2": found.acceleration_m_s2,
@@ -136,7 +139,10 @@ def _repeated(found: Reach, description: str, segments: Segments, least_s: float
             }
         )
 
-    return profile(math.ceil(least_s / _duration_s(profile(1))))
+    try:
+        return profile(math.ceil(least_s / _duration_s(profile(1))))
+    except ValidationError:
+        return None
 
 
 def _reversal(found: Reach, way_m: float, feed_m_s: float) -> Segments:

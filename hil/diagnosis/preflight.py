@@ -2,8 +2,7 @@
 
     torque = J a + D v + Fc sign(v) + T0      by least squares over the measured motion
 
-A negative J without positive friction Fc shows a wrong sign; J and Fc that both deviate from the bench by a large
-factor show a wrong unit.
+A negative J without positive friction Fc shows a wrong sign; J and Fc far from those of the bench, a wrong unit.
 """
 
 import math
@@ -18,7 +17,7 @@ from hil.bench.bench_file import Bench
 from hil.channels import AXIS_CHANNELS
 from hil.errors import InputError
 from hil.identification.completion import DERIVED, completed, torque_is_measured
-from hil.identification.measured import Measured, take
+from hil.identification.measured import LEAD_IN, Measured, take
 from hil.quantities import digits, misread_factors
 from hil.recording.recording import Recording
 
@@ -67,7 +66,7 @@ def prepare(recordings: Sequence[Recording], bench: Bench) -> list[Measured]:
 
 
 def _raw_problems(recording: Recording, bench: Bench) -> Iterator[str]:
-    duration = len(recording) * recording.period_s
+    duration = (len(recording) - recording.metadata.get(LEAD_IN, 0)) * recording.period_s
     if duration < SHORTEST_S:
         yield (
             f"{recording.name}: too short: given {duration:.3g} s, allowed {SHORTEST_S:g} s or more; "
@@ -92,7 +91,7 @@ def _problems(run: Measured, bench: Bench, derived: set[str]) -> Iterator[str]:
     names, ratio = AXIS_CHANNELS[run.kind], bench.axis.ratio_m_rad
     command = run.position_command_m
     top = float(np.max(np.abs(run.velocity_command_m_s)))
-    moving = run.moving
+    moving = run.moving & (np.arange(run.motor.size) >= run.lead_in)
     moved = float(np.ptp(run.motor)) * ratio
     if np.ptp(command) == 0.0 or top == 0.0:
         yield (
@@ -156,7 +155,8 @@ def _position_problems(run: Measured, bench: Bench, motor: str, table: str) -> I
 
 
 def _set_point_problems(run: Measured, name: str) -> Iterator[str]:
-    slope = _slope(np.gradient(run.position_command_m, run.period_s), run.velocity_command_m_s)
+    speed = np.gradient(run.position_command_m, run.period_s)
+    slope = float(speed @ run.velocity_command_m_s / (speed @ speed))  # at a constant feed it has no other
     if abs(slope - 1.0) > SLOPE_TOLERANCE:
         yield f"{name}: {_factor(slope, _VELOCITY_UNITS, 'the derivative of the position set-points')}"
 
@@ -207,7 +207,7 @@ def _turned(found: tuple[list[float], list[float]] | None) -> bool:
 def regress(run: Measured, spring: bool = False) -> tuple[list[float], list[float]] | None:
     """Fit J, D, Fc, T0 of the module's equation, with standard errors [motor units]; None without sliding motion.
 
-    With `spring` a torque over the position is fitted too, as a fifth value.
+    `spring` adds a torque over the position. Of motion in one direction Fc holds the load; its error is infinite.
     """
     window = max(round(_SMOOTH_S / run.period_s) | 1, 5)
     if run.motor.size < 4 * window:
@@ -219,15 +219,15 @@ def regress(run: Measured, spring: bool = False) -> tuple[list[float], list[floa
     rows[:window] = rows[-window:] = False
     if rows.sum() < 4 * window:
         return None
-    basis = np.stack([acceleration, velocity, np.sign(velocity), np.ones_like(velocity), run.motor], axis=1)[rows]
-    basis = basis if spring else basis[:, :4]
-    if np.ptp(basis[:, 2]) == 0.0:
-        basis[:, 3] = 0.0  # one direction only: offset and Coulomb friction are not separable
-    solution, *_ = np.linalg.lstsq(basis, torque[rows], rcond=None)
+    columns = [acceleration, velocity, np.sign(velocity), np.ones_like(velocity), run.motor]
+    basis = np.stack(columns if spring else columns[:4], axis=1)[rows]
+    basis[:, 3] *= not (one_way := bool(np.ptp(basis[:, 2]) == 0.0))
+    solution = np.linalg.lstsq(basis, torque[rows], rcond=None)[0]
     left = torque[rows] - basis @ solution
     variance = float(left @ left) / max(rows.sum() / window - 4.0, 1.0)  # one independent sample per window
     covariance = np.linalg.pinv(basis.T @ basis) * variance
-    return [float(value) for value in solution], [float(np.sqrt(value)) for value in np.diag(covariance)]
+    errors = np.sqrt(np.diag(covariance)).tolist()
+    return solution.tolist(), [*errors[:2], np.inf if one_way else errors[2], *errors[3:]]
 
 
 def _saturation(run: Measured, bench: Bench, moving: NDArray[np.bool_]) -> Iterator[str]:

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hil.arrays import FloatArray
-from hil.identification.measured import SETTLE_IN_MOTION_S
-from hil.identification.noise import moving
+from hil.identification.measured import LEAD_IN
 from hil.recording.recording import Recording
 
 # Share of the motion before the cut, and whether the part after it is held out; the first that fits is taken. Two
@@ -24,10 +24,9 @@ _SPEED_S = 0.02  # time over which a speed is averaged: many counts of an encode
 def split(recordings: Sequence[Recording]) -> tuple[list[Recording], list[Recording]]:
     """Split each recording into a part of its motion for training and one that is held out, as `CUTS` order them.
 
-    Both keep their time. After a cut in motion the last part begins with the rows that settle its start, which are not
-    evaluated (`Measured.judged`): every row is evaluated in one part. The training part is as fast as the other, and
-    both move both ways, where a cut makes it so; else the training part does: of motion in one direction friction and a
-    load are one offset.
+    Both keep their time. The training part is as fast as the other, and both move both ways, where a cut makes it so;
+    else the training part does: of motion in one direction friction and a load are one offset. A part that begins in
+    motion has rows before it, from which the twin gets its state there: every row is evaluated in one part.
     """
     train, rest = [], []
     for recording in recordings:
@@ -37,25 +36,29 @@ def split(recordings: Sequence[Recording]) -> tuple[list[Recording], list[Record
         fast = [parts for parts in found if _covers(*parts)] or found[:1]
         told = [parts for parts in fast if _moves_both_ways(parts[0], travel)] or fast
         parts = next((parts for parts in told if _moves_both_ways(parts[1], travel)), told[0])
-        train.append(parts[0])
-        rest.append(parts[1])
+        train.append(_led_in(recording, parts[0]))
+        rest.append(_led_in(recording, parts[1]))
     return train, rest
 
 
 def _cut(recording: Recording, row: int, last: bool) -> tuple[Recording, Recording]:
     """Return the part for training and the one held out, cut at rest near a row; `last`: the last one is held out."""
     cut = _standstill(recording, row)
-    after = slice(cut - _lead(recording, cut), None)
-    parts = _part(recording, slice(0, cut), _FIRST), _part(recording, after, _LAST)
+    parts = _part(recording, slice(0, cut), _FIRST), _part(recording, slice(cut, None), _LAST)
     return parts if last else (parts[1], parts[0])
 
 
-def _lead(recording: Recording, cut: int) -> int:
-    """Rows before a cut in motion that are simulated before the part after it, where no part would evaluate else."""
-    rows, velocity = round(SETTLE_IN_MOTION_S / recording.period_s), recording.axis.velocity_command
-    if velocity not in recording.columns or not 0 < rows <= min(cut, (len(recording) - cut) // 3):
-        return 0
-    return rows if bool(np.all(moving(recording[velocity])[cut - rows : cut + 1])) else 0
+def _led_in(recording: Recording, part: Recording) -> Recording:
+    """The part, and as many rows before it as it has itself if they are recorded; unchanged if it begins at rest.
+
+    They are simulated and not evaluated: a flexible load, which swings at the cut, has an unknown state there.
+    """
+    first = round((part.start_s - recording.start_s) / recording.period_s)
+    lead = min(first, len(part))
+    if not lead or _rests(recording)[first]:
+        return part
+    longer = _part(recording, slice(first - lead, first + len(part)), "")
+    return replace(longer, name=part.name, metadata=part.metadata | {LEAD_IN: lead})
 
 
 def held_out_note(held_out: Sequence[Recording]) -> str:
@@ -114,12 +117,15 @@ def _top_speed(recording: Recording) -> float:
 
 def _standstill(recording: Recording, row: int) -> int:
     """Return the row at rest nearest to `row`; `row` itself if none is within a tenth of the recording."""
-    names = recording.axis
-    if names.velocity_command not in recording.columns:
-        return row
-    still = np.flatnonzero(recording[names.velocity_command] == 0.0)
+    still = np.flatnonzero(_rests(recording))
     near = still[np.abs(still - row) < 0.1 * len(recording)]
     return int(near[np.argmin(np.abs(near - row))]) if near.size else row
+
+
+def _rests(recording: Recording) -> NDArray[np.bool_]:
+    """Rows (n,) at which the set-points rest, all without set-points."""
+    speed = recording.columns.get(recording.axis.velocity_command)
+    return np.ones(len(recording), dtype=bool) if speed is None else speed == 0.0
 
 
 def _part(recording: Recording, rows: slice, what: str) -> Recording:

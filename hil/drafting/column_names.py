@@ -22,27 +22,30 @@ class Quantity(StrEnum):
 
 # Words of four letters and more are also found within a token (lagesollwert); shorter ones must be the whole token.
 _QUANTITIES = {
-    Quantity.TIME: "time t zeit temps timestamp stamp zeitstempel horodatage clock uhrzeit elapsed",
+    Quantity.TIME: "time t zeit temps timestamp stamp zeitstempel horodatage clock uhrzeit elapsed tempo tiempo",
     Quantity.OTHER: "error err deviation schleppfehler schleppabstand regelabweichung abweichung erreur ecart lag "
     "feedforward ff compensation vorsteuerung anticipation temperature temperatur status state zustand etat flag "
     "mode lateness segment cycle index sample counter zaehler compteur deflection diff difference limit twin",
     Quantity.VELOCITY: "velocity velocities vel speed spd omega w v n qd dq qdot qp dqdt xd dx xdot "
     "geschwindigkeit geschw "
-    "drehzahl winkelgeschwindigkeit vitesse vit rpm feedrate",
+    "drehzahl winkelgeschwindigkeit vitesse vit rpm feedrate velocita velocidad",
     Quantity.ACCELERATION: "acceleration accel acc qdd ddq qddot beschleunigung acceleration",
     Quantity.EFFORT: "torque trq tq tau moment drehmoment mom md couple cpl current cur curr strom courant "
     "intensite amp i iq iqs "
-    "isq force kraft effort f voltage volt spannung tension u pwm duty",
+    "isq force kraft effort f voltage volt spannung tension u pwm duty coppia forza corrente fuerza corriente",
     Quantity.POSITION: "position positions pos posn angle ang winkel theta phi q x y z lage weg hub stroke "
     "displacement displ "
-    "encoder enc geber codeur course deplacement distance travel",
+    "encoder enc geber codeur course deplacement distance travel posizione posicion angolo angulo",
 }
 _COMMAND = (
     "command commanded cmd set setpoint setp ref reference target desired des demand soll sollwert consigne cons sp "
-    "goal"
+    "goal comando comandata comandato riferimento consigna"
 )
-_MEASURED = "actual act ist istwert measured meas measure feedback fbk fb real reel mesure mesuree mes response"
-_MOTOR = "motor mot moteur rotor antrieb drive primary"
+_MEASURED = (
+    "actual act ist istwert measured meas measure feedback fbk fb real reel mesure mesuree mes response "
+    "misurata misurato medida medido"
+)
+_MOTOR = "motor mot moteur motore rotor antrieb drive primary"
 _TABLE = (
     "table load link secondary second external ext linear scale tisch last abtriebs schlitten charge carriage slide "
     "axis2 arm aux auxiliary glasmassstab regle"
@@ -51,6 +54,8 @@ _TORQUE_UNIT = {
     "current": "A",
     "strom": "A",
     "courant": "A",
+    "corrente": "A",
+    "corriente": "A",
     "voltage": "V",
     "spannung": "V",
     "tension": "V",

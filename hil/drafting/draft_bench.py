@@ -9,9 +9,9 @@ from hil.drafting.bench_notes import told
 from hil.drafting.estimate import BenchValue, Estimate
 from hil.drafting.loop_values import loop_values
 from hil.drafting.plant_values import PlantValues, TransmissionValues, plant_values, transmission_values
-from hil.drafting.relations import proportional
+from hil.drafting.ratio_values import gear_of, lead_of
 from hil.drafting.sensor_values import noise_of
-from hil.drafting.usual_values import ROTARY_LEAD_M, usual_lead
+from hil.drafting.usual_values import ROTARY_LEAD_M
 from hil.errors import InputError
 from hil.identification.completion import with_position
 from hil.identification.coordinates import TRUST
@@ -23,11 +23,8 @@ from hil.twin.mechanisms import gravity_torque
 
 _FINEST_M, _COARSEST_M = 1e-12, 1e-3  # resolution of a second encoder that a bench file takes
 LONGEST_LEAD_M = 1.0  # that a bench file takes; a load that turns as far as its motor, 1 m for 1 rad, has 6.3
-DIRECT = 0.02  # deviation from equal angles of motor and load up to which there is no gear
 # Least deflection over acceleration that is written: a mode at 5 kHz, beyond any control loop.
 _STIFFEST_S2 = (2.0 * pi * 5e3) ** -2
-_WHOLE = 1e-4  # deviation from a whole gear ratio that is none: play between the encoders biases the measured one by it
-_SURE_TURNS = 0.05  # standard error of a ratio below which the next whole number is seldom near by chance
 _STEPS_PER_NOISE = sqrt(12.0)  # a count of q has noise of q / sqrt(12)
 
 
@@ -75,14 +72,14 @@ def draft_bench(recording: Recording) -> BenchDraft:
         ratio = 1.0
         _linear(draft, plant)
     else:
-        lead = _lead(recording, transmission)
+        lead = lead_of(recording, transmission)
         ratio = lead.value / (2.0 * pi)
         deflection = None if transmission is None else _deflection_s2(transmission)
         turns = recording.metadata.get("lead_m") == ROTARY_LEAD_M or lead.value > LONGEST_LEAD_M
         plant = plant_or_assumed(recording, transmission, ratio if turns else None)
         if plant.gravity_angle is not None and transmission is not None:  # it bends what the ratio is measured over
             transmission = transmission_values(recording, plant.gravity_angle.value)
-            lead = _lead(recording, transmission)
+            lead = lead_of(recording, transmission)
         stiff = deflection is None or not deflection.significant
         volts = turns and stiff and _in_volts(recording) and plant.viscous.significant
         model = {(True, True): "rotary_two_mass", (True, False): "rotary", (False, True): "two_mass"}.get(
@@ -103,23 +100,6 @@ def draft_bench(recording: Recording) -> BenchDraft:
     draft.notes += notes
     draft.unsure += unsure
     return draft
-
-
-def _lead(recording: Recording, transmission: TransmissionValues | None) -> Estimate:
-    """Travel per motor revolution; on a rotary axis that of the load in rad."""
-    names = recording.axis
-    if transmission is not None:
-        measured = transmission.ratio.scaled(2.0 * pi)
-    elif names.position_command in recording.columns:
-        relation = proportional(recording[names.position_command], recording[names.motor_position])
-        measured = Estimate(2.0 * pi * relation.factor, 0.0, "set-points over the motor's encoder")
-    else:
-        return Estimate(ROTARY_LEAD_M, 0.0, "one encoder and no set-points: no ratio is told")
-    if abs(measured.value / ROTARY_LEAD_M - 1.0) < DIRECT:
-        return Estimate(ROTARY_LEAD_M, measured.std_error, f"direct; {measured.how}")
-    lead = usual_lead(measured.value)
-    how = measured.how if lead == measured.value else f"{measured.how} ({1e3 * measured.value:.6g} mm measured)"
-    return Estimate(lead, measured.std_error, how)
 
 
 def _deflection_s2(transmission: TransmissionValues) -> Estimate | None:
@@ -199,7 +179,7 @@ def _weight(draft: BenchDraft, plant: PlantValues) -> None:
 
 def _turning(draft: BenchDraft, plant: PlantValues, transmission: TransmissionValues | None, lead: Estimate) -> None:
     deflection = None if transmission is None else _deflection_s2(transmission)
-    gear = _gear(Estimate(ROTARY_LEAD_M / lead.value, ROTARY_LEAD_M / lead.value**2 * lead.std_error, lead.how))
+    gear = gear_of(lead)
     draft.axis.append(_value("gear_ratio", gear, "motor per load"))
     if deflection is None:
         draft.axis.append(_value("inertia_kg_m2", plant.inertia, "kg m^2 at the motor"))
@@ -221,16 +201,6 @@ def _turning(draft: BenchDraft, plant: PlantValues, transmission: TransmissionVa
 def _guess(half: Estimate) -> Estimate:
     """Half of a sum whose split is not told: the other half may be all or nothing."""
     return replace(half, std_error=half.value)
-
-
-def _gear(measured: Estimate) -> Estimate:
-    """The whole number of turns that a measured ratio is very near to, else the ratio."""
-    whole = float(round(measured.value))
-    apart = abs(measured.value - whole)
-    near = apart < _WHOLE * whole or (apart < 2.0 * measured.std_error and measured.std_error < _SURE_TURNS)
-    if whole < 1.0 or not apart or not near:
-        return measured
-    return replace(measured, value=whole, how=f"{measured.how} ({measured.value:.7g} measured)")
 
 
 def _rotary_friction(draft: BenchDraft, plant: PlantValues) -> None:

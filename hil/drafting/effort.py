@@ -8,6 +8,7 @@ from hil.arrays import FloatArray
 from hil.channels import AxisKind
 from hil.drafting.column_names import Label
 from hil.drafting.relations import EffortCause, MotionColumns, proportional
+from hil.quantities import UNITS
 
 CAUSED = 0.3  # share of an effort explained by its motion from which its sign can be judged
 TOGETHER = 0.25  # share of the variance that torque and command have in common, from which they have one cause
@@ -106,15 +107,9 @@ def _unit(told: Label, kind: AxisKind, scalars: dict[str, float]) -> tuple[dict[
         notes.append(
             f"{told.column}: the rated {si} is not known, 1 is taken: masses and friction are in multiples of it"
         )
-    elif kind is AxisKind.LINEAR and unit in ("N m", "mN m"):
-        entry |= {"unit": "N", "scale": 1e-3 if unit == "mN m" else 1.0}
-        notes.append(
-            f"{told.column}: is in {unit}, the position in a length; 1 N per N m is taken: set scale to 2 pi / "
-            "lead to get N"
-        )
-    elif kind is AxisKind.ROTARY and unit in ("N", "kN"):
-        entry |= {"unit": "N m", "scale": 1e3 if unit == "kN" else 1.0}
-        notes.append(
-            f"{told.column}: is in {unit}, the position in an angle; 1 N m per N is taken: set scale to the radius"
-        )
+    elif unit in UNITS and UNITS[unit][0] != si:
+        entry |= {"unit": si, "scale": UNITS[unit][1]}
+        lever = "a length; 1 N per N m is" if kind is AxisKind.LINEAR else "an angle; 1 N m per N is"
+        factor = "multiply scale by 2 pi / lead to get N" if kind is AxisKind.LINEAR else "multiply scale by the radius"
+        notes.append(f"{told.column}: is in {unit}, the position in {lever} taken: {factor}")
     return entry, notes

@@ -18,6 +18,7 @@ from hil.drafting.relations import (
     smoothed,
 )
 from hil.errors import InputError
+from hil.quantities import UNITS
 
 SAME_POSITION = 0.98  # share from which a column is another reading of a position: following errors are below 5 %
 FOLLOWED = 0.5  # share of a set-point that a controlled motion follows: less is another axis or no loop
@@ -25,7 +26,7 @@ IS_DERIVATIVE = 0.9  # share from which a column is the velocity of another: cou
 IS_DRIVEN = 0.4  # share of an unnamed effort that one mass with friction explains: gravity and springs may be more
 SAME_COLUMN = 1e-6  # of the travel: a copy in another unit deviates by printed digits, a second sensor by more
 SMOOTH = 0.3  # roughness of a motion; rows without order have 1.4
-_UNIT_RANK = ("N m", "mN m", "N", "kN", "A", "mA", "%", "permille", None, "V", "mV")
+_UNIT_RANK = ("N m", "N", "A", "mA", "%", "permille", None, "V", "mV")  # torques and forces by their SI unit
 
 
 @dataclass
@@ -61,8 +62,7 @@ def find_roles(
     """
     roles = Roles()
     labels = _of_one_axis(where, dict(labels), columns, roles, axis)
-    frozen = [name for name in columns if name in labels and np.ptp(columns[name]) == 0.0]
-    for name in frozen:
+    for name in [name for name in columns if name in labels and np.ptp(columns[name]) == 0.0]:
         roles.left_out[name] = f"constant at {columns[name][0]:g}"
         labels.pop(name)
     live = {name: columns[name] for name in columns if name in labels}
@@ -279,10 +279,10 @@ def _efforts(live: dict[str, FloatArray], labels: dict[str, Label], names: list[
     """Tell commanded and measured effort; of several the one at the motor, in the unit nearest to torque."""
 
     def rank(name: str) -> tuple[bool, int]:
-        unit = labels[name].unit or labels[name].electric
-        return labels[name].table, _UNIT_RANK.index(unit if unit in _UNIT_RANK else None)
+        si = UNITS.get(unit := labels[name].unit or labels[name].electric or "", (unit,))[0]
+        return labels[name].table, _UNIT_RANK.index(si if si in _UNIT_RANK else None)
 
-    voltage = [name for name in names if (labels[name].unit or labels[name].electric) in ("V", "mV")]
+    voltage = [name for name in names if (labels[name].unit or labels[name].electric) in _UNIT_RANK[-2:]]
     commands = [name for name in names if labels[name].command or name in voltage]
     measured = [name for name in names if name not in commands]
     commands = [name for name in commands if name not in voltage] or commands

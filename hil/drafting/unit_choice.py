@@ -56,7 +56,7 @@ def prefers_length(positions: list[str], effort: Label | None) -> bool | None:
         return False
     if re.search(_LENGTH, words):
         return True
-    return False if effort and effort.unit in ("N m", "mN m") else None
+    return False if effort and UNITS.get(effort.unit or "", ("",))[0] == "N m" else None
 
 
 def unit_by_convention(effort: Label | None) -> UnitChoice | None:

@@ -3,6 +3,8 @@
 import re
 import unicodedata
 
+from hil.quantities import UNITS
+
 # spellings in lower case, without blanks, brackets and multiplication signs -> unit of a map
 _SPELLINGS = {
     "s": "s sec secs second seconds sek sekunde sekunden seconde secondes",
@@ -15,6 +17,7 @@ _SPELLINGS = {
     "um": "um µm micron microns mikrometer",
     "nm": "nanometer nanometre",
     "in": "inch inches",
+    "ft": "ft foot feet",
     "rad": "rad radian radians",
     "mrad": "mrad",
     "deg": "deg degree degrees ° grad degre degres degré degrés",
@@ -24,6 +27,10 @@ _SPELLINGS = {
     "um/s": "um/s µm/s um_s",
     "m/min": "m/min m_min",
     "mm/min": "mm/min mm_min",
+    "in/s": "in/s in_s ips inch/s",
+    "in/min": "in/min in_min ipm inch/min",
+    "ft/s": "ft/s ft_s fps",
+    "ft/min": "ft/min ft_min fpm",
     "rad/s": "rad/s rad_s rads-1 rads^-1",
     "deg/s": "deg/s °/s deg_s grad/s degre/s",
     "rev/s": "rev/s rps u/s tr/s rev_s",
@@ -34,8 +41,17 @@ _SPELLINGS = {
     "deg/s^2": "deg/s^2 deg/s2 °/s² deg_s2",
     "N m": "nm n_m newtonmeter",
     "mN m": "mnm mn_m",
+    "N cm": "ncm n_cm",
+    "kN m": "knm kn_m",
     "N": "n newton",
     "kN": "kn",
+    "kgf": "kgf kp",
+    "lbf": "lbf lb lbs",
+    "kgf m": "kgfm kgf_m kgf-m kpm",
+    "kgf cm": "kgfcm kgf_cm kgf-cm kpcm",
+    "lbf ft": "lbfft lbf_ft lbf-ft ftlbf ft_lbf ft-lbf lbft lb_ft lb-ft ftlb ft_lb ft-lb ftlbs ft-lbs",
+    "lbf in": "lbfin lbf_in lbf-in inlbf in_lbf in-lbf lbin lb_in lb-in inlb in_lb in-lb inlbs in-lbs",
+    "ozf in": "ozfin ozf_in ozf-in inozf in_ozf in-ozf ozin oz_in oz-in inoz in_oz in-oz",
     "A": "a amp amps ampere arms a_rms apk aeff a_eff",
     "mA": "ma",
     "V": "v volt volts",
@@ -46,13 +62,22 @@ _SPELLINGS = {
 }
 _UNIT_OF = {spelling: unit for unit, spellings in _SPELLINGS.items() for spelling in spellings.split()}
 _KIND = {
-    "time": ("s", "ms", "us", "ns", "min"),
-    "position": ("m", "mm", "um", "nm", "in", "rad", "mrad", "deg", "rev", "counts"),
-    "velocity": ("m/s", "mm/s", "um/s", "m/min", "mm/min", "rad/s", "deg/s", "rev/s", "rpm"),
-    "acceleration": ("m/s^2", "mm/s^2", "rad/s^2", "deg/s^2"),
-    "effort": ("N m", "mN m", "N", "kN", "A", "mA", "V", "mV", "%", "permille"),
+    "s": "time",
+    "m": "position",
+    "rad": "position",
+    "m/s": "velocity",
+    "rad/s": "velocity",
+    "m/s^2": "acceleration",
+    "rad/s^2": "acceleration",
+    "N m": "effort",
+    "N": "effort",
 }
-QUANTITY_OF_UNIT = {unit: kind for kind, units in _KIND.items() for unit in units}
+_ELECTRIC = ("A", "mA", "V", "mV", "%", "permille")
+QUANTITY_OF_UNIT = (
+    {unit: _KIND[si] for unit, (si, _) in UNITS.items() if si in _KIND}
+    | {"counts": "position"}
+    | dict.fromkeys(_ELECTRIC, "effort")
+)
 # one letter at the end of a name is a unit only after a word: x_m may be in metres, q_m of the motor
 _BRACKETS = re.compile(r"[\[(<{]\s*([^\])>}]*)\s*[\])>}]\s*$")
 _BITS = re.compile(r"(?<=[a-z])\d+(bit)?$")  # counts16bit

@@ -31,6 +31,7 @@ Channels = tuple[FloatArray, FloatArray, FloatArray, FloatArray]  # as control.r
 
 SETTLE_S = 0.05  # not evaluated at the start: several time constants of the observer, for errors of the initial state
 SETTLE_IN_MOTION_S = 0.3  # modes of a machine axis have decayed
+LEAD_IN = "lead_in_rows"  # metadata: rows at the start that belong to another part and only give the twin its state
 _REPLAYED_ROWS = 200  # to find the phase of the position loop: many of its ticks
 _FITTED_ROWS = 11  # motor positions fitted by a parabola for the first velocity: averages encoder counts
 
@@ -56,6 +57,7 @@ class Measured:
     integrated: bool = False  # the motor position is the sum of its measured velocity
     sampled: bool = False  # the rows are samples of the torque, which changes between them
     speed_set_point: FloatArray = field(default_factory=lambda: np.empty(0))  # of unknown scale; empty if not recorded
+    lead_in: int = 0  # first rows, which are simulated and not evaluated
 
     @cached_property
     def torque_gap(self) -> FloatArray:
@@ -100,7 +102,7 @@ class Measured:
         """
         first = min(int(np.argmax(self.moving)), self.motor.size // 2)
         settle_s = SETTLE_IN_MOTION_S if self.moving[0] else SETTLE_S
-        return slice(max(min(round(settle_s / self.period_s), self.motor.size // 4), first), None)
+        return slice(max(min(round(settle_s / self.period_s), self.motor.size // 4), first, self.lead_in), None)
 
 
 def take(recording: Recording, bench: Bench) -> Measured:
@@ -178,6 +180,7 @@ def take(recording: Recording, bench: Bench) -> Measured:
         integrated,
         not bench.law_known and torque_is_measured(recording) and not rows_are_ticks(recording),
         speed if np.any(speed) else np.empty(0),
+        max(int(recording.metadata.get(LEAD_IN, 0)) - first, 0),
     )
 
 

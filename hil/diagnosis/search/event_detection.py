@@ -67,12 +67,14 @@ def _of_fit(found: Fit, reversals: bool) -> list[Event]:
 
 
 def _of_run(run: Measured, seen: Disturbance, reversals: bool) -> list[Event]:
-    block = max(round(BLOCK_S / run.period_s), -(-run.motor.size // _MOST_BLOCKS), 1)
-    rows = run.motor.size // block * block
+    first = run.lead_in  # those rows belong to another part
+    seen = Disturbance(seen.torque[first:], seen.velocity[first:], seen.sliding[first:])
+    block = max(round(BLOCK_S / run.period_s), -(-seen.sliding.size // _MOST_BLOCKS), 1)
+    rows = seen.sliding.size // block * block
     turns = np.diff(np.signbit(seen.velocity), append=np.signbit(seen.velocity[-1])).astype(float)
     turning = np.convolve(turns, np.ones(2 * round(_REVERSAL_S / run.period_s) + 1), "same") > 0.5
     usable = seen.sliding if reversals else seen.sliding & ~turning
-    usable = usable & (np.arange(usable.size) >= run.judged.start)
+    usable = usable & (np.arange(usable.size) >= run.judged.start - first)
 
     def means(values: FloatArray) -> FloatArray:
         whole = (values * usable)[:rows].reshape(-1, block)
@@ -96,7 +98,7 @@ def _of_run(run: Measured, seen: Disturbance, reversals: bool) -> list[Event]:
             return []
     near = np.any(turning[:rows].reshape(-1, block), axis=1, keepdims=True)[:, 0]
     found = [one for one in found if _beyond_reversals(rest, weights, near, one)]
-    at_s, length_s = run.time_s[0], block * run.period_s
+    at_s, length_s = run.time_s[first], block * run.period_s
     return [Event(run.name, at_s + one.first * length_s, at_s + one.last * length_s, one.level) for one in found]
 
 

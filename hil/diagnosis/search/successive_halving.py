@@ -3,7 +3,7 @@
 Losing candidates are not converged; only their ranking is used.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import NamedTuple, TypeVar
@@ -19,7 +19,7 @@ from hil.identification.dataset import TORQUE_ACCURACY, inertia
 from hil.identification.estimator import Estimator, Fit
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.inference import by_energy
-from hil.identification.levenberg_marquardt import robust_loss
+from hil.identification.levenberg_marquardt import damped_step, normal_equations, robust_loss
 from hil.identification.nominal_fit import SOFT
 from hil.identification.parallel import POOL, in_parallel
 from hil.identification.terms import Term, compatible
@@ -37,6 +37,7 @@ LONG = 25  # evaluations of a last fit
 # A second fit is converged if its cost is below _BEATEN times that of the converged leader or _LEVEL times that of the
 # leader's second fit, and its gain above the share _BEHIND of the leader's: unconverged fits may be far from their end.
 _BEATEN, _LEVEL, _BEHIND = 5.0, 1.5, 0.5
+_SOLVED = 1e-9  # damping of a step that solves the normal equations, over their diagonal: only against singular ones
 _HOPELESS = 0.02  # share of the residual energy over that of the first candidate: below, a candidate is not fitted
 _CLEARLY = 10.0  # BIC difference between variants of one mechanism: "very strong" (Kass and Raftery 1995)
 _EDGE_SHIFTS_S = np.arange(-15, 16) * 0.005  # tried shifts of an edge: its valley is narrower than a step of the fit
@@ -138,11 +139,11 @@ class _Race:
     def _first_fit(self, candidate: Candidate) -> _FirstFit:
         """Fit a candidate briefly with the derivatives of the base, at the base or at the bench's parameters.
 
-        The first candidates also start with the variant preferred by the score test: another variant may have a lower
-        cost at the start only because its effect is small.
+        A start may cost least only because its effect is small. Therefore the start that costs least after a step of
+        the base's parameters is fitted too, and of the first candidates the variant preferred by the score test.
         """
         here = self.base.hypothesis.x
-        begun = [self._best_start(candidate, here)]
+        begun = self._least(candidate, here, _soft, self._cost_beside_base)
         if candidate in self.candidates[:_CONTINUED]:
             begun.append(self._owner_start(candidate))
             if begun[0].terms[-1].variant != candidate.term.variant:
@@ -158,10 +159,22 @@ class _Race:
 
     def _best_start(self, candidate: Candidate, x: FloatArray) -> Fit:
         """Return the start of a candidate with the least cost at x."""
+        return self._least(candidate, x, _soft)[0]
+
+    def _least(self, candidate: Candidate, x: FloatArray, *costs: Callable[[Fit], float]) -> list[Fit]:
+        """Return the starts of a candidate at x with the least of each cost, each start once."""
         base = self.base.hypothesis.moved(x)
-        return min(
-            (self.search.evaluate(base.with_term(term)) for term in (candidate.term, *candidate.others)), key=_soft
-        )
+        begun = [self.search.evaluate(base.with_term(term)) for term in (candidate.term, *candidate.others)]
+        return _unique([min(begun, key=cost) for cost in costs])
+
+    def _cost_beside_base(self, start: Fit) -> float:
+        """Cost of a start after one linear step of the parameters of the base, within their bounds."""
+        x, vector = self.base.hypothesis.x, start.residuals.vector
+        low, high = (bound[: x.size] - x for bound in start.hypothesis.bounds)
+        slopes = self.derivatives[tuple(x)].astype(np.float64)
+        normal, descent = normal_equations(slopes, vector, robust_loss(vector, SOFT)[1])
+        step = damped_step(normal, descent, _SOLVED, np.sqrt(np.diag(normal)), low, high)
+        return robust_loss(vector + slopes @ step, SOFT)[0]
 
     def _owner_start(self, candidate: Candidate) -> Fit:
         """Return the best start of a candidate at the parameters of the bench."""

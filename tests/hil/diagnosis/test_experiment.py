@@ -172,3 +172,11 @@ def test_an_axis_that_may_do_little_still_gets_candidates(change: dict[str, floa
     reached = replace(reach(runs(ONE_WAY).runs, OWNER), low_m=0.0, high_m=0.1)
     short, long = candidates(replace(reached, **change))
     assert len(short) + len(long) >= count
+
+
+def test_candidates_of_a_load_that_turns_many_times_are_those_that_a_profile_may_hold() -> None:
+    """A profile holds positions up to 100 m or rad, and an hour."""
+    turning = replace(reach(runs(ONE_WAY).runs, OWNER), low_m=-20.0, high_m=150.0, start_m=0.0)
+    short, long = candidates(turning)
+    assert short or long
+    assert candidates(replace(turning, start_m=120.0)) == ([], [])

@@ -60,6 +60,24 @@ def test_the_regression_finds_inertia_and_friction(run: Recording) -> None:
     assert abs(offset) < 0.02
 
 
+def test_motion_in_one_direction_tells_no_friction_and_no_unit(run: Recording) -> None:
+    """Friction and a load are one value there: a heavy load is no wrong unit of the torque."""
+    command = np.linspace(0.0, 0.06, len(run))
+    turn = np.round(command / OWNER.axis.ratio_m_rad / 6e-6) * 6e-6
+    columns = {
+        "position_command_m": command,
+        "velocity_command_m_s": np.full(len(run), 0.06 / (len(run) * run.period_s)),
+        "motor_position_rad": turn,
+        "table_position_m": command + 1e-7 * np.sin(turn),
+        "torque_n_m": 8.0 + run["torque_n_m"] - run["torque_command_n_m"],
+        "torque_command_n_m": None,
+    }
+    prepared = prepare([changed(run, **columns)], OWNER)[0]
+    found = regress(prepared)
+    assert found is not None
+    assert found[1][2] == math.inf
+
+
 def test_too_short(run: Recording) -> None:
     assert "too short: given 0.7 s, allowed 0.8 s" in refused(part(run, slice(0, 700)))
 

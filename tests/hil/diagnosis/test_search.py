@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from diagnosis_runs import dataset, recorded
+from diagnosis_runs import bench, dataset, recorded
 
 from hil.bench.bench_file import load_bench
 from hil.diagnosis.diagnose import diagnose
-from hil.diagnosis.search.successive_halving import owner_points
+from hil.diagnosis.preflight import prepare
+from hil.diagnosis.search.score_test import Candidate
+from hil.diagnosis.search.successive_halving import _Race, _soft, owner_points
 from hil.identification.coordinates import CHATTER_STEP, LAST_EDGE_STEP_S
-from hil.identification.dataset import inertia
+from hil.identification.dataset import inertia, prepare_dataset
 from hil.identification.estimator import Estimator, Fit
 from hil.identification.hypothesis import Hypothesis
+from hil.identification.nominal_fit import fit_nominal_parameters
 from hil.identification.residuals import Residuals
 from hil.identification.terms import Term
 
@@ -76,3 +79,14 @@ def test_play_on_a_light_nut_beside_wrong_springs() -> None:
     found = diagnose([recorded(truth, play, times=2)], [recorded(truth, play, seed=2)], owner)
     assert [one.effect for one in found.result.missing] == ["backlash"]
     assert found.result.missing[0].parameters["gap_m"].value == pytest.approx(5e-6, rel=0.05)
+
+
+def test_a_start_is_compared_beside_the_parameters_that_the_mismatch_has_bent() -> None:
+    """Friction that falls as the axis warms up bends the fitted friction: beside it a start at the truth costs more."""
+    truth, drift = bench(), Term("friction_drift", 0, (-0.5, 1.5))
+    data = prepare_dataset(prepare([recorded(truth, drift, times=2)], truth), truth)
+    base = fit_nominal_parameters(data)
+    weak = Term("friction_drift", 0, (0.01, 1.5))
+    contest = _Race(base, [Candidate(drift, 0.5, (weak,))])
+    begun = contest._least(contest.candidates[0], base.hypothesis.x, _soft, contest._cost_beside_base)
+    assert [fit.terms for fit in begun] == [(weak,), (drift,)]

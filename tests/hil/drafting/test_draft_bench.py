@@ -16,6 +16,7 @@ from hil.commands.identify import identify
 from hil.commands.import_ import import_
 from hil.drafting.bench_text import bench_text
 from hil.drafting.draft_bench import draft_bench
+from hil.drafting.ratio_values import lead_of
 from hil.errors import InputError
 from hil.recording.quantum import count_of
 from hil.recording.recording import Recording
@@ -91,8 +92,37 @@ def test_gravity_over_the_angle_becomes_a_mechanism_of_the_bench(tmp_path: Path)
     bench = load_bench(drafted(tmp_path, columns))
     (entry,) = bench.mechanisms
     assert entry.effect == gravity_torque.MECHANISM.id
-    assert entry.parameters["gravity_torque_n_m"] == pytest.approx(3.0, rel=0.02)
-    assert entry.parameters["angle_rad"] == pytest.approx(0.5, abs=0.02)
+    assert entry.parameters["gravity_torque_n_m"] == pytest.approx(3.0, rel=2e-3)
+    assert entry.parameters["angle_rad"] == pytest.approx(0.5, abs=2e-3)
+
+
+def test_a_spring_on_a_load_that_turns_far_is_no_gravity(tmp_path: Path) -> None:
+    angle = AXIS["angle"] / 10.0
+    columns = {"time_s": AXIS["t"], "motor_angle_rad": angle, "torque_Nm": AXIS["torque"] + 1.2 * angle}
+    path = drafted(tmp_path, columns)
+    bench = load_bench(path)
+    assert not bench.mechanisms
+    assert bench.axis.inertia_kg_m2 == pytest.approx(100.0 * INERTIA_KG_M2 / 10.0, rel=0.02)
+    assert "(a spring) 1.2 N m/rad" in path.read_text()
+
+
+def test_a_lead_is_rounded_only_where_the_measured_one_agrees(tmp_path: Path) -> None:
+    """Else a diagnosis would name the difference as an error of the screw."""
+    near = load_bench(drafted(tmp_path, SCREW))
+    assert near.axis.lead_m == LEAD_M
+    (tmp_path / "far").mkdir()
+    path = drafted(tmp_path / "far", SCREW | {"table_position_mm": 1.001 * SCREW["table_position_mm"]})
+    assert load_bench(path).axis.lead_m == pytest.approx(1.001 * LEAD_M, rel=2e-5)
+    assert "if its nominal lead is 10 mm write that" in path.read_text()
+
+
+def test_a_following_error_of_the_set_points_is_no_gear() -> None:
+    """Set-points that a loop follows by 80 % to 110 % say no more than that the ratio is one."""
+    low, middle, high = (np.sin(frequency * AXIS["t"]) for frequency in (2.0, 5.0, 11.0))
+    columns = {"motor_position_rad": low + middle + high, "position_command_m": low + 1.25 * middle + 0.9 * high}
+    lead = lead_of(Recording("joint", columns, 1e-3), None)
+    assert lead.value == pytest.approx(2.0 * np.pi)
+    assert lead.std_error > 0.01 * lead.value
 
 
 def test_a_gear_follows_from_two_angles(tmp_path: Path) -> None:

@@ -1,0 +1,74 @@
+"""Lead of a screw, or gear ratio, from two positions of a recording."""
+
+from dataclasses import replace
+from math import pi
+
+import numpy as np
+
+from hil.drafting.estimate import Estimate, fit_blocks
+from hil.drafting.plant_values import TransmissionValues
+from hil.drafting.relations import direction, motion
+from hil.drafting.usual_values import ROTARY_LEAD_M, usual_lead
+from hil.recording.recording import Recording
+
+DIRECT = 0.02  # deviation from equal angles of motor and load up to which there is no gear
+_WHOLE = 1e-4  # deviation from a round value that is none: play between the encoders biases the measured one by it
+_SURE_TURNS = 0.05  # standard error of a ratio below which the next whole number is seldom near by chance
+_LIKELY = 2.0  # standard errors within which a round value is taken
+
+
+def lead_of(recording: Recording, transmission: TransmissionValues | None) -> Estimate:
+    """Travel per motor revolution [m]; on a rotary axis that of the load in rad.
+
+    Of two encoders, else of set-points and encoder. A usual lead is taken only where the measured one does not
+    contradict it: what the bench file says would else be named as an error of the machine.
+    """
+    names = recording.axis
+    if transmission is not None:
+        measured = transmission.ratio.scaled(2.0 * pi)
+    elif names.position_command in recording.columns:
+        measured = _of_set_points(recording).scaled(2.0 * pi)
+    else:
+        return Estimate(ROTARY_LEAD_M, 0.0, "one encoder and no set-points: no ratio is told")
+    if abs(measured.value - ROTARY_LEAD_M) < max(DIRECT * ROTARY_LEAD_M, _LIKELY * measured.std_error):
+        return Estimate(ROTARY_LEAD_M, measured.std_error, f"direct; {measured.how}")
+    lead = usual_lead(measured.value)
+    if lead == measured.value:
+        return measured
+    if _agrees(lead, measured):
+        return replace(measured, value=lead, how=f"{measured.how} ({1e3 * measured.value:.6g} mm measured)")
+    how = f"{measured.how}; if its nominal lead is {1e3 * lead:g} mm write that: hil diagnose then names the difference"
+    return replace(measured, how=how)
+
+
+def gear_of(lead: Estimate) -> Estimate:
+    """Motor revolutions per revolution of the load: the whole number that is very near, else the ratio."""
+    measured = Estimate(ROTARY_LEAD_M / lead.value, ROTARY_LEAD_M / lead.value**2 * lead.std_error, lead.how)
+    whole = float(round(measured.value))
+    near = whole >= 1.0 and _agrees(whole, measured)
+    if (
+        not near
+        or measured.value == whole
+        or not (measured.std_error < _SURE_TURNS or abs(measured.value - whole) < _WHOLE * whole)
+    ):
+        return measured
+    return replace(measured, value=whole, how=f"{measured.how} ({measured.value:.7g} measured)")
+
+
+def _agrees(value: float, measured: Estimate) -> bool:
+    return abs(measured.value - value) < max(_WHOLE * value, _LIKELY * measured.std_error)
+
+
+def _of_set_points(recording: Recording) -> Estimate:
+    """Set-points over the motor's position [m/rad], beside a following error over velocity and acceleration.
+
+    The control loop makes what is left, which depends on the motion: it counts whole as an error of the ratio.
+    """
+    names = recording.axis
+    moved = motion(recording[names.motor_position], recording.period_s)
+    columns = (moved.position, moved.velocity, moved.acceleration, direction(moved.velocity))
+    constant = np.ones_like(moved.position)
+    fit = fit_blocks([*columns, constant], recording[names.position_command])
+    ratio = fit.estimates[0]
+    error = max(ratio.std_error, fit.left * abs(ratio.value))
+    return Estimate(ratio.value, error, "set-points over the motor's encoder")

@@ -1,0 +1,42 @@
+"""Spellings of units of foreign files."""
+
+import pytest
+
+from hil.drafting.column_names import Quantity, label
+from hil.drafting.units import QUANTITY_OF_UNIT, split_unit, unit_named
+from hil.quantities import si_factor
+
+
+@pytest.mark.parametrize(
+    ("spelling", "unit", "si"),
+    [
+        ("lbf", "lbf", 4.44822),
+        ("lbf·ft", "lbf ft", 1.355818),
+        ("ft-lb", "lbf ft", 1.355818),
+        ("lbf in", "lbf in", 0.1129848),
+        ("in.lb", "lbf in", 0.1129848),
+        ("oz-in", "ozf in", 0.00706155),
+        ("kgf cm", "kgf cm", 0.0980665),
+        ("Ncm", "N cm", 0.01),
+    ],
+)
+def test_forces_and_torques_of_other_systems(spelling: str, unit: str, si: float) -> None:
+    assert unit_named(spelling) == unit
+    assert si_factor(unit, "N" if unit == "lbf" else "N m") == pytest.approx(si, rel=1e-5)
+    assert QUANTITY_OF_UNIT[unit] == "effort"
+
+
+@pytest.mark.parametrize(
+    ("name", "rest", "unit"),
+    [("torque_lbf_in", "torque", "lbf in"), ("Torque [lbf in]", "Torque", "lbf in"), ("speed (in/s)", "speed", "in/s")],
+)
+def test_a_unit_in_the_name_of_a_column(name: str, rest: str, unit: str) -> None:
+    assert split_unit(name) == (rest, unit, False)
+
+
+def test_names_in_italian_and_spanish() -> None:
+    wanted, given = label("posizione comandata [mm]"), label("posición medida [mm]")
+    assert (wanted.quantity, wanted.command, wanted.unit) == (Quantity.POSITION, True, "mm")
+    assert (given.quantity, given.measured, given.command) == (Quantity.POSITION, True, False)
+    assert label("velocità [rpm]").quantity is Quantity.VELOCITY
+    assert label("forza [N]").quantity is Quantity.EFFORT

@@ -62,9 +62,9 @@ def find_roles(
     """
     roles = Roles()
     labels = _of_one_axis(where, dict(labels), columns, roles, axis)
-    for name in [name for name in columns if name in labels and np.ptp(columns[name]) == 0.0]:
-        roles.left_out[name] = f"constant at {columns[name][0]:g}"
-        labels.pop(name)
+    frozen = [name for name in columns if name in labels and np.ptp(columns[name]) == 0.0]
+    roles.left_out |= {name: f"constant at {columns[name][0]:g}" for name in frozen}
+    labels = {name: label for name, label in labels.items() if name not in frozen}
     live = {name: columns[name] for name in columns if name in labels}
     labels = _with_quantities(live, labels, period_s, roles)
     of = {kind: [name for name in live if labels[name].quantity is kind] for kind in Quantity}

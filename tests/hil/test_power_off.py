@@ -19,7 +19,7 @@ from drivers.sim.drive_node import SimulatedDrive
 from hil.cli import app
 from hil.errors import StillPowered
 from hil.loop.devices import Rig
-from hil.loop.session import Session
+from hil.loop.session import DISARM_TIMEOUT_S, Session
 from hil.loop.supervision import Ending
 from hil.motion.profile import Profile
 from hil.motion.trajectory import plan
@@ -116,6 +116,26 @@ def test_while_power_is_switched_off_zero_is_commanded(at: FaultyBench, mode: st
     assert at.run(bench_with(drive={"mode": mode}), watch).outcome.ending is Ending.COMPLETE
     assert commanded
     assert set(commanded) == {0.0}
+
+
+def test_a_drive_that_never_answers_is_asked_for_a_fifth_of_a_second_only(at: FaultyBench) -> None:
+    """A ramp is waited for only if the drive has said that it brakes."""
+    switching_off: list[float] = []
+
+    def deafen(rig: Rig, session: Session) -> None:
+        for can_id in (0x185, 0x285):
+            at.lose(can_id)
+        read = rig.drive.read
+
+        def seen(now_s: float) -> Any:
+            if session._switching_off:
+                switching_off.append(now_s)
+            return read(now_s)
+
+        rig.drive.read = seen
+
+    at.run(bench_with(), lambda rig, session: {MOVING: lambda: deafen(rig, session)})
+    assert DISARM_TIMEOUT_S - 0.01 < switching_off[-1] - switching_off[0] < DISARM_TIMEOUT_S + 0.01
 
 
 def test_cut_off_master_sends_nothing_that_feeds_a_watchdog(at: FaultyBench) -> None:

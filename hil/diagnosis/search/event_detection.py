@@ -142,10 +142,9 @@ def _windows(rest: FloatArray, weights: FloatArray) -> list[Segment]:
 
 def _noise(rest: FloatArray, weights: FloatArray) -> float:
     """Standard deviation of a block of a signal (n,), from the differences of neighbouring means; 0 if not told."""
-    size = rest.size // _SMOOTH_BLOCKS * _SMOOTH_BLOCKS
-    known = weights[:size].reshape(-1, _SMOOTH_BLOCKS).sum(axis=1)
-    total = (rest * weights)[:size].reshape(-1, _SMOOTH_BLOCKS).sum(axis=1)
-    means = (total / np.maximum(known, 1.0))[known >= _SMOOTH_BLOCKS / 2]
-    if means.size < 2:
+    if rest.size < 2 * _SMOOTH_BLOCKS:
         return 0.0
-    return 1.4826 * float(np.median(np.abs(np.diff(means)))) * float(np.sqrt(_SMOOTH_BLOCKS / 2.0))
+    known, total = (np.convolve(values, np.ones(_SMOOTH_BLOCKS), "valid") for values in (weights, rest * weights))
+    means, enough = total / np.maximum(known, 1.0), known >= _SMOOTH_BLOCKS / 2
+    steps = (means[_SMOOTH_BLOCKS:] - means[:-_SMOOTH_BLOCKS])[enough[_SMOOTH_BLOCKS:] & enough[:-_SMOOTH_BLOCKS]]
+    return 1.4826 * float(np.median(np.abs(steps)) * np.sqrt(_SMOOTH_BLOCKS / 2.0)) if steps.size else 0.0

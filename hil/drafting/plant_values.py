@@ -12,18 +12,21 @@ from scipy.signal import butter, sosfiltfilt
 from hil.arrays import FloatArray
 from hil.drafting.estimate import BlockFit, Estimate, fit_blocks
 from hil.drafting.relations import direction, motion, smoothed
-from hil.drafting.torque_columns import LEAST_ROWS, torque_columns
 from hil.errors import InputError
-from hil.identification.inverse_dynamics import CORNER, CUT_AT_START
+from hil.identification.inverse_dynamics import CORNER, CUT_AT_START, inverse_dynamics_columns
 from hil.identification.noise import white_noise
 from hil.recording.recording import Recording
 
 CUTOFFS_HZ = (100.0, 50.0, 25.0, 12.0, 6.0, 3.0)  # of the position filter
 NOISE_SHARE = 0.02  # of noise in the acceleration: it makes the inertia too small by this share
 MOST_OF_RATE = 0.2  # of the sampling rate: the filter must end well below half of it
+LEAST_ROWS = 80  # after decimation: eight per block of the error estimate
 # Residual with a torque over the position over that without, up to which it is reported: on LEAST_ROWS white rows two
 # parameters without effect remove 1 %.
 GRAVITY_GAIN = 0.85
+# Least low-passed sign of the velocity of a row that is fitted: below, the filter mixes the friction of both directions
+# and of rest, and its change near a reversal, where the acceleration is largest, looks like an inertia.
+SLIDES = 0.9
 WRONG_SIGN = 3.0  # standard errors by which a negative inertia is none that the motion does not tell
 LEAST_ANGLE_RAD = 0.5  # of the load: over less, a sine is a straight line to 1 %, and gravity is a spring
 
@@ -138,7 +141,10 @@ def _fit(recording: Recording, cutoff_hz: float, load_ratio: float | None) -> Bl
     position = recording[recording.axis.motor_position]
     angle = position * (load_ratio or 0.0)
     over_position = [position, np.sin(angle), np.cos(angle)]
-    columns, torque = torque_columns(recording, cutoff_hz, decimation, over_position)
+    columns, torque = inverse_dynamics_columns(recording, cutoff_hz, decimation, more=over_position)
+    slides = np.abs(columns[:, 2]) > SLIDES
+    if np.count_nonzero(slides) >= LEAST_ROWS:
+        columns, torque = columns[slides], torque[slides]
     how = f"least squares of torque over motion, position filtered at {cutoff_hz:g} Hz"
     motion_only, spring, weight = columns[:, :4].T, columns[:, 4], columns[:, 5:].T
     plain = fit_blocks(list(motion_only), torque, [how] * 4)

@@ -24,6 +24,7 @@ Sensitivity of the published figures to each step, changed alone (computed on th
 Therefore sign(v) is taken at the full rate and low-passed with the other columns, and the start of the record is cut.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -86,9 +87,11 @@ def fit_inverse_dynamics(
 
 
 def inverse_dynamics_columns(
-    recording: Recording, cutoff_hz: float, decimation: int, cut_at_end: int = 0
+    recording: Recording, cutoff_hz: float, decimation: int, cut_at_end: int = 0, more: Sequence[FloatArray] = ()
 ) -> tuple[FloatArray, FloatArray]:
     """Regressors (n, 4) for inertia, viscous, Coulomb and offset, and torque or force (n,), filtered and decimated.
+
+    `more` are further regressors at the rate of the recording (rows,), appended as columns.
 
     Raises InputError if the record does not move both ways.
     """
@@ -102,9 +105,9 @@ def inverse_dynamics_columns(
             "both; Coulomb friction and offset are not separable in one direction: record a return move"
         )
 
-    # the column of the offset is filtered too: the filter's gain at zero frequency is not exactly 1
+    # every column is filtered, the offset too: the filter's gain at low frequencies is 0.989, not 1
     settled = slice(CUT_AT_START, len(recording) - cut_at_end)
-    columns = (acceleration, velocity, np.sign(velocity), np.ones_like(velocity))
+    columns = (acceleration, velocity, np.sign(velocity), np.ones_like(velocity), *more)
     regressors = np.column_stack([_decimate(column[settled], decimation) for column in columns])
     return regressors, _decimate(force[settled], decimation)
 

@@ -62,7 +62,7 @@ def _agrees(value: float, measured: Estimate) -> bool:
 def _of_set_points(recording: Recording) -> Estimate:
     """Set-points over the motor's position [m/rad], beside a following error over velocity and acceleration.
 
-    The control loop makes what is left, which depends on the motion: it counts whole as an error of the ratio.
+    The remaining difference is following error, which depends on the motion. All of it counts as error of the ratio.
     """
     names = recording.axis
     moved = motion(recording[names.motor_position], recording.period_s)

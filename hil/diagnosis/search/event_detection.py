@@ -103,7 +103,7 @@ def _of_run(run: Measured, seen: Disturbance, reversals: bool) -> list[Event]:
 
 
 def _beyond_reversals(rest: FloatArray, weights: FloatArray, near: NDArray[np.bool_], one: Segment) -> bool:
-    """True for a window that stands out against what is left about the other reversals, if most of it is about one."""
+    """False for a window mostly about a reversal, if its level is not well above the residuals at other reversals."""
     known = weights[one.first : one.last]
     if 2.0 * known[near[one.first : one.last]].sum() <= known.sum():
         return True

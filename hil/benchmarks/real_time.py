@@ -3,11 +3,11 @@
     python -m hil.benchmarks.real_time [--rates 250,1000] [--seconds 600] [--no-busy]
 
 The whole loop is measured: bus, drive, encoders, controller, twin, supervision and recorder; the simulated devices are
-in its process. cyclictest has a lower priority than the loop and wakes at other times: it meets the same disturbances,
-may wait for a tick of the loop, and never delays it. Left out are the cycles that the loop's rule leaves out
-(`clock.SKIP_FROM`: more than half a period late), counted for cyclictest by the same rule. The lateness is that of the
-ticks themselves: a reader of the recording interpolates rows that were left out. The deadlines of the drive are wide,
-so that a stall of the machine does not end the measurement.
+in its process. cyclictest wakes four times in a period with a higher priority than the loop, so that the loop never
+delays it. Left out are the cycles that the loop's rule leaves out (`clock.SKIP_FROM`: more than half a period late);
+those of cyclictest are the cycles that a peer would have left out by the same rule, had it been due when the loop was
+(`left_out`). The lateness is that of the ticks themselves: a reader of the recording interpolates rows that were left
+out. The deadlines of the drive are wide, so that a stall of the machine does not end the measurement.
 """
 
 import os
@@ -20,6 +20,7 @@ import typer
 
 from hil.bench.bench_file import Bench
 from hil.benchmarks.diagnosis import repeated
+from hil.benchmarks.left_out import LeftOut, Stalls, compare
 from hil.loop.latency import Cyclictest, Latencies, cyclictest, load
 from hil.loop.realtime import PRIORITY, loop_core
 from hil.loop.run import run_profile
@@ -30,6 +31,7 @@ from hil.report.console import err, out, table
 
 # as slow as a loop of 250 Hz allows: those of the reference bench are for a velocity loop of 1 kHz
 _GAINS = {"position_gain_1_s": 15.0, "velocity_gain_ma_rpm": 10.0, "velocity_integral_time_ms": 30.0}
+_WAKE_UPS = 4  # of cyclictest in a period of the loop
 _STALL_S = 5.0  # longer than any stall; the axis moves on meanwhile
 _DRIVE = {
     "command_deadline_s": _STALL_S,
@@ -54,18 +56,27 @@ def measure(
             err.print(
                 f"{seconds:g} s at {rate_hz:g} Hz beside {processes} busy processes, load {os.getloadavg()[0]:.1f} ..."
             )
-            ended, loop, reference, certificate = _run(rate_hz, seconds)
-            rows += [_row(f"loop, {rate_hz:g} Hz", loop, certificate["skipped"])]
-            rows += [_row("cyclictest", reference, reference.left_out(1.0 / rate_hz))] if reference else []
+            ended, loop, certificate, beside = _run(rate_hz, seconds)
             counts = ", ".join(f"{name.replace('_', ' ')} {value}" for name, value in certificate.items())
             said.append(f"{rate_hz:g} Hz: {ended}; {counts}")
+            if beside is None:
+                rows += [_row(f"loop, {rate_hz:g} Hz", loop, certificate["skipped"])]
+                continue
+            reference, both = beside
+            rows += [_row(f"loop, {rate_hz:g} Hz", loop, both.loop), _row("cyclictest", reference, both.peer)]
+            said.append(
+                f"{rate_hz:g} Hz: left out by the loop and not by cyclictest within a period: {both.loop_only}; by "
+                f"cyclictest and not by the loop: {both.peer_only}; shared if cyclictest's were at other times: "
+                f"{both.by_chance:.1f}"
+            )
     table(("", "ticks", "left out", "p50", "p99.9", "largest"), rows)
     for line in said:
         out.print(line)
 
 
-def _run(rate_hz: float, seconds: float) -> tuple[str, Latencies, Latencies | None, dict[str, int]]:
-    """Ending, lateness of the loop's ticks, of cyclictest, and what disturbed the loop between arming and its end."""
+def _run(rate_hz: float, seconds: float) -> tuple[str, Latencies, dict[str, int], tuple[Latencies, LeftOut] | None]:
+    """Ending, lateness of the loop's ticks, what disturbed the loop between arming and its end, and cyclictest's
+    latencies with the comparison, None without cyclictest."""
     period_s = 1.0 / rate_hz
     data = load_simulated("reference").model_dump()
     data["control"] |= {"position_period_s": period_s, "velocity_period_s": period_s} | _GAINS
@@ -75,7 +86,8 @@ def _run(rate_hz: float, seconds: float) -> tuple[str, Latencies, Latencies | No
     profile = repeated(PROVE, seconds, period_s)
     with tempfile.TemporaryDirectory() as folder:
         with ExitStack() as stack:
-            beside = partial(cyclictest, period_s, seconds, loop_core(), PRIORITY - 1)
+            wake_up_s = period_s / _WAKE_UPS
+            beside = partial(cyclictest, wake_up_s, seconds, loop_core(), PRIORITY + 1, 0.5 * wake_up_s)
             started = list[Cyclictest]()
             result = run_profile(
                 bench, profile, folder, "run", force=True,
@@ -85,8 +97,12 @@ def _run(rate_hz: float, seconds: float) -> tuple[str, Latencies, Latencies | No
         recording = read_recording(result.recording)
     certificate = recording.metadata["real_time"]["run"]
     counted = {name: certificate[name] for name in ("skipped", "page_faults", "preemptions", "collections", "threads")}
-    ended = f"{result.outcome.ending}: {result.outcome.reason}"
-    return ended, Latencies.of(result.outcome.lateness_s), started[0]()[0], counted
+    outcome = result.outcome
+    reference = started[0]()[0]
+    stalls = Stalls.of(started[0].spikes, wake_up_s)
+    both = compare(outcome.lateness_s, outcome.first_tick_s, period_s, stalls)
+    found = None if reference is None else (reference, both)
+    return f"{outcome.ending}: {outcome.reason}", Latencies.of(outcome.lateness_s), counted, found
 
 
 def _row(name: str, found: Latencies, left_out: int) -> tuple[str, ...]:

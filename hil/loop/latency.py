@@ -24,12 +24,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
-from hil.loop.clock import SKIP_FROM, SPIN_S, WallClock
+from hil.loop.clock import SPIN_S, WallClock
 from hil.loop.disturbances import Disturbances
 from hil.loop.realtime import PRIORITY, Grant, loop_core, real_time
 
 HALF_DECADES = (1e-6, 2e-6, 5e-6, 1e-5, 2e-5, 5e-5, 1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2, 0.1)
 _HISTOGRAM_US = 1_000_000  # longest latency that cyclictest resolves
+_SPIKES = 1_000_000  # the most that are listed
 _LEAD_S = 0.3  # from the start of cyclictest to its first wake-up at a full second
 # A busy process: arithmetic and copies of more memory than a core's cache holds.
 _BUSY = "import os, sys; os.sched_setaffinity(0, {int(sys.argv[1])}); a = bytearray(1 << 24)\nwhile True: bytes(a)"
@@ -69,11 +70,6 @@ class Latencies:
     def missed(self, period_s: float) -> int:
         """Return the periods that passed without a cycle: a latency of 3.2 periods misses three."""
         return sum(count * int(latency_s / period_s) for latency_s, count in self.counts.items())
-
-    def left_out(self, period_s: float) -> int:
-        """Return the ticks that a loop leaves out at these latencies: as `clock.next_due` does."""
-        late = ((latency_s / period_s, count) for latency_s, count in self.counts.items())
-        return sum(count * math.ceil(periods) for periods, count in late if periods > SKIP_FROM)
 
     def bins(self) -> list[int]:
         """Counts below each of HALF_DECADES, and above the last."""
@@ -139,10 +135,11 @@ def load() -> Iterator[int]:
 
 
 class Cyclictest:
-    """Result of a run of cyclictest, when it has ended."""
+    """Result of a run of cyclictest, when it has ended. spikes: its list of late wake-ups, if it was asked for."""
 
     def __init__(self, process: subprocess.Popen[str] | None, results: Path) -> None:
         self._process, self._results = process, results
+        self.spikes = ""
         self.found: tuple[Latencies | None, str] = (
             None,
             "cyclictest is not installed: sudo apt install rt-tests (Debian, Ubuntu), "
@@ -156,7 +153,7 @@ class Cyclictest:
         """Wait for the end and read the histogram."""
         if self._process is None:
             return
-        said = self._process.communicate()[1].strip().splitlines()
+        self.spikes, errors = self._process.communicate()
         try:
             thread = json.loads(self._results.read_text())["thread"]["0"]
             counts = {int(us) / 1e6: count for us, count in thread["histogram"].items()}
@@ -166,12 +163,17 @@ class Cyclictest:
                     counts[_HISTOGRAM_US / 1e6] = beyond - 1
             self.found = Latencies(counts), ""
         except (OSError, ValueError, KeyError):
-            self.found = None, f"cyclictest failed: {' '.join(said) or 'without a message'}"
+            self.found = None, f"cyclictest failed: {' '.join(errors.split()) or 'without a message'}"
 
 
 @contextmanager
-def cyclictest(period_s: float, seconds: float, core: int, priority: int = PRIORITY) -> Iterator[Cyclictest]:
-    """Run cyclictest beside the block, if it is installed; its result is known after the block."""
+def cyclictest(
+    period_s: float, seconds: float, core: int, priority: int = PRIORITY, spike_s: float | None = None
+) -> Iterator[Cyclictest]:
+    """Run cyclictest beside the block, if it is installed; its result is known after the block.
+
+    spike_s: latency from which its wake-ups are listed with their times.
+    """
     program = shutil.which("cyclictest")
     with tempfile.TemporaryDirectory(prefix="hil-latency-") as folder:
         results = Path(folder) / "cyclictest.json"
@@ -180,8 +182,9 @@ def cyclictest(period_s: float, seconds: float, core: int, priority: int = PRIOR
             process = subprocess.Popen(
                 [program, "--quiet", "--mlockall", f"--priority={priority}", f"--affinity={core}", "--secaligned",
                  f"--interval={round(1e6 * period_s)}", f"--loops={max(1, round(seconds / period_s))}",
-                 f"--histogram={_HISTOGRAM_US}", f"--json={results}"],
-                stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)  # fmt: skip
+                 f"--histogram={_HISTOGRAM_US}", f"--histfile={os.devnull}", f"--json={results}",
+                 *([] if spike_s is None else [f"--spike={round(1e6 * spike_s)}", f"--spike-nodes={_SPIKES}"])],
+                stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)  # fmt: skip
         reference = Cyclictest(process, results)
         try:
             yield reference

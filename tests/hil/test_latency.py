@@ -15,7 +15,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hil.loop import latency
-from hil.loop.clock import VirtualClock, next_due
 from hil.loop.disturbances import Disturbances
 from hil.loop.latency import HALF_DECADES, Latencies, Series, load, measure
 from hil.loop.suitability import RATES_HZ, Suitability, beside, judge
@@ -44,20 +43,6 @@ def test_bins_and_percentiles_hold_every_wake_up(counts: dict[float, int]) -> No
 def test_a_stall_misses_as_many_periods_as_it_lasts() -> None:
     assert Latencies({0.0032: 1, 1e-5: 999}).missed(0.001) == 3
     assert Latencies({0.0032: 1, 1e-5: 999}).missed(0.004) == 0
-
-
-def test_ticks_left_out_are_those_that_a_loop_leaves_out() -> None:
-    class Late(VirtualClock):
-        def __init__(self, late_s: float) -> None:
-            self.late_s = [0.0, late_s]
-
-        def wait(self, tick: int) -> float:
-            return self.late_s.pop() if self.late_s else 0.0
-
-    for late_s in (0.0004, 0.0006, 0.001, 0.0011, 0.0087):
-        clock = Late(late_s)
-        skipped = next_due(clock, 7, 0.001, clock.wait(7)).skipped
-        assert Latencies({late_s: 3, 1e-5: 20}).left_out(0.001) == 3 * skipped
 
 
 class StalledClock:

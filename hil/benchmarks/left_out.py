@@ -55,7 +55,7 @@ class LeftOut(NamedTuple):
 
     loop: int
     peer: int
-    loop_only: int
+    loop_only: tuple[int, ...]
     peer_only: int
     by_chance: float
 
@@ -67,9 +67,19 @@ def compare(lateness_s: Sequence[float], first_tick_s: float, period_s: float, s
     due_s: FloatArray = first_tick_s + np.arange(1, ticks + 1, dtype=np.float64) * period_s
     peer = of_peer(stalls.lateness_s(due_s), period_s)
     shared = [_shared(loop, of_peer(stalls.lateness_s(due_s + shift_s), period_s)) for shift_s in _SHIFTS_S]
-    return LeftOut(
-        len(loop), len(peer), len(loop) - _shared(loop, peer), len(peer) - _shared(peer, loop), float(np.mean(shared))
-    )
+    alone = tuple(sorted(1 + tick for tick in loop if not _near(tick, peer)))
+    return LeftOut(len(loop), len(peer), alone, len(peer) - _shared(peer, loop), float(np.mean(shared)))
+
+
+def blocks(ticks: Sequence[int]) -> list[tuple[int, int]]:
+    """Return the first of each block of ticks without a gap, and its length; the longest block first."""
+    found = list[tuple[int, int]]()
+    for tick in ticks:
+        if found and tick == sum(found[-1]):
+            found[-1] = (found[-1][0], found[-1][1] + 1)
+        else:
+            found.append((tick, 1))
+    return sorted(found, key=lambda block: -block[1])
 
 
 def of_loop(lateness_s: Sequence[float], period_s: float) -> tuple[set[int], int]:
@@ -93,5 +103,9 @@ def of_peer(lateness_s: FloatArray, period_s: float) -> set[int]:
 
 
 def _shared(ticks: Iterable[int], others: set[int]) -> int:
-    """How many of the ticks are among the others, or beside one of them."""
-    return sum(bool({tick - 1, tick, tick + 1} & others) for tick in ticks)
+    return sum(_near(tick, others) for tick in ticks)
+
+
+def _near(tick: int, others: set[int]) -> bool:
+    """True for a tick that is among the others, or beside one of them."""
+    return bool({tick - 1, tick, tick + 1} & others)

@@ -18,9 +18,10 @@ from typing import Annotated
 
 import typer
 
+from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
 from hil.benchmarks.diagnosis import repeated
-from hil.benchmarks.left_out import LeftOut, Stalls, compare
+from hil.benchmarks.left_out import LeftOut, Stalls, blocks, compare
 from hil.loop.latency import Cyclictest, Latencies, cyclictest, load
 from hil.loop.realtime import PRIORITY, loop_core
 from hil.loop.run import run_profile
@@ -31,6 +32,7 @@ from hil.report.console import err, out, table
 
 # as slow as a loop of 250 Hz allows: those of the reference bench are for a velocity loop of 1 kHz
 _GAINS = {"position_gain_1_s": 15.0, "velocity_gain_ma_rpm": 10.0, "velocity_integral_time_ms": 30.0}
+_SHOWN = 8  # longest blocks of ticks left out by the loop alone
 _WAKE_UPS = 4  # of cyclictest in a period of the loop
 _STALL_S = 5.0  # longer than any stall; the axis moves on meanwhile
 _DRIVE = {
@@ -56,7 +58,7 @@ def measure(
             err.print(
                 f"{seconds:g} s at {rate_hz:g} Hz beside {processes} busy processes, load {os.getloadavg()[0]:.1f} ..."
             )
-            ended, loop, certificate, beside = _run(rate_hz, seconds)
+            ended, loop, certificate, beside, cycle_s = _run(rate_hz, seconds)
             counts = ", ".join(f"{name.replace('_', ' ')} {value}" for name, value in certificate.items())
             said.append(f"{rate_hz:g} Hz: {ended}; {counts}")
             if beside is None:
@@ -65,18 +67,25 @@ def measure(
             reference, both = beside
             rows += [_row(f"loop, {rate_hz:g} Hz", loop, both.loop), _row("cyclictest", reference, both.peer)]
             said.append(
-                f"{rate_hz:g} Hz: left out by the loop and not by cyclictest within a period: {both.loop_only}; by "
-                f"cyclictest and not by the loop: {both.peer_only}; shared if cyclictest's were at other times: "
+                f"{rate_hz:g} Hz: left out by the loop and not by cyclictest within a period: {len(both.loop_only)}; "
+                f"by cyclictest and not by the loop: {both.peer_only}; shared if cyclictest's were at other times: "
                 f"{both.by_chance:.1f}"
             )
+            said += [
+                f"{rate_hz:g} Hz: {count} left out by the loop alone from {tick / rate_hz:.3f} s on; the cycle before "
+                f"took {1e3 * cycle_s[tick - 1]:.3f} ms"
+                for tick, count in blocks(both.loop_only)[:_SHOWN]
+            ]
     table(("", "ticks", "left out", "p50", "p99.9", "largest"), rows)
     for line in said:
         out.print(line)
 
 
-def _run(rate_hz: float, seconds: float) -> tuple[str, Latencies, dict[str, int], tuple[Latencies, LeftOut] | None]:
-    """Ending, lateness of the loop's ticks, what disturbed the loop between arming and its end, and cyclictest's
-    latencies with the comparison, None without cyclictest."""
+def _run(
+    rate_hz: float, seconds: float
+) -> tuple[str, Latencies, dict[str, int], tuple[Latencies, LeftOut] | None, FloatArray]:
+    """Ending, lateness of the loop's ticks, what disturbed the loop between arming and its end, cyclictest's
+    latencies with the comparison, None without cyclictest, and the time that the cycle of each tick took [s]."""
     period_s = 1.0 / rate_hz
     data = load_simulated("reference").model_dump()
     data["control"] |= {"position_period_s": period_s, "velocity_period_s": period_s} | _GAINS
@@ -102,7 +111,7 @@ def _run(rate_hz: float, seconds: float) -> tuple[str, Latencies, dict[str, int]
     stalls = Stalls.of(started[0].spikes, wake_up_s)
     both = compare(outcome.lateness_s, outcome.first_tick_s, period_s, stalls)
     found = None if reference is None else (reference, both)
-    return f"{outcome.ending}: {outcome.reason}", Latencies.of(outcome.lateness_s), counted, found
+    return f"{outcome.ending}: {outcome.reason}", Latencies.of(outcome.lateness_s), counted, found, recording["cycle_s"]
 
 
 def _row(name: str, found: Latencies, left_out: int) -> tuple[str, ...]:

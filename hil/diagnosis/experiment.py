@@ -18,13 +18,14 @@ import numpy as np
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
 from hil.diagnosis.candidate_motions import candidates, reach
-from hil.diagnosis.search.forward_selection import ALIKE, TIED, Explanation
+from hil.diagnosis.search.forward_selection import Explanation
 from hil.diagnosis.verdict.findings import rivals_of
 from hil.diagnosis.verdict.judge import not_testable
 from hil.diagnosis.wording import title
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Estimator, Fit
 from hil.identification.hypothesis import Hypothesis
+from hil.identification.inference import ALIKE, TIED
 from hil.identification.measured import Measured
 from hil.identification.parallel import in_parallel
 from hil.identification.terms import SAME, ambiguous, compatible

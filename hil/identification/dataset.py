@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
@@ -13,7 +14,7 @@ from hil.errors import InputError
 from hil.identification.command_timing import unknown_share
 from hil.identification.measured import Measured
 from hil.identification.noise import Laps
-from hil.identification.rest import creeping
+from hil.identification.rest import creeping, resting
 from hil.twin.axis import Response, Start
 from hil.twin.stepping.loops import LEAST_TICKS
 
@@ -69,6 +70,11 @@ class Dataset:
         """Noise of the residuals at each row, (n,) per channel, for each run: scales without model discrepancy."""
         return self.scales(discrepancy=0.0)
 
+    @cached_property
+    def floors(self) -> tuple[dict[str, float], ...]:
+        """Noise floor of the residual of each channel, block by block, for each run."""
+        return tuple(noise_floor_rms(run, self.bench, self.observer_s) for run in self.runs)
+
     @property
     def rows(self) -> int:
         """Number of evaluated rows of all runs."""
@@ -111,37 +117,83 @@ def scales(
     """Size of one unit of weighted residual at each row (n,), per channel: noise and model discrepancy.
 
     A torque d that the twin misses moves its motor by d tau^2 / J before the correction takes hold, with tau the
-    observer's time constant: the motor counts from the torque that the torque channel can still see. White noise e
-    of its encoder comes back through the observer as (1 - z^-1)^2 / (1 - a z^-1)^2 e, a = 1 - T / tau. That of a
-    velocity v, whose trapezoidal sum is the position, comes back as (1 - z^-2) / 2 / (1 - a z^-1)^2 T v.
+    observer's time constant: the motor counts from the torque that the torque channel can still see.
     """
-    seen = torque_accuracy * run.noise.torque * observer_s**2 / inertia(bench)
+    found = {
+        name: np.hypot(noise, left)
+        for (name, noise), left in zip(
+            sensor_noise(run, bench, observer_s).items(), unknown_input(run, bench, observer_s).values(), strict=True
+        )
+    }
+    found["motor"] = np.hypot(found["motor"], torque_accuracy * run.noise.torque * observer_s**2 / inertia(bench))
+    if run.table_m.size and discrepancy:
+        found["table"] = np.hypot(found["table"], discrepancy * _deflection(run, bench, observer_s))
+    return found
+
+
+def _deflection(run: Measured, bench: Bench, observer_s: float) -> FloatArray:
+    """Deflection (n,) of the transmission [m] as the bench gives it for the measured motion, its median taken off.
+
+    The measured difference of the encoders is more than that: it has their lateness and errors of the lead, which a
+    simulation reproduces exactly.
+    """
+    twin = bench.twin()
+    twin = replace(twin, observer_s=observer_s)
+    rest = resting(run, twin.slow_velocity)
+    with np.errstate(invalid="ignore", over="ignore"):  # the twin of a bench may be unstable
+        found = twin.observe(run.position_command_m, run.velocity_command_m_s, run.response, run.start, rest)
+        apart = found.table_position_m - bench.axis.ratio_m_rad * found.motor_position
+        return np.asarray(apart - np.median(apart), dtype=np.float64)
+
+
+def sensor_noise(run: Measured, bench: Bench, observer_s: float) -> dict[str, FloatArray]:
+    """Noise of the sensors at each row (n,) in the residual of each channel, block by block.
+
+    White noise e of the motor's encoder comes back through the observer as (1 - z^-1)^2 / (1 - a z^-1)^2 e,
+    a = 1 - T / tau. That of a velocity v, whose trapezoidal sum is the position, comes back as
+    (1 - z^-2) / 2 / (1 - a z^-1)^2 T v.
+    """
     a = 1.0 - run.period_s / observer_s
     impulse = np.zeros(round(20.0 * observer_s / run.period_s) + 3)
     impulse[0] = 1.0
     numerator = [0.5, 0.0, -0.5] if run.integrated else [1.0, -2.0, 1.0]
     passed = lfilter(numerator, [1.0, -2.0 * a, a * a], impulse)
+    table, torque = (np.full(run.motor.shape, noise) for noise in (run.noise.table_m, run.noise.torque))
+    found = {"motor": run.motor_noise * np.linalg.norm(passed), "table": table, "torque": torque, "command": torque}
+    if run.sampled and run.torque_is_command:  # its noise drives the twin too
+        for name, response in impulse_responses(run, bench, observer_s).items():
+            found[name] = np.hypot(found[name], run.noise.torque * np.linalg.norm(response))
+    return found
+
+
+def unknown_input(run: Measured, bench: Bench, observer_s: float) -> dict[str, FloatArray]:
+    """Largest effect at each row (n,), per channel, of what samples leave open: torque between rows, friction at creep.
+
+    These are standard deviations where nothing else is known, so upper bounds: most of a torque that is smooth, or of
+    friction in a reversal, follows from the rows about it.
+    """
     rows = run.motor.shape
-    table, torque = (np.broadcast_to(noise, rows) for noise in (run.noise.table_m, run.noise.torque))
-    if run.table_m.size:
-        deflection_m = run.table_m - bench.axis.ratio_m_rad * run.motor
-        table = np.hypot(table, discrepancy * (deflection_m - np.median(deflection_m)))
-    found = {
-        "motor": np.hypot(run.motor_noise * np.linalg.norm(passed), seen),
-        "table": table,
-        "torque": torque,
-        "command": torque,
-    }
+    found = {name: np.zeros(rows) for name in ("motor", "table", "torque", "command")}
     if run.sampled:
         unknown = unknown_torque(run, bench)
-        if run.torque_is_command:  # its noise drives the twin too
-            unknown = np.hypot(unknown, run.noise.torque)
         for name, response in impulse_responses(run, bench, observer_s).items():
-            found[name] = np.sqrt(found[name] ** 2 + np.convolve(unknown**2, response**2)[: rows[0]])
+            found[name] = np.sqrt(np.convolve(unknown**2, response**2)[: rows[0]])
     if run.noise.coarse:
         held = bench.axis.physics().coulomb_n_m * observer_s**2 / inertia(bench)
         found["motor"] = np.hypot(found["motor"], np.where(creeping(run), held, 0.0))
     return found
+
+
+def noise_floor_rms(run: Measured, bench: Bench, observer_s: float) -> dict[str, float]:
+    """rms of the noise in the residual of each channel of a run, block by block.
+
+    Of what samples leave open it has the size in the median row: in reversals that is a bound far above its rms.
+    """
+    left = unknown_input(run, bench, observer_s)
+    return {
+        name: float(np.hypot(np.sqrt(np.mean(noise[run.judged] ** 2)), np.median(left[name][run.judged])))
+        for name, noise in sensor_noise(run, bench, observer_s).items()
+    }
 
 
 def unknown_torque(run: Measured, bench: Bench) -> FloatArray:

@@ -25,6 +25,10 @@ Filter = FloatArray
 _ORDER = 24  # of the autoregressive model: 24 ms at 1 kHz, the period of the slowest control resonance
 # Added to each energy per row, in units of noise^2: differences below a tenth of the noise in rms carry no evidence.
 _BLUR = 0.01
+TIED = 10.0  # BIC difference: a rival closer than this is not refuted. "Very strong" evidence (Kass and Raftery 1995)
+# Difference in energy per row, in units of noise^2, up to which a rival is not refuted, whatever the evidence: 7 % of
+# the noise in rms. The model discrepancy of two simulations of one axis is as large.
+ALIKE = 0.005
 _SOKAL = 5.0  # window of the autocorrelation sum in correlation times (Sokal 1997)
 
 
@@ -79,6 +83,11 @@ def by_energy(better: Fit, worse: Fit) -> float:
     rows = effective_samples(better)
     more = better.hypothesis.free - worse.hypothesis.free
     return float(rows * np.log(worse.cost / better.cost) - more * np.log(rows))
+
+
+def refuted(evidence: float, more: float) -> bool:
+    """True if a hypothesis falls behind another by this evidence (BIC difference) and this energy per row [noise^2]."""
+    return evidence >= TIED and more >= ALIKE
 
 
 def correlation_time(residual: FloatArray) -> float:

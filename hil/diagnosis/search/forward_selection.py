@@ -20,7 +20,7 @@ from hil.identification.coordinates import LAST_EDGE_STEP_S
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit, FitStatus
 from hil.identification.hypothesis import effects
-from hil.identification.inference import against, whitening
+from hil.identification.inference import TIED, against, refuted, whitening
 from hil.identification.nominal_fit import fit_nominal_parameters, require_finite
 from hil.identification.parallel import in_parallel
 from hil.identification.terms import FRICTION, Key, Term, compatible, free_slot
@@ -28,14 +28,10 @@ from hil.twin.library import BY_ID
 from hil.twin.physics import Active
 
 MOST_TERMS = 8  # at once: more than an engineer can act on; limits the duration of a search
-TIED = 10.0  # BIC difference: a rival closer than this is not refuted. "Very strong" evidence (Kass and Raftery 1995)
 # After this many terms that leave more than `MOST` of the energy above the floor the search ends.
 _IN_VAIN = 3
 _NEAR = 1.1  # cost over that of the chosen explanation, up to which the fit of a rival is ended before it is compared
 _ENDED = 40  # evaluations: a fit that starts near its minimum converges within them
-# Difference in energy per row up to which a rival is not refuted, whatever the evidence: a quarter of MATERIAL, 7 % of
-# the noise in rms. The model discrepancy of two simulations of one axis is as large.
-ALIKE = 0.25 * MATERIAL
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +55,7 @@ class RivalFit:
     @property
     def tied(self) -> bool:
         """True if it is not refuted."""
-        return self.evidence < TIED or self.more < ALIKE
+        return not refuted(self.evidence, self.more)
 
 
 @dataclass(frozen=True, eq=False)

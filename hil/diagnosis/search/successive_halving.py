@@ -18,7 +18,7 @@ from hil.identification.coordinates import LAST_EDGE_STEP_S, TRUST
 from hil.identification.dataset import TORQUE_ACCURACY, inertia
 from hil.identification.estimator import Estimator, Fit
 from hil.identification.hypothesis import Hypothesis
-from hil.identification.inference import by_energy
+from hil.identification.inference import by_energy, refuted
 from hil.identification.levenberg_marquardt import damped_step, normal_equations, robust_loss
 from hil.identification.nominal_fit import SOFT
 from hil.identification.parallel import POOL, in_parallel
@@ -39,7 +39,6 @@ LONG = 25  # evaluations of a last fit
 _BEATEN, _LEVEL, _BEHIND = 5.0, 1.5, 0.5
 _SOLVED = 1e-9  # damping of a step that solves the normal equations, over their diagonal: only against singular ones
 _HOPELESS = 0.02  # share of the residual energy over that of the first candidate: below, a candidate is not fitted
-_CLEARLY = 10.0  # BIC difference between variants of one mechanism: "very strong" (Kass and Raftery 1995)
 _EDGE_SHIFTS_S = np.arange(-15, 16) * 0.005  # tried shifts of an edge: its valley is narrower than a step of the fit
 
 
@@ -278,8 +277,13 @@ def _rather(fit: Fit, known: Fit) -> bool:
     if not BY_ID[mine.effect].first_unless_clear or mine.variant == other.variant:
         return fit.cost < known.cost
     if mine.variant < other.variant:
-        return by_energy(known, fit) < _CLEARLY
-    return by_energy(fit, known) >= _CLEARLY
+        return not _behind(fit, known)
+    return _behind(known, fit)
+
+
+def _behind(worse: Fit, better: Fit) -> bool:
+    """True if the residuals refute a form of a mechanism against another form of it."""
+    return refuted(by_energy(better, worse), (worse.cost - better.cost) / better.rows)
 
 
 def _soft(fit: Fit) -> float:

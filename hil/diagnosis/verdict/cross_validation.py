@@ -12,13 +12,13 @@ from functools import partial
 
 import numpy as np
 
-from hil.diagnosis.search.forward_selection import TIED, claimed
+from hil.diagnosis.search.forward_selection import claimed
 from hil.diagnosis.search.harm import refuting
 from hil.diagnosis.search.initial_values import axis_facts
 from hil.diagnosis.verdict.fit_table import channel_names
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
-from hil.identification.inference import against, standard_errors
+from hil.identification.inference import TIED, against, standard_errors
 from hil.identification.noise_floor import REPEATS, unrepeated
 from hil.identification.parallel import in_parallel
 from hil.identification.terms import Term

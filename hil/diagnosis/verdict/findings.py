@@ -11,7 +11,7 @@ from dataclasses import replace
 
 from hil.bench.bench_file import Bench, MechanismEntry
 from hil.diagnosis.result import Correction, Finding, Rival, Value
-from hil.diagnosis.search.forward_selection import TIED, Explanation, RivalFit
+from hil.diagnosis.search.forward_selection import Explanation, RivalFit
 from hil.diagnosis.search.initial_values import claimable
 from hil.diagnosis.verdict.cross_validation import Ablation
 from hil.diagnosis.verdict.event_windows import describe_event
@@ -20,7 +20,7 @@ from hil.diagnosis.wording import sentence, title, unit_in
 from hil.identification.coordinates import DELAY
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
-from hil.identification.inference import standard_errors
+from hil.identification.inference import TIED, standard_errors
 from hil.identification.terms import FRICTION, LOAD, SAME, Key, Term, ambiguous
 from hil.quantities import digits, unit_of
 from hil.twin.library import BY_ID, LIBRARY

@@ -99,12 +99,12 @@ class _ChannelTable:
     def _white(self, data: Dataset, index: int) -> float:
         """White noise of the channel in a run.
 
-        Block by block it is the scale of the weighted residuals. In closed loop it is the noise of the sensor and the
-        response of the axis to the noise of its encoders.
+        Block by block it is what of that noise reaches the residual. In closed loop it is the noise of the sensor and
+        the response of the axis to the noise of its encoders.
         """
         run = data.runs[index]
         if self.mode is Mode.BLOCKS:
-            return rms(data.noise[index][self.channel][run.judged])
+            return data.floors[index][self.channel]
         return math.hypot(sensor_noise(run)[self.channel], self.noise[run][self.channel])
 
 
@@ -137,7 +137,8 @@ def fit_table(owner: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> dict[s
         }
         mode = modes[0]
         if held:
-            closed, block = (max(one.after_rms / one.noise_floor_rms for one in figures[mode]) for mode in figures)
+            closed = max(one.after_rms / one.noise_floor_rms for one in figures[mode])
+            block = math.sqrt(max(ratios[channel] for data in sets for ratios in final.on(data).noise_ratios))
             chaotic = closed > STRAYS >= block and not train.runs[0].torque_is_command
             mode = Mode.BLOCKS if chaotic else Mode.CLOSED_LOOP
         result[recorded] = ChannelFit(

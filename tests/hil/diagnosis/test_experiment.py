@@ -13,12 +13,12 @@ from hil.bench.bench_file import Bench
 from hil.bench.hardware import SetPointLimits
 from hil.diagnosis.candidate_motions import candidates, reach
 from hil.diagnosis.experiment import Experiment, separating, showing
-from hil.diagnosis.search.forward_selection import TIED, Explanation, RivalFit
+from hil.diagnosis.search.forward_selection import Explanation, RivalFit
 from hil.diagnosis.verdict.judge import not_testable
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
-from hil.identification.inference import against
+from hil.identification.inference import TIED, against
 from hil.identification.measured import take
 from hil.identification.terms import Term
 from hil.motion.profile import Profile, load_profile, write_profile

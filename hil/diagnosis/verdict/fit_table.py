@@ -108,6 +108,13 @@ class _ChannelTable:
         return math.hypot(sensor_noise(run)[self.channel], self.noise[run][self.channel])
 
 
+def _over_noise(hypothesis: Hypothesis, data: Dataset, channel: str) -> float:
+    """Residual rms of a channel block by block over its noise as the fits weigh it."""
+    runs = list(zip(data.runs, hypothesis.residuals(data).channels, data.noise, strict=True))
+    left = np.concatenate([parts[channel][run.judged] for run, parts, _ in runs])
+    return rms(left) / rms(np.concatenate([noise[channel][run.judged] for run, _, noise in runs]))
+
+
 def closed_loop_held(nominal: Fit, final: Fit, held_out: Dataset) -> bool:
     """True if the control law is known, and refitted and final twin keep to all recordings in closed loop."""
     sets = [data for data in (final.data, held_out) if data.runs]
@@ -138,7 +145,7 @@ def fit_table(owner: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> dict[s
         mode = modes[0]
         if held:
             closed = max(one.after_rms / one.noise_floor_rms for one in figures[mode])
-            block = math.sqrt(max(ratios[channel] for data in sets for ratios in final.on(data).noise_ratios))
+            block = max(_over_noise(final.hypothesis, data, channel) for data in sets)
             chaotic = closed > STRAYS >= block and not train.runs[0].torque_is_command
             mode = Mode.BLOCKS if chaotic else Mode.CLOSED_LOOP
         result[recorded] = ChannelFit(

@@ -52,6 +52,22 @@ def test_a_floor_is_never_below_the_sensor_noise(three_laps: Measured) -> None:
     assert floor(np.zeros(three_laps.motor.size), 0.02, found).rms == 0.02
 
 
+def test_a_late_encoder_does_not_widen_the_scale_of_its_channel(three_laps: Measured) -> None:
+    late = replace(three_laps, table_m=np.concatenate([np.full(2, three_laps.table_m[0]), three_laps.table_m[:-2]]))
+    before, after = (prepare_dataset([run], bench()).scales()[0]["table"] for run in (three_laps, late))
+    assert np.median(after[late.moving]) == pytest.approx(np.median(before[late.moving]), rel=0.05)
+
+
+def test_the_floor_of_the_motor_is_its_encoder_not_the_torque_that_counts(three_laps: Measured) -> None:
+    quiet, loud = (
+        prepare_dataset([replace(three_laps, noise=replace(three_laps.noise, torque=torque))], bench())
+        for torque in (0.01, 0.02)
+    )
+    assert quiet.observer_s == loud.observer_s
+    assert loud.floors[0]["motor"] == quiet.floors[0]["motor"]
+    assert np.median(loud.noise[0]["motor"]) > 1.5 * np.median(quiet.noise[0]["motor"])
+
+
 def test_without_laps_the_floor_is_the_sensor_noise() -> None:
     once = take(recorded(bench()), bench())
     assert once.laps is None

@@ -117,6 +117,9 @@ CATALOGUE: Mapping[str, Definition] = MappingProxyType({
     "encoder_eccentricity": Definition(
         "motor encoder reads theta + amplitude sin(theta + phase)",
         {"amplitude_rad": _AT_LEAST_0, "phase_rad": _PHASE}),
+    "load_encoder_eccentricity": Definition(
+        "table encoder of a load that turns: one head; its graduation is off centre by amplitude times its radius",
+        {"amplitude_rad": ParameterRange(0.0, 0.9), "phase_rad": _PHASE}),
     "scale_interpolation_error": Definition(
         "linear encoder reads x + amplitude sin(2 pi x / period + phase)",
         {"amplitude_m": _AT_LEAST_0, "period_m": _POSITIVE, "phase_rad": _PHASE_0}),

@@ -79,6 +79,18 @@ def test_encoder_eccentricity_once_per_revolution(amplitude, phase, value) -> No
     assert np.abs(np.delete(harmonic, 1)).max() < 1e-11
 
 
+@given(amplitude=st.floats(0.0, 0.01), phase=phases, value=st.floats(-100.0, 100.0), ratio=st.floats(0.01, 1.0))
+def test_load_encoder_eccentricity_once_per_revolution_of_the_load(amplitude, phase, value, ratio) -> None:
+    def error(load_rad):
+        at = AT_REST._replace(table_position_m=load_rad, angle_rad=load_rad / ratio)
+        return call("load_encoder_eccentricity", value, at, amplitude_rad=amplitude, phase_rad=phase) - value
+
+    assert error(-phase) == pytest.approx(0.0, abs=1e-12)
+    assert error(np.pi / 2 - phase) == pytest.approx(amplitude, abs=1e-12)
+    assert error(np.pi / 6 - phase) == pytest.approx(0.5 * amplitude, abs=1e-12)
+    assert error(2.0 * np.pi + 0.4) == pytest.approx(error(0.4), abs=1e-12)
+
+
 @given(amplitude=st.floats(0.0, 1e-5), period=st.floats(1e-5, 1e-3), phase=phases, position=st.floats(-0.5, 0.5))
 def test_scale_interpolation_error_within_its_signal_period(amplitude, period, phase, position) -> None:
     quarters = [

@@ -75,6 +75,9 @@ CATALOGUE: Mapping[str, Definition] = MappingProxyType({
         ("attached", "base")),
     "external_force": Definition(
         "force on the table while start <= t < end", {"force_n": _ANY, "start_s": _ANY, "end_s": _ANY}),
+    "periodic_force": Definition(
+        "force on the table all the time, as of a rotor out of balance: the projection of a vector that turns",
+        {"force_n": _AT_LEAST_0, "frequency_hz": _POSITIVE, "phase_rad": _PHASE}),
     "spring_load": Definition(
         "-stiffness (x - rest) on the table", {"stiffness_n_m": _AT_LEAST_0, "rest_position_m": _ANY}),
     "gravity_torque": Definition(

@@ -237,8 +237,8 @@ class Mechanism:
 
     @property
     def once_per_turn(self) -> bool:
-        """True if it has a phase, but no period, order or frequency: it repeats once per revolution."""
-        others = (Role.PERIOD, Role.ORDER, Role.FREQUENCY)
+        """True if it has a phase, but no period, order or line: it repeats once per revolution."""
+        others = (Role.PERIOD, Role.ORDER, Role.LINE)
         return bool(self.indices(Role.PHASE)) and not any(self.indices(role) for role in others)
 
     def size(self, values: Sequence[float], axis: AxisFacts) -> float:

@@ -95,7 +95,10 @@ def _named(term: Term, lead_m: float) -> Lock:
         order = 1.0 + float(np.argmax([term.values[index] for index in mechanism.indices(Role.STRENGTH)]))
     if order is not None:  # without a lead counted per metre
         return Lock(period_m=lead_m / order, order_per_rev=order) if lead_m else Lock(period_m=1.0 / order)
-    return Lock(frequency_hz=mechanism.named(Role.FREQUENCY, term.values), period_m=period_m)
+    frequency_hz = next(
+        (f for f in (mechanism.named(role, term.values) for role in (Role.FREQUENCY, Role.LINE)) if f), None
+    )
+    return Lock(frequency_hz=frequency_hz, period_m=period_m)
 
 
 def _lead_m(bench: Bench) -> float:

@@ -68,6 +68,17 @@ def test_gravity_pulls_an_arm_down(torque, angle, from_down) -> None:
     assert weight(from_down) == pytest.approx(-weight(-from_down), abs=1e-9)
 
 
+@given(force=st.floats(0.0, 500.0), frequency_hz=st.floats(0.5, 50.0), phase=phases, position=st.floats(-1.0, 1.0))
+def test_periodic_force_goes_with_the_clock_and_not_with_the_position(force, frequency_hz, phase, position) -> None:
+    def at(turns):
+        moment = AT_REST._replace(time_s=turns / frequency_hz, step_s=0.0, table_position_m=position)
+        return call("periodic_force", 0.0, moment, force_n=force, frequency_hz=frequency_hz, phase_rad=phase)
+
+    assert np.hypot(at(0.1), at(0.35)) == pytest.approx(force, rel=1e-9, abs=1e-9)
+    assert at(1.1) == pytest.approx(at(0.1), abs=1e-6)
+    assert at(0.0) == pytest.approx(force * np.sin(phase), abs=1e-6)
+
+
 # -- sensors
 
 

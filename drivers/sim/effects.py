@@ -75,6 +75,9 @@ CATALOGUE: Mapping[str, Definition] = MappingProxyType({
         ("attached", "base")),
     "external_force": Definition(
         "force on the table while start <= t < end", {"force_n": _ANY, "start_s": _ANY, "end_s": _ANY}),
+    "periodic_force": Definition(
+        "force on the table all the time, as of a rotor out of balance: the projection of a vector that turns",
+        {"force_n": _AT_LEAST_0, "frequency_hz": _POSITIVE, "phase_rad": _PHASE}),
     "spring_load": Definition(
         "-stiffness (x - rest) on the table", {"stiffness_n_m": _AT_LEAST_0, "rest_position_m": _ANY}),
     "gravity_torque": Definition(
@@ -117,6 +120,9 @@ CATALOGUE: Mapping[str, Definition] = MappingProxyType({
     "encoder_eccentricity": Definition(
         "motor encoder reads theta + amplitude sin(theta + phase)",
         {"amplitude_rad": _AT_LEAST_0, "phase_rad": _PHASE}),
+    "load_encoder_eccentricity": Definition(
+        "table encoder of a load that turns: one head; its graduation is off centre by amplitude times its radius",
+        {"amplitude_rad": ParameterRange(0.0, 0.9), "phase_rad": _PHASE}),
     "scale_interpolation_error": Definition(
         "linear encoder reads x + amplitude sin(2 pi x / period + phase)",
         {"amplitude_m": _AT_LEAST_0, "period_m": _POSITIVE, "phase_rad": _PHASE_0}),

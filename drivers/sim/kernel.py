@@ -7,7 +7,7 @@ Leapfrog with friction as an impulse (Moreau's time stepping, diagonal M): posit
 second order in h for springs and torque, exact rest in stiction. A torque that changes at t_k acts with its mean there.
 """
 
-from math import pi, sin, sqrt
+from math import cos, pi, sin, sqrt
 from typing import Any
 
 import numpy as np
@@ -79,6 +79,9 @@ def table_force(p: Any, position_m: float, time_s: float) -> float:
     e = p.external_force
     if e.start_s <= time_s < e.end_s:
         force += e.force_n
+    if p.periodic_force.on:
+        turns = p.periodic_force.frequency_hz * time_s + p.periodic_force.phase_rad / (2.0 * pi)
+        force += p.periodic_force.force_n * cos(2.0 * pi * (turns - np.floor(turns) - 0.25))
     if p.gravity_torque.on:
         weight = p.gravity_torque
         force += weight.gravity_torque_n_m * sin(-position_m - weight.angle_rad)

@@ -15,7 +15,7 @@ from drivers.sim.sensors import Sensors
 NEED_TABLE = (
     "backlash", "preload_loss", "position_dependent_stiffness", "periodic_lead_error", "cumulative_lead_error",
     "thermal_growth", "table_side_friction", "scale_interpolation_error",
-    "novel_pitch_bump",
+    "load_encoder_eccentricity", "novel_pitch_bump",
 )  # fmt: skip
 GROUPS = {
     "varied_friction": (
@@ -26,7 +26,9 @@ GROUPS = {
     "lead_errors": ("periodic_lead_error", "cumulative_lead_error", "thermal_growth", "novel_pitch_bump"),
     "drive_path": ("torque_saturation", "torque_dead_zone", "current_loop_lag", "transport_delay"),
     "angle_torque": ("torque_ripple", "torque_constant_saturation", "cogging_torque", "novel_torque_fade"),
-    "table_force": ("external_force", "spring_load", "gravity_torque", "novel_vibration", "novel_hammering"),
+    "table_force": (
+        "external_force", "periodic_force", "spring_load", "gravity_torque", "novel_vibration", "novel_hammering",
+    ),
 }  # fmt: skip
 LARGEST_PHASE_STEP = 1.5  # omega h; leapfrog is stable below 2, less with damping
 

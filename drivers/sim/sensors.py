@@ -1,7 +1,7 @@
 """Encoders and torque measurement of the simulated axis: resolution, offset, noise, sampling jitter."""
 
 from dataclasses import dataclass, fields
-from math import cos, isfinite, log, pi, sin, sqrt
+from math import atan2, cos, isfinite, log, pi, sin, sqrt
 from typing import Any
 
 import numpy as np
@@ -108,6 +108,19 @@ def table_truth(p: Any, s: Any) -> float:
     reading: float = s.position[p.table] + p.table_offset
     if p.base >= 0:
         reading -= s.position[p.base]
+    if p.load_encoder_eccentricity.on:
+        reading += off_centre(p.load_encoder_eccentricity, s.position[p.table])
     if e.on:
         reading += e.amplitude_m * sin(2.0 * pi * reading / e.period_m + e.phase_rad)
     return reading
+
+
+@njit(cache=True)
+def off_centre(e: Any, angle_rad: float) -> float:
+    """Error [rad] of one head on a graduation whose centre is off the axis of rotation.
+
+    In radii of the graduation, seen from its centre: the axis is at distance a, and the head one radius from the axis.
+    """
+    across = e.amplitude_rad * sin(angle_rad + e.phase_rad)
+    along = e.amplitude_rad * cos(angle_rad + e.phase_rad)
+    return atan2(across, 1.0 + along)

@@ -54,6 +54,11 @@ class Dataset:
         """Other recordings of the same axis with the same observer and travel."""
         return Dataset(tuple(runs), self.bench, self.observer_s, self.travel_m)
 
+    @property
+    def duration_s(self) -> float:
+        """Time at the end of the last recording [s]; 0 without recordings."""
+        return max((float(run.time_s[-1]) for run in self.runs), default=0.0)
+
     def scales(
         self, torque_accuracy: float = TORQUE_ACCURACY, discrepancy: float = DISCREPANCY
     ) -> tuple[dict[str, FloatArray], ...]:

@@ -190,7 +190,7 @@ class Estimator:
 
     def steps(self, hypothesis: Hypothesis) -> FloatArray:
         """Steps (p,) of the forward differences."""
-        return hypothesis.steps(self.data.travel_m, self.edge_step_s)
+        return hypothesis.steps(self.data.travel_m, self.data.duration_s, self.edge_step_s)
 
     def jacobian(self, hypothesis: Hypothesis, held: FloatArray | SingleArray | None = None) -> FloatArray:
         """Derivative of the weighted residuals (m, p) by forward differences, columns in parallel.

@@ -181,8 +181,8 @@ class Hypothesis:
         pairs = np.array([c.bounds for c in self.coordinates])
         return pairs[:, 0], pairs[:, 1]
 
-    def steps(self, travel_m: float, edge_step_s: float) -> FloatArray:
-        """Steps (p,) of x for forward differences."""
+    def steps(self, travel_m: float, duration_s: float, edge_step_s: float) -> FloatArray:
+        """Steps (p,) of x for forward differences; `travel_m` and `duration_s` of the recordings."""
         step = CHATTER_STEP if self._chatters else 1e-4
         angle_rad = travel_m / self.bench.axis.ratio_m_rad * self.bench.axis.physics().angle_per_unit
         of_axis = self.nominal_count - len(self._known)
@@ -196,6 +196,8 @@ class Hypothesis:
                 own = edge_step_s / max(abs(start), EDGE_STEP_S)
             elif coordinate.role is Role.ORDER:
                 own = 0.01 / (start * max(angle_rad, 1.0))
+            elif coordinate.role is Role.LINE:
+                own = 0.01 / (2.0 * np.pi * start * max(duration_s, 1.0 / start))
             if not coordinate.logarithmic:
                 own = own if coordinate.edge else max(own, 1e-3)
                 own = min(own, 0.1 * (coordinate.high - coordinate.low) / coordinate.scale)

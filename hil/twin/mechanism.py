@@ -146,6 +146,7 @@ class Mechanism:
     neutral: Callable[[AxisFacts], float] | None = None  # strength without effect, if it is finite and not 0
     needs_table: bool = False  # not observable without a linear encoder
     turning: bool = False  # only where the load turns
+    part_of_wave: bool = False  # told by motion over part of its wavelength
     # force on the table [N], mean over each tick that begins at times (n,) [s], of (times, period, values): an event of
     # the recording in which it is found, not expected in another one
     over_time: Callable[[FloatArray, float, Sequence[float]], FloatArray] | None = None
@@ -214,27 +215,31 @@ class Mechanism:
     def is_valid(self, values: Sequence[float], variant: int, axis: AxisFacts) -> bool:
         """Check that the effect has a size, that the motion passes a whole wave of it, that its name applies, and that
         the sensors can show it."""
-        if not self._has_size(values) or self.wavelength_m(values, axis) > axis.travel_m:
+        if not self._has_size(values):
             return False
-        if not axis.turn_known and self._once_per_turn:
+        if not self.part_of_wave and self.wavelength_m(values, axis) > axis.travel_m:
+            return False
+        if not axis.turn_known and self.once_per_turn:
             return False
         return self.valid is None or self.valid(values, variant, axis)
 
     def wavelength_m(self, values: Sequence[float], axis: AxisFacts) -> float:
         """Length along the travel in which the effect repeats [m]; 0 if it is not periodic in position or angle.
 
-        With a phase but no period or order it repeats once per revolution.
+        With a phase but no period or order it repeats once per revolution, of the load if it is `turning`.
         """
         period_m = self.named(Role.PERIOD, values)
         if period_m is not None:
             return period_m
-        if not self.indices(Role.PHASE):
-            return 0.0
-        return 2.0 * math.pi * axis.ratio / (axis.angle_per_unit * (self.named(Role.ORDER, values) or 1.0))
+        turn_m = 2.0 * math.pi * (1.0 if self.turning else axis.ratio / axis.angle_per_unit)
+        order = self.named(Role.ORDER, values)
+        return turn_m / order if order else turn_m if self.once_per_turn else 0.0
 
     @property
-    def _once_per_turn(self) -> bool:
-        return bool(self.indices(Role.PHASE)) and not (self.indices(Role.PERIOD) or self.indices(Role.ORDER))
+    def once_per_turn(self) -> bool:
+        """True if it has a phase, but no period, order or line: it repeats once per revolution."""
+        others = (Role.PERIOD, Role.ORDER, Role.LINE)
+        return bool(self.indices(Role.PHASE)) and not any(self.indices(role) for role in others)
 
     def size(self, values: Sequence[float], axis: AxisFacts) -> float:
         """Distance of the strength from the value without effect, in the unit of the strength."""

@@ -53,7 +53,8 @@ class Role(StrEnum):
     PHASE = "phase"  # angle at which the effect begins
     PERIOD = "period"  # along the travel
     ORDER = "order"  # cycles per revolution of the motor
-    FREQUENCY = "frequency"  # over time
+    FREQUENCY = "frequency"  # of a mode
+    LINE = "line"  # frequency of a force whose phase goes with the clock
     EDGE = "edge"  # start or end of a window of time
     SHAPE = "shape"  # any other
 

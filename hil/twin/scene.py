@@ -52,6 +52,7 @@ class Scene:
     ripple_orders: list[float]  # of the disturbance torque over the torque
     friction_periods: list[float]  # [m]
     scale_periods: list[float]  # of the table residual [m]
+    lines_hz: list[float]  # of the disturbance torque over time
     window: tuple[float, float, float]  # start, end, level [N m]
     rest_m: float  # position at which a straight line through the disturbance torque over the position is 0
     stretch: float  # table against motor [m], typical

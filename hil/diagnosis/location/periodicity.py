@@ -6,6 +6,7 @@ At a single speed the three domains are equal. So rows of all speeds are used, a
 speed.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -88,11 +89,16 @@ def lock(seen: Sequence[Energy], channel: str, bench: Bench, terms: Sequence[Ter
 def _named(term: Term, lead_m: float) -> Lock:
     mechanism = BY_ID[term.effect]
     order, period_m = (mechanism.named(role, term.values) for role in (Role.ORDER, Role.PERIOD))
-    if order is None and period_m is None and mechanism.indices(Role.PHASE):  # harmonics of the turn: the strongest
+    if mechanism.once_per_turn and mechanism.turning:  # of the load
+        return Lock(period_m=2.0 * math.pi)
+    if mechanism.once_per_turn:  # harmonics of the turn: the strongest
         order = 1.0 + float(np.argmax([term.values[index] for index in mechanism.indices(Role.STRENGTH)]))
     if order is not None:  # without a lead counted per metre
         return Lock(period_m=lead_m / order, order_per_rev=order) if lead_m else Lock(period_m=1.0 / order)
-    return Lock(frequency_hz=mechanism.named(Role.FREQUENCY, term.values), period_m=period_m)
+    frequency_hz = next(
+        (f for f in (mechanism.named(role, term.values) for role in (Role.FREQUENCY, Role.LINE)) if f), None
+    )
+    return Lock(frequency_hz=frequency_hz, period_m=period_m)
 
 
 def _lead_m(bench: Bench) -> float:

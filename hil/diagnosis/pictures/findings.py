@@ -187,7 +187,9 @@ def _spectrum(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:
     label = CHANNEL_LABELS["table"] if channel == "table" else "motor position"
     style_axis(axis, f"{label} [{unit}/√Hz]", "frequency [Hz]", "Spectrum of the residual")
     axis.legend(frameon=False)
-    return Captioned(figure, "A mode that the twin lacks is a peak of the nominal twin and absent with the findings.")
+    return Captioned(
+        figure, "A mode or a line that the twin lacks is a peak of the nominal twin and absent with the findings."
+    )
 
 
 def _over_time(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:

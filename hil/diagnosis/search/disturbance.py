@@ -120,10 +120,23 @@ def scale_periods(runs: Sequence[Measured], errors: Sequence[FloatArray], most: 
     ][:most]
 
 
+def lines_hz(run: Measured, d: Disturbance, most: int = 4) -> list[float]:
+    """Frequencies [Hz], up to 60 Hz, of the strongest lines of the disturbance over time while the axis slides, best
+    first; of what constant, Coulomb and viscous friction leave."""
+    if np.count_nonzero(d.sliding) < 100:
+        return []
+    basis = np.stack([np.ones_like(d.velocity), np.sign(d.velocity), d.velocity], axis=1)[d.sliding]
+    coefficients, *_ = np.linalg.lstsq(basis, d.torque[d.sliding], rcond=None)
+    left = np.zeros(d.torque.size)
+    left[d.sliding] = d.torque[d.sliding] - basis @ coefficients
+    time_s = np.arange(left.size, dtype=np.float64) * run.period_s
+    return [1.0 / wave_s for wave_s in _periods([time_s], [left], run.period_s, 1.0 / _PASS_HZ, most)]
+
+
 def _periods(
     positions: Sequence[FloatArray], values: Sequence[FloatArray], bin_m: float, shortest_m: float, most: int
 ) -> list[float]:
-    """Periods [m] of the spectral peaks of values (n,) over position (n,) [m], averaged in bins, best first."""
+    """Periods [m] of the spectral peaks of values (n,) over position (n,) [m], or [s] over time, averaged in bins."""
     x, y = np.concatenate(list(positions)), np.concatenate(list(values))
     if x.size < 100 or np.ptp(x) < 4.0 * shortest_m:
         return []

@@ -132,6 +132,7 @@ def scene(runs: Sequence[Measured], bench: Bench, blocks: Sequence[dict[str, Flo
         scale_periods=(
             estimate.scale_periods(runs, [block["table"] for block in blocks]) if runs[0].table_m.size else []
         ),
+        lines_hz=estimate.lines_hz(runs[longest], found[longest]),
         window=(runs[longest].start.time_s + first_s, runs[longest].start.time_s + last_s, level),
         rest_m=estimate.rest_position(runs, found, ratio),
         stretch=max(stretch, 0.5e-6),

@@ -63,7 +63,7 @@ def place(effect: Effect | EncoderFault, axis: DrawnAxis) -> dict[str, float | t
         return {"window_s": (values["start_s"], values["end_s"])}
     if effect.id == "structural_mode":
         return {"frequency_hz": compared(effect, axis)["frequency_hz"]}
-    if effect.id == "novel_vibration":
+    if effect.id in ("periodic_force", "novel_vibration"):
         return {"frequency_hz": values["frequency_hz"]}
     if effect.id == "novel_hammering":
         return {"frequency_hz": 1.0 / values["period_s"]}

@@ -32,4 +32,5 @@ MECHANISM = Mechanism(
     typical=lambda a: (0.5 * a.friction / a.ratio, 0.0),
     picture=Picture.POSITION,
     turning=True,
+    part_of_wave=True,
 )

@@ -116,6 +116,20 @@ def test_encoder_eccentricity_reads_a_sine_of_the_angle() -> None:
         assert plant.motor_position_rad == pytest.approx(angle + 2e-3 * np.sin(angle + 0.4), abs=1e-12)
 
 
+def test_a_graduation_off_centre_errs_by_the_angle_between_its_centre_and_the_axis() -> None:
+    """To first order a sine of the load's angle; the law of sines holds exactly."""
+    amplitude, phase = 0.02, 0.4
+    effect = Effect("load_encoder_eccentricity", {"amplitude_rad": amplitude, "phase_rad": phase})
+    plant = plant_with(FREE, effect)
+    plant.velocities_m_s[:] = 0.5
+    for _ in range(50):
+        plant.advance(0.0, 0.1)
+        angle = plant.table_true_m
+        error = plant.table_position_m - angle
+        assert error == pytest.approx(amplitude * np.sin(angle + phase), abs=0.6 * amplitude**2)
+        assert np.sin(error) == pytest.approx(amplitude * np.sin(angle + phase - error), abs=1e-12)
+
+
 def test_scale_interpolation_error_repeats_with_the_signal_period() -> None:
     plant = plant_with(FREE, Effect("scale_interpolation_error", {"amplitude_m": 1e-7, "period_m": 2e-5}))
     plant.velocities_m_s[:] = 1e-4

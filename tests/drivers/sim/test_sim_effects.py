@@ -43,8 +43,10 @@ SHOWN = {
     "velocity_filter_lag": {"time_constant_s": 8e-4},
     "channel_time_skew": {"delay_s": 2.2e-3},
     "encoder_eccentricity": {"amplitude_rad": 3e-3, "phase_rad": 0.2},
+    "load_encoder_eccentricity": {"amplitude_rad": 1e-4, "phase_rad": 0.7},
     "scale_interpolation_error": {"amplitude_m": 3e-6, "period_m": 2e-5},
     "external_force": {"force_n": 300.0, "start_s": 0.4, "end_s": 0.8},
+    "periodic_force": {"force_n": 300.0, "frequency_hz": 5.0, "phase_rad": 0.3},
     "spring_load": {"stiffness_n_m": 3000.0, "rest_position_m": 0.0},
     "gravity_torque": {"gravity_torque_n_m": 300.0, "angle_rad": 1.0},
     "friction_gradient": {"slope_1_m": 3.0},
@@ -65,7 +67,7 @@ def test_catalogue_holds_exactly_the_interface() -> None:
         for name, definition in CATALOGUE.items()
     }
     assert required == {name: set(parameters) for name, parameters in SHOWN.items()}
-    assert len(CATALOGUE) == 30
+    assert len(CATALOGUE) == 32
 
 
 @pytest.mark.parametrize("name", SHOWN)

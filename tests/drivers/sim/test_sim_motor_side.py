@@ -147,6 +147,14 @@ def test_spring_load_pulls_the_table_to_its_rest_position() -> None:
     assert outer_force_n(plant, position_m=0.05) == pytest.approx(-2000.0 * 0.03, rel=1e-9)
 
 
+def test_periodic_force_is_a_sine_of_time() -> None:
+    shake = Effect("periodic_force", {"force_n": 40.0, "frequency_hz": 7.0, "phase_rad": 0.3})
+    plant = plant_with(FRICTIONLESS, shake)
+    for _ in range(5):
+        force, time_s = outer_force_n(plant), plant.time_s - plant.step_s
+        assert force == pytest.approx(40.0 * np.sin(2 * np.pi * 7.0 * time_s + 0.3), rel=1e-6, abs=1e-6)
+
+
 def test_gravity_turns_the_load_towards_straight_down() -> None:
     plant = plant_with(FRICTIONLESS, Effect("gravity_torque", {"gravity_torque_n_m": 40.0, "angle_rad": np.pi / 6}))
     assert outer_force_n(plant, position_m=0.0) == pytest.approx(-20.0, rel=1e-9)

@@ -45,8 +45,10 @@ TABLE = {
     "velocity_filter_lag": ("controller", ["time_constant_s"]),
     "channel_time_skew": ("sensor", ["delay_s"]),
     "encoder_eccentricity": ("sensor", ["amplitude_rad", "phase_rad"]),
+    "load_encoder_eccentricity": ("sensor", ["amplitude_rad", "phase_rad"]),
     "scale_interpolation_error": ("sensor", ["amplitude_m", "period_m"]),
     "external_force": ("table", ["force_n", "start_s", "end_s"]),
+    "periodic_force": ("table", ["force_n", "frequency_hz", "phase_rad"]),
     "spring_load": ("table", ["stiffness_n_m", "rest_position_m"]),
     "gravity_torque": ("table", ["gravity_torque_n_m", "angle_rad"]),
 }
@@ -71,8 +73,10 @@ NEUTRAL = {
     "torque_ripple": {"fraction": 0.0, "cycles_per_rev": 6.0, "phase_rad": 1.0},
     "torque_saturation": {"limit_n_m": VALUE},
     "encoder_eccentricity": {"amplitude_rad": 0.0, "phase_rad": 1.0},
+    "load_encoder_eccentricity": {"amplitude_rad": 0.0, "phase_rad": 1.0},
     "scale_interpolation_error": {"amplitude_m": 0.0, "period_m": 2e-5, "phase_rad": 1.0},
     "external_force": {"force_n": 0.0, "start_s": 1.0, "end_s": 2.0},
+    "periodic_force": {"force_n": 0.0, "frequency_hz": 7.0, "phase_rad": 1.0},
     "spring_load": {"stiffness_n_m": 0.0, "rest_position_m": 0.1},
     "gravity_torque": {"gravity_torque_n_m": 0.0, "angle_rad": 1.0},
 }

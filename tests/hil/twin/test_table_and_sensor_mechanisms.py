@@ -68,6 +68,17 @@ def test_gravity_pulls_an_arm_down(torque, angle, from_down) -> None:
     assert weight(from_down) == pytest.approx(-weight(-from_down), abs=1e-9)
 
 
+@given(force=st.floats(0.0, 500.0), frequency_hz=st.floats(0.5, 50.0), phase=phases, position=st.floats(-1.0, 1.0))
+def test_periodic_force_goes_with_the_clock_and_not_with_the_position(force, frequency_hz, phase, position) -> None:
+    def at(turns):
+        moment = AT_REST._replace(time_s=turns / frequency_hz, step_s=0.0, table_position_m=position)
+        return call("periodic_force", 0.0, moment, force_n=force, frequency_hz=frequency_hz, phase_rad=phase)
+
+    assert np.hypot(at(0.1), at(0.35)) == pytest.approx(force, rel=1e-9, abs=1e-9)
+    assert at(1.1) == pytest.approx(at(0.1), abs=1e-6)
+    assert at(0.0) == pytest.approx(force * np.sin(phase), abs=1e-6)
+
+
 # -- sensors
 
 
@@ -77,6 +88,18 @@ def test_encoder_eccentricity_once_per_revolution(amplitude, phase, value) -> No
     harmonic = np.fft.rfft(error) / REVOLUTION.size
     np.testing.assert_allclose(2.0 * harmonic[1], amplitude * np.exp(1j * (phase - pi / 2)), atol=1e-11)
     assert np.abs(np.delete(harmonic, 1)).max() < 1e-11
+
+
+@given(amplitude=st.floats(0.0, 0.01), phase=phases, value=st.floats(-100.0, 100.0), ratio=st.floats(0.01, 1.0))
+def test_load_encoder_eccentricity_once_per_revolution_of_the_load(amplitude, phase, value, ratio) -> None:
+    def error(load_rad):
+        at = AT_REST._replace(table_position_m=load_rad, angle_rad=load_rad / ratio)
+        return call("load_encoder_eccentricity", value, at, amplitude_rad=amplitude, phase_rad=phase) - value
+
+    assert error(-phase) == pytest.approx(0.0, abs=1e-12)
+    assert error(np.pi / 2 - phase) == pytest.approx(amplitude, abs=1e-12)
+    assert error(np.pi / 6 - phase) == pytest.approx(0.5 * amplitude, abs=1e-12)
+    assert error(2.0 * np.pi + 0.4) == pytest.approx(error(0.4), abs=1e-12)
 
 
 @given(amplitude=st.floats(0.0, 1e-5), period=st.floats(1e-5, 1e-3), phase=phases, position=st.floats(-0.5, 0.5))

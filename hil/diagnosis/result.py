@@ -151,7 +151,7 @@ class ChannelFit(_Part):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, populate_by_name=True)
 
 
-AT_FLOOR = "Every channel is at its noise floor."
+AT_FLOOR = "The residuals of all channels are within the noise of positions and torque."
 
 
 class Unexplained(_Part):

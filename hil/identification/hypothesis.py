@@ -6,7 +6,6 @@ results are confirmed with this kind. With stick-slip or play the closed loop ma
 hypothesis does not reproduce a recording.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -199,8 +198,8 @@ class Hypothesis:
             elif coordinate.role is Role.LINE:
                 own = 0.01 / (2.0 * np.pi * start * max(duration_s, 1.0 / start))
             if not coordinate.logarithmic:
-                own = own if coordinate.edge else max(own, 1e-3)
-                own = min(own, 0.1 * (coordinate.high - coordinate.low) / coordinate.scale)
+                tenth = 0.1 * (coordinate.high - coordinate.low) / coordinate.scale
+                own = min(own if coordinate.edge else max(own, 1e-3), tenth)
             found.append(own)
         return np.array(found)
 
@@ -295,8 +294,3 @@ class Hypothesis:
                 ),
             )
         return self._done[key]
-
-
-def effects(terms: Sequence[Term]) -> list[tuple[str, int]]:
-    """Effect and variant of each term, in alphabetical order."""
-    return sorted((term.effect, term.variant) for term in terms)

@@ -124,3 +124,8 @@ def compatible(found: Sequence[Term | Active]) -> bool:
     return all(effects.count(effect) <= BY_ID[effect].most for effect in effects) and not any(
         repeats(one, other) for one, other in combinations(found, 2)
     )
+
+
+def effects(terms: Sequence[Term]) -> list[tuple[str, int]]:
+    """Effect and variant of each term, in alphabetical order."""
+    return sorted((term.effect, term.variant) for term in terms)

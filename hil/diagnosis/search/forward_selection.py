@@ -19,11 +19,10 @@ from hil.diagnosis.search.score_test import Candidate, screen_library
 from hil.identification.coordinates import LAST_EDGE_STEP_S
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit, FitStatus
-from hil.identification.hypothesis import effects
 from hil.identification.inference import TIED, against, refuted, whitening
 from hil.identification.nominal_fit import fit_nominal_parameters, require_finite
 from hil.identification.parallel import in_parallel
-from hil.identification.terms import FRICTION, Key, Term, compatible, free_slot
+from hil.identification.terms import FRICTION, Key, Term, compatible, effects, free_slot
 from hil.twin.library import BY_ID
 from hil.twin.physics import Active
 

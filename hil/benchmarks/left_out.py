@@ -49,9 +49,9 @@ class Stalls(NamedTuple):
 
 
 class LeftOut(NamedTuple):
-    """Ticks left out. loop, peer: by the loop, by a peer with the same due times; loop_only, peer_only: those that the
-    other did not leave out within a period; by_chance: those of the loop that the peer would share if its stalls had
-    been at other times, mean of several shifts."""
+    """Ticks left out. loop, peer: their number, of the loop and of a peer with the same due times. loop_only: the ticks
+    that the peer did not leave out within a period; peer_only: the number of those of the peer that the loop did not;
+    by_chance: how many the loop would share with a peer whose stalls were at other times, mean of several shifts."""
 
     loop: int
     peer: int

@@ -108,9 +108,10 @@ def _run(
     counted = {name: certificate[name] for name in ("skipped", "page_faults", "preemptions", "collections", "threads")}
     outcome = result.outcome
     reference = started[0]()[0]
-    stalls = Stalls.of(started[0].spikes, wake_up_s)
-    both = compare(outcome.lateness_s, outcome.first_tick_s, period_s, stalls)
-    found = None if reference is None else (reference, both)
+    found = None
+    if reference is not None:
+        stalls = Stalls.of(started[0].spikes, wake_up_s)
+        found = reference, compare(outcome.lateness_s, outcome.first_tick_s, period_s, stalls)
     return f"{outcome.ending}: {outcome.reason}", Latencies.of(outcome.lateness_s), counted, found, recording["cycle_s"]
 
 

@@ -96,8 +96,9 @@ def sensor_noise(run: Measured) -> dict[str, float]:
 
 
 def rms(values: FloatArray) -> float:
-    """Root mean square."""
-    return float(np.sqrt(np.mean(values**2)))
+    """Root mean square; infinite where a twin that diverges exceeds the range of numbers."""
+    with np.errstate(over="ignore"):
+        return float(np.sqrt(np.mean(values**2)))
 
 
 def _misread(values: FloatArray, count: float, noise: FloatArray | float, rng: np.random.Generator) -> FloatArray:

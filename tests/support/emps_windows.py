@@ -19,6 +19,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
+from hil.identification.estimator import Fit
 from hil.recording.importing import import_recording
 from hil.recording.recording import Recording
 
@@ -26,6 +27,7 @@ EMPS = Path(__file__).parents[2].parent / "shared" / "recordings" / "emps" / "DA
 MASS_KG, VISCOUS_N_S_M = 95.1, 203.5
 POSITION_GAIN_1_S, VELOCITY_GAIN_V_S_M, FORCE_PER_VOLT = 160.18, 243.45, 35.15065
 PERIOD_S, SUBSTEPS = 1e-3, 10
+EDGE_S, NEAR_REVERSAL_S = 0.005, 0.02  # errors of an edge that are allowed
 
 
 class Push(NamedTuple):
@@ -94,3 +96,22 @@ def irregular(count: int, seed: int, start_s: float = 0.6, end_s: float = 24.3) 
         height_n = rng.choice([-1.0, 1.0]) * np.exp(rng.uniform(np.log(20.0), np.log(200.0)))
         found.append(Push(float(begin_s), float(begin_s + width_s), float(height_n)))
     return found
+
+
+def windows(found: Fit) -> list[tuple[float, ...]]:
+    """Start [s], end [s] and force [N] of all windows of a fit, by time."""
+    values = [term.at(window) for term in found.terms for window in term.windows]
+    return sorted((start, end, force) for force, start, end in values)
+
+
+def edge_s(at_s: float) -> float:
+    """Error allowed for an edge: more where the axis reverses, since friction hides a force there."""
+    reversals_s = 3.1035 + 3.12 * np.arange(7)
+    return NEAR_REVERSAL_S if np.min(np.abs(reversals_s - at_s)) < 0.05 else EDGE_S
+
+
+def assert_found(found: Sequence[tuple[float, ...]], pushes: list[Push]) -> None:
+    assert len(found) == len(pushes)
+    for (start_s, end_s, _), push in zip(found, pushes, strict=True):
+        assert start_s == pytest.approx(push.start_s, abs=edge_s(push.start_s))
+        assert end_s == pytest.approx(push.end_s, abs=edge_s(push.end_s))

@@ -69,11 +69,12 @@ class _ChannelTable:
         ]
         white = float(np.sqrt(np.mean(np.square(lapped or [rms for rms, _ in own]))))
         closed = self.mode is Mode.CLOSED_LOOP
+        by_owner = math.inf if closed and not holds(self.owner, data) else self._rms(self.owner, data)
         return FitFigures(
             before_rms=self._rms(self.nominal, data),
             after_rms=self._rms(self.final, data),
             noise_floor_rms=white,
-            owner_rms=None if closed and not holds(self.owner, data) else self._rms(self.owner, data),
+            owner_rms=by_owner if math.isfinite(by_owner) else None,  # the twin diverges with the owner's values
         )
 
     def _of(self, hypothesis: Hypothesis, data: Dataset) -> list[FloatArray]:

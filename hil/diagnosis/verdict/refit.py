@@ -1,5 +1,7 @@
 """Refit of the nominal parameters as it is reported, and the torque that the twins leave on held-out motion."""
 
+import numpy as np
+
 from hil.diagnosis.result import TorqueLeft
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
@@ -41,4 +43,5 @@ def torque_left(owner: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> Torq
         name: left_by_twin(fit.hypothesis, held_out, plain.slowest, deviation)
         for name, fit in (("owner", owner), ("refitted", nominal), ("final", final))
     }
-    return TorqueLeft(plain=by_plain, **of)
+    told = {name: None if left is None or not np.isfinite(left) else left for name, left in of.items()}
+    return TorqueLeft(plain=by_plain, **told)

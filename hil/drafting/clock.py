@@ -7,6 +7,7 @@ import numpy as np
 from hil.arrays import FloatArray
 from hil.drafting.column_names import Label, Quantity, label
 from hil.drafting.foreign_table import ForeignTable
+from hil.drafting.header_values import Constant
 from hil.errors import InputError
 from hil.recording.importing import SECONDS
 from hil.recording.stamps import GAP_STEPS, REPEATS
@@ -76,7 +77,8 @@ def _written_rate(table: ForeignTable) -> tuple[float, str] | None:
             return value, f"scalar {name} of the file"
         if plain in _PERIOD_NAMES and SLOWEST_HZ <= 1.0 / (value or 1e9) <= FASTEST_HZ:
             return 1.0 / value, f"scalar {name} of the file, as period in s"
-    return None if table.rate_hz is None else (table.rate_hz, "a comment of the file")
+    told = table.constants.get(Constant.RATE)
+    return (told.value, f"header of the file: {told.text}") if told and SLOWEST_HZ <= told.value <= FASTEST_HZ else None
 
 
 def _column(table: ForeignTable, labels: dict[str, Label]) -> str | None:

@@ -21,19 +21,19 @@ _UNIT = re.compile(r"[\[(]?\s*[a-zA-Zµμ°%‰Ω·/^*\d. _-]{0,14}\s*[\])]?")
 
 @dataclass(frozen=True)
 class CsvDialect:
-    """Options of a map, names as the map must spell them, units of a unit row, and the comment lines."""
+    """Options of a map, names as the map must spell them, units of a unit row, and the lines above the numbers."""
 
     options: CsvOptions
     names: tuple[str, ...]
     units: tuple[str, ...]
-    comments: tuple[str, ...]
+    above: tuple[str, ...]
 
 
 def find_dialect(path: Path) -> CsvDialect:
     """Find the dialect of `path`. Raises InputError: empty, no text, or no rows of numbers."""
     lines, encoding = _sample(path)
     delimiter, point, width, first = _layout(path, lines)
-    comments = tuple(_COMMENT.sub("", line) for line in lines[:first] if _COMMENT.match(line))
+    told = tuple(lines[:first])
     above = [index for index in range(first) if lines[index].strip()]
     given: dict[str, object] = {"delimiter": delimiter, "decimal_point": point, "encoding": encoding}
     paired = _paired_names(lines[:first], delimiter, width)
@@ -41,9 +41,8 @@ def find_dialect(path: Path) -> CsvDialect:
         # lines such as "SampleTime;1;SampleTime;1" are half numbers
         first = next(i for i in range(first, len(lines)) if _starts_with_number(lines[i], delimiter, point))
         given |= {"skip_lines": first, "column_names": paired}
-        return CsvDialect(
-            CsvOptions.model_validate(given), paired, _paired_units(lines[:first], delimiter, width), comments
-        )
+        units = _paired_units(lines[:first], delimiter, width)
+        return CsvDialect(CsvOptions.model_validate(given), paired, units, tuple(lines[:first]))
     unit_row: tuple[str, ...] = ()
     header = None
     for index in reversed(above[-4:]):
@@ -70,7 +69,7 @@ def find_dialect(path: Path) -> CsvDialect:
     repeated = [name for name in dict.fromkeys(names) if names.count(name) > 1 and name.strip()]
     if repeated:
         raise InputError(f"{path}: {repeated[0]!r} names two columns of the header, allowed one; rename or remove one")
-    return CsvDialect(CsvOptions.model_validate(given), names, unit_row or ("",) * width, comments)
+    return CsvDialect(CsvOptions.model_validate(given), names, unit_row or ("",) * width, told)
 
 
 def _starts_with_number(line: str, delimiter: str, point: str) -> bool:

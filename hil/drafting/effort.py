@@ -7,33 +7,31 @@ import numpy as np
 from hil.arrays import FloatArray
 from hil.channels import AxisKind
 from hil.drafting.column_names import Label
+from hil.drafting.foreign_table import ForeignTable
+from hil.drafting.header_values import Constant, HeaderValue
 from hil.drafting.relations import EffortCause, MotionColumns, proportional
 from hil.quantities import UNITS
 
 CAUSED = 0.3  # share of an effort explained by its motion from which its sign can be judged
 TOGETHER = 0.25  # share of the variance that torque and command have in common, from which they have one cause
+_CONSTANT_KEY = {AxisKind.LINEAR: "force_constant_n_a", AxisKind.ROTARY: "torque_constant_n_m_a"}
 PART = 0.1  # of the effort: the inertia's part must exceed it, else the sign of friction decides
 # names of a torque or force constant without underscores and digits; others ("torque_limit", "tau_filter") are none
 _CONSTANT_NAMES = "gtau ktau kt km kf km torqueconstant forceconstant motorconstant drehmomentkonstante kraftkonstante"
 
 
 def effort_entry(
-    told: Label,
-    kind: AxisKind,
-    scalars: dict[str, float],
-    cause: EffortCause,
-    sign: int,
+    told: Label, kind: AxisKind, table: ForeignTable, cause: EffortCause, sign: int
 ) -> tuple[dict[str, object], list[str]]:
     """Entry of the map, and notes on what is unsure.
 
-    `cause` is what `relations.driven` gives for it, `sign` what `signs_of` does.
+    `cause` is what `relations.driven` gives for it, `sign` what `signs_of` does; constants are those of `table`.
     """
-    entry, notes = _unit(told, kind, scalars)
+    entry, notes = _unit(told, kind, table)
     if cause.share < CAUSED:
         notes.append(
             f"{told.column}: inertia and friction of the motion explain only {100 * max(cause.share, 0.0):.0f} % "
-            "of it; check that "
-            "it drives this axis"
+            "of it; check that it drives this axis"
         )
     if sign < 0:
         entry["sign"] = -1
@@ -68,48 +66,42 @@ def _sign(coefficients: FloatArray, moved: MotionColumns) -> int:
     return -1 if deciding < 0.0 else 1
 
 
-def _unit(told: Label, kind: AxisKind, scalars: dict[str, float]) -> tuple[dict[str, object], list[str]]:
-    unit = told.unit or told.electric
-    si = "N" if kind is AxisKind.LINEAR else "N m"
-    entry: dict[str, object] = {"column": told.column, "unit": unit or si}
+def _unit(told: Label, kind: AxisKind, table: ForeignTable) -> tuple[dict[str, object], list[str]]:
+    unit, column, scalars = told.unit or told.electric, told.column, table.scalars
+    linear = kind is AxisKind.LINEAR
+    si = "N" if linear else "N m"
+    entry: dict[str, object] = {"column": column, "unit": unit or si}
     if unit in ("mA", "mV"):
         entry |= {"unit": unit[1:], "scale": 1e-3}
         unit = unit[1:]
-    constants = [name for name in scalars if re.sub(r"[^a-z]", "", name.lower()) in _CONSTANT_NAMES.split()]
-    scalar = constants[0] if len(constants) == 1 else None
-    notes = (
-        [f"{told.column}: several scalars may be its constant ({', '.join(constants)})"] if len(constants) > 1 else []
-    )
-    if unit is None and scalar is not None:
-        entry |= {"unit": "V", "gain": scalar}
-        notes.append(
-            f"{told.column}: no unit is given; {scalar} = {scalars[scalar]:g} of the file is taken as {si} per unit"
-        )
-    elif unit is None:
-        notes.append(f"{told.column}: no unit is given; {si} is taken: masses and friction scale with it")
-    elif unit == "A":
-        constant = "force_constant_n_a" if kind is AxisKind.LINEAR else "torque_constant_n_m_a"
-        entry[constant] = scalars[scalar] if scalar else 1.0
-        notes.append(
-            f"{told.column}: {scalar} = {scalars[scalar]:g} of the file is taken as {si} per A"
-            if scalar
-            else f"{told.column}: the {si} per A are not known, 1 is taken: masses and friction are in multiples of it"
-        )
-    elif unit == "V":
-        entry["gain"] = scalar or 1.0
-        notes.append(
-            f"{told.column}: {scalar} = {scalars[scalar]:g} of the file is taken as {si} per V"
-            if scalar
-            else f"{told.column}: the {si} per V are not known, 1 is taken: masses and friction are in multiples of it"
-        )
-    elif unit in ("%", "permille"):
-        entry["rated"] = 1.0
-        notes.append(
-            f"{told.column}: the rated {si} is not known, 1 is taken: masses and friction are in multiples of it"
-        )
-    elif unit in UNITS and UNITS[unit][0] != si:
+    if unit in UNITS and UNITS[unit][0] != si:
         entry |= {"unit": si, "scale": UNITS[unit][1]}
-        lever = "a length; 1 N per N m is" if kind is AxisKind.LINEAR else "an angle; 1 N m per N is"
-        factor = "multiply scale by 2 pi / lead to get N" if kind is AxisKind.LINEAR else "multiply scale by the radius"
-        notes.append(f"{told.column}: is in {unit}, the position in {lever} taken: {factor}")
-    return entry, notes
+        lever = "a length; 1 N per N m is" if linear else "an angle; 1 N m per N is"
+        factor = "multiply scale by 2 pi / lead to get N" if linear else "multiply scale by the radius"
+        return entry, [f"{column}: is in {unit}, the position in {lever} taken: {factor}"]
+    if unit in UNITS:
+        return entry, []
+    multiples = "1 is taken: masses and friction are in multiples of it"
+    if unit in ("%", "permille"):
+        rated = table.constants.get(Constant.RATED_FORCE if linear else Constant.RATED_TORQUE)
+        entry["rated"] = rated.value if rated else 1.0
+        return entry, [_from(column, rated) if rated else f"{column}: the rated {si} is not known, {multiples}"]
+    header = table.constants.get(Constant.FORCE if linear else Constant.TORQUE)
+    if unit == "A" and header is not None:
+        return entry | {_CONSTANT_KEY[kind]: header.value}, [_from(column, header)]
+    named = [name for name in scalars if re.sub(r"[^a-z]", "", name.lower()) in _CONSTANT_NAMES.split()]
+    if len(named) != 1:
+        notes = [f"{column}: several scalars may be its constant ({', '.join(named)})"] if named else []
+        if unit is None:
+            return entry, [*notes, f"{column}: no unit is given; {si} is taken: masses and friction scale with it"]
+        entry[_CONSTANT_KEY[kind] if unit == "A" else "gain"] = 1.0
+        return entry, [*notes, f"{column}: the {si} per {unit} are not known, {multiples}"]
+    size = f"{named[0]} = {scalars[named[0]]:g} of the file is taken as {si} per"
+    if unit is None:
+        return entry | {"unit": "V", "gain": named[0]}, [f"{column}: no unit is given; {size} unit"]
+    key, value = (_CONSTANT_KEY[kind], scalars[named[0]]) if unit == "A" else ("gain", named[0])
+    return entry | {key: value}, [f"{column}: {size} {unit}"]
+
+
+def _from(column: str, constant: HeaderValue) -> str:
+    return f"{column}: its constant is taken from the header of the file: {constant.text}"

@@ -26,11 +26,15 @@ class EvenRows:
 
 
 def without_duplicates(table: ForeignTable) -> tuple[ForeignTable, tuple[str, ...]]:
-    """Leave out rows that repeat the row before in every column, its stamp too, where they are few; say so."""
+    """Leave out rows that repeat the row before in every column, its stamp too, where they are few; say so.
+
+    Without a column that grows in all other rows, equal rows are those of an axis at rest.
+    """
     same = np.logical_and.reduce([np.diff(values) == 0.0 for values in table.columns.values()])
-    if not same.any() or same.mean() > REPEATS:
-        return table, ()
     kept = np.r_[True, ~same]
+    stamped = any(bool(np.all(np.diff(values[kept]) > 0.0)) for values in table.columns.values())
+    if not same.any() or same.mean() > REPEATS or not stamped:
+        return table, ()
     note = f"duplicate rows: {same.sum()} repeat the row before, first row {np.flatnonzero(same)[0] + 2} of the numbers"
     return (
         replace(table, columns={name: values[kept] for name, values in table.columns.items()}),

@@ -5,7 +5,6 @@ and column of what is wrong.
 """
 
 import csv
-import re
 from collections import Counter
 from dataclasses import dataclass, field, replace
 from itertools import islice
@@ -16,6 +15,7 @@ import pyarrow as pa
 
 from hil.arrays import FloatArray
 from hil.drafting.csv_dialect import find_dialect, is_missing, number_of
+from hil.drafting.header_values import Constant, HeaderValue, header_values
 from hil.errors import InputError
 from hil.files import json_columns
 from hil.files.date_stamps import is_date, seconds_of
@@ -26,18 +26,14 @@ from hil.recording.import_map import CsvOptions
 
 MOST_ROWS = 200_000  # read of a text file for the draft: minutes of a recording
 WIDEST = 64  # columns of a matrix in a .mat file: a wider one is no table of channels
-_RATE = re.compile(
-    r"(?:sample|sampling|abtast|échantillonnage|echantillonnage)\D{0,20}?([\d.,]+)\s*(k?hz|ms|us|µs|s)\b", re.IGNORECASE
-)
-_PER_S = {"hz": 1.0, "khz": 1e3}
-_SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6}
 
 
 @dataclass(frozen=True, eq=False)
 class ForeignTable:
     """Columns of equal length, NaN where a field is no number; units and scalars as the file gives them.
 
-    `dates` are columns of dates or times of day, in seconds; `texts` is the first text among the numbers of a column.
+    `constants` are what lines above the numbers, or scalars, give by a name that is known. `dates` are columns of dates
+    or times of day, in seconds; `texts` is the first text among the numbers of a column.
     """
 
     path: Path
@@ -45,7 +41,7 @@ class ForeignTable:
     units: dict[str, str]
     scalars: dict[str, float]
     csv: CsvOptions
-    rate_hz: float | None = None  # written in a comment
+    constants: dict[Constant, HeaderValue] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
     dates: frozenset[str] = frozenset()
     texts: dict[str, str] = field(default_factory=dict)
@@ -108,18 +104,8 @@ def _text(path: Path) -> ForeignTable:
         elif name.strip():
             remarks.append(f"{name.strip()}: text such as {next((f for f in fields if f.strip()), '')!r}, no numbers")
     units = {name: unit.strip("[]() ") for name, unit in zip(dialect.names, dialect.units, strict=True) if unit}
-    rate_hz = _rate_of(dialect.comments)
-    return ForeignTable(path, columns, units, {}, options, rate_hz, tuple(remarks), frozenset(dates), texts)
-
-
-def _rate_of(comments: tuple[str, ...]) -> float | None:
-    for comment in comments:
-        match = _RATE.search(comment)
-        if match:
-            value, unit = number_of(match[1].rstrip(".,"), "," if "," in match[1] else "."), match[2].lower()
-            if value > 0:
-                return value * _PER_S[unit] if unit in _PER_S else 1.0 / (value * _SECONDS[unit])
-    return None
+    constants = header_values(dialect.above, {})
+    return ForeignTable(path, columns, units, {}, options, constants, tuple(remarks), frozenset(dates), texts)
 
 
 def _mat(path: Path) -> ForeignTable:
@@ -143,7 +129,9 @@ def _mat(path: Path) -> ForeignTable:
             "vector per "
             "channel or a matrix with a column per channel; save the vectors themselves, not a structure"
         )
-    return _equal_length(ForeignTable(path, columns, {}, scalars, CsvOptions(), None, tuple(remarks)))
+    return _equal_length(
+        ForeignTable(path, columns, {}, scalars, CsvOptions(), header_values((), scalars), tuple(remarks))
+    )
 
 
 def _parquet(path: Path) -> ForeignTable:
@@ -161,7 +149,7 @@ def _parquet(path: Path) -> ForeignTable:
             dates.add(one.name)
         else:
             remarks.append(f"{one.name}: {one.type} values, no numbers; convert the column to use it")
-    return ForeignTable(path, columns, units, {}, CsvOptions(), None, tuple(remarks), frozenset(dates))
+    return ForeignTable(path, columns, units, {}, CsvOptions(), {}, tuple(remarks), frozenset(dates))
 
 
 def _json(path: Path) -> ForeignTable:
@@ -179,9 +167,10 @@ def _json(path: Path) -> ForeignTable:
                 f"{name}: values such as {next(v for v in values if isinstance(v, str | bool | list | dict))!r}, "
                 "no numbers"
             )
+    constants = header_values((), content.scalars)
     return _equal_length(
         ForeignTable(
-            path, columns, content.units, content.scalars, CsvOptions(), None, tuple(remarks), frozenset(dates)
+            path, columns, content.units, content.scalars, CsvOptions(), constants, tuple(remarks), frozenset(dates)
         )
     )
 

@@ -12,8 +12,8 @@ from hil.drafting.usual_values import ROTARY_LEAD_M, usual_lead
 from hil.recording.recording import Recording
 
 DIRECT = 0.02  # deviation from equal angles of motor and load up to which there is no gear
-_WHOLE = 1e-4  # deviation from a round value that is none: play between the encoders biases the measured one by it
-_SURE_TURNS = 0.05  # standard error of a ratio below which the next whole number is seldom near by chance
+_WHOLE = 1e-4  # relative deviation from a round value that is none: play between the encoders biases the measured one
+_SURE_TURNS = 0.05  # deviation from a whole number that is seldom seen by chance
 _LIKELY = 2.0  # standard errors within which a round value is taken
 
 
@@ -45,12 +45,8 @@ def gear_of(lead: Estimate) -> Estimate:
     """Motor revolutions per revolution of the load: the whole number that is very near, else the ratio."""
     measured = Estimate(ROTARY_LEAD_M / lead.value, ROTARY_LEAD_M / lead.value**2 * lead.std_error, lead.how)
     whole = float(round(measured.value))
-    near = whole >= 1.0 and _agrees(whole, measured)
-    if (
-        not near
-        or measured.value == whole
-        or not (measured.std_error < _SURE_TURNS or abs(measured.value - whole) < _WHOLE * whole)
-    ):
+    off = abs(measured.value - whole)
+    if whole < 1.0 or off == 0.0 or off > _SURE_TURNS or not _agrees(whole, measured):
         return measured
     return replace(measured, value=whole, how=f"{measured.how} ({measured.value:.7g} measured)")
 

@@ -7,7 +7,7 @@ from hil.quantities import UNITS
 
 # spellings in lower case, without blanks, brackets and multiplication signs -> unit of a map
 _SPELLINGS = {
-    "s": "s sec secs second seconds sek sekunde sekunden seconde secondes",
+    "s": "s sec secs second seconds sek sekunde sekunden seconde secondes segundo segundos secondi",
     "ms": "ms msec millis millisecond milliseconds millisekunden",
     "us": "us usec µs microseconds mikrosekunden",
     "ns": "ns nsec nanoseconds",
@@ -18,10 +18,10 @@ _SPELLINGS = {
     "nm": "nanometer nanometre",
     "in": "inch inches",
     "ft": "ft foot feet",
-    "rad": "rad radian radians",
+    "rad": "rad radian radians radianes radianti radiant",
     "mrad": "mrad",
-    "deg": "deg degree degrees ° grad degre degres degré degrés",
-    "rev": "rev revs revolutions turn turns tr tours umdr umdrehungen u",
+    "deg": "deg degree degrees ° grad degre degres degré degrés grado grados gradi",
+    "rev": "rev revs revolutions turn turns tr tours umdr umdrehungen u vueltas giri",
     "m/s": "m/s mps m_s ms-1 ms^-1",
     "mm/s": "mm/s mm_s mms-1",
     "um/s": "um/s µm/s um_s",
@@ -32,7 +32,7 @@ _SPELLINGS = {
     "ft/s": "ft/s ft_s fps",
     "ft/min": "ft/min ft_min fpm",
     "rad/s": "rad/s rad_s rads-1 rads^-1",
-    "deg/s": "deg/s °/s deg_s grad/s degre/s",
+    "deg/s": "deg/s °/s deg_s grad/s degre/s degres/s grados/s gradi/s",
     "rev/s": "rev/s rps u/s tr/s rev_s",
     "rpm": "rpm u/min 1/min min-1 min^-1 /min tr/min t/min u_min tr_min rev/min",
     "m/s^2": "m/s^2 m/s2 m/s² m_s2",

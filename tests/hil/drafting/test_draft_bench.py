@@ -16,7 +16,8 @@ from hil.commands.identify import identify
 from hil.commands.import_ import import_
 from hil.drafting.bench_text import bench_text
 from hil.drafting.draft_bench import draft_bench
-from hil.drafting.ratio_values import lead_of
+from hil.drafting.estimate import Estimate
+from hil.drafting.ratio_values import gear_of, lead_of
 from hil.errors import InputError
 from hil.recording.quantum import count_of
 from hil.recording.recording import Recording
@@ -244,3 +245,19 @@ def test_a_recording_at_20_khz_tells_its_inertia(tmp_path: Path) -> None:
     fast = renamed(axis(rows=60_000, rate_hz=20_000.0), t="time_s", angle="motor_angle_rad", torque="torque_Nm")
     bench = load_bench(drafted(tmp_path, fast))
     assert bench.axis.inertia_kg_m2 == pytest.approx(INERTIA_KG_M2, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("measured", "error", "gear"),
+    [
+        (79.998, 0.003, 80.0),
+        (79.998, 0.0005, 80.0),
+        (4583.62, 0.05, 4583.62),
+        (79.9, 0.003, 79.9),
+        (0.98, 0.02, 1.0),
+        (0.9, 0.06, 0.9),
+    ],
+)
+def test_a_gear_is_rounded_only_to_a_whole_number_that_is_near(measured: float, error: float, gear: float) -> None:
+    lead = 2.0 * np.pi / measured
+    assert gear_of(Estimate(lead, lead / measured * error)).value == pytest.approx(gear, rel=1e-9)

@@ -40,3 +40,8 @@ def test_names_in_italian_and_spanish() -> None:
     assert (given.quantity, given.measured, given.command) == (Quantity.POSITION, True, False)
     assert label("velocità [rpm]").quantity is Quantity.VELOCITY
     assert label("forza [N]").quantity is Quantity.EFFORT
+
+
+@pytest.mark.parametrize("name", ["pos_motor_grados", "angolo [gradi]", "Ángulo (grados)"])
+def test_degrees_in_spanish_and_italian(name: str) -> None:
+    assert split_unit(name)[1] == "deg"

@@ -1,0 +1,83 @@
+"""Constants that stand above the numbers of a file, or beside them as scalars, are used in the drafted map."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from foreign_axis import axis, csv_text, renamed
+
+from hil.drafting.draft_map import draft_map
+from hil.drafting.header_values import Constant, header_values
+
+AXIS = axis()
+
+
+@pytest.mark.parametrize(
+    ("line", "constant", "value"),
+    [
+        ("Abtastrate;800 Hz", Constant.RATE, 800.0),
+        ("# recorded with a sampling rate of 1 kHz, 3 axes", Constant.RATE, 1000.0),
+        ("Sampling interval: 0.5 ms", Constant.RATE, 2000.0),
+        ("Fréquence d'échantillonnage : 2 kHz", Constant.RATE, 2000.0),
+        ('"Torque constant: 0.8 Nm/A"', Constant.TORQUE, 0.8),
+        ("Constante de par: 0,42 N·m/A", Constant.TORQUE, 0.42),
+        ("torque constant 50 mN m/A at 20 C", Constant.TORQUE, 0.05),
+        ("Force constant = 67 N/A", Constant.FORCE, 67.0),
+        ("Lead [mm];5", Constant.LEAD, 0.005),
+        ("Encoder counts per rev,10000", Constant.COUNTS, 10000.0),
+        ("Nennmoment (Nm): 1,27", Constant.RATED_TORQUE, 1.27),
+        ("Rated torque,1.27,Nm,,", Constant.RATED_TORQUE, 1.27),
+    ],
+)
+def test_a_line_gives_a_constant_in_si(line: str, constant: Constant, value: float) -> None:
+    found = header_values([line], {})
+    assert list(found) == [constant]
+    assert found[constant].value == pytest.approx(value)
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "Fecha;12/03/2026",
+        "pole pitch 24 mm",
+        "Torque constant: 0.8 mm",
+        "Torque constant: 0 Nm/A",
+        "Torque constant: see manual",
+        "t;x;y",
+        "1;2;3",
+        "",
+    ],
+)
+def test_another_line_gives_none(line: str) -> None:
+    assert header_values([line], {}) == {}
+
+
+def test_a_scalar_gives_a_constant_by_its_name_and_two_values_none() -> None:
+    found = header_values([], {"sample_rate_hz": 200.0, "torqueConstant_Nm_A": 0.3, "mass": 2.0})
+    assert {one: told.value for one, told in found.items()} == {Constant.RATE: 200.0, Constant.TORQUE: 0.3}
+    assert header_values(["Torque constant: 0.8 Nm/A", "Motor constant: 0.7 Nm/A"], {}) == {}
+
+
+def test_a_current_is_converted_with_the_constant_of_the_header(tmp_path: Path) -> None:
+    amps = renamed(AXIS | {"torque": AXIS["torque"] / 0.8}, t="time_s", angle="motor_angle_rad", torque="current_A")
+    path = tmp_path / "log.csv"
+    path.write_text('"Drive export v3.2"\n"Torque constant: 0.8 Nm/A"\n' + csv_text(amps))
+    draft = draft_map(path)
+    entry = next(one.entry for one in draft.channels if one.channel == "torque_n_m")
+    assert entry["unit"] == "A"
+    assert entry["torque_constant_n_m_a"] == 0.8
+    assert any("Torque constant: 0.8 Nm/A" in note for note in draft.unsure)
+
+
+def test_rows_of_an_axis_at_rest_are_kept_where_no_column_is_a_stamp(tmp_path: Path) -> None:
+    still = renamed(AXIS, angle="motor_angle_rad", torque="torque_Nm")
+    still = {name: np.concatenate([values, np.full(20, values[-1])]) for name, values in still.items()}
+    path = tmp_path / "log.csv"
+    path.write_text("Abtastrate: 1000 Hz\n" + csv_text(still))
+    draft = draft_map(path)
+    rows = len(next(iter(still.values())))
+    assert draft.clock.rate_hz == 1000.0
+    assert draft.clock.time_s.size == rows
+    assert not [note for note in draft.unsure if "left out" in note]

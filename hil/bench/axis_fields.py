@@ -36,6 +36,11 @@ class Driven(BenchSection):
         return False
 
     @property
+    def drive_unit(self) -> str:
+        """Unit of the torque channels: N m, N, or V of a motor that is driven by its voltage."""
+        return "N m"
+
+    @property
     def turns(self) -> bool:
         """True if the load turns."""
         return False

@@ -145,6 +145,11 @@ class OneMass(BenchSection):
         return True
 
     @property
+    def drive_unit(self) -> str:
+        """Unit of the torque channels."""
+        return "N"
+
+    @property
     def turns(self) -> bool:
         """True if the load turns."""
         return False

@@ -24,6 +24,11 @@ class Turning(BenchSection):
         return False
 
     @property
+    def drive_unit(self) -> str:
+        """Unit of the torque channels."""
+        return "N m"
+
+    @property
     def turns(self) -> bool:
         """True if the load turns."""
         return True
@@ -92,6 +97,11 @@ class DcMotor(Turning):
     time_constant_s: Positive = Field(description="mechanical time constant tau [s]")
     coulomb_voltage_v: NotNegative = Field(description="voltage that Coulomb friction takes, half the dead zone [V]")
     voltage_constant_v_s_rad: Positive = Field(description="voltage per speed k, back-EMF and viscous [V s/rad]")
+
+    @property
+    def drive_unit(self) -> str:
+        """Unit of the torque channels, which hold the voltage."""
+        return "V"
 
     def physics(self) -> Physics:
         """The nominal physics of the twin, 1 N m for 1 V."""

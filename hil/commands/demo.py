@@ -136,7 +136,7 @@ def _say(result: Result, truth: SimulationSection, believed: Bench) -> None:
     parameters = {parameter.name: parameter for parameter in BY_ID[hidden.effect].parameters}
     for name, value in hidden.parameters.items():
         parameter, seen = parameters[name], found.parameters[name] if found else None
-        unit = parameter.dimension.unit(linear=False)
+        unit = parameter.dimension.unit()
         rows.append(
             (
                 name,

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 
-from hil.diagnosis.result import AT_FLOOR, Finding, FitFigures, Mode, Result, Verdict
+from hil.diagnosis.result import AT_FLOOR, Correction, Finding, FitFigures, Mode, Result, Verdict
 from hil.diagnosis.wording import title
 from hil.quantities import percent, quantity
 
@@ -35,9 +35,8 @@ def statement(result: Result) -> str:
             f"rms; the noise floor is {noise}.{_left(result)}"
         )
     if result.verdict is Verdict.PARAMETER_ERROR:
-        shares = {name: one.value / one.nominal for name, one in result.parameter_corrections.items() if one.nominal}
-        worst = sorted(shares.items(), key=lambda item: -abs(math.log(max(item[1], 1e-300))))
-        changes = ", ".join(f"{name} {100.0 * (share - 1.0):+.1f} %" for name, share in worst[:3])
+        worst = sorted(result.parameter_corrections.items(), key=lambda item: -_growth(item[1]))
+        changes = ", ".join(_changed(name, one) for name, one in worst[:3])
         if not changes:
             return "No physics is missing, but parameters of the bench file are wrong; this motion does not tell them."
         return f"No physics is missing; parameters of the bench file are wrong: {changes}."
@@ -53,6 +52,17 @@ def statement(result: Result) -> str:
             f"noise: {part} {result.unexplained.description}"
         )
     return f"The mismatch is not explained by any mechanism of the library: {result.unexplained.description}"
+
+
+def _growth(one: Correction) -> float:
+    """Absolute logarithm of value over nominal; 0 where their ratio says nothing: of angles, and over a zero."""
+    return abs(math.log(one.value / one.nominal)) if one.unit != "rad" and one.value * one.nominal > 0.0 else 0.0
+
+
+def _changed(name: str, one: Correction) -> str:
+    if _growth(one):
+        return f"{name} {100.0 * (one.value / one.nominal - 1.0):+.1f} %"
+    return f"{name} {quantity(one.value, one.unit)} instead of {quantity(one.nominal, one.unit)}"
 
 
 def _left(result: Result) -> str:

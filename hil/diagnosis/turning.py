@@ -9,6 +9,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _WORDS = {
+    "ball screw, nut and linear encoder": "gear, coupling and load encoder",
+    "linear encoder": "load encoder",
     "ball nut and thrust bearing": "gear or coupling",
     "ball screw": "gear",
     "lead": "transmission",
@@ -16,6 +18,7 @@ _WORDS = {
     "Table": "Load",
     "guideways": "bearings",
     "screw": "motor",
+    "metre": "radian",
     "mm": "mrad",
     "µm": "µrad",
     "force": "torque",

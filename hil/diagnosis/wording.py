@@ -46,7 +46,12 @@ def unit_in(bench: Bench, parameter: Parameter) -> str:
     """SI unit of a parameter of a mechanism on the axis of a bench."""
     if parameter.role is Role.ORDER and not bench.axis.physics().turn_known:
         return "1/m"
-    return parameter.dimension.unit(bench.axis.linear, bench.axis.turns)
+    return parameter.dimension.unit(bench.axis.drive_unit, bench.axis.turns)
+
+
+def value_in_words(value: float, parameter: Parameter, bench: Bench) -> str:
+    """Value of a parameter with its unit; edges of windows to a hundredth of a second, early and late ones alike."""
+    return f"{value:.2f} s" if parameter.role is Role.EDGE else quantity(value, unit_in(bench, parameter))
 
 
 def sentence(term: Term, bench: Bench) -> str:
@@ -62,7 +67,7 @@ def sentence(term: Term, bench: Bench) -> str:
     least = _LITTLE * max((abs(given[place]) for place in mechanism.indices(Role.STRENGTH)), default=0.0)
     for parameter, value in zip(mechanism.parameters, given, strict=True):
         little = parameter.role is Role.STRENGTH and abs(value) < least
-        told = quantity(least if little else value, unit_in(bench, parameter))
+        told = value_in_words(least if little else value, parameter, bench)
         values[parameter.name] = f"less than {told}" if little else told
     order = mechanism.named(Role.ORDER, term.values)
     values["wave"] = "" if order is None else _wave(order, bench)
@@ -70,10 +75,10 @@ def sentence(term: Term, bench: Bench) -> str:
     told = of_load(text, axis.turns).format(**values, variant=variant.name)
     if not variant.name or "{variant}" in text:
         return told
-    return f"{told.removesuffix('.')} ({_in_words(variant.name)})."
+    return f"{told.removesuffix('.')} ({_variant_in_words(variant.name)})."
 
 
-def _in_words(variant: str) -> str:
+def _variant_in_words(variant: str) -> str:
     """The name of a variant, with what it says of the measured torque in words."""
     return "; ".join(_SEEN.get(word, word) for word in variant.split()) if variant.split()[0] in _SEEN else variant
 

@@ -25,10 +25,11 @@ class Dimension(StrEnum):
     PER_LENGTH = "1/m"
     COUNT = "1/rev"
 
-    def unit(self, linear: bool, turns: bool = False) -> str:
-        """SI unit on a rotary or on a linear axis; `turns`: of a load that turns."""
-        other = _LINEAR_UNITS if linear else _TURNING_UNITS if turns else {}
-        return other.get(self, self.value)
+    def unit(self, drive: str = "N m", turns: bool = False) -> str:
+        """SI unit on an axis whose motor is driven by N m, N or V (`drive`); `turns`: of a load that turns."""
+        other = _LINEAR_UNITS if drive == "N" else _TURNING_UNITS if turns else {}
+        unit = other.get(self, self.value)
+        return unit.replace("(N m)", "V").replace("N m", "V") if drive == "V" else unit
 
 
 _LINEAR_UNITS = {

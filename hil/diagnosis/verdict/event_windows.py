@@ -11,6 +11,7 @@ import numpy as np
 from hil.arrays import FloatArray
 from hil.diagnosis.result import EventWindow, PulseTrain, Value
 from hil.diagnosis.turning import of_load
+from hil.diagnosis.wording import unit_in, value_in_words
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.measured import Measured
@@ -51,7 +52,7 @@ class EventReport:
 def describe_event(final: Fit, index: int, held_out: Dataset) -> EventReport:
     """Report the event that is the term `index` of a fit, with its windows in training and held-out recordings."""
     term = final.terms[index]
-    mechanism, kind = BY_ID[term.effect], (final.bench.axis.linear, final.bench.axis.turns)
+    mechanism, bench = BY_ID[term.effect], final.bench
     fits = [final] + ([replace(final.estimator, data=held_out).evaluate(final.hypothesis)] if held_out.runs else [])
     seen = _whole([one for fit in fits for one in _seen(fit, index)])
     common = _common(np.array([one.values[2] for one in seen]), np.array([one.errors[2] for one in seen]))
@@ -66,7 +67,7 @@ def describe_event(final: Fit, index: int, held_out: Dataset) -> EventReport:
         seen = [_Seen(one.run, (*at_s, one.values[2]), (*error_s, one.errors[2])) for one, at_s, error_s in pairs]
     train = regular[0] if regular is not None else None
     names = [mechanism.names[place] for place in (*_edges(term), mechanism.strength)]
-    units = [mechanism.parameters[place].dimension.unit(*kind) for place in (*_edges(term), mechanism.strength)]
+    units = [unit_in(bench, mechanism.parameters[place]) for place in (*_edges(term), mechanism.strength)]
 
     def value_of(one: _Seen, place: int) -> Value:
         return Value(value=one.values[place], std=one.errors[place], unit=units[place])
@@ -84,11 +85,11 @@ def describe_event(final: Fit, index: int, held_out: Dataset) -> EventReport:
         text = mechanism.periodic
     elif _different(seen) > 1:
         text = mechanism.repeated
-    words = {name: quantity(entry.value, entry.unit) for name, entry in parameters.items()}
+    words = {one.name: value_in_words(parameters[one.name].value, one, bench) for one in mechanism.parameters}
     words["count"] = str(train.count if train else _different(seen))
     if train is not None:
         words |= {"width_s": quantity(train.width_s, "s"), "period_s": quantity(train.period_s, "s")}
-    text = of_load(text, final.bench.axis.turns).format(**words)
+    text = of_load(text, bench.axis.turns).format(**words)
     return EventReport(windows, train, text, parameters)
 
 

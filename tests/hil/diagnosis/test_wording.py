@@ -1,9 +1,11 @@
 """Sentences of findings."""
 
 import pytest
+from example_result import EXAMPLE
 
 from hil.bench.bench_file import load_bench
-from hil.diagnosis.result import Location
+from hil.diagnosis.result import Location, Result
+from hil.diagnosis.statement import statement
 from hil.diagnosis.turning import of_load
 from hil.diagnosis.wording import sentence, where
 from hil.identification.terms import Term
@@ -56,3 +58,35 @@ def test_a_sentence_says_whether_the_measured_torque_shows_an_effect() -> None:
     assert hidden.endswith("(the measured torque does not show it).")
     gate = sentence(Term("torque_dead_zone", 2, (0.1,)), load_bench("reference"))
     assert gate.endswith("(the measured torque shows it; gate).")
+
+
+def test_values_of_a_motor_driven_by_its_voltage_are_volts() -> None:
+    text = sentence(Term("torque_dead_zone", 0, (0.347,)), load_bench("dc_motor"))
+    assert "below 0.347 V" in text
+
+
+def test_times_of_a_window_have_two_decimals_early_and_late() -> None:
+    text = sentence(Term("external_force", 0, (45.0, 6.2, 13.125)), load_bench("emps"))
+    assert "From 6.20 s to 13.12 s" in text
+
+
+def test_a_rotary_load_is_counted_in_radians() -> None:
+    assert of_load("5 µm too far for each metre of travel", True) == "5 µrad too far for each radian of travel"
+    assert of_load("ball screw, nut and linear encoder", True) == "gear, coupling and load encoder"
+
+
+@pytest.mark.parametrize(
+    ("nominal", "value", "unit", "said"),
+    [
+        (335.0, 301.5, "kg", "x -10.0 %"),
+        (0.02, -0.0001, "rad", "x -0.100 mrad instead of 20.0 mrad"),
+        (-0.5, 0.25, "N m", "x 0.250 N m instead of -0.500 N m"),
+        (0.0, 0.25, "N m", "x 0.250 N m instead of 0.00 mN m"),
+    ],
+)
+def test_a_change_is_a_share_only_where_a_ratio_says_something(
+    nominal: float, value: float, unit: str, said: str
+) -> None:
+    correction = {"nominal": nominal, "value": value, "std": 1e-6, "unit": unit}
+    result = Result.model_validate(EXAMPLE | {"verdict": "parameter_error", "parameter_corrections": {"x": correction}})
+    assert statement(result) == f"No physics is missing; parameters of the bench file are wrong: {said}."

@@ -36,6 +36,11 @@ _REPLAYED_ROWS = 200  # to find the phase of the position loop: many of its tick
 _FITTED_ROWS = 11  # motor positions fitted by a parabola for the first velocity: averages encoder counts
 
 
+_CHANNELS = (
+    "position_command_m", "velocity_command_m_s", "motor", "table_m", "torque_command", "torque", "speed_set_point",
+)  # fmt: skip
+
+
 @dataclass(frozen=True, eq=False)
 class Measured:
     """A recording prepared for the comparison, channels (n,) in motor units: rad and N m, or m and N."""
@@ -87,6 +92,11 @@ class Measured:
     def response(self) -> Response:
         """The measured channels in the twin's order."""
         return Response(self.motor, self.table_m, self.torque_command, self.torque)
+
+    def until(self, row: int) -> "Measured":
+        """The rows before `row`."""
+        cut = {name: values[:row] for name, values in vars(self).items() if name in _CHANNELS and values.size}
+        return replace(self, **cut)
 
     @cached_property
     def moving(self) -> NDArray[np.bool_]:

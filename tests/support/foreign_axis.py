@@ -11,8 +11,13 @@ INERTIA_KG_M2, COULOMB_N_M, VISCOUS_N_M_S_RAD = 2.0e-3, 0.4, 0.01
 LEAD_M = 0.010
 
 
-def axis(rows: int = 4000, rate_hz: float = 1000.0) -> dict[str, np.ndarray]:
-    """t [s], x_set, x_act [mm], motor angle [rad], speed [rad/s], torque [N m] of a screw of 10 mm."""
+def axis(
+    rows: int = 4000, rate_hz: float = 1000.0, inertia_kg_m2: float | np.ndarray = INERTIA_KG_M2
+) -> dict[str, np.ndarray]:
+    """t [s], x_set, x_act [mm], motor angle [rad], speed [rad/s], torque [N m] of a screw of 10 mm.
+
+    The inertia is one value, or one for each row.
+    """
     random = np.random.default_rng(1)
     t = np.arange(rows) / rate_hz
     phases = ((30.0, 0.5, 0.0), (12.0, 1.3, 1.0), (4.0, 3.1, 2.0))
@@ -22,7 +27,7 @@ def axis(rows: int = 4000, rate_hz: float = 1000.0) -> dict[str, np.ndarray]:
         angle += size * (np.sin(w * t + phase) - np.sin(phase))
         speed += size * w * np.cos(w * t + phase)
         acceleration -= size * w**2 * np.sin(w * t + phase)
-    torque = INERTIA_KG_M2 * acceleration + VISCOUS_N_M_S_RAD * speed + COULOMB_N_M * np.sign(speed)
+    torque = inertia_kg_m2 * acceleration + VISCOUS_N_M_S_RAD * speed + COULOMB_N_M * np.sign(speed)
     count = 2 * np.pi / 2**17
     ratio_mm = 1e3 * LEAD_M / (2 * np.pi)
     late = np.interp(t + 0.004, t, angle, right=angle[-1])  # the set-point comes before the motion

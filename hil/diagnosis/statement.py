@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 
-from hil.diagnosis.result import AT_FLOOR, Correction, Finding, FitFigures, Mode, Result, Verdict
+from hil.diagnosis.result import AT_FLOOR, Correction, Finding, FitFigures, Result, Verdict
 from hil.diagnosis.wording import title
 from hil.quantities import percent, quantity
 
@@ -14,10 +14,7 @@ def statement(result: Result) -> str:
     """The verdict as one sentence."""
     if result.verdict is Verdict.MISSING_PHYSICS:
         named = _sentences(result.missing)
-        name, entry = max(
-            result.fit.items(),
-            key=lambda item: (item[1].mode is Mode.CLOSED_LOOP, _improvement(item[1].train)),
-        )
+        name, entry = max(result.fit.items(), key=lambda item: _improvement(item[1].train))
         found = entry.validate_ or entry.train
         before, after, noise = (
             quantity(value, entry.unit) for value in (found.best_before_rms, found.after_rms, found.noise_floor_rms)

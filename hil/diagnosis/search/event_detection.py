@@ -27,6 +27,7 @@ _ALIKE = 0.25  # levels of adjacent windows that differ less are one
 _ROUNDS = 3  # windows found in one round do not count as motion or noise in the next; then they stay
 _REWEIGHTED = 40  # iterations of the regression
 _LEAST_USUAL = 0.3  # of the blocks without an event: else which level is none cannot be told
+_FAINT = 1e-3  # of the energy of all windows, in the faintest together: 3 % of their rms
 _SMOOTH_BLOCKS = 8  # the noise of a block is that of means over 40 ms: longer than the observer remembers
 
 
@@ -46,8 +47,17 @@ def without_events(found: Fit) -> Fit:
 
 
 def detect(found: Fit) -> list[Event]:
-    """Find the events of all runs of a fit, beside its permanent terms; none about a reversal."""
-    return _of_fit(without_events(found), False)
+    """Find the events of all runs of a fit, beside its permanent terms; none about a reversal.
+
+    They are those that hold nearly all energy of the windows: a fit that begins with many faint ones ends nowhere. What
+    those leave shows beside the fitted ones (`left_over`).
+    """
+    events = _of_fit(without_events(found), False)
+    energies = np.array([one.level**2 * (one.end_s - one.start_s) for one in events])
+    faint = np.zeros(len(events), dtype=bool)
+    faintest = np.argsort(energies)
+    faint[faintest] = np.cumsum(energies[faintest]) < _FAINT * energies.sum()
+    return [one for one, leave in zip(events, faint.tolist(), strict=True) if not leave]
 
 
 def left_over(found: Fit) -> list[Event]:
@@ -99,7 +109,12 @@ def _of_run(run: Measured, seen: Disturbance, reversals: bool) -> list[Event]:
     near = np.any(turning[:rows].reshape(-1, block), axis=1, keepdims=True)[:, 0]
     found = [one for one in found if _beyond_reversals(rest, weights, near, one)]
     at_s, length_s = run.time_s[first], block * run.period_s
-    return [Event(run.name, at_s + one.first * length_s, at_s + one.last * length_s, one.level) for one in found]
+    # edges are where the torque is seen: at rest before and after it a window may begin anywhere
+    shown = [one.first + np.flatnonzero(weights[one.first : one.last])[[0, -1]] + [0, 1] for one in found]
+    return [
+        Event(run.name, at_s + float(begin) * length_s, at_s + float(end) * length_s, one.level)
+        for one, (begin, end) in zip(found, shown, strict=True)
+    ]
 
 
 def _beyond_reversals(rest: FloatArray, weights: FloatArray, near: NDArray[np.bool_], one: Segment) -> bool:

@@ -124,13 +124,20 @@ def _events(base: Fit) -> list[StartPoint]:
     if any(term.windows for term in base.terms):
         return []
     # events may have led the fitted parameters astray, those of the bench file may be wrong
-    found = [detect(one) for one in (base, base.estimator.evaluate(base.hypothesis.owner))]
-    terms = [event_term(events, base.bench.axis.ratio_m_rad) for events in found if events]
+    points = (base, base.estimator.evaluate(base.hypothesis.owner))
+    found = [(one, event_term(events, base.bench.axis.ratio_m_rad)) for one in points if (events := detect(one))]
+    terms = [term for _, term in sorted(found, key=lambda pair: _criterion(*pair))[:1]]
     return [
         StartPoint(term.effect, 0, term.values, BY_ID[term.effect].strength, windows=term.windows)
         for term in terms
         if offered(term, base.hypothesis, base.terms)
     ]
+
+
+def _criterion(at: Fit, event: Term) -> float:
+    """Bayesian information criterion of an event at the parameters of a fit: three values for each window."""
+    begun = at.estimator.evaluate(at.hypothesis.with_term(event))
+    return float(begun.rows * np.log(begun.cost) + 3 * len(event.windows) * np.log(begun.rows))
 
 
 def offered(new: Term, hypothesis: Hypothesis, terms: Sequence[Term]) -> bool:

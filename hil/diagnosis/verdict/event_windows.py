@@ -3,7 +3,7 @@
 A window that the split of a recording cut is one window.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -58,7 +58,7 @@ def describe_event(final: Fit, index: int, held_out: Dataset) -> EventReport:
     common = _common(np.array([one.values[2] for one in seen]), np.array([one.errors[2] for one in seen]))
     if common is not None:
         value, error = common
-        seen = [replace(one, values=(*one.values[:2], value), errors=(*one.errors[:2], error)) for one in seen]
+        seen = _joined(replace(one, values=(*one.values[:2], value), errors=(*one.errors[:2], error)) for one in seen)
     regular = None
     if common is not None and _different(seen) == len(seen):
         regular = train_of(np.array([one.values[:2] for one in seen]), np.array([one.errors[:2] for one in seen]))
@@ -127,6 +127,19 @@ def _whole(seen: Sequence[_Seen]) -> list[_Seen]:
         values = (before.values[0], one.values[1], better.values[2])
         result[result.index(before)] = _Seen(before.run, values, (before.errors[0], one.errors[1], better.errors[2]))
     return result
+
+
+def _joined(seen: Iterable[_Seen]) -> list[_Seen]:
+    """Join windows of one strength in a run of which one begins where another ends."""
+    result = list[_Seen]()
+    for one in sorted(seen, key=lambda other: (other.run.name, other.values[0])):
+        last = result[-1] if result else None
+        if last is None or last.run is not one.run or one.values[0] - last.values[1] > _REGULAR_S:
+            result.append(one)
+        elif one.values[1] > last.values[1]:
+            values, errors = (last.values[0], *one.values[1:]), (last.errors[0], *one.errors[1:])
+            result[-1] = _Seen(one.run, values, errors)
+    return sorted(result, key=lambda other: other.values[0])
 
 
 def _continues(before: _Seen, after: _Seen) -> bool:

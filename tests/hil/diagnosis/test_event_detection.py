@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
-from diagnosis_runs import bench, dataset, fitted, recorded
+from diagnosis_runs import bench, dataset, evaluated, fitted, recorded
 from emps_windows import PERIOD_S, Push, assert_found, emps_recording, irregular, pushed, regular, response, windows
 
 from hil.bench.bench_file import load_bench
@@ -17,6 +18,7 @@ from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.measured import take
 from hil.identification.nominal_fit import fit_nominal_parameters
+from hil.identification.terms import Term
 from hil.identification.window_fit import fit_windows
 
 OWNER = bench()
@@ -105,3 +107,19 @@ def test_without_an_event_the_held_out_part_gets_none() -> None:
     run = take(recorded(OWNER), OWNER)
     plain = fitted(Hypothesis(OWNER), [run])
     assert with_events_of(dataset([take(recorded(OWNER, seed=2), OWNER)], OWNER), plain) is plain
+
+
+def test_edges_of_a_window_are_where_the_axis_moves() -> None:
+    """At rest friction holds a force, and its window may begin anywhere."""
+    run = take(recorded(OWNER, Term("external_force", 0, (100.0, 1.42, 2.0))), OWNER)
+    moves = np.abs(np.gradient(run.motor, run.period_s)) > 1e-3
+    found = detect(evaluated(Hypothesis(OWNER), [run]))
+    assert found
+    for event in found:
+        for edge_s in (event.start_s, event.end_s):
+            assert moves[np.abs(run.time_s - edge_s) < 0.02].any()
+
+
+def test_faint_windows_are_left_for_later() -> None:
+    nominal, *_ = prepared([Push(5.2, 6.4, 200.0), Push(8.6, 8.62, 30.0)])
+    assert len(detect(nominal)) == 1

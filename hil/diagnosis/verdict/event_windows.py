@@ -10,6 +10,7 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.diagnosis.result import EventWindow, PulseTrain, Value
+from hil.diagnosis.search.event_detection import BLOCK_S, EDGE
 from hil.diagnosis.turning import of_load
 from hil.diagnosis.wording import unit_in, value_in_words
 from hil.identification.dataset import Dataset
@@ -27,11 +28,12 @@ _SIGMAS, _SHARE = 3.0, 0.05
 _REGULAR_S = 0.005  # largest deviation of an edge from a period: a controlled event repeats more exactly
 _LEAST_ERROR_S = 1e-4  # of an edge in the fit of a period: ten times finer than the rows of a recording at 1 kHz
 _FEWEST = 3  # windows of a train: two always have a period
+_EDGE_S = EDGE * BLOCK_S
 _CUT_S = 0.15  # at the cut of a recording: rows at rest or not evaluated
 
 
 @dataclass(frozen=True)
-class _Seen:
+class Seen:
     """A window of one run: start, end [s] and strength, and their standard errors."""
 
     run: Measured
@@ -54,22 +56,23 @@ def describe_event(final: Fit, index: int, held_out: Dataset) -> EventReport:
     term = final.terms[index]
     mechanism, bench = BY_ID[term.effect], final.bench
     fits = [final] + ([replace(final.estimator, data=held_out).evaluate(final.hypothesis)] if held_out.runs else [])
-    seen = _whole([one for fit in fits for one in _seen(fit, index)])
+    seen = joined(_whole([one for fit in fits for one in _seen(fit, index)]))
     common = _common(np.array([one.values[2] for one in seen]), np.array([one.errors[2] for one in seen]))
     if common is not None:
         value, error = common
-        seen = _joined(replace(one, values=(*one.values[:2], value), errors=(*one.errors[:2], error)) for one in seen)
+        same = (replace(one, values=(*one.values[:2], value), errors=(*one.errors[:2], error)) for one in seen)
+        seen = joined(same, alike=True)
     regular = None
     if common is not None and _different(seen) == len(seen):
         regular = train_of(np.array([one.values[:2] for one in seen]), np.array([one.errors[:2] for one in seen]))
     if regular is not None:
         pairs = zip(seen, regular[1].tolist(), regular[2].tolist(), strict=True)
-        seen = [_Seen(one.run, (*at_s, one.values[2]), (*error_s, one.errors[2])) for one, at_s, error_s in pairs]
+        seen = [Seen(one.run, (*at_s, one.values[2]), (*error_s, one.errors[2])) for one, at_s, error_s in pairs]
     train = regular[0] if regular is not None else None
     names = [mechanism.names[place] for place in (*_edges(term), mechanism.strength)]
     units = [unit_in(bench, mechanism.parameters[place]) for place in (*_edges(term), mechanism.strength)]
 
-    def value_of(one: _Seen, place: int) -> Value:
+    def value_of(one: Seen, place: int) -> Value:
         return Value(value=one.values[place], std=one.errors[place], unit=units[place])
 
     windows = tuple(
@@ -97,7 +100,7 @@ def _edges(term: Term) -> list[int]:
     return BY_ID[term.effect].indices(Role.EDGE)
 
 
-def _seen(fit: Fit, index: int) -> list[_Seen]:
+def _seen(fit: Fit, index: int) -> list[Seen]:
     term, strength = fit.terms[index], BY_ID[fit.terms[index].effect].strength
     runs = {run.name: run for run in fit.data.runs}
     inside = [window for window in term.windows if window.run in runs]
@@ -110,14 +113,14 @@ def _seen(fit: Fit, index: int) -> list[_Seen]:
         return min(max(start, first), last), min(max(end, first), last)
 
     return [
-        _Seen(runs[window.run], (*edges(window), term.at(window)[strength]), (row[0], row[1], row[2]))
+        Seen(runs[window.run], (*edges(window), term.at(window)[strength]), (row[0], row[1], row[2]))
         for window, row in zip(inside, window_errors(fit, index).tolist(), strict=True)
     ]
 
 
-def _whole(seen: Sequence[_Seen]) -> list[_Seen]:
+def _whole(seen: Sequence[Seen]) -> list[Seen]:
     """Join windows that continue in the next part of a recording, in order of time."""
-    result = list[_Seen]()
+    result = list[Seen]()
     for one in sorted(seen, key=lambda other: other.values[0]):
         before = next((other for other in result if _continues(other, one)), None)
         if before is None:
@@ -125,24 +128,37 @@ def _whole(seen: Sequence[_Seen]) -> list[_Seen]:
             continue
         better = min(before, one, key=lambda other: other.errors[2])
         values = (before.values[0], one.values[1], better.values[2])
-        result[result.index(before)] = _Seen(before.run, values, (before.errors[0], one.errors[1], better.errors[2]))
+        result[result.index(before)] = Seen(before.run, values, (before.errors[0], one.errors[1], better.errors[2]))
     return result
 
 
-def _joined(seen: Iterable[_Seen]) -> list[_Seen]:
-    """Join windows of one strength in a run of which one begins where another ends."""
-    result = list[_Seen]()
+def joined(seen: Iterable[Seen], alike: bool = False) -> list[Seen]:
+    """Join windows of one sign in a run of which one begins where another ends: of one strength (`alike`), or a ramp.
+
+    A window shorter than the observer follows an edge is the ramp of the longer one, which gives the strength.
+    """
+    result = list[Seen]()
     for one in sorted(seen, key=lambda other: (other.run.name, other.values[0])):
         last = result[-1] if result else None
-        if last is None or last.run is not one.run or one.values[0] - last.values[1] > _REGULAR_S:
+        if last is None or not (_touch(last, one) and (alike or min(_width_s(last), _width_s(one)) < _EDGE_S)):
             result.append(one)
-        elif one.values[1] > last.values[1]:
-            values, errors = (last.values[0], *one.values[1:]), (last.errors[0], *one.errors[1:])
-            result[-1] = _Seen(one.run, values, errors)
+            continue
+        longer, end = max(last, one, key=_width_s), max(last, one, key=lambda other: other.values[1])
+        values = (last.values[0], end.values[1], longer.values[2])
+        result[-1] = Seen(one.run, values, (last.errors[0], end.errors[1], longer.errors[2]))
     return sorted(result, key=lambda other: other.values[0])
 
 
-def _continues(before: _Seen, after: _Seen) -> bool:
+def _touch(before: Seen, after: Seen) -> bool:
+    near = after.values[0] - before.values[1] < _REGULAR_S
+    return before.run is after.run and near and before.values[2] * after.values[2] > 0.0
+
+
+def _width_s(one: Seen) -> float:
+    return one.values[1] - one.values[0]
+
+
+def _continues(before: Seen, after: Seen) -> bool:
     last_s, first_s = before.run.time_s[-1], after.run.time_s[after.run.judged.start]
     cut_s, period_s = after.run.start.time_s, after.run.period_s
     following = before.run is not after.run and cut_s - 2.0 * period_s < last_s < max(cut_s, first_s) + 2.0 * period_s
@@ -158,7 +174,7 @@ def _common(strengths: FloatArray, errors: FloatArray) -> tuple[float, float] | 
     return (mean, error) if bool(fits.all()) else None
 
 
-def _different(seen: Sequence[_Seen]) -> int:
+def _different(seen: Sequence[Seen]) -> int:
     """Number of windows at different times: the same one in several recordings counts once."""
     starts = np.sort([one.values[0] for one in seen])
     return 1 + int(np.count_nonzero(np.diff(starts) > _REGULAR_S))

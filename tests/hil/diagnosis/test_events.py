@@ -13,6 +13,7 @@ from hil.bench.bench_file import load_bench
 from hil.diagnosis.diagnose import Diagnosis, diagnose
 from hil.diagnosis.search.events import constant_inside
 from hil.diagnosis.split import split
+from hil.diagnosis.verdict.event_windows import Seen, joined
 from hil.diagnosis.verdict.findings import diagnosed_bench
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.measured import take
@@ -138,3 +139,16 @@ def test_windows_in_emps_are_one_finding(pushes: list[Push], common_n: float | N
 def test_emps_without_added_forces_has_no_event_in_its_diagnosis(name: str) -> None:
     found = diagnose([emps_recording()], [], load_bench(name))
     assert "external_force" not in [finding.effect for finding in found.result.missing]
+
+
+def test_a_ramp_is_part_of_its_window_and_equal_neighbours_are_one() -> None:
+    run = take(recorded(OWNER), OWNER)
+    error = (1e-4, 1e-4, 0.1)
+    ramp, push, other = (
+        Seen(run, values, error) for values in ((1.0, 1.02, 20.0), (1.021, 1.8, 45.0), (1.8, 2.0, 30.0))
+    )
+    assert [one.values for one in joined([push, ramp, other])] == [(1.0, 1.8, 45.0), (1.8, 2.0, 30.0)]
+    equal = [replace(one, values=(*one.values[:2], 40.0)) for one in (push, other)]
+    assert [one.values for one in joined(equal, alike=True)] == [(1.021, 2.0, 40.0)]
+    apart = [push, replace(other, values=(1.9, 2.0, 45.0)), replace(other, values=(2.0, 2.1, -45.0))]
+    assert joined(apart, alike=True) == apart

@@ -67,7 +67,7 @@ def diagnose(
                 name,
                 *(
                     quantity(value, entry.unit)
-                    for value in (figures.before_rms, figures.after_rms, figures.noise_floor_rms)
+                    for value in (figures.best_before_rms, figures.after_rms, figures.noise_floor_rms)
                 ),
             )
             for name, entry in result.fit.items()

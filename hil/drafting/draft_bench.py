@@ -14,7 +14,6 @@ from hil.drafting.sensor_values import noise_of
 from hil.drafting.usual_values import ROTARY_LEAD_M
 from hil.errors import InputError
 from hil.identification.completion import with_position
-from hil.identification.coordinates import TRUST
 from hil.quantities import digits
 from hil.recording.importing import STEP
 from hil.recording.quantum import count_of, is_decimal
@@ -103,9 +102,9 @@ def draft_bench(recording: Recording) -> BenchDraft:
 
 
 def _deflection_s2(transmission: TransmissionValues) -> Estimate | None:
-    """Deflection of the transmission over the load's acceleration; where it is not told, below its standard error.
+    """Deflection of the transmission over the load's acceleration; where it is not told, its standard error.
 
-    A diagnosis searches within a factor of `TRUST` of it: the transmission is as soft as the standard error or stiffer.
+    A diagnosis searches within a factor of `TRUST` of it: up to three standard errors, which are not told yet.
 
     Two encoders show what a transmission does, which a rigid axis does not have: lead error, play, twist. None: the
     second encoder is late, and no deflection is told beside its delay.
@@ -115,8 +114,8 @@ def _deflection_s2(transmission: TransmissionValues) -> Estimate | None:
         return replace(stretch, how="deflection over acceleration")
     if transmission.delay_s.significant:
         return None
-    how = "not told by this motion: a third of the standard error of the deflection over acceleration"
-    return Estimate(max(stretch.value, stretch.std_error / TRUST, _STIFFEST_S2), stretch.std_error, how)
+    how = "not told by this motion: the standard error of the deflection over acceleration"
+    return Estimate(max(stretch.value, stretch.std_error, _STIFFEST_S2), stretch.std_error, how)
 
 
 def _linear(draft: BenchDraft, plant: PlantValues) -> None:

@@ -53,8 +53,16 @@ _PERIOD = (
 # factor of a unit, in lower case without blanks and signs between, to the SI unit of the constant
 _UNITS = {
     Constant.RATE: {"hz": 1.0, "khz": 1e3, "1/s": 1.0, "s/s": 1.0, "sps": 1.0},
-    Constant.TORQUE: {"nm/a": 1.0, "mnm/a": 1e-3, "ncm/a": 1e-2, "nma": 1.0, "mnma": 1e-3},
-    Constant.FORCE: {"n/a": 1.0, "na": 1.0},
+    Constant.TORQUE: {
+        "nm/a": 1.0,
+        "mnm/a": 1e-3,
+        "ncm/a": 1e-2,
+        "nma": 1.0,
+        "mnma": 1e-3,
+        "nmpera": 1.0,
+        "mnmpera": 1e-3,
+    },
+    Constant.FORCE: {"n/a": 1.0, "na": 1.0, "npera": 1.0},
     Constant.LEAD: {"mm": 1e-3, "m": 1.0, "um": 1e-6, "in": 0.0254, "mm/rev": 1e-3, "mm/u": 1e-3, "mm/tr": 1e-3},
     Constant.COUNTS: {"": 1.0, "counts": 1.0, "inc": 1.0, "1/rev": 1.0, "counts/rev": 1.0},
     Constant.RATED_TORQUE: {"nm": 1.0, "mnm": 1e-3, "ncm": 1e-2},
@@ -113,11 +121,11 @@ def _unit_of_name(name: str) -> tuple[str, str]:
     """Words and unit of the name of a scalar: torque_constant_nm_a -> torque_constant, nma."""
     tokens = _plain(re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name)).split()
     units = {unit for known in (*_UNITS.values(), _SECONDS) for unit in known if unit}
-    for take in (3, 2, 1):
+    for take in (4, 3, 2, 1):
         unit = "".join(tokens[-take:])
         if len(tokens) > take and unit in units:
             return " ".join(tokens[:-take]), unit
-    return name, ""
+    return " ".join(tokens), ""
 
 
 def _folded(text: str) -> str:

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 
 import numpy as np
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
@@ -74,11 +73,6 @@ class Dataset:
     def noise(self) -> tuple[dict[str, FloatArray], ...]:
         """Noise of the residuals at each row, (n,) per channel, for each run: scales without model discrepancy."""
         return self.scales(discrepancy=0.0)
-
-    @cached_property
-    def floors(self) -> tuple[dict[str, float], ...]:
-        """Noise floor of the residual of each channel, block by block, for each run."""
-        return tuple(noise_floor_rms(run, self.bench, self.observer_s) for run in self.runs)
 
     @property
     def rows(self) -> int:
@@ -187,18 +181,6 @@ def unknown_input(run: Measured, bench: Bench, observer_s: float) -> dict[str, F
         held = bench.axis.physics().coulomb_n_m * observer_s**2 / inertia(bench)
         found["motor"] = np.hypot(found["motor"], np.where(creeping(run), held, 0.0))
     return found
-
-
-def noise_floor_rms(run: Measured, bench: Bench, observer_s: float) -> dict[str, float]:
-    """rms of the noise in the residual of each channel of a run, block by block.
-
-    Of what samples leave open it has the size in the median row: in reversals that is a bound far above its rms.
-    """
-    left = unknown_input(run, bench, observer_s)
-    return {
-        name: float(np.hypot(np.sqrt(np.mean(noise[run.judged] ** 2)), np.median(left[name][run.judged])))
-        for name, noise in sensor_noise(run, bench, observer_s).items()
-    }
 
 
 def unknown_torque(run: Measured, bench: Bench) -> FloatArray:

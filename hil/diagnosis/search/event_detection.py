@@ -5,6 +5,7 @@ in turn, and so is the noise beside the windows. The motion is the measured one:
 the windows itself.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -53,11 +54,16 @@ def detect(found: Fit) -> list[Event]:
     those leave shows beside the fitted ones (`left_over`).
     """
     events = _of_fit(without_events(found), False)
-    energies = np.array([one.level**2 * (one.end_s - one.start_s) for one in events])
-    faint = np.zeros(len(events), dtype=bool)
-    faintest = np.argsort(energies)
-    faint[faintest] = np.cumsum(energies[faintest]) < _FAINT * energies.sum()
-    return [one for one, leave in zip(events, faint.tolist(), strict=True) if not leave]
+    left_out = faint([(one.start_s, one.end_s, one.level) for one in events])
+    return [one for one, leave in zip(events, left_out, strict=True) if not leave]
+
+
+def faint(windows: Sequence[tuple[float, float, float]]) -> list[bool]:
+    """True for windows (start, end, level) that hold next to nothing of the energy of all, weakest first."""
+    energies = np.array([level**2 * (end_s - start_s) for start_s, end_s, level in windows])
+    found, order = np.zeros(len(windows), dtype=bool), np.argsort(energies)
+    found[order] = np.cumsum(energies[order]) < _FAINT * energies.sum()
+    return [bool(one) for one in found]
 
 
 def left_over(found: Fit) -> list[Event]:

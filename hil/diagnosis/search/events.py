@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from hil.arrays import FloatArray
-from hil.diagnosis.search.event_detection import BLOCK_S, EDGE, Event, detect, left_over
+from hil.diagnosis.search.event_detection import BLOCK_S, EDGE, Event, detect, faint, left_over
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
@@ -162,7 +162,7 @@ def _with_windows(at: Hypothesis, index: int, windows: tuple[Window, ...]) -> Hy
 def _trimmed(found: Fit, others: bool = True) -> Fit:
     """Leave out windows of the runs of a fit whose force is no larger than its error allows, and fit the others again.
 
-    Such are windows at rest, where friction holds against a force.
+    Such are windows at rest, where friction holds against a force. Faint ones are left out too.
     """
     index = _index(found)
     if index is None:
@@ -171,8 +171,12 @@ def _trimmed(found: Fit, others: bool = True) -> Fit:
     strength = BY_ID[term.effect].strength
     errors = iter(window_errors(found, index))
     at = found.hypothesis.resolved.terms[index]
+    inside = [one for one in term.windows if one.run in names]
+    weak = dict(zip(inside, faint([(*at.edges(one), at.at(one)[strength]) for one in inside]), strict=True))
     kept = tuple(
-        one for one in term.windows if one.run not in names or abs(at.at(one)[strength]) > _SIGMAS * next(errors)[2]
+        one
+        for one in term.windows
+        if one.run not in names or (abs(at.at(one)[strength]) > _SIGMAS * next(errors)[2] and not weak[one])
     )
     if len(kept) == len(term.windows):
         return found
@@ -185,7 +189,8 @@ def constant_inside(found: Fit, base: Fit) -> bool:
     """True if a constant force explains the windows of a fit as well as the rest of its recordings is explained.
 
     A force of another form, such as friction at one place, leaves more inside. What happens once is no law of place or
-    speed: a blow has any form, of which a constant explains most. `base` is the fit without the force.
+    speed: a blow or a push by hand has any form, of which windows that follow each other explain most. `base` is the
+    fit without the force.
     """
     index = _index(found)
     if index is None:
@@ -204,8 +209,16 @@ def constant_inside(found: Fit, base: Fit) -> bool:
         outside.append(part[~within] ** 2)
         before += float(np.sum(base.residuals.parts[number, channel][within] ** 2))
     left, rest = np.concatenate(inside), np.concatenate(outside)
-    once = len(term.windows) == 1 and float(np.sum(left)) <= _OF_BLOW * before
+    once = _one_push(term) and float(np.sum(left)) <= _OF_BLOW * before
     return once or not left.size or bool(np.mean(left) <= _OF_CONSTANT * max(float(np.mean(rest)), 1.0))
+
+
+def _one_push(term: Term) -> bool:
+    """True if the windows of an event follow each other in one recording, as far as the observer tells."""
+    edges = sorted(term.edges(one) for one in term.windows)
+    ends = np.maximum.accumulate([end_s for _, end_s in edges])
+    gaps_s = np.array([start_s for start_s, _ in edges[1:]]) - ends[:-1]
+    return len({one.run for one in term.windows}) == 1 and bool(np.all(gaps_s < EDGE * BLOCK_S))
 
 
 def _index(found: Fit) -> int | None:

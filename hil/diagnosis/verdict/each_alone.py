@@ -11,10 +11,11 @@ from hil.identification.estimator import Fit
 from hil.identification.inference import standard_errors
 from hil.identification.measured import SETTLE_IN_MOTION_S, Measured
 from hil.identification.nominal_fit import fit_nominal_parameters
-from hil.quantities import quantity, unit_of
+from hil.quantities import percent, quantity, unit_of
 
 _SURE = 3.0  # standard errors from which two values differ
 _BLOCK_S = 0.02  # resolution of the moment: several time constants of the observer
+_MOST = 0.9  # of the energy above the noise that a change explains; less has another cause
 _SHORTEST = 0.1  # of the judged rows: a shorter part tells no parameters
 
 
@@ -26,7 +27,8 @@ def changed_between(nominal: Fit, held_out: Dataset) -> str:
     runs = (*nominal.data.runs, *held_out.runs)
     if len(runs) < 2:
         return ""
-    told = _differing(nominal.data, runs, [f"in {run.name}" for run in runs])
+    fits = _each(nominal.data, runs)
+    told = _differing(fits, [f"in {run.name}" for run in runs]) if all(fit.at_floor for fit in fits) else ""
     return (
         "Each recording alone is explained without missing physics, with parameters of its own: the axis changed "
         f"between them. {told}."
@@ -36,7 +38,7 @@ def changed_between(nominal: Fit, held_out: Dataset) -> str:
 
 
 def changed_within(nominal: Fit, held_out: Dataset) -> str:
-    """Parameters that change at a moment of a recording whose parts the twin reproduces; empty if there is none.
+    """Parameters that change at a moment of a recording and explain nearly all of its mismatch; empty if there is none.
 
     The moment is that at which two sets of parameters, one before and one after it, leave least of the residuals, each
     linear in their change. `nominal` is the fit of one set to the recordings; `held_out` may hold the moment.
@@ -49,28 +51,32 @@ def changed_within(nominal: Fit, held_out: Dataset) -> str:
         settled = row + round(SETTLE_IN_MOTION_S / run.period_s)
         if settled >= run.motor.size:
             continue
-        told = _differing(nominal.data, [run.until(row), replace(run, lead_in=settled)], ["before", "after"])
-        if told:
-            return (
-                f"The recording {run.name} is explained without missing physics by parameters that change at "
-                f"{run.time_s[row]:.2f} s: the axis changed there. {told}."
-            )
+        fits = _each(nominal.data, [run.until(row), replace(run, lead_in=settled)])
+        explained = 1.0 - sum(fit.excess for fit in fits) / alone.excess
+        if explained < _MOST or not (told := _differing(fits, ["before", "after"])):
+            continue
+        how = "without missing physics" if all(fit.at_floor for fit in fits) else f"for {percent(explained)}"
+        return (
+            f"The mismatch of {run.name} is explained {how} by parameters that change at {run.time_s[row]:.2f} s: "
+            f"the axis changed there. {told}."
+        )
     return ""
 
 
-def _differing(data: Dataset, runs: Sequence[Measured], where: Sequence[str]) -> str:
-    """Parameters that differ between runs, each with its value and where it is; empty if a run is not explained."""
-    fits = []
-    for run in runs:
-        fits.append(fit_nominal_parameters(data.over([run])))
-        if not fits[-1].at_floor:
-            return ""
+def _each(data: Dataset, runs: Sequence[Measured]) -> list[Fit]:
+    """Fit of the nominal parameters to each run alone."""
+    return [fit_nominal_parameters(data.over([run])) for run in runs]
+
+
+def _differing(fits: Sequence[Fit], where: Sequence[str]) -> str:
+    """Parameters that differ between fits, each with its value and where it is; empty if none does."""
     values = np.array([fit.hypothesis.values for fit in fits])
     errors = np.array([standard_errors(fit)[: values.shape[1]] for fit in fits])
-    told = []
+    told, stuck = [], {name for fit in fits for name in fit.at_bound}  # a value at its bound is not identifiable
     for index, coordinate in enumerate(fits[0].hypothesis.coordinates):
         least, most = int(np.argmin(values[:, index])), int(np.argmax(values[:, index]))
-        if values[most, index] - values[least, index] > _SURE * float(np.hypot(*errors[[least, most], index])):
+        sure = _SURE * float(np.hypot(*errors[[least, most], index]))
+        if coordinate.name not in stuck and values[most, index] - values[least, index] > sure:
             unit = unit_of(coordinate.name)
             each = (f"{quantity(value, unit)} {one}" for value, one in zip(values[:, index], where, strict=True))
             told.append(f"{coordinate.name} {', '.join(each)}")

@@ -10,7 +10,6 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.diagnosis.result import EventWindow, PulseTrain, Value
-from hil.diagnosis.search.event_detection import BLOCK_S, EDGE
 from hil.diagnosis.turning import of_load
 from hil.diagnosis.wording import unit_in, value_in_words
 from hil.identification.dataset import Dataset
@@ -28,7 +27,7 @@ _SIGMAS, _SHARE = 3.0, 0.05
 _REGULAR_S = 0.005  # largest deviation of an edge from a period: a controlled event repeats more exactly
 _LEAST_ERROR_S = 1e-4  # of an edge in the fit of a period: ten times finer than the rows of a recording at 1 kHz
 _FEWEST = 3  # windows of a train: two always have a period
-_EDGE_S = EDGE * BLOCK_S
+_RAMP = 1.0 / 3.0  # of the impulse of a push
 _CUT_S = 0.15  # at the cut of a recording: rows at rest or not evaluated
 
 
@@ -133,29 +132,35 @@ def _whole(seen: Sequence[Seen]) -> list[Seen]:
 
 
 def joined(seen: Iterable[Seen], alike: bool = False) -> list[Seen]:
-    """Join windows of one sign in a run of which one begins where another ends: of one strength (`alike`), or a ramp.
+    """Join windows of a run of which one begins where another ends: all of one strength (`alike`), or ramps of a push.
 
-    A window shorter than the observer follows an edge is the ramp of the longer one, which gives the strength.
+    A neighbour with less than a third of the impulse is the ramp of the stronger one, whose strength the push has.
     """
-    result = list[Seen]()
-    for one in sorted(seen, key=lambda other: (other.run.name, other.values[0])):
-        last = result[-1] if result else None
-        if last is None or not (_touch(last, one) and (alike or min(_width_s(last), _width_s(one)) < _EDGE_S)):
-            result.append(one)
-            continue
-        longer, end = max(last, one, key=_width_s), max(last, one, key=lambda other: other.values[1])
-        values = (last.values[0], end.values[1], longer.values[2])
-        result[-1] = Seen(one.run, values, (last.errors[0], end.errors[1], longer.errors[2]))
-    return sorted(result, key=lambda other: other.values[0])
+    parts = sorted(seen, key=lambda one: (one.run.name, one.values[0]))
+    while True:
+        pairs = (place for place in range(1, len(parts)) if _belong(parts[place - 1], parts[place], alike))
+        place = next(pairs, None)
+        if place is None:
+            return sorted(parts, key=lambda one: one.values[0])
+        parts[place - 1 : place + 1] = [_both(parts[place - 1], parts[place])]
 
 
-def _touch(before: Seen, after: Seen) -> bool:
-    near = after.values[0] - before.values[1] < _REGULAR_S
-    return before.run is after.run and near and before.values[2] * after.values[2] > 0.0
+def _belong(before: Seen, after: Seen, alike: bool) -> bool:
+    near = before.run is after.run and after.values[0] - before.values[1] < _REGULAR_S
+    less, more = sorted((abs(_impulse(before)), abs(_impulse(after))))
+    return near and (less < _RAMP * more or (alike and _impulse(before) * _impulse(after) > 0.0))
 
 
-def _width_s(one: Seen) -> float:
-    return one.values[1] - one.values[0]
+def _both(before: Seen, after: Seen) -> Seen:
+    stronger = max(before, after, key=lambda one: abs(_impulse(one)))
+    last = max(before, after, key=lambda one: one.values[1])
+    values = (before.values[0], last.values[1], stronger.values[2])
+    return Seen(before.run, values, (before.errors[0], last.errors[1], stronger.errors[2]))
+
+
+def _impulse(one: Seen) -> float:
+    start_s, end_s, strength = one.values
+    return (end_s - start_s) * strength
 
 
 def _continues(before: Seen, after: Seen) -> bool:

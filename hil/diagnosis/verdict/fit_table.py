@@ -100,20 +100,13 @@ class _ChannelTable:
     def _white(self, data: Dataset, index: int) -> float:
         """White noise of the channel in a run.
 
-        Block by block it is what of that noise reaches the residual. In closed loop it is the noise of the sensor and
-        the response of the axis to the noise of its encoders.
+        Block by block it is the scale of the weighted residuals. In closed loop it is the noise of the sensor and the
+        response of the axis to the noise of its encoders.
         """
         run = data.runs[index]
         if self.mode is Mode.BLOCKS:
-            return data.floors[index][self.channel]
+            return rms(data.noise[index][self.channel][run.judged])
         return math.hypot(sensor_noise(run)[self.channel], self.noise[run][self.channel])
-
-
-def _over_noise(hypothesis: Hypothesis, data: Dataset, channel: str) -> float:
-    """Residual rms of a channel block by block over its noise as the fits weigh it."""
-    runs = list(zip(data.runs, hypothesis.residuals(data).channels, data.noise, strict=True))
-    left = np.concatenate([parts[channel][run.judged] for run, parts, _ in runs])
-    return rms(left) / rms(np.concatenate([noise[channel][run.judged] for run, _, noise in runs]))
 
 
 def closed_loop_held(nominal: Fit, final: Fit, held_out: Dataset) -> bool:
@@ -145,8 +138,7 @@ def fit_table(owner: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> dict[s
         }
         mode = modes[0]
         if held:
-            closed = max(one.after_rms / one.noise_floor_rms for one in figures[mode])
-            block = max(_over_noise(final.hypothesis, data, channel) for data in sets)
+            closed, block = (max(one.after_rms / one.noise_floor_rms for one in figures[mode]) for mode in figures)
             chaotic = closed > STRAYS >= block and not train.runs[0].torque_is_command
             mode = Mode.BLOCKS if chaotic else Mode.CLOSED_LOOP
         result[recorded] = ChannelFit(

@@ -8,14 +8,12 @@ from pathlib import Path
 from typing import Any
 
 import jsonschema
-import numpy as np
 import pytest
 from diagnosis_runs import rig
 
 from hil.bench.bench_file import load_bench
 from hil.diagnosis.diagnose import Diagnosis, diagnose
 from hil.diagnosis.result import schema
-from hil.identification.dataset import inertia
 from hil.identification.measured import take
 from hil.recording.recording import read_recording
 from hil.report.diagnosis_report import write_diagnosis
@@ -53,18 +51,16 @@ def test_the_effect_is_named_first_with_its_parameters(folder: str) -> None:
 
 @pytest.mark.parametrize("folder", EFFECTS)
 def test_it_explains_the_held_out_recording(folder: str) -> None:
-    diagnosis = diagnosed(folder)
-    result = diagnosis.result
+    result = diagnosed(folder).result
     for channel, entry in result.fit.items():
         assert entry.validate_ is not None
-        assert entry.validate_.after_rms < 1.15 * noise(diagnosis, channel), channel
+        assert entry.validate_.after_rms < 1.15 * entry.validate_.noise_floor_rms, channel
         assert entry.validate_.after_rms < 0.3 * entry.validate_.before_rms, channel
     assert result.unexplained.share < 0.01
 
 
 def test_where_no_physics_is_missing_none_is_named() -> None:
-    diagnosis = diagnosed("null")
-    result = diagnosis.result
+    result = diagnosed("null").result
     assert result.verdict == "parameter_error"
     assert result.missing == ()
     correction = result.parameter_corrections["coulomb_torque_n_m"]
@@ -72,19 +68,8 @@ def test_where_no_physics_is_missing_none_is_named() -> None:
     assert abs(correction.value - 1.1) > 10.0 * correction.std
     for channel, entry in result.fit.items():
         assert entry.validate_ is not None
-        assert entry.validate_.after_rms < 1.15 * noise(diagnosis, channel), channel
+        assert entry.validate_.after_rms < 1.15 * entry.validate_.noise_floor_rms, channel
     assert result.unexplained.share < 0.01
-
-
-def noise(diagnosis: Diagnosis, channel: str) -> float:
-    """Noise floor of a channel; block by block also the motion by a torque as large as the noise of the torque."""
-    entry = diagnosis.result.fit[channel]
-    assert entry.validate_ is not None
-    floor = entry.validate_.noise_floor_rms
-    if entry.mode == "closed_loop" or channel != "motor_position_rad":
-        return floor
-    data = diagnosis.held_out
-    return float(np.hypot(floor, data.runs[0].noise.torque * data.observer_s**2 / inertia(diagnosis.owner)))
 
 
 @pytest.mark.parametrize("folder", ["null", *EFFECTS])

@@ -145,10 +145,10 @@ def test_a_ramp_is_part_of_its_window_and_equal_neighbours_are_one() -> None:
     run = take(recorded(OWNER), OWNER)
     error = (1e-4, 1e-4, 0.1)
     ramp, push, other = (
-        Seen(run, values, error) for values in ((1.0, 1.02, 20.0), (1.021, 1.8, 45.0), (1.8, 2.0, 30.0))
+        Seen(run, values, error) for values in ((1.0, 1.02, 20.0), (1.021, 1.8, 45.0), (1.8, 2.8, 30.0))
     )
-    assert [one.values for one in joined([push, ramp, other])] == [(1.0, 1.8, 45.0), (1.8, 2.0, 30.0)]
+    assert [one.values for one in joined([push, ramp, other])] == [(1.0, 1.8, 45.0), (1.8, 2.8, 30.0)]
     equal = [replace(one, values=(*one.values[:2], 40.0)) for one in (push, other)]
-    assert [one.values for one in joined(equal, alike=True)] == [(1.021, 2.0, 40.0)]
+    assert [one.values for one in joined(equal, alike=True)] == [(1.021, 2.8, 40.0)]
     apart = [push, replace(other, values=(1.9, 2.0, 45.0)), replace(other, values=(2.0, 2.1, -45.0))]
     assert joined(apart, alike=True) == apart

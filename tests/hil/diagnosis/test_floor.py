@@ -58,16 +58,6 @@ def test_a_late_encoder_does_not_widen_the_scale_of_its_channel(three_laps: Meas
     assert np.median(after[late.moving]) == pytest.approx(np.median(before[late.moving]), rel=0.05)
 
 
-def test_the_floor_of_the_motor_is_its_encoder_not_the_torque_that_counts(three_laps: Measured) -> None:
-    quiet, loud = (
-        prepare_dataset([replace(three_laps, noise=replace(three_laps.noise, torque=torque))], bench())
-        for torque in (0.01, 0.02)
-    )
-    assert quiet.observer_s == loud.observer_s
-    assert loud.floors[0]["motor"] == quiet.floors[0]["motor"]
-    assert np.median(loud.noise[0]["motor"]) > 1.5 * np.median(quiet.noise[0]["motor"])
-
-
 def test_without_laps_the_floor_is_the_sensor_noise() -> None:
     once = take(recorded(bench()), bench())
     assert once.laps is None

@@ -57,6 +57,8 @@ def test_another_line_gives_none(line: str) -> None:
 def test_a_scalar_gives_a_constant_by_its_name_and_two_values_none() -> None:
     found = header_values([], {"sample_rate_hz": 200.0, "torqueConstant_Nm_A": 0.3, "mass": 2.0})
     assert {one: told.value for one, told in found.items()} == {Constant.RATE: 200.0, Constant.TORQUE: 0.3}
+    named = header_values([], {"torque_constant_Nm_per_A": 2.9, "encoder_counts_per_rev": 4194304.0})
+    assert {one: told.value for one, told in named.items()} == {Constant.TORQUE: 2.9, Constant.COUNTS: 4194304.0}
     assert header_values(["Torque constant: 0.8 Nm/A", "Motor constant: 0.7 Nm/A"], {}) == {}
 
 

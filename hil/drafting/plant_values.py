@@ -13,6 +13,7 @@ from hil.arrays import FloatArray
 from hil.drafting.estimate import BlockFit, Estimate, fit_blocks
 from hil.drafting.relations import direction, motion, smoothed
 from hil.errors import InputError
+from hil.identification.friction import identify_friction
 from hil.identification.inverse_dynamics import CORNER, CUT_AT_START, inverse_dynamics_columns
 from hil.identification.noise import white_noise
 from hil.recording.recording import Recording
@@ -100,7 +101,25 @@ def plant_values(recording: Recording, load_ratio: float | None = None) -> Plant
         inertia = replace(inertia, value=inertia.std_error, how=f"{inertia.how}; not told by this motion: its error")
     gravity, angle = _gravity(more[0], more[1], load_ratio) if len(more) == 2 and load_ratio else (None, None)
     spring = more[0] if len(more) == 1 else None
+    if not (viscous.significant and viscous.value > 0.0):
+        viscous, coulomb = _at_feeds(recording) or (viscous, coulomb)
     return PlantValues(inertia, viscous, coulomb, offset, fit.left, gravity, angle, spring, cutoff_hz)
+
+
+def _at_feeds(recording: Recording) -> tuple[Estimate, Estimate] | None:
+    """Viscous and Coulomb friction from constant feeds, where these tell both; else None.
+
+    Friction that falls from rest makes the viscous friction of all rows too small, and negative.
+    """
+    try:
+        found = identify_friction(recording)
+    except InputError:
+        return None
+    how = f"{len(found.points)} constant feeds; all rows do not tell it"
+    viscous = Estimate(found.viscous, found.viscous_std_error, how)
+    coulomb = Estimate(found.coulomb, found.coulomb_std_error, how)
+    told = all(one.significant and one.value > 0.0 for one in (viscous, coulomb))
+    return (viscous, coulomb) if told else None
 
 
 def _gravity(sine: Estimate, cosine: Estimate, load_ratio: float) -> tuple[Estimate, Estimate]:

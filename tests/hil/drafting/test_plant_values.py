@@ -50,3 +50,26 @@ def test_inertia_of_a_faster_table() -> None:
     assert found.gravity is None
     assert found.inertia.value == pytest.approx(INERTIA_KG_M2, rel=0.02)
     assert found.left < 0.15  # 0.43 with the rows around reversals
+
+
+def test_viscous_friction_that_a_stribeck_peak_hides_is_taken_from_constant_feeds() -> None:
+    parts = []
+    for speed in (3.0, 5.0, 2.0, 4.0):
+        for direction in (1.0, -1.0):
+            fast, slow = np.linspace(0.0, speed, 200), np.linspace(0.0, 0.3, 2000)
+            parts += [direction * part for part in (fast, np.full(600, speed), fast[::-1], slow, slow[::-1])]
+    velocity = np.concatenate(parts)
+    position, acceleration = np.cumsum(velocity) * STEP_S, np.gradient(velocity, STEP_S)
+    friction = np.sign(velocity) * (1.3 + 1.0 * np.exp(-((velocity / 0.12) ** 2))) + 0.09 * velocity
+    torque = 0.08 * acceleration + friction + np.random.default_rng(1).normal(0.0, 0.02, velocity.size)
+    columns = {"motor_position_rad": position, "torque_n_m": torque}
+    told = {
+        "time_s": np.arange(velocity.size) * STEP_S,
+        "position_command_m": position,
+        "velocity_command_m_s": velocity,
+    }
+    without, found = (plant_values(Recording("table", one, STEP_S)) for one in (columns, columns | told))
+    assert not without.viscous.significant
+    assert found.viscous.value == pytest.approx(0.09, rel=0.05)
+    assert found.coulomb.value == pytest.approx(1.3, rel=0.05)
+    assert "constant feeds" in found.viscous.how

@@ -69,7 +69,7 @@ def answer(out: Path, name: str, way: str) -> dict[str, list[tuple[str, float]]]
             result = diagnose(train, held_out, bench).result
             found = {
                 "verdict": str(result.verdict),
-                "names": [(one.effect, one.confidence) for one in result.missing],
+                "names": [(one.effect, one.confidence) for one in result.findings],
                 "not_testable": list(result.not_testable),
                 "notes": list(result.notes),
             }

@@ -13,7 +13,7 @@ import numpy as np
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
 from hil.diagnosis.experiment import Experiment, separating, showing
-from hil.diagnosis.location.locate import locate
+from hil.diagnosis.location.locate import locate, shown_in
 from hil.diagnosis.notes import at_bound, ended, notes_on, on_torque, stopped
 from hil.diagnosis.preparation import prepare_diagnosis
 from hil.diagnosis.result import AT_FLOOR, Location, Mode, NextExperiment, Result, TimeBudget, Unexplained, Verdict
@@ -148,7 +148,8 @@ def diagnose(
     before = owner if of_plant is Verdict.PARAMETER_ERROR else nominal
 
     progress("locating")
-    location = None if verdict is Verdict.NO_MISMATCH else locate(before, nominal if partly else final)
+    seen, goal = shown_in(before, held_out), nominal if partly else final
+    location = None if verdict is Verdict.NO_MISMATCH else locate(seen, seen if goal is before else goal)
     if verdict is not of_plant:  # the plant is as the bench describes it, the law is not
         location = Location(block="controller", element="settings of the control law", channels=())
     progress("comparing the fits with the noise floor")

@@ -17,6 +17,7 @@ from hil.diagnosis.location.reaction_torque import acting
 from hil.diagnosis.location.residual_energy import Energy, energies, without_terms
 from hil.diagnosis.result import Location, Phase, PhaseKind
 from hil.diagnosis.verdict.fit_table import channel_names
+from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.measured import Measured
 from hil.twin.library import BY_ID
@@ -77,6 +78,11 @@ def locate(found: Fit, final: Fit) -> Location:
         speed_m_s=_range([np.abs(run.run.velocity_command_m_s) for run in seen], seen),
         **asdict(locked),
     )
+
+
+def shown_in(found: Fit, held_out: Dataset) -> Fit:
+    """The fit on the recordings that show its mismatch: those of training, or the held-out ones if only they do."""
+    return found.on(held_out) if held_out.runs and found.at_floor else found
 
 
 def mismatch_energies(found: Fit, final: Fit) -> list[Energy]:

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from hil.arrays import FloatArray
-from hil.diagnosis.location.locate import BLOCKS, block_shares, mismatch_energies, phase_shares
+from hil.diagnosis.location.locate import BLOCKS, block_shares, mismatch_energies, phase_shares, shown_in
 from hil.diagnosis.result import Verdict
 from hil.diagnosis.turning import speed_unit
 from hil.diagnosis.verdict.fit_table import channel_names
@@ -29,7 +29,7 @@ ENERGY = "residual² / noise²"
 
 def location_figure(diagnosis: Diagnosis) -> Figure:
     """Draw shares of the residual energy by block and phase, and its mean over position, speed and time."""
-    before = reference_fit(diagnosis)
+    before = shown_in(reference_fit(diagnosis), diagnosis.held_out)
     seen = mismatch_energies(before, diagnosis.final)
     figure = Figure(figsize=(10.0, 8.2), layout="constrained")
     axes = figure.subplot_mosaic([["block", "phase"], ["position", "speed"], ["time", "time"]])

@@ -60,6 +60,8 @@ def test_the_moment_at_which_the_inertia_changes_is_said(tmp_path: Path, second:
     result = diagnose([read_recording(tmp_path / "log.parquet")], [], load_bench(tmp_path / "axis.yaml")).result
     assert result.verdict == "unexplained"
     assert "the axis changed there" in result.statement
+    assert result.location is not None
+    assert sum(phase.share for phase in result.location.phases) == pytest.approx(1.0)  # also if it is held out
     moment_s = float(re.search(r"change at ([\d.]+) s", result.statement)[1])  # type: ignore[index]
     assert moment_s == pytest.approx(1e-3 * at, abs=0.1)
     before, after = re.findall(r"inertia_kg_m2 (\S+) \S+ \S+ before, (\S+)", result.statement)[0]

@@ -46,6 +46,7 @@ def geared(effects: list[dict[str, object]]) -> Bench:
     )
 
 
+@pytest.mark.long
 def test_an_eccentric_encoder_of_the_load_is_found() -> None:
     amplitude_rad, phase_rad = 3e-4, 1.1
     parameters = {"amplitude_rad": amplitude_rad, "phase_rad": phase_rad}
@@ -56,7 +57,7 @@ def test_an_eccentric_encoder_of_the_load_is_found() -> None:
         {
             "schema_version": 1,
             "limits": {"velocity_m_s": 6.0, "acceleration_m_s2": 30.0, "jerk_m_s3": 600.0},
-            "segments": [{"kind": "repeat", "times": 3, "segments": legs}],
+            "segments": [{"kind": "repeat", "times": 1, "segments": legs}],
         }
     )
     recording = hil.simulate(truth, plan(profile, truth.period_s), seed=3)

@@ -24,7 +24,7 @@ from hil.diagnosis.time_left import with_time_left
 from hil.diagnosis.turning import labelled
 from hil.diagnosis.untold import untold
 from hil.diagnosis.verdict.cross_validation import CrossValidation, cross_validate
-from hil.diagnosis.verdict.each_alone import changed_between, changed_within
+from hil.diagnosis.verdict.each_alone import changed
 from hil.diagnosis.verdict.findings import corrections, diagnosed_bench, findings, form_of, renamed
 from hil.diagnosis.verdict.fit_table import channel_names, channel_residuals, closed_loop_held, fit_table
 from hil.diagnosis.verdict.judge import explains_most, judge, not_testable, unexplained_share
@@ -192,10 +192,9 @@ def diagnose(
         runtime_s=time.monotonic() - begin,
     )
     told = statement(result.model_copy(update={"verdict": of_plant}))
-    changed = ""
-    if of_plant is Verdict.UNEXPLAINED and not explanation.stopped_at:
-        changed = changed_between(nominal, held_out) or changed_within(nominal, held_out)
-    said = " ".join(text for text in (law.advice, changed or told) if text)
+    open_still = of_plant is Verdict.UNEXPLAINED and not explanation.stopped_at
+    told = (changed(nominal, held_out) if open_still else "") or told
+    said = " ".join(text for text in (law.advice, told) if text)
     result = result.model_copy(update={"statement": said})
     after = bench if of_plant is Verdict.NO_MISMATCH else diagnosed_bench(bench, final)
     if not bench.law_known:  # what was set aside stays in the file

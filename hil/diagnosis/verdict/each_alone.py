@@ -19,48 +19,38 @@ _MOST = 0.9  # of the energy above the noise that a change explains; less has an
 _SHORTEST = 0.1  # of the judged rows: a shorter part tells no parameters
 
 
-def changed_between(nominal: Fit, held_out: Dataset) -> str:
-    """Parameters that differ between recordings which the twin reproduces alone; empty if it does not, or if none does.
+def changed(nominal: Fit, held_out: Dataset) -> str:
+    """Parameters of the axis that change between the recordings, or during one; empty if none does.
 
-    `nominal` is the fit of one set of parameters to those of training.
+    `nominal` is the fit of one set of parameters to the recordings of training.
     """
     runs = (*nominal.data.runs, *held_out.runs)
-    if len(runs) < 2:
+    alone = _each(nominal.data, runs)
+    if len(runs) > 1 and all(fit.at_floor for fit in alone):
+        told = _differing(alone, [f"in {run.name}" for run in runs])
+        if told:
+            return (
+                "Each recording alone is explained without missing physics, with parameters of its own: the axis "
+                f"changed between them. {told}."
+            )
+    return next((text for fit in alone if not fit.at_floor and (text := _changed_within(fit))), "")
+
+
+def _changed_within(alone: Fit) -> str:
+    """Parameters that change during the only recording of a fit and explain nearly all of its mismatch; else empty."""
+    (run,) = alone.data.runs
+    row, settling = _moment(alone), round(SETTLE_IN_MOTION_S / run.period_s)
+    if row is None or row + settling >= run.motor.size:
         return ""
-    fits = _each(nominal.data, runs)
-    told = _differing(fits, [f"in {run.name}" for run in runs]) if all(fit.at_floor for fit in fits) else ""
+    fits = _each(alone.data, [run.until(row), replace(run, lead_in=row + settling)])
+    explained = 1.0 - sum(fit.excess for fit in fits) / alone.excess
+    if explained < _MOST or not (told := _differing(fits, ["before", "after"])):
+        return ""
+    how = "without missing physics" if all(fit.at_floor for fit in fits) else f"for {percent(explained)}"
     return (
-        "Each recording alone is explained without missing physics, with parameters of its own: the axis changed "
-        f"between them. {told}."
-        if told
-        else ""
+        f"The mismatch of {run.name} is explained {how} by parameters that change at {run.time_s[row]:.2f} s: "
+        f"the axis changed there. {told}."
     )
-
-
-def changed_within(nominal: Fit, held_out: Dataset) -> str:
-    """Parameters that change at a moment of a recording and explain nearly all of its mismatch; empty if there is none.
-
-    The moment is that at which two sets of parameters, one before and one after it, leave least of the residuals, each
-    linear in their change. `nominal` is the fit of one set to the recordings; `held_out` may hold the moment.
-    """
-    for run in (*nominal.data.runs, *held_out.runs):
-        alone = fit_nominal_parameters(nominal.data.over([run]))
-        if alone.at_floor or not alone.jacobian.shape[1]:
-            continue
-        row = _moment(alone)
-        settled = row + round(SETTLE_IN_MOTION_S / run.period_s)
-        if settled >= run.motor.size:
-            continue
-        fits = _each(nominal.data, [run.until(row), replace(run, lead_in=settled)])
-        explained = 1.0 - sum(fit.excess for fit in fits) / alone.excess
-        if explained < _MOST or not (told := _differing(fits, ["before", "after"])):
-            continue
-        how = "without missing physics" if all(fit.at_floor for fit in fits) else f"for {percent(explained)}"
-        return (
-            f"The mismatch of {run.name} is explained {how} by parameters that change at {run.time_s[row]:.2f} s: "
-            f"the axis changed there. {told}."
-        )
-    return ""
 
 
 def _each(data: Dataset, runs: Sequence[Measured]) -> list[Fit]:
@@ -83,8 +73,12 @@ def _differing(fits: Sequence[Fit], where: Sequence[str]) -> str:
     return "; ".join(told)
 
 
-def _moment(alone: Fit) -> int:
-    """Row of the only run of a fit at which a change of its parameters leaves least of its residuals."""
+def _moment(alone: Fit) -> int | None:
+    """Row of the only run of a fit at which its parameters change most likely; None in a run that is too short.
+
+    Two changes of the parameters, one for the rows before it and one for those after it, leave the smallest residuals
+    there. Residuals are taken as linear in these changes.
+    """
     (run,) = alone.data.runs
     parts = alone.residuals.split(np.column_stack([alone.jacobian, alone.residuals.vector]))
     block = max(round(_BLOCK_S / run.period_s), 1)
@@ -93,6 +87,8 @@ def _moment(alone: Fit) -> int:
     normal = np.einsum("bij,bik->bjk", table, table).cumsum(axis=0)
     margin = max(round(_SHORTEST * len(normal)), 1)
     cuts = range(margin, len(normal) - margin)
+    if not cuts or not alone.jacobian.shape[1]:
+        return None
     best = min(cuts, key=lambda cut: _left(normal[cut]) + _left(normal[-1] - normal[cut]))
     return run.judged.indices(run.motor.size)[0] + (best + 1) * block
 

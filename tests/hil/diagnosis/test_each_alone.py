@@ -14,7 +14,7 @@ from hil.bench.bench_file import Bench, load_bench
 from hil.commands.identify import identify
 from hil.commands.import_ import import_
 from hil.diagnosis.diagnose import diagnose
-from hil.diagnosis.verdict.each_alone import changed_between
+from hil.diagnosis.verdict.each_alone import changed
 from hil.identification.measured import take
 from hil.identification.nominal_fit import fit_nominal_parameters
 from hil.identification.terms import Term
@@ -33,7 +33,7 @@ def rough(factor: float) -> Bench:
 def said(*benches: Bench, terms: tuple[Term, ...] = ()) -> str:
     runs = [take(recorded(one, *terms, seed=k, name=f"run {k}"), OWNER) for k, one in enumerate(benches)]
     nominal = fit_nominal_parameters(dataset(runs, OWNER))
-    return changed_between(nominal, nominal.data.over([]))
+    return changed(nominal, nominal.data.over([]))
 
 
 def test_a_parameter_that_differs_between_recordings_is_said() -> None:

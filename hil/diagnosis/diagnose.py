@@ -24,7 +24,7 @@ from hil.diagnosis.time_left import with_time_left
 from hil.diagnosis.turning import labelled
 from hil.diagnosis.untold import untold
 from hil.diagnosis.verdict.cross_validation import CrossValidation, cross_validate
-from hil.diagnosis.verdict.each_alone import changed
+from hil.diagnosis.verdict.each_alone import Change, changed
 from hil.diagnosis.verdict.findings import corrections, diagnosed_bench, findings, form_of, renamed
 from hil.diagnosis.verdict.fit_table import channel_names, channel_residuals, closed_loop_held, fit_table
 from hil.diagnosis.verdict.judge import explains_most, judge, not_testable, unexplained_share
@@ -64,15 +64,23 @@ class Diagnosis:
     proof: CrossValidation
     final: Fit
     experiment: Experiment | None = None  # next motion; None if no question is open
+    change: Change | None = None  # of the axis, between or during the recordings
 
-    def plot(self, what: Literal["residuals", "location", "finding"] = "residuals", number: int = 1) -> Figure:
-        """Draw the residuals before and after, the location of the mismatch, or the evidence for finding `number`.
+    def plot(
+        self, what: Literal["residuals", "location", "finding", "change"] = "residuals", number: int = 1
+    ) -> Figure:
+        """Draw the residuals before and after, the location of the mismatch, the evidence for finding `number`, or that
+        for a change of the axis.
 
-        Residuals are those of the first held-out recording. Raises InputError if there is no such finding.
+        Residuals are those of the first held-out recording. Raises InputError if there is no such finding or change.
         """
         from hil.diagnosis.pictures import findings, location
         from hil.figures.drawing import over_time
 
+        if what == "change":
+            from hil.diagnosis.pictures.change import change_figure
+
+            return labelled(change_figure(self), self.owner.axis.turns)
         if what == "location":
             return labelled(location.location_figure(self), self.owner.axis.turns)
         if what == "finding":
@@ -133,17 +141,23 @@ def diagnose(
     progress("testing on held-out recordings")
     proof = cross_validate(nominal, with_events_of(held_out, renamed(explanation.final)), held_out)
     of_plant = judge(owner, nominal, proof.final, held_out)
+    refit, change = reported_refit(nominal), None
+    if of_plant is Verdict.UNEXPLAINED and not explanation.stopped_at:
+        change = changed(refit.fit, held_out)
+        if change and proof.final.terms and unexplained_share(nominal, proof.final, held_out) < change.left:
+            change = None
+    of_plant = Verdict.AXIS_CHANGED if change else of_plant
     verdict = law.verdict(of_plant)
     named = verdict is Verdict.MISSING_PHYSICS
     # what explains most of a mismatch is told, though it is not the name of all of it
     partly = verdict is Verdict.UNEXPLAINED and explains_most(nominal, proof.final, held_out)
-    refit = reported_refit(nominal)
     nominal = refit.fit
     explanation = replace(explanation, nominal=nominal)
     if partly:
         final = proof.final
     else:
         final = {Verdict.MISSING_PHYSICS: proof.final, Verdict.NO_MISMATCH: owner}.get(of_plant, nominal)
+    as_given = of_plant in (Verdict.NO_MISMATCH, Verdict.AXIS_CHANGED)  # no correction of the bench holds throughout
     # a parameter error is located and measured against the parameters of the bench file
     before = owner if of_plant is Verdict.PARAMETER_ERROR else nominal
 
@@ -161,7 +175,7 @@ def diagnose(
     progress("designing the next experiment")
     # with findings only their rivals are in question; without, the cause may be a mechanism that the motion cannot show
     experiment = None
-    if closed_loop_held(nominal, final, held_out) and not explanation.stopped_at:
+    if closed_loop_held(nominal, final, held_out) and not explanation.stopped_at and not change:
         experiment = separating(explanation, proof.final, held_out) if named else showing(nominal, hidden, held_out)
     left = torque_left(owner, nominal, final, held_out)
     notes += [*notes_on(table, proof, forms, verdict, explanation, final), *ended(final), *on_torque(left)]
@@ -174,11 +188,12 @@ def diagnose(
         location=location,
         missing=found if named else (),
         partial=found if partly else (),
-        parameter_corrections=law.corrections | ({} if of_plant is Verdict.NO_MISMATCH else corrections(bench, final)),
-        not_identifiable=() if of_plant is Verdict.NO_MISMATCH else at_bound(final),
+        change=change.told if change else None,
+        parameter_corrections=law.corrections | ({} if as_given else corrections(bench, final)),
+        not_identifiable=() if as_given else at_bound(final),
         fit=table,
         not_testable=hidden,
-        unexplained=_unexplained(before, final, held_out, location, of_plant),
+        unexplained=_unexplained(before, final, held_out, location, of_plant, change),
         torque_left=left,
         next_experiment=NextExperiment(profile=NEXT_EXPERIMENT, separates=experiment.separates)
         if experiment and experiment.profile
@@ -192,26 +207,28 @@ def diagnose(
         runtime_s=time.monotonic() - begin,
     )
     told = statement(result.model_copy(update={"verdict": of_plant}))
-    open_still = of_plant is Verdict.UNEXPLAINED and not explanation.stopped_at
-    told = (changed(nominal, held_out) if open_still else "") or told
-    said = " ".join(text for text in (law.advice, told) if text)
+    # the settings come first where they are the verdict
+    said = " ".join(text for text in ((law.advice, told) if verdict is not of_plant else (told, law.advice)) if text)
     result = result.model_copy(update={"statement": said})
-    after = bench if of_plant is Verdict.NO_MISMATCH else diagnosed_bench(bench, final)
+    after = bench if as_given else diagnosed_bench(bench, final)
     if not bench.law_known:  # what was set aside stays in the file
         after = after.model_copy(update={"control": believed.control})
     after = after.model_copy(update={"encoders": believed.encoders})
-    return Diagnosis(result, after, bench, data, held_out, explanation, proof, final, experiment)
+    return Diagnosis(result, after, bench, data, held_out, explanation, proof, final, experiment, change)
 
 
 def _unexplained(
-    before: Fit, final: Fit, held_out: Dataset, location: Location | None, verdict: Verdict
+    before: Fit, final: Fit, held_out: Dataset, location: Location | None, verdict: Verdict, change: Change | None
 ) -> Unexplained:
     """Unexplained share of the energy above the floor, and the channels above their noise."""
     share = 0.0 if verdict is Verdict.NO_MISMATCH else unexplained_share(before, final, held_out)
+    fits: tuple[Fit, ...] = final.on(final.data), final.on(held_out)
+    if change:
+        share, fits = change.left, change.parts
     worst: dict[str, float] = {}
     names = channel_names(final.bench, final.data.runs[0])
-    for data in (final.data, held_out):
-        for ratios in final.on(data).noise_ratios:
+    for fit in fits:
+        for ratios in fit.noise_ratios:
             for name, ratio in ratios.items():
                 worst[names[name]] = max(worst.get(names[name], 0.0), ratio)
     above = {name: float(np.sqrt(ratio)) for name, ratio in worst.items() if ratio > FLOOR}

@@ -17,11 +17,13 @@ NotNegative = Annotated[float, Field(ge=0.0)]
 
 
 class Verdict(StrEnum):
-    """Answer: the twin explains the recordings, has wrong parameters, lacks named physics, or lacks unknown physics."""
+    """Answer: the twin explains the recordings, has wrong parameters, lacks named physics, or lacks unknown physics; or
+    the parameters of the axis changed."""
 
     NO_MISMATCH = "no_mismatch"
     PARAMETER_ERROR = "parameter_error"
     MISSING_PHYSICS = "missing_physics"
+    AXIS_CHANGED = "axis_changed"
     UNEXPLAINED = "unexplained"
 
 
@@ -175,6 +177,22 @@ class TorqueLeft(_Part):
     )
 
 
+class ChangedParameter(_Part):
+    """A parameter of the axis that is another one in each part of the recordings."""
+
+    name: str
+    values: tuple[Value, ...] = Field(description="in the order of the parts")
+
+
+class AxisChange(_Part):
+    """Change of the axis between recordings, or at a moment of one."""
+
+    recording: str | None = Field(description="in which it changed; null between recordings")
+    moment_s: float | None = Field(description="by the time of that recording; null between recordings")
+    parts: tuple[str, ...] = Field(description="names of the recordings, or `before` and `after`")
+    parameters: tuple[ChangedParameter, ...]
+
+
 class NextExperiment(_Part):
     """Motion that separates mechanisms that the recorded motion cannot."""
 
@@ -201,6 +219,7 @@ class Result(_Part):
     partial: tuple[Finding, ...] = Field(
         (), description="only for `unexplained`: mechanisms that explain most of the mismatch and leave more than noise"
     )
+    change: AxisChange | None = Field(None, description="only for `axis_changed`")
     parameter_corrections: dict[str, Correction]
     not_identifiable: tuple[str, ...] = Field(
         (), description="nominal parameters whose fit ended at the bound of the allowed range: no correction"

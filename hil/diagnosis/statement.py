@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 
-from hil.diagnosis.result import AT_FLOOR, Correction, Finding, FitFigures, Result, Verdict
+from hil.diagnosis.result import AT_FLOOR, AxisChange, Correction, Finding, FitFigures, Result, Verdict
 from hil.diagnosis.wording import title
 from hil.quantities import percent, quantity
 
@@ -39,6 +39,8 @@ def statement(result: Result) -> str:
         return f"No physics is missing; parameters of the bench file are wrong: {changes}."
     if result.verdict is Verdict.NO_MISMATCH:
         return "The twin reproduces these recordings to within their noise."
+    if result.change is not None:
+        return f"{_of_axis(result.change, result.unexplained.share)}{_left(result)}"
     if result.time_budget:
         return f"The time budget ended before a mechanism was found: {result.unexplained.description}"
     if result.partial:
@@ -49,6 +51,23 @@ def statement(result: Result) -> str:
             f"noise: {part} {result.unexplained.description}"
         )
     return f"The mismatch is not explained by any mechanism of the library: {result.unexplained.description}"
+
+
+def _of_axis(change: AxisChange, left: float) -> str:
+    """What changed on the axis, with the values in each part."""
+    where = "between the recordings"
+    parts, how = [f"in {part}" for part in change.parts], "With values of its own each recording is explained"
+    if change.moment_s is not None:
+        where, parts = f"at {change.moment_s:.2f} s of {change.recording}", list(change.parts)
+        how = f"Values that change there explain {percent(1.0 - left)} of the mismatch"
+    told = "; ".join(
+        f"{one.name} "
+        + ", ".join(
+            f"{quantity(entry.value, entry.unit)} {part}" for entry, part in zip(one.values, parts, strict=True)
+        )
+        for one in change.parameters
+    )
+    return f"The axis changed {where}: {told}. {how}, without missing physics."
 
 
 def _growth(one: Correction) -> float:

@@ -143,13 +143,14 @@ def _best(rows: LawRows, ratio_m_rad: float, period_s: float) -> LawFit | None:
         if ticks * period_s > _LONGEST_S:
             continue
         delays = find_delays(rows, Settings(_gains(ratio_m_rad, period_s, ticks, True, mean)))
-        for integral, late in product((True, False), (False, True)):
-            start = Settings(
-                _gains(ratio_m_rad, period_s, ticks, integral, mean), 1.0, *(delays if late else (0.0, 0.0))
-            )
-            base = closed_form([rows], start, [first_tick(rows, start)])
-            if base is not None:  # the start is too far off to tell which variant is right
-                tried.append((late, fit_settings([rows], base, twin, delays=late, start=base, most=_FIRST_STEPS)))
+        for integral in (True, False):
+            start = Settings(_gains(ratio_m_rad, period_s, ticks, integral, mean))
+            late = start._replace(setpoint_rows=delays[0], feedback_rows=delays[1])
+            # delays begin where a coarse search finds them, and at none: the fit resolves parts of a row
+            for free, one in ((False, start), (True, start), (True, late)):
+                base = closed_form([rows], one, [first_tick(rows, one)])
+                if base is not None:  # the start is too far off to tell which variant is right
+                    tried.append((free, fit_settings([rows], base, twin, delays=free, start=base, most=_FIRST_STEPS)))
     if not tried:
         return None
     best = preferred([one for _, one in tried])

@@ -229,7 +229,7 @@ def _fitted(
         learnt = closed_form(runs, near, cuts) if law.gains else None
         starts = [np.clip(law.at(one), low, high) for one in (law.base, near, learnt) if one is not None]
         first = starts[0] if len(starts) == 1 else min(starts, key=lambda one: float(np.sum(stacked(one) ** 2)))
-        fit = least_squares(stacked, first, jac, bounds=(low, high), max_nfev=most)
+        fit = least_squares(stacked, first, jac, bounds=(low, high), x_scale="jac", max_nfev=most)
         y = fit.x
     settings, terms = law.values(y)
     weight = settings.gains.velocity_gain_n_m_s_rad

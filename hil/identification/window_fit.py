@@ -31,7 +31,7 @@ _SEEN = 9.0  # growth of the energy in units of noise^2: three standard errors
 _LEAST_GAIN = 1e-6  # relative to the cost, as for other fits
 
 
-def fit_windows(found: Fit, evaluations: int = 8, others: bool = True) -> Fit:
+def fit_windows(found: Fit, evaluations: int = 16, others: bool = True) -> Fit:
     """Fit the windows of the event in a fit, with the other parameters (`others`) or alone; then those once more.
 
     Returns the fit itself if it has no event in its runs.

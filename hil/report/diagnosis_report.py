@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from hil.diagnosis.diagnose import NEXT_EXPERIMENT, Diagnosis
+from hil.diagnosis.pictures.change import CAPTION
 from hil.diagnosis.pictures.findings import finding_figure, term_of
 from hil.diagnosis.pictures.location import residual_panels
 from hil.diagnosis.result import Finding, FitFigures, Result, TorqueLeft, Value, Verdict
@@ -37,6 +38,7 @@ def write_diagnosis(diagnosis: Diagnosis, folder: Path) -> None:
     page = Page(f"Diagnosis of {names}", _lead(diagnosis), result.statement, good)
     for index in range(len(result.findings)):
         _finding(page, diagnosis, index, folder)
+    _change(page, diagnosis, folder)
     if result.location is not None:
         page.heading("Where it is")
         page.items(
@@ -112,6 +114,21 @@ def _finding(page: Page, diagnosis: Diagnosis, index: int, folder: Path) -> None
         page.table(
             ("rejected alternative", "reason"), [(title(rival.effect), rival.evidence) for rival in finding.rivals]
         )
+
+
+def _change(page: Page, diagnosis: Diagnosis, folder: Path) -> None:
+    change = diagnosis.result.change
+    if change is None:
+        return
+    page.heading("What changed")
+    page.picture(save(diagnosis.plot("change"), folder / "change.png"), CAPTION)
+    rows = []
+    for one in change.parameters:
+        factor, unit = reading_unit(one.values[0].unit, max(abs(entry.value) for entry in one.values))
+        cells = (f"{digits(entry.value * factor, 4)} ± {digits(entry.std * factor, 2)}" for entry in one.values)
+        rows.append((one.name, *map(Number, cells), unit))
+    page.table(("parameter", *change.parts, "unit"), rows)
+    page.text("The tables below are of one set of parameters for all recordings. No value of the bench is corrected.")
 
 
 def _windows(finding: Finding) -> list[tuple[str, ...]]:
@@ -197,14 +214,20 @@ def _corrections(page: Page, result: Result) -> None:
 
 
 def _next_experiment(page: Page, diagnosis: Diagnosis, folder: Path) -> None:
-    experiment = diagnosis.experiment
+    experiment, result = diagnosis.experiment, diagnosis.result
     page.heading("Next experiment")
-    page.text(experiment.note if experiment else "No question is open that another motion could answer.")
+    page.text(experiment.note if experiment else _no_experiment(result))
     if experiment and experiment.profile:
         page.text(
             f"{NEXT_EXPERIMENT} is its profile: run it and diagnose all recordings together; hil investigate does both."
         )
         write_profile(folder / NEXT_EXPERIMENT, experiment.profile)
+
+
+def _no_experiment(result: Result) -> str:
+    if result.verdict is Verdict.UNEXPLAINED:
+        return "None was designed: that needs a known control law, and a twin that holds its closed loop."
+    return "No question is open that another motion could answer."
 
 
 def _value(entry: Value) -> tuple[str, ...]:

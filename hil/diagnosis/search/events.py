@@ -70,8 +70,9 @@ def revised(found: Fit) -> Fit:
 def with_events_of(held_out: Dataset, final: Fit) -> Fit:
     """Add the events of held-out recordings to a fit: its parameters and its own events stay.
 
-    They are those that the disturbance torque shows, or those of the training recordings at the same times, whichever
-    the recordings support. An event is no prediction: it is found in each recording.
+    They are those that the disturbance torque shows, beside the terms of the fit or beside the nominal twin, or those
+    of the training recordings at the same times, whichever the recordings support best. An event is no prediction: it
+    is found in each recording.
     """
     if EVENT is None or not held_out.runs:
         return final
@@ -79,9 +80,11 @@ def with_events_of(held_out: Dataset, final: Fit) -> Fit:
     there = replace(final.estimator, data=held_out)
     before = there.evaluate(at)
     choices = list[Term]()
-    found, ratio = detect(before), final.bench.axis.ratio_m_rad
-    if found:
-        choices.append(event_term(found, ratio))
+    plain = there.evaluate(at.without(*range(len(at.terms))))
+    # terms may depend on the motion, which strong events disturb: some show only beside the nominal twin
+    for beside in (before, plain) if at.terms else (before,):
+        if found := detect(beside):
+            choices.append(event_term(found, final.bench.axis.ratio_m_rad))
     if index is not None:
         windows = dict.fromkeys(one._replace(run=run.name) for run in held_out.runs for one in at.terms[index].windows)
         choices.append(replace(at.resolved.terms[index], windows=tuple(windows)))

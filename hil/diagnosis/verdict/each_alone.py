@@ -1,17 +1,18 @@
 """Recordings, or parts of one, that the twin explains one by one, with other parameters for each: the axis changed."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from hil.arrays import FloatArray
+from hil.diagnosis.result import AxisChange, ChangedParameter, Value
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.inference import standard_errors
 from hil.identification.measured import SETTLE_IN_MOTION_S, Measured
 from hil.identification.nominal_fit import fit_nominal_parameters
-from hil.quantities import percent, quantity, unit_of
+from hil.quantities import unit_of
 
 _SURE = 3.0  # standard errors from which two values differ
 _BLOCK_S = 0.02  # resolution of the moment: several time constants of the observer
@@ -19,38 +20,48 @@ _MOST = 0.9  # of the energy above the noise that a change explains; less has an
 _SHORTEST = 0.1  # of the judged rows: a shorter part tells no parameters
 
 
-def changed(nominal: Fit, held_out: Dataset) -> str:
-    """Parameters of the axis that change between the recordings, or during one; empty if none does.
+@dataclass(frozen=True, eq=False)
+class Change:
+    """A change of the axis: `told`, and the evidence for it.
+
+    `runs` are the recordings, `parts` the fits of the nominal parameters to each of them, or before and after the
+    moment; `left` is the share of the energy above the noise that these leave.
+    """
+
+    told: AxisChange
+    runs: tuple[Measured, ...]
+    parts: tuple[Fit, ...]
+    left: float
+
+
+def changed(nominal: Fit, held_out: Dataset) -> Change | None:
+    """Find parameters of the axis that change between the recordings, or during one; None if none does.
 
     `nominal` is the fit of one set of parameters to the recordings of training.
     """
     runs = (*nominal.data.runs, *held_out.runs)
     alone = _each(nominal.data, runs)
     if len(runs) > 1 and all(fit.at_floor for fit in alone):
-        told = _differing(alone, [f"in {run.name}" for run in runs])
-        if told:
-            return (
-                "Each recording alone is explained without missing physics, with parameters of its own: the axis "
-                f"changed between them. {told}."
-            )
-    return next((text for fit in alone if not fit.at_floor and (text := _changed_within(fit))), "")
+        names = tuple(run.name for run in runs)
+        told = AxisChange(recording=None, moment_s=None, parts=names, parameters=_differing(alone))
+        if told.parameters:
+            return Change(told, runs, tuple(alone), 0.0)
+    return next((found for fit in alone if not fit.at_floor and (found := _changed_within(fit))), None)
 
 
-def _changed_within(alone: Fit) -> str:
-    """Parameters that change during the only recording of a fit and explain nearly all of its mismatch; else empty."""
+def _changed_within(alone: Fit) -> Change | None:
+    """A change during the only recording of a fit that explains nearly all of its mismatch; else None."""
     (run,) = alone.data.runs
     row, settling = _moment(alone), round(SETTLE_IN_MOTION_S / run.period_s)
     if row is None or row + settling >= run.motor.size:
-        return ""
+        return None
     fits = _each(alone.data, [run.until(row), replace(run, lead_in=row + settling)])
-    explained = 1.0 - sum(fit.excess for fit in fits) / alone.excess
-    if explained < _MOST or not (told := _differing(fits, ["before", "after"])):
-        return ""
-    how = "without missing physics" if all(fit.at_floor for fit in fits) else f"for {percent(explained)}"
-    return (
-        f"The mismatch of {run.name} is explained {how} by parameters that change at {run.time_s[row]:.2f} s: "
-        f"the axis changed there. {told}."
-    )
+    left = sum(fit.excess for fit in fits) / alone.excess
+    found = _differing(fits)
+    if left > 1.0 - _MOST or not found:
+        return None
+    told = AxisChange(recording=run.name, moment_s=float(run.time_s[row]), parts=("before", "after"), parameters=found)
+    return Change(told, (run,), tuple(fits), left)
 
 
 def _each(data: Dataset, runs: Sequence[Measured]) -> list[Fit]:
@@ -58,8 +69,8 @@ def _each(data: Dataset, runs: Sequence[Measured]) -> list[Fit]:
     return [fit_nominal_parameters(data.over([run])) for run in runs]
 
 
-def _differing(fits: Sequence[Fit], where: Sequence[str]) -> str:
-    """Parameters that differ between fits, each with its value and where it is; empty if none does."""
+def _differing(fits: Sequence[Fit]) -> tuple[ChangedParameter, ...]:
+    """Parameters that differ between fits by more than their errors."""
     values = np.array([fit.hypothesis.values for fit in fits])
     errors = np.array([standard_errors(fit)[: values.shape[1]] for fit in fits])
     told, stuck = [], {name for fit in fits for name in fit.at_bound}  # a value at its bound is not identifiable
@@ -68,9 +79,10 @@ def _differing(fits: Sequence[Fit], where: Sequence[str]) -> str:
         sure = _SURE * float(np.hypot(*errors[[least, most], index]))
         if coordinate.name not in stuck and values[most, index] - values[least, index] > sure:
             unit = unit_of(coordinate.name)
-            each = (f"{quantity(value, unit)} {one}" for value, one in zip(values[:, index], where, strict=True))
-            told.append(f"{coordinate.name} {', '.join(each)}")
-    return "; ".join(told)
+            pairs = zip(values[:, index], errors[:, index], strict=True)
+            each = tuple(Value(value=float(value), std=float(std), unit=unit) for value, std in pairs)
+            told.append(ChangedParameter(name=coordinate.name, values=each))
+    return tuple(told)
 
 
 def _moment(alone: Fit) -> int | None:

@@ -49,7 +49,7 @@ class GradedCase:
     @property
     def detected(self) -> bool:
         """True if the answer says that something is missing, with a name or without."""
-        return self.answer.verdict in ("missing_physics", "unexplained")
+        return self.answer.verdict in ("missing_physics", "unexplained", "axis_changed")
 
     @property
     def top(self) -> bool:

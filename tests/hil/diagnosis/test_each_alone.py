@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +18,7 @@ from hil.identification.measured import take
 from hil.identification.nominal_fit import fit_nominal_parameters
 from hil.identification.terms import Term
 from hil.recording.recording import read_recording
+from hil.report.diagnosis_report import write_diagnosis
 
 OWNER = bench()
 
@@ -30,23 +30,23 @@ def rough(factor: float) -> Bench:
     )
 
 
-def said(*benches: Bench, terms: tuple[Term, ...] = ()) -> str:
+def differing(*benches: Bench, terms: tuple[Term, ...] = ()) -> dict[str, tuple[float, ...]]:
     runs = [take(recorded(one, *terms, seed=k, name=f"run {k}"), OWNER) for k, one in enumerate(benches)]
     nominal = fit_nominal_parameters(dataset(runs, OWNER))
-    return changed(nominal, nominal.data.over([]))
+    found = changed(nominal, nominal.data.over([]))
+    return {one.name: tuple(value.value for value in one.values) for one in found.told.parameters} if found else {}
 
 
 def test_a_parameter_that_differs_between_recordings_is_said() -> None:
-    text = said(rough(1.3), OWNER)
-    assert "coulomb_torque_n_m" in text
-    assert "in run 0" in text
-    assert "mass" not in text
+    first, second = differing(rough(1.3), OWNER)["coulomb_torque_n_m"]
+    assert first / second == pytest.approx(1.3, rel=0.02)
+    assert "table_mass_kg" not in differing(rough(1.3), OWNER)
 
 
 def test_alike_recordings_and_those_that_are_not_explained_alone_say_nothing() -> None:
-    assert not said(OWNER, OWNER)
-    assert not said(OWNER)
-    assert not said(rough(1.3), OWNER, terms=(Term("cogging_torque", 0, (0.3, 6.0, 0.2)),))
+    assert not differing(OWNER, OWNER)
+    assert not differing(OWNER)
+    assert not differing(rough(1.3), OWNER, terms=(Term("cogging_torque", 0, (0.3, 6.0, 0.2)),))
 
 
 @pytest.mark.parametrize("second", [False, True])
@@ -57,12 +57,17 @@ def test_the_moment_at_which_the_inertia_changes_is_said(tmp_path: Path, second:
     path = write(tmp_path / "log.csv", renamed(columns, t="time_s", angle="motor_angle_rad", torque="torque_Nm"))
     import_(path, None, tmp_path / "log.parquet", None, None)
     identify(tmp_path / "log.parquet", tmp_path / "axis.yaml")
-    result = diagnose([read_recording(tmp_path / "log.parquet")], [], load_bench(tmp_path / "axis.yaml")).result
-    assert result.verdict == "unexplained"
-    assert "the axis changed there" in result.statement
+    found = diagnose([read_recording(tmp_path / "log.parquet")], [], load_bench(tmp_path / "axis.yaml"))
+    result = found.result
+    assert result.verdict == "axis_changed"
+    assert result.change is not None
+    assert result.statement.startswith(f"The axis changed at {result.change.moment_s:.2f} s of log (")
+    assert result.unexplained.share < 0.1
+    assert not result.parameter_corrections  # none holds throughout
+    write_diagnosis(found, tmp_path)
+    assert (tmp_path / "change.png").stat().st_size > 10_000
     assert result.location is not None
     assert sum(phase.share for phase in result.location.phases) == pytest.approx(1.0)  # also if it is held out
-    moment_s = float(re.search(r"change at ([\d.]+) s", result.statement)[1])  # type: ignore[index]
-    assert moment_s == pytest.approx(1e-3 * at, abs=0.1)
-    before, after = re.findall(r"inertia_kg_m2 (\S+) \S+ \S+ before, (\S+)", result.statement)[0]
-    assert float(after) / float(before) == pytest.approx(1.6, rel=0.02)
+    assert result.change.moment_s == pytest.approx(1e-3 * at, abs=0.1)
+    before, after = next(one.values for one in result.change.parameters if one.name == "inertia_kg_m2")
+    assert after.value / before.value == pytest.approx(1.6, rel=0.02)

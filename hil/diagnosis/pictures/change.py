@@ -1,0 +1,71 @@
+"""Figure of a change of the axis: the torque left by one set of parameters, and by those of each part."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from hil.arrays import FloatArray
+from hil.diagnosis.pictures.view import CHANNEL_LABELS, unit_of_channel
+from hil.diagnosis.search.disturbance import disturbance
+from hil.errors import InputError
+from hil.figures.drawing import legend_above, style_axis
+from hil.figures.panels import COMMAND, DEVIATION, SIMULATED, thin
+from hil.identification.dataset import inertia
+from hil.identification.estimator import Fit
+from hil.quantities import reading_unit
+
+if TYPE_CHECKING:
+    from hil.diagnosis.diagnose import Diagnosis
+
+DRAWN_ROWS = 6000  # several per pixel
+CAPTION = (
+    "What the twin leaves with one set of parameters for all recordings, and with those of each part. The line marks "
+    "the moment of the change."
+)
+
+
+def change_figure(diagnosis: Diagnosis) -> Figure:
+    """Draw the residual of each recording over time. Raises InputError if the axis did not change."""
+    change = diagnosis.change
+    if change is None:
+        raise InputError("change: the axis did not change between or during these recordings")
+    figure = Figure(figsize=(10.0, 1.0 + 2.4 * len(change.runs)), layout="constrained")
+    axes = figure.subplots(len(change.runs), 1, squeeze=False)[:, 0]
+    nominal = diagnosis.explanation.nominal
+    for axis, run in zip(axes, change.runs, strict=True):
+        channel = "table" if "motor" in run.unseen else "motor"
+        before = _residual(nominal.on(diagnosis.train.over([run])), channel)
+        after = np.full(run.motor.size, np.nan)
+        for part in change.parts:
+            (own,) = part.data.runs
+            if own.name == run.name:
+                after[: own.motor.size][own.judged] = _residual(part, channel)[own.judged]
+        drawn = run.judged
+        time_s, lines = run.time_s[drawn], [before[drawn], after[drawn]]
+        chosen = thin([np.nan_to_num(values) for values in lines], DRAWN_ROWS)
+        factor, unit = reading_unit(unit_of_channel(diagnosis, channel), float(np.abs(lines[0]).max()))
+        axis.plot(
+            time_s[chosen],
+            factor * lines[0][chosen],
+            color=COMMAND,
+            linewidth=2.0,
+            alpha=0.5,
+            label="one set of parameters",
+        )
+        axis.plot(time_s[chosen], factor * lines[1][chosen], color=SIMULATED, linewidth=0.9, label="those of each part")
+        if change.told.moment_s is not None:
+            axis.axvline(change.told.moment_s, color=DEVIATION, linewidth=1.4, label=f"{change.told.moment_s:.2f} s")
+        style_axis(axis, f"{CHANNEL_LABELS[channel]}\n[{unit}]", "time [s]", run.name)
+        legend_above(axis)
+    return figure
+
+
+def _residual(fit: Fit, channel: str) -> FloatArray:
+    """Residual (n,) of the only run of a fit; that of the motor as the torque that causes it."""
+    (run,), (channels,) = fit.data.runs, fit.residuals.channels
+    if channel == "motor":
+        return disturbance(run, channels["motor"], inertia(fit.bench), fit.data.observer_s).torque
+    return channels[channel]

@@ -207,8 +207,8 @@ def diagnose(
         runtime_s=time.monotonic() - begin,
     )
     told = statement(result.model_copy(update={"verdict": of_plant}))
-    # the settings come first where they are the verdict
-    said = " ".join(text for text in ((law.advice, told) if verdict is not of_plant else (told, law.advice)) if text)
+    # settings of the controller come after what is found on the machine
+    said = " ".join(text for text in ((told, law.advice) if found or change else (law.advice, told)) if text)
     result = result.model_copy(update={"statement": said})
     after = bench if as_given else diagnosed_bench(bench, final)
     if not bench.law_known:  # what was set aside stays in the file

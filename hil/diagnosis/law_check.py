@@ -182,7 +182,10 @@ def _accepted(bench: Bench, found: LawFit) -> LawCheck:
     corrections = _of_velocity_loop(bench, found) | _of_position_loop(bench, found) | _of_delays(bench, found)
     if not corrections:
         return LawCheck(bench)
-    advice = f"Check the controller's settings in the bench file: the torque commands follow the control law with {_told(corrections)}."
+    advice = (
+        "Check the controller's settings in the bench file: the torque commands follow the control law with "
+        f"{_told(corrections)}."
+    )
     if _FEEDBACK_DELAY in corrections:
         law = _set_aside(bench, "its positions are older than those of the recording, which the twin does not simulate")
         return replace(law, corrections=corrections, notes=(advice, *law.notes), advice=advice)

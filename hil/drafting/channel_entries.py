@@ -5,13 +5,22 @@ from math import pi
 import numpy as np
 
 from hil.arrays import FloatArray
-from hil.channels import AXIS_CHANNELS, AxisKind
+from hil.channels import AXIS_CHANNELS, SPEED_SET_POINT, AxisKind
 from hil.drafting.column_names import Label
 from hil.drafting.effort import effort_entry, signs_of
 from hil.drafting.encoder_counts import CountSize, assumed, from_length, from_speed
 from hil.drafting.header_values import Constant
 from hil.drafting.map_draft import DraftedChannel, MapDraft
-from hil.drafting.relations import MotionColumns, derivative_of, driven, lateness_s, motion, proportional
+from hil.drafting.relations import (
+    MotionColumns,
+    derivative_of,
+    driven,
+    explained,
+    lateness_s,
+    motion,
+    proportional,
+    smoothed,
+)
 from hil.drafting.roles import SAME_POSITION, Roles
 from hil.drafting.unit_choice import (
     MATCH,
@@ -31,6 +40,9 @@ from hil.quantities import UNITS
 
 SAME_COUNTS = 1e-3  # deviation of the factor between motor and set-point, both in counts: following errors are below
 LATE_ROWS = 0.5  # by which a set-point may seem late: its rounding and the sampling of the encoder
+# Shares of a speed set-point: what the velocity of the position set-point must leave, and the most of this that the
+# following error may leave, if it is the output of the position loop.
+LEAST_LEFT, LOOP_LEAVES = 1e-4, 0.25
 
 
 class ChannelEntries:
@@ -223,7 +235,10 @@ class ChannelEntries:
                 self.draft.left_out[name] = "a velocity set-point without a position set-point"
             return
         relation = derivative_of(self.live[name], motion(self.live[command], self.period_s), self.period_s)
-        if relation.share < 0.9:
+        channel, how = "velocity_command_m_s", f"the derivative of {command}"
+        if self._holds_following_error(name, command):
+            channel, how = SPEED_SET_POINT, "output of the position loop: it holds the following error"
+        elif relation.share < 0.9:
             self.draft.left_out[name] = f"no derivative of {command} (share {relation.share:.2f})"
             return
         choice = velocity_unit(name, self.labels[name].unit, relation.factor, self.units[command])
@@ -233,7 +248,15 @@ class ChannelEntries:
         entry: dict[str, object] = {"column": name, "unit": choice.unit}
         if sign < 0:
             entry["sign"] = -1
-        self.draft.channels.append(DraftedChannel("velocity_command_m_s", entry, f"the derivative of {command}"))
+        self.draft.channels.append(DraftedChannel(channel, entry, how))
+
+    def _holds_following_error(self, name: str, command: str) -> bool:
+        """True if the following error explains most of what the velocity of the set-point leaves of a speed."""
+        motor, moved = self.live[str(self.roles.motor)], motion(self.live[command], self.period_s)
+        error = self.live[command] - proportional(self.live[command], motor).factor * motor
+        speed = smoothed(self.live[name], self.period_s)
+        alone, both = explained(speed, moved.velocity), explained(speed, moved.velocity, smoothed(error, self.period_s))
+        return 1.0 - alone > LEAST_LEFT and 1.0 - both < LOOP_LEAVES * (1.0 - alone)
 
     def _efforts(self, moved: MotionColumns) -> None:
         names = AXIS_CHANNELS[self.kind]

@@ -58,7 +58,7 @@ def assumed(column: str) -> CountSize:
     """A count of a micrometre, so that the shape of the motion can be judged."""
     note = (
         f"{column}: is in counts, and no other column tells their size; 1 um per count is taken: lengths, speeds, "
-        "masses and stiffness are in multiples of it, and nothing is told per revolution. Give counts_per_rev and "
-        "unit counts (or counts_per_m)"
+        "masses and stiffness are in multiples of it, and nothing is told per revolution. In the map give "
+        "counts_per_m; or, of a rotary encoder, name the channel motor_position_rad and give counts_per_rev"
     )
     return CountSize({"counts_per_m": _ASSUMED_PER_M}, note)

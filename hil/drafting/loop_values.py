@@ -154,8 +154,8 @@ def _best(rows: LawRows, ratio_m_rad: float, period_s: float) -> LawFit | None:
     if not tried:
         return None
     best = preferred([one for _, one in tried])
-    late = next(late for late, one in tried if one is best)
-    return fit_settings([rows], best.settings, twin, delays=late, start=best.settings, most=_LAST_STEPS)
+    free = next(free for free, one in tried if one is best)
+    return fit_settings([rows], best.settings, twin, delays=free, start=best.settings, most=_LAST_STEPS)
 
 
 def _gains(ratio_m_rad: float, period_s: float, ticks: int, integral: bool, mean: bool) -> Gains:

@@ -61,6 +61,14 @@ def derivative_of(values: FloatArray, moved: MotionColumns, period_s: float) -> 
     return proportional(smoothed(values, period_s), moved.velocity)
 
 
+def explained(values: FloatArray, *columns: FloatArray) -> float:
+    """Share of the variance of values (n,) that columns (n,) and a constant explain by least squares."""
+    centred = values - values.mean()
+    matrix = np.column_stack([column - column.mean() for column in columns])
+    left = centred - matrix @ np.linalg.lstsq(matrix, centred, rcond=None)[0]
+    return 1.0 - float(left @ left) / max(float(centred @ centred), 1e-300)
+
+
 def lateness_s(values: FloatArray, moved: MotionColumns) -> float:
     """Time by which a position (n,) comes after a motion, from least squares: x = k (q - late v) + c."""
     columns = np.column_stack([moved.position, moved.velocity, np.ones_like(moved.position)])

@@ -28,7 +28,7 @@ from hil.diagnosis.pictures.view import (
 from hil.diagnosis.pictures.windows import force_over_time
 from hil.diagnosis.turning import labelled
 from hil.figures.drawing import legend_above, style_axis
-from hil.figures.panels import COMMAND, MEASURED, SIMULATED, thin
+from hil.figures.panels import COMMAND, DEVIATION, MEASURED, SIMULATED, thin
 from hil.identification.terms import Term
 from hil.quantities import reading_unit
 from hil.twin.library import BY_ID
@@ -181,6 +181,11 @@ def _spectrum(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:
         ]
         density = np.sqrt(np.mean([power for _, power in spectra], axis=0))
         axis.loglog(spectra[0][0][1:], density[1:], color=colour, label=label)
+    term = BY_ID[views[0].term.effect]
+    for role in (Role.FREQUENCY, Role.LINE):
+        found_hz = term.named(role, views[0].term.values)
+        if found_hz is not None:
+            axis.axvline(found_hz, color=DEVIATION, linewidth=1.0, linestyle="--", label=f"{found_hz:.3g} Hz")
     # here the motor's residual is a position, not converted to a torque
     linear = diagnosis.owner.axis.linear or (channel == "table" and not diagnosis.owner.axis.turns)
     unit = "m" if linear else "rad"

@@ -120,7 +120,6 @@ def fit_table(owner: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> dict[s
     train = final.data
     sets = [data for data in (train, held_out) if data.runs]
     laps = any(data.laps for data in sets)
-    law_known = final.bench.law_known
     held = closed_loop_held(nominal, final, held_out)
     modes = (Mode.CLOSED_LOOP, Mode.BLOCKS) if held else (Mode.BLOCKS,)
     noise = {run: noise_response(final.hypothesis, run) if held else {} for data in sets for run in data.runs}
@@ -129,7 +128,7 @@ def fit_table(owner: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> dict[s
         shown = train.runs[0]
         if channel == "command" or channel in shown.unseen:
             continue
-        if channel == "torque" and not law_known and shown.torque_is_command:  # the twin was given it
+        if channel == "torque" and shown.torque_is_command and not held:  # the twin was given it
             continue
         figures = {
             mode: [table.figures(data, held_out if data is train else train) for data in sets]

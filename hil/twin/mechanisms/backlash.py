@@ -37,8 +37,19 @@ MECHANISM = Mechanism(
     source="Nordin and Gutman, Automatica 38 (2002) 1633, dead-zone model",
     parameters=(Parameter("gap_m", Dimension.LENGTH, 0.0, 0.05, role=Role.STRENGTH),),
     variants=(
-        Variant(Stage.TRANSMISSION, _free_play, "oiled flanks"),
-        Variant(Stage.TRANSMISSION, _free_play, "dry flanks", play=True),
+        Variant(
+            Stage.TRANSMISSION,
+            _free_play,
+            "oiled flanks",
+            sentence="There are {gap_m} of lost motion between screw and table ({variant} resist parting).",
+        ),
+        Variant(
+            Stage.TRANSMISSION,
+            _free_play,
+            "dry flanks",
+            sentence="There are {gap_m} of lost motion between screw and table ({variant} only push).",
+            play=True,
+        ),
     ),
     starts=lambda s: [(f * s.stretch,) for f in (0.5, 1.0, 2.0, 4.0)],
     typical=lambda a: (3e-6,),

@@ -139,8 +139,8 @@ MECHANISM = Mechanism(
             "flexible load",
             element="load on an elastic arm, shaft or belt",
             sentence=(
-                "The load is flexible: an inertia {mass_ratio} as large as the rest of the axis swings at "
-                "{frequency_hz} where the motor is held, damped by {damping_ratio}."
+                "The load is flexible: an inertia {mass_ratio} times that of the rest of the axis swings against a "
+                "motor at rest with {frequency_hz} (antiresonance of the motor), damped by {damping_ratio}."
             ),
             # an arm or a bar swings at some hertz; behind a belt or a gear it may be most of the inertia
             starts=lambda s: [(f, 0.03, ratio) for f in np.geomspace(1.5, 100.0, 13) for ratio in (0.3, 3.0)],

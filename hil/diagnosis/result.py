@@ -219,7 +219,7 @@ class Result(_Part):
     partial: tuple[Finding, ...] = Field(
         (), description="only for `unexplained`: mechanisms that explain most of the mismatch and leave more than noise"
     )
-    change: AxisChange | None = Field(None, description="only for `axis_changed`")
+    change: AxisChange | None = Field(None, description="for `axis_changed`; for `unexplained` one that explains most")
     parameter_corrections: dict[str, Correction]
     not_identifiable: tuple[str, ...] = Field(
         (), description="nominal parameters whose fit ended at the bound of the allowed range: no correction"

@@ -147,7 +147,7 @@ def _best(rows: LawRows, ratio_m_rad: float, period_s: float) -> LawFit | None:
             start = Settings(_gains(ratio_m_rad, period_s, ticks, integral, mean))
             late = start._replace(setpoint_rows=delays[0], feedback_rows=delays[1])
             # delays begin where a coarse search finds them, and at none: the fit resolves parts of a row
-            for free, one in ((False, start), (True, start), (True, late)):
+            for free, one in ((0, start), (1, start), (2, start), (2, late)):
                 base = closed_form([rows], one, [first_tick(rows, one)])
                 if base is not None:  # the start is too far off to tell which variant is right
                     tried.append((free, fit_settings([rows], base, twin, delays=free, start=base, most=_FIRST_STEPS)))

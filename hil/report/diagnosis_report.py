@@ -117,10 +117,10 @@ def _finding(page: Page, diagnosis: Diagnosis, index: int, folder: Path) -> None
 
 
 def _change(page: Page, diagnosis: Diagnosis, folder: Path) -> None:
-    change = diagnosis.result.change
+    result, change = diagnosis.result, diagnosis.result.change
     if change is None:
         return
-    page.heading("What changed")
+    page.heading("What changed" if result.verdict is Verdict.AXIS_CHANGED else "Explains a part: a change of the axis")
     page.picture(save(diagnosis.plot("change"), folder / "change.png"), CAPTION)
     rows = []
     for one in change.parameters:

@@ -153,7 +153,9 @@ class ChannelFit(_Part):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, populate_by_name=True)
 
 
-AT_FLOOR = "The residuals of all channels are within the noise of positions and torque."
+AT_FLOOR = (
+    "Block by block, with measured inputs, the residuals of all channels are within the noise of positions and torque."
+)
 
 
 class Unexplained(_Part):

@@ -50,7 +50,8 @@ def loop_values(recording: Recording, ratio_m_rad: float) -> ControlValues:
             [],
             f"the cascaded law leaves {_left(loop)} with positions that are "
             f"{1e3 * period_s * delays.feedback_rows:.3g} ms old, +-{1e3 * period_s * errors.feedback_rows:.1g}; "
-            "such a delay of the loop is not simulated",
+            "a delay of the loop is not simulated; if the drive filters its velocity instead, give its gains and "
+            "velocity_filter_time_constant_s",
         )
     how = f"the replayed law leaves {_left(loop)}"
     values = [

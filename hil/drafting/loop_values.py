@@ -1,7 +1,8 @@
 """Gains of a cascaded control law from set-points, motion and torque command, without a bench.
 
 The fit is that of `hil.identification.control_law`, from a closed form, at every period of the position loop, with both
-velocity estimates, with and without an integrator and delays; the best of these is refined.
+velocity estimates, with and without an integrator and delays; the best of these is refined, also with a feed-forward of
+the last difference of the position set-points.
 """
 
 from dataclasses import replace
@@ -84,6 +85,12 @@ def loop_values(recording: Recording, ratio_m_rad: float) -> ControlValues:
                 "setpoint_delay_s", period_s * delays.setpoint_rows, f"s, +-{period_s * errors.setpoint_rows:.2g}"
             )
         )
+    if delays.differenced:
+        values.append(
+            BenchValue(
+                "velocity_setpoint", "backward_difference", "", "of the position set-points, better than as recorded"
+            )
+        )
     values += [
         BenchValue("velocity_period_s", float(f"{period_s:.9g}"), "s", "the period of the recording"),
         BenchValue(
@@ -156,7 +163,13 @@ def _best(rows: LawRows, ratio_m_rad: float, period_s: float) -> LawFit | None:
         return None
     best = preferred([one for _, one in tried])
     free = next(free for free, one in tried if one is best)
-    return fit_settings([rows], best.settings, twin, delays=free, start=best.settings, most=_LAST_STEPS)
+    last = [fit_settings([rows], best.settings, twin, delays=free, start=best.settings, most=_LAST_STEPS)]
+    for some in {0, free}:
+        start = best.settings._replace(differenced=True, setpoint_rows=0.0, feedback_rows=0.0)
+        base = closed_form([rows], start, [first_tick(rows, start)])
+        if base is not None:
+            last.append(fit_settings([rows], base, twin, delays=some, start=base, most=_LAST_STEPS))
+    return preferred(last)
 
 
 def _gains(ratio_m_rad: float, period_s: float, ticks: int, integral: bool, mean: bool) -> Gains:

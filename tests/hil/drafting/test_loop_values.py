@@ -16,7 +16,7 @@ RATIO_M_RAD = OWNER.axis.ratio_m_rad
 EMPS = RIG.parent / "emps" / "DATA_EMPS.mat"
 
 
-def assert_drafted(drafted: ControlValues, **more: float) -> None:
+def assert_drafted(drafted: ControlValues, velocity_setpoint: str = "recorded", **more: float) -> None:
     values = {entry.key: entry.value for entry in drafted.values}
     gains = OWNER.gains
     expected = {
@@ -29,6 +29,7 @@ def assert_drafted(drafted: ControlValues, **more: float) -> None:
         **more,
     }
     assert values.pop("velocity_estimate") == "backward_difference"
+    assert values.pop("velocity_setpoint", "recorded") == velocity_setpoint
     assert values == pytest.approx(expected, rel=2e-3)
 
 
@@ -42,6 +43,12 @@ def test_gains_are_drafted_with_and_without_a_speed_set_point(scale: float | Non
 def test_a_delay_of_the_set_points_is_drafted() -> None:
     drafted = loop_values(servo_run(OWNER, late_rows=7), RATIO_M_RAD)
     assert_drafted(drafted, setpoint_delay_s=7e-3)
+
+
+def test_a_feed_forward_of_the_last_difference_of_the_set_points_is_drafted() -> None:
+    recording = changed(servo_run(OWNER, differenced=True), velocity_reference_m_s=None)
+    drafted = loop_values(recording, RATIO_M_RAD)
+    assert_drafted(drafted, velocity_setpoint="backward_difference")
 
 
 def test_a_delay_of_the_loop_is_said_and_the_law_left_unknown() -> None:

@@ -202,7 +202,7 @@ class _Level(NamedTuple):
 
 
 def _levels(sums: FloatArray, counts: NDArray[np.int_]) -> list[_Level]:
-    """The most significant constant levels above and below the mean of values, given as sums and counts of bins (n,)."""
+    """The most significant constant levels above and below the mean, of sums and counts of values in bins (n,)."""
     mean = sums.sum() / max(counts.sum(), 1)
     total = np.concatenate([[0.0], np.cumsum(sums - mean * counts)])
     count = np.concatenate([[0.0], np.cumsum(counts)])

@@ -50,7 +50,7 @@ MECHANISM = Mechanism(
     "{flank_m} at either end.",
     reversed="From {from_m} to {to_m} of the travel, friction is lower by a share of {fraction}; it changes over "
     "{flank_m} at either end.",
-    equation="F = Fc (1 + a s(x)), s = 1 in the zone, 0 outside, straight flanks of which `from` and `to` are the middle",
+    equation="F = Fc (1 + a s(x)), s = 1 in the zone, 0 outside, straight flanks; half height at `from` and `to`",
     source="Armstrong-Hélouvry, Control of Machines with Friction (1991), position-dependent friction",
     parameters=(
         Parameter("fraction", Dimension.RATIO, -0.9, 5.0, role=Role.STRENGTH),

@@ -186,8 +186,8 @@ def friction_zones(
         return []
     width = float(np.ptp(x)) / _BINS
     index = np.minimum(((x - x.min()) / width).astype(int), _BINS - 1)
-    sums, counts = (np.bincount(index, weights=of, minlength=_BINS) for of in (against, None))
-    levels = sorted(_levels(sums, counts), key=lambda level: -level.score)
+    sums = np.bincount(index, weights=against, minlength=_BINS)
+    levels = sorted(_levels(sums, np.bincount(index, minlength=_BINS)), key=lambda level: -level.score)
     start = float(x.min())
     return [(start + width * one.first, start + width * one.last, one.level) for one in levels if one.score > 0.0]
 

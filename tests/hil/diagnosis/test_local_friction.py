@@ -32,16 +32,13 @@ def recorded(owner: Bench, fraction: float) -> Recording:
     truth = Bench.model_validate(data)
     legs = [
         {"kind": "dwell", "duration_s": 0.2},
-        *(
-            {"kind": "sine_squared", "to_m": to_m, "feed_m_s": feed}
-            for to_m, feed in ((0.4, 0.25), (0.0, 0.25), (0.4, 0.12), (0.0, 0.12))
-        ),
+        *({"kind": "sine_squared", "to_m": to_m, "feed_m_s": feed} for to_m, feed in ((0.4, 0.15), (0.0, 0.08))),
     ]
     profile = Profile.model_validate(
         {
             "schema_version": 1,
             "limits": {"velocity_m_s": 0.3, "acceleration_m_s2": 3.0, "jerk_m_s3": 100.0},
-            "segments": legs,
+            "segments": [{"kind": "repeat", "times": 2, "segments": legs}],
         }
     )
     return hil.simulate(truth, plan(profile, truth.period_s), seed=3)

@@ -37,6 +37,9 @@ def friction_law(p: Any, velocity: float, position_m: float, time_s: float) -> t
         bound *= 1.0 + e.fraction * sin(2.0 * pi * position_m / e.period_m + e.phase_rad)
     if p.friction_gradient.on:
         bound *= max(1.0 + p.friction_gradient.slope_1_m * position_m, 0.0)
+    if p.local_friction.on:
+        z = p.local_friction
+        bound *= 1.0 + z.fraction * ramp((position_m - z.from_m) / z.flank_m) * ramp((z.to_m - position_m) / z.flank_m)
     if p.novel_friction_bump.on:
         b = p.novel_friction_bump
         bound *= 1.0 + b.fraction * bell((position_m - b.centre_m) / b.width_m)
@@ -49,6 +52,12 @@ def friction_law(p: Any, velocity: float, position_m: float, time_s: float) -> t
         w = p.novel_friction_wander
         scale *= 1.0 + w.fraction * wander(time_s / w.period_s, w.phase_rad)
     return scale * bound, scale * offset, scale * drag
+
+
+@njit(cache=True)
+def ramp(u: float) -> float:
+    """0 below -1/2, 1 above 1/2, straight between."""
+    return 0.5 * (abs(u + 0.5) - abs(u - 0.5) + 1.0)
 
 
 @njit(cache=True)

@@ -24,6 +24,7 @@ class AxisFacts:
     table_count_m: float | None  # resolution of the linear encoder; None without one
     duration_s: float  # of the longest recording
     travel_m: float = math.inf  # of the longest motion
+    positions_m: tuple[float, float] = (-math.inf, math.inf)  # first and last position of the table
     lost_m: float = math.inf  # largest range of the table against the motor
     turn_known: bool = True  # False on a linear axis without a lead
     held_s: Callable[[float], float] = _always  # longest time for which |torque command| is at a level or above
@@ -51,6 +52,7 @@ class Scene:
     orders: list[float]  # of the disturbance torque, per revolution
     ripple_orders: list[float]  # of the disturbance torque over the torque
     friction_periods: list[float]  # [m]
+    friction_zones: list[tuple[float, float, float]]  # from, to [m], friction above the rest of the travel [N m]
     scale_periods: list[float]  # of the table residual [m]
     lines_hz: list[float]  # of the disturbance torque over time
     window: tuple[float, float, float]  # start, end, level [N m]

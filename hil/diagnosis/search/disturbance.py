@@ -8,6 +8,7 @@ constant tau of the observer: the torque whose effect equals the observer's corr
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from hil.identification.measured import Measured
 
 _SMOOTH_S = 0.006  # mean of the innovations: passes 60 Hz, reduces encoder counts
 _PASS_HZ = 60.0  # above, the mean attenuates a ripple by more than a fifth
+_BINS = 400  # of the travel, for zones of friction
 _ORDERS = np.arange(1, 49)  # of the motor angle; up to 48 slots or pole passings per revolution
 
 
@@ -165,17 +167,56 @@ def force_window(run: Measured, d: Disturbance) -> tuple[float, float, float]:
     n = run.motor.size // block
     mask = d.sliding[: n * block].reshape(n, block)
     values = np.where(mask, d.torque[: n * block].reshape(n, block), 0.0).sum(axis=1)
-    counts = mask.sum(axis=1)
-    mean = values.sum() / max(counts.sum(), 1)
-    total = np.concatenate([[0.0], np.cumsum(values - mean * counts)])
+    first, last, level = max(_levels(values, mask.sum(axis=1)), key=lambda found: found.score)[:3]
+    scale = block * run.period_s
+    return first * scale, last * scale, level
+
+
+def friction_zones(
+    runs: Sequence[Measured], found: Sequence[Disturbance], ratio: float
+) -> list[tuple[float, float, float]]:
+    """Zones of the travel with the most significant constant friction above and below the mean, best first.
+
+    Each is start, end [m] and level [motor units]. The torque against the motion is summed in bins of the position by
+    the motor encoder, both directions together, so that a constant force and a lag of the observer cancel.
+    """
+    x = np.concatenate([ratio * run.motor[d.sliding] for run, d in zip(runs, found, strict=True)])
+    against = np.concatenate([-d.torque[d.sliding] * np.sign(d.velocity[d.sliding]) for d in found])
+    if x.size < 100 or np.ptp(x) == 0.0:
+        return []
+    width = float(np.ptp(x)) / _BINS
+    index = np.minimum(((x - x.min()) / width).astype(int), _BINS - 1)
+    sums = np.bincount(index, weights=against, minlength=_BINS)
+    levels = sorted(_levels(sums, np.bincount(index, minlength=_BINS)), key=lambda level: -level.score)
+    start = float(x.min())
+    return [(start + width * one.first, start + width * one.last, one.level) for one in levels if one.score > 0.0]
+
+
+class _Level(NamedTuple):
+    """Bins from `first` to before `last` with a constant level above the mean of all, and its significance."""
+
+    first: int
+    last: int
+    level: float
+    score: float
+
+
+def _levels(sums: FloatArray, counts: NDArray[np.int_]) -> list[_Level]:
+    """The most significant constant levels above and below the mean, of sums and counts of values in bins (n,)."""
+    mean = sums.sum() / max(counts.sum(), 1)
+    total = np.concatenate([[0.0], np.cumsum(sums - mean * counts)])
     count = np.concatenate([[0.0], np.cumsum(counts)])
-    stride = max(n // 600, 1)
+    stride = max(sums.size // 600, 1)
     total, count = total[::stride], count[::stride]
-    sums = np.subtract.outer(total, total).T
+    inside = np.subtract.outer(total, total).T
     sizes = np.subtract.outer(count, count).T
     rest = np.maximum(count[-1] - sizes, 1.0)
-    score = np.where(sizes > 5, sums**2 * (1.0 / np.maximum(sizes, 1.0) + 1.0 / rest), 0.0)
-    first, last = np.unravel_index(int(np.argmax(np.triu(score))), score.shape)
-    scale = block * stride * run.period_s
-    level = float(sums[first, last] / max(sizes[first, last], 1.0))
-    return float(first * scale), float(max(last, first + 1) * scale), level
+    score = np.where(sizes > 5, inside**2 * (1.0 / np.maximum(sizes, 1.0) + 1.0 / rest), 0.0)
+    found = []
+    for signed in (np.where(inside > 0.0, score, 0.0), np.where(inside < 0.0, score, 0.0)):
+        first, last = np.unravel_index(int(np.argmax(np.triu(signed))), signed.shape)
+        level = float(inside[first, last] / max(sizes[first, last], 1.0))
+        found.append(
+            _Level(int(first) * stride, max(int(last), int(first) + 1) * stride, level, float(signed[first, last]))
+        )
+    return found

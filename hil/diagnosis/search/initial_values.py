@@ -64,6 +64,10 @@ def axis_facts(bench: Bench, runs: Sequence[Measured] = ()) -> AxisFacts:
         table_count_m=table.resolution_m if table is not None else None,
         duration_s=max((run.motor.size * run.period_s for run in runs), default=0.0),
         travel_m=max((ratio * float(np.ptp(run.motor)) for run in runs), default=math.inf),
+        positions_m=(
+            min((ratio * float(np.min(run.motor)) for run in runs), default=-math.inf),
+            max((ratio * float(np.max(run.motor)) for run in runs), default=math.inf),
+        ),
         lost_m=max(apart, default=math.inf),
         turn_known=physics.turn_known,
         held_s=lambda level: max((_held_s(run, level) for run in runs), default=math.inf),
@@ -129,6 +133,7 @@ def scene(runs: Sequence[Measured], bench: Bench, blocks: Sequence[dict[str, Flo
         orders=orders,
         ripple_orders=estimate.orders(runs, found, physics.angle_per_unit, 2, ripple) if physics.turn_known else [],
         friction_periods=[*periods, *turns],
+        friction_zones=estimate.friction_zones(runs, found, ratio),
         scale_periods=(
             estimate.scale_periods(runs, [block["table"] for block in blocks]) if runs[0].table_m.size else []
         ),

@@ -15,6 +15,10 @@ from hil.twin.library import BY_ID
 
 # Two names for one law: friction that differs by direction shifts its band as a weight does, also at standstill.
 SAME_LAW = (frozenset({"asymmetric_friction", "constant_load"}),)
+# Physics that the library lacks, and the mechanism of the library that is another form of it: its name is right too.
+OTHER_FORM: Mapping[str, str] = {"novel_friction_bump": "local_friction"}
+# The same, and another verdict that says what it is.
+OTHER_VERDICT: Mapping[str, str] = {"novel_mass_change": "axis_changed"}
 
 
 def same_law(effect: str) -> tuple[str, ...]:

@@ -7,7 +7,7 @@ from math import inf, pi, remainder
 
 from hil.diagnosis.wording import title
 from hil.proof.answer.answers import ABSENT, FAILED, Answer, Named
-from hil.proof.draw.expected import same_law
+from hil.proof.draw.expected import OTHER_FORM, OTHER_VERDICT, same_law
 from hil.proof.draw.generator import Concealed, Truth
 from hil.twin.library import names_of
 from hil.twin.parameter import Role
@@ -143,8 +143,11 @@ class GradedCase:
             return self.called_untestable and not self.answer.named
         if self.truth.tier == "less_known" and self.called_untestable:
             return not self.answer.named
+        if self.truth.tier == "novel" and self.answer.named:
+            return all(self.matched) and not self.spurious
         if not self.truth.effects or self.truth.tier == "novel":
-            return self.answer.verdict == self.truth.verdict and not self.answer.named
+            others = (OTHER_VERDICT.get(effect.effect) for effect in self.truth.effects)
+            return self.answer.verdict in (self.truth.verdict, *others) and not self.answer.named
         if not self.above_floor and not self.answer.named:
             return True
         return all(self.matched) and not self.spurious
@@ -226,8 +229,11 @@ class GradedCase:
         return self.concealed.compared if self.concealed else {}
 
     def _law(self, index: int) -> frozenset[str]:
-        """Return the ids for the law of a concealed effect."""
-        return frozenset(self.truth.effects[index].same_law) if index < len(self.truth.effects) else frozenset()
+        """Return the ids for the law of a concealed effect, and for another form of it."""
+        if index >= len(self.truth.effects):
+            return frozenset()
+        effect = self.truth.effects[index]
+        return frozenset(effect.same_law) | ({OTHER_FORM[effect.effect]} if effect.effect in OTHER_FORM else set())
 
     def _laws(self, index: int) -> frozenset[str]:
         """Return the same, with the rivals of the first effect."""

@@ -96,6 +96,12 @@ def test_a_friction_gradient_is_straight_along_the_travel() -> None:
         assert friction_n_m(Effect("friction_gradient", {"slope_1_m": 2.0}), 10.0, x) == pytest.approx(expected)
 
 
+def test_local_friction_is_a_zone_with_straight_flanks() -> None:
+    effect = Effect("local_friction", {"fraction": 0.4, "from_m": 0.1, "to_m": 0.2, "flank_m": 0.02})
+    for x, share in ((0.0, 0.0), (0.09, 0.0), (0.1, 0.5), (0.105, 0.75), (0.15, 1.0), (0.2, 0.5), (0.3, 0.0)):
+        assert friction_n_m(effect, 10.0, x) == pytest.approx(1.1 * (1.0 + 0.4 * share) + 0.064)
+
+
 def test_nonlinear_viscous_friction_is_odd_and_quadratic() -> None:
     effect = Effect("nonlinear_viscous_friction", {"quadratic_n_m_s2_rad2": 1e-5})
     for speed in (200.0, -200.0):

@@ -63,6 +63,22 @@ def test_what_a_motion_cannot_show_must_be_listed_and_nothing_named() -> None:
     assert (named.called_untestable, named.right) == (True, False)
 
 
+def test_another_form_of_the_same_physics_is_right_beside_unexplained() -> None:
+    bump, change = (truth("novel", concealed(name)) for name in ("novel_friction_bump", "novel_mass_change"))
+    assert marked(bump).right
+    named = marked(bump, finding("local_friction"))
+    assert (named.right, named.names_too_much) == (True, False)
+    for wrong in (
+        marked(bump, finding("external_force")),
+        marked(bump, finding("local_friction"), finding("external_force")),
+        marked(bump, verdict="axis_changed"),
+        marked(change, finding("local_friction")),
+    ):
+        assert not wrong.right
+    assert marked(change).right
+    assert marked(change, verdict="axis_changed").right
+
+
 def test_below_the_floor_silence_is_right_and_a_wrong_name_is_not() -> None:
     of = truth("ladder", concealed("backlash", size=0.5))
     assert marked(of, verdict="no_mismatch").right

@@ -135,6 +135,36 @@ def test_a_friction_gradient_is_straight_and_never_pushes(level, slope, position
 
 @given(
     level=st.floats(0.1, 5.0),
+    fraction=st.floats(-0.9, 5.0),
+    start=st.floats(-0.3, 0.3),
+    length=st.floats(0.02, 0.3),
+    flank=st.floats(1e-3, 0.02),
+    share=st.floats(-1.0, 1.0),
+)
+def test_local_friction_is_symmetric_about_its_zone_and_acts_only_there(
+    level, fraction, start, length, flank, share
+) -> None:
+    def at(position):
+        moment = AT_REST._replace(table_position_m=position)
+        values = {"fraction": fraction, "from_m": start, "to_m": start + length, "flank_m": flank}
+        return call("local_friction", level, moment, **values)
+
+    middle = start + 0.5 * length
+    for offset in (share * length, 0.0, 0.5 * length):
+        assert at(middle + offset) == pytest.approx(at(middle - offset), rel=1e-6, abs=1e-6 * level)
+        assert (
+            min(level, (1.0 + fraction) * level) - 1e-9
+            <= at(middle + offset)
+            <= max(1.0, 1.0 + fraction) * level + 1e-9
+        )
+    assert at(middle) == pytest.approx((1.0 + fraction) * level)
+    assert at(start) == pytest.approx((1.0 + 0.5 * fraction) * level)
+    for outside in (start - 0.51 * flank, start + length + 0.51 * flank):
+        assert at(outside) == pytest.approx(level)
+
+
+@given(
+    level=st.floats(0.1, 5.0),
     fraction=st.floats(0.0, 1.0),
     period=st.floats(1e-3, 1.0),
     phase=phases,

@@ -1,0 +1,89 @@
+"""Friction that is higher or lower in a zone of the travel: found on a simulated axis with two encoders and one."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from diagnosis_runs import bench
+
+import hil
+from hil.bench.bench_file import Bench
+from hil.diagnosis.search.disturbance import Disturbance, friction_zones
+from hil.diagnosis.search.initial_values import axis_facts
+from hil.identification.measured import take
+from hil.motion.profile import Profile
+from hil.motion.trajectory import plan
+from hil.recording.recording import Recording
+from hil.twin.library import BY_ID
+
+MECHANISM = BY_ID["local_friction"]
+ZONE = {"from_m": 0.22, "to_m": 0.30, "flank_m": 0.004}
+
+
+def recorded(owner: Bench, fraction: float) -> Recording:
+    """A recording of the simulated axis with a zone of other friction, at two feeds."""
+    effect: dict[str, Any] = {"effect": MECHANISM.id, "parameters": {"fraction": fraction, **ZONE}}
+    data = owner.model_dump(mode="json") | {
+        "simulation": {"effects": [effect]},
+        "drive": {"following_error_m": 0.05},
+    }
+    truth = Bench.model_validate(data)
+    legs = [
+        {"kind": "dwell", "duration_s": 0.2},
+        *({"kind": "sine_squared", "to_m": to_m, "feed_m_s": feed} for to_m, feed in ((0.4, 0.15), (0.0, 0.08))),
+    ]
+    profile = Profile.model_validate(
+        {
+            "schema_version": 1,
+            "limits": {"velocity_m_s": 0.3, "acceleration_m_s2": 3.0, "jerk_m_s3": 100.0},
+            "segments": [{"kind": "repeat", "times": 2, "segments": legs}],
+        }
+    )
+    return hil.simulate(truth, plan(profile, truth.period_s), seed=3)
+
+
+def single() -> Bench:
+    """The bench with the encoder of the motor alone."""
+    owner = bench()
+    return owner.model_copy(update={"encoders": owner.encoders.model_copy(update={"table": None})})
+
+
+@pytest.mark.parametrize(("owner", "fraction"), [(bench(), 0.5), (single(), -0.4)], ids=["two encoders", "one encoder"])
+def test_a_zone_of_other_friction_is_the_only_finding(owner: Bench, fraction: float) -> None:
+    result = hil.diagnose(recorded(owner, fraction), owner).result
+    (finding,) = result.missing
+    assert finding.effect == MECHANISM.id
+    assert finding.parameters["fraction"].value == pytest.approx(fraction, rel=0.1)
+    for name in ("from_m", "to_m"):
+        assert finding.parameters[name].value == pytest.approx(ZONE[name], abs=3e-3)
+    assert ("lower" if fraction < 0.0 else "higher") in result.statement
+
+
+@pytest.mark.parametrize("level", [0.5, -0.3])
+def test_the_zone_is_estimated_from_the_torque_against_the_motion(level: float) -> None:
+    run = take(recorded(bench(), 0.0), bench())
+    x = bench().axis.ratio_m_rad * run.motor
+    velocity = np.gradient(run.motor, run.period_s)
+    more = np.where((x > 0.22) & (x < 0.30), level, 0.0)
+    noise = np.random.default_rng(1).normal(0.0, 0.1, x.size)
+    torque = 0.2 - more * np.sign(velocity) + noise  # the constant force is no friction
+    from_m, to_m, found = friction_zones(
+        [run], [Disturbance(torque, velocity, np.abs(velocity) > 1.0)], bench().axis.ratio_m_rad
+    )[0]
+    assert (from_m, to_m) == pytest.approx((0.22, 0.30), abs=3e-3)
+    assert abs(found) <= abs(level)
+    assert found * level > 0.0
+
+
+def test_a_zone_is_a_part_of_the_travel() -> None:
+    facts = axis_facts(bench(), [take(recorded(bench(), 0.0), bench())])
+    for zone, told in (
+        ((0.22, 0.30, 0.004), True),
+        ((0.01, 0.39, 0.004), False),  # the whole travel
+        ((0.38, 0.50, 0.004), False),  # most of it is out of reach
+        ((0.30, 0.22, 0.004), False),
+        ((0.22, 0.30, 0.1), False),  # flanks without a zone between
+    ):
+        assert MECHANISM.is_valid((0.5, *zone), 0, facts) is told

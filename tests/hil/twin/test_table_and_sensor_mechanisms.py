@@ -18,6 +18,11 @@ def test_table_side_friction_is_a_share(share, at) -> None:
     assert call("table_side_friction", 0.0, at, share=share) == share
 
 
+@given(share=st.floats(-1.0, 1.0), before=st.floats(0.0, 0.5), at=moments)
+def test_viscous_friction_on_the_table_has_a_share_beyond(share, before, at) -> None:
+    assert call("table_side_viscous_friction", before, at, share=share) == before + share
+
+
 @given(
     force=st.floats(-1e3, 1e3),
     start=st.floats(0.0, 0.02),

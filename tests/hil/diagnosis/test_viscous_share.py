@@ -7,7 +7,7 @@ from diagnosis_runs import bench
 
 import hil
 from hil.bench.bench_file import Bench
-from hil.diagnosis.result import DiagnosisResult
+from hil.diagnosis.result import Result
 from hil.motion.profile import Profile
 from hil.motion.trajectory import plan
 
@@ -16,7 +16,7 @@ SHARES = {"table_side_friction", "table_side_viscous_friction"}
 SKEW = "channel_time_skew"
 
 
-def diagnosed(*effects: tuple[str, dict[str, float]]) -> DiagnosisResult:
+def diagnosed(*effects: tuple[str, dict[str, float]]) -> Result:
     """Diagnose a recording of the simulated axis with effects, at two feeds."""
     simulation = {"effects": [{"effect": effect, "parameters": parameters} for effect, parameters in effects]}
     data = OWNER.model_dump(mode="json") | {"simulation": simulation, "drive": {"following_error_m": 0.05}}

@@ -132,7 +132,8 @@ def advance(p: Any, s: Any, lines: Any, command: float, steps: int) -> None:
     q, v, force = s.position, s.velocity, s.force
     skew = p.channel_time_skew
     motor_share = 1.0 - p.table_side_friction.share
-    motor_viscous = min(max(motor_share - p.table_side_viscous_friction.share, 0.0), 1.0)
+    moved = p.table_side_viscous_friction.share
+    motor_viscous = motor_share * (1.0 - moved) if moved >= 0.0 else 1.0 - (1.0 - motor_share) * (1.0 + moved)
     guided = min(motor_share, motor_viscous) < 1.0
     measured = 0.0
     for _ in range(steps):

@@ -42,7 +42,7 @@ def friction(c, own, internal, motion, at, effects, free, table_free):  # type: 
     share = _table_share(0.0, at, effects)
     stiffness = _bristle(0.0, at, effects)
     scale = max(_friction_scale(1.0, at, effects), 0.0)
-    viscous_share = min(max(share + _table_viscous_share(0.0, at, effects), 0.0), 1.0)
+    viscous_share = _table_viscous_share(share, at, effects)
     viscous, rest = scale * c.viscous, 1.0 - share
     viscous, guide_viscous = (1.0 - viscous_share) * viscous, viscous_share * viscous
     bound, opposing = _level(c, scale, at, effects)

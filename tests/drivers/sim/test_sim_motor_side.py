@@ -122,7 +122,9 @@ def test_table_side_friction_acts_behind_the_spring() -> None:
     assert friction_n_m(Effect("table_side_friction", {"share": 0.5}), 10.0) == pytest.approx(1.164, rel=1e-9)
 
 
-@pytest.mark.parametrize(("coulomb", "more", "viscous"), [(0.0, 0.6, 0.6), (0.5, -0.2, 0.3), (0.5, -0.8, 0.0)])
+@pytest.mark.parametrize(
+    ("coulomb", "more", "viscous"), [(0.0, 0.6, 0.6), (0.5, 0.4, 0.7), (0.5, -0.4, 0.3), (0.5, -1.0, 0.0)]
+)
 def test_viscous_friction_on_the_table_has_a_share_of_its_own(coulomb: float, more: float, viscous: float) -> None:
     """At a steady speed the spring holds what acts on the table; the friction of the axis is what it was."""
     effects = [

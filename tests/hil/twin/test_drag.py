@@ -112,7 +112,7 @@ def test_a_share_of_all_friction_pulls_at_the_table(active, drag_n) -> None:
 
 
 @pytest.mark.parametrize(
-    ("coulomb", "more", "viscous"), [(0.0, 0.6, 0.6), (0.5, -0.2, 0.3), (0.5, -0.8, 0.0), (0.5, 0.9, 1.0)]
+    ("coulomb", "more", "viscous"), [(0.0, 0.6, 0.6), (0.5, 0.4, 0.7), (0.5, -0.4, 0.3), (0.5, -1.0, 0.0)]
 )
 def test_viscous_friction_pulls_at_the_table_with_a_share_of_its_own(coulomb, more, viscous) -> None:
     """At a steady speed the spring holds it; viscous friction equals Coulomb friction there."""

@@ -186,7 +186,7 @@ def friction_zones(
         return []
     width = float(np.ptp(x)) / _BINS
     index = np.minimum(((x - x.min()) / width).astype(int), _BINS - 1)
-    sums = np.bincount(index, weights=against, minlength=_BINS)
+    sums = np.asarray(np.bincount(index, weights=against, minlength=_BINS), dtype=np.float64)
     levels = sorted(_levels(sums, np.bincount(index, minlength=_BINS)), key=lambda level: -level.score)
     start = float(x.min())
     return [(start + width * one.first, start + width * one.last, one.level) for one in levels if one.score > 0.0]

@@ -18,6 +18,7 @@ from hil.drafting.estimate import BenchValue
 from hil.identification.control_law import fit_settings
 from hil.identification.law_fit import REPLAYED, LawFit, preferred, sure
 from hil.identification.law_replay import LawRows, Settings, closed_form, find_delays, first_tick
+from hil.identification.parallel import one_blas_thread
 from hil.identification.terms import Term
 from hil.recording.recording import Recording
 from hil.twin.axis import Response, Start, Twin
@@ -26,10 +27,12 @@ from hil.twin.physics import Physics
 from hil.twin.structure.chain import one_mass
 
 _FILTER = Term(velocity_filter_lag.MECHANISM.id, 0, (2e-3,))  # as drives have it
-_LEAST_FILTER = 0.2  # time constant over the period: a shorter one changes the velocity by less than a hundredth
+_FORWARD = 0.01  # feed-forward below which its velocity is not told
+_LEAST_FILTER = 1.0  # time constant over the period: a shorter one is not told from a delay of a part of a row
 _TICKS = (1, 2, 4, 8)  # of the velocity loop per tick of the position loop, as drives have them
 _LONGEST_S = 0.1  # period of a position loop that a bench allows
 _FIRST_STEPS, _LAST_STEPS = 8, 40  # of the refinement of each variant, and of the best
+_NEAR = 3  # variants without delays, the best ones, that are also fitted with delays of a part of a row
 _ROWS = 8000  # that are replayed: seconds of motion at a usual rate
 _SETTLED = 10  # rows after which the first difference of the position is forgotten
 _NOISE = 1e-4  # of the command: a scale of the residuals, of no influence on the values
@@ -121,6 +124,7 @@ def _left(loop: LawFit) -> str:
     return f"{100 * loop.left_of_command:.2g} % of the torque command{of_speed}"
 
 
+@one_blas_thread
 def fit_loops(recording: Recording, ratio_m_rad: float) -> LawFit | None:
     """Fit the control law; None without set-points or torque, or where no gains are found.
 
@@ -159,23 +163,30 @@ def fit_loops(recording: Recording, ratio_m_rad: float) -> LawFit | None:
 def _best(rows: LawRows, ratio_m_rad: float, period_s: float) -> LawFit | None:
     """The variant of the law with the best criterion, with and without delays."""
     twin = Twin(Physics(one_mass(1.0), 0.0, 0.0), _gains(ratio_m_rad, period_s, 1, True, False))
-    tried = []
+    tried = list[tuple[Settings, int, LawFit]]()
+
+    def attempt(start: Settings, free: int) -> None:
+        base = closed_form([rows], start, [first_tick(rows, start)])
+        if base is not None:  # the start is too far off to tell which variant is right
+            fit = fit_settings([rows], base, twin, delays=free, start=base, most=_FIRST_STEPS)
+            tried.append((start, free, fit))
+
     for ticks, mean in product(_TICKS, (True, False)):
         if ticks * period_s > _LONGEST_S:
             continue
         delays = find_delays(rows, Settings(_gains(ratio_m_rad, period_s, ticks, True, mean)))
         for integral in (True, False):
             start = Settings(_gains(ratio_m_rad, period_s, ticks, integral, mean))
-            late = start._replace(setpoint_rows=delays[0], feedback_rows=delays[1])
-            # delays begin where a coarse search finds them, and at none: the fit resolves parts of a row
-            for free, one in ((0, start), (1, start), (2, start), (2, late)):
-                base = closed_form([rows], one, [first_tick(rows, one)])
-                if base is not None:  # the start is too far off to tell which variant is right
-                    tried.append((free, fit_settings([rows], base, twin, delays=free, start=base, most=_FIRST_STEPS)))
+            attempt(start, 0)
+            attempt(start._replace(setpoint_rows=delays[0], feedback_rows=delays[1]), 2)
+    # a coarse search finds no delays of a part of a row: the fit resolves them, from none
+    near = sorted((one for one in tried if one[1] == 0), key=lambda one: one[2].cost)[:_NEAR]
+    for (start, _, _), free in product(near, (1, 2)):
+        attempt(start, free)
     if not tried:
         return None
-    best = preferred([one for _, one in tried])
-    free = next(free for free, one in tried if one is best)
+    best = preferred([fit for *_, fit in tried])
+    free = next(free for _, free, fit in tried if fit is best)
     return _refined(rows, best.settings, free, twin)
 
 
@@ -186,6 +197,8 @@ def _refined(rows: LawRows, at: Settings, delays: int, twin: Twin) -> LawFit:
     """
     fits = [fit_settings([rows], at, twin, delays=delays, start=at, most=_LAST_STEPS)]
     for differenced, mean, filtered in product((False, True), (False, True), (False, True)):
+        if not (differenced or filtered) or (differenced and at.gains.velocity_feedforward < _FORWARD):
+            continue
         start = at._replace(
             gains=at.gains._replace(two_sample_mean=mean),
             setpoint_rows=0.0 if differenced else at.setpoint_rows,
@@ -197,7 +210,6 @@ def _refined(rows: LawRows, at: Settings, delays: int, twin: Twin) -> LawFit:
         fits += [
             fit_settings([rows], start, twin, [_FILTER] if filtered else [], delays=some, start=start, most=_LAST_STEPS)
             for some in {0, min(delays, 1)}
-            if differenced or filtered
         ]
     least_s = _LEAST_FILTER * at.gains.period_s
     return preferred([one for one in fits if not one.terms or one.terms[0].values[0] > least_s] or fits[:1])

@@ -226,8 +226,8 @@ def _left(runs: Sequence[LawRows], base: Settings, cuts: Sequence[int]) -> float
     """Share of command and speed set-point (rms) that the columns of both loops leave with the delays of `base`."""
     of_command, of_speed = _tables(runs, base, cuts)
     last = -1 if base.gains.integral_gain_n_m_rad > 0.0 else (of_command.shape[1] - 1) // 2
-    left = _least_squares(of_command[:, :last], of_command[:, -1])[1]
-    return float(np.hypot(left, _least_squares(of_speed[:, :2], of_speed[:, 2])[1])) if of_speed.size else left
+    left = _share_left(of_command[:, :last], of_command[:, -1])
+    return float(np.hypot(left, _share_left(of_speed[:, :2], of_speed[:, 2]))) if of_speed.size else left
 
 
 def _one_law(found: FloatArray, table: FloatArray) -> FloatArray:
@@ -261,6 +261,14 @@ def _least_squares(columns: FloatArray, values: FloatArray) -> tuple[FloatArray,
     found = np.linalg.lstsq(columns, values, rcond=None)[0]
     rest, size = values - columns @ found, float(values @ values)
     return np.asarray(found, dtype=np.float64), float(np.sqrt(rest @ rest / size)) if size else 1.0
+
+
+def _share_left(columns: FloatArray, values: FloatArray) -> float:
+    """Share of values (n,) (rms) that columns (n, k) leave."""
+    size = float(np.linalg.norm(values))
+    # the last diagonal entry is the distance of the last column from the others
+    small = np.asarray(np.linalg.qr(np.column_stack([columns, values]), mode="r"), dtype=np.float64)
+    return abs(float(small[-1, -1])) / size if size else 1.0
 
 
 def first_tick(run: LawRows, start: Settings) -> int:

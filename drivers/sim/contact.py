@@ -14,8 +14,8 @@ WANDER_RATES = (1.0, 1.618034, 0.414214, 2.718282)
 
 
 @njit(cache=True)
-def friction_law(p: Any, velocity: float, position_m: float, time_s: float) -> tuple[float, float, float]:
-    """Coulomb bound F(v, x, t) >= 0, offset and smooth drag, with every active friction effect.
+def friction_law(p: Any, velocity: float, position_m: float, time_s: float) -> tuple[float, float, float, float]:
+    """Coulomb bound F(v, x, t) >= 0, offset, smooth drag and factor on all three, with every active friction effect.
 
     friction = F sign(v) + offset + drag;  drag = Fv v + quadratic v |v|
     F = [Fc + (Fs - Fc) s(v / vs)] (1 + fraction sin(2 pi x / period + phase))
@@ -51,7 +51,7 @@ def friction_law(p: Any, velocity: float, position_m: float, time_s: float) -> t
     if p.novel_friction_wander.on:
         w = p.novel_friction_wander
         scale *= 1.0 + w.fraction * wander(time_s / w.period_s, w.phase_rad)
-    return scale * bound, scale * offset, scale * drag
+    return scale * bound, scale * offset, scale * drag, scale
 
 
 @njit(cache=True)

@@ -72,6 +72,9 @@ CATALOGUE: Mapping[str, Definition] = MappingProxyType({
     # table
     "table_side_friction": Definition(
         "this share of the Coulomb and viscous friction acts on the table", {"share": ParameterRange(0.0, 1.0)}),
+    "table_side_viscous_friction": Definition(
+        "takes |share| of the viscous friction from the motor to the table, or back if share < 0",
+        {"share": ParameterRange(-1.0, 1.0)}),
     "structural_mode": Definition(
         "attached: a mass on a spring on the table; base: the machine base under the axis yields",
         {"frequency_hz": _POSITIVE, "damping_ratio": ParameterRange(0.0, 2.0),

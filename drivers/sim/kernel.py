@@ -106,15 +106,16 @@ def moving_mass(p: Any, index: int, time_s: float) -> float:
 
 
 @njit(cache=True)
-def kick(p: Any, s: Any, index: int, side: int, share: float, time_s: float) -> None:
-    """New velocity of a mass under its force and its share of the friction."""
+def kick(p: Any, s: Any, index: int, side: int, share: float, viscous: float, time_s: float) -> None:
+    """New velocity of a mass under its force, its share of the friction and its viscous friction."""
     h, ratio, mass = p.step_s, p.drive_ratio, moving_mass(p, index, time_s)
     speed = s.velocity[index] / ratio
     if p.varied_friction:
-        bound, offset, drag = friction_law(p, speed, s.position[index], time_s)
-        bound, offset, drag = share * bound, share * offset, share * drag
+        bound, offset, drag, scale = friction_law(p, speed, s.position[index], time_s)
+        bound, offset = share * bound, share * offset
+        drag = share * drag + scale * (viscous - share * p.viscous) * speed
     else:
-        bound, offset, drag = share * p.coulomb, 0.0, share * p.viscous * speed
+        bound, offset, drag = share * p.coulomb, 0.0, viscous * speed
     force = s.force[index] - drag / ratio
     if p.presliding_hysteresis.on:
         force -= bristle_torque(p, s.bristle[side], share, h * speed, h, bound, offset) / ratio
@@ -131,6 +132,9 @@ def advance(p: Any, s: Any, lines: Any, command: float, steps: int) -> None:
     q, v, force = s.position, s.velocity, s.force
     skew = p.channel_time_skew
     motor_share = 1.0 - p.table_side_friction.share
+    moved = p.table_side_viscous_friction.share
+    motor_viscous = motor_share * (1.0 - moved) if moved >= 0.0 else 1.0 - (1.0 - motor_share) * (1.0 + moved)
+    guided = min(motor_share, motor_viscous) < 1.0
     measured = 0.0
     for _ in range(steps):
         time_s = s.tick * h
@@ -154,11 +158,11 @@ def advance(p: Any, s: Any, lines: Any, command: float, steps: int) -> None:
             nut(p, s, time_s)
         if p.table_force:
             force[p.table] += table_force(p, q[p.table], time_s)
-        kick(p, s, 0, MOTOR_SIDE, motor_share, time_s)
+        kick(p, s, 0, MOTOR_SIDE, motor_share, motor_viscous * p.viscous, time_s)
         last = p.masses
         for i in range(1, last):
-            if i == p.table and motor_share < 1.0:
-                kick(p, s, i, TABLE_SIDE, 1.0 - motor_share, time_s)
+            if i == p.table and guided:
+                kick(p, s, i, TABLE_SIDE, 1.0 - motor_share, (1.0 - motor_viscous) * p.viscous, time_s)
             else:
                 v[i] += h / moving_mass(p, i, time_s) * force[i]
         for i in range(last):

@@ -14,7 +14,7 @@ from drivers.sim.sensors import Sensors
 
 NEED_TABLE = (
     "backlash", "preload_loss", "position_dependent_stiffness", "periodic_lead_error", "cumulative_lead_error",
-    "thermal_growth", "table_side_friction", "scale_interpolation_error",
+    "thermal_growth", "table_side_friction", "table_side_viscous_friction", "scale_interpolation_error",
     "load_encoder_eccentricity", "novel_pitch_bump",
 )  # fmt: skip
 GROUPS = {

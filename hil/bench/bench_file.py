@@ -15,7 +15,7 @@ from pydantic import Field, model_validator
 from hil.bench.axis_fields import BenchSection
 from hil.bench.axis_models import Axis, OneMass, model_of
 from hil.bench.control_section import Control, ControlSection, UnknownControl, with_law
-from hil.bench.hardware import DriveSection, SimulationSection
+from hil.bench.hardware import DriveMode, DriveSection, SimulationSection
 from hil.control import cascade as law
 from hil.errors import FieldError, InputError
 from hil.files.yaml_model import load_model
@@ -171,6 +171,13 @@ class Bench(BenchSection):
     def torque_delay_s(self) -> float | None:
         """Delay with which a recorded torque acts, to be estimated; None: it acts as recorded."""
         return self.control.torque_delay_s if isinstance(self.control, UnknownControl) else None
+
+    @property
+    def differences_setpoints(self) -> bool:
+        """True if the velocity feed-forward is the last difference of the position set-points, as in a drive in CSP."""
+        if self.drive is not None and self.drive.mode is DriveMode.CSP:
+            return True
+        return isinstance(self.control, Control) and self.control.velocity_setpoint == "backward_difference"
 
     @property
     def setpoint_delay_s(self) -> float:

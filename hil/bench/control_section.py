@@ -38,6 +38,9 @@ class Control(BenchSection):
     position_feedback: Literal["motor", "table"] = "motor"
     velocity_estimate: Literal["backward_difference", "two_sample_mean"] = "backward_difference"
     velocity_filter_time_constant_s: NotNegative = 0.0
+    velocity_setpoint: Literal["recorded", "backward_difference"] = Field(
+        "recorded", description="of the feed-forward, in a recording; or the last difference of its position set-points"
+    )
     setpoint_delay_s: float = Field(
         0.0, ge=-10.0, le=10.0, description="the loop uses the set-points of a recording so much later [s]"
     )

@@ -40,9 +40,10 @@ def diagnose(
     from hil.bench.bench_file import load_bench
     from hil.commands.warm_up import compile_kernels
     from hil.diagnosis.diagnose import diagnose as diagnose_recordings
+    from hil.diagnosis.wording import title
     from hil.files.output import default_folder, new_folder
     from hil.identification.measured import bench_of
-    from hil.quantities import quantity
+    from hil.quantities import percent, quantity
     from hil.report.diagnosis_report import torque_line, write_diagnosis
 
     train = [read_run(path) for path in runs]
@@ -77,6 +78,12 @@ def diagnose(
     if result.time_budget:
         out.print(
             f"\nThe search ended with its time budget before {result.time_budget.stopped_before}: best answer so far."
+        )
+    if result.findings:
+        out.print()
+        table(
+            ("found", "confidence that it is there"),
+            [(title(finding.effect), percent(finding.confidence)) for finding in result.findings],
         )
     if result.torque_left:
         out.print(f"\n{torque_line(result.torque_left)}")

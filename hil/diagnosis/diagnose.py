@@ -146,18 +146,18 @@ def diagnose(
         change = changed(refit.fit, held_out)
         if change and proof.final.terms and unexplained_share(nominal, proof.final, held_out) < change.left:
             change = None
-    of_plant = Verdict.AXIS_CHANGED if change else of_plant
+    of_plant = Verdict.AXIS_CHANGED if change and change.explains_all else of_plant
     verdict = law.verdict(of_plant)
     named = verdict is Verdict.MISSING_PHYSICS
     # what explains most of a mismatch is told, though it is not the name of all of it
-    partly = verdict is Verdict.UNEXPLAINED and explains_most(nominal, proof.final, held_out)
+    partly = verdict is Verdict.UNEXPLAINED and not change and explains_most(nominal, proof.final, held_out)
     nominal = refit.fit
     explanation = replace(explanation, nominal=nominal)
     if partly:
         final = proof.final
     else:
         final = {Verdict.MISSING_PHYSICS: proof.final, Verdict.NO_MISMATCH: owner}.get(of_plant, nominal)
-    as_given = of_plant in (Verdict.NO_MISMATCH, Verdict.AXIS_CHANGED)  # no correction of the bench holds throughout
+    as_given = of_plant is Verdict.NO_MISMATCH or change is not None  # no correction of the bench holds throughout
     # a parameter error is located and measured against the parameters of the bench file
     before = owner if of_plant is Verdict.PARAMETER_ERROR else nominal
 

@@ -151,7 +151,7 @@ def _is_coarse(runs: Sequence[Measured], found: LawFit) -> bool:
 class _Candidate(NamedTuple):
     terms: tuple[Term, ...] = ()
     free: bool = False
-    delays: bool = False
+    delays: int = 0
 
 
 def _candidates(runs: Sequence[Measured], bench: Bench) -> list[list[_Candidate]]:
@@ -171,8 +171,10 @@ def _candidates(runs: Sequence[Measured], bench: Bench) -> list[list[_Candidate]
     pairs = [pair for pair in combinations(single, 2) if pair[0].effect != pair[1].effect]
     levels = []
     for free in (False, True):
-        levels += [[_Candidate((), free)]] if free else []
-        levels += [[_Candidate((), free, delays=True), *(_Candidate((term,), free) for term in single)]]
+        late = [_Candidate((), free, delays) for delays in (1, 2)]
+        # gains make up for a delay that is left out
+        levels += [[_Candidate((), free), *late]] if free else []
+        levels += [[*([] if free else late), *(_Candidate((term,), free) for term in single)]]
         levels += [[_Candidate(pair, free) for pair in pairs]]
     return levels
 

@@ -79,7 +79,8 @@ def ended(final: Fit) -> list[str]:
     if nominal:
         notes.append(
             f"{', '.join(nominal)}: not identifiable from this motion. The fit ended at the bound of the allowed "
-            "range, a third or three times the value of the bench file; the value is no correction."
+            "range, a third or three times the value of the bench file; the value is no correction, but the one with "
+            "which bench.diagnosed.yaml fits."
         )
     others = ", ".join(name.split(".")[-1] for name in final.at_bound if name not in nominal)
     if others:

@@ -153,7 +153,9 @@ class ChannelFit(_Part):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, populate_by_name=True)
 
 
-AT_FLOOR = "The residuals of all channels are within the noise of positions and torque."
+AT_FLOOR = (
+    "Block by block, with measured inputs, the residuals of all channels are within the noise of positions and torque."
+)
 
 
 class Unexplained(_Part):
@@ -219,7 +221,7 @@ class Result(_Part):
     partial: tuple[Finding, ...] = Field(
         (), description="only for `unexplained`: mechanisms that explain most of the mismatch and leave more than noise"
     )
-    change: AxisChange | None = Field(None, description="only for `axis_changed`")
+    change: AxisChange | None = Field(None, description="for `axis_changed`; for `unexplained` one that explains most")
     parameter_corrections: dict[str, Correction]
     not_identifiable: tuple[str, ...] = Field(
         (), description="nominal parameters whose fit ended at the bound of the allowed range: no correction"

@@ -40,7 +40,7 @@ def statement(result: Result) -> str:
     if result.verdict is Verdict.NO_MISMATCH:
         return "The twin reproduces these recordings to within their noise."
     if result.change is not None:
-        return f"{_of_axis(result.change, result.unexplained.share)}{_left(result)}"
+        return f"{_of_axis(result.change, result)}{_left(result)}"
     if result.time_budget:
         return f"The time budget ended before a mechanism was found: {result.unexplained.description}"
     if result.partial:
@@ -53,13 +53,11 @@ def statement(result: Result) -> str:
     return f"The mismatch is not explained by any mechanism of the library: {result.unexplained.description}"
 
 
-def _of_axis(change: AxisChange, left: float) -> str:
+def _of_axis(change: AxisChange, result: Result) -> str:
     """What changed on the axis, with the values in each part."""
-    where = "between the recordings"
-    parts, how = [f"in {part}" for part in change.parts], "With values of its own each recording is explained"
+    where, parts = "between the recordings", [f"in {part}" for part in change.parts]
     if change.moment_s is not None:
         where, parts = f"at {change.moment_s:.2f} s of {change.recording}", list(change.parts)
-        how = f"Values that change there explain {percent(1.0 - left)} of the mismatch"
     told = "; ".join(
         f"{one.name} "
         + ", ".join(
@@ -67,7 +65,13 @@ def _of_axis(change: AxisChange, left: float) -> str:
         )
         for one in change.parameters
     )
-    return f"The axis changed {where}: {told}. {how}, without missing physics."
+    if result.verdict is Verdict.AXIS_CHANGED:
+        return f"The axis changed {where}: {told}. With values of each part no physics is missing."
+    share = percent(1.0 - result.unexplained.share)
+    return (
+        f"No mechanism of the library explains the whole mismatch. Parameters that change {where} explain {share} of "
+        f"it: {told}."
+    )
 
 
 def _growth(one: Correction) -> float:

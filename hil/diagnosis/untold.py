@@ -16,8 +16,8 @@ def untold(data: Dataset) -> list[str]:
     return [
         "The control law is unknown: the plant was judged alone, block by block, from measured torque to measured "
         "motion. There is no figure in closed loop and no next experiment, and no mismatch was assigned to the "
-        f"controller. {controller.capitalize()} cannot be tested: describe the law under `control` of the bench file, "
-        "and record the set-points.",
+        f"controller. {controller.capitalize()} cannot be tested: that needs recorded set-points, and the law under "
+        "`control` of the bench file.",
         *_of_torque(run),
         *_of_encoders(run, bench),
     ]

@@ -1,7 +1,8 @@
 """Gains of a cascaded control law from set-points, motion and torque command, without a bench.
 
 The fit is that of `hil.identification.control_law`, from a closed form, at every period of the position loop, with both
-velocity estimates, with and without an integrator and delays; the best of these is refined.
+velocity estimates, with and without an integrator and delays; the best of these is refined, also with a feed-forward of
+the last difference of the position set-points.
 """
 
 from dataclasses import replace
@@ -17,11 +18,15 @@ from hil.drafting.estimate import BenchValue
 from hil.identification.control_law import fit_settings
 from hil.identification.law_fit import REPLAYED, LawFit, preferred, sure
 from hil.identification.law_replay import LawRows, Settings, closed_form, find_delays, first_tick
+from hil.identification.terms import Term
 from hil.recording.recording import Recording
 from hil.twin.axis import Response, Start, Twin
+from hil.twin.mechanisms import velocity_filter_lag
 from hil.twin.physics import Physics
 from hil.twin.structure.chain import one_mass
 
+_FILTER = Term(velocity_filter_lag.MECHANISM.id, 0, (2e-3,))  # as drives have it
+_LEAST_FILTER = 0.2  # time constant over the period: a shorter one changes the velocity by less than a hundredth
 _TICKS = (1, 2, 4, 8)  # of the velocity loop per tick of the position loop, as drives have them
 _LONGEST_S = 0.1  # period of a position loop that a bench allows
 _FIRST_STEPS, _LAST_STEPS = 8, 40  # of the refinement of each variant, and of the best
@@ -50,7 +55,8 @@ def loop_values(recording: Recording, ratio_m_rad: float) -> ControlValues:
             [],
             f"the cascaded law leaves {_left(loop)} with positions that are "
             f"{1e3 * period_s * delays.feedback_rows:.3g} ms old, +-{1e3 * period_s * errors.feedback_rows:.1g}; "
-            "such a delay of the loop is not simulated",
+            "a delay of the loop is not simulated; if the drive filters its velocity instead, give its gains and "
+            "velocity_filter_time_constant_s",
         )
     how = f"the replayed law leaves {_left(loop)}"
     values = [
@@ -81,6 +87,21 @@ def loop_values(recording: Recording, ratio_m_rad: float) -> ControlValues:
         values.append(
             BenchValue(
                 "setpoint_delay_s", period_s * delays.setpoint_rows, f"s, +-{period_s * errors.setpoint_rows:.2g}"
+            )
+        )
+    if loop.terms:
+        values.append(
+            BenchValue(
+                "velocity_filter_time_constant_s",
+                loop.terms[0].values[0],
+                "s",
+                "a filter of the velocity explains most",
+            )
+        )
+    if delays.differenced:
+        values.append(
+            BenchValue(
+                "velocity_setpoint", "backward_difference", "", "of the position set-points, better than as recorded"
             )
         )
     values += [
@@ -147,7 +168,7 @@ def _best(rows: LawRows, ratio_m_rad: float, period_s: float) -> LawFit | None:
             start = Settings(_gains(ratio_m_rad, period_s, ticks, integral, mean))
             late = start._replace(setpoint_rows=delays[0], feedback_rows=delays[1])
             # delays begin where a coarse search finds them, and at none: the fit resolves parts of a row
-            for free, one in ((False, start), (True, start), (True, late)):
+            for free, one in ((0, start), (1, start), (2, start), (2, late)):
                 base = closed_form([rows], one, [first_tick(rows, one)])
                 if base is not None:  # the start is too far off to tell which variant is right
                     tried.append((free, fit_settings([rows], base, twin, delays=free, start=base, most=_FIRST_STEPS)))
@@ -155,7 +176,31 @@ def _best(rows: LawRows, ratio_m_rad: float, period_s: float) -> LawFit | None:
         return None
     best = preferred([one for _, one in tried])
     free = next(free for free, one in tried if one is best)
-    return fit_settings([rows], best.settings, twin, delays=free, start=best.settings, most=_LAST_STEPS)
+    return _refined(rows, best.settings, free, twin)
+
+
+def _refined(rows: LawRows, at: Settings, delays: int, twin: Twin) -> LawFit:
+    """The best of the law as found, with a feed-forward of the last difference, and with a filter of the velocity.
+
+    A filter looks like old positions, another feed-forward like other gains.
+    """
+    fits = [fit_settings([rows], at, twin, delays=delays, start=at, most=_LAST_STEPS)]
+    for differenced, mean, filtered in product((False, True), (False, True), (False, True)):
+        start = at._replace(
+            gains=at.gains._replace(two_sample_mean=mean),
+            setpoint_rows=0.0 if differenced else at.setpoint_rows,
+            feedback_rows=0.0,
+            differenced=differenced,
+        )
+        if differenced:
+            start = closed_form([rows], start, [first_tick(rows, start)]) or start
+        fits += [
+            fit_settings([rows], start, twin, [_FILTER] if filtered else [], delays=some, start=start, most=_LAST_STEPS)
+            for some in {0, min(delays, 1)}
+            if differenced or filtered
+        ]
+    least_s = _LEAST_FILTER * at.gains.period_s
+    return preferred([one for one in fits if not one.terms or one.terms[0].values[0] > least_s] or fits[:1])
 
 
 def _gains(ratio_m_rad: float, period_s: float, ticks: int, integral: bool, mean: bool) -> Gains:

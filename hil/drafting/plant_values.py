@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
+from scipy.stats import norm
+from scipy.stats import t as student
 
 from hil.arrays import FloatArray
 from hil.drafting.estimate import BlockFit, Estimate, fit_blocks
@@ -101,25 +103,32 @@ def plant_values(recording: Recording, load_ratio: float | None = None) -> Plant
         inertia = replace(inertia, value=inertia.std_error, how=f"{inertia.how}; not told by this motion: its error")
     gravity, angle = _gravity(more[0], more[1], load_ratio) if len(more) == 2 and load_ratio else (None, None)
     spring = more[0] if len(more) == 1 else None
-    if not (viscous.significant and viscous.value > 0.0):
-        viscous, coulomb = _at_feeds(recording) or (viscous, coulomb)
+    viscous, coulomb = _at_feeds(recording, viscous, coulomb) or (viscous, coulomb)
     return PlantValues(inertia, viscous, coulomb, offset, fit.left, gravity, angle, spring, cutoff_hz)
 
 
-def _at_feeds(recording: Recording) -> tuple[Estimate, Estimate] | None:
-    """Viscous and Coulomb friction from constant feeds, where these tell both; else None.
+def _at_feeds(recording: Recording, viscous: Estimate, coulomb: Estimate) -> tuple[Estimate, Estimate] | None:
+    """Viscous and Coulomb friction from constant feeds, where these tell both better than all rows do; else None.
 
-    Friction that falls from rest makes the viscous friction of all rows too small, and negative.
+    Friction that falls from rest makes the viscous friction of all rows too small, and negative; rows at reversals,
+    where the sign of the velocity is least known, make Coulomb friction too small.
     """
     try:
         found = identify_friction(recording)
     except InputError:
         return None
-    how = f"{len(found.points)} constant feeds; all rows do not tell it"
-    viscous = Estimate(found.viscous, found.viscous_std_error, how)
-    coulomb = Estimate(found.coulomb, found.coulomb_std_error, how)
-    told = all(one.significant and one.value > 0.0 for one in (viscous, coulomb))
-    return (viscous, coulomb) if told else None
+    how = f"{len(found.points)} constant feeds; all rows tell it less well"
+    # the error of a few points is known badly (Student's t)
+    wider = float(student.ppf(0.975, len(found.points) - 3) / norm.ppf(0.975))
+    at_feeds = (
+        Estimate(found.viscous, wider * found.viscous_std_error, how),
+        Estimate(found.coulomb, wider * found.coulomb_std_error, how),
+    )
+    if not all(one.significant and one.value > 0.0 for one in at_feeds):
+        return None
+    pairs = zip(at_feeds, (viscous, coulomb), strict=True)
+    better = all(feed.std_error < rows.std_error for feed, rows in pairs)
+    return at_feeds if better or not (viscous.significant and viscous.value > 0.0) else None
 
 
 def _gravity(sine: Estimate, cosine: Estimate, load_ratio: float) -> tuple[Estimate, Estimate]:

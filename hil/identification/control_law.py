@@ -51,7 +51,7 @@ class _Law:
     base: Settings
     terms: tuple[Term, ...]
     gains: bool
-    delays: bool
+    delays: int  # that are free: 0, 1 of the set-points, 2 and of the feedback
     scaled: bool  # a speed set-point of unknown scale is recorded
 
     def values(self, y: FloatArray) -> tuple[Settings, tuple[Term, ...]]:
@@ -67,7 +67,8 @@ class _Law:
             )
             settings, y = settings._replace(gains=gains), y[4:]
         if self.delays:
-            settings, y = settings._replace(setpoint_rows=float(y[0]), feedback_rows=float(y[1])), y[2:]
+            rows = dict(zip(("setpoint_rows", "feedback_rows"), y[: self.delays].tolist(), strict=False))
+            settings, y = settings._replace(**rows), y[self.delays :]
         if self.scaled:
             settings, y = settings._replace(scale=settings.scale * float(np.exp(y[0]))), y[1:]
         scaled = zip(self.terms, np.split(y, len(self.terms)) if self.terms else (), strict=True)
@@ -84,7 +85,7 @@ class _Law:
                 np.log(gains.velocity_gain_n_m_s_rad / base.velocity_gain_n_m_s_rad),
                 np.log(max(ki, 1e-9)),
             ]
-        y += [settings.setpoint_rows, settings.feedback_rows] if self.delays else []
+        y += [settings.setpoint_rows, settings.feedback_rows][: self.delays]
         y += [np.log(settings.scale / self.base.scale)] if self.scaled else []
         return np.array([*y, *(1.0 for term in self.terms for _ in term.values)])
 
@@ -92,7 +93,7 @@ class _Law:
     def bounds(self) -> tuple[FloatArray, FloatArray]:
         most = np.log(_FARTHEST)
         bounds = [(-most, most), (0.0, _MOST_FEEDFORWARD), (-most, most), (-most, most)] if self.gains else []
-        bounds += [(-SETPOINT_ROWS, SETPOINT_ROWS), (0.0, FEEDBACK_ROWS)] if self.delays else []
+        bounds += [(-SETPOINT_ROWS, SETPOINT_ROWS), (0.0, FEEDBACK_ROWS)][: self.delays]
         bounds += [(-most, most)] if self.scaled else []
         for term in self.terms:
             for parameter, value in zip(BY_ID[term.effect].parameters, term.values, strict=True):
@@ -111,8 +112,7 @@ class _Law:
     def errors(self, y: FloatArray) -> LawErrors:
         """Standard errors from those of y (p,)."""
         of_gains, rest = (y[:4], y[4:]) if self.gains else (np.zeros(4), y)
-        of_delays = rest[:2] if self.delays else np.zeros(2)
-        return LawErrors(*(float(one) for one in (*of_gains, *of_delays)))
+        return LawErrors(*(float(one) for one in (*of_gains, *rest[: self.delays])))
 
 
 def counting_noise(run: Measured, gains: Gains) -> float:
@@ -133,10 +133,11 @@ def fit_law(
     terms: Sequence[Term] = (),
     *,
     free: bool = True,
-    delays: bool = False,
+    delays: int = 0,
     by_loop: bool = False,
 ) -> LawFit:
-    """Fit the gains of a bench (if `free`), `delays` and the values of `terms` to the commands of recordings.
+    """Fit the gains of a bench (if `free`), `delays` (1: of the set-points, 2: and of the feedback) and the values of
+    `terms` to the commands of recordings.
 
     `by_loop`: each loop on its own, from the recorded speed set-point. Without anything to fit the law is evaluated.
     """
@@ -169,11 +170,13 @@ def fit_settings(
     terms: Sequence[Term] = (),
     *,
     free: bool = True,
-    delays: bool = False,
+    delays: int = 0,
     start: Settings | None = None,
     most: int = _STEPS,
 ) -> LawFit:
     """Fit settings, from `base` or a closed form, and `terms`; `twin` has the known mechanisms of the axis.
+
+    `delays`: 1 of the set-points, 2 and of the feedback.
 
     Every tick of the position loop is tried as the first one if gains or delays are free. Delays are looked for
     unless they `start` somewhere. `most`: evaluations.
@@ -182,7 +185,7 @@ def fit_settings(
     if delays:
         if start is None:
             late, old = find_delays(rows[0], base)
-            start = base._replace(setpoint_rows=late, feedback_rows=old)
+            start = base._replace(setpoint_rows=late, feedback_rows=old if delays > 1 else 0.0)
         return _fitted(law, twin, rows, [first_tick(run, start) for run in rows], most, start)
     if not free or base.gains.position_ticks == 1:
         return _fitted(law, twin, rows, [0] * len(rows), most)

@@ -45,7 +45,7 @@ class Refit(NamedTuple):
         if not self.worse:
             return ""
         kept = f"{100.0 * self.share:g} % of its change was taken" if self.share else "the bench's values were kept"
-        return f"The refit would be worse than the bench file in {'; '.join(self.worse)}: {kept}."
+        return f"The refit without new physics would be worse than the bench file in {'; '.join(self.worse)}: {kept}."
 
 
 def never_worse(fit: Fit, figures: Callable[[Hypothesis], Figures], enough: Figures) -> Refit:

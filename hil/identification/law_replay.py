@@ -20,7 +20,7 @@ from scipy.signal import lfilter
 
 from hil.arrays import FloatArray
 from hil.control.cascade import Gains
-from hil.identification.measured import later
+from hil.identification.measured import last_difference, later
 from hil.twin.axis import Response, Start, Twin
 from hil.twin.stepping.loops import INTEGRATOR_S
 
@@ -39,6 +39,7 @@ class Settings(NamedTuple):
     scale: float = 1.0
     setpoint_rows: float = 0.0  # the law uses the recorded set-points so much later
     feedback_rows: float = 0.0  # the law uses positions that are so old
+    differenced: bool = False  # the feed-forward is the last difference of the position set-points
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,12 +64,15 @@ class LawRows:
         """The rows with the inputs that the law uses, by the delays of `settings`."""
         late, old = settings.setpoint_rows, settings.feedback_rows
         motor, table = self.measured.motor_position, self.measured.table_position_m
+        velocity = self.velocity_command_m_s
+        if settings.differenced:
+            velocity = last_difference(self.position_command_m, settings.gains.period_s)
         if old:
             motor, table = later(motor, old), later(table, old) if table.size else table
         return replace(
             self,
             position_command_m=later(self.position_command_m, late) if late else self.position_command_m,
-            velocity_command_m_s=later(self.velocity_command_m_s, late) if late else self.velocity_command_m_s,
+            velocity_command_m_s=later(velocity, late) if late else velocity,
             measured=self.measured._replace(motor_position=motor, table_position_m=table),
         )
 

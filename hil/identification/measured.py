@@ -17,7 +17,6 @@ from pydantic import ValidationError
 
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
-from hil.bench.hardware import DriveMode
 from hil.channels import SPEED_SET_POINT, AxisKind
 from hil.control import cascade
 from hil.errors import InputError
@@ -150,8 +149,8 @@ def take(recording: Recording, bench: Bench) -> Measured:
         )
     motor, torque = _column(recording, names.motor_position), _column(recording, names.torque)
     position, velocity = _column(recording, names.position_command), _column(recording, names.velocity_command)
-    if bench.drive is not None and bench.drive.mode is DriveMode.CSP:
-        velocity = np.diff(position, prepend=2.0 * position[0] - position[1]) / gains.period_s
+    if bench.differences_setpoints:
+        velocity = last_difference(position, gains.period_s)
     if bench.setpoint_delay_s:
         position, velocity = (later(one, bench.setpoint_delay_s / gains.period_s) for one in (position, velocity))
     has_command = names.torque_command in recording.columns
@@ -213,6 +212,11 @@ def bench_of(recording: Recording) -> Bench:
             f"{recording.name}: bench.{'.'.join(map(str, first['loc']))}: {first['msg']}: the bench recorded in it is "
             "damaged; give one: --bench FILE or a shipped name"
         ) from None
+
+
+def last_difference(position: FloatArray, period_s: float) -> FloatArray:
+    """Velocity (n,) of position set-points, as a loop computes it that knows none of the future."""
+    return np.asarray(np.diff(position, prepend=2.0 * position[0] - position[1]) / period_s, dtype=np.float64)
 
 
 def later(values: FloatArray, rows: float) -> FloatArray:

@@ -197,6 +197,12 @@ def check_runnable(bench: Bench) -> None:
             ("control", "setpoint_delay_s"),
             f"given {control.setpoint_delay_s:g}, allowed 0 for a run: its loop uses set-points at once; remove it",
         )
+    if control.velocity_setpoint != "recorded":
+        raise FieldError(
+            ("control", "velocity_setpoint"),
+            f"given {control.velocity_setpoint}, allowed for recordings alone: a run has the velocity of its profile; "
+            "remove it",
+        )
     if bench.drive is None and bench.simulation is None:
         raise FieldError(
             ("drive",),

@@ -103,7 +103,7 @@ def _finding(page: Page, diagnosis: Diagnosis, index: int, folder: Path) -> None
         page.text(f"Reported as part of this curve, because it corrects the curve's form only slightly: {finding.form}")
     page.table(
         ("parameter", "value", "standard error", "unit"),
-        [(name, *_value(entry)) for name, entry in finding.parameters.items()],
+        [(name, *_value(entry, scaled=not finding.windows)) for name, entry in finding.parameters.items()],
     )
     if len(finding.windows) > 1:
         unit = finding.windows[0].strength.unit
@@ -117,10 +117,10 @@ def _finding(page: Page, diagnosis: Diagnosis, index: int, folder: Path) -> None
 
 
 def _change(page: Page, diagnosis: Diagnosis, folder: Path) -> None:
-    change = diagnosis.result.change
+    result, change = diagnosis.result, diagnosis.result.change
     if change is None:
         return
-    page.heading("What changed")
+    page.heading("What changed" if result.verdict is Verdict.AXIS_CHANGED else "Explains a part: a change of the axis")
     page.picture(save(diagnosis.plot("change"), folder / "change.png"), CAPTION)
     rows = []
     for one in change.parameters:
@@ -230,9 +230,9 @@ def _no_experiment(result: Result) -> str:
     return "No question is open that another motion could answer."
 
 
-def _value(entry: Value) -> tuple[str, ...]:
-    """Cells of a value, its standard error, and the unit in which both are shown."""
-    factor, unit = reading_unit(entry.unit, entry.value)
+def _value(entry: Value, scaled: bool = True) -> tuple[str, ...]:
+    """Cells of a value, its standard error, and the unit in which both are shown: the SI unit if not `scaled`."""
+    factor, unit = reading_unit(entry.unit, entry.value) if scaled else (1.0, entry.unit)
     return Number(digits(entry.value * factor, 4)), Number(digits(entry.std * factor, 2)), unit
 
 

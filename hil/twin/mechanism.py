@@ -47,6 +47,7 @@ class Stage(StrEnum):
     BIAS = "bias"  # + shift of the band [-Fc, Fc] of Coulomb friction
     BRISTLE = "bristle"  # + stiffness of the contact before sliding; 0 is rigid contact
     TABLE_SHARE = "table_share"  # + share of the friction that acts on the table
+    TABLE_VISCOUS_SHARE = "table_viscous_share"  # that share -> share of the viscous friction
     TRANSMISSION = "transmission"  # deflection of the transmission [motor units] -> the deflection its
     # nominal spring would need for the same torque
     SCREW = "screw"  # x factor on the stiffness of the screw between its bearing and the nut

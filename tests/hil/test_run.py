@@ -123,6 +123,7 @@ def test_shipped_benches_run(tmp_path: Path, name: str) -> None:
         ),
         ({"encoders": {"motor": {"counts_per_rev": 4096, "direction": -1}}}, r"0x607E"),
         ({"drive": {"mode": "csp"}, "control": {"position_feedback": "table"}}, r"csp with position_feedback: table"),
+        ({"control": {"velocity_setpoint": "backward_difference"}}, r"velocity_setpoint.*allowed for recordings alone"),
         ({"control": {"setpoint_delay_s": 0.004}}, r"setpoint_delay_s.*given 0.004, allowed 0 for a run"),
     ],
 )

@@ -125,12 +125,13 @@ def recorded(case: dict[str, Any], out: Path) -> tuple[list[Recording], list[Rec
         (place / "bench.yaml").write_text(yaml.safe_dump(plain, sort_keys=False))
         laws = [same_law(effect.effect) for effect in drawn.truth.effects]
         (place / "truth.json").write_text(json.dumps([drawn.truth.verdict, [list(law) for law in laws if law]]))
+    verdict, laws = json.loads((place / "truth.json").read_text())
     train = [read_recording(place / f"train_{number}.parquet") for number in (1, 2)]
     return (
         train,
         [read_recording(place / "holdout.parquet")],
         load_bench(place / "bench.yaml"),
-        json.loads((place / "truth.json").read_text()),
+        [case.get("verdict", verdict), laws],
     )
 
 

@@ -19,18 +19,28 @@ def one_encoder(bench: Bench) -> Bench:
     return bench.model_copy(update={"encoders": bench.encoders.model_copy(update={"table": None})})
 
 
-def servo_run(bench: Bench, old_rows: float = 0.0, late_rows: int = 0, scale: float = 1.0, times: int = 1) -> Recording:
+def servo_run(
+    bench: Bench,
+    old_rows: float = 0.0,
+    late_rows: int = 0,
+    scale: float = 1.0,
+    times: int = 1,
+    differenced: bool = False,
+) -> Recording:
     """Record the law of `bench` on one inertia; the loop sees positions of `old_rows` ago.
 
     It moves `times` times through the segments, uses the recorded set-points `late_rows` later, and records its speed
-    set-point in units of `scale` m/s.
+    set-point in units of `scale` m/s. Its feed-forward is the velocity of the profile, or the last difference of the
+    position set-points (`differenced`).
     """
     gains = bench.gains
     period_s, ratio = gains.period_s, gains.ratio_m_rad
     physics = bench.axis.physics()
     inertia = float(physics.chain.inertia_kg_m2.sum())
     trajectory = plan(moves(SEGMENTS, times), period_s)
-    rows = np.arange(trajectory.position_m.size)
+    rows, ahead = np.arange(trajectory.position_m.size), trajectory.velocity_m_s
+    if differenced:
+        ahead = np.diff(trajectory.position_m, prepend=trajectory.position_m[0]) / period_s
     used = np.clip(rows - late_rows, 0, rows[-1])
     count, step_s = bench.motor_count, period_s / STEPS
     angle = speed = 0.0
@@ -40,7 +50,7 @@ def servo_run(bench: Bench, old_rows: float = 0.0, late_rows: int = 0, scale: fl
     for k in rows:
         motor[k] = np.round(angle / count) * count
         seen = np.round(past[-1 - round(STEPS * old_rows)] / count) * count
-        inputs = cascade.Inputs(trajectory.position_m[used[k]], trajectory.velocity_m_s[used[k]], seen, ratio * seen)
+        inputs = cascade.Inputs(trajectory.position_m[used[k]], float(ahead[used[k]]), seen, ratio * seen)
         state, outputs = cascade.step(gains, state, inputs)
         torque[k], reference[k] = outputs
         for _ in range(STEPS):

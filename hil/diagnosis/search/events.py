@@ -165,7 +165,8 @@ def _with_windows(at: Hypothesis, index: int, windows: tuple[Window, ...]) -> Hy
 def _trimmed(found: Fit, others: bool = True) -> Fit:
     """Leave out windows of the runs of a fit whose force is no larger than its error allows, and fit the others again.
 
-    Such are windows at rest, where friction holds against a force. Faint ones are left out too.
+    Such are windows at rest, where friction holds against a force. Faint ones and those without a length are left out
+    too.
     """
     index = _index(found)
     if index is None:
@@ -179,7 +180,12 @@ def _trimmed(found: Fit, others: bool = True) -> Fit:
     kept = tuple(
         one
         for one in term.windows
-        if one.run not in names or (abs(at.at(one)[strength]) > _SIGMAS * next(errors)[2] and not weak[one])
+        if one.run not in names
+        or (
+            abs(at.at(one)[strength]) > _SIGMAS * next(errors)[2]
+            and not weak[one]
+            and at.edges(one)[1] > at.edges(one)[0]
+        )
     )
     if len(kept) == len(term.windows):
         return found

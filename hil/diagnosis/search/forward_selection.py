@@ -112,8 +112,9 @@ def explain(data: Dataset, progress: Progress = lambda text: None, deadline_s: f
         found = [other for other in found if other is not best]
         if not best.jacobian.size:  # only evaluated so far, since the fitted ones were rejected
             best = replace(best.estimator, edge_step_s=LAST_EDGE_STEP_S).fit(best.hypothesis)
-        filters = whitening(best)
         found = [ended(one) if one.cost < _NEAR * best.cost else one for one in found]
+        best, found = _on_fewest_parts(best, found)
+        filters = whitening(best)
         rivals[best.terms[-1].key] = sorted(
             (RivalFit.of(one, against(best, one, filters), (one.cost - best.cost) / base.rows) for one in found),
             key=lambda rival: rival.evidence,
@@ -147,6 +148,23 @@ def _simplest(tied: list[Fit]) -> Fit:
     most axes are horizontal.
     """
     return min(tied, key=lambda found: (found.hypothesis.free, found.terms[-1].key[:2] != (FRICTION, 0)))
+
+
+def _on_fewest_parts(best: Fit, found: list[Fit]) -> tuple[Fit, list[Fit]]:
+    """Return the explanation on the fewest parts of the axis of those that are not refuted, and the others.
+
+    What a part does that is found already needs no second cause elsewhere.
+    """
+    filters = whitening(best)
+    tied = [
+        one
+        for one in found
+        if one.jacobian.size
+        and one.hypothesis.free <= best.hypothesis.free
+        and not refuted(against(best, one, filters), (one.cost - best.cost) / best.rows)
+    ]
+    first = min([best, *tied], key=lambda one: len({BY_ID[term.effect].element_of(term.variant) for term in one.terms}))
+    return first, [one for one in (best, *found) if one is not first]
 
 
 def _without(found: Fit, index: int) -> Fit:

@@ -33,6 +33,11 @@ class Change:
     parts: tuple[Fit, ...]
     left: float
 
+    @property
+    def explains_all(self) -> bool:
+        """True if nothing above the noise is left."""
+        return all(fit.at_floor for fit in self.parts)
+
 
 def changed(nominal: Fit, held_out: Dataset) -> Change | None:
     """Find parameters of the axis that change between the recordings, or during one; None if none does.

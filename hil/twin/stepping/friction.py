@@ -8,6 +8,7 @@ from hil.twin.stepping.contact import COMPILE, Resistance
 
 _coulomb, _friction_scale, _drag = stages.coulomb, stages.friction_scale, stages.drag
 _bias, _bristle, _table_share = stages.bias, stages.bristle, stages.table_share
+_table_viscous_share = stages.table_viscous_share
 _rigid, _elastic, _slipping = contact.rigid, contact.elastic, contact.slipping
 
 
@@ -41,12 +42,14 @@ def friction(c, own, internal, motion, at, effects, free, table_free):  # type: 
     share = _table_share(0.0, at, effects)
     stiffness = _bristle(0.0, at, effects)
     scale = max(_friction_scale(1.0, at, effects), 0.0)
+    viscous_share = _table_viscous_share(share, at, effects)
     viscous, rest = scale * c.viscous, 1.0 - share
+    viscous, guide_viscous = (1.0 - viscous_share) * viscous, viscous_share * viscous
     bound, opposing = _level(c, scale, at, effects)
     if effects.codes.coulomb or effects.codes.drag:  # at the middle of the step friction over speed is second order
-        met = _rigid(free, gain, Resistance(rest * bound, rest * viscous, shift, rest * opposing))
+        met = _rigid(free, gain, Resistance(rest * bound, viscous, shift, rest * opposing))
         bound, opposing = _level(c, scale, _at_speed(at, 0.5 * (motion.speed + free - gain * met)), effects)
-    resistance = Resistance(rest * bound, rest * viscous, shift, rest * opposing)
+    resistance = Resistance(rest * bound, viscous, shift, rest * opposing)
     if stiffness > 0.0 and c.slips > 0:
         motor = _slipping(free, gain, resistance, stiffness, own.slip_elements, at.step_s, motion.speed)
     elif stiffness > 0.0:
@@ -56,12 +59,12 @@ def friction(c, own, internal, motion, at, effects, free, table_free):  # type: 
     else:
         motor = _rigid(free, gain, resistance)
     guide = 0.0
-    if share > 0.0:
+    if share > 0.0 or viscous_share > 0.0:
         met, gain, opposing = table_free - internal.cross_gain * motor, internal.table_gain, 0.0
         if effects.codes.drag:  # at the table's own speed: at the motor's it would drive a table that swings
-            guide = _rigid(met, gain, Resistance(share * bound, share * viscous, 0.0, 0.0))
+            guide = _rigid(met, gain, Resistance(share * bound, guide_viscous, 0.0, 0.0))
             speed = 0.5 * (motion.table_speed + met - gain * guide)
             opposing = scale * _drag(0.0, _at_speed(at, speed), effects)
         # a torque that differs by direction, alike at every speed, is a load and stays on the motor
-        guide = _rigid(met, gain, Resistance(share * bound, share * viscous, 0.0, share * opposing))
+        guide = _rigid(met, gain, Resistance(share * bound, guide_viscous, 0.0, share * opposing))
     return motor, guide

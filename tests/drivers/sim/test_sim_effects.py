@@ -26,6 +26,7 @@ SHOWN = {
     "nonlinear_viscous_friction": {"quadratic_n_m_s2_rad2": 2e-5},
     "friction_drift": {"fraction": -0.3, "time_constant_s": 1.0},
     "table_side_friction": {"share": 0.5},
+    "table_side_viscous_friction": {"share": 0.8},
     "backlash": {"gap_m": 1e-5},
     "preload_loss": {"zone_m": 5e-6, "stiffness_ratio": 0.3},
     "position_dependent_stiffness": {"relative_slope": -3.0},
@@ -68,7 +69,7 @@ def test_catalogue_holds_exactly_the_interface() -> None:
         for name, definition in CATALOGUE.items()
     }
     assert required == {name: set(parameters) for name, parameters in SHOWN.items()}
-    assert len(CATALOGUE) == 33
+    assert len(CATALOGUE) == 34
 
 
 @pytest.mark.parametrize("name", SHOWN)

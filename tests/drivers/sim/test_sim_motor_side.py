@@ -128,6 +128,25 @@ def test_table_side_friction_acts_behind_the_spring() -> None:
     assert friction_n_m(Effect("table_side_friction", {"share": 0.5}), 10.0) == pytest.approx(1.164, rel=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("coulomb", "more", "viscous"), [(0.0, 0.6, 0.6), (0.5, 0.4, 0.7), (0.5, -0.4, 0.3), (0.5, -1.0, 0.0)]
+)
+def test_viscous_friction_on_the_table_has_a_share_of_its_own(coulomb: float, more: float, viscous: float) -> None:
+    """At a steady speed the spring holds what acts on the table; the friction of the axis is what it was."""
+    effects = [
+        Effect("table_side_friction", {"share": coulomb}),
+        Effect("table_side_viscous_friction", {"share": more}),
+    ]
+    for drift, scale in ((), 1.0), ((Effect("friction_drift", {"fraction": 0.5, "time_constant_s": 1e-3}),), 1.5):
+        plant = plant_with(AXIS, *effects, *drift)
+        plant.advance(scale * (1.1 + 0.64), 0.01)
+        plant.velocities_m_s[:] = 100.0 * R
+        plant.advance(scale * (1.1 + 0.64), 0.2)
+        held = scale * (1.1 * coulomb + 0.64 * viscous) / R
+        assert plant.velocities_m_s[0] == pytest.approx(100.0 * R, rel=1e-3)
+        assert (plant.positions_m[0] - plant.positions_m[1]) * 5.64e7 == pytest.approx(held, rel=1e-2, abs=1.0)
+
+
 def test_cogging_torque_is_locked_to_the_angle_and_unseen_by_the_current() -> None:
     cogging = Effect("cogging_torque", dict(amplitude_n_m=0.2, cycles_per_rev=12, phase_rad=0.3))
     plant = plant_with(FRICTIONLESS, cogging)

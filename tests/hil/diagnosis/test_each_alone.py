@@ -62,7 +62,7 @@ def test_the_moment_at_which_the_inertia_changes_is_said(tmp_path: Path, second:
     assert result.verdict == "axis_changed"
     assert result.change is not None
     assert result.statement.startswith(f"The axis changed at {result.change.moment_s:.2f} s of log (")
-    assert result.unexplained.share < 0.1
+    assert result.unexplained.share < 0.01
     assert not result.parameter_corrections  # none holds throughout
     write_diagnosis(found, tmp_path)
     assert (tmp_path / "change.png").stat().st_size > 10_000

@@ -6,7 +6,7 @@ import pytest
 from diagnosis_runs import RIG, bench, changed
 from servo_loop import one_encoder, servo_run
 
-from hil.bench.bench_file import load_bench
+from hil.bench.bench_file import Bench, load_bench
 from hil.drafting.loop_values import ControlValues, loop_values
 from hil.recording.importing import import_recording
 from hil.recording.recording import Recording
@@ -16,9 +16,11 @@ RATIO_M_RAD = OWNER.axis.ratio_m_rad
 EMPS = RIG.parent / "emps" / "DATA_EMPS.mat"
 
 
-def assert_drafted(drafted: ControlValues, **more: float) -> None:
+def assert_drafted(
+    drafted: ControlValues, velocity_setpoint: str = "recorded", owner: Bench = OWNER, **more: float
+) -> None:
     values = {entry.key: entry.value for entry in drafted.values}
-    gains = OWNER.gains
+    gains = owner.gains
     expected = {
         "position_gain_1_s": gains.position_gain_1_s,
         "velocity_feedforward": gains.velocity_feedforward,
@@ -29,6 +31,7 @@ def assert_drafted(drafted: ControlValues, **more: float) -> None:
         **more,
     }
     assert values.pop("velocity_estimate") == "backward_difference"
+    assert values.pop("velocity_setpoint", "recorded") == velocity_setpoint
     assert values == pytest.approx(expected, rel=2e-3)
 
 
@@ -42,6 +45,22 @@ def test_gains_are_drafted_with_and_without_a_speed_set_point(scale: float | Non
 def test_a_delay_of_the_set_points_is_drafted() -> None:
     drafted = loop_values(servo_run(OWNER, late_rows=7), RATIO_M_RAD)
     assert_drafted(drafted, setpoint_delay_s=7e-3)
+
+
+def test_a_feed_forward_of_the_last_difference_of_the_set_points_is_drafted() -> None:
+    recording = changed(servo_run(OWNER, differenced=True), velocity_reference_m_s=None)
+    drafted = loop_values(recording, RATIO_M_RAD)
+    assert_drafted(drafted, velocity_setpoint="backward_difference")
+
+
+def test_a_filter_of_the_velocity_is_drafted() -> None:
+    """A drive whose loops run at one rate, with a filter of four periods."""
+    control = OWNER.known_control.model_copy(
+        update={"position_period_s": 1e-3, "velocity_filter_time_constant_s": 4e-3, "velocity_integral_time_ms": 50.0}
+    )
+    owner = OWNER.model_copy(update={"control": control})
+    drafted = loop_values(changed(servo_run(owner), velocity_reference_m_s=None), RATIO_M_RAD)
+    assert_drafted(drafted, owner=owner, velocity_filter_time_constant_s=4e-3)
 
 
 def test_a_delay_of_the_loop_is_said_and_the_law_left_unknown() -> None:

@@ -111,6 +111,32 @@ def test_a_share_of_all_friction_pulls_at_the_table(active, drag_n) -> None:
     )
 
 
+@pytest.mark.parametrize(
+    ("coulomb", "more", "viscous"), [(0.0, 0.6, 0.6), (0.5, 0.4, 0.7), (0.5, -0.4, 0.3), (0.5, -1.0, 0.0)]
+)
+def test_viscous_friction_pulls_at_the_table_with_a_share_of_its_own(coulomb, more, viscous) -> None:
+    """At a steady speed the spring holds it; viscous friction equals Coulomb friction there."""
+    stiffness_n_m = 2e5
+    axis = Twin(
+        Physics(two_mass(60.0, 40.0, stiffness_n_m, 0.1, LINEAR_LEAD_M), COULOMB_N, VISCOUS_N_S_M, linear=True),
+        GAINS,
+        (Active("table_side_friction", (coulomb,)), Active("table_side_viscous_friction", (more,))),
+    )
+    found = axis.drive(np.full(10_000, 2.0 * COULOMB_N))
+    assert speeds(found)[-1] == pytest.approx(SPEED_M_S, rel=1e-4)
+    assert found.motor_position[-1] - found.table_position_m[-1] == pytest.approx(
+        (coulomb + viscous) * COULOMB_N / stiffness_n_m, rel=1e-4
+    )
+
+
+@pytest.mark.parametrize("more", [0.0, -0.5])
+def test_without_viscous_friction_on_the_table_nothing_changes(more) -> None:
+    force = 60.0 * np.sin(np.arange(2000) * GAINS.period_s * 2.0 * np.pi)
+    plain = twin().drive(force).motor_position
+    found = twin(Active("table_side_viscous_friction", (more,))).drive(force).motor_position
+    np.testing.assert_allclose(found, plain, rtol=0.0, atol=1e-15)
+
+
 def test_what_drifts_scales_drag_too() -> None:
     warm = Active("friction_drift", (0.5, 1e-3))
     quadratic = Active("nonlinear_viscous_friction", (500.0,))

@@ -29,6 +29,7 @@ TABLE = {
     "nonlinear_viscous_friction": ("motor_side", ["quadratic_n_m_s2_rad2"]),
     "friction_drift": ("motor_side", ["fraction", "time_constant_s"]),
     "table_side_friction": ("table", ["share"]),
+    "table_side_viscous_friction": ("table", ["share"]),
     "backlash": ("transmission", ["gap_m"]),
     "preload_loss": ("transmission", ["zone_m", "stiffness_ratio"]),
     "position_dependent_stiffness": ("transmission", ["relative_slope"]),

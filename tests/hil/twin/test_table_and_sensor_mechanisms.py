@@ -18,6 +18,14 @@ def test_table_side_friction_is_a_share(share, at) -> None:
     assert call("table_side_friction", 0.0, at, share=share) == share
 
 
+@given(share=st.floats(-1.0, 1.0), coulomb=st.floats(0.0, 1.0), at=moments)
+def test_viscous_friction_has_less_on_one_side(share, coulomb, at) -> None:
+    found = call("table_side_viscous_friction", coulomb, at, share=share)
+    assert -1e-15 <= found <= 1.0 + 1e-15
+    rest, before = (1.0 - found, 1.0 - coulomb) if share > 0.0 else (found, coulomb)
+    assert rest == pytest.approx((1.0 - abs(share)) * before, abs=1e-15)
+
+
 @given(
     force=st.floats(-1e3, 1e3),
     start=st.floats(0.0, 0.02),

@@ -73,7 +73,7 @@ def sentence(term: Term, bench: Bench) -> str:
     values["wave"] = "" if order is None else _wave(order, bench)
     values["viscous_speed"] = quantity(bench.axis.physics().viscous_speed, "m/s" if axis.linear else "rad/s")
     told = of_load(text, axis.turns).format(**values, variant=variant.name)
-    if not variant.name or "{variant}" in text:
+    if not variant.name or "{variant}" in text or variant.name in told:
         return told
     return f"{told.removesuffix('.')} ({_variant_in_words(variant.name)})."
 

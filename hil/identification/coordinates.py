@@ -58,9 +58,9 @@ class Coordinate:
 
 
 def coordinate_of(name: str, parameter: Parameter, start: float) -> Coordinate:
-    """The coordinate of a mechanism's parameter, scaled by its starting value."""
+    """The coordinate of a mechanism's parameter, scaled by its starting value if it has no scale of its own."""
     positive = parameter.low > 0.0
-    scale = start if positive else abs(start) or 1.0
+    scale = parameter.scale or (start if positive else abs(start) or 1.0)
     return Coordinate(name, scale, positive, parameter.low, parameter.high, parameter)
 
 

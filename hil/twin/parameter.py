@@ -62,7 +62,10 @@ class Role(StrEnum):
 
 @dataclass(frozen=True)
 class Parameter:
-    """Parameter of a mechanism: name with unit, dimension, physical bounds, default (None: required) and role."""
+    """Parameter of a mechanism: name with unit, dimension, physical bounds, default (None: required) and role.
+
+    `scale` is the size of a change that matters, where the value does not tell it: a position goes with its zero.
+    """
 
     name: str
     dimension: Dimension
@@ -70,6 +73,7 @@ class Parameter:
     high: float
     default: float | None = None
     role: Role = Role.SHAPE
+    scale: float | None = None
 
 
 def default_starts(parameter: Parameter, scene: Scene) -> list[float]:

@@ -167,7 +167,7 @@ def force_window(run: Measured, d: Disturbance) -> tuple[float, float, float]:
     n = run.motor.size // block
     mask = d.sliding[: n * block].reshape(n, block)
     values = np.where(mask, d.torque[: n * block].reshape(n, block), 0.0).sum(axis=1)
-    first, last, level = max(_levels(values, mask.sum(axis=1)), key=lambda found: found.score)[:3]
+    first, last, level = max(_levels(values, mask.sum(axis=1, dtype=np.float64)), key=lambda found: found.score)[:3]
     scale = block * run.period_s
     return first * scale, last * scale, level
 
@@ -186,8 +186,9 @@ def friction_zones(
         return []
     width = float(np.ptp(x)) / _BINS
     index = np.minimum(((x - x.min()) / width).astype(int), _BINS - 1)
-    sums = np.asarray(np.bincount(index, weights=against, minlength=_BINS), dtype=np.float64)
-    levels = sorted(_levels(sums, np.bincount(index, minlength=_BINS)), key=lambda level: -level.score)
+    sums = np.bincount(index, weights=against, minlength=_BINS).astype(np.float64)
+    counts = np.bincount(index, minlength=_BINS).astype(np.float64)
+    levels = sorted(_levels(sums, counts), key=lambda level: -level.score)
     start = float(x.min())
     return [(start + width * one.first, start + width * one.last, one.level) for one in levels if one.score > 0.0]
 
@@ -201,7 +202,7 @@ class _Level(NamedTuple):
     score: float
 
 
-def _levels(sums: FloatArray, counts: NDArray[np.int_]) -> list[_Level]:
+def _levels(sums: FloatArray, counts: FloatArray) -> list[_Level]:
     """The most significant constant levels above and below the mean, of sums and counts of values in bins (n,)."""
     mean = sums.sum() / max(counts.sum(), 1)
     total = np.concatenate([[0.0], np.cumsum(sums - mean * counts)])

@@ -13,6 +13,7 @@ from hil.twin.scene import AxisFacts, Scene
 
 # Shortest flank [m]: an axis needs several internal steps for it, so that the twin is continuous in the edges.
 _STEEPEST_M = 1e-3
+_LENGTH_M = 0.03  # of a zone
 _WHOLE = 0.8  # share of the travel above which a zone is the travel, and its friction that of the axis
 _FLANKS = (0.1, 0.8)  # of the length of the zone: steep, and nearly a triangle
 
@@ -54,8 +55,8 @@ MECHANISM = Mechanism(
     source="Armstrong-Hélouvry, Control of Machines with Friction (1991), position-dependent friction",
     parameters=(
         Parameter("fraction", Dimension.RATIO, -0.9, 5.0, role=Role.STRENGTH),
-        Parameter("from_m", Dimension.LENGTH, -100.0, 100.0),
-        Parameter("to_m", Dimension.LENGTH, -100.0, 100.0),
+        Parameter("from_m", Dimension.LENGTH, -100.0, 100.0, scale=_LENGTH_M),
+        Parameter("to_m", Dimension.LENGTH, -100.0, 100.0, scale=_LENGTH_M),
         Parameter("flank_m", Dimension.LENGTH, _STEEPEST_M, 1.0),
     ),
     variants=(Variant(Stage.COULOMB, _level_in_zone),),

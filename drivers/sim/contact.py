@@ -39,7 +39,9 @@ def friction_law(p: Any, velocity: float, position_m: float, time_s: float) -> t
         bound *= max(1.0 + p.friction_gradient.slope_1_m * position_m, 0.0)
     if p.local_friction.on:
         z = p.local_friction
-        bound *= 1.0 + z.fraction * ramp((position_m - z.from_m) / z.flank_m) * ramp((z.to_m - position_m) / z.flank_m)
+        bound *= 1.0 + z.fraction * ramp((position_m - z.begin_m) / z.flank_m) * ramp(
+            (z.end_m - position_m) / z.flank_m
+        )
     if p.novel_friction_bump.on:
         b = p.novel_friction_bump
         bound *= 1.0 + b.fraction * bell((position_m - b.centre_m) / b.width_m)

@@ -20,25 +20,25 @@ _FLANKS = (0.1, 0.8)  # of the length of the zone: steep, and nearly a triangle
 
 @njit
 def _level_in_zone(value: float, at: Moment, parameters: Row, memory: Row) -> float:
-    fraction, from_m, to_m, flank_m = parameters[0], parameters[1], parameters[2], parameters[3]
+    fraction, begin_m, end_m, flank_m = parameters[0], parameters[1], parameters[2], parameters[3]
     if flank_m <= 0.0:
         return value
-    inside_m = min(at.table_position_m - from_m, to_m - at.table_position_m)
+    inside_m = min(at.table_position_m - begin_m, end_m - at.table_position_m)
     return value * (1.0 + fraction * min(max(inside_m / flank_m + 0.5, 0.0), 1.0))
 
 
 def _is_zone(values: Sequence[float], variant: int, axis: AxisFacts) -> bool:
     """True if the zone is a part of the travel, and most of it is within the travel."""
-    _, from_m, to_m, flank_m = values
+    _, begin_m, end_m, flank_m = values
     first_m, last_m = axis.positions_m
-    inside_m = min(to_m, last_m) - max(from_m, first_m)
-    return flank_m <= to_m - from_m <= min(_WHOLE * axis.travel_m, 2.0 * inside_m)
+    inside_m = min(end_m, last_m) - max(begin_m, first_m)
+    return flank_m <= end_m - begin_m <= min(_WHOLE * axis.travel_m, 2.0 * inside_m)
 
 
 def _starts(scene: Scene) -> list[tuple[float, ...]]:
     return [
-        (level / scene.coulomb, from_m, to_m, flank * (to_m - from_m))
-        for from_m, to_m, level in scene.friction_zones
+        (level / scene.coulomb, begin_m, end_m, flank * (end_m - begin_m))
+        for begin_m, end_m, level in scene.friction_zones
         for flank in _FLANKS
     ]
 
@@ -47,16 +47,16 @@ MECHANISM = Mechanism(
     id="local_friction",
     block=Block.MOTOR_SIDE,
     element="ball screw, guideways or covers",
-    sentence="From {from_m} to {to_m} of the travel, friction is higher by a share of {fraction}; it changes over "
+    sentence="From {begin_m} to {end_m} of the travel, friction is higher by a share of {fraction}; it changes over "
     "{flank_m} at either end.",
-    reversed="From {from_m} to {to_m} of the travel, friction is lower by a share of {fraction}; it changes over "
+    reversed="From {begin_m} to {end_m} of the travel, friction is lower by a share of {fraction}; it changes over "
     "{flank_m} at either end.",
     equation="F = Fc (1 + a s(x)), s = 1 in the zone, 0 outside, straight flanks; half height at `from` and `to`",
     source="Armstrong-Hélouvry, Control of Machines with Friction (1991), position-dependent friction",
     parameters=(
         Parameter("fraction", Dimension.RATIO, -0.9, 5.0, role=Role.STRENGTH),
-        Parameter("from_m", Dimension.LENGTH, -100.0, 100.0, scale=_LENGTH_M),
-        Parameter("to_m", Dimension.LENGTH, -100.0, 100.0, scale=_LENGTH_M),
+        Parameter("begin_m", Dimension.LENGTH, -100.0, 100.0, scale=_LENGTH_M),
+        Parameter("end_m", Dimension.LENGTH, -100.0, 100.0, scale=_LENGTH_M),
         Parameter("flank_m", Dimension.LENGTH, _STEEPEST_M, 1.0),
     ),
     variants=(Variant(Stage.COULOMB, _level_in_zone),),

@@ -51,7 +51,7 @@ SHOWN = {
     "spring_load": {"stiffness_n_m": 3000.0, "rest_position_m": 0.0},
     "gravity_torque": {"gravity_torque_n_m": 300.0, "angle_rad": 1.0},
     "friction_gradient": {"slope_1_m": 3.0},
-    "local_friction": {"fraction": 0.5, "from_m": 0.01, "to_m": 0.03, "flank_m": 2e-3},
+    "local_friction": {"fraction": 0.5, "begin_m": 0.01, "end_m": 0.03, "flank_m": 2e-3},
 }
 EFFECTS = {name: Effect(name, parameters) for name, parameters in SHOWN.items()}
 # together with all loads the drive needs more than the limit that shows alone

@@ -97,7 +97,7 @@ def test_a_friction_gradient_is_straight_along_the_travel() -> None:
 
 
 def test_local_friction_is_a_zone_with_straight_flanks() -> None:
-    effect = Effect("local_friction", {"fraction": 0.4, "from_m": 0.1, "to_m": 0.2, "flank_m": 0.02})
+    effect = Effect("local_friction", {"fraction": 0.4, "begin_m": 0.1, "end_m": 0.2, "flank_m": 0.02})
     for x, share in ((0.0, 0.0), (0.09, 0.0), (0.1, 0.5), (0.105, 0.75), (0.15, 1.0), (0.2, 0.5), (0.3, 0.0)):
         assert friction_n_m(effect, 10.0, x) == pytest.approx(1.1 * (1.0 + 0.4 * share) + 0.064)
 
@@ -141,7 +141,7 @@ def test_viscous_friction_on_the_table_has_a_share_of_its_own(coulomb: float, mo
         plant = plant_with(AXIS, *effects, *drift)
         plant.advance(scale * (1.1 + 0.64), 0.01)
         plant.velocities_m_s[:] = 100.0 * R
-        plant.advance(scale * (1.1 + 0.64), 0.2)
+        plant.advance(scale * (1.1 + 0.64), 0.5)
         held = scale * (1.1 * coulomb + 0.64 * viscous) / R
         assert plant.velocities_m_s[0] == pytest.approx(100.0 * R, rel=1e-3)
         assert (plant.positions_m[0] - plant.positions_m[1]) * 5.64e7 == pytest.approx(held, rel=1e-2, abs=1.0)

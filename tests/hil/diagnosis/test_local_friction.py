@@ -19,7 +19,7 @@ from hil.recording.recording import Recording
 from hil.twin.library import BY_ID
 
 MECHANISM = BY_ID["local_friction"]
-ZONE = {"from_m": 0.22, "to_m": 0.30, "flank_m": 0.004}
+ZONE = {"begin_m": 0.22, "end_m": 0.30, "flank_m": 0.004}
 
 
 def recorded(owner: Bench, fraction: float) -> Recording:
@@ -64,7 +64,7 @@ def test_a_zone_of_other_friction_is_the_only_finding(owner: Bench, fraction: fl
     (finding,) = result.missing
     assert finding.effect == MECHANISM.id
     assert finding.parameters["fraction"].value == pytest.approx(fraction, rel=0.1)
-    for name in ("from_m", "to_m"):
+    for name in ("begin_m", "end_m"):
         assert finding.parameters[name].value == pytest.approx(ZONE[name], abs=3e-3)
     assert ("lower" if fraction < 0.0 else "higher") in result.statement
 
@@ -77,10 +77,10 @@ def test_the_zone_is_estimated_from_the_torque_against_the_motion(level: float) 
     more = np.where((x > 0.22) & (x < 0.30), level, 0.0)
     noise = np.random.default_rng(1).normal(0.0, 0.1, x.size)
     torque = 0.2 - more * np.sign(velocity) + noise  # the constant force is no friction
-    from_m, to_m, found = friction_zones(
+    begin_m, end_m, found = friction_zones(
         [run], [Disturbance(torque, velocity, np.abs(velocity) > 1.0)], bench().axis.ratio_m_rad
     )[0]
-    assert (from_m, to_m) == pytest.approx((0.22, 0.30), abs=3e-3)
+    assert (begin_m, end_m) == pytest.approx((0.22, 0.30), abs=3e-3)
     assert abs(found) <= abs(level)
     assert found * level > 0.0
 

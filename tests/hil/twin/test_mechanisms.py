@@ -146,7 +146,7 @@ def test_local_friction_is_symmetric_about_its_zone_and_acts_only_there(
 ) -> None:
     def at(position):
         moment = AT_REST._replace(table_position_m=position)
-        values = {"fraction": fraction, "from_m": start, "to_m": start + length, "flank_m": flank}
+        values = {"fraction": fraction, "begin_m": start, "end_m": start + length, "flank_m": flank}
         return call("local_friction", level, moment, **values)
 
     middle = start + 0.5 * length

@@ -49,7 +49,7 @@ def test_alike_recordings_and_those_that_are_not_explained_alone_say_nothing() -
     assert not differing(rough(1.3), OWNER, terms=(Term("cogging_torque", 0, (0.3, 6.0, 0.2)),))
 
 
-@pytest.mark.parametrize("second", [False, True])
+@pytest.mark.parametrize("second", [False, pytest.param(True, marks=pytest.mark.long)])
 def test_the_moment_at_which_the_inertia_changes_is_said(tmp_path: Path, second: bool) -> None:
     """Torque of a motion in closed form: a load is put on in the training part, or in the part that is held out."""
     at = 9000 if second else 4000

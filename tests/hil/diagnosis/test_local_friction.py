@@ -57,7 +57,10 @@ FALSE_PLAY = pytest.mark.xfail(
 
 @pytest.mark.parametrize(
     ("owner", "fraction"),
-    [pytest.param(bench(), 0.5, id="two encoders", marks=FALSE_PLAY), pytest.param(single(), -0.4, id="one encoder")],
+    [
+        pytest.param(bench(), 0.5, id="two encoders", marks=(FALSE_PLAY, pytest.mark.long)),
+        pytest.param(single(), -0.4, id="one encoder"),
+    ],
 )
 def test_a_zone_of_other_friction_is_the_only_finding(owner: Bench, fraction: float) -> None:
     result = hil.diagnose(recorded(owner, fraction), owner).result

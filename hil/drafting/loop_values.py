@@ -98,7 +98,7 @@ def loop_values(recording: Recording, ratio_m_rad: float) -> ControlValues:
                 "velocity_filter_time_constant_s",
                 loop.terms[0].values[0],
                 "s",
-                "a filter of the velocity explains most",
+                "better than without a filter, and than a delay",
             )
         )
     if delays.differenced:

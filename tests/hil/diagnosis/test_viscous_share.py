@@ -44,7 +44,7 @@ def test_shares_of_coulomb_and_viscous_friction_are_told() -> None:
     assert "table_side_viscous_friction" in (other.effect, *other.equivalents)
 
 
-@pytest.mark.parametrize("delay_s", [3e-6, 300e-6])
+@pytest.mark.parametrize("delay_s", [3e-6, pytest.param(300e-6, marks=pytest.mark.long)])
 def test_a_late_channel_keeps_its_name(delay_s: float) -> None:
     (found,) = diagnosed((SKEW, {"delay_s": delay_s})).missing
     assert SKEW in (found.effect, *found.equivalents)

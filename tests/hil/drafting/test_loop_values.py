@@ -35,7 +35,7 @@ def assert_drafted(
     assert values == pytest.approx(expected, rel=2e-3)
 
 
-@pytest.mark.parametrize("scale", [None, 1.0, 57.3])
+@pytest.mark.parametrize("scale", [None, 57.3, pytest.param(1.0, marks=pytest.mark.long)])
 def test_gains_are_drafted_with_and_without_a_speed_set_point(scale: float | None) -> None:
     recording = servo_run(OWNER, scale=scale or 1.0)
     recording = recording if scale else changed(recording, velocity_reference_m_s=None)
@@ -89,7 +89,7 @@ def test_the_law_of_emps_is_drafted() -> None:
     assert "velocity_integral_time_s" not in values
 
 
-@pytest.mark.parametrize("time_s", [0.02, 0.2])
+@pytest.mark.parametrize("time_s", [0.02, pytest.param(0.2, marks=pytest.mark.long)])
 @pytest.mark.parametrize("feedforward", [1.0, 0.4])
 def test_loops_of_one_period_are_told_apart(time_s: float, feedforward: float) -> None:
     """The position error is the integral of set less measured speed there, so the closed form has one column less."""

@@ -54,7 +54,7 @@ def statement(result: Result) -> str:
 
 
 def _of_axis(change: AxisChange, result: Result) -> str:
-    """What changed on the axis, with the values in each part."""
+    """Say which parameters of the axis changed, where, and their value in each recording or before and after."""
     where, parts = "between the recordings", [f"in {part}" for part in change.parts]
     if change.moment_s is not None:
         where, parts = f"at {change.moment_s:.2f} s of {change.recording}", list(change.parts)

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
+from concealed_run import concealed_run
 from diagnosis_runs import bench
 
 import hil
@@ -13,8 +12,6 @@ from hil.bench.bench_file import Bench
 from hil.diagnosis.search.disturbance import Disturbance, friction_zones
 from hil.diagnosis.search.initial_values import axis_facts
 from hil.identification.measured import take
-from hil.motion.profile import Profile
-from hil.motion.trajectory import plan
 from hil.recording.recording import Recording
 from hil.twin.library import BY_ID
 
@@ -24,24 +21,7 @@ ZONE = {"begin_m": 0.22, "end_m": 0.30, "flank_m": 0.004}
 
 def recorded(owner: Bench, fraction: float) -> Recording:
     """A recording of the simulated axis with a zone of other friction, at two feeds."""
-    effect: dict[str, Any] = {"effect": MECHANISM.id, "parameters": {"fraction": fraction, **ZONE}}
-    data = owner.model_dump(mode="json") | {
-        "simulation": {"effects": [effect]},
-        "drive": {"following_error_m": 0.05},
-    }
-    truth = Bench.model_validate(data)
-    legs = [
-        {"kind": "dwell", "duration_s": 0.2},
-        *({"kind": "sine_squared", "to_m": to_m, "feed_m_s": feed} for to_m, feed in ((0.4, 0.15), (0.0, 0.08))),
-    ]
-    profile = Profile.model_validate(
-        {
-            "schema_version": 1,
-            "limits": {"velocity_m_s": 0.3, "acceleration_m_s2": 3.0, "jerk_m_s3": 100.0},
-            "segments": [{"kind": "repeat", "times": 2, "segments": legs}],
-        }
-    )
-    return hil.simulate(truth, plan(profile, truth.period_s), seed=3)
+    return concealed_run(owner, {MECHANISM.id: {"fraction": fraction, **ZONE}})
 
 
 def single() -> Bench:

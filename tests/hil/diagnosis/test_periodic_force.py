@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from concealed_run import concealed_run
 from diagnosis_runs import bench
 
 import hil
-from hil.bench.bench_file import Bench
 from hil.diagnosis.search.disturbance import Disturbance, lines_hz
 from hil.diagnosis.search.initial_values import axis_facts
 from hil.identification.measured import take
-from hil.motion.profile import Profile
-from hil.motion.trajectory import plan
 from hil.recording.recording import Recording
 from hil.twin.library import BY_ID
 
@@ -22,22 +20,7 @@ MECHANISM = BY_ID["periodic_force"]
 
 def recorded(effect: str, parameters: dict[str, float]) -> Recording:
     """A recording of the simulated axis with an effect, at two feeds."""
-    simulation = {"effects": [{"effect": effect, "parameters": parameters}]}
-    data = OWNER.model_dump(mode="json") | {"simulation": simulation, "drive": {"following_error_m": 0.05}}
-    truth = Bench.model_validate(data)
-    move = {"kind": "sine_squared"}
-    legs = [
-        {"kind": "dwell", "duration_s": 0.2},
-        *(move | {"to_m": to_m, "feed_m_s": feed} for to_m, feed in ((0.4, 0.15), (0.0, 0.08))),
-    ]
-    profile = Profile.model_validate(
-        {
-            "schema_version": 1,
-            "limits": {"velocity_m_s": 0.3, "acceleration_m_s2": 3.0, "jerk_m_s3": 100.0},
-            "segments": [{"kind": "repeat", "times": 2, "segments": legs}],
-        }
-    )
-    return hil.simulate(truth, plan(profile, truth.period_s), seed=3)
+    return concealed_run(OWNER, {effect: parameters})
 
 
 def test_a_force_of_fixed_frequency_is_found_and_holds_in_the_part_held_out() -> None:

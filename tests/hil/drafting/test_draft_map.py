@@ -288,24 +288,3 @@ def test_torque_and_command_get_signs_that_agree(tmp_path: Path, turned: tuple[s
     found = channels(draft_map(write(tmp_path / "log.csv", changed)))
     assert found["torque_command_n_m"].get("sign", 1) == (-1 if "torque_command_Nm" in turned else 1)
     assert found["torque_n_m"].get("sign", 1) == (-1 if "torque_measured_Nm" in turned else 1)
-
-
-@pytest.mark.parametrize("feedforward", [1.0, 0.0])
-def test_a_speed_set_point_with_the_following_error_is_the_output_of_the_position_loop(
-    tmp_path: Path, feedforward: float
-) -> None:
-    gain_1_s = 40.0
-    error_rad = AXIS["torque"] / 20.0 + (1.0 - feedforward) * AXIS["speed"] / gain_1_s
-    angle_set = AXIS["angle"] + error_rad
-    speed = feedforward * np.gradient(angle_set, AXIS["t"]) + gain_1_s * error_rad
-    set_points = {"x_set": 1e3 * LEAD_M / (2.0 * np.pi) * angle_set, "n_set": speed}
-    columns = renamed(AXIS | set_points, **NAMES, n_set="speed_setpoint_rad_s")
-    draft = draft_map(write(tmp_path / "log.csv", columns))
-    assert channels(draft)["velocity_reference_m_s"]["column"] == "speed_setpoint_rad_s"
-    assert "velocity_command_m_s" not in channels(draft)
-
-
-def test_a_speed_set_point_without_it_is_the_velocity_of_the_set_point(tmp_path: Path) -> None:
-    speed = np.gradient(AXIS["x_set"], AXIS["t"])
-    columns = renamed(AXIS | {"v_set": speed}, **NAMES, v_set="velocity_setpoint_mm_s")
-    assert channels(draft_map(write(tmp_path / "log.csv", columns)))["velocity_command_m_s"]

@@ -31,6 +31,7 @@ REPEATS = 0.95
 # loop is chaotic. A regular axis with coarse counts moved by 3, chaotic loops by tens. The torque has no upper limit:
 # one coarse count in a loop of high gain makes many times the noise of a good current sensor.
 _LITTLE, _LARGE = 0.3, 5.0
+_READINGS = 4  # of the table's encoder: the steps at rest are few, and their places decide
 _HALF = 0.75  # response to half the noise over that to all of it: 0.5 in a linear loop, 1 in a chaotic one
 
 
@@ -126,20 +127,24 @@ def unrepeated(hypothesis: Hypothesis, data: Dataset) -> float:
 def noise_ratios(hypothesis: Hypothesis, data: Dataset) -> tuple[dict[str, float], ...]:
     """Mean square over noise of each channel block by block, for each run.
 
-    The ratio of the table is corrected for the noise of the motor encoder amplified by the transmission.
+    The input of a block is measured: the ratio of the table is corrected for the noise of the motor encoder that the
+    transmission amplifies, that of the motor for the noise of the table encoder that the transmission returns to it.
     """
     residuals = hypothesis.residuals(data)
     found = []
-    for index, run in enumerate(data.runs):
+    for index, (run, channels) in enumerate(zip(data.runs, residuals.channels, strict=True)):
         ratios = {name: float(part @ part) / part.size for (of, name), part in residuals.parts.items() if of == index}
         if ratios.get("table", 0.0) > 1.0:
-            added = _noise_amplification(hypothesis, run, residuals.channels[index]["table"], data.observer_s)
+            added = _amplified_by_transmission(hypothesis, run, channels["table"], data.observer_s)
             ratios["table"] /= max(1.0, 1.0 + added / run.noise.table_m**2)
+        if ratios["motor"] > 1.0 and "table" in ratios:
+            scale = data.scales()[index]["motor"][run.judged]
+            ratios["motor"] /= 1.0 + _returned_to_motor(hypothesis, run, channels, data.observer_s, scale)
         found.append(ratios)
     return tuple(found)
 
 
-def _noise_amplification(hypothesis: Hypothesis, run: Measured, table: FloatArray, observer_s: float) -> float:
+def _amplified_by_transmission(hypothesis: Hypothesis, run: Measured, table: FloatArray, observer_s: float) -> float:
     """Variance [m^2] that noise of the motor encoder adds to the block residual `table` (n,) beyond its direct part.
 
     The input of the table block is the measured motion of the motor: a lightly damped resonance amplifies its noise.
@@ -148,3 +153,27 @@ def _noise_amplification(hypothesis: Hypothesis, run: Measured, table: FloatArra
     noisy = hypothesis.blocks(replace(run, motor=run.motor + noise), observer_s, rests=run)["table"]
     added = float(np.var((noisy - table)[run.judged]))
     return added - float(np.mean((hypothesis.bench.axis.ratio_m_rad * run.motor_noise[run.judged]) ** 2))
+
+
+def _returned_to_motor(
+    hypothesis: Hypothesis, run: Measured, channels: dict[str, FloatArray], observer_s: float, scale: FloatArray
+) -> float:
+    """Mean square that noise of the table encoder adds to the block residual of the motor, in units of `scale` (n,).
+
+    While the motor rests the twin holds its table where the encoder reads it. One count of a stiff transmission is a
+    torque that moves the motor. Counts that change slowly are no white noise: the table is read again, at other
+    places of the counts within the first.
+    """
+    axis, table = hypothesis.bench.axis, hypothesis.bench.encoders.table
+    place = run.table_m - channels["table"] - axis.ratio_m_rad * channels["motor"]
+    if not np.isfinite(place).all():
+        return 0.0
+    count = min(table.resolution_m if table else 0.0, np.sqrt(12.0) * run.noise.table_m)
+    quiet = hypothesis.blocks(replace(run, table_m=place), observer_s, rests=run)["motor"]
+    rng, added = np.random.default_rng(0), 0.0
+    for _ in range(_READINGS):
+        offset = count * rng.random()
+        read = place + _misread(place + offset, count, run.noise.table_m, rng)
+        other = hypothesis.blocks(replace(run, table_m=read), observer_s, rests=run)["motor"]
+        added += rms((other - quiet)[run.judged] / scale) ** 2 / _READINGS
+    return added if np.isfinite(added) else 0.0

@@ -128,7 +128,9 @@ def _change(page: Page, diagnosis: Diagnosis, folder: Path) -> None:
         cells = (f"{digits(entry.value * factor, 4)} ± {digits(entry.std * factor, 2)}" for entry in one.values)
         rows.append((one.name, *map(Number, cells), unit))
     page.table(("parameter", *change.parts, "unit"), rows)
-    page.text("The tables below are of one set of parameters for all recordings. No parameter of the axis is corrected.")
+    page.text(
+        "The tables below are of one set of parameters for all recordings. No parameter of the axis is corrected."
+    )
 
 
 def _windows(finding: Finding) -> list[tuple[str, ...]]:

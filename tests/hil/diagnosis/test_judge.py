@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from diagnosis_runs import bench, changed, dataset, evaluated, fitted, recorded, rows_of
 
+from hil.bench.bench_file import Bench
 from hil.diagnosis.result import Verdict
 from hil.diagnosis.search.forward_selection import Explanation, RivalFit
 from hil.diagnosis.verdict.cross_validation import cross_validate, explained_share
@@ -56,6 +57,22 @@ def test_noise_of_the_motor_encoder_rings_in_the_table_and_is_no_physics(damping
     assert right.noise_ratios[0]["table"] == pytest.approx(1.0, abs=0.1)
     softer = evaluated(Hypothesis(bench(damping_ratio=damping, stiffness_n_m=4e7)), data)
     assert softer.noise_ratios[0]["table"] > 2.0 * FLOOR  # and physics is none of that noise
+
+
+def test_counts_of_the_table_encoder_pull_at_a_resting_motor_and_are_no_physics() -> None:
+    count_m = 4e-6
+    coarse = bench(coulomb_torque_n_m=0.3, stiffness_n_m=1.2e8).model_dump(mode="json", exclude_none=True)
+    coarse["encoders"]["table"]["resolution_m"] = count_m
+    truth = Bench.model_validate(coarse)
+    recording = recorded(truth)
+    counted = changed(recording, table_position_m=np.round(recording["table_position_m"] / count_m) * count_m)
+    data = dataset([take(counted, truth)], truth, observer_s=0.002)
+    right = evaluated(Hypothesis(truth), data)
+    motor = right.residuals.parts[0, "motor"]
+    assert float(motor @ motor) > FLOOR * motor.size  # what white noise of the motor encoder does not explain
+    assert right.at_floor
+    coarse["axis"]["coulomb_torque_n_m"] *= 1.05
+    assert evaluated(Hypothesis(Bench.model_validate(coarse)), data).noise_ratios[0]["motor"] > FLOOR  # physics is none
 
 
 def test_a_trifle_is_no_parameter_error() -> None:

@@ -64,8 +64,7 @@ def next_term(
         step("fitting a lost preload from the springs of the bench file")
         found = sorted([*found, unbent(base)], key=lambda other: other.cost)
         best = _worthwhile(found, base, reference, owner)
-    much = base.excess > min(MOST * nominal.excess, _NOISE * base.rows)
-    if best is None and not base.at_floor and much and not base.estimator.expired:
+    if best is None and not base.at_floor and not base.estimator.expired:
         step("searching again beside the parameters of the bench file")
         found = _claimable(from_owner(base))
         best = _worthwhile(found, base, reference, owner)

@@ -35,8 +35,22 @@ def _level(c, scale, at, effects):  # type: ignore[no-untyped-def]
 
 
 @njit(_nrt=False, forceinline=True, **COMPILE)
+def _contact(slips, free, gain, resistance, stiffness, elements, step, before):  # type: ignore[no-untyped-def]
+    """Friction torque of one contact that meets velocity `free`; `elements` (ELEMENTS,) is its memory."""
+    if stiffness <= 0.0:
+        return _rigid(free, gain, resistance)
+    if slips > 0:
+        return _slipping(free, gain, resistance, stiffness, elements, step, before)
+    torque, elements[0] = _elastic(free, gain, resistance, stiffness, elements[0], step, before)
+    return torque
+
+
+@njit(_nrt=False, forceinline=True, **COMPILE)
 def friction(c, own, internal, motion, at, effects, free, table_free):  # type: ignore[no-untyped-def]
-    """Friction torques on motor and table, which without friction would have velocities `free` and `table_free`."""
+    """Friction torques on motor and table, which without friction would have velocities `free` and `table_free`.
+
+    A contact that yields before it slides does so on either side, as stiff as its share of the friction.
+    """
     gain = internal.motor_gain
     shift = _bias(0.0, at, effects)
     share = _table_share(0.0, at, effects)
@@ -50,14 +64,7 @@ def friction(c, own, internal, motion, at, effects, free, table_free):  # type: 
         met = _rigid(free, gain, Resistance(rest * bound, viscous, shift, rest * opposing))
         bound, opposing = _level(c, scale, _at_speed(at, 0.5 * (motion.speed + free - gain * met)), effects)
     resistance = Resistance(rest * bound, viscous, shift, rest * opposing)
-    if stiffness > 0.0 and c.slips > 0:
-        motor = _slipping(free, gain, resistance, stiffness, own.slip_elements, at.step_s, motion.speed)
-    elif stiffness > 0.0:
-        motor, own.bristle_deflection = _elastic(
-            free, gain, resistance, stiffness, own.bristle_deflection, at.step_s, motion.speed
-        )
-    else:
-        motor = _rigid(free, gain, resistance)
+    motor = _contact(c.slips, free, gain, resistance, rest * stiffness, own.motor_contact, at.step_s, motion.speed)
     guide = 0.0
     if share > 0.0 or viscous_share > 0.0:
         met, gain, opposing = table_free - internal.cross_gain * motor, internal.table_gain, 0.0
@@ -66,5 +73,8 @@ def friction(c, own, internal, motion, at, effects, free, table_free):  # type: 
             speed = 0.5 * (motion.table_speed + met - gain * guide)
             opposing = scale * _drag(0.0, _at_speed(at, speed), effects)
         # a torque that differs by direction, alike at every speed, is a load and stays on the motor
-        guide = _rigid(met, gain, Resistance(share * bound, guide_viscous, 0.0, share * opposing))
+        resistance = Resistance(share * bound, guide_viscous, 0.0, share * opposing)
+        guide = _contact(
+            c.slips, met, gain, resistance, share * stiffness, own.table_contact, at.step_s, motion.table_speed
+        )
     return motor, guide

@@ -47,11 +47,12 @@ MEMORY = np.dtype(
         ("mechanisms", np.float64, (len(SLOTS), WIDTH)),
         ("clock", np.float64),  # [s]
         ("push", np.float64),  # force on the table over this tick beside the mechanisms [N]
-        ("bristle_deflection", np.float64),  # of the contact after Dahl
         ("spring_extra", np.float64),  # deflection by mechanisms of the transmission at the last step
         ("floating", np.float64),  # 1: the table floats in a gap
         ("last_speed", np.float64),  # of the motor at the last tick
-        ("slip_elements", np.float64, (ELEMENTS,)),  # their torques
+        # torques of the slip elements of each contact; the first is the deflection of a contact after Dahl
+        ("motor_contact", np.float64, (ELEMENTS,)),
+        ("table_contact", np.float64, (ELEMENTS,)),
     ],
     align=True,
 )

@@ -27,8 +27,6 @@ CLEAR = 0.7
 MATERIAL = 0.02
 # Energy above the noise floor per row, in units of noise^2, below which nothing is left to explain: half of MATERIAL.
 _NOTHING = 0.5 * MATERIAL
-# Energy above the noise floor per row, in units of noise^2, above which more than noise is left.
-_NOISE = 1.0
 # Least share of the energy above the noise that a term removes: many terms of less are a series expansion of another
 # effect.
 WORTH = 0.02

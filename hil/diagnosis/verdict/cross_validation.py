@@ -4,7 +4,8 @@
 
 Both hypotheses are fitted to the training recordings, so that the gain has no penalty for parameters. Repeated motion
 is a second test: a term whose effect differs from lap to lap must reduce the measured differences between laps. A term
-also falls if its strength is within its standard error, or if it worsens a channel of a training recording, see `harm`.
+also falls if its strength is within its standard error, if it worsens a channel of a training recording, see `harm`, or
+if it changes only what the noise of the sensors does, see `noise_free`.
 """
 
 from dataclasses import dataclass
@@ -16,6 +17,7 @@ from hil.diagnosis.search.forward_selection import claimed
 from hil.diagnosis.search.harm import refuting
 from hil.diagnosis.search.initial_values import axis_facts
 from hil.diagnosis.verdict.fit_table import channel_names
+from hil.diagnosis.verdict.noise_free import LEAST, gain_without_noise
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.inference import TIED, against, standard_errors
@@ -36,7 +38,7 @@ class Ablation:
     that does not repeat from lap to lap. `gain` is the evidence for the term on the held-out recordings. They are None
     without held-out recordings or laps, and for an event, whose `train` is the ratio over all recordings. `acts`: the
     term changes the held-out residuals as it does those in training. `clear`: its strength is above its standard error.
-    `worse`: channels of training recordings that it harms.
+    `worse`: channels of training recordings that it harms. `noise_free`: its gain on motion without noise, if known.
     """
 
     term: Term
@@ -48,6 +50,7 @@ class Ablation:
     acts: bool = False
     clear: bool = True
     worse: tuple[str, ...] = ()
+    noise_free: float | None = None
 
     @property
     def refuted(self) -> str:
@@ -58,6 +61,8 @@ class Ablation:
             return "it improves the fit to the training recordings, but worsens that to repeated laps"
         if not self.clear:
             return "its strength is below its standard error"
+        if self.noise_free is not None and self.noise_free < LEAST:
+            return "it changes what the noise of the sensors does in the twin, and hardly the motion"
         if self.worse:
             return f"with it the training recordings are reproduced worse in {', '.join(self.worse)}"
         return ""
@@ -133,6 +138,7 @@ def _ablate(owner: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> list[Abl
             bool(there and own_held_out and _change(own_held_out, there) > _ACTS * _change(final, other)),
             clear[index],
             _worse(final, other, owner),
+            gain_without_noise(final, other),
         )
 
     return [ablation(index, term, other) for index, (term, other) in enumerate(zip(final.terms, fits, strict=True))]

@@ -1,4 +1,7 @@
-"""Presliding hysteresis: elastic micro-motion of the contact before it slides."""
+"""Presliding hysteresis: elastic micro-motion of the contact before it slides.
+
+Where a share of the friction acts on the table, the same share of the stiffness does.
+"""
 
 from numba import njit
 

@@ -1,4 +1,4 @@
-"""Drag in the stepping kernel: steady speeds as its equations say, and it stops an axis but never drives one."""
+"""Friction in the stepping kernel: steady speeds as its equations say; drag stops an axis but never drives one."""
 
 import numpy as np
 import pytest
@@ -177,3 +177,21 @@ def test_drag_on_a_swinging_table_takes_energy_and_gives_none(active, share, con
     assert alone[0] > 5.0
     assert alone.max() < 1.02 * alone[0]
     assert alone[-100:].max() < 0.5 * alone[0]
+
+
+@pytest.mark.parametrize("variant", [0, 1], ids=["Dahl", "Maxwell slip"])
+@pytest.mark.parametrize("share", [0.0, 0.4, 1.0])
+def test_a_contact_yields_on_both_sides_before_it_slides(share, variant) -> None:
+    """Far below Coulomb friction the contacts of motor and table are springs beside and behind that of the screw."""
+    contact_n_m, screw_n_m, force_n = 4e6, 2e6, 0.002 * COULOMB_N
+    axis = Twin(
+        Physics(two_mass(60.0, 40.0, screw_n_m, 0.2, LINEAR_LEAD_M), COULOMB_N, VISCOUS_N_S_M, linear=True),
+        GAINS,
+        (Active("presliding_hysteresis", (contact_n_m,), variant), Active("table_side_friction", (share,))),
+    )
+    found = axis.drive(force_n * np.minimum(np.arange(4000) / 2000.0, 1.0))
+    on_motor, on_table = (1.0 - share) * contact_n_m, share * contact_n_m
+    held = on_motor + (1.0 / (1.0 / screw_n_m + 1.0 / on_table) if on_table else 0.0)
+    motor_m, table_m = (float(np.mean(part[-1000:])) for part in (found.motor_position, found.table_position_m))
+    assert motor_m == pytest.approx(force_n / held, rel=5e-3)
+    assert table_m == pytest.approx(force_n / held * screw_n_m / (screw_n_m + on_table), rel=5e-3)

@@ -16,8 +16,9 @@ import numpy as np
 from hil.diagnosis.search.forward_selection import claimed
 from hil.diagnosis.search.harm import refuting
 from hil.diagnosis.search.initial_values import axis_facts
+from hil.diagnosis.search.next_term import MATERIAL
 from hil.diagnosis.verdict.fit_table import channel_names
-from hil.diagnosis.verdict.noise_free import LEAST, gain_without_noise
+from hil.diagnosis.verdict.noise_free import energy_without_noise
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.inference import TIED, against, standard_errors
@@ -38,7 +39,7 @@ class Ablation:
     that does not repeat from lap to lap. `gain` is the evidence for the term on the held-out recordings. They are None
     without held-out recordings or laps, and for an event, whose `train` is the ratio over all recordings. `acts`: the
     term changes the held-out residuals as it does those in training. `clear`: its strength is above its standard error.
-    `worse`: channels of training recordings that it harms. `noise_free`: its gain on motion without noise, if known.
+    `worse`: channels of training recordings that it harms. `quiet`: it hardly acts on motion without noise.
     """
 
     term: Term
@@ -50,7 +51,7 @@ class Ablation:
     acts: bool = False
     clear: bool = True
     worse: tuple[str, ...] = ()
-    noise_free: float | None = None
+    quiet: bool = False
 
     @property
     def refuted(self) -> str:
@@ -61,7 +62,7 @@ class Ablation:
             return "it improves the fit to the training recordings, but worsens that to repeated laps"
         if not self.clear:
             return "its strength is below its standard error"
-        if self.noise_free is not None and self.noise_free < LEAST:
+        if self.quiet:
             return "it changes what the noise of the sensors does in the twin, and hardly the motion"
         if self.worse:
             return f"with it the training recordings are reproduced worse in {', '.join(self.worse)}"
@@ -138,7 +139,7 @@ def _ablate(owner: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> list[Abl
             bool(there and own_held_out and _change(own_held_out, there) > _ACTS * _change(final, other)),
             clear[index],
             _worse(final, other, owner),
-            gain_without_noise(final, other),
+            _quiet(final, other),
         )
 
     return [ablation(index, term, other) for index, (term, other) in enumerate(zip(final.terms, fits, strict=True))]
@@ -162,6 +163,12 @@ def _clear(found: Fit) -> list[bool]:
         sizes[mechanism.strength] = mechanism.size(term.values, axis)
         result.append(any(size > own[place] for place, size in sizes.items()))
     return result
+
+
+def _quiet(found: Fit, without: Fit) -> bool:
+    """True if a term removes less on motion without noise than a term must on recordings."""
+    removed = energy_without_noise(found, without)
+    return removed is not None and removed < MATERIAL * found.rows
 
 
 def _worse(found: Fit, without: Fit, owner: Fit) -> tuple[str, ...]:

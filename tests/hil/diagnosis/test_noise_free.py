@@ -7,7 +7,7 @@ from diagnosis_runs import bench, dataset, fitted, moves, recorded
 
 from hil.bench.bench_file import Bench
 from hil.diagnosis.verdict.cross_validation import cross_validate
-from hil.diagnosis.verdict.noise_free import LEAST, gain_without_noise
+from hil.diagnosis.verdict.noise_free import energy_without_noise
 from hil.identification.dataset import Dataset
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.inference import against
@@ -36,19 +36,19 @@ def test_a_filter_of_counts_gains_evidence_but_not_on_motion_without_noise() -> 
     owner = coarse_motor()
     data = constant_feed(owner)
     plain, found = fitted(Hypothesis(owner), data), fitted(Hypothesis(owner, (FLEXIBLE_LOAD,)), data)
+    gained, alone = plain.cost - found.cost, energy_without_noise(found, plain)
     assert against(found, plain) > 1000.0
-    gain = gain_without_noise(found, plain)
-    assert gain is not None
-    assert gain < 0.2 * LEAST
+    assert alone is not None
+    assert alone < 0.05 * gained
     proof = cross_validate(plain, found, data.over(()))
     assert not proof.final.terms
     assert "noise of the sensors" in proof.dropped[0].refuted
 
 
 def test_an_effect_of_the_axis_gains_as_much_on_motion_without_noise() -> None:
-    owner = coarse_motor()
+    owner = bench()
     data = constant_feed(owner, COGGING)
     plain, found = fitted(Hypothesis(owner), data), fitted(Hypothesis(owner, (COGGING,)), data)
-    assert gain_without_noise(found, plain) == pytest.approx(1.0, abs=0.05)
+    assert energy_without_noise(found, plain) == pytest.approx(plain.cost - found.cost, rel=0.05)
     proof = cross_validate(plain, found, data.over(()))
     assert [term.effect for term in proof.final.terms] == ["cogging_torque"]

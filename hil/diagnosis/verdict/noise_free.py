@@ -35,6 +35,7 @@ def energy_without_noise(found: Fit, without: Fit) -> float | None:
         )
         own, other = (fit.hypothesis.blocks(smooth, found.data.observer_s) for fit in (found, without))
         for name, values in own.items():
-            change = ((other[name] - values) / scales[name])[run.judged]
-            removed += float(change @ change)
+            with np.errstate(over="ignore", invalid="ignore"):  # without the term a twin may be unstable
+                change = ((other[name] - values) / scales[name])[run.judged]
+                removed += float(change @ change)
     return removed if np.isfinite(removed) else None

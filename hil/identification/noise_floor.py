@@ -128,7 +128,7 @@ def noise_ratios(hypothesis: Hypothesis, data: Dataset) -> tuple[dict[str, float
     """Mean square over noise of each channel block by block, for each run.
 
     The input of a block is measured: the ratio of the table is corrected for the noise of the motor encoder that the
-    transmission amplifies, that of the motor for the noise of the table encoder that the transmission returns to it.
+    transmission amplifies, that of the motor for the counts of the table encoder that the transmission returns to it.
     """
     residuals = hypothesis.residuals(data)
     found = []
@@ -158,11 +158,11 @@ def _amplified_by_transmission(hypothesis: Hypothesis, run: Measured, table: Flo
 def _returned_to_motor(
     hypothesis: Hypothesis, run: Measured, channels: dict[str, FloatArray], observer_s: float, scale: FloatArray
 ) -> float:
-    """Mean square that noise of the table encoder adds to the block residual of the motor, in units of `scale` (n,).
+    """Mean square that counts of the table encoder add to the block residual of the motor, in units of `scale` (n,).
 
     While the motor rests the twin holds its table where the encoder reads it. One count of a stiff transmission is a
     torque that moves the motor. Counts that change slowly are no white noise: the table is read again, at other
-    places of the counts within the first.
+    places of the counts within the first. Other errors of the reading are not known to be there at rest.
     """
     axis, table = hypothesis.bench.axis, hypothesis.bench.encoders.table
     place = run.table_m - channels["table"] - axis.ratio_m_rad * channels["motor"]
@@ -173,7 +173,7 @@ def _returned_to_motor(
     rng, added = np.random.default_rng(0), 0.0
     for _ in range(_READINGS):
         offset = count * rng.random()
-        read = place + _misread(place + offset, count, run.noise.table_m, rng)
+        read = place + _misread(place + offset, count, 0.0, rng)
         other = hypothesis.blocks(replace(run, table_m=read), observer_s, rests=run)["motor"]
         added += rms((other - quiet)[run.judged] / scale) ** 2 / _READINGS
     return added if np.isfinite(added) else 0.0

@@ -22,6 +22,7 @@ _EVIDENCE = 20.0  # BIC difference for the events of a held-out recording: that 
 _MATERIAL = 0.02  # least energy per row that they remove, in units of noise^2: that of a term in the search (MATERIAL)
 _SIGMAS = 3.0  # standard errors of the force of a window: 0.3 % of Gaussian ones are above without a force
 _OF_CONSTANT = 4.0  # energy per row left inside windows over that outside: twice the rms, for edges between two rows
+_OF_FORM = 0.0025  # of the energy inside windows, 1/20 in rms: so little is left by a constant, not by another form
 _OF_BLOW = 0.25  # of the energy inside a window: the best constant leaves 0.19 of half a sine, 0.25 of a triangle
 
 
@@ -195,7 +196,7 @@ def _trimmed(found: Fit, others: bool = True) -> Fit:
 
 
 def constant_inside(found: Fit, base: Fit) -> bool:
-    """True if a constant force explains the windows of a fit as well as the rest of its recordings is explained.
+    """True if a constant force explains the windows of a fit nearly whole, or as well as the rest of its recordings.
 
     A force of another form, such as friction at one place, leaves more inside. What happens once is no law of place or
     speed: a blow or a push by hand has any form, of which windows that follow each other explain most. `base` is the
@@ -218,8 +219,12 @@ def constant_inside(found: Fit, base: Fit) -> bool:
         outside.append(part[~within] ** 2)
         before += float(np.sum(base.residuals.parts[number, channel][within] ** 2))
     left, rest = np.concatenate(inside), np.concatenate(outside)
-    once = _one_push(term) and float(np.sum(left)) <= _OF_BLOW * before
-    return once or not left.size or bool(np.mean(left) <= _OF_CONSTANT * max(float(np.mean(rest)), 1.0))
+    share = _OF_BLOW if _one_push(term) else _OF_FORM
+    return (
+        float(np.sum(left)) <= share * before
+        or not left.size
+        or bool(np.mean(left) <= _OF_CONSTANT * max(float(np.mean(rest)), 1.0))
+    )
 
 
 def _one_push(term: Term) -> bool:

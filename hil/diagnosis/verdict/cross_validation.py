@@ -28,6 +28,7 @@ from hil.identification.terms import Term
 from hil.twin.library import BY_ID
 from hil.twin.parameter import Role
 
+_MOTION = 0.5  # least share of the gain of a term that it has on motion without noise: 0.6 to 1 where it acts on it
 _ACTS = 0.1  # least change of the held-out residual per row, over that in training, from which a term acts there
 
 
@@ -166,9 +167,9 @@ def _clear(found: Fit) -> list[bool]:
 
 
 def _quiet(found: Fit, without: Fit) -> bool:
-    """True if a term removes less on motion without noise than a term must on recordings."""
+    """True if a term removes too little on motion without noise: less than a term must, and not most of its gain."""
     removed = energy_without_noise(found, without)
-    return removed is not None and removed < MATERIAL * found.rows
+    return removed is not None and removed < min(MATERIAL * found.rows, _MOTION * (without.cost - found.cost))
 
 
 def _worse(found: Fit, without: Fit, owner: Fit) -> tuple[str, ...]:

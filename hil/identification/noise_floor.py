@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d
 
 from hil.arrays import FloatArray
 from hil.identification.dataset import Dataset
@@ -31,6 +32,7 @@ REPEATS = 0.95
 # loop is chaotic. A regular axis with coarse counts moved by 3, chaotic loops by tens. The torque has no upper limit:
 # one coarse count in a loop of high gain makes many times the noise of a good current sensor.
 _LITTLE, _LARGE = 0.3, 5.0
+_NEAR_S = 0.05  # time between two counts of a table that creeps to its rest
 _READINGS = 4  # of the table's encoder: the steps at rest are few, and their places decide
 _HALF = 0.75  # response to half the noise over that to all of it: 0.5 in a linear loop, 1 in a chaotic one
 
@@ -138,8 +140,9 @@ def noise_ratios(hypothesis: Hypothesis, data: Dataset) -> tuple[dict[str, float
             added = _amplified_by_transmission(hypothesis, run, channels["table"], data.observer_s)
             ratios["table"] /= max(1.0, 1.0 + added / run.noise.table_m**2)
         if ratios["motor"] > 1.0 and "table" in ratios:
-            scale = data.scales()[index]["motor"][run.judged]
-            ratios["motor"] /= 1.0 + _returned_to_motor(hypothesis, run, channels, data.observer_s, scale)
+            scale, part = data.scales()[index]["motor"][run.judged], residuals.parts[index, "motor"]
+            noise = 1.0 + _returned_to_motor(hypothesis, run, channels, data.observer_s, scale)
+            ratios["motor"] = float(np.mean(part**2 / noise))
         found.append(ratios)
     return tuple(found)
 
@@ -157,23 +160,28 @@ def _amplified_by_transmission(hypothesis: Hypothesis, run: Measured, table: Flo
 
 def _returned_to_motor(
     hypothesis: Hypothesis, run: Measured, channels: dict[str, FloatArray], observer_s: float, scale: FloatArray
-) -> float:
-    """Mean square that counts of the table encoder add to the block residual of the motor, in units of `scale` (n,).
+) -> FloatArray:
+    """Mean square (n,) that counts of the table add to the block residual of the motor, in units of `scale` (n,).
 
     While the motor rests the twin holds its table where the encoder reads it. One count of a stiff transmission is a
     torque that moves the motor. Counts that change slowly are no white noise: the table is read again, at other
-    places of the counts within the first. Other errors of the reading are not known to be there at rest.
+    places of the counts within the first. All rows near returned noise get its mean, the others none. Other errors of
+    the reading are not known to be there at rest.
     """
     axis, table = hypothesis.bench.axis, hypothesis.bench.encoders.table
+    added = np.zeros(scale.size)
     place = run.table_m - channels["table"] - axis.ratio_m_rad * channels["motor"]
     if not np.isfinite(place).all():
-        return 0.0
+        return added
     count = min(table.resolution_m if table else 0.0, np.sqrt(12.0) * run.noise.table_m)
     quiet = hypothesis.blocks(replace(run, table_m=place), observer_s, rests=run)["motor"]
-    rng, added = np.random.default_rng(0), 0.0
+    rng = np.random.default_rng(0)
     for _ in range(_READINGS):
         offset = count * rng.random()
         read = place + _misread(place + offset, count, 0.0, rng)
         other = hypothesis.blocks(replace(run, table_m=read), observer_s, rests=run)["motor"]
-        added += rms((other - quiet)[run.judged] / scale) ** 2 / _READINGS
-    return added if np.isfinite(added) else 0.0
+        added += ((other - quiet)[run.judged] / scale) ** 2 / _READINGS
+    near = maximum_filter1d(added, 2 * round(_NEAR_S / run.period_s) + 1) > 1.0
+    if not near.any() or not np.isfinite(added).all():
+        return np.zeros(scale.size)
+    return np.where(near, np.mean(added[near]), 0.0)

@@ -104,7 +104,7 @@ def explain(data: Dataset, progress: Progress = lambda text: None, deadline_s: f
         candidates = screen_library(base)
         first = first or candidates
         reference = beside_loads(nominal, base)
-        found, best = next_term(base, owner, nominal, reference, candidates, step)
+        found, best = next_term(base, owner, reference, candidates, step)
         fitted = {fit.terms[-1].effect for fit in found if not base.estimator.expired}
         if best is None:
             break

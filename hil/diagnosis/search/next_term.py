@@ -40,7 +40,7 @@ FORM = 0.0025
 
 
 def next_term(
-    base: Fit, owner: Fit, nominal: Fit, reference: Fit, candidates: Sequence[Candidate], step: Progress
+    base: Fit, owner: Fit, reference: Fit, candidates: Sequence[Candidate], step: Progress
 ) -> tuple[list[Fit], Fit | None]:
     """Fit the base with one more term; return the fits and the first one with sufficient evidence, if any.
 

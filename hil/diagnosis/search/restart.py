@@ -1,8 +1,8 @@
 """Restart of the search at the bench-file parameters: nominal refitting can absorb a missing effect.
 
 A score test projects out everything that unbounded parameters could explain. Bounded parameters explain less: of
-a spring on a table, 47 times the noise, the projection removed 94 % and the refit a tenth. If no term is found and most
-of the mismatch remains, the library is screened again at the parameters of the bench file, without the projection.
+a spring on a table, 47 times the noise, the projection removed 94 % and the refit a tenth. If no term is found and more
+than noise is left, the library is screened again at the parameters of the bench file, without the projection.
 
 A nut without preload is softer within its gap. A refit of other springs in series and of their damping absorbs most of
 that, and the local score test finds no descent direction. So preload loss is fitted from the springs of the bench file.

@@ -28,7 +28,9 @@ from hil.identification.terms import Term
 from hil.twin.library import BY_ID
 from hil.twin.parameter import Role
 
-_MOTION = 0.5  # least share of the gain of a term that it has on motion without noise: 0.6 to 1 where it acts on it
+_MOTION = (
+    0.5  # least share of the gain of a term that it has on motion without noise: about 1 where it acts on the motion
+)
 _ACTS = 0.1  # least change of the held-out residual per row, over that in training, from which a term acts there
 
 

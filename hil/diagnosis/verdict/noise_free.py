@@ -6,8 +6,9 @@ motion without noise. That motion is the closed-loop response y of the twin, and
 
     |r_without(y) - r_with(y)|^2
 
-For an effect of the axis it is the same as in the recordings, since the residuals that a fit leaves are orthogonal to
-the effect.
+For an effect of the axis it is near that in the recordings, since the residuals that a fit leaves are orthogonal to the
+effect. The input of controller and drive is the recorded command, which is exact: what they do with it counts as
+recorded.
 """
 
 from dataclasses import replace
@@ -22,7 +23,7 @@ def energy_without_noise(found: Fit, without: Fit) -> float | None:
     if not found.bench.law_known or any(run.sampled for run in found.data.runs):
         return None
     removed = 0.0
-    for run, scales in zip(found.data.runs, found.data.scales(), strict=True):
+    for index, (run, scales) in enumerate(zip(found.data.runs, found.data.scales(), strict=True)):
         response = found.hypothesis.respond(run)
         if not all(np.isfinite(part).all() for part in response):
             return None
@@ -33,7 +34,11 @@ def energy_without_noise(found: Fit, without: Fit) -> float | None:
             torque_command=response.torque_command,
             torque=response.torque,
         )
-        own, other = (fit.hypothesis.blocks(smooth, found.data.observer_s) for fit in (found, without))
+        own, other = (
+            fit.hypothesis.blocks(smooth, found.data.observer_s)
+            | {name: fit.residuals.channels[index][name] for name in ("torque", "command")}
+            for fit in (found, without)
+        )
         for name, values in own.items():
             with np.errstate(over="ignore", invalid="ignore"):  # without the term a twin may be unstable
                 change = ((other[name] - values) / scales[name])[run.judged]

@@ -150,4 +150,4 @@ def test_the_noise_of_a_sampled_torque_is_no_evidence() -> None:
     delay_s = found.hypothesis.values[found.hypothesis.nominal.index("torque_delay_s")]
     assert abs(delay_s) < 0.1 * recording.period_s
     candidates = [Candidate(COGGING, 0.9)]
-    assert next_term(found, found, found, found, candidates, print) == ([], None)
+    assert next_term(found, found, found, candidates, print) == ([], None)

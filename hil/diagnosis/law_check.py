@@ -39,6 +39,7 @@ _COARSE = (
 _SAME_PERIOD = 0.01  # relative: stamps are printed with few digits
 _SURE = 3.0  # standard errors from which a gain differs from that of the bench
 _SETPOINT_DELAY, _FEEDBACK_DELAY = "setpoint_delay_s", "feedback_delay_s"
+_REMOVED = 0.5  # share of the mean square above the noise that further parts of a law must remove
 _MATERIAL = 1e-3  # relative change of a gain that is worth a correction: settings have three digits
 
 
@@ -130,15 +131,23 @@ def check_law(runs: Sequence[Measured], bench: Bench) -> LawCheck:
 
 
 def _best(runs: Sequence[Measured], bench: Bench, given: LawFit, by_loop: bool) -> LawFit:
-    """The simplest law that leaves noise, else one that leaves counting noise, else that of the best criterion."""
+    """The simplest law that leaves noise, else one that leaves counting noise, else that of the best criterion.
+
+    A simpler law that leaves counting noise is preferred if that of more parts removes less than half of this excess.
+    """
     tried = [fit_law(runs, bench, free=False, by_loop=True) if by_loop else given]
+    right = list[LawFit]()
     for level in _candidates(runs, bench):
         fits = [fit_law(runs, bench, one.terms, free=one.free, delays=one.delays, by_loop=by_loop) for one in level]
+        tried += fits
         right = [one for one in fits if one.ratio <= FLOOR]
         if right:
-            return preferred(right)
-        tried += fits
-    return next((one for one in tried if _is_coarse(runs, one)), preferred(tried))
+            break
+    coarse = next((one for one in tried if one not in right and _is_coarse(runs, one)), None)
+    if not right:
+        return coarse or preferred(tried)
+    found = preferred(right)
+    return coarse if coarse and found.ratio - 1.0 > _REMOVED * (coarse.ratio - 1.0) else found
 
 
 def _is_coarse(runs: Sequence[Measured], found: LawFit) -> bool:
@@ -219,8 +228,9 @@ def _gain(bench: Bench, found: LawFit, name: str, error: float) -> dict[str, Cor
     nominal, value = getattr(control, name), getattr(control.with_gains(found.gains), name)
     if nominal is None:
         return {}
-    std = error * (1.0 if name == "velocity_feedforward" else abs(value))
-    if abs(value - nominal) <= max(_SURE * std, _MATERIAL * max(abs(nominal), _MATERIAL)):
+    share = name == "velocity_feedforward"
+    std = error * (1.0 if share else abs(value))
+    if abs(value - nominal) <= max(_SURE * std, _MATERIAL * (1.0 if share else abs(nominal))):
         return {}
     return {name: Correction(nominal=nominal, value=value, std=std, unit=unit_of(name))}
 

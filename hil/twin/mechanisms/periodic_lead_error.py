@@ -40,6 +40,5 @@ MECHANISM = Mechanism(
     variants=(Variant(Stage.TRANSMISSION, _wobble),),
     starts=lambda s: [(0.5e-6, 0.0, 0.0, 0.0, 0.0, 0.0)],
     typical=lambda a: (2e-6, 0.0),
-    needs_table=True,
     picture=Picture.SCREW_ANGLE,
 )

@@ -22,6 +22,5 @@ MECHANISM = Mechanism(
     variants=(Variant(Stage.SCREW, _stiffness_along_travel),),
     starts=lambda s: [(0.1 / s.travel_m,)],
     typical=lambda a: (0.5,),
-    needs_table=True,
     softens=True,
 )

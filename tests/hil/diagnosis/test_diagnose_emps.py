@@ -9,7 +9,9 @@ from diagnosis_runs import RIG
 
 from hil.bench.bench_file import Bench, load_bench
 from hil.diagnosis.diagnose import Diagnosis, diagnose
+from hil.diagnosis.law_check import check_law
 from hil.identification.compare import compare
+from hil.identification.measured import take
 from hil.recording.importing import import_recording
 from hil.recording.recording import Recording
 
@@ -26,6 +28,18 @@ def recording() -> Recording:
 def diagnosed() -> Diagnosis:
     """The diagnosis, made once."""
     return diagnose([recording()], [], load_bench("emps_symmetric"))
+
+
+def test_wrong_gains_are_learnt_without_another_part_of_the_law() -> None:
+    """The simplest law that leaves the noise of the position steps is learnt, not a lag and a delay with other gains."""
+    owner = load_bench("emps_symmetric")
+    law = owner.known_control
+    given = {"position_gain_1_s": 1.48 * law.position_gain_1_s, "velocity_gain_n_s_m": 0.63 * 8557.43}
+    wrong = owner.model_copy(update={"control": law.model_copy(update=given)})
+    learnt = check_law([take(recording(), wrong)], wrong)
+    assert set(learnt.corrections) == set(given)
+    assert learnt.corrections["position_gain_1_s"].value == pytest.approx(law.position_gain_1_s, rel=1e-3)
+    assert learnt.corrections["velocity_gain_n_s_m"].value == pytest.approx(8557.43, rel=1e-3)
 
 
 @pytest.mark.long

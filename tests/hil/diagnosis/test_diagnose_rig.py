@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import jsonschema
+import numpy as np
 import pytest
 from diagnosis_runs import rig
 
@@ -15,6 +16,7 @@ from hil.bench.bench_file import load_bench
 from hil.diagnosis.diagnose import Diagnosis, diagnose
 from hil.diagnosis.result import schema
 from hil.identification.measured import take
+from hil.proof.draw.less_known import forget
 from hil.recording.recording import read_recording
 from hil.report.diagnosis_report import write_diagnosis
 from hil.twin.library import BY_ID
@@ -98,3 +100,14 @@ def test_the_diagnosed_bench_is_a_bench_and_explains(folder: str, tmp_path: Path
     assert entry.validate_ is not None
     if entry.mode == "closed_loop":
         assert float((left**2).mean() ** 0.5) == pytest.approx(entry.validate_.after_rms, rel=0.02)
+
+
+@pytest.mark.long
+def test_a_lead_error_is_told_from_an_eccentric_encoder_by_its_reaction_on_the_motor() -> None:
+    """Without the linear encoder: the table's inertia alone reacts to a lead error, the whole axis to an encoder's."""
+    path = rig("lead")
+    runs = [read_recording(path / f"{name}.csv") for name in ("train_1", "train_2", "holdout")]
+    one, bench = forget("one encoder", runs, load_bench(path.parent / "axis.yaml"), np.random.default_rng(0))
+    (found,) = diagnose(one[:2], one[2:], bench).result.missing
+    assert found.effect == "periodic_lead_error"
+    assert found.parameters["amplitude_m"].value == pytest.approx(5.858e-6, rel=0.02)

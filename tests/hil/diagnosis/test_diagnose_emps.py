@@ -31,7 +31,7 @@ def diagnosed() -> Diagnosis:
 
 
 def test_wrong_gains_are_learnt_without_another_part_of_the_law() -> None:
-    """The simplest law that leaves the noise of the position steps is learnt, not a lag and a delay with other gains."""
+    """The simplest law that leaves the noise of the position steps is learnt, not a lag and a delay beside."""
     owner = load_bench("emps_symmetric")
     law = owner.known_control
     given = {"position_gain_1_s": 1.48 * law.position_gain_1_s, "velocity_gain_n_s_m": 0.63 * 8557.43}

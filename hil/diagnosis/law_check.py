@@ -14,21 +14,20 @@ If the recorded positions are coarser than those that the loop saw, the noise of
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from itertools import combinations
 from typing import NamedTuple
 
 from hil.bench.bench_file import Bench
-from hil.bench.control_section import without_law
-from hil.diagnosis.result import Correction, Verdict
+from hil.diagnosis.result import Correction
 from hil.diagnosis.search.initial_values import axis_facts
+from hil.diagnosis.usable_law import LawCheck, set_aside
 from hil.identification.control_law import counting_noise, fit_law
 from hil.identification.law_fit import REPLAYED, LawFit, preferred, sure
 from hil.identification.measured import Measured
 from hil.identification.noise_floor import FLOOR
 from hil.identification.terms import Term
 from hil.quantities import digits, unit_of
-from hil.recording.recording import RESAMPLED, Recording
 from hil.twin.library import LIBRARY
 from hil.twin.mechanism import Stage
 
@@ -36,74 +35,10 @@ _COARSE = (
     "The control law reproduces the commands to the noise that the steps of the recorded positions make in a replay. "
     "It was not tested further, because the control loop may have seen finer positions."
 )
-_SAME_PERIOD = 0.01  # relative: stamps are printed with few digits
 _SURE = 3.0  # standard errors from which a gain differs from that of the bench
 _SETPOINT_DELAY, _FEEDBACK_DELAY = "setpoint_delay_s", "feedback_delay_s"
 _REMOVED = 0.5  # share of the mean square above the noise that further parts of a law must remove
 _MATERIAL = 1e-3  # relative change of a gain that is worth a correction: settings have three digits
-
-
-@dataclass(frozen=True)
-class LawCheck:
-    """Bench whose control law may be used, corrections of its gains, and notes.
-
-    `coarse`: the law is right to the noise that the recorded positions make in a replay, and cannot be tested further.
-    `advice` is what the owner should check, empty if nothing; `mismatch`: the law was set aside because no gains
-    reproduce the commands.
-    """
-
-    bench: Bench
-    corrections: dict[str, Correction] = field(default_factory=dict)
-    notes: tuple[str, ...] = ()
-    coarse: bool = False
-    advice: str = ""
-    mismatch: bool = False
-    resampled: bool = False  # the rows are not the ticks of the velocity loop
-
-    def marked(self, recording: Recording) -> Recording:
-        """The recording, marked if its rows are not the ticks of the velocity loop."""
-        if not self.resampled:
-            return recording
-        return replace(recording, metadata={**recording.metadata, RESAMPLED: True})
-
-    def verdict(self, of_plant: Verdict) -> Verdict:
-        """Verdict on plant and control law, from that on the plant."""
-        if self.mismatch and of_plant in (Verdict.NO_MISMATCH, Verdict.PARAMETER_ERROR):
-            return Verdict.UNEXPLAINED
-        if self.corrections and of_plant is Verdict.NO_MISMATCH:
-            return Verdict.PARAMETER_ERROR
-        return of_plant
-
-    def judged(self, runs: Sequence[Measured]) -> list[Measured]:
-        """The runs, without the command of the controller if they are too coarse to test it."""
-        if not self.coarse:
-            return list(runs)
-        return [replace(run, unseen=run.unseen | {"command"}) for run in runs]
-
-
-def replayable(bench: Bench, recordings: Sequence[Recording]) -> LawCheck:
-    """Set the control law of a bench aside if recordings lack what a replay needs."""
-    if not bench.law_known:
-        return LawCheck(bench)
-    for recording in recordings:
-        names, period_s = recording.axis, bench.period_s
-        missing = [name for name in (names.position_command, names.velocity_command) if name not in recording.columns]
-        if not {names.torque_command, names.torque} & set(recording.columns):
-            missing.append(names.torque_command)
-        if not {names.motor_position} <= set(recording.columns):
-            missing.append(names.motor_position)
-        if missing:
-            return _set_aside(bench, f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} not recorded")
-        if abs(recording.period_s - period_s) > _SAME_PERIOD * period_s:
-            found = _set_aside(
-                bench,
-                f"the rows are {1e3 * recording.period_s:.4g} ms apart, the ticks of the velocity loop "
-                f"{1e3 * period_s:.4g} ms",
-            )
-            return replace(found, resampled=True)
-        if recording.metadata.get(RESAMPLED):
-            return _set_aside(bench, "the rows were interpolated, so that the ticks of the controller are lost")
-    return LawCheck(bench)
 
 
 def check_law(runs: Sequence[Measured], bench: Bench) -> LawCheck:
@@ -198,7 +133,7 @@ def _accepted(bench: Bench, found: LawFit) -> LawCheck:
         f"{_told(corrections)}."
     )
     if _FEEDBACK_DELAY in corrections:
-        law = _set_aside(bench, "its positions are older than those of the recording, which the twin does not simulate")
+        law = set_aside(bench, "its positions are older than those of the recording, which the twin does not simulate")
         return replace(law, corrections=corrections, notes=(advice, *law.notes), advice=advice)
     control = bench.known_control.with_gains(found.gains)
     if _SETPOINT_DELAY in corrections:
@@ -268,15 +203,10 @@ def _refused(bench: Bench, given: LawFit, best: LawFit) -> LawCheck:
         corrections |= _of_position_loop(bench, best) if best.left_of_speed <= REPLAYED else {}
     told = f" One loop follows its settings with {_told(corrections)}." if corrections else ""
     advice = f"Check the controller's settings: the control law of the bench is not that of the recording, {why}.{told}"
-    return replace(_set_aside(bench, why), corrections=corrections, advice=advice, mismatch=True)
+    return replace(set_aside(bench, why), corrections=corrections, advice=advice, mismatch=True)
 
 
 def _told(corrections: Mapping[str, Correction]) -> str:
     return ", ".join(
         f"{name} {digits(entry.value, 4)} instead of {digits(entry.nominal, 4)}" for name, entry in corrections.items()
     )
-
-
-def _set_aside(bench: Bench, why: str) -> LawCheck:
-    bench = bench.model_copy(update={"control": without_law(bench.known_control)})
-    return LawCheck(bench, notes=(f"The control law of the bench was not used: {why}.",))

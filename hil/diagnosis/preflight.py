@@ -28,7 +28,6 @@ LEAST_MOVING_S = 0.5  # a few hundred moving rows: below, the parameters are not
 WRONG_BY = 4.0
 SLOPE_TOLERANCE = 0.2  # of positions against set-points; following errors are below 5 %
 _RELATED = 0.5  # least squared correlation of two channels for a factor between them: half of the variance
-_AWAY, _AWAY_M = 0.01, 1e-3  # largest offset at rest, of the travel and absolute: a closed loop rests far below both
 _SWINGS = 6  # of the command between its limits in a move one way: to speed up and to brake make two
 SATURATED = 0.5  # share of the moving rows at the torque limit: above, most rows do not obey the control law
 _SMOOTH_S = 0.021  # window of the derivatives of the motor position: passes some 20 Hz, averages encoder counts
@@ -130,15 +129,8 @@ def _problems(run: Measured, bench: Bench, derived: set[str]) -> Iterator[str]:
 def _position_problems(run: Measured, bench: Bench, motor: str, table: str) -> Iterator[str]:
     ratio = bench.axis.ratio_m_rad
     slope = _factor_between(run.position_command_m, ratio * run.motor)
-    resting = ~run.moving
-    away_m = float(np.median((run.position_command_m - ratio * run.motor)[resting])) if resting.any() else 0.0
     if abs(slope - 1.0) > SLOPE_TOLERANCE:
         yield f"{motor}: {_factor(slope, _POSITION_UNITS, 'the set-points')}"
-    elif bench.law_known and abs(away_m) > max(_AWAY * float(np.ptp(run.position_command_m)), _AWAY_M):
-        yield (
-            f"{motor}: lies {1e3 * away_m:.4g} mm behind the set-points at rest: the zeros differ; "
-            "correct the offset in the import map"
-        )
     if not run.table_m.size:
         return
     if np.ptp(run.table_m) == 0.0:

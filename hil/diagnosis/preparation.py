@@ -4,9 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from hil.bench.bench_file import Bench
-from hil.diagnosis.law_check import LawCheck, check_law, replayable
+from hil.diagnosis.law_check import check_law
 from hil.diagnosis.preflight import prepare
 from hil.diagnosis.split import held_out_note, same, split
+from hil.diagnosis.usable_law import LawCheck, at_set_points, replayable
 from hil.diagnosis.usable_parts import usable_parts
 from hil.errors import InputError
 from hil.identification.completion import completed, reduced
@@ -50,7 +51,8 @@ def prepare_diagnosis(train: Sequence[Recording], validate: Sequence[Recording],
     runs = [*train, *validate]
     prepared = prepare(runs, judged)
     if judged.law_known:
-        law = check_law(prepared[: len(train)], judged)
+        law = at_set_points(prepared, judged)
+        law = check_law(prepared[: len(train)], judged) if law.bench is judged else law
         if law.bench is not judged:
             judged = reduced(law.bench, runs)
             prepared = prepare(runs, judged)

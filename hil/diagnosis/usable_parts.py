@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from hil.bench.bench_file import Bench
-from hil.diagnosis.law_check import replayable
 from hil.diagnosis.preflight import prepare
 from hil.diagnosis.split import split
+from hil.diagnosis.usable_law import replayable
 from hil.errors import InputError
 from hil.identification.completion import reduced
 from hil.recording.recording import Recording

@@ -20,8 +20,8 @@ _LIKELY = 2.0  # standard errors within which a round value is taken
 def lead_of(recording: Recording, transmission: TransmissionValues | None) -> Estimate:
     """Travel per motor revolution [m]; on a rotary axis that of the load in rad.
 
-    Of two encoders, else of set-points and encoder. A usual lead is taken only where the measured one does not
-    contradict it: what the bench file says would else be named as an error of the machine.
+    Of two encoders, else of set-points and encoder. The lead of the import map, or a usual one, is taken only where
+    the measured one does not contradict it: what the bench file says would else be named as an error of the machine.
     """
     names = recording.axis
     if transmission is not None:
@@ -32,7 +32,8 @@ def lead_of(recording: Recording, transmission: TransmissionValues | None) -> Es
         return Estimate(ROTARY_LEAD_M, 0.0, "one encoder and no set-points: no ratio is told")
     if abs(measured.value - ROTARY_LEAD_M) < max(DIRECT * ROTARY_LEAD_M, _LIKELY * measured.std_error):
         return Estimate(ROTARY_LEAD_M, measured.std_error, f"direct; {measured.how}")
-    lead = usual_lead(measured.value)
+    told, usual = recording.metadata.get("lead_m", ROTARY_LEAD_M), usual_lead(measured.value)
+    lead = told if told != ROTARY_LEAD_M and _agrees(told, measured) else usual
     if lead == measured.value:
         return measured
     if _agrees(lead, measured):

@@ -17,6 +17,9 @@ CHATTER_STEP = 0.03
 # Bound of nominal parameters over the bench file, as a factor: beyond it lie minima in which implausible parameters
 # compensate for a wrong structure.
 TRUST = 3.0
+# Friction that a bench file gives as 0 is not known: scale, step of the forward difference over it, and largest value,
+# in the unit of the parameter.
+LITTLE, LITTLE_STEP, ANY = 1e-3, 1e-2, 1e6
 # Delay of a recorded torque whose rows are not the ticks of the drive. A mean over the tick before or after a row, or
 # a sample of it, shifts it by up to a row and a half.
 DELAY, MOST_DELAY = "torque_delay_s", 1.5

@@ -15,9 +15,12 @@ import numpy as np
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench, MechanismEntry
 from hil.identification.coordinates import (
+    ANY,
     CHATTER_STEP,
     DELAY,
     EDGE_STEP_S,
+    LITTLE,
+    LITTLE_STEP,
     MOST_DELAY,
     TRUST,
     Coordinate,
@@ -140,8 +143,10 @@ class Hypothesis:
             if name == "damping_ratio":
                 found.append(Coordinate(name, max(value, 0.01), True, 1e-4, 0.9))
                 continue
-            scale = value if value > 0.0 else 1e-3
-            found.append(Coordinate(name, scale, True, scale / TRUST, scale * TRUST))
+            if value > 0.0:
+                found.append(Coordinate(name, value, True, value / TRUST, value * TRUST))
+            else:  # friction that the bench leaves out
+                found.append(Coordinate(name, LITTLE, False, 0.0, ANY))
         if DELAY in self.nominal:
             delay_s, most_s = self.bench.torque_delay_s or 0.0, MOST_DELAY * self.bench.period_s
             found.append(Coordinate(DELAY, self.bench.period_s, False, delay_s - most_s, delay_s + most_s))
@@ -167,11 +172,7 @@ class Hypothesis:
 
     @cached_property
     def _initial(self) -> FloatArray:
-        of_axis = len(self.bench.axis.NOMINAL)
-        starts = [
-            value or coordinate.scale for value, coordinate in zip(self.given[:of_axis], self.coordinates, strict=False)
-        ]
-        values = [*starts, *self.given[of_axis:], *(value for term in self.terms for value in term.values)]
+        values = [*self.given, *(value for term in self.terms for value in term.values)]
         return np.array([c.x(value) for c, value in zip(self.coordinates, values, strict=True)])
 
     @property
@@ -185,7 +186,10 @@ class Hypothesis:
         step = CHATTER_STEP if self._chatters else 1e-4
         angle_rad = travel_m / self.bench.axis.ratio_m_rad * self.bench.axis.physics().angle_per_unit
         of_axis = self.nominal_count - len(self._known)
-        found = [max(step, 1e-3) if name in ("damping_ratio", DELAY) else step for name in self.nominal[:of_axis]]
+        found = [
+            max(step, 1e-3 if one.name in ("damping_ratio", DELAY) else 0.0 if one.logarithmic else LITTLE_STEP)
+            for one in self.coordinates[:of_axis]
+        ]
         starts = [*self.given[of_axis:], *(value for term in self.terms for value in term.values)]
         for coordinate, start in zip(self.coordinates[of_axis:], starts, strict=True):
             own = step

@@ -117,3 +117,11 @@ def test_the_torque_left_is_that_of_the_undelayed_torque() -> None:
     assert by_now is not None
     assert by_late is not None
     assert by_late < 0.5 * by_now
+
+
+def test_friction_that_a_bench_leaves_out_is_fitted() -> None:
+    """A draft says 0 where another effect hides the friction; 0 is no bound of it."""
+    owner = bench(coulomb_torque_n_m=0.0, viscous_torque_n_m_s_rad=0.0)
+    found = fit_nominal(dataset([take(recorded(bench()), owner)], owner), lambda one: {})
+    assert found.bench.axis.coulomb_torque_n_m == pytest.approx(bench().axis.coulomb_torque_n_m, rel=0.01)  # type: ignore[union-attr]
+    assert found.bench.axis.viscous_torque_n_m_s_rad == pytest.approx(bench().axis.viscous_torque_n_m_s_rad, rel=0.03)  # type: ignore[union-attr]

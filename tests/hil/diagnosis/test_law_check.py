@@ -84,6 +84,15 @@ def test_another_law_is_set_aside_and_said() -> None:
     assert any("The control law of the bench was not used" in note for note in result.notes)
 
 
+def test_a_motor_that_rests_away_from_its_set_points_is_judged_without_the_law() -> None:
+    """The zeros of both differ here by 2 % of the travel; a loop that yields to a load looks the same."""
+    recording = laps(COGGING)
+    shifted = recording["position_command_m"] + 0.02 * np.ptp(recording["position_command_m"])
+    result = answer(changed(recording, position_command_m=shifted), OWNER)
+    assert [finding.effect for finding in result.missing] == ["cogging_torque"]
+    assert any("the motor rests 2 % of the travel behind its set-points" in note for note in result.notes)
+
+
 def test_every_fourth_row_is_judged_without_the_law() -> None:
     recording = laps(COGGING)
     rows = {name: values[::4].copy() for name, values in recording.columns.items()}

@@ -126,6 +126,14 @@ def test_a_following_error_of_the_set_points_is_no_gear() -> None:
     assert lead.std_error > 0.01 * lead.value
 
 
+@pytest.mark.parametrize(("off", "lead"), [(0.5e-4, 0.15), (5e-4, 0.15 * (1.0 + 5e-4))])
+def test_the_lead_of_the_map_stands_where_the_measured_one_does_not_contradict_it(off: float, lead: float) -> None:
+    angle = 100.0 * np.sin(np.arange(4000) * 1e-3)
+    columns = {"motor_position_rad": angle, "position_command_m": 0.15 * (1.0 + off) * angle / (2.0 * np.pi)}
+    found = lead_of(Recording("belt", columns, 1e-3, {"lead_m": 0.15}), None)
+    assert found.value == pytest.approx(lead, rel=1e-6)
+
+
 def test_a_gear_follows_from_two_angles(tmp_path: Path) -> None:
     columns = {"time_s": AXIS["t"], "motor_angle_rad": AXIS["angle"], "load_angle_rad": AXIS["angle"] / 50.0}
     bench = load_bench(drafted(tmp_path, columns | {"torque_Nm": AXIS["torque"]}))

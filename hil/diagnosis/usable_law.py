@@ -1,0 +1,107 @@
+"""Whether the control law of a bench can be used on recordings, and what was found of it.
+
+It is set aside where recordings lack what a replay needs, or a motor rests away from its set-points. The plant is then
+judged alone.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from hil.bench.bench_file import Bench
+from hil.bench.control_section import without_law
+from hil.diagnosis.result import Correction, Verdict
+from hil.identification.measured import Measured
+from hil.recording.recording import RESAMPLED, Recording
+
+_AWAY, _AWAY_M = 0.01, 1e-3  # largest offset at rest, of the travel and absolute: a closed loop rests far below both
+_SAME_PERIOD = 0.01  # relative: stamps are printed with few digits
+
+
+@dataclass(frozen=True)
+class LawCheck:
+    """Bench whose control law may be used, corrections of its gains, and notes.
+
+    `coarse`: the law is right to the noise that the recorded positions make in a replay, and cannot be tested further.
+    `advice` is what the owner should check, empty if nothing; `mismatch`: the law was set aside because no gains
+    reproduce the commands.
+    """
+
+    bench: Bench
+    corrections: dict[str, Correction] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+    coarse: bool = False
+    advice: str = ""
+    mismatch: bool = False
+    resampled: bool = False  # the rows are not the ticks of the velocity loop
+
+    def marked(self, recording: Recording) -> Recording:
+        """The recording, marked if its rows are not the ticks of the velocity loop."""
+        if not self.resampled:
+            return recording
+        return replace(recording, metadata={**recording.metadata, RESAMPLED: True})
+
+    def verdict(self, of_plant: Verdict) -> Verdict:
+        """Verdict on plant and control law, from that on the plant."""
+        if self.mismatch and of_plant in (Verdict.NO_MISMATCH, Verdict.PARAMETER_ERROR):
+            return Verdict.UNEXPLAINED
+        if self.corrections and of_plant is Verdict.NO_MISMATCH:
+            return Verdict.PARAMETER_ERROR
+        return of_plant
+
+    def judged(self, runs: Sequence[Measured]) -> list[Measured]:
+        """The runs, without the command of the controller if they are too coarse to test it."""
+        if not self.coarse:
+            return list(runs)
+        return [replace(run, unseen=run.unseen | {"command"}) for run in runs]
+
+
+def replayable(bench: Bench, recordings: Sequence[Recording]) -> LawCheck:
+    """Set the control law of a bench aside if recordings lack what a replay needs."""
+    if not bench.law_known:
+        return LawCheck(bench)
+    for recording in recordings:
+        names, period_s = recording.axis, bench.period_s
+        missing = [name for name in (names.position_command, names.velocity_command) if name not in recording.columns]
+        if not {names.torque_command, names.torque} & set(recording.columns):
+            missing.append(names.torque_command)
+        if not {names.motor_position} <= set(recording.columns):
+            missing.append(names.motor_position)
+        if missing:
+            return set_aside(bench, f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} not recorded")
+        if abs(recording.period_s - period_s) > _SAME_PERIOD * period_s:
+            found = set_aside(
+                bench,
+                f"the rows are {1e3 * recording.period_s:.4g} ms apart, the ticks of the velocity loop "
+                f"{1e3 * period_s:.4g} ms",
+            )
+            return replace(found, resampled=True)
+        if recording.metadata.get(RESAMPLED):
+            return set_aside(bench, "the rows were interpolated, so that the ticks of the controller are lost")
+    return LawCheck(bench)
+
+
+def at_set_points(runs: Sequence[Measured], bench: Bench) -> LawCheck:
+    """Set the control law of a bench aside if a motor rests away from its set-points.
+
+    Either the zeros of the recording differ, or the loop yields to a load: a twin from the set-points is elsewhere.
+    """
+    for run in runs if bench.law_known else ():
+        travel, resting = float(np.ptp(run.position_command_m)), ~run.moving
+        behind = (run.position_command_m - bench.axis.ratio_m_rad * run.motor)[resting]
+        away = float(np.median(behind)) if behind.size else 0.0
+        if abs(away) > max(_AWAY * travel, _AWAY_M):
+            where = "behind" if away > 0.0 else "beyond"
+            return set_aside(
+                bench,
+                f"in {run.name} the motor rests {100.0 * abs(away) / travel:.3g} % of the travel {where} its "
+                "set-points: the loop yields to a load, or the zeros differ; an offset in the map corrects a zero",
+            )
+    return LawCheck(bench)
+
+
+def set_aside(bench: Bench, why: str) -> LawCheck:
+    """The bench without its control law, with a note on the reason."""
+    bench = bench.model_copy(update={"control": without_law(bench.known_control)})
+    return LawCheck(bench, notes=(f"The control law of the bench was not used: {why}.",))

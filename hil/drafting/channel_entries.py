@@ -208,7 +208,11 @@ class ChannelEntries:
                 )
         if unit == "counts":  # of the motor's encoder, as in the set-points of a drive
             same = abs(abs(factor) - 1.0) < SAME_COUNTS
-            entry |= {"unit": motor, "scale": float(f"{self.per_count / (1.0 if same else abs(factor)):.8g}")}
+            per_count = self.per_count / (1.0 if same else abs(factor))
+            if motor == "m":
+                entry |= {"counts_per_m": float(f"{1.0 / per_count:.8g}")}
+            else:
+                entry |= {"unit": motor, "scale": float(f"{per_count:.8g}")}
         self.draft.channels.append(DraftedChannel(channel, entry, self._how(name, what)))
 
     def _count_size(self, length: str | None, factor: float) -> CountSize:

@@ -47,10 +47,15 @@ class ControlValues(NamedTuple):
 
 def loop_values(recording: Recording, ratio_m_rad: float) -> ControlValues:
     """Draft the control section of a bench from a recording; `ratio_m_rad`: travel over motor angle."""
-    loop = fit_loops(recording, ratio_m_rad)
+    names, loop = recording.axis, fit_loops(recording, ratio_m_rad)
     if loop is None or loop.left > REPLAYED:
         why = "no set-points are recorded, or no gains reproduce the torque command"
-        return ControlValues([], why if loop is None else f"the best cascaded law leaves {_left(loop)}")
+        if loop is not None:
+            torque, command = (recording.columns.get(name) for name in (names.torque, names.torque_command))
+            measured = command is None or (torque is not None and np.array_equal(command, torque))
+            why = f"the best cascaded law leaves {_left(loop)}"
+            why += "; its command is not recorded, the measured torque stands for it" if measured else ""
+        return ControlValues([], why)
     linear, period_s = recording.kind is AxisKind.LINEAR, recording.period_s
     gains, delays, errors = loop.gains, loop.settings, loop.errors
     if sure(delays.feedback_rows, errors.feedback_rows):

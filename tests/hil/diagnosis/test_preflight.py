@@ -177,11 +177,6 @@ def test_a_linear_axis_is_not_for_a_rotary_bench(run: Recording) -> None:
         prepare([run], load_bench("emps"))
 
 
-def test_a_motor_encoder_with_another_zero_is_refused(run: Recording) -> None:
-    shifted = changed(run, motor_position_rad=run["motor_position_rad"] + 10.0)
-    assert "lies -15.9" in refused(shifted)
-
-
 def test_an_axis_that_lags_on_short_strokes_is_not_taken_for_another_unit() -> None:
     """The motor makes three quarters of each stroke, late."""
     lagging = recorded(OWNER)

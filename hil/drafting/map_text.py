@@ -34,9 +34,7 @@ def map_text(draft: MapDraft) -> str:
     else:
         lines += [f"sample_rate_hz: {clock.rate_hz!r}   # instead of time stamps; {clock.how}"]
     if clock.resample_hz is not None:
-        lines += [
-            f"resample_hz: {clock.resample_hz!r}   # the steps of the clock are uneven: channels are interpolated"
-        ]
+        lines += [f"resample_hz: {clock.resample_hz!r}   # for rows that are missing or taken at uneven moments"]
     if draft.rows_per_sample is not None:
         lines += [f"rows_per_sample: {draft.rows_per_sample!r}   # the logger repeated samples: each is kept once"]
     if draft.missing:

@@ -7,6 +7,7 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.errors import InputError
+from hil.recording.row_clock import RowClock, Ticks, row_clock, row_ticks, slope
 
 CLOCK_TOLERANCE = 0.01  # of the period: what a step of a regular clock may deviate
 LARGEST = 1e12  # above every SI value of a channel, and of a clock in microseconds per day
@@ -15,8 +16,6 @@ LEAST_ROWS = 50  # of a part: fewer show no motion
 REPEATS = 0.02  # share of repeated stamps from which they have too few digits, and are no duplicate rows
 _TENTHS = 200  # steps from which the median of a tenth is a typical step in spite of jitter
 _TWO_RATES = 1.5  # ratio of typical steps at both ends: more than jitter and drift
-_CLEARLY = 1.5  # ratio of mean squares: noise alone gives 1, and the stamps are believed
-_DROPPED = 1.9  # times the period: a step in which a row is missing, so that rows cannot be counted
 
 
 @dataclass(frozen=True)
@@ -63,10 +62,11 @@ def regular_rows(
     """Cut columns (n,) at gaps of their `time_s` and give each part equal steps.
 
     Stamps that are regular within 1 % stay as they are, single missing rows are interpolated; stamps with too few
-    digits get equal steps. Else either the stamps jitter and the rows do not, or the rows were taken at these times:
-    the one is right in which the channels are smoother. Rows taken at uneven times are interpolated, to `rate_hz` or
-    the mean rate. `judged_by` are the columns that decide, by default all. `period_s` of the ticks, if it is known:
-    rows of a loop that was late lie at whole multiples of it.
+    digits get equal steps. Else either the stamps jitter and the rows are equal ticks, or the rows were taken at these
+    times: the motion tells (`row_clock`), in the columns `judged_by`, by default all. Equal ticks are numbered, not
+    interpolated; rows taken at uneven times are interpolated, to `rate_hz` or that of the typical step. A `rate_hz`
+    within 1 % of that of equal ticks asks for nothing. `period_s` of the ticks, if it is known: rows of a loop that
+    was late lie at whole multiples of it.
 
     `place` as in `check_finite`. Raises InputError: NaN, time that repeats or runs back, two rates, too few rows
     to tell the clock (with `period_s` three are enough).
@@ -98,37 +98,86 @@ def regular_rows(
         )
     notes = _of_gaps(time_s, pieces, kept, typical)
     mean_s = float(np.sum(within) / within.size)
-    if even and rate_hz is None:
+    if even and (rate_hz is None or _near(1.0 / rate_hz, mean_s)):
         period_s = round(mean_s, 12)
         return _joined([_taken(columns, piece) for piece in kept], time_s[0], period_s, None, notes)
     if few_digits:
-        period_s = _slope(time_s, kept)
+        period_s = slope([time_s[piece] for piece in kept], [np.arange(piece.stop - piece.start) for piece in kept])
         notes = (*notes, f"clock: stamps repeat (too few digits); equal steps of {period_s:.6g} s are taken")
         return _joined([_counted(columns, piece, period_s) for piece in kept], time_s[0], period_s, None, notes)
-    missing = np.maximum(np.round(within / typical), 1.0) - 1.0
     judged = {name: columns[name] for name in judged_by or columns} | {"time_s": time_s}
-    whole = bool(np.all(np.abs(within - (missing + 1.0) * typical) <= CLOCK_TOLERANCE * typical))
-    told = f"clock: steps from {within.min():.4g} to {within.max():.4g} s, typically {typical:.4g} s"
-    if rate_hz is None and whole:
-        mean_s = float(np.sum(within) / np.sum(missing + 1.0))
-        places = np.count_nonzero(missing)
-        notes = (
-            *notes,
-            f"clock: {missing.sum():.0f} rows are missing in {places} place{'s' if places > 1 else ''} at a period of "
-            f"{mean_s:.6g} s; they are interpolated",
-        )
-    elif rate_hz is None and within.max() < _DROPPED * typical and _counts_better(judged, kept, mean_s):
-        period_s = _slope(time_s, kept)
-        notes = (*notes, f"{told}: the stamps jitter, the rows do not; equal steps of {period_s:.6g} s are taken")
-        return _joined([_counted(columns, piece, period_s) for piece in kept], time_s[0], period_s, None, notes)
+    clock, told = row_clock(judged, kept, typical)
+    if clock is None:
+        period_s = _usual_step(time_s, kept, within, typical) if rate_hz is None else 1.0 / rate_hz
+        notes = (*notes, _of_uneven(within, typical, told, 1.0 / period_s))
     else:
-        # a step that most rows have is the period of the logger, with delays between
-        most = np.mean(np.abs(within - typical) <= CLOCK_TOLERANCE * typical) > 0.5
-        mean_s = float(f"{typical if most else mean_s:.4g}") if rate_hz is None else 1.0 / rate_hz
-        notes = (*notes, f"{told}; the channels are interpolated to {1.0 / mean_s:.6g} Hz")
-    rate_hz = float(f"{1.0 / mean_s:.9g}")
+        columns = _at_their_ticks(columns, kept, clock)
+        whole_rate = rate_hz is None or _near(1.0 / rate_hz, clock.period_s)
+        period_s = clock.period_s if rate_hz is None or whole_rate else 1.0 / rate_hz
+        notes = (*notes, *_of_ticks(clock, None if whole_rate else rate_hz))
+        if whole_rate:
+            parts = [_filled(columns, piece, at, period_s) for piece, at in zip(kept, clock.ticks, strict=True)]
+            filled_hz = float(f"{1.0 / period_s:.9g}") if clock.missing else None
+            return _joined(parts, time_s[0], period_s, filled_hz, notes)
+    rate_hz = float(f"{1.0 / period_s:.9g}")
     parts = [_interpolated(columns, piece, rate_hz) for piece in kept]
     return _joined(parts, time_s[0], round(1.0 / rate_hz, 12), rate_hz, notes)
+
+
+def _near(step_s: float, period_s: float) -> bool:
+    return abs(step_s - period_s) <= CLOCK_TOLERANCE * period_s
+
+
+def _usual_step(time_s: FloatArray, kept: list[slice], within: FloatArray, typical: float) -> float:
+    """Step of uneven rows, of four digits: that which most have, else the mean of those where no row is missing."""
+    most = np.mean(np.abs(within - typical) <= CLOCK_TOLERANCE * typical) > 0.5
+    times = [time_s[piece] for piece in kept]
+    return float(f"{typical if most else slope(times, [row_ticks(one) for one in times]):.4g}")
+
+
+def _of_uneven(within: FloatArray, typical: float, told: bool, rate_hz: float) -> str:
+    """Note on rows that are interpolated by their stamps."""
+    doubt = "" if told else ", and the motion does not tell whether the rows are equal ticks"
+    return (
+        f"clock: the steps of the stamps are uneven, typically {span_text(typical)}, from {span_text(within.min())} to "
+        f"{span_text(within.max())}{doubt}; the channels are interpolated by the stamps to {rate_hz:.6g} Hz"
+    )
+
+
+def _of_ticks(clock: RowClock, rate_hz: float | None) -> tuple[str, ...]:
+    """Notes on rows that are counted: jitter of the stamps, missing rows, and another rate that the map wants."""
+    notes, missing = [], clock.missing
+    if clock.jitter_s > CLOCK_TOLERANCE * clock.period_s:
+        notes.append(
+            f"clock: the stamps jitter by {span_text(clock.jitter_s)}, but the rows are equal ticks of "
+            f"{span_text(clock.period_s)}: the row number is the clock"
+        )
+    if missing:
+        notes.append(
+            f"clock: {sum(missing)} rows are missing in {len(missing)} place{'s' if len(missing) > 1 else ''} at a "
+            f"period of {clock.period_s:.6g} s; they are interpolated"
+        )
+    if rate_hz is not None:
+        notes.append(
+            f"clock: the channels are interpolated from ticks of {span_text(clock.period_s)} to {rate_hz:.6g} Hz"
+        )
+    return tuple(notes)
+
+
+def span_text(span_s: float) -> str:
+    """A span of time in us, ms or s, of four digits."""
+    factor, unit = (1e6, "us") if span_s < 1e-3 else (1e3, "ms") if span_s < 1.0 else (1.0, "s")
+    return f"{factor * span_s:.4g} {unit}"
+
+
+def _at_their_ticks(columns: Mapping[str, FloatArray], kept: list[slice], clock: RowClock) -> dict[str, FloatArray]:
+    """Columns (n,) whose `time_s` is that of the ticks; parts begin at whole ticks since the first row."""
+    time_s = columns["time_s"].copy()
+    begin_s, period_s = time_s[0], clock.period_s
+    for piece, ticks in zip(kept, clock.ticks, strict=True):
+        first = round(float(time_s[piece.start] - begin_s) / period_s)
+        time_s[piece] = begin_s + (first + ticks) * period_s
+    return {**columns, "time_s": time_s}
 
 
 def _at_ticks(steps: FloatArray, period_s: float) -> bool:
@@ -137,16 +186,6 @@ def _at_ticks(steps: FloatArray, period_s: float) -> bool:
         return False
     ticks = np.round(steps / period_s)
     return bool(ticks.min() == 1.0 and np.all(np.abs(steps - ticks * period_s) <= CLOCK_TOLERANCE * period_s))
-
-
-def _slope(time_s: FloatArray, kept: list[slice]) -> float:
-    """Period of counted rows: slope of the stamps over the rows in all parts, rounded to 1 ps."""
-    product, power = 0.0, 0.0
-    for piece in kept:
-        rows = np.arange(piece.stop - piece.start) - 0.5 * (piece.stop - piece.start - 1)
-        product += float(rows @ (time_s[piece] - time_s[piece].mean()))
-        power += float(rows @ rows)
-    return round(product / power, 12)
 
 
 def _refuse_order(time_s: FloatArray, steps: FloatArray, few_digits: bool, place: Callable[[int], str]) -> None:
@@ -192,43 +231,6 @@ def _of_gaps(time_s: FloatArray, pieces: list[slice], kept: list[slice], typical
     return (text + (f"; {lost} rows in parts of less than {LEAST_ROWS} are left out" if lost else ""),)
 
 
-def _counts_better(columns: Mapping[str, FloatArray], kept: list[slice], period_s: float) -> bool:
-    """True if channels are clearly smoother over the count of the rows than over their stamps.
-
-    The error of a cubic through the two rows on each side, of the channel in which both differ most.
-    """
-    ratio = 0.0
-    for name, values in columns.items():
-        if name == "time_s" or np.ptp(values) == 0.0:
-            continue
-        errors = []
-        for piece in kept:
-            time_s = columns["time_s"][piece]
-            counted = np.asarray(np.arange(time_s.size) * period_s, dtype=np.float64)
-            uneven = np.abs(time_s[4:] - time_s[:-4] - 4.0 * period_s) > CLOCK_TOLERANCE * period_s
-            errors.append([_cubic_error(time, values[piece])[uneven] for time in (time_s, counted)])
-        by_stamp, by_count = (float(np.sum(np.concatenate(one) ** 2)) for one in zip(*errors, strict=True))
-        if min(by_stamp, by_count) > 0.0:
-            ratio = max(ratio, float(np.log(by_stamp / by_count)), key=abs)
-    return bool(ratio > np.log(_CLEARLY))
-
-
-def _cubic_error(time: FloatArray, values: FloatArray) -> FloatArray:
-    """Value less the cubic (Lagrange) through two neighbours on each side, over the weight of white noise (n - 4,)."""
-    n = time.size - 4
-    at = time[2 : 2 + n]
-    others = [slice(0, n), slice(1, n + 1), slice(3, n + 3), slice(4, n + 4)]
-    error, weight = values[2 : 2 + n].copy(), np.ones(n)
-    for one in others:
-        factor = np.ones(n)
-        for other in others:
-            if other is not one:
-                factor *= (at - time[other]) / (time[one] - time[other])
-        error -= factor * values[one]
-        weight += factor**2
-    return np.asarray(error / np.sqrt(weight))
-
-
 def _taken(columns: Mapping[str, FloatArray], piece: slice) -> dict[str, FloatArray]:
     return {name: values[piece] for name, values in columns.items()}
 
@@ -237,6 +239,13 @@ def _counted(columns: Mapping[str, FloatArray], piece: slice, period_s: float) -
     """The rows of a part with equal steps from its first stamp on."""
     taken = _taken(columns, piece)
     return taken | {"time_s": taken["time_s"][0] + np.arange(piece.stop - piece.start) * period_s}
+
+
+def _filled(columns: Mapping[str, FloatArray], piece: slice, ticks: Ticks, period_s: float) -> dict[str, FloatArray]:
+    """The rows of a part at each of its ticks, linear where rows are missing."""
+    taken, grid = _taken(columns, piece), np.arange(ticks[-1] + 1)
+    columns = {name: np.interp(grid, ticks, values) for name, values in taken.items()}
+    return columns | {"time_s": taken["time_s"][0] + grid * period_s}
 
 
 def _interpolated(columns: Mapping[str, FloatArray], piece: slice, rate_hz: float) -> dict[str, FloatArray]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -55,11 +56,58 @@ def test_jitter_of_the_stamps_is_told_from_jitter_of_the_rows() -> None:
     uneven_s = TICKS_S + RANDOM.uniform(-2e-4, 2e-4, ROWS)
     of_stamps = made(uneven_s, position(TICKS_S))
     assert of_stamps.rate_hz is None
-    assert "the stamps jitter, the rows do not" in of_stamps.notes[0]
+    assert "but the rows are equal ticks of 1 ms: the row number is the clock" in of_stamps.notes[0]
     np.testing.assert_array_equal(of_stamps.columns["x"], position(TICKS_S))
     of_rows = made(uneven_s, position(uneven_s))
     assert of_rows.rate_hz == pytest.approx(1000.0, rel=1e-3)
     np.testing.assert_allclose(of_rows.columns["x"], position(of_rows.columns["time_s"]), atol=1e-4)
+
+
+def test_missing_rows_are_filled_at_their_ticks_and_the_last_row_stays() -> None:
+    kept = np.delete(np.arange(ROWS), [700, 1200, 1201])
+    rows = made((TICKS_S + RANDOM.normal(0.0, 5e-5, ROWS))[kept], position(TICKS_S)[kept])
+    np.testing.assert_array_equal(rows.columns["x"][kept], position(TICKS_S)[kept])
+    assert rows.columns["x"].size == ROWS
+    np.testing.assert_allclose(np.diff(rows.columns["time_s"]), rows.period_s, rtol=1e-9)
+    assert "the stamps jitter by" in rows.notes[0]
+    assert "3 rows are missing in 2 places" in rows.notes[1]
+
+
+@pytest.mark.parametrize("wanted_hz", [998.7, 1001.0])
+def test_a_rate_near_that_of_equal_ticks_asks_for_nothing(wanted_hz: float) -> None:
+    for time_s in (TICKS_S, TICKS_S + RANDOM.normal(0.0, 5e-5, ROWS)):
+        rows = made(time_s, position(TICKS_S), wanted_hz)
+        assert rows.rate_hz is None
+        np.testing.assert_array_equal(rows.columns["x"], position(TICKS_S))
+
+
+def test_equal_ticks_are_interpolated_to_another_rate_that_is_wanted() -> None:
+    rows = made(TICKS_S + RANDOM.normal(0.0, 5e-5, ROWS), position(TICKS_S), 400.0)
+    assert rows.rate_hz == 400.0
+    # the first stamp is that of the first tick: a shift of the whole, no jitter
+    shift_s = rows.columns["time_s"][0]
+    np.testing.assert_allclose(rows.columns["x"], position(rows.columns["time_s"] - shift_s), atol=5e-5)
+    assert "interpolated from ticks of 1 ms to 400 Hz" in rows.notes[-1]
+
+
+def test_the_note_on_uneven_rows_tells_the_steps_apart() -> None:
+    uneven_s = TICKS_S + RANDOM.uniform(-2e-4, 2e-4, ROWS)
+    note = made(uneven_s, position(uneven_s)).notes[0]
+    assert re.search(r"typically (99\d\.?\d*|1\.?\d*) (us|ms), from 6\d\d\.?\d* us to 1\.3\d* ms; .* to \d+ Hz", note)
+    assert "to 1000 Hz" in note
+    assert "does not tell" not in note
+    assert "the motion does not tell" in made(uneven_s, RANDOM.normal(size=ROWS)).notes[0]
+
+
+def test_a_csv_recording_with_uneven_stamps_is_read_by_its_rows(tmp_path: Path) -> None:
+    stamps_s = 20.0 + TICKS_S + RANDOM.normal(0.0, 5e-5, ROWS)
+    lines = [f"{t:.6f},{x:.9f},{np.cos(x):.6f}" for t, x in zip(stamps_s, position(TICKS_S), strict=True)]
+    path = tmp_path / "run.csv"
+    path.write_text("\n".join(["time_s,motor_position_rad,torque_n_m", *lines]) + "\n")
+    recording = read_recording(path)
+    np.testing.assert_allclose(recording["motor_position_rad"], position(TICKS_S), atol=1e-9)
+    assert "the row number is the clock" in recording.metadata["clock_notes"][0]
+    assert "resampled" not in recording.metadata
 
 
 def test_noise_alone_leaves_the_stamps_right() -> None:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hil.arrays import FloatArray
-from hil.recording.held_samples import kept_rows
+from hil.recording.held_samples import kept_rows, lost_samples
 from hil.recording.stamps import REPEATS
 
 
@@ -44,8 +44,15 @@ def complete_rows(columns: Mapping[str, FloatArray], rows_per_sample: float | No
             f"missing: {np.sum(~good)} rows have no value of {lacking} (first row {first} of the numbers) and are left "
             "out: interpolated where they are few, else cut like a gap"
         )
+    told = {name: values[rows] for name, values in columns.items() if name != "time_s"}
+    lost = lost_samples(told) if rows_per_sample is None else np.zeros(rows.size, dtype=np.bool_)
+    if lost.any() and lost.mean() <= REPEATS:
+        notes.append(
+            f"lost samples: {lost.sum()} rows in motion repeat all values of the row before, first row "
+            f"{int(rows[lost][0]) + 1} of the numbers; they are left out and interpolated"
+        )
+        rows = rows[~lost]
     if rows_per_sample is not None:
-        told = {name: values[rows] for name, values in columns.items() if name != "time_s"}
         kept = kept_rows(told, rows_per_sample)
         notes.append(
             f"repeated samples: the logger ran {rows_per_sample:g} times as fast as the loop; {kept.size} of "

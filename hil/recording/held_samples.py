@@ -11,6 +11,8 @@ _REACH = 5  # rows on each side over which a channel must move
 _FAST = 2.0  # least steps of a channel from row to row by which a motion is told from rest: each sample is new there
 _STRAIGHT = 0.5  # of the path that a motion makes in one direction: noise goes to and fro
 _MANY = 0.1  # share of repeated rows in motion: below, a few lost samples and no logger that is faster
+_CREEPS = 0.3  # usual steps: those around a lost sample are longer; a jump from rest is none
+_CATCHES_UP = 1.5  # usual steps: the row after a lost sample moves by two, the others by less than this
 _LEAST_ROWS = 100  # in motion, for a share to a few per cent
 _WHOLE = 0.02  # deviation from a whole ratio of the rates
 _IN_STEP = 0.95  # share of the new samples at one phase of a whole ratio
@@ -46,6 +48,25 @@ def kept_rows(columns: Mapping[str, FloatArray], ratio: float) -> NDArray[np.int
         if new[row] or row - kept[-1] >= longest:
             kept.append(row)
     return np.array(kept, dtype=np.intp)
+
+
+def lost_samples(columns: Mapping[str, FloatArray]) -> NDArray[np.bool_]:
+    """Rows (n,) of a motion in which a sample was lost: all columns repeat the row before, the next row catches up.
+
+    For a few of them: many are a faster logger (`rows_per_sample`).
+    """
+    held = ~_new(columns) & _moving(columns)
+    rows = np.flatnonzero(held)
+    caught_up = np.zeros(rows.size, dtype=np.bool_)
+    for values in columns.values() if rows.size else ():
+        usual = (values[rows + _REACH] - values[rows - _REACH]) / (2 * _REACH)
+        steps, size, way = np.diff(values), np.abs(usual), np.sign(usual)
+        around = way * np.array([steps[rows + offset] for offset in range(-_REACH, _REACH) if offset not in (-1, 0)])
+        steady = (around.min(axis=0) > _CREEPS * size) & (around.max(axis=0) < _CATCHES_UP * size)
+        caught_up |= steady & (way * steps[rows] > _CATCHES_UP * size)
+    lost = np.zeros(held.size, dtype=np.bool_)
+    lost[rows[caught_up]] = True
+    return lost
 
 
 def _new(columns: Mapping[str, FloatArray]) -> NDArray[np.bool_]:

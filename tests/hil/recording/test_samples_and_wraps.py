@@ -1,4 +1,4 @@
-"""Samples that a logger repeated are kept once; counters that start again are unwrapped; dates are read as seconds."""
+"""Repeated samples are kept once, lost ones found; counters that start again are unwrapped; dates become seconds."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hil.files.date_stamps import is_date, seconds_of
-from hil.recording.held_samples import kept_rows, rows_per_sample
+from hil.recording.held_samples import kept_rows, lost_samples, rows_per_sample
 from hil.recording.wraps import unwrapped, wrap_range
 
 RANDOM = np.random.default_rng(12)
@@ -31,6 +31,23 @@ def test_a_logger_at_another_rate_keeps_each_sample() -> None:
     ratio = rows_per_sample(logged)
     assert ratio == pytest.approx(1.6, rel=0.01)
     assert kept_rows(logged, ratio).size == pytest.approx(T.size, rel=0.01)
+
+
+def test_a_few_lost_samples_in_motion_are_found() -> None:
+    rows = np.array([200, 900, 1250, 2075, 3100])
+    logged = {name: values.copy() for name, values in COLUMNS.items()}
+    for values in logged.values():
+        values[rows] = values[rows - 1]
+    found = np.flatnonzero(lost_samples(logged))
+    assert set(found) <= set(rows)
+    assert found.size >= 4  # not where the axis turns
+
+
+def test_rest_slow_counts_and_a_jump_from_rest_are_no_lost_samples() -> None:
+    jump = {"angle": np.where(T > 2.0, 500.0, 0.0), "torque": np.zeros(T.size)}
+    slow = {"angle": np.round(COUNTS / 400.0), "torque": np.zeros(T.size)}
+    for columns in (COLUMNS, jump, slow):
+        assert not lost_samples(columns).any()
 
 
 def test_rest_and_coarse_counts_are_no_repetitions() -> None:

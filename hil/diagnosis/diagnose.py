@@ -26,10 +26,10 @@ from hil.diagnosis.untold import untold
 from hil.diagnosis.verdict.cross_validation import CrossValidation, cross_validate
 from hil.diagnosis.verdict.each_alone import Change, changed
 from hil.diagnosis.verdict.findings import corrections, diagnosed_bench, findings, form_of, renamed
-from hil.diagnosis.verdict.fit_table import channel_names, channel_residuals, closed_loop_held, fit_table
+from hil.diagnosis.verdict.fit_table import channel_residuals, closed_loop_held, fit_table
 from hil.diagnosis.verdict.judge import explains_most, judge, not_testable, unexplained_share
 from hil.diagnosis.verdict.refit import reported_refit, torque_left
-from hil.diagnosis.wording import title, titles, where_in_short
+from hil.diagnosis.wording import channel_names, title, titles, where_in_short
 from hil.errors import InputError
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit

@@ -3,8 +3,10 @@
 from collections.abc import Iterable
 
 from hil.bench.bench_file import Bench
+from hil.channels import AXIS_CHANNELS
 from hil.diagnosis.result import Location
 from hil.diagnosis.turning import of_load, speed_unit
+from hil.identification.measured import Measured
 from hil.identification.terms import Term
 from hil.quantities import digits, quantity
 from hil.twin.library import BY_ID
@@ -22,6 +24,15 @@ def title(effect: str) -> str:
 def titles(effects: Iterable[str]) -> str:
     """List ids in words, separated by commas."""
     return ", ".join(map(title, effects))
+
+
+def channel_names(bench: Bench, run: Measured) -> dict[str, str]:
+    """Map channels of the twin to names of recorded channels."""
+    names = AXIS_CHANNELS[run.kind]
+    found = {"motor": names.motor_position, "torque": names.torque, "command": names.torque_command}
+    if bench.has_table_encoder:
+        found["table"] = names.table_position
+    return found
 
 
 def label(term: Term, bench: Bench) -> str:

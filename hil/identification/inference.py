@@ -74,6 +74,14 @@ def against(better: Fit, worse: Fit, filters: Sequence[Filter] | None = None) ->
     return float(max(plain, white - more * np.log(better.rows)))
 
 
+def between(named: Fit, rival: Fit, filters: Sequence[Filter] | None = None) -> float:
+    """Return BIC(rival) - BIC(named); < 0 favours the rival. `filters`: by default those of `named`.
+
+    Both residuals are whitened by the filter of the fit with less cost: that of the other would hide what it leaves.
+    """
+    return against(named, rival, filters) if named.cost <= rival.cost else -against(rival, named)
+
+
 def by_energy(better: Fit, worse: Fit) -> float:
     """BIC(worse) - BIC(better) on plain residuals with their number of independent rows.
 

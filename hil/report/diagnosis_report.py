@@ -112,7 +112,8 @@ def _finding(page: Page, diagnosis: Diagnosis, index: int, folder: Path) -> None
         page.text(f"This motion cannot distinguish it from: {titles(finding.equivalents)}.")
     if finding.rivals:
         page.table(
-            ("rejected alternative", "reason"), [(title(rival.effect), rival.evidence) for rival in finding.rivals]
+            ("alternative", "compared with this finding"),
+            [(title(rival.effect), rival.evidence) for rival in finding.rivals],
         )
 
 

@@ -154,6 +154,7 @@ class Mechanism:
     reversed: str = ""  # sentence of a negative strength, which it gives without the sign; without: `sentence`
     repeated: str = ""  # sentence of several such events; may also name count
     periodic: str = ""  # sentence of several at equal intervals; may also name count, width and period
+    shifts_time: bool = False  # many values are local minima: starts are ranked at their own values
     softens: bool = False  # changes the stiffness of a spring of the chain
     most: int = 1  # number that may act at once, with periods or orders of their own
     screw_locked: bool = False  # at one slow speed, a share of Coulomb friction that repeats with the screw

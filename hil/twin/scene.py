@@ -4,6 +4,8 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
+_PERIODS = 12  # of a delay: as far as the simulated drive remembers its commands
+
 
 def _always(level: float) -> float:
     return math.inf
@@ -47,6 +49,7 @@ class Scene:
     viscous_speed: float  # [rad/s] at which viscous friction equals Coulomb friction
     travel_m: float
     duration_s: float
+    period_s: float  # of the rows
     ratio: float  # [m/rad]
     lead_m: float  # of the screw
     orders: list[float]  # of the disturbance torque, per revolution
@@ -59,3 +62,12 @@ class Scene:
     rest_m: float  # position at which a straight line through the disturbance torque over the position is 0
     stretch: float  # table against motor [m], typical
     most_stretch: float  # and largest
+
+    def delays_s(self, least_s: float, most_s: float) -> list[float]:
+        """Delays of whole periods between two bounds, up to twelve periods.
+
+        A command with noise fits best where it is late by whole periods, and worse between: a fit of a delay goes to
+        the nearest of these minima, so that it is begun at each of them.
+        """
+        found = [number * self.period_s for number in range(-_PERIODS, _PERIODS + 1) if number]
+        return [delay_s for delay_s in found if least_s <= delay_s <= most_s]

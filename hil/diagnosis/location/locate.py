@@ -16,7 +16,7 @@ from hil.diagnosis.location.periodicity import lock
 from hil.diagnosis.location.reaction_torque import acting
 from hil.diagnosis.location.residual_energy import Energy, energies, without_terms
 from hil.diagnosis.result import Location, Phase, PhaseKind
-from hil.diagnosis.verdict.fit_table import channel_names
+from hil.diagnosis.wording import channel_names
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.measured import Measured

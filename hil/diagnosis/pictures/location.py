@@ -12,8 +12,7 @@ from hil.arrays import FloatArray
 from hil.diagnosis.location.locate import BLOCKS, block_shares, mismatch_energies, phase_shares, shown_in
 from hil.diagnosis.result import Verdict
 from hil.diagnosis.turning import speed_unit
-from hil.diagnosis.verdict.fit_table import channel_names
-from hil.diagnosis.wording import title
+from hil.diagnosis.wording import channel_names, title
 from hil.figures.drawing import style_axis
 from hil.figures.panels import COMMAND, DEVIATION, MEASURED, SIMULATED, Line, Panel
 from hil.identification.estimator import Fit

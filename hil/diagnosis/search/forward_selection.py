@@ -6,7 +6,7 @@ that are no longer needed are removed: a first term may have imitated two causes
 
 import math
 import time
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
@@ -15,46 +15,20 @@ from hil.diagnosis.search.events import beside_loads, revised
 from hil.diagnosis.search.initial_values import axis_facts, claimable
 from hil.diagnosis.search.next_term import CLEAR, MATERIAL, MOST, NEEDED, Progress, gain, next_term
 from hil.diagnosis.search.restart import again
+from hil.diagnosis.search.rivals import ENDED, RivalFit, chosen, ended
 from hil.diagnosis.search.score_test import Candidate, screen_library
-from hil.identification.coordinates import LAST_EDGE_STEP_S
 from hil.identification.dataset import Dataset
-from hil.identification.estimator import Fit, FitStatus
-from hil.identification.inference import TIED, against, refuted, whitening
+from hil.identification.estimator import Fit
+from hil.identification.inference import against, whitening
 from hil.identification.nominal_fit import fit_nominal_parameters, require_finite
 from hil.identification.parallel import in_parallel
-from hil.identification.terms import FRICTION, Key, Term, compatible, effects, free_slot
+from hil.identification.terms import Key, Term, compatible, effects, free_slot
 from hil.twin.library import BY_ID
 from hil.twin.physics import Active
 
 MOST_TERMS = 8  # at once: more than an engineer can act on; limits the duration of a search
 # After this many terms that leave more than `MOST` of the energy above the floor the search ends.
 _IN_VAIN = 3
-_NEAR = 1.1  # cost over that of the chosen explanation, up to which the fit of a rival is ended before it is compared
-_ENDED = 40  # evaluations: a fit that starts near its minimum converges within them
-
-
-@dataclass(frozen=True, eq=False)
-class RivalFit:
-    """Another explanation of the same residual and the evidence against it (BIC difference).
-
-    `reduced` is its mean squared weighted residual, `more` its energy per row in units of noise^2 less that of the
-    chosen explanation. The fit itself is not kept: its residuals and derivatives grow with the recordings.
-    """
-
-    terms: tuple[Term, ...]
-    reduced: float
-    evidence: float
-    more: float = np.inf
-
-    @classmethod
-    def of(cls, fit: Fit, evidence: float, more: float = np.inf) -> "RivalFit":
-        """The explanation by a fit."""
-        return cls(fit.terms, fit.reduced, evidence, more)
-
-    @property
-    def tied(self) -> bool:
-        """True if it is not refuted."""
-        return not refuted(self.evidence, self.more)
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,21 +82,12 @@ def explain(data: Dataset, progress: Progress = lambda text: None, deadline_s: f
         fitted = {fit.terms[-1].effect for fit in found if not base.estimator.expired}
         if best is None:
             break
-        best = _simplest([best, *(other for other in found if other is not best and against(best, other) < TIED)])
-        found = [other for other in found if other is not best]
-        if not best.jacobian.size:  # only evaluated so far, since the fitted ones were rejected
-            best = replace(best.estimator, edge_step_s=LAST_EDGE_STEP_S).fit(best.hypothesis)
-        found = [ended(one) if one.cost < _NEAR * best.cost else one for one in found]
-        best, found = _on_fewest_parts(best, found)
-        filters = whitening(best)
-        rivals[best.terms[-1].key] = sorted(
-            (RivalFit.of(one, against(best, one, filters), (one.cost - best.cost) / base.rows) for one in found),
-            key=lambda rival: rival.evidence,
-        )
+        best, others = chosen(best, found, base, reference, owner)
+        rivals[best.terms[-1].key] = others
         found = []  # their residuals are not needed any more
         best, needed = _pruned(best, reference)
         # to convergence: the residual of an unfinished fit resembles other mechanisms
-        base = revised(claimed(best.refit(_ENDED, slopes=best.jacobian)))
+        base = revised(claimed(best.refit(ENDED, slopes=best.jacobian)))
         if not base.terms and base.cost < nominal.cost - NEEDED:
             nominal = base  # the term has only led the nominal parameters out of a local minimum
             continue
@@ -132,7 +97,7 @@ def explain(data: Dataset, progress: Progress = lambda text: None, deadline_s: f
         if len(base.terms) >= _IN_VAIN and base.excess > MOST * nominal.excess:
             break
     step("fitting the explanation to convergence")
-    final = ended(again(revised(base).refit(_ENDED), _ENDED))
+    final = ended(again(revised(base).refit(ENDED), ENDED))
     kept = {term.key for term in final.terms}
     present = {*fitted, *(term.effect for term in final.terms)}
     not_tried = tuple(effect for effect in BY_ID if effect not in present) if stopped_at else ()
@@ -141,41 +106,10 @@ def explain(data: Dataset, progress: Progress = lambda text: None, deadline_s: f
     return Explanation(owner, nominal, final, rivals, needed, tuple(first), stopped_at, not_tried)
 
 
-def _simplest(tied: list[Fit]) -> Fit:
-    """Return the explanation with the fewest parameters of those that the evidence does not separate.
-
-    Constant torque and direction-dependent Coulomb friction are equal on every motion; friction is preferred, since
-    most axes are horizontal.
-    """
-    return min(tied, key=lambda found: (found.hypothesis.free, found.terms[-1].key[:2] != (FRICTION, 0)))
-
-
-def _on_fewest_parts(best: Fit, found: list[Fit]) -> tuple[Fit, list[Fit]]:
-    """Return the explanation on the fewest parts of the axis of those that are not refuted, and the others.
-
-    What a part does that is found already needs no second cause elsewhere.
-    """
-    filters = whitening(best)
-    tied = [
-        one
-        for one in found
-        if one.jacobian.size
-        and one.hypothesis.free <= best.hypothesis.free
-        and not refuted(against(best, one, filters), (one.cost - best.cost) / best.rows)
-    ]
-    first = min([best, *tied], key=lambda one: len({BY_ID[term.effect].element_of(term.variant) for term in one.terms}))
-    return first, [one for one in (best, *found) if one is not first]
-
-
 def _without(found: Fit, index: int) -> Fit:
     """Fit the hypothesis without one of the terms, in few evaluations."""
     slopes = np.delete(found.jacobian, found.hypothesis.columns(index), axis=1)
     return found.estimator.fit(found.hypothesis.without(index), evaluations=6, slopes=slopes)
-
-
-def ended(found: Fit) -> Fit:
-    """The fit, continued if it ran out of steps: only then its cost refutes it."""
-    return found.refit(_ENDED, slopes=found.jacobian) if found.status is FitStatus.OUT_OF_STEPS else found
 
 
 def claimed(found: Fit) -> Fit:
@@ -191,9 +125,9 @@ def claimed(found: Fit) -> Fit:
         other = _beyond(found, lost)
         if other is None:
             rest = _without(found, lost)
-            found = rest.refit(_ENDED, slopes=rest.jacobian)
+            found = rest.refit(ENDED, slopes=rest.jacobian)
         else:
-            found = found.estimator.fit(found.hypothesis.replaced(lost, other), evaluations=_ENDED)
+            found = found.estimator.fit(found.hypothesis.replaced(lost, other), evaluations=ENDED)
 
 
 def _beyond(found: Fit, index: int) -> Term | None:
@@ -217,7 +151,7 @@ def _pruned(found: Fit, nominal: Fit) -> tuple[Fit, dict[Key, float]]:
     def ablated(index: int) -> tuple[float, Fit]:
         other = _without(found, index)
         if found.cost > CLEAR * other.cost:
-            other = other.refit(_ENDED, slopes=other.jacobian)
+            other = other.refit(ENDED, slopes=other.jacobian)
         return against(found, other, filters), other
 
     while found.terms:

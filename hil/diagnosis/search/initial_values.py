@@ -128,6 +128,7 @@ def scene(runs: Sequence[Measured], bench: Bench, blocks: Sequence[dict[str, Flo
         viscous_speed=max(physics.viscous_speed, 1e-6),
         travel_m=travel,
         duration_s=max(run.motor.size * run.period_s for run in runs),
+        period_s=runs[0].period_s,
         ratio=ratio,
         lead_m=lead,
         orders=orders,

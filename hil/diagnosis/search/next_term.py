@@ -5,11 +5,12 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from hil.diagnosis.search.events import constant_inside
-from hil.diagnosis.search.harm import harmed
+from hil.diagnosis.search.harm import refuting
 from hil.diagnosis.search.initial_values import claimable
 from hil.diagnosis.search.restart import companion, from_owner, may_hide, together, unbent
 from hil.diagnosis.search.score_test import Candidate
 from hil.diagnosis.search.successive_halving import race
+from hil.diagnosis.wording import channel_names
 from hil.identification.estimator import Fit
 from hil.identification.inference import against
 from hil.identification.noise_floor import REPEATS, unrepeated
@@ -55,45 +56,57 @@ def next_term(
     found: list[Fit] = []
     if promising:
         step("fitting " + ", ".join(one.term.effect for one in promising[:3]))
-        found = _claimable(race(base, promising))
-    best = _worthwhile(found, base, reference, owner)
+        found = valid(race(base, promising))
+    best = worthwhile(found, base, reference, owner)
     unfinished = (best is None or best.cost > CLEAR * base.cost) and not base.estimator.expired
     if unfinished and not owner.at_floor and base.excess > _NOTHING * base.rows and may_hide(base):
         step("fitting a lost preload from the springs of the bench file")
         found = sorted([*found, unbent(base)], key=lambda other: other.cost)
-        best = _worthwhile(found, base, reference, owner)
+        best = worthwhile(found, base, reference, owner)
     if best is None and not base.at_floor and not base.estimator.expired:
         step("searching again beside the parameters of the bench file")
-        found = _claimable(from_owner(base))
-        best = _worthwhile(found, base, reference, owner)
+        found = valid(from_owner(base))
+        best = worthwhile(found, base, reference, owner)
     if best is not None and not best.at_floor and not base.estimator.expired and (other := companion(base, best)):
         step(f"fitting {best.terms[-1].effect} together with {other.effect}")
-        pairs = [pair for pair in _claimable(together(base, best, other)) if pair.cost < CLEAR * best.cost]
+        pairs = [pair for pair in valid(together(base, best, other)) if pair.cost < CLEAR * best.cost]
         found = sorted([*found, *pairs], key=lambda fit: fit.cost)
-        best = _worthwhile(found, base, reference, owner)
+        best = worthwhile(found, base, reference, owner)
     return found, best
 
 
-def _claimable(found: Sequence[Fit]) -> list[Fit]:
+def valid(found: Sequence[Fit]) -> list[Fit]:
+    """The fits whose last term has values of its mechanism that the sensors can show."""
     return [other for other in found if claimable(other.terms[-1], other.bench, other.data.runs)]
 
 
-def _worthwhile(found: Sequence[Fit], base: Fit, nominal: Fit, owner: Fit) -> Fit | None:
-    """Return the first fit whose last term has evidence and material energy, repeats over laps, and is well formed.
+def worthwhile(found: Sequence[Fit], base: Fit, nominal: Fit, owner: Fit) -> Fit | None:
+    """Return the first fit whose last term has evidence and material energy, and can be the cause.
 
-    A fit that harms no channel comes before those that do: their terms will be refuted.
+    A fit that is refuted by a channel comes after all others.
     """
     enough = max(MATERIAL * base.rows, (WORTH if len(base.terms) < _SEVERAL else SERIES) * base.excess)
-    differs = unrepeated(base.hypothesis, base.data)
     good = [
         other
         for other in found
-        if against(other, base) >= NEEDED
-        and gain(base, other, nominal) >= enough
-        and REPEATS * unrepeated(other.hypothesis, other.data) <= differs
-        and constant_inside(other, base)
+        if against(other, base) >= NEEDED and gain(base, other, nominal) >= enough and not ill_formed(other, base)
     ]
-    return next((other for other in good if not harmed(other, base, owner)), good[0] if good else None)
+    return next((other for other in good if not refuting(other, base, owner)), good[0] if good else None)
+
+
+def ill_formed(found: Fit, base: Fit) -> str:
+    """Why the last term of a fit cannot be the cause, whatever it explains; empty if it can."""
+    if REPEATS * unrepeated(found.hypothesis, found.data) > unrepeated(base.hypothesis, base.data):
+        return "with it the repeated laps are reproduced worse"
+    return "" if constant_inside(found, base) else "the force is not constant within its windows"
+
+
+def objection(found: Fit, named: Fit, base: Fit, owner: Fit) -> str:
+    """Why the last term of a fit cannot be named instead of that of `named`, whatever it explains; empty if it can."""
+    names = channel_names(base.bench, base.data.runs[0])
+    worse = sorted(names[one] for one in refuting(found, base, owner) - refuting(named, base, owner))
+    harm = f"with it the training recordings are reproduced worse in {', '.join(worse)}" if worse else ""
+    return ill_formed(found, base) or harm
 
 
 def gain(without: Fit, found: Fit, nominal: Fit) -> float:

@@ -39,11 +39,13 @@ class Candidate:
     """A mechanism to be fitted: its scaled start, and the share of the residual energy that it would explain.
 
     `others` are starts of the same mechanism at less strength or other values, since large changes act nonlinearly.
+    `own` is the share at the values of the term, `share` that at the best strength.
     """
 
     term: Term
     share: float
     others: tuple[Term, ...] = ()
+    own: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,6 +101,7 @@ def screen_library(base: Fit) -> list[Candidate]:
     views = [_view(base, False), _view(base, True)]
     for candidate in screen(base, points, views):
         best.setdefault(candidate.term.effect, []).append(candidate)
+    best = {effect: _nearest_first(same) if BY_ID[effect].shifts_time else same for effect, same in best.items()}
     # a tuned start replaces the grid of its mechanism
     tuned = {effect: _tuned(base, same[0], views) for effect, same in best.items()}
     best = {effect: same if tuned[effect] is same[0] else [tuned[effect]] for effect, same in best.items()}
@@ -159,6 +162,15 @@ def _beside_known(start: StartPoint, hypothesis: Hypothesis) -> StartPoint:
     return replace(start, instead=replaces)
 
 
+def _nearest_first(same: Sequence[Candidate]) -> list[Candidate]:
+    """Order the starts of one mechanism by what they explain at their own values, each with the largest share.
+
+    What a start far from the truth explains at another strength it does not reach: a local minimum lies between.
+    """
+    share = max(one.share for one in same)
+    return sorted((replace(one, share=share) for one in same), key=lambda one: -one.own)
+
+
 def _tuned(base: Fit, best: Candidate, views: Sequence[_View]) -> Candidate:
     """Move a start with a frequency to a higher score: a resonance is narrower than the grid of starts."""
     mechanism, variant = BY_ID[best.term.effect], best.term.variant
@@ -206,11 +218,12 @@ def screen(base: Fit, points: Sequence[StartPoint], views: Sequence[_View] = ())
         if start.strength < 0:
             # a start that cannot be scaled is also scored at its own strength
             whole = float(2.0 * target[0] - products[0, 0]) / energy
-            return Candidate(start.term(), max(share if coefficients[0] > 0.0 else 0.0, whole))
+            return Candidate(start.term(), max(share if coefficients[0] > 0.0 else 0.0, whole), own=whole)
         return Candidate(
             start.term(_scaled(start, coefficients)),
             share,
             tuple(start.term(_scaled(start, factor * coefficients)) for factor in _WEAKER),
+            share,
         )
 
     return sorted(POOL.map(candidate, points), key=lambda found: -found.share)

@@ -17,11 +17,11 @@ from hil.diagnosis.search.forward_selection import claimed
 from hil.diagnosis.search.harm import refuting
 from hil.diagnosis.search.initial_values import axis_facts
 from hil.diagnosis.search.next_term import MATERIAL
-from hil.diagnosis.verdict.fit_table import channel_names
 from hil.diagnosis.verdict.noise_free import energy_without_noise
+from hil.diagnosis.wording import channel_names
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
-from hil.identification.inference import TIED, against, standard_errors
+from hil.identification.inference import TIED, between, standard_errors
 from hil.identification.noise_floor import REPEATS, unrepeated
 from hil.identification.parallel import in_parallel
 from hil.identification.terms import Term
@@ -181,9 +181,5 @@ def _worse(found: Fit, without: Fit, owner: Fit) -> tuple[str, ...]:
 
 
 def _gain(found: Fit, without: Fit) -> float:
-    """Evidence for the term on held-out recordings, negative where it harms.
-
-    Both residuals are whitened by the filter of the fit with less cost: that of the other would hide the harm.
-    """
-    paid = (found.hypothesis.free - without.hypothesis.free) * float(np.log(found.rows))
-    return against(found, without) + paid if found.cost <= without.cost else paid - against(without, found)
+    """Evidence for the term on held-out recordings, negative where it harms."""
+    return between(found, without) + (found.hypothesis.free - without.hypothesis.free) * float(np.log(found.rows))

@@ -11,8 +11,9 @@ from dataclasses import replace
 
 from hil.bench.bench_file import Bench, MechanismEntry
 from hil.diagnosis.result import Correction, Finding, Rival, Value
-from hil.diagnosis.search.forward_selection import Explanation, RivalFit
+from hil.diagnosis.search.forward_selection import Explanation
 from hil.diagnosis.search.initial_values import claimable
+from hil.diagnosis.search.rivals import RivalFit
 from hil.diagnosis.verdict.cross_validation import Ablation
 from hil.diagnosis.verdict.event_windows import describe_event
 from hil.diagnosis.verdict.judge import confidence
@@ -78,7 +79,9 @@ def findings(
                     variant=BY_ID[term.effect].forms[term.variant],
                     confidence=confidence(left, _factor(ablation), margin),
                     equivalents=tuple(dict.fromkeys(tied)),
-                    rivals=tuple(Rival(effect=rival.terms[-1].effect, evidence=_text(rival, term)) for rival in rivals),
+                    rivals=tuple(
+                        Rival(effect=rival.terms[-1].effect, evidence=rival_in_words(rival, term)) for rival in rivals
+                    ),
                     parameters=event.parameters if event else _values(term, errors, bench),
                     windows=event.windows if event else (),
                     train=event.train if event else None,
@@ -166,20 +169,39 @@ def _key(explanation: Explanation, term: Term) -> Key:
 def rivals_of(explanation: Explanation, term: Term) -> list[RivalFit]:
     """Other mechanisms than the term's own, each in its best variant, the strongest first."""
     best: dict[str, RivalFit] = {}
-    for rival in sorted(explanation.rivals.get(_key(explanation, term), []), key=lambda found: found.evidence):
+    known = explanation.rivals.get(_key(explanation, term), [])
+    for rival in sorted(known, key=lambda found: (bool(found.objection), found.evidence)):
         other = rival.terms[-1]
         if other.effect != term.effect and not (ambiguous(other) and ambiguous(term)):
             best.setdefault(other.effect, rival)
     return list(best.values())
 
 
-def _text(rival: RivalFit, term: Term) -> str:
+def rival_in_words(rival: RivalFit, term: Term) -> str:
+    """How a rival compares with the named term: what each leaves, the evidence, and what decides beside it."""
+    left = f"leaves residuals of {digits(math.sqrt(rival.reduced))} × the noise (rms)"
+    if math.isfinite(rival.named):
+        left += f", {title(term.effect)} in its place {digits(math.sqrt(rival.named))} ×"
     if rival.tied:
-        return (
-            f"not distinguishable from {title(term.effect)} by this motion: evidence against it is "
-            f"{digits(rival.evidence)}, and its residuals differ by less than the model accuracy"
-        )
-    size = math.sqrt(rival.reduced)
+        return f"not distinguishable from {title(term.effect)} by this motion: {left}; {_tie(rival)}"
+    return f"{left}{_stuck(rival)}; {_evidence(rival)}{f', but {rival.objection}' if rival.objection else ''}"
+
+
+def _evidence(rival: RivalFit) -> str:
+    """The evidence between a rival and the named term, on the side that it supports."""
+    side = "against it" if rival.evidence >= 0.0 else "for it"
+    return f"evidence {side} {digits(abs(rival.evidence))}, where {TIED:g} is very strong"
+
+
+def _tie(rival: RivalFit) -> str:
+    """What makes a rival equivalent to the named term, and why it is not named if the evidence favours it."""
+    if rival.evidence >= TIED:
+        return f"{_evidence(rival)}, but the difference is below the model accuracy"
+    return f"{_evidence(rival)}{f', but {rival.behind}' if rival.behind else ''}"
+
+
+def _stuck(rival: RivalFit) -> str:
+    """Names the parameters of a rival that ended at a bound."""
     parameters = BY_ID[rival.terms[-1].effect].parameters
     at = rival.terms[-1].values
     stuck = [
@@ -187,11 +209,7 @@ def _text(rival: RivalFit, term: Term) -> str:
         for parameter, value in zip(parameters, at, strict=True)
         if parameter.dimension is not Dimension.ANGLE and value in (parameter.low, parameter.high)
     ]
-    bound = f", with {', '.join(stuck)} at the bound of the allowed range" if stuck else ""
-    return (
-        f"leaves residuals of {digits(size)} × the noise (rms){bound}; evidence against it "
-        f"{digits(rival.evidence)}, where {TIED:g} is very strong"
-    )
+    return f", with {', '.join(stuck)} at the bound of the allowed range" if stuck else ""
 
 
 def _needed(ablation: Ablation) -> str:

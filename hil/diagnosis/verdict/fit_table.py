@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from hil.arrays import FloatArray
-from hil.bench.bench_file import Bench
-from hil.channels import AXIS_CHANNELS, CHANNELS
+from hil.channels import CHANNELS
 from hil.diagnosis.result import ChannelFit, FitFigures, Mode
+from hil.diagnosis.wording import channel_names
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.honest_refit import holds
@@ -25,15 +25,6 @@ from hil.identification.noise_floor import floor, noise_response, rms, sensor_no
 # Closed-loop rms over its floor above which the loop counts as chaotic if the block is below: a margin for the
 # uncertainty of the closed-loop floor.
 STRAYS = 1.15
-
-
-def channel_names(bench: Bench, run: Measured) -> dict[str, str]:
-    """Map channels of the twin to names of recorded channels."""
-    names = AXIS_CHANNELS[run.kind]
-    found = {"motor": names.motor_position, "torque": names.torque, "command": names.torque_command}
-    if bench.has_table_encoder:
-        found["table"] = names.table_position
-    return found
 
 
 def channel_residuals(hypothesis: Hypothesis, data: Dataset, mode: Mode) -> tuple[dict[str, FloatArray], ...]:

@@ -9,7 +9,9 @@ import numpy as np
 from hil.arrays import FloatArray
 from hil.twin.mechanism import Block, Mechanism, Stage, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
+from hil.twin.scene import Scene
 
+_MOST_S = 0.01
 _ENDS = 64  # rows by which samples are continued: the response to a corner has fallen below 1 %
 Channels = tuple[FloatArray, ...]  # motor position, table position, torque command, torque
 
@@ -37,6 +39,10 @@ def delayed_mean(means: FloatArray, periods: float) -> FloatArray:
     return np.asarray(
         (1.0 - f) * means[np.clip(nearest, 0, last)] + f * means[np.clip(nearest - 1, 0, last)], dtype=np.float64
     )
+
+
+def _torque_starts(scene: Scene) -> list[tuple[float, ...]]:
+    return [(delay_s,) for delay_s in (2e-4, -2e-4, *scene.delays_s(-_MOST_S, _MOST_S))]
 
 
 @lru_cache(maxsize=64)
@@ -79,13 +85,14 @@ MECHANISM = Mechanism(
     reversed="The channel {variant} is recorded {delay_s} early against the others.",
     equation="y_recorded(t) = y(t - delay)",
     source="Laakso et al., IEEE Signal Processing Magazine 13 (1996) 30, fractional delay",
-    parameters=(Parameter("delay_s", Dimension.TIME, -0.01, 0.01, role=Role.STRENGTH),),
+    parameters=(Parameter("delay_s", Dimension.TIME, -_MOST_S, _MOST_S, role=Role.STRENGTH),),
     variants=(
         Variant(Stage.CHANNEL, _late_table, "table_position", needs_table=True),
-        Variant(Stage.CHANNEL, _late_torque, "torque"),
+        Variant(Stage.CHANNEL, _late_torque, "torque", starts=_torque_starts, proportional=False),
         Variant(Stage.CHANNEL, _late_motor, "motor_position", sign=-1.0),
     ),
     first_unless_clear=True,  # motor position and torque are the clock unless their relation says otherwise
     starts=lambda s: [(2e-4,)],
     typical=lambda a: (2e-4,),
+    shifts_time=True,
 )

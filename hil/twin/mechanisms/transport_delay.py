@@ -8,6 +8,7 @@ from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, Stage, Va
 from hil.twin.parameter import Dimension, Parameter, Role
 
 _OLDEST = 14  # age in ticks of the oldest command kept: 12 ticks of delay, a fraction, and its step
+_MOST_S = 0.012
 _STARTED = 15  # memory[_STARTED] is 0 until the first command has come
 
 
@@ -37,13 +38,14 @@ MECHANISM = Mechanism(
     sentence="The torque command acts {delay_s} later than the controller believes.",
     equation="T(t) = u(t - delay), u held over a control period",
     source="Åström and Wittenmark, Computer-Controlled Systems, 3rd ed. (1997), systems with time delay",
-    parameters=(Parameter("delay_s", Dimension.TIME, 0.0, 0.012, role=Role.STRENGTH),),
+    parameters=(Parameter("delay_s", Dimension.TIME, 0.0, _MOST_S, role=Role.STRENGTH),),
     variants=(
         Variant(Stage.CURRENT, _delayed_command, "measured"),
         Variant(Stage.TORQUE, _delayed_command, "hidden"),
     ),
-    starts=lambda s: [(1.5e-4,), (7e-4,)],
+    starts=lambda s: [(delay_s,) for delay_s in (1.5e-4, 7e-4, *s.delays_s(0.0, _MOST_S))],
     typical=lambda a: (5e-4,),
     proportional=False,
+    shifts_time=True,
     picture=Picture.DRIVE_LAW,
 )

@@ -13,7 +13,8 @@ from hil.bench.bench_file import Bench
 from hil.bench.hardware import SetPointLimits
 from hil.diagnosis.candidate_motions import candidates, reach
 from hil.diagnosis.experiment import Experiment, separating, showing
-from hil.diagnosis.search.forward_selection import Explanation, RivalFit
+from hil.diagnosis.search.forward_selection import Explanation
+from hil.diagnosis.search.rivals import RivalFit
 from hil.diagnosis.verdict.judge import not_testable
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit

@@ -7,7 +7,8 @@ import pytest
 from diagnosis_runs import bench, dataset, recorded
 
 from hil.bench.bench_file import Bench, MechanismEntry
-from hil.diagnosis.search.forward_selection import Explanation, RivalFit
+from hil.diagnosis.search.forward_selection import Explanation
+from hil.diagnosis.search.rivals import RivalFit
 from hil.diagnosis.search.score_test import screen_library
 from hil.diagnosis.verdict.cross_validation import cross_validate
 from hil.diagnosis.verdict.findings import diagnosed_bench, findings, renamed

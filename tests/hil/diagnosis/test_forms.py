@@ -8,7 +8,8 @@ import pytest
 from diagnosis_runs import bench, dataset, fitted, recorded
 
 from hil.diagnosis.result import Finding
-from hil.diagnosis.search.forward_selection import Explanation, RivalFit
+from hil.diagnosis.search.forward_selection import Explanation
+from hil.diagnosis.search.rivals import RivalFit
 from hil.diagnosis.verdict.cross_validation import CrossValidation, cross_validate
 from hil.diagnosis.verdict.findings import OF_ITS_FORM, diagnosed_bench, findings, form_of
 from hil.identification.hypothesis import Hypothesis

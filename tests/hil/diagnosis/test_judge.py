@@ -8,7 +8,8 @@ from diagnosis_runs import bench, changed, dataset, evaluated, fitted, recorded,
 
 from hil.bench.bench_file import Bench
 from hil.diagnosis.result import Verdict
-from hil.diagnosis.search.forward_selection import Explanation, RivalFit
+from hil.diagnosis.search.forward_selection import Explanation
+from hil.diagnosis.search.rivals import RivalFit
 from hil.diagnosis.verdict.cross_validation import cross_validate, explained_share
 from hil.diagnosis.verdict.findings import diagnosed_bench, findings, renamed
 from hil.diagnosis.verdict.judge import judge, names_stand, not_testable

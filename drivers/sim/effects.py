@@ -87,6 +87,9 @@ CATALOGUE: Mapping[str, Definition] = MappingProxyType({
         {"force_n": _AT_LEAST_0, "frequency_hz": _POSITIVE, "phase_rad": _PHASE}),
     "spring_load": Definition(
         "-stiffness (x - rest) on the table", {"stiffness_n_m": _AT_LEAST_0, "rest_position_m": _ANY}),
+    "end_stop": Definition(
+        "elastic stop on the table: -stiffness (x - edge) beyond the edge, 0 before it; upper or lower end",
+        {"stiffness_n_m": _AT_LEAST_0, "edge_m": _ANY}, ("upper end", "lower end")),
     "gravity_torque": Definition(
         "-m g r sin(angle + offset) on a load that turns, its angle [rad] the position of the table",
         {"gravity_torque_n_m": _AT_LEAST_0, "angle_rad": _PHASE}),

@@ -74,7 +74,7 @@ def springs(p: Any, s: Any) -> None:
 
 @njit(cache=True)
 def table_force(p: Any, position_m: float, time_s: float) -> float:
-    """Force [N] on the table from outside: a push during a window, spring, gravity of an arm, vibration, hammering."""
+    """Force [N] on the table from outside: push in a window, spring, stop, gravity of an arm, vibration, hammering."""
     force: float = -p.spring_load.stiffness_n_m * (position_m - p.spring_load.rest_position_m)
     e = p.external_force
     if e.start_s <= time_s < e.end_s:
@@ -82,6 +82,10 @@ def table_force(p: Any, position_m: float, time_s: float) -> float:
     if p.periodic_force.on:
         turns = p.periodic_force.frequency_hz * time_s + p.periodic_force.phase_rad / (2.0 * pi)
         force += p.periodic_force.force_n * cos(2.0 * pi * (turns - np.floor(turns) - 0.25))
+    if p.end_stop.on:
+        side = 1.0 - 2.0 * p.end_stop.form
+        pressed = side * (position_m - p.end_stop.edge_m)
+        force -= 0.5 * side * p.end_stop.stiffness_n_m * (pressed + abs(pressed))
     if p.gravity_torque.on:
         weight = p.gravity_torque
         force += weight.gravity_torque_n_m * sin(-position_m - weight.angle_rad)

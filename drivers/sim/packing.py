@@ -27,7 +27,8 @@ GROUPS = {
     "drive_path": ("torque_saturation", "torque_dead_zone", "current_loop_lag", "transport_delay"),
     "angle_torque": ("torque_ripple", "torque_constant_saturation", "cogging_torque", "novel_torque_fade"),
     "table_force": (
-        "external_force", "periodic_force", "spring_load", "gravity_torque", "novel_vibration", "novel_hammering",
+        "external_force", "periodic_force", "spring_load", "end_stop", "gravity_torque", "novel_vibration",
+        "novel_hammering",
     ),
 }  # fmt: skip
 LARGEST_PHASE_STEP = 1.5  # omega h; leapfrog is stable below 2, less with damping

@@ -36,14 +36,15 @@ def channel_names(bench: Bench, run: Measured) -> dict[str, str]:
 
 
 def label(term: Term, bench: Bench) -> str:
-    """Name a term, with its period or order if the effect may act more than once."""
+    """Name a term, with its period, order or variant if the effect may act more than once."""
     mechanism = BY_ID[term.effect]
     if mechanism.most == 1:
         return title(term.effect)
     period_m, order = (mechanism.named(role, term.values) for role in (Role.PERIOD, Role.ORDER))
     if period_m is not None:
         return f"{title(term.effect)}, every {quantity(period_m, 'm')}"
-    return title(term.effect) if order is None else f"{title(term.effect)}, {_wave(order, bench)}"
+    which = mechanism.forms[term.variant] if order is None else _wave(order, bench)
+    return f"{title(term.effect)}, {which}"
 
 
 def _wave(order: float, bench: Bench) -> str:

@@ -103,13 +103,14 @@ def is_load(term: Term) -> bool:
 
 
 def repeats(one: Term | Active, other: Term | Active) -> bool:
-    """True if two mechanisms are the same: equal effect and period or order, or both `ambiguous`."""
+    """True if two mechanisms are the same: equal effect and period, order or, without these, variant; or both
+    `ambiguous`."""
     if one.effect != other.effect:
         return ambiguous(one) and ambiguous(other)
     for parameter, value, other_value in zip(BY_ID[one.effect].parameters, one.values, other.values, strict=True):
         if parameter.role in (Role.PERIOD, Role.ORDER):
             return max(value, other_value) < _APART * min(value, other_value)
-    return True
+    return BY_ID[one.effect].most == 1 or one.variant == other.variant
 
 
 def free_slot(effect: str, beside: Sequence[Term]) -> int:

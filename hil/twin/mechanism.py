@@ -156,7 +156,7 @@ class Mechanism:
     periodic: str = ""  # sentence of several at equal intervals; may also name count, width and period
     shifts_time: bool = False  # many values are local minima: starts are ranked at their own values
     softens: bool = False  # changes the stiffness of a spring of the chain
-    most: int = 1  # number that may act at once, with periods or orders of their own
+    most: int = 1  # number that may act at once, with periods or orders of their own, or as different variants
     screw_locked: bool = False  # at one slow speed, a share of Coulomb friction that repeats with the screw
     first_unless_clear: bool = False  # an earlier variant is named unless a later one leaves clearly less energy
     same_as: str = ""  # id of a less common cause whose first variant is the same torque as this one's

@@ -48,6 +48,7 @@ class Scene:
     peak_speed: float  # [rad/s]
     viscous_speed: float  # [rad/s] at which viscous friction equals Coulomb friction
     travel_m: float
+    positions_m: tuple[float, float]  # first and last position of the table
     duration_s: float
     period_s: float  # of the rows
     ratio: float  # [m/rad]

@@ -14,10 +14,17 @@ Effects = dict[str, dict[str, float]]  # parameters by the id of the effect
 
 
 def concealed_run(
-    owner: Bench, effects: Effects, far_m: float = 0.4, feeds: tuple[float, float] = (0.15, 0.08), times: int = 2
+    owner: Bench,
+    effects: Effects,
+    far_m: float = 0.4,
+    feeds: tuple[float, float] = (0.15, 0.08),
+    times: int = 2,
+    form: str = "",
 ) -> Recording:
-    """Record the axis of a bench with effects: to `far_m` and back at `feeds` [m/s], `times` times."""
-    listed: list[dict[str, Any]] = [{"effect": effect, "parameters": given} for effect, given in effects.items()]
+    """Record the axis of a bench with effects of a form: to `far_m` and back at `feeds` [m/s], `times` times."""
+    listed: list[dict[str, Any]] = [
+        {"effect": effect, "parameters": given, "form": form} for effect, given in effects.items()
+    ]
     data = owner.model_dump(mode="json") | {"simulation": {"effects": listed}, "drive": {"following_error_m": 0.05}}
     truth = Bench.model_validate(data)
     moves = zip((far_m, 0.0), feeds, strict=True)
@@ -28,7 +35,7 @@ def concealed_run(
     profile = Profile.model_validate(
         {
             "schema_version": 1,
-            "limits": {"velocity_m_s": 0.3, "acceleration_m_s2": 3.0, "jerk_m_s3": 100.0},
+            "limits": {"velocity_m_s": max(0.3, *feeds), "acceleration_m_s2": 3.0, "jerk_m_s3": 100.0},
             "segments": [{"kind": "repeat", "times": times, "segments": legs}],
         }
     )

@@ -127,6 +127,7 @@ def scene(runs: Sequence[Measured], bench: Bench, blocks: Sequence[dict[str, Flo
         peak_speed=max(float(np.max(np.abs(d.velocity))) for d in found),
         viscous_speed=max(physics.viscous_speed, 1e-6),
         travel_m=travel,
+        positions_m=axis_facts(bench, runs).positions_m,
         duration_s=max(run.motor.size * run.period_s for run in runs),
         period_s=runs[0].period_s,
         ratio=ratio,

@@ -49,6 +49,7 @@ SHOWN = {
     "external_force": {"force_n": 300.0, "start_s": 0.4, "end_s": 0.8},
     "periodic_force": {"force_n": 300.0, "frequency_hz": 5.0, "phase_rad": 0.3},
     "spring_load": {"stiffness_n_m": 3000.0, "rest_position_m": 0.0},
+    "end_stop": {"stiffness_n_m": 1e5, "edge_m": 0.02},
     "gravity_torque": {"gravity_torque_n_m": 300.0, "angle_rad": 1.0},
     "friction_gradient": {"slope_1_m": 3.0},
     "local_friction": {"fraction": 0.5, "begin_m": 0.01, "end_m": 0.03, "flank_m": 2e-3},
@@ -69,7 +70,7 @@ def test_catalogue_holds_exactly_the_interface() -> None:
         for name, definition in CATALOGUE.items()
     }
     assert required == {name: set(parameters) for name, parameters in SHOWN.items()}
-    assert len(CATALOGUE) == 34
+    assert len(CATALOGUE) == 35
 
 
 @pytest.mark.parametrize("name", SHOWN)

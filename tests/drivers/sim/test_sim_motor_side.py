@@ -172,6 +172,14 @@ def test_spring_load_pulls_the_table_to_its_rest_position() -> None:
     assert outer_force_n(plant, position_m=0.05) == pytest.approx(-2000.0 * 0.03, rel=1e-9)
 
 
+@pytest.mark.parametrize(("form", "free_m", "pressed_m"), [("upper end", 0.0, 0.05), ("lower end", 0.05, -0.02)])
+def test_an_end_stop_pushes_the_table_back_on_one_side(form: str, free_m: float, pressed_m: float) -> None:
+    plant = plant_with(FRICTIONLESS, Effect("end_stop", {"stiffness_n_m": 2000.0, "edge_m": 0.02}, form))
+    assert outer_force_n(plant, position_m=pressed_m) == pytest.approx(-2000.0 * (pressed_m - 0.02), rel=1e-9)
+    plant = plant_with(FRICTIONLESS, Effect("end_stop", {"stiffness_n_m": 2000.0, "edge_m": 0.02}, form))
+    assert outer_force_n(plant, position_m=free_m) == 0.0
+
+
 def test_periodic_force_is_a_sine_of_time() -> None:
     shake = Effect("periodic_force", {"force_n": 40.0, "frequency_hz": 7.0, "phase_rad": 0.3})
     plant = plant_with(FRICTIONLESS, shake)

@@ -52,6 +52,7 @@ TABLE = {
     "external_force": ("table", ["force_n", "start_s", "end_s"]),
     "periodic_force": ("table", ["force_n", "frequency_hz", "phase_rad"]),
     "spring_load": ("table", ["stiffness_n_m", "rest_position_m"]),
+    "end_stop": ("table", ["stiffness_n_m", "edge_m"]),
     "gravity_torque": ("table", ["gravity_torque_n_m", "angle_rad"]),
 }
 

@@ -22,8 +22,8 @@ def motion(*active):
     return Twin(BENCH.axis.physics(), BENCH.gains, active).drive(TORQUE_N_M).motor_position
 
 
-def test_what_has_a_period_or_an_order_may_act_twice() -> None:
-    assert {mechanism.id for mechanism in LIBRARY if mechanism.most > 1} == set(TWICE)
+def test_what_has_a_period_or_an_order_may_act_twice_and_a_stop_at_each_end() -> None:
+    assert {mechanism.id for mechanism in LIBRARY if mechanism.most > 1} == {*TWICE, "end_stop"}
     assert [mechanism.id for mechanism in SLOTS if mechanism.id in TWICE].count("cogging_torque") == 2
 
 
@@ -34,6 +34,11 @@ def test_both_act_each_with_its_own_parameters(effect) -> None:
     np.testing.assert_allclose(motion(second, first), both, rtol=1e-9, atol=1e-12)
     for one in (first, second):
         assert np.ptp(both - motion(one)) > 1e-3
+
+
+def test_a_stop_to_either_side_of_one_edge_is_a_spring() -> None:
+    stops = [Active("end_stop", (2e5, 0.001), variant) for variant in (0, 1)]
+    np.testing.assert_allclose(motion(*stops), motion(Active("spring_load", (2e5, 0.001))), rtol=1e-9, atol=1e-12)
 
 
 def test_two_alike_are_one_of_twice_the_strength() -> None:

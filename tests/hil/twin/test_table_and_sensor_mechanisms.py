@@ -60,6 +60,17 @@ def test_spring_load_pulls_to_rest(stiffness, rest, offset) -> None:
     assert force == pytest.approx(-stiffness * offset, abs=1e-6)
 
 
+@given(stiffness=st.floats(0.0, 1e5), edge=st.floats(-1.0, 1.0), offset=st.floats(0.0, 1.0))
+def test_an_end_stop_only_pushes_back(stiffness, edge, offset) -> None:
+    def force(position, variant):
+        at = AT_REST._replace(table_position_m=position)
+        return call("end_stop", 0.0, at, variant=variant, stiffness_n_m=stiffness, edge_m=edge)
+
+    assert force(edge + offset, 0) == pytest.approx(-stiffness * offset, abs=1e-6)
+    assert force(edge - offset, 1) == pytest.approx(stiffness * offset, abs=1e-6)
+    assert force(edge - offset, 0) == force(edge + offset, 1) == 0.0
+
+
 @given(
     torque=st.floats(0.0, 1e3),
     angle=st.floats(-3.0, 3.0),

@@ -171,6 +171,11 @@ class Mechanism:
         return self.over_time is not None
 
     @property
+    def in_transmission(self) -> bool:
+        """True if it acts between motor and table, which are one mass on a rigid axis."""
+        return all(variant.stage in (Stage.TRANSMISSION, Stage.SCREW) for variant in self.variants)
+
+    @property
     def names(self) -> tuple[str, ...]:
         """Names of its parameters, in order."""
         return tuple(parameter.name for parameter in self.parameters)

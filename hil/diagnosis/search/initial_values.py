@@ -239,7 +239,10 @@ def observable(mechanism: Mechanism, variant: Variant, bench: Bench) -> bool:
     """True if the encoders of a bench can show a variant of a mechanism."""
     if variant.motor_alone:
         return not bench.has_table_encoder
-    return bench.has_table_encoder or not (mechanism.needs_table or variant.needs_table)
+    if bench.has_table_encoder:
+        return True
+    felt = bool(bench.axis.SPRINGS) or not mechanism.in_transmission  # by the motor, as a reaction of the table
+    return felt and not (mechanism.needs_table or variant.needs_table)
 
 
 def judged(effect: str, runs: Sequence[Measured]) -> bool:

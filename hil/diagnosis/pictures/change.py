@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from hil.arrays import FloatArray
-from hil.diagnosis.pictures.view import CHANNEL_LABELS, unit_of_channel
+from hil.diagnosis.pictures.view import label_of_channel, unit_of_channel
 from hil.diagnosis.search.disturbance import disturbance
 from hil.errors import InputError
 from hil.figures.drawing import legend_above, style_axis
@@ -58,7 +58,7 @@ def change_figure(diagnosis: Diagnosis) -> Figure:
         axis.plot(time_s[chosen], factor * lines[1][chosen], color=SIMULATED, linewidth=0.9, label="those of each part")
         if change.told.moment_s is not None:
             axis.axvline(change.told.moment_s, color=DEVIATION, linewidth=1.4, label=f"{change.told.moment_s:.2f} s")
-        style_axis(axis, f"{CHANNEL_LABELS[channel]}\n[{unit}]", "time [s]", run.name)
+        style_axis(axis, f"{label_of_channel(diagnosis, channel)}\n[{unit}]", "time [s]", run.name)
         legend_above(axis)
     return figure
 

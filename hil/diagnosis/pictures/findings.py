@@ -19,6 +19,7 @@ from hil.diagnosis.pictures.view import (
     angle,
     around,
     binned,
+    label_of_channel,
     longest,
     noise,
     position,
@@ -117,7 +118,8 @@ def _residual_over(
         axis.plot(centre, curve * factor, color=SIMULATED, linewidth=1.8, label=CURVE)
         axis.axhline(0.0, color="black", linewidth=0.8)
         legend_above(axis)
-        name = "friction" if against_motion else "change of the torque" if per_torque else CHANNEL_LABELS[channel]
+        name = label_of_channel(diagnosis, channel)
+        name = "friction" if against_motion else "change of the torque" if per_torque else name
         style_axis(axis, f"{name} [{unit}]", f"{label} [{x_unit}]", f"Residual over {label}")
         return Captioned(
             figure,
@@ -212,7 +214,7 @@ def _over_time(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:
         time = view.run.time_s[rows][chosen]
         axis.plot(time, measured[rows][chosen] * factor, color=MEASURED, linewidth=2.4, alpha=0.5, label=POINTS)
         axis.plot(time, modelled[rows][chosen] * factor, color=SIMULATED, linewidth=1.0, label=CURVE)
-        style_axis(axis, f"{CHANNEL_LABELS[channel]} [{unit}]")
+        style_axis(axis, f"{label_of_channel(diagnosis, channel)} [{unit}]")
     axes[0].set_title("Residual over time", loc="left")
     legend_above(axes[0])
     axes[-1].set_xlabel("time [s]")

@@ -102,6 +102,12 @@ def unit_of_channel(diagnosis: Diagnosis, channel: str) -> str:
     return "N" if axis.linear else "N m"
 
 
+def label_of_channel(diagnosis: Diagnosis, channel: str) -> str:
+    """What a residual is, in words: of a linear axis a force."""
+    label = CHANNEL_LABELS[channel]
+    return label.replace("torque", "force") if diagnosis.owner.axis.linear else label
+
+
 def noise(run: Measured, channel: str) -> float:
     """White noise (1 sigma) of a residual."""
     return {"motor": run.noise.motor, "table": run.noise.table_m}.get(channel, run.noise.torque)

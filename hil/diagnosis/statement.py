@@ -75,12 +75,14 @@ def _of_axis(change: AxisChange, result: Result) -> str:
 
 
 def _growth(one: Correction) -> float:
-    """Absolute logarithm of value over nominal; 0 where their ratio says nothing: of angles, and over a zero."""
-    return abs(math.log(one.value / one.nominal)) if one.unit != "rad" and one.value * one.nominal > 0.0 else 0.0
+    """Absolute logarithm of value over nominal, infinite over a zero; 0 where their ratio says nothing: of angles."""
+    if one.unit == "rad" or one.value * one.nominal < 0.0:
+        return 0.0
+    return abs(math.log(one.value / one.nominal)) if one.nominal else math.inf
 
 
 def _changed(name: str, one: Correction) -> str:
-    if _growth(one):
+    if 0.0 < _growth(one) < math.inf:
         return f"{name} {100.0 * (one.value / one.nominal - 1.0):+.1f} %"
     return f"{name} {quantity(one.value, one.unit)} instead of {quantity(one.nominal, one.unit)}"
 

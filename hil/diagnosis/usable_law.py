@@ -91,13 +91,14 @@ def at_set_points(runs: Sequence[Measured], bench: Bench) -> LawCheck:
         travel, resting = float(np.ptp(run.position_command_m)), ~run.moving
         behind = (run.position_command_m - bench.axis.ratio_m_rad * run.motor)[resting]
         away = float(np.median(behind)) if behind.size else 0.0
-        if abs(away) > max(_AWAY * travel, _AWAY_M):
+        if travel and abs(away) > max(_AWAY * travel, _AWAY_M):
             where = "behind" if away > 0.0 else "beyond"
-            return set_aside(
+            law = set_aside(
                 bench,
                 f"in {run.name} the motor rests {100.0 * abs(away) / travel:.3g} % of the travel {where} its "
                 "set-points: the loop yields to a load, or the zeros differ; an offset in the map corrects a zero",
             )
+            return replace(law, advice=law.notes[0])
     return LawCheck(bench)
 
 

@@ -60,7 +60,7 @@ def assumed(column: str) -> CountSize:
         f"{column}: is in counts, and no other column tells their size; 1 um per count is taken: lengths, speeds, "
         "masses and stiffness are in multiples of it, and nothing is told per revolution. In the map correct "
         "counts_per_m of each channel in counts; or, of a rotary encoder, give them counts_per_rev instead, rename "
-        "motor_position_m to motor_position_rad and force_n to torque_n_m, and add lead_m: 6.283185 (of a "
+        "motor_position_m to motor_position_rad and force_n to torque_n_m (N to N m), and add lead_m: 6.283185 (of a "
         "rotary axis without a gear)"
     )
     return CountSize({"counts_per_m": _ASSUMED_PER_M}, note)

@@ -32,8 +32,8 @@ def lead_of(recording: Recording, transmission: TransmissionValues | None) -> Es
         return Estimate(ROTARY_LEAD_M, 0.0, "one encoder and no set-points: no ratio is told")
     if abs(measured.value - ROTARY_LEAD_M) < max(DIRECT * ROTARY_LEAD_M, _LIKELY * measured.std_error):
         return Estimate(ROTARY_LEAD_M, measured.std_error, f"direct; {measured.how}")
-    told, usual = recording.metadata.get("lead_m", ROTARY_LEAD_M), usual_lead(measured.value)
-    lead = told if told != ROTARY_LEAD_M and _agrees(told, measured) else usual
+    told, usual = recording.metadata.get("lead_m"), usual_lead(measured.value)
+    lead = told if told not in (None, ROTARY_LEAD_M) and _agrees(told, measured) else usual
     if lead == measured.value:
         return measured
     if _agrees(lead, measured):

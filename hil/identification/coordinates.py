@@ -45,6 +45,11 @@ class Coordinate:
         return float(np.log(value / self.scale)) if self.logarithmic else value / self.scale
 
     @property
+    def left_out(self) -> bool:
+        """True for friction of the axis that the bench gives as 0."""
+        return self.parameter is None and self.low == 0.0
+
+    @property
     def bounds(self) -> tuple[float, float]:
         """Bounds of x."""
         return self.x(self.low), self.x(self.high)

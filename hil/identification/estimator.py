@@ -122,10 +122,14 @@ class Fit:
 
     @property
     def at_bound(self) -> tuple[str, ...]:
-        """Names of the parameters that ended at a bound."""
+        """Names of the parameters that ended at a bound; friction that is 0, as the bench has it, is at none."""
         low, high = self.hypothesis.bounds
-        x, names = self.hypothesis.x, [coordinate.name for coordinate in self.hypothesis.coordinates]
-        return tuple(name for name, value, a, b in zip(names, x, low, high, strict=True) if value <= a or value >= b)
+        x, coordinates = self.hypothesis.x, self.hypothesis.coordinates
+        return tuple(
+            one.name
+            for one, value, a, b in zip(coordinates, x, low, high, strict=True)
+            if (value <= a and not one.left_out) or value >= b
+        )
 
     @property
     def status(self) -> FitStatus:

@@ -11,8 +11,8 @@ _REACH = 5  # rows on each side over which a channel must move
 _FAST = 2.0  # least steps of a channel from row to row by which a motion is told from rest: each sample is new there
 _STRAIGHT = 0.5  # of the path that a motion makes in one direction: noise goes to and fro
 _MANY = 0.1  # share of repeated rows in motion: below, a few lost samples and no logger that is faster
-_CREEPS = 0.3  # usual steps: those around a lost sample are longer; a jump from rest is none
-_CATCHES_UP = 1.5  # usual steps: the row after a lost sample moves by two, the others by less than this
+_EVEN = 0.2  # deviation of the other steps from the usual one: noise and coarse counts make larger ones
+_TWO = (1.7, 2.3)  # usual steps by which the row after a lost sample moves
 _LEAST_ROWS = 100  # in motion, for a share to a few per cent
 _WHOLE = 0.02  # deviation from a whole ratio of the rates
 _IN_STEP = 0.95  # share of the new samples at one phase of a whole ratio
@@ -62,8 +62,8 @@ def lost_samples(columns: Mapping[str, FloatArray]) -> NDArray[np.bool_]:
         usual = (values[rows + _REACH] - values[rows - _REACH]) / (2 * _REACH)
         steps, size, way = np.diff(values), np.abs(usual), np.sign(usual)
         around = way * np.array([steps[rows + offset] for offset in range(-_REACH, _REACH) if offset not in (-1, 0)])
-        steady = (around.min(axis=0) > _CREEPS * size) & (around.max(axis=0) < _CATCHES_UP * size)
-        caught_up |= steady & (way * steps[rows] > _CATCHES_UP * size)
+        even = np.abs(around - size).max(axis=0) < _EVEN * size
+        caught_up |= even & (way * steps[rows] > _TWO[0] * size) & (way * steps[rows] < _TWO[1] * size)
     lost = np.zeros(held.size, dtype=np.bool_)
     lost[rows[caught_up]] = True
     return lost

@@ -74,9 +74,21 @@ def row_clock(columns: Mapping[str, FloatArray], kept: list[slice], period_s: fl
             counts.append([np.arange(times.size) for times in stamps])
     shares = [stamp_share(columns, kept, ticks) for ticks in counts]
     for ticks, share in zip(counts, shares, strict=True):
-        if share.says_rows or (whole and not share.says_stamps):
+        if (share.says_rows and _follow(stamps, ticks)) or (whole and not share.says_stamps):
             return RowClock(ticks, slope(stamps, ticks), _jitter_s(stamps, ticks)), True
     return None, shares[0].says_stamps
+
+
+def _follow(times: list[FloatArray], ticks: list[Ticks]) -> bool:
+    """True if stamps follow the ticks to half a period; they leave them where missing rows were not counted."""
+    period_s = slope(times, ticks)
+    for time_s, at in zip(times, ticks, strict=True):
+        late = (time_s - time_s[0]) / period_s - at
+        near = min(2 * _REACH, late.size)
+        smooth = np.median(sliding_window_view(late - np.median(late), near), axis=1)
+        if np.max(np.abs(smooth)) > 0.5:
+            return False
+    return True
 
 
 def row_ticks(time_s: FloatArray) -> Ticks:

@@ -27,6 +27,8 @@ from hil.quantities import digits, unit_of
 from hil.twin.library import BY_ID, LIBRARY
 from hil.twin.parameter import Dimension, Role
 
+_SURE = 3.0  # standard errors from which friction that the bench leaves out is told
+
 
 def renamed(found: Fit) -> Fit:
     """The fit with a constant load renamed to asymmetric friction, where that is valid and the bench has no load.
@@ -114,7 +116,10 @@ def corrections(owner: Bench, found: Fit) -> dict[str, Correction]:
             unit=unit_of(one.name) if one.parameter is None else unit_in(owner, one.parameter),
         )
         for before, one, value, std in entries
-        if one.name in told and one.name not in (*found.at_bound, DELAY) and not math.isclose(value, before)
+        if one.name in told
+        and one.name not in (*found.at_bound, DELAY)
+        and not math.isclose(value, before)
+        and (before or value > _SURE * std)
     }
 
 

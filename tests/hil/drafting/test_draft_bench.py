@@ -134,6 +134,13 @@ def test_the_lead_of_the_map_stands_where_the_measured_one_does_not_contradict_i
     assert found.value == pytest.approx(lead, rel=1e-6)
 
 
+def test_a_map_without_a_lead_leaves_the_measured_one() -> None:
+    angle = 100.0 * np.sin(np.arange(4000) * 1e-3)
+    columns = {"motor_position_rad": angle, "position_command_m": 0.0123 * angle / (2.0 * np.pi)}
+    found = lead_of(Recording("belt", columns, 1e-3, {"lead_m": None}), None)
+    assert found.value == pytest.approx(0.0123, rel=1e-6)
+
+
 def test_a_gear_follows_from_two_angles(tmp_path: Path) -> None:
     columns = {"time_s": AXIS["t"], "motor_angle_rad": AXIS["angle"], "load_angle_rad": AXIS["angle"] / 50.0}
     bench = load_bench(drafted(tmp_path, columns | {"torque_Nm": AXIS["torque"]}))

@@ -146,3 +146,16 @@ def test_stamps_of_whole_milliseconds_of_a_clock_of_2_5_ms_are_counted() -> None
     assert found is not None
     assert found.period_s == pytest.approx(2.5e-3, rel=1e-5)
     np.testing.assert_array_equal(found.ticks[0], ticks)
+
+
+def test_rows_are_not_the_clock_where_missing_ones_cannot_be_counted() -> None:
+    """One row of twenty is missing, and the stamps jitter by a fifth of a period: a count of all would drift."""
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        kept = np.sort(rng.choice(20_000, 19_000, replace=False))
+        time_s = 1e-3 * kept + rng.normal(0.0, 0.2e-3, kept.size)
+        time_s = np.maximum.accumulate(time_s + 1e-9 * np.arange(kept.size))
+        columns = {"time_s": time_s, "position_m": motion(1e-3 * kept)}
+        clock, _ = row_clock(columns, [slice(0, kept.size)], 1e-3)
+        if clock is not None:
+            assert np.max(np.abs(clock.ticks[0] - (kept - kept[0]))) <= 1

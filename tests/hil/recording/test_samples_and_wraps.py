@@ -50,6 +50,14 @@ def test_rest_slow_counts_and_a_jump_from_rest_are_no_lost_samples() -> None:
         assert not lost_samples(columns).any()
 
 
+@pytest.mark.parametrize("counts_per_row", [2.0, 4.0])
+def test_noise_of_half_a_count_is_no_lost_sample(counts_per_row: float) -> None:
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        counts = np.round(counts_per_row * np.arange(4000) + rng.normal(0.0, 0.5, 4000))
+        assert not lost_samples({"angle": counts, "torque": np.repeat(rng.normal(0.0, 1.0, 100), 40)}).any()
+
+
 def test_rest_and_coarse_counts_are_no_repetitions() -> None:
     slow = {"angle": np.round(COUNTS / 400.0), "torque": np.round(COLUMNS["torque"])}
     assert rows_per_sample(slow) == 1.0

@@ -1,7 +1,7 @@
-"""Whether the control law of a bench can be used on recordings, and what was found of it.
+"""Decide whether the control law of a bench can be replayed on recordings; `LawCheck` holds the result.
 
-It is set aside where recordings lack what a replay needs, or a motor rests away from its set-points. The plant is then
-judged alone.
+The law is set aside, and the plant judged alone, if recordings lack what a replay needs or if the motor rests away from
+its set-points.
 """
 
 from collections.abc import Sequence

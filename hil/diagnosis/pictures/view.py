@@ -103,7 +103,7 @@ def unit_of_channel(diagnosis: Diagnosis, channel: str) -> str:
 
 
 def label_of_channel(diagnosis: Diagnosis, channel: str) -> str:
-    """What a residual is, in words: of a linear axis a force."""
+    """Axis label of the residual of a channel, with "force" for "torque" on a linear axis."""
     label = CHANNEL_LABELS[channel]
     return label.replace("torque", "force") if diagnosis.owner.axis.linear else label
 

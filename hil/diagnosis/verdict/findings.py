@@ -199,7 +199,7 @@ def _evidence(rival: RivalFit) -> str:
 
 
 def _tie(rival: RivalFit) -> str:
-    """What makes a rival equivalent to the named term, and why it is not named if the evidence favours it."""
+    """Reason why a rival counts as equivalent and, if the evidence favours it, why the other term is named."""
     if rival.evidence >= TIED:
         return f"{_evidence(rival)}, but the difference is below the model accuracy"
     return f"{_evidence(rival)}{f', but {rival.behind}' if rival.behind else ''}"

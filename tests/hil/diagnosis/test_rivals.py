@@ -105,7 +105,7 @@ def test_what_explains_more_is_named_unless_there_is_an_objection(monkeypatch: p
 
 
 def explained(cost: float, motor: float, table: float) -> Any:
-    """What the choice of a term reads of a fit: cost, and mean square over noise of two channels of 1000 rows."""
+    """Stand-in for a fit: its cost, and the mean squares of motor and table residuals over their noise."""
     run = SimpleNamespace(motor=np.zeros(1000), judged=slice(None))
     data = SimpleNamespace(runs=(run,))
     return SimpleNamespace(

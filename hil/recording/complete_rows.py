@@ -46,10 +46,10 @@ def complete_rows(columns: Mapping[str, FloatArray], rows_per_sample: float | No
         )
     told = {name: values[rows] for name, values in columns.items() if name != "time_s"}
     lost = lost_samples(told) if rows_per_sample is None else np.zeros(rows.size, dtype=np.bool_)
-    if lost.any() and lost.mean() <= REPEATS:
+    if lost.any():
         notes.append(
-            f"lost samples: {lost.sum()} rows in motion repeat all values of the row before, first row "
-            f"{int(rows[lost][0]) + 1} of the numbers; they are left out and interpolated"
+            f"lost samples: {lost.sum()} rows ({lost.mean():.1%}) in motion repeat all values of the row before, "
+            f"first row {int(rows[lost][0]) + 1} of the numbers; they are left out and interpolated"
         )
         rows = rows[~lost]
     if rows_per_sample is not None:

@@ -13,6 +13,8 @@ _STRAIGHT = 0.5  # of the path that a motion makes in one direction: noise goes 
 _MANY = 0.1  # share of repeated rows in motion: below, a few lost samples and no logger that is faster
 _EVEN = 0.2  # deviation of the other steps from the usual one: noise and coarse counts make larger ones
 _TWO = (1.7, 2.3)  # usual steps by which the row after a lost sample moves
+_CHANCE = 0.05  # rows at which a column repeats alone, over those at which all do: these are then not by chance
+_MOST = 0.5  # share of the rows at which all repeat that the next one catches up: after lost samples, not otherwise
 _LEAST_ROWS = 100  # in motion, for a share to a few per cent
 _WHOLE = 0.02  # deviation from a whole ratio of the rates
 _IN_STEP = 0.95  # share of the new samples at one phase of a whole ratio
@@ -24,7 +26,7 @@ def rows_per_sample(columns: Mapping[str, FloatArray]) -> float:
     Counted in rows in which a channel moves by several of its steps: no new sample repeats all channels there.
     """
     new, moving = _new(columns), _moving(columns)
-    if moving.sum() < _LEAST_ROWS or np.mean(~new[moving]) < _MANY:
+    if moving.sum() < _LEAST_ROWS or np.mean(~new[moving]) < _MANY or lost_samples(columns)[~new & moving].all():
         return 1.0
     ratio = float(moving.sum() / max(new[moving].sum(), 1))
     return float(round(ratio)) if abs(ratio - round(ratio)) < _WHOLE * ratio else float(f"{ratio:.4g}")
@@ -51,22 +53,41 @@ def kept_rows(columns: Mapping[str, FloatArray], ratio: float) -> NDArray[np.int
 
 
 def lost_samples(columns: Mapping[str, FloatArray]) -> NDArray[np.bool_]:
-    """Rows (n,) of a motion in which a sample was lost: all columns repeat the row before, the next row catches up.
+    """Rows (n,) of a motion in which a sample was lost: all columns repeat the row before, a later row catches up.
 
-    For a few of them: many are a faster logger (`rows_per_sample`).
+    Where a column seldom repeats unless all do, and most such rows are caught up by the next, these are all of them;
+    else only those that the next row catches up in an even motion.
     """
-    held = ~_new(columns) & _moving(columns)
-    rows = np.flatnonzero(held)
-    caught_up = np.zeros(rows.size, dtype=np.bool_)
-    for values in columns.values() if rows.size else ():
-        usual = (values[rows + _REACH] - values[rows - _REACH]) / (2 * _REACH)
-        steps, size, way = np.diff(values), np.abs(usual), np.sign(usual)
-        around = way * np.array([steps[rows + offset] for offset in range(-_REACH, _REACH) if offset not in (-1, 0)])
-        even = np.abs(around - size).max(axis=0) < _EVEN * size
-        caught_up |= even & (way * steps[rows] > _TWO[0] * size) & (way * steps[rows] < _TWO[1] * size)
-    lost = np.zeros(held.size, dtype=np.bool_)
-    lost[rows[caught_up]] = True
-    return lost
+    same, moving = ~_new(columns), _moving(columns)
+    held = same & moving
+    if not held.any():
+        return held
+    by_chance = min(np.sum(moving[1:] & ~same[1:] & (np.diff(values) == 0.0)) for values in columns.values())
+    caught_up, judged = _caught_up(columns, np.flatnonzero(held), same)
+    if by_chance <= _CHANCE * held.sum() and judged.any() and caught_up[judged].mean() >= _MOST:
+        return held
+    held[held] = caught_up
+    return held
+
+
+def _caught_up(
+    columns: Mapping[str, FloatArray], rows: NDArray[np.intp], same: NDArray[np.bool_]
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Whether a column moves evenly around each of the rows (k,) and by twice as much in the step after it, and
+    whether enough rows around it are new to tell.
+    """
+    around = rows[:, None] + np.array([offset for offset in range(-_REACH, _REACH) if offset not in (-1, 0)])
+    counted = ~(same[around] | same[around + 1])  # no step to or from another row that repeats
+    total = counted.sum(axis=1)
+    found = np.zeros(rows.size, dtype=np.bool_)
+    for values in columns.values():
+        steps = np.diff(values)
+        usual = np.sum(steps[around] * counted, axis=1) / np.maximum(total, 1)
+        size, way = np.abs(usual), np.sign(usual)
+        even = (np.abs(steps[around] - usual[:, None]) * counted).max(axis=1) < _EVEN * size
+        found |= even & (way * steps[rows] > _TWO[0] * size) & (way * steps[rows] < _TWO[1] * size)
+    judged = total >= _REACH
+    return np.asarray(found & judged), np.asarray(judged)
 
 
 def _new(columns: Mapping[str, FloatArray]) -> NDArray[np.bool_]:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from hil.files.date_stamps import is_date, seconds_of
+from hil.recording.complete_rows import complete_rows
 from hil.recording.held_samples import kept_rows, lost_samples, rows_per_sample
 from hil.recording.wraps import unwrapped, wrap_range
 
@@ -41,6 +42,37 @@ def test_a_few_lost_samples_in_motion_are_found() -> None:
     found = np.flatnonzero(lost_samples(logged))
     assert set(found) <= set(rows)
     assert found.size >= 4  # not where the axis turns
+
+
+@pytest.mark.parametrize("share", [0.01, 0.05, 0.2])
+def test_lost_samples_are_left_out_and_said(share: float) -> None:
+    rows = np.sort(np.random.default_rng(8).choice(np.arange(20, T.size - 20), int(share * T.size), replace=False))
+    fine = COLUMNS | {"torque": COLUMNS["torque"] + RANDOM.normal(0.0, 0.3, T.size)}
+    for columns, least in ((COLUMNS, 0.2), (fine, 0.9)):  # a fine channel repeats only where a sample is lost
+        logged = {name: values.copy() for name, values in columns.items()}
+        for values in logged.values():
+            for row in rows:
+                values[row] = values[row - 1]
+        complete = complete_rows(logged | {"time_s": T})
+        left_out = np.setdiff1d(np.arange(T.size), complete.rows)
+        assert set(left_out) <= set(rows)
+        assert left_out.size > least * rows.size  # not where the axis turns
+        assert [note for note in complete.notes if note.startswith(f"lost samples: {left_out.size} rows")]
+
+
+def test_lost_samples_are_no_faster_logger() -> None:
+    fine = COLUMNS | {"torque": COLUMNS["torque"] + RANDOM.normal(0.0, 0.3, T.size)}
+    rows = np.sort(np.random.default_rng(9).choice(np.arange(1, T.size), T.size // 5, replace=False))
+    index = np.arange(T.size)
+    for row in rows:
+        index[row] = index[row - 1]
+    assert rows_per_sample({name: values[index] for name, values in fine.items()}) == 1.0
+
+
+def test_samples_of_a_logger_five_percent_faster_are_not_lost() -> None:
+    index = np.floor(np.arange(int(1.05 * T.size)) / 1.05).astype(int)
+    fine = COLUMNS | {"torque": COLUMNS["torque"] + RANDOM.normal(0.0, 0.3, T.size)}
+    assert not lost_samples({name: values[index] for name, values in fine.items()}).any()
 
 
 def test_rest_slow_counts_and_a_jump_from_rest_are_no_lost_samples() -> None:

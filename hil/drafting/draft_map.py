@@ -34,7 +34,8 @@ def draft_map(path: Path, rate_hz: float | None = None, axis: str | None = None)
     used = {name: columns[name] for name in roles.used}
     refuse_missing(path, used, table.texts)
     # only now it is known which columns must be complete, and which repeat when a sample does
-    ratio = rows_per_sample({name: filled[name] for name in used})
+    positions = [{name: filled[name]} for name in (roles.motor, roles.table) if name]
+    ratio = max(rows_per_sample(one) for one in ({name: filled[name] for name in used}, *positions))
     complete = complete_rows(used | {"time_s": clock.time_s}, ratio if ratio > 1.0 else None)
     kept = {name: values[complete.rows] for name, values in filled.items()}
     even = even_rows(path, kept, complete.columns["time_s"], judged_by=[n for n in used if n != roles.unfollowed])

@@ -36,7 +36,7 @@ def map_text(draft: MapDraft) -> str:
     if clock.resample_hz is not None:
         lines += [f"resample_hz: {clock.resample_hz!r}   # for rows that are missing or taken at uneven moments"]
     if draft.rows_per_sample is not None:
-        lines += [f"rows_per_sample: {draft.rows_per_sample!r}   # the logger repeated samples: each is kept once"]
+        lines += [f"rows_per_sample: {draft.rows_per_sample!r}   # each sample stands in so many rows and is kept once"]
     if draft.missing:
         lines += ["missing: leave_out          # rows without a value; refuse: do not import such a file"]
     options = content.get("csv")

@@ -18,6 +18,7 @@ from hil.recording.quantum import count_of
 _COARSER = 1.5  # factor of a recorded step over the count of the bench: one count, seen with noise, is below
 _RESPONSE_ROWS = 20  # of the current loop and its delays: 4 to 50 ms at 5 kHz to 400 Hz
 _LESS = 0.9  # of the plain deviation: fitted to noise alone, the response takes away less than a hundredth
+_LEVELS = 20  # counts of a torque: fewer are the levels of a command, which are exact
 _DIGITS = 1e-7  # of the largest value: rounding of a recording in single precision, the least noise of a torque
 
 
@@ -56,13 +57,13 @@ def estimate_noise(
     motor_noise, table_noise = max(white_noise(motor), count / np.sqrt(12.0)), 0.0
     if table.size and bench.encoders.table is not None:
         ratio_m = bench.axis.ratio_m_rad
-        counting = np.hypot(_count(table, bench.encoders.table.resolution_m), ratio_m * count) / np.sqrt(12.0)
-        table_noise = max(white_noise(table - ratio_m * motor), float(counting))
+        counts = np.hypot(_count(table, bench.encoders.table.resolution_m), ratio_m * count)
+        table_noise = max(white_noise(table - ratio_m * motor), float(counts) / np.sqrt(12.0))
     if not np.array_equal(command, torque):
         of_torque = _of_drive(command, torque)
     else:  # the steps of a held command are no noise
         of_torque = 0.0 if is_held(torque, motor) else white_noise(torque)
-    of_torque = max(of_torque, _DIGITS * float(np.max(np.abs(torque), initial=0.0)))
+    of_torque = max(of_torque, _rounding(torque), _DIGITS * float(np.max(np.abs(torque), initial=0.0)))
     jitter_s = _jitter_s(motor, velocity, motor_noise, period_s)
     return Noise(motor_noise, table_noise, of_torque, jitter_s, coarse=count > bench.motor_count)
 
@@ -71,6 +72,12 @@ def _count(values: FloatArray, of_bench: float) -> float:
     """Count of a channel (n,): that of the bench, or the step of the values if it is clearly coarser."""
     step = count_of(values) or 0.0
     return step if step > _COARSER * of_bench else of_bench
+
+
+def _rounding(torque: FloatArray) -> float:
+    """Noise of a torque (n,) that was recorded in counts; 0 for a command of few levels, such as a binary sequence."""
+    step = count_of(torque) or 0.0
+    return step / np.sqrt(12.0) if np.ptp(torque) > _LEVELS * step else 0.0
 
 
 def moving(velocity: FloatArray) -> NDArray[np.bool_]:

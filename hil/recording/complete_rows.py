@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hil.arrays import FloatArray
-from hil.recording.held_samples import kept_rows, lost_samples
+from hil.recording.held_samples import kept_rows, lost_samples, repeating
 from hil.recording.stamps import REPEATS
 
 
@@ -54,9 +54,11 @@ def complete_rows(columns: Mapping[str, FloatArray], rows_per_sample: float | No
         rows = rows[~lost]
     if rows_per_sample is not None:
         kept = kept_rows(told, rows_per_sample)
+        slow = repeating(told, rows_per_sample)
+        which = f"{', '.join(slow)}: sampled more slowly than the rows" if 0 < len(slow) < len(told) else "all columns"
         notes.append(
-            f"repeated samples: the logger ran {rows_per_sample:g} times as fast as the loop; {kept.size} of "
-            f"{rows.size} rows are kept, one per sample"
+            f"repeated samples: each stands in {rows_per_sample:g} rows ({which}); {kept.size} of {rows.size} rows are "
+            "kept, one per sample"
         )
         rows = rows[kept]
     return CompleteRows({name: values[rows] for name, values in columns.items()}, rows, tuple(notes))

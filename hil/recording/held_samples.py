@@ -1,4 +1,7 @@
-"""Find samples that a logger repeated because it ran faster than the loop, and keep each of them once."""
+"""Find samples that a logger repeated, and keep each of them once; find rows whose sample was lost.
+
+A logger repeats all channels if it runs faster than the loop, one channel if that is sampled more slowly than the rest.
+"""
 
 from collections.abc import Mapping
 
@@ -32,12 +35,19 @@ def rows_per_sample(columns: Mapping[str, FloatArray]) -> float:
     return float(round(ratio)) if abs(ratio - round(ratio)) < _WHOLE * ratio else float(f"{ratio:.4g}")
 
 
+def repeating(columns: Mapping[str, FloatArray], ratio: float) -> list[str]:
+    """Names of the columns (n,) of which each sample stands in `ratio` rows."""
+    return [name for name, values in columns.items() if rows_per_sample({name: values}) == ratio]
+
+
 def kept_rows(columns: Mapping[str, FloatArray], ratio: float) -> NDArray[np.intp]:
     """Rows to keep so that each sample stands once, for `ratio` rows per sample.
 
     At a whole ratio every so many rows from that at which most samples are new; else each new sample, and at rest,
-    where samples do not differ, one row per `ratio`.
+    where samples do not differ, one row per `ratio`. The columns that repeat at this ratio tell which are new.
     """
+    slow = repeating(columns, ratio)
+    columns = {name: columns[name] for name in slow} if slow else columns
     new = _new(columns)
     rows = np.flatnonzero(new & _moving(columns))
     if ratio == round(ratio) and rows.size:

@@ -10,7 +10,7 @@ from scipy.signal import lfilter
 from hil.errors import InputError
 from hil.identification.dataset import prepare_dataset
 from hil.identification.measured import take
-from hil.identification.noise import _jitter_s, _of_drive, white_noise
+from hil.identification.noise import _jitter_s, _of_drive, _rounding, white_noise
 from hil.identification.rest import resting
 
 PERIOD_S = 1e-3
@@ -86,6 +86,22 @@ def test_a_torque_without_noise_has_that_of_its_digits_and_one_of_zero_is_refuse
     zero.columns["torque_command_n_m"] = zero["torque_n_m"]
     with pytest.raises(InputError, match="torque: given 0 throughout"):
         prepare_dataset([take(zero, bench())], bench())
+
+
+@pytest.mark.parametrize("step", [0.05, 0.2])
+def test_a_torque_in_counts_has_at_least_their_noise(step: float) -> None:
+    quiet = recorded(bench(), torque_noise_n_m=0.0)
+    counts = step * np.round(quiet["torque_n_m"] / step)
+    measured = take(
+        replace(quiet, columns={**quiet.columns, "torque_n_m": counts, "torque_command_n_m": counts}), bench()
+    )
+    assert measured.noise.torque >= 0.99 * step / np.sqrt(12.0)
+
+
+def test_a_binary_command_has_no_noise_of_counts() -> None:
+    signs = np.sign(np.random.default_rng(2).standard_normal(4000))
+    assert _rounding(signs) == 0.0
+    assert _rounding(np.round(np.cumsum(signs))) == pytest.approx(1.0 / np.sqrt(12.0))
 
 
 @pytest.mark.parametrize("late_rows", [0, 3])

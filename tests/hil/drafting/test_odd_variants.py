@@ -116,12 +116,23 @@ def test_a_counter_that_wraps_is_unwrapped_and_said(tmp_path: Path, values: np.n
     assert draft.lead_m == pytest.approx(LEAD_M, rel=1e-3)
 
 
+def test_a_position_sampled_more_slowly_than_the_torque_is_said_and_kept_once(tmp_path: Path) -> None:
+    columns = renamed(AXIS, **NAMES)
+    position = next(name for name, values in columns.items() if values is AXIS["angle"])
+    held = np.arange(AXIS["t"].size) // 4 * 4
+    draft, recording = imported(write(tmp_path / "log.csv", columns | {position: AXIS["angle"][held]}))
+    assert draft.rows_per_sample == 4.0
+    assert any(f"each stands in 4 rows ({position}: sampled more slowly than the rows)" in one for one in draft.unsure)
+    assert recording.period_s == pytest.approx(4e-3)
+    np.testing.assert_allclose(recording["motor_position_rad"], AXIS["angle"][::4], atol=1e-5)
+
+
 def test_repeated_samples_are_said_and_kept_once(tmp_path: Path) -> None:
     columns = {name: np.repeat(values, 2) for name, values in renamed(AXIS, **NAMES).items()}
     columns["time_s"] = np.arange(2 * AXIS["t"].size) * 5e-4
     draft, recording = imported(write(tmp_path / "log.csv", columns))
     assert draft.rows_per_sample == 2.0
-    assert any("2 times as fast as the loop" in note for note in draft.unsure)
+    assert any("each stands in 2 rows" in note for note in draft.unsure)
     assert recording.period_s == pytest.approx(1e-3)
     np.testing.assert_allclose(recording["motor_position_rad"], AXIS["angle"], atol=1e-5)
 

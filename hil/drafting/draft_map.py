@@ -10,7 +10,7 @@ from hil.drafting.column_names import label
 from hil.drafting.even_rows import even_rows, filled_in, find_wraps, with_rate, without_duplicates
 from hil.drafting.foreign_table import read_table
 from hil.drafting.map_draft import MapDraft
-from hil.drafting.oddities import jumps_told, refuse_damage, refuse_missing
+from hil.drafting.oddities import jumps_told, limit_told, refuse_damage, refuse_missing
 from hil.drafting.roles import find_roles
 from hil.recording.complete_rows import complete_rows
 from hil.recording.held_samples import rows_per_sample
@@ -34,16 +34,20 @@ def draft_map(path: Path, rate_hz: float | None = None, axis: str | None = None)
     used = {name: columns[name] for name in roles.used}
     refuse_missing(path, used, table.texts)
     # only now it is known which columns must be complete, and which repeat when a sample does
-    positions = [{name: filled[name]} for name in (roles.motor, roles.table) if name]
-    ratio = max(rows_per_sample(one) for one in ({name: filled[name] for name in used}, *positions))
-    complete = complete_rows(used | {"time_s": clock.time_s}, ratio if ratio > 1.0 else None)
+    positions = [name for name in (roles.motor, roles.table) if name]
+    together = ({name: filled[name] for name in used}, *({name: filled[name]} for name in positions))
+    ratio = max(rows_per_sample(one) for one in together)
+    complete = complete_rows(used | {"time_s": clock.time_s}, ratio if ratio > 1.0 else None, positions)
     kept = {name: values[complete.rows] for name, values in filled.items()}
     even = even_rows(path, kept, complete.columns["time_s"], judged_by=[n for n in used if n != roles.unfollowed])
-    jumps = [note for n in (roles.motor, roles.table) if n for note in jumps_told(n, filled[n], clock.time_s)]
+    stamps = clock.time_s[complete.rows]
+    jumps = [note for n in positions for note in jumps_told(n, kept[n], stamps)]
+    measured = [name for name in (roles.effort, roles.effort_command) if name and not labels[name].command]
+    limits = [note for name in measured for note in limit_told(name, kept[name])]
     refuse_damage(path, {name: filled[name] for name in used}, clock.time_s, even.columns, roles, even.period_s)
     clock = with_rate(clock, even)
     unwraps = [f"{name}: wraps at {wraps[name]:g}; it is unwrapped" for name in used if name in wraps]
-    notes = [*doubled, *clock.unsure, *complete.notes, *even.notes, *jumps, *unwraps]
+    notes = [*doubled, *clock.unsure, *complete.notes, *even.notes, *jumps, *limits, *unwraps]
     draft = MapDraft(table, clock, unsure=[*notes, *roles.unsure], left_out=dict(roles.left_out))
     draft.left_out |= dict(remark.split(": ", 1) for remark in table.remarks)
     draft.unsure += [

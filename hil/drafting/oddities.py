@@ -1,6 +1,6 @@
 """Refuse columns that are damaged: many values missing, spikes, jumps, a sign that turns, rows out of order.
 
-Jumps that are small beside the travel, as of a potentiometer that passes its gap, are told.
+Jumps that are small beside the travel, as of a potentiometer that passes its gap, are told, and a torque at a limit.
 """
 
 from pathlib import Path
@@ -22,6 +22,7 @@ SUDDEN = 20.0  # times the change of the rows around: a fast motion is fast for 
 # A row in which a position moves so many times as far as in 95 % of the rows in motion, and the row before or after it
 # less than half as far in this direction, is one of the sensor: an axis speeds up and brakes over several rows.
 FAR, TOP, ALONE = 5.0, 0.95, 0.5
+CLIPPED = 0.002  # share of the rows at the largest or least torque: without a limit one row has it, or a few in counts
 TOLD = 0.8  # share of the torque that the motion of each half must explain before its sign is judged
 
 
@@ -83,6 +84,21 @@ def jumps_told(name: str, values: FloatArray, time_s: FloatArray) -> list[str]:
         f"{size[rows].max() / usual:.0f} times as far as in nearly all others: its sensor, not the axis; leave its "
         "values around there empty, or cut the file there"
     ]
+
+
+def limit_told(name: str, values: FloatArray) -> list[str]:
+    """Note on a torque (n,) that stays at its largest or least value; none for a command of few values."""
+    if np.unique(values).size < FEW_VALUES:
+        return []
+    held = np.r_[False, np.diff(values) == 0.0]
+    for limit in (values.max(), values.min()):
+        share = float(np.mean(held & (values == limit)))
+        if share > CLIPPED:
+            return [
+                f"{name}: stays at {limit:.4g} in {share:.1%} of the rows: a limit of the drive, or the end of the "
+                "range of this channel; if the drive gave more, masses and friction come out too small"
+            ]
+    return []
 
 
 def _refuse_missing(path: Path, name: str, values: FloatArray) -> None:

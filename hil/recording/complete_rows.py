@@ -1,6 +1,6 @@
-"""Leave out rows of a foreign file that hold no new sample: with a missing value, or that repeat the row before."""
+"""Leave out rows of a foreign file that hold no new sample: a value is missing or off, or repeats the row before."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from hil.arrays import FloatArray
 from hil.recording.held_samples import kept_rows, lost_samples, repeating
+from hil.recording.spikes import lone_values
 from hil.recording.stamps import REPEATS
 
 
@@ -20,8 +21,10 @@ class CompleteRows:
     notes: tuple[str, ...]
 
 
-def complete_rows(columns: Mapping[str, FloatArray], rows_per_sample: float | None = None) -> CompleteRows:
-    """Leave out rows of columns (n,) with NaN, and those that repeat the row before with its stamp.
+def complete_rows(
+    columns: Mapping[str, FloatArray], rows_per_sample: float | None = None, positions: Collection[str] = ()
+) -> CompleteRows:
+    """Leave out rows of columns (n,) with NaN or a spike of `positions`, and those that repeat the row before.
 
     `rows_per_sample`: each sample stands in so many rows, of which one is kept. The clock then shows where rows are
     missing: single ones are interpolated, long stretches are gaps (`stamps.regular_rows`).
@@ -61,4 +64,12 @@ def complete_rows(columns: Mapping[str, FloatArray], rows_per_sample: float | No
             "kept, one per sample"
         )
         rows = rows[kept]
+    for name in positions:
+        off = lone_values(columns[name][rows])
+        if off.any():
+            notes.append(
+                f"spikes: {name} is off the motion for one row in {off.sum()} places, first row "
+                f"{int(rows[off][0]) + 1} of the numbers; these rows are left out and interpolated"
+            )
+            rows = rows[~off]
     return CompleteRows({name: values[rows] for name, values in columns.items()}, rows, tuple(notes))

@@ -116,6 +116,22 @@ def test_a_counter_that_wraps_is_unwrapped_and_said(tmp_path: Path, values: np.n
     assert draft.lead_m == pytest.approx(LEAD_M, rel=1e-3)
 
 
+def test_spikes_are_left_out_and_a_torque_at_its_limit_is_said(tmp_path: Path) -> None:
+    columns = renamed(AXIS, **NAMES)
+    position, torque = (
+        next(name for name, values in columns.items() if values is AXIS[key]) for key in ("angle", "torque")
+    )
+    spiked = AXIS["angle"].copy()
+    spiked[[500, 1500]] += 0.02 * np.ptp(spiked)
+    limit = 0.6 * np.abs(AXIS["torque"]).max()
+    odd = columns | {position: spiked, torque: np.clip(AXIS["torque"], -limit, limit)}
+    draft, recording = imported(write(tmp_path / "log.csv", odd))
+    assert any(one.startswith(f"spikes: {position} is off the motion for one row in 2 places") for one in draft.unsure)
+    assert any(one.startswith(f"{torque}: stays at {limit:.4g} in") for one in draft.unsure)
+    np.testing.assert_allclose(recording["motor_position_rad"], AXIS["angle"], atol=2e-3 * np.ptp(AXIS["angle"]))
+    assert not any("stays at" in one for one in imported(write(tmp_path / "whole.csv", columns))[0].unsure)
+
+
 def test_a_position_sampled_more_slowly_than_the_torque_is_said_and_kept_once(tmp_path: Path) -> None:
     columns = renamed(AXIS, **NAMES)
     position = next(name for name, values in columns.items() if values is AXIS["angle"])

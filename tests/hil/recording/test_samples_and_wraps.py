@@ -8,6 +8,7 @@ import pytest
 from hil.files.date_stamps import is_date, seconds_of
 from hil.recording.complete_rows import complete_rows
 from hil.recording.held_samples import kept_rows, lost_samples, rows_per_sample
+from hil.recording.spikes import lone_values
 from hil.recording.wraps import unwrapped, wrap_range
 
 RANDOM = np.random.default_rng(12)
@@ -73,6 +74,25 @@ def test_samples_of_a_logger_five_percent_faster_are_not_lost() -> None:
     index = np.floor(np.arange(int(1.05 * T.size)) / 1.05).astype(int)
     fine = COLUMNS | {"torque": COLUMNS["torque"] + RANDOM.normal(0.0, 0.3, T.size)}
     assert not lost_samples({name: values[index] for name, values in fine.items()}).any()
+
+
+def test_single_values_off_the_motion_are_left_out_and_said() -> None:
+    rows = np.array([300, 1020, 1025, 2500, 3300])
+    angle = ANGLE.copy()
+    angle[rows] += np.array([1.0, -1.0, 2.0, 1.0, -3.0])
+    complete = complete_rows({"angle": angle, "time_s": T}, positions=["angle"])
+    assert set(np.setdiff1d(np.arange(T.size), complete.rows)) == set(rows[[0, 3, 4]])  # two close ones hide each other
+    assert [note for note in complete.notes if note.startswith("spikes: angle is off the motion for one row in 3")]
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.01, 1.0])
+def test_noise_flickering_counts_steps_and_vibration_are_no_spikes(noise: float) -> None:
+    white = np.random.default_rng(6).normal(0.0, 1.0, (20, T.size))
+    step = np.where(T > 2.0, 5.0, 0.0)
+    vibration = np.where(T > 2.0, np.exp(-200.0 * (T - 2.0)) * np.sin(2 * np.pi * 200.0 * T), 0.0)
+    for one in white:
+        for position in (COUNTS, ANGLE, step, np.round(3.0 * vibration, 2)):
+            assert not lone_values(np.round(position + noise * one, 3)).any()
 
 
 def test_rest_slow_counts_and_a_jump_from_rest_are_no_lost_samples() -> None:

@@ -1,0 +1,35 @@
+"""Find single values of a position that its axis cannot have reached: read wrongly, or disturbed on the way."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hil.arrays import FloatArray
+
+_BESIDE = 5  # rows on each side whose deviations tell how the axis moves there
+_FAR = 8.0  # times the deviations of all rows beside it
+_RARE = 10.0  # times the usual deviation: noise and flickering counts stay below
+_FEW = 0.01  # share of the rows: more are no accidents of a sensor
+
+
+def lone_values(position: FloatArray) -> NDArray[np.bool_]:
+    """Rows (n,) at which a position is off the line between its neighbours, which lie on that of their own neighbours.
+
+    An axis goes back within one row only if the rows beside it show the same acceleration. None if they are many.
+    """
+    lone = np.zeros(position.size, dtype=np.bool_)
+    if position.size <= 2 * _BESIDE + 1 or not np.isfinite(position).all():
+        return lone
+    off = np.zeros(position.size)
+    off[1:-1] = np.abs(position[1:-1] - 0.5 * (position[:-2] + position[2:]))
+    if not off.any():
+        return lone
+    rows = np.flatnonzero(off > _RARE * np.median(off[off > 0.0]))
+    rows = rows[(rows >= _BESIDE) & (rows < position.size - _BESIDE)]
+    # a value that is off moves the deviations of its direct neighbours by half: they are no measure of the motion
+    offsets = np.array([row for row in range(-_BESIDE, _BESIDE + 1) if abs(row) > 1])
+    around = off[rows[:, None] + offsets].max(axis=1)
+    between = np.abs(position[rows + 1] - position[rows - 1])
+    found = rows[(off[rows] > _FAR * around) & (off[rows] > between)]
+    if found.size <= _FEW * position.size:
+        lone[found] = True
+    return lone

@@ -13,7 +13,7 @@ from hil.drafting.map_draft import MapDraft
 from hil.drafting.oddities import jumps_told, limit_told, refuse_damage, refuse_missing
 from hil.drafting.roles import find_roles
 from hil.recording.complete_rows import complete_rows
-from hil.recording.held_samples import rows_per_sample
+from hil.recording.held_samples import rows_per_slowest_sample
 from hil.recording.wraps import unwrapped
 
 
@@ -35,8 +35,7 @@ def draft_map(path: Path, rate_hz: float | None = None, axis: str | None = None)
     refuse_missing(path, used, table.texts)
     # only now it is known which columns must be complete, and which repeat when a sample does
     positions = [name for name in (roles.motor, roles.table) if name]
-    together = ({name: filled[name] for name in used}, *({name: filled[name]} for name in positions))
-    ratio = max(rows_per_sample(one) for one in together)
+    ratio = rows_per_slowest_sample({name: filled[name] for name in used}, positions)
     complete = complete_rows(used | {"time_s": clock.time_s}, ratio if ratio > 1.0 else None, positions)
     kept = {name: values[complete.rows] for name, values in filled.items()}
     even = even_rows(path, kept, complete.columns["time_s"], judged_by=[n for n in used if n != roles.unfollowed])

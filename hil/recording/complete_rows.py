@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hil.arrays import FloatArray
-from hil.recording.held_samples import kept_rows, lost_samples, repeating
+from hil.recording.held_samples import kept_rows, lost_samples, slower
 from hil.recording.spikes import lone_values
 from hil.recording.stamps import REPEATS
 
@@ -57,7 +57,7 @@ def complete_rows(
         rows = rows[~lost]
     if rows_per_sample is not None:
         kept = kept_rows(told, rows_per_sample)
-        slow = repeating(told, rows_per_sample)
+        slow = slower(told, rows_per_sample)
         which = f"{', '.join(slow)}: sampled more slowly than the rows" if 0 < len(slow) < len(told) else "all columns"
         notes.append(
             f"repeated samples: each stands in {rows_per_sample:g} rows ({which}); {kept.size} of {rows.size} rows are "

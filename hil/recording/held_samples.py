@@ -3,7 +3,7 @@
 A logger repeats all channels if it runs faster than the loop, one channel if that is sampled more slowly than the rest.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,31 +35,44 @@ def rows_per_sample(columns: Mapping[str, FloatArray]) -> float:
     return float(round(ratio)) if abs(ratio - round(ratio)) < _WHOLE * ratio else float(f"{ratio:.4g}")
 
 
-def repeating(columns: Mapping[str, FloatArray], ratio: float) -> list[str]:
-    """Names of the columns (n,) of which each sample stands in `ratio` rows."""
-    return [name for name, values in columns.items() if rows_per_sample({name: values}) == ratio]
+def rows_per_slowest_sample(columns: Mapping[str, FloatArray], positions: Collection[str]) -> float:
+    """Rows of columns (n,) for each sample of all, or of a position that is sampled more slowly at a whole ratio."""
+    alone = [rows_per_sample({name: columns[name]}) for name in positions]
+    return max([rows_per_sample(columns), *(ratio for ratio in alone if slower(columns, ratio))])
+
+
+def slower(columns: Mapping[str, FloatArray], ratio: float) -> list[str]:
+    """Names of the columns (n,) that alone hold each sample for a whole `ratio` of rows, from one phase; else none."""
+    if ratio == 1.0 or ratio != round(ratio) or rows_per_sample(columns) == ratio:
+        return []
+    return [name for name, values in columns.items() if _phase({name: values}, int(ratio)) is not None]
 
 
 def kept_rows(columns: Mapping[str, FloatArray], ratio: float) -> NDArray[np.intp]:
     """Rows to keep so that each sample stands once, for `ratio` rows per sample.
 
     At a whole ratio every so many rows from that at which most samples are new; else each new sample, and at rest,
-    where samples do not differ, one row per `ratio`. The columns that repeat at this ratio tell which are new.
+    where samples do not differ, one row per `ratio`. Columns that are `slower` than the others tell which are new.
     """
-    slow = repeating(columns, ratio)
+    slow = slower(columns, ratio)
     columns = {name: columns[name] for name in slow} if slow else columns
     new = _new(columns)
-    rows = np.flatnonzero(new & _moving(columns))
-    if ratio == round(ratio) and rows.size:
-        phases = np.bincount(rows % int(ratio), minlength=int(ratio))
-        if phases.max() > _IN_STEP * rows.size:
-            return np.arange(int(phases.argmax()), new.size, int(ratio))
+    if ratio == round(ratio) and (phase := _phase(columns, int(ratio))) is not None:
+        return np.arange(phase, new.size, int(ratio))
     longest = int(np.ceil(ratio))
     kept = [0]
     for row in range(1, new.size):
         if new[row] or row - kept[-1] >= longest:
             kept.append(row)
     return np.array(kept, dtype=np.intp)
+
+
+def _phase(columns: Mapping[str, FloatArray], ratio: int) -> int | None:
+    """First of every `ratio` rows at which nearly all new samples of a motion stand; None if they do not."""
+    if rows_per_sample(columns) != ratio:
+        return None
+    phases = np.bincount(np.flatnonzero(_new(columns) & _moving(columns)) % ratio, minlength=ratio)
+    return int(phases.argmax()) if phases.max() > _IN_STEP * phases.sum() else None
 
 
 def lost_samples(columns: Mapping[str, FloatArray]) -> NDArray[np.bool_]:

@@ -14,7 +14,7 @@ _FEW = 0.01  # share of the rows: more are no accidents of a sensor
 def lone_values(position: FloatArray) -> NDArray[np.bool_]:
     """Rows (n,) at which a position is off the line between its neighbours, which lie on that of their own neighbours.
 
-    An axis goes back within one row only if the rows beside it show the same acceleration. None if they are many.
+    Where an axis turns within one row, its way before or after leads to the value. None if they are many.
     """
     lone = np.zeros(position.size, dtype=np.bool_)
     if position.size <= 2 * _BESIDE + 1 or not np.isfinite(position).all():
@@ -29,7 +29,8 @@ def lone_values(position: FloatArray) -> NDArray[np.bool_]:
     offsets = np.array([row for row in range(-_BESIDE, _BESIDE + 1) if abs(row) > 1])
     around = off[rows[:, None] + offsets].max(axis=1)
     between = np.abs(position[rows + 1] - position[rows - 1])
-    found = rows[(off[rows] > _FAR * around) & (off[rows] > between)]
+    ways = [np.abs(position[rows] - 2.0 * position[rows + one] + position[rows + 2 * one]) for one in (-1, 1)]
+    found = rows[(off[rows] > _FAR * around) & (off[rows] > between) & (np.minimum(*ways) > 0.5 * off[rows])]
     if found.size <= _FEW * position.size:
         lone[found] = True
     return lone

@@ -7,7 +7,7 @@ import pytest
 
 from hil.files.date_stamps import is_date, seconds_of
 from hil.recording.complete_rows import complete_rows
-from hil.recording.held_samples import kept_rows, lost_samples, rows_per_sample
+from hil.recording.held_samples import kept_rows, lost_samples, rows_per_sample, rows_per_slowest_sample, slower
 from hil.recording.spikes import lone_values
 from hil.recording.wraps import unwrapped, wrap_range
 
@@ -93,6 +93,26 @@ def test_noise_flickering_counts_steps_and_vibration_are_no_spikes(noise: float)
     for one in white:
         for position in (COUNTS, ANGLE, step, np.round(3.0 * vibration, 2)):
             assert not lone_values(np.round(position + noise * one, 3)).any()
+
+
+@pytest.mark.parametrize("rows", [50, 250])
+def test_turning_within_one_row_is_no_spike(rows: int) -> None:
+    there_and_back = np.abs(np.arange(4000) % (2 * rows) - rows + 0.3)
+    assert not lone_values(there_and_back).any()
+
+
+def test_a_stepper_and_digits_that_grow_are_not_sampled_more_slowly() -> None:
+    rng = np.random.default_rng(7)
+    torque = rng.normal(0.0, 1.0, 12000)
+    index = np.arange(12000)
+    stepper = np.round(0.05 * (index // 50 + 1 - np.exp(-(index % 50) / 2.0)), 3)
+    feed = np.where(index < 1500, 0.12 * index, 180.0 + 5e-4 * (index - 1500))
+    printed = np.array([float(f"{value:.6g}") for value in feed])
+    for position in (stepper, printed):
+        assert rows_per_slowest_sample({"x": position, "torque": torque}, ["x"]) == 1.0
+    held = feed[index // 3 * 3]
+    assert rows_per_slowest_sample({"x": held, "torque": torque}, ["x"]) == 3.0
+    assert slower({"x": held, "torque": torque}, 3.0) == ["x"]
 
 
 def test_rest_slow_counts_and_a_jump_from_rest_are_no_lost_samples() -> None:

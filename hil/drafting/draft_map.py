@@ -39,8 +39,7 @@ def draft_map(path: Path, rate_hz: float | None = None, axis: str | None = None)
     complete = complete_rows(used | {"time_s": clock.time_s}, ratio if ratio > 1.0 else None, positions)
     kept = {name: values[complete.rows] for name, values in filled.items()}
     even = even_rows(path, kept, complete.columns["time_s"], judged_by=[n for n in used if n != roles.unfollowed])
-    stamps = clock.time_s[complete.rows]
-    jumps = [note for n in positions for note in jumps_told(n, kept[n], stamps)]
+    jumps = [note for n in positions for note in jumps_told(n, kept[n], complete.columns["time_s"])]
     measured = [name for name in (roles.effort, roles.effort_command) if name and not labels[name].command]
     limits = [note for name in measured for note in limit_told(name, kept[name])]
     refuse_damage(path, {name: filled[name] for name in used}, clock.time_s, even.columns, roles, even.period_s)

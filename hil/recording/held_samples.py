@@ -16,11 +16,13 @@ _STRAIGHT = 0.5  # of the path that a motion makes in one direction: noise goes 
 _MANY = 0.1  # share of repeated rows in motion: below, a few lost samples and no logger that is faster
 _EVEN = 0.2  # deviation of the other steps from the usual one: noise and coarse counts make larger ones
 _TWO = (1.7, 2.3)  # usual steps by which the row after a lost sample moves
-_CHANCE = 0.05  # rows at which a column repeats alone, over those at which all do: these are then not by chance
-_MOST = 0.5  # share of the rows at which all repeat that the next one catches up: after lost samples, not otherwise
+# Most rows at which a column repeats alone, per row at which all repeat: so few of these are then repeated by chance.
+_CHANCE = 0.05
+_MOST = 0.5  # share of the rows at which all repeat that are caught up: nearly all after lost samples, else few
 _LEAST_ROWS = 100  # in motion, for a share to a few per cent
 _WHOLE = 0.02  # deviation from a whole ratio of the rates
 _IN_STEP = 0.95  # share of the new samples at one phase of a whole ratio
+_SEVERAL = 20  # new samples that tell this share of one column: of fewer, none may be off the phase
 
 
 def rows_per_sample(columns: Mapping[str, FloatArray]) -> float:
@@ -36,16 +38,22 @@ def rows_per_sample(columns: Mapping[str, FloatArray]) -> float:
 
 
 def rows_per_slowest_sample(columns: Mapping[str, FloatArray], positions: Collection[str]) -> float:
-    """Rows of columns (n,) for each sample of all, or of a position that is sampled more slowly at a whole ratio."""
+    """Rows per sample of all columns (n,) together, or of the position that is sampled at the lowest rate.
+
+    A position alone counts only at a whole ratio, with its new samples at regular rows.
+    """
     alone = [rows_per_sample({name: columns[name]}) for name in positions]
     return max([rows_per_sample(columns), *(ratio for ratio in alone if slower(columns, ratio))])
 
 
 def slower(columns: Mapping[str, FloatArray], ratio: float) -> list[str]:
-    """Names of the columns (n,) that alone hold each sample for a whole `ratio` of rows, from one phase; else none."""
-    if ratio == 1.0 or ratio != round(ratio) or rows_per_sample(columns) == ratio:
+    """Names of the columns (n,) that are sampled at every `ratio`-th row while others change between them.
+
+    None at a ratio that is not whole, or if all columns repeat together.
+    """
+    if ratio == 1.0 or ratio != round(ratio) or _phase(columns, int(ratio)) is not None:
         return []
-    return [name for name, values in columns.items() if _phase({name: values}, int(ratio)) is not None]
+    return [name for name, values in columns.items() if _phase({name: values}, int(ratio), _SEVERAL) is not None]
 
 
 def kept_rows(columns: Mapping[str, FloatArray], ratio: float) -> NDArray[np.intp]:
@@ -67,19 +75,21 @@ def kept_rows(columns: Mapping[str, FloatArray], ratio: float) -> NDArray[np.int
     return np.array(kept, dtype=np.intp)
 
 
-def _phase(columns: Mapping[str, FloatArray], ratio: int) -> int | None:
-    """First of every `ratio` rows at which nearly all new samples of a motion stand; None if they do not."""
-    if rows_per_sample(columns) != ratio:
-        return None
-    phases = np.bincount(np.flatnonzero(_new(columns) & _moving(columns)) % ratio, minlength=ratio)
-    return int(phases.argmax()) if phases.max() > _IN_STEP * phases.sum() else None
+def _phase(columns: Mapping[str, FloatArray], ratio: int, least: int = 1) -> int | None:
+    """First of every `ratio` rows at which nearly all new samples of a motion stand.
+
+    None if they are spread over other rows, too, or fewer than `least`.
+    """
+    rows = np.flatnonzero(_new(columns) & _moving(columns))
+    phases = np.bincount(rows % ratio, minlength=ratio)
+    return int(phases.argmax()) if rows.size >= least and phases.max() > _IN_STEP * rows.size else None
 
 
 def lost_samples(columns: Mapping[str, FloatArray]) -> NDArray[np.bool_]:
     """Rows (n,) of a motion in which a sample was lost: all columns repeat the row before, a later row catches up.
 
-    Where a column seldom repeats unless all do, and most such rows are caught up by the next, these are all of them;
-    else only those that the next row catches up in an even motion.
+    If some column hardly ever repeats alone, and most of the rows at which all repeat are caught up, all of these are
+    lost samples. Otherwise only those are that the next row catches up.
     """
     same, moving = ~_new(columns), _moving(columns)
     held = same & moving
@@ -96,11 +106,13 @@ def lost_samples(columns: Mapping[str, FloatArray]) -> NDArray[np.bool_]:
 def _caught_up(
     columns: Mapping[str, FloatArray], rows: NDArray[np.intp], same: NDArray[np.bool_]
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Whether a column moves evenly around each of the rows (k,) and by twice as much in the step after it, and
-    whether enough rows around it are new to tell.
+    """Tell for each of the rows (k,) whether the next row catches up, and whether the rows around it can tell that.
+
+    The next row catches up if a column moves by equal steps around the row and by two of them in the step after it.
+    Steps to and from other rows that repeat (`same`) do not count; at least `_REACH` others are needed.
     """
     around = rows[:, None] + np.array([offset for offset in range(-_REACH, _REACH) if offset not in (-1, 0)])
-    counted = ~(same[around] | same[around + 1])  # no step to or from another row that repeats
+    counted = ~(same[around] | same[around + 1])
     total = counted.sum(axis=1)
     found = np.zeros(rows.size, dtype=np.bool_)
     for values in columns.values():

@@ -62,8 +62,8 @@ def import_recording(source: str | Path, map_path: str | Path) -> Recording:
         if entry.gain is not None:
             origins[name]["si_per_volt"] = gain if isinstance(entry.gain, str) else entry.gain
     clock = the_map.time.column if the_map.time is not None else "sample_rate_hz"
-    positions = {the_map.axis.motor_position, the_map.axis.table_position} & set(raw)
-    complete = complete_rows(raw, the_map.rows_per_sample, sorted(positions))
+    positions = [name for name in (the_map.axis.motor_position, the_map.axis.table_position) if name in raw]
+    complete = complete_rows(raw, the_map.rows_per_sample, positions)
     rows = regular_rows(
         complete.columns, lambda row: f"{foreign.place(int(complete.rows[row]))}: {clock}", the_map.resample_hz
     )

@@ -16,6 +16,7 @@ T = np.arange(4000) * 1e-3
 ANGLE = 40.0 * np.sin(2 * np.pi * 0.5 * T) + 6.0 * np.sin(2 * np.pi * 2.3 * T)
 COUNTS = np.round(ANGLE * 4096 / (2 * np.pi))
 COLUMNS = {"angle": COUNTS, "torque": np.round(np.gradient(ANGLE) * 50 + RANDOM.normal(0.0, 0.3, T.size), 1)}
+FINE = COLUMNS | {"torque": COLUMNS["torque"] + RANDOM.normal(0.0, 0.3, T.size)}  # repeats only if a sample is lost
 
 
 @pytest.mark.parametrize("ratio", [1, 2, 5])
@@ -48,8 +49,7 @@ def test_a_few_lost_samples_in_motion_are_found() -> None:
 @pytest.mark.parametrize("share", [0.01, 0.05, 0.2])
 def test_lost_samples_are_left_out_and_said(share: float) -> None:
     rows = np.sort(np.random.default_rng(8).choice(np.arange(20, T.size - 20), int(share * T.size), replace=False))
-    fine = COLUMNS | {"torque": COLUMNS["torque"] + RANDOM.normal(0.0, 0.3, T.size)}
-    for columns, least in ((COLUMNS, 0.2), (fine, 0.9)):  # a fine channel repeats only where a sample is lost
+    for columns, least in ((COLUMNS, 0.2), (FINE, 0.9)):
         logged = {name: values.copy() for name, values in columns.items()}
         for values in logged.values():
             for row in rows:
@@ -62,18 +62,16 @@ def test_lost_samples_are_left_out_and_said(share: float) -> None:
 
 
 def test_lost_samples_are_no_faster_logger() -> None:
-    fine = COLUMNS | {"torque": COLUMNS["torque"] + RANDOM.normal(0.0, 0.3, T.size)}
     rows = np.sort(np.random.default_rng(9).choice(np.arange(1, T.size), T.size // 5, replace=False))
     index = np.arange(T.size)
     for row in rows:
         index[row] = index[row - 1]
-    assert rows_per_sample({name: values[index] for name, values in fine.items()}) == 1.0
+    assert rows_per_sample({name: values[index] for name, values in FINE.items()}) == 1.0
 
 
 def test_samples_of_a_logger_five_percent_faster_are_not_lost() -> None:
     index = np.floor(np.arange(int(1.05 * T.size)) / 1.05).astype(int)
-    fine = COLUMNS | {"torque": COLUMNS["torque"] + RANDOM.normal(0.0, 0.3, T.size)}
-    assert not lost_samples({name: values[index] for name, values in fine.items()}).any()
+    assert not lost_samples({name: values[index] for name, values in FINE.items()}).any()
 
 
 def test_single_values_off_the_motion_are_left_out_and_said() -> None:
@@ -113,6 +111,8 @@ def test_a_stepper_and_digits_that_grow_are_not_sampled_more_slowly() -> None:
     held = feed[index // 3 * 3]
     assert rows_per_slowest_sample({"x": held, "torque": torque}, ["x"]) == 3.0
     assert slower({"x": held, "torque": torque}, 3.0) == ["x"]
+    short = {"x": held[1400:1600], "torque": torque[1400:1600]}  # another file by the map of the first
+    np.testing.assert_array_equal(kept_rows(short, 3.0), np.arange(1, 200, 3))
 
 
 def test_rest_slow_counts_and_a_jump_from_rest_are_no_lost_samples() -> None:

@@ -36,9 +36,9 @@ if TYPE_CHECKING:
     from hil.errors import FieldError, HilError, InputError
     from hil.identification.compare import Comparison, compare
     from hil.identification.friction import identify_friction
+    from hil.importing.by_map import import_recording
     from hil.motion.profile import Profile, load_profile
     from hil.motion.trajectory import Trajectory, plan
-    from hil.recording.importing import import_recording
     from hil.recording.recording import Recording, read_recording
     from hil.twin.axis import Twin
     from hil.twin.library import LIBRARY
@@ -57,7 +57,7 @@ _MODULE_OF = {
     "simulate": "hil.api",
     "run": "hil.api",
     "read_recording": "hil.recording.recording",
-    "import_recording": "hil.recording.importing",
+    "import_recording": "hil.importing.by_map",
     "compare": "hil.identification.compare",
     "fit_nominal": "hil.api",
     "identify_friction": "hil.identification.friction",

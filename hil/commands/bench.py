@@ -11,7 +11,7 @@ import typer
 from hil.report.console import Progress, out, progress, table
 
 if TYPE_CHECKING:
-    from hil.benchmarks.figure import Figure
+    from hil.validation.benchmarks.figure import Figure
 
 
 def bench(
@@ -22,10 +22,10 @@ def bench(
     as_json: Annotated[bool, typer.Option("--json", help="Print the figures as JSON instead of tables.")] = False,
 ) -> None:
     """Measure loop, simulated bench, twin and a diagnosis on this machine, beside other tools and its limits."""
-    from hil.benchmarks import diagnosis_stages, summary
     from hil.commands.warm_up import compile_kernels
     from hil.files.output import write_json
     from hil.loop.realtime import machine_state, measure_jitter, now_text, real_time
+    from hil.validation.benchmarks import diagnosis_stages, summary
 
     earlier = None if against is None else summary.read_earlier(against)
     compile_kernels()
@@ -68,7 +68,7 @@ def bench(
 
 
 def _figures(tell: Progress) -> Iterator[Figure]:
-    from hil.benchmarks import cycle, peers, simulation
+    from hil.validation.benchmarks import cycle, peers, simulation
 
     for what, measure in (
         ("whole cycle of the loop", cycle.figures),

@@ -35,7 +35,7 @@ def demo(
     from hil.commands.warm_up import compile_kernels
     from hil.files.output import default_folder, new_folder
     from hil.loop.simulated_bench import load_simulated
-    from hil.proof.draw import demo as concealed
+    from hil.validation.proof.draw import demo as concealed
 
     folder = folder or default_folder("demo")
     seed = secrets.randbelow(10_000) if seed is None else seed
@@ -75,7 +75,7 @@ def demo(
 def _record(bench: Bench, folder: Path, virtual: bool) -> list[Recording]:
     """Record the two runs of the demo; in virtual time if the machine does not keep wall-clock time."""
     from hil.errors import HilError
-    from hil.proof.draw.demo import LEARN, PROVE
+    from hil.validation.proof.draw.demo import LEARN, PROVE
 
     recordings = []
     for name, profile in (("learn", LEARN), ("prove", PROVE)):

@@ -38,7 +38,7 @@ def import_(
 ) -> None:
     """Convert a foreign recording to Parquet by a map of its columns, units and signs, or draft this map."""
     from hil.errors import InputError
-    from hil.recording.importing import import_recording
+    from hil.importing.by_map import import_recording
     from hil.recording.recording import CLOCK_NOTES, write_parquet
 
     target = target or Path(f"{source.stem}.parquet")
@@ -65,9 +65,9 @@ def import_(
 
 def _drafted(source: Path, target: Path, rate_hz: float | None, axis: str | None) -> Path:
     """Draft a map beside the recording to write; return its path."""
-    from hil.drafting.draft_map import draft_map
-    from hil.drafting.map_text import map_text
     from hil.errors import InputError
+    from hil.importing.draft_map import draft_map
+    from hil.importing.map_text import map_text
 
     path = target.with_name(f"{target.stem}-map.yaml")
     if path.exists():

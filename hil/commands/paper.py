@@ -10,8 +10,8 @@ def paper(
     """Reproduce the source paper: printed and computed values, reasons for differences, and its figures."""
     from hil.commands.warm_up import compile_kernels
     from hil.files.output import default_folder, new_folder
-    from hil.paper import run_paper
-    from hil.report.paper_report import verdict, write_paper
+    from hil.validation.paper import run_paper
+    from hil.validation.paper.report import verdict, write_paper
 
     folder = folder or default_folder("paper")
     compile_kernels()

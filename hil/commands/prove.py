@@ -62,11 +62,11 @@ def prove(
 
     from hil.commands.warm_up import compile_kernels
     from hil.errors import InputError
-    from hil.proof.draw.plan import PLANTS, plan
-    from hil.proof.run import prove as run
-    from hil.proof.run import score_others
-    from hil.proof.score.page import write_proof
-    from hil.proof.score.tables import HEADERS, goal_row, published
+    from hil.validation.proof.draw.plan import PLANTS, plan
+    from hil.validation.proof.run import prove as run
+    from hil.validation.proof.run import score_others
+    from hil.validation.proof.score.page import write_proof
+    from hil.validation.proof.score.tables import HEADERS, goal_row, published
 
     if show is not None:
         out.print(published(show))

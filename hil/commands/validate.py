@@ -30,10 +30,10 @@ def _checked(path: Path) -> str:
 
     from hil.errors import FieldError
     from hil.files.yaml_model import load_model, located
+    from hil.importing.map_file import RecordingMap
     from hil.loop.devices import check_runnable
     from hil.loop.simulated_bench import load_simulated
     from hil.motion.profile import load_profile
-    from hil.recording.import_map import RecordingMap
 
     class AnyFile(BaseModel):
         model_config = ConfigDict(extra="allow")

@@ -15,14 +15,14 @@ from hil.bench.bench_file import Bench
 from hil.diagnosis.experiment import Experiment, separating, showing
 from hil.diagnosis.location.locate import locate, shown_in
 from hil.diagnosis.notes import at_bound, ended, notes_on, on_torque, stopped
-from hil.diagnosis.preparation import prepare_diagnosis
+from hil.diagnosis.preparation.prepare import prepare_diagnosis
+from hil.diagnosis.preparation.untold import untold
 from hil.diagnosis.result import AT_FLOOR, Location, Mode, NextExperiment, Result, TimeBudget, Unexplained, Verdict
 from hil.diagnosis.search.events import with_events_of
 from hil.diagnosis.search.forward_selection import Explanation, explain
 from hil.diagnosis.statement import statement
 from hil.diagnosis.time_left import with_time_left
 from hil.diagnosis.turning import labelled
-from hil.diagnosis.untold import untold
 from hil.diagnosis.verdict.cross_validation import CrossValidation, cross_validate
 from hil.diagnosis.verdict.each_alone import Change, changed
 from hil.diagnosis.verdict.findings import corrections, diagnosed_bench, findings, form_of, renamed

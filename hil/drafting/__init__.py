@@ -1,1 +1,1 @@
-"""Draft a map of a foreign file and a bench file of its axis from the recording alone."""
+"""Draft a bench file of an axis from its recording alone."""

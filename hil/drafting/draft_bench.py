@@ -11,11 +11,11 @@ from hil.drafting.loop_values import loop_values
 from hil.drafting.plant_values import PlantValues, TransmissionValues, plant_values, transmission_values
 from hil.drafting.ratio_values import gear_of, lead_of
 from hil.drafting.sensor_values import noise_of
-from hil.drafting.usual_values import ROTARY_LEAD_M
 from hil.errors import InputError
 from hil.identification.completion import with_position
+from hil.importing.by_map import STEP
+from hil.importing.usual_values import ROTARY_LEAD_M
 from hil.quantities import digits
-from hil.recording.importing import STEP
 from hil.recording.quantum import count_of, is_decimal
 from hil.recording.recording import Recording
 from hil.twin.mechanisms import gravity_torque

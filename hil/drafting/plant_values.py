@@ -13,11 +13,11 @@ from scipy.stats import t as student
 
 from hil.arrays import FloatArray
 from hil.drafting.estimate import BlockFit, Estimate, fit_blocks
-from hil.drafting.relations import direction, motion, smoothed
 from hil.errors import InputError
 from hil.identification.friction import identify_friction
 from hil.identification.inverse_dynamics import CORNER, CUT_AT_START, inverse_dynamics_columns
 from hil.identification.noise import white_noise
+from hil.importing.relations import direction, motion, smoothed
 from hil.recording.recording import Recording
 
 CUTOFFS_HZ = (100.0, 50.0, 25.0, 12.0, 6.0, 3.0)  # of the position filter

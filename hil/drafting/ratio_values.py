@@ -7,8 +7,8 @@ import numpy as np
 
 from hil.drafting.estimate import Estimate, fit_blocks
 from hil.drafting.plant_values import TransmissionValues
-from hil.drafting.relations import direction, motion
-from hil.drafting.usual_values import ROTARY_LEAD_M, usual_lead
+from hil.importing.relations import direction, motion
+from hil.importing.usual_values import ROTARY_LEAD_M, usual_lead
 from hil.recording.recording import Recording
 
 DIRECT = 0.02  # deviation from equal angles of motor and load up to which there is no gear

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from hil.drafting.relations import lead_rows
 from hil.identification.noise import white_noise
+from hil.importing.relations import lead_rows
 from hil.recording.recording import Recording
 
 MOST_LEAD_ROWS = 50  # of a command before the measured torque: tens of ms

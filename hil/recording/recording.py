@@ -1,7 +1,7 @@
 """Recordings: columns of the channel table at one period, read from and written to files.
 
 Parquet (units in the schema) for finished runs, an Arrow stream (`.arrows`) during a run, CSV with the names of the
-channel table for exchange. Other files are read by `hil.recording.importing`.
+channel table for exchange. Other files are read by `hil.importing.by_map`.
 """
 
 from __future__ import annotations

@@ -20,7 +20,7 @@ from hil.identification.dataset import prepare_dataset
 from hil.identification.deviations import low_pass
 from hil.identification.measured import bench_of, take
 from hil.identification.nominal_fit import fit_nominal
-from hil.recording.importing import import_recording
+from hil.importing.by_map import import_recording
 from hil.recording.recording import Recording, read_recording
 from hil.report.compare_report import parameter_rows, rows_of, verdict, write_comparison
 

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 from command_line import hil, refused
 
-from hil.proof.draw.demo import CONCEALED
 from hil.recording.recording import read_recording
+from hil.validation.proof.draw.demo import CONCEALED
 
 
 def test_the_demo_finds_what_it_conceals(tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from hil.channels import AxisKind
 from hil.errors import InputError
 from hil.identification.friction import constant_feed_stretches, identify_friction
-from hil.recording.importing import import_recording
+from hil.importing.by_map import import_recording
 from hil.recording.recording import Recording, read_recording
 
 SHARED = Path(__file__).parents[2].parent / "shared" / "recordings"

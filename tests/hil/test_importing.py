@@ -17,8 +17,8 @@ from scipy.io import savemat
 
 from hil.channels import AxisKind
 from hil.errors import InputError
+from hil.importing.by_map import import_recording
 from hil.quantities import UNITS, si_factor
-from hil.recording.importing import import_recording
 from hil.recording.recording import read_recording, write_parquet
 
 EMPS = Path(__file__).parents[2].parent / "shared" / "recordings" / "emps" / "DATA_EMPS.mat"

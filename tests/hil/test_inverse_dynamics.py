@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from hil.errors import InputError
 from hil.identification.inverse_dynamics import fit_inverse_dynamics, solve
-from hil.recording.importing import import_recording
+from hil.importing.by_map import import_recording
 from hil.recording.recording import Recording
 
 EMPS = Path(__file__).parents[2].parent / "shared" / "recordings" / "emps" / "DATA_EMPS.mat"

@@ -19,9 +19,9 @@ import numpy as np
 from hil.bench.bench_file import Bench, load_bench
 from hil.diagnosis.diagnose import diagnose
 from hil.errors import HilError
-from hil.proof.draw.less_known import WAYS, forget
-from hil.recording.importing import import_recording
+from hil.importing.by_map import import_recording
 from hil.recording.recording import Recording, read_recording
+from hil.validation.proof.draw.less_known import WAYS, forget
 
 RECORDINGS = Path(__file__).parents[3] / "shared" / "recordings"
 RIG = ("null", "stribeck", "backlash", "lead")

@@ -28,11 +28,11 @@ import yaml
 
 from hil.bench.bench_file import Bench, load_bench
 from hil.diagnosis.diagnose import diagnose
-from hil.proof.answer.worker_pool import side_by_side
-from hil.proof.draw.expected import same_law
-from hil.proof.draw.generator import draw
-from hil.recording.importing import import_recording
+from hil.importing.by_map import import_recording
 from hil.recording.recording import Recording, read_recording, write_parquet
+from hil.validation.proof.answer.worker_pool import side_by_side
+from hil.validation.proof.draw.expected import same_law
+from hil.validation.proof.draw.generator import draw
 
 HERE = Path(__file__).parent
 REFERENCE = HERE / "answers.json"

@@ -20,7 +20,7 @@ import pytest
 from scipy.linalg import expm
 
 from hil.identification.estimator import Fit
-from hil.recording.importing import import_recording
+from hil.importing.by_map import import_recording
 from hil.recording.recording import Recording
 
 EMPS = Path(__file__).parents[2].parent / "shared" / "recordings" / "emps" / "DATA_EMPS.mat"

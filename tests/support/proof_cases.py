@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from hil.proof.answer.answers import parse_answer
-from hil.proof.draw.expected import block, same_law
-from hil.proof.draw.generator import Concealed, Truth
-from hil.proof.score.grading import GradedCase
-from hil.proof.score.scores import Goal, Scores, score
+from hil.validation.proof.answer.answers import parse_answer
+from hil.validation.proof.draw.expected import block, same_law
+from hil.validation.proof.draw.generator import Concealed, Truth
+from hil.validation.proof.score.grading import GradedCase
+from hil.validation.proof.score.scores import Goal, Scores, score
 
 VERDICTS = {"null": "no_mismatch", "parameters_only": "parameter_error", "insufficient": "parameter_error",
             "novel": "unexplained"}  # fmt: skip

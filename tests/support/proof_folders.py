@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from hil.files.output import write_json
-from hil.proof.answer.blind import DIAGNOSIS
-from hil.proof.run import ANSWERS
+from hil.validation.proof.answer.blind import DIAGNOSIS
+from hil.validation.proof.run import ANSWERS
 
 
 def quiet(*what: object) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from diagnosis_runs import bench, changed, dataset, recorded
 
-from hil.diagnosis.preflight import prepare
+from hil.diagnosis.preparation.preflight import prepare
 from hil.identification.compare import compare
 from hil.identification.dataset import FASTEST_OBSERVER_S
 from hil.identification.hypothesis import Hypothesis

@@ -9,10 +9,10 @@ from diagnosis_runs import RIG
 
 from hil.bench.bench_file import Bench, load_bench
 from hil.diagnosis.diagnose import Diagnosis, diagnose
-from hil.diagnosis.law_check import check_law
+from hil.diagnosis.preparation.law_check import check_law
 from hil.identification.compare import compare
 from hil.identification.measured import take
-from hil.recording.importing import import_recording
+from hil.importing.by_map import import_recording
 from hil.recording.recording import Recording
 
 EMPS = RIG.parent / "emps" / "DATA_EMPS.mat"

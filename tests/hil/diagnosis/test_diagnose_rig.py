@@ -16,10 +16,10 @@ from hil.bench.bench_file import load_bench
 from hil.diagnosis.diagnose import Diagnosis, diagnose
 from hil.diagnosis.result import schema
 from hil.identification.measured import take
-from hil.proof.draw.less_known import forget
 from hil.recording.recording import read_recording
 from hil.report.diagnosis_report import write_diagnosis
 from hil.twin.library import BY_ID
+from hil.validation.proof.draw.less_known import forget
 
 # As the README of the recordings has it
 TRUTH: dict[str, tuple[str, dict[str, float]]] = {

@@ -10,9 +10,9 @@ from diagnosis_runs import bench, dataset, evaluated, fitted, recorded
 from emps_windows import PERIOD_S, Push, assert_found, emps_recording, irregular, pushed, regular, response, windows
 
 from hil.bench.bench_file import load_bench
+from hil.diagnosis.preparation.split import split
 from hil.diagnosis.search.event_detection import detect
 from hil.diagnosis.search.events import event_term, with_events_of
-from hil.diagnosis.split import split
 from hil.identification.dataset import prepare_dataset
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis

@@ -11,8 +11,8 @@ from emps_windows import Push, assert_found, emps_recording, irregular, pushed, 
 
 from hil.bench.bench_file import load_bench
 from hil.diagnosis.diagnose import Diagnosis, diagnose
+from hil.diagnosis.preparation.split import split
 from hil.diagnosis.search.events import constant_inside
-from hil.diagnosis.split import split
 from hil.diagnosis.verdict.event_windows import Seen, joined
 from hil.diagnosis.verdict.findings import diagnosed_bench
 from hil.identification.hypothesis import Hypothesis

@@ -17,9 +17,9 @@ from hil.identification.measured import Measured, take
 from hil.identification.noise import Laps
 from hil.identification.noise_floor import floor, noise_response
 from hil.identification.terms import Term
-from hil.proof.draw.generator import draw, rerun
-from hil.recording.importing import import_recording
+from hil.importing.by_map import import_recording
 from hil.twin.library import BY_ID
+from hil.validation.proof.draw.generator import draw, rerun
 
 EMPS = RIG.parent / "emps" / "DATA_EMPS.mat"
 

@@ -12,8 +12,8 @@ from servo_loop import one_encoder, servo_run
 from hil.bench.bench_file import Bench
 from hil.bench.control_section import Control
 from hil.diagnosis.diagnose import diagnose
-from hil.diagnosis.law_check import check_law
-from hil.diagnosis.usable_law import LawCheck
+from hil.diagnosis.preparation.law_check import check_law
+from hil.diagnosis.preparation.usable_law import LawCheck
 from hil.identification.control_law import fit_law
 from hil.identification.measured import take
 from hil.recording.recording import Recording

@@ -10,8 +10,8 @@ import pytest
 
 from hil.bench.bench_file import Bench
 from hil.diagnosis.diagnose import diagnose
-from hil.diagnosis.preflight import prepare
-from hil.diagnosis.split import held_out_note, split
+from hil.diagnosis.preparation.preflight import prepare
+from hil.diagnosis.preparation.split import held_out_note, split
 from hil.errors import InputError
 from hil.identification.completion import reduced
 from hil.identification.dataset import prepare_dataset

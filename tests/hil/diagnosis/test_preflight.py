@@ -9,7 +9,7 @@ import pytest
 from diagnosis_runs import bench, changed, recorded
 
 from hil.bench.bench_file import load_bench
-from hil.diagnosis.preflight import _factor_between, prepare, regress
+from hil.diagnosis.preparation.preflight import _factor_between, prepare, regress
 from hil.errors import InputError
 from hil.identification.terms import Term
 from hil.recording.recording import Recording

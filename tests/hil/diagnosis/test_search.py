@@ -8,7 +8,7 @@ from diagnosis_runs import bench, dataset, recorded
 
 from hil.bench.bench_file import load_bench
 from hil.diagnosis.diagnose import diagnose
-from hil.diagnosis.preflight import prepare
+from hil.diagnosis.preparation.preflight import prepare
 from hil.diagnosis.search.score_test import Candidate
 from hil.diagnosis.search.successive_halving import _Race, _soft, owner_points
 from hil.identification.coordinates import CHATTER_STEP, LAST_EDGE_STEP_S

@@ -5,7 +5,7 @@ import pytest
 
 from hil.bench.bench_file import load_bench
 from hil.bench.control_section import UnknownControl
-from hil.diagnosis.split import split
+from hil.diagnosis.preparation.split import split
 from hil.identification.measured import LEAD_IN, take
 from hil.recording.recording import Recording
 

@@ -14,7 +14,7 @@ from scipy.interpolate import CubicSpline
 from hil.bench.bench_file import Bench, load_bench
 from hil.bench.control_section import UnknownControl
 from hil.diagnosis.diagnose import diagnose
-from hil.diagnosis.preparation import prepare_diagnosis
+from hil.diagnosis.preparation.prepare import prepare_diagnosis
 from hil.diagnosis.result import Result
 from hil.diagnosis.search.next_term import next_term
 from hil.diagnosis.search.score_test import Candidate

@@ -13,8 +13,8 @@ import hil
 from hil.bench.bench_file import load_bench
 from hil.commands.compare import compare as compare_command
 from hil.commands.identify import identify
-from hil.diagnosis.preparation import prepare_diagnosis
-from hil.diagnosis.usable_parts import usable_parts
+from hil.diagnosis.preparation.prepare import prepare_diagnosis
+from hil.diagnosis.preparation.usable_parts import usable_parts
 from hil.errors import InputError
 from hil.recording.recording import Recording, write_parquet
 from hil.recording.stamps import regular_rows

@@ -11,9 +11,9 @@ import pytest
 from foreign_axis import LEAD_M, axis, csv_text, renamed, write
 
 from hil.commands.import_ import import_
-from hil.drafting.column_names import label
-from hil.drafting.draft_map import draft_map
-from hil.drafting.map_draft import MapDraft
+from hil.importing.column_names import label
+from hil.importing.draft_map import draft_map
+from hil.importing.map_draft import MapDraft
 from hil.recording.recording import Recording, read_recording
 
 AXIS = axis()

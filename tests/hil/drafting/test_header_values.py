@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from foreign_axis import axis, csv_text, renamed
 
-from hil.drafting.draft_map import draft_map
-from hil.drafting.header_values import Constant, header_values
+from hil.importing.draft_map import draft_map
+from hil.importing.header_values import Constant, header_values
 
 AXIS = axis()
 

@@ -8,7 +8,7 @@ from servo_loop import one_encoder, servo_run
 
 from hil.bench.bench_file import Bench, load_bench
 from hil.drafting.loop_values import ControlValues, loop_values
-from hil.recording.importing import import_recording
+from hil.importing.by_map import import_recording
 from hil.recording.recording import Recording
 
 OWNER = one_encoder(bench())

@@ -10,7 +10,7 @@ from damaged_files import AXIS, GOOD, LINES, RANDOM, TEXT, Make, content, field,
 from foreign_axis import renamed, write
 
 from hil.commands.import_ import import_
-from hil.drafting.draft_map import draft_map
+from hil.importing.draft_map import draft_map
 from hil.recording.recording import read_recording
 
 NOTED: dict[str, tuple[Make, str]] = {

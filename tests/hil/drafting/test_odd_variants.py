@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from foreign_axis import LEAD_M, axis, renamed, write
 
-from hil.drafting.draft_map import draft_map
-from hil.drafting.map_draft import MapDraft
-from hil.drafting.map_text import map_text
-from hil.recording.importing import import_recording
+from hil.importing.by_map import import_recording
+from hil.importing.draft_map import draft_map
+from hil.importing.map_draft import MapDraft
+from hil.importing.map_text import map_text
 from hil.recording.recording import Recording
 
 SHARED = Path(__file__).parents[4] / "shared" / "recordings"

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from foreign_axis import LEAD_M, axis, renamed, write
 
-from hil.drafting.draft_map import draft_map
-from hil.drafting.map_draft import MapDraft
+from hil.importing.draft_map import draft_map
+from hil.importing.map_draft import MapDraft
 
 AXIS = axis()
 NAMES = {"t": "time_s", "x_set": "position_setpoint_mm", "angle": "motor_angle_rad", "torque": "torque_Nm"}

@@ -2,8 +2,8 @@
 
 import pytest
 
-from hil.drafting.column_names import Quantity, label
-from hil.drafting.units import QUANTITY_OF_UNIT, split_unit, unit_named
+from hil.importing.column_names import Quantity, label
+from hil.importing.units import QUANTITY_OF_UNIT, split_unit, unit_named
 from hil.quantities import si_factor
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hil.recording.importing import import_recording
+from hil.importing.by_map import import_recording
 from hil.recording.recording import read_recording, write_parquet
 
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from hil.files.date_stamps import is_date, seconds_of
-from hil.recording.complete_rows import complete_rows
-from hil.recording.held_samples import kept_rows, lost_samples, rows_per_sample, rows_per_slowest_sample, slower
-from hil.recording.spikes import lone_values
-from hil.recording.wraps import unwrapped, wrap_range
+from hil.importing.complete_rows import complete_rows
+from hil.importing.held_samples import kept_rows, lost_samples, rows_per_sample, rows_per_slowest_sample, slower
+from hil.importing.spikes import lone_values
+from hil.importing.wraps import unwrapped, wrap_range
 
 RANDOM = np.random.default_rng(12)
 T = np.arange(4000) * 1e-3

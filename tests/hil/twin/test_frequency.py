@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from hil.control import cascade
-from hil.paper.formulas import recursive_transfer
 from hil.twin.structure.chain import RECONSTRUCTED_TABLE_1, seven_dof, two_mass
 from hil.twin.structure.frequency import (
     bandwidth_hz,
@@ -19,6 +18,7 @@ from hil.twin.structure.frequency import (
     sampled_transfer,
 )
 from hil.twin.structure.modal import Modal, discretise, modal
+from hil.validation.paper.formulas import recursive_transfer
 
 LEAD_M = 0.010
 R = LEAD_M / (2.0 * pi)

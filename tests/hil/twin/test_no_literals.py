@@ -13,7 +13,7 @@ from hil.twin.library import LIBRARY
 
 ROOTS = [Path(package.__path__[0]) for package in (hil, drivers)]
 # The library itself, and what draws or simulates an axis whose truth is known: both name effects on purpose.
-DRAWN = ("hil/twin/mechanisms", "hil/twin/library.py", "hil/proof/draw", "drivers/sim")
+DRAWN = ("hil/twin/mechanisms", "hil/twin/library.py", "hil/validation/proof/draw", "drivers/sim")
 IDS = {mechanism.id for mechanism in LIBRARY}
 VARIANTS = {f"{mechanism.id}.{form}" for mechanism in LIBRARY for form in mechanism.forms if form}
 PARAMETERS = {name for mechanism in LIBRARY for name in mechanism.names}

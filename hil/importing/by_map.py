@@ -1,0 +1,125 @@
+"""Import a foreign recording (CSV, MATLAB .mat to version 7, Parquet, JSON) by a map (`hil.importing.map_file`)."""
+
+import hashlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hil.arrays import FloatArray
+from hil.channels import CHANNELS, AxisChannels
+from hil.files.yaml_model import load_model
+from hil.importing.complete_rows import complete_rows
+from hil.importing.foreign_files import FEW_MISSING, read_foreign
+from hil.importing.map_file import SECONDS, RecordingMap
+from hil.importing.wraps import unwrapped
+from hil.recording.quantum import count_of
+from hil.recording.recording import CLOCK_NOTES, Recording, clock_metadata
+from hil.recording.stamps import RegularRows, regular_rows
+
+EPOCH_S = 1e6  # start of a clock that counts from 1970 or year 0: its large numbers have few digits for the steps
+STEP = "step"  # key of a channel's metadata: step of its values before they are interpolated
+MAPS = Path(__file__).parents[1] / "maps"
+
+
+def import_recording(source: str | Path, map_path: str | Path) -> Recording:
+    """Read `source` (.csv, .txt, .mat, .parquet, .json) by the map file `map_path`, or by a shipped map's name (emps).
+
+    Missing channels are derived: velocity_command_m_s by central differences of the position command; torque from
+    torque command or vice versa (on a linear axis force). The metadata list them (`derived`) and the source of each
+    channel (`channels`).
+    Rows without a value are left out if the map says so; gaps of the clock cut the recording into `Recording.parts`.
+    The metadata say so (`clock_notes`).
+    Raises InputError with file, row and column: wrong format, a missing column, text, infinity, many missing values,
+    columns of different length, time that runs back.
+    """
+    source, map_path = Path(source), _find_map(map_path)
+    the_map = load_model(map_path, RecordingMap)
+    wanted = [entry.column for entry in the_map.channels.values()]
+    if the_map.time is not None:
+        wanted.append(the_map.time.column)
+    gains = {entry.gain for entry in the_map.channels.values() if isinstance(entry.gain, str)}
+    dates = the_map.time.column if the_map.time is not None and the_map.time.unit == "date" else None
+    few = FEW_MISSING if the_map.missing == "leave_out" else 0.0
+    foreign = read_foreign(source, wanted, sorted(gains), the_map.csv.format(), dates, few)
+
+    raw = {"time_s": _time_s(the_map, foreign.columns)}
+    origins: dict[str, dict[str, str | float]] = {}
+    for name, entry in the_map.channels.items():
+        gain = foreign.scalars[entry.gain] if isinstance(entry.gain, str) else 1.0
+        factor = entry.factor_to(CHANNELS[name].unit, the_map.lead_m, gain)
+        assert factor is not None  # the map was validated
+        values = foreign.columns[entry.column]
+        if entry.wraps_at is not None:
+            values = unwrapped(values, entry.wraps_at)
+        raw[name] = factor * values + entry.offset
+        origins[name] = {"column": entry.column, "unit": entry.unit, "factor": factor, "offset": entry.offset}
+        step = count_of(raw[name][np.isfinite(raw[name])])
+        if step is not None:
+            origins[name][STEP] = step
+        if entry.gain is not None:
+            origins[name]["si_per_volt"] = gain if isinstance(entry.gain, str) else entry.gain
+    clock = the_map.time.column if the_map.time is not None else "sample_rate_hz"
+    positions = [name for name in (the_map.axis.motor_position, the_map.axis.table_position) if name in raw]
+    complete = complete_rows(raw, the_map.rows_per_sample, positions)
+    rows = regular_rows(
+        complete.columns, lambda row: f"{foreign.place(int(complete.rows[row]))}: {clock}", the_map.resample_hz
+    )
+    columns = dict(rows.columns)
+    derived = _derive(columns, the_map.axis, rows)
+    metadata: dict[str, Any] = {
+        "source": source.name,
+        "source_sha256": _sha256(source),
+        "map": map_path.name,
+        "about": the_map.about,
+        "lead_m": the_map.lead_m,
+        "channels": origins,
+        "derived": derived,
+        "clock": _describe_clock(rows),
+    }
+    metadata |= clock_metadata(rows)
+    if complete.notes or rows.notes:
+        metadata[CLOCK_NOTES] = [*complete.notes, *rows.notes]
+    return Recording(source.stem, columns, rows.period_s, metadata)
+
+
+def _find_map(map_path: str | Path) -> Path:
+    shipped = MAPS / f"{map_path}.yaml"
+    return shipped if not Path(map_path).exists() and shipped.is_file() else Path(map_path)
+
+
+def _time_s(the_map: RecordingMap, raw: dict[str, FloatArray]) -> FloatArray:
+    if the_map.time is not None:
+        stamps, factor = raw[the_map.time.column], SECONDS[the_map.time.unit]
+        if abs(factor * stamps[0]) > EPOCH_S:
+            stamps = stamps - stamps[0]
+        return np.asarray(factor * stamps, dtype=np.float64)
+    assert the_map.sample_rate_hz is not None
+    rows = next(iter(raw.values())).size
+    return np.asarray(np.arange(rows) / the_map.sample_rate_hz, dtype=np.float64)
+
+
+def _derive(columns: dict[str, FloatArray], axis: AxisChannels, rows: RegularRows) -> dict[str, str]:
+    """Add the channels that follow from others; return how each was derived."""
+    derived = {}
+    if axis.velocity_command not in columns and axis.position_command in columns:
+        parts = np.split(columns[axis.position_command], [part.row for part in rows.parts[1:]])
+        columns[axis.velocity_command] = np.concatenate([np.gradient(part, rows.period_s) for part in parts])
+        derived[axis.velocity_command] = f"central differences of {axis.position_command}"
+    for name, other in ((axis.torque, axis.torque_command), (axis.torque_command, axis.torque)):
+        if name not in columns and other in columns:
+            columns[name] = columns[other].copy()
+            derived[name] = f"copy of {other}, the only one recorded"
+    return derived
+
+
+def _describe_clock(rows: RegularRows) -> str:
+    """Describe the largest deviation of the time stamps from start of the part + tick x period."""
+    parts = np.split(rows.columns["time_s"], [part.row for part in rows.parts[1:]])
+    deviation_s = max(float(np.abs(part - part[0] - np.arange(part.size) * rows.period_s).max()) for part in parts)
+    return f"period {rows.period_s:.9g} s; stamps within {deviation_s:.2g} s of start + tick x period"
+
+
+def _sha256(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

@@ -1,0 +1,54 @@
+"""Tell a position that is computed, a set-point, from positions that are measured."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from hil.arrays import FloatArray
+from hil.importing.relations import noise
+from hil.importing.unit_choice import are_counts
+from hil.recording.quantum import count_of
+
+QUIET = 0.3  # of the noise of the measured positions: a set-point is computed and has none but rounding
+_OF_COUNTS = 0.3  # of the noise that counting gives: less is a step by chance, as of a constant feed
+_OF_DIGITS = 2.0  # times the noise that rounding gives: more is a sensor's
+_DECIMAL = 1e-3  # relative deviation of a step from a power of ten: printed steps have few digits
+
+
+class Computed(NamedTuple):
+    """The computed position (none or one name), and how it was told."""
+
+    names: list[str]
+    why: str
+
+
+def computed_one(positions: dict[str, FloatArray], plain: list[str]) -> Computed:
+    """Find the set-point among positions (n,), of which `plain` have names that do not tell.
+
+    It has clearly less noise than the others, or nothing but the rounding of its digits where the others have the
+    counts of encoders. A column with such counts is no set-point.
+    """
+    noises = {name: noise(values) for name, values in positions.items()}
+    rounded = {name: _rounding(values, noises[name] * float(np.std(values))) for name, values in positions.items()}
+    for name in plain:
+        others = [other for other in positions if other != name]
+        if rounded[name] == "counts" or not others:
+            continue
+        if noises[name] < QUIET * min(noises[other] for other in others):
+            return Computed([name], f"it has less noise than {others[-1]}")
+        if rounded[name] == "digits" and all(rounded[other] == "counts" for other in others):
+            return Computed([name], f"it is rounded to digits, {' and '.join(others)} to counts of an encoder")
+    return Computed([], "")
+
+
+def _rounding(values: FloatArray, noise_abs: float) -> str:
+    """Say what the noise of a column is: that of "counts", of decimal "digits", or neither ("")."""
+    if are_counts(values):
+        return "counts"
+    step = count_of(values)
+    if step is None:
+        return ""
+    power = np.log10(step)
+    if abs(power - np.round(power)) < _DECIMAL / np.log(10.0):
+        return "digits" if noise_abs < _OF_DIGITS * step / np.sqrt(12.0) else ""
+    return "counts" if noise_abs > _OF_COUNTS * step / np.sqrt(12.0) else ""

@@ -1,0 +1,170 @@
+"""Map file: which column of a foreign recording is which channel; `hil.importing.by_map` applies it.
+
+    value [SI] = sign x scale x factor(unit) x column + offset
+
+A map is a YAML file, such as the shipped `hil/maps/emps.yaml`.
+"""
+
+from math import pi
+from typing import Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, model_validator
+
+from hil.channels import AXIS_CHANNELS, CHANNELS, AxisChannels, AxisKind
+from hil.errors import FieldError
+from hil.files.csv_columns import CsvFormat
+from hil.files.date_stamps import DAY_S
+from hil.quantities import si_factor, units_of
+
+SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "d": DAY_S, "date": 1.0}  # of a unit of time
+# units that need a constant, and the fields that may give it
+_CONSTANTS = {
+    "counts": ("counts_per_rev", "counts_per_m"),
+    "A": ("torque_constant_n_m_a", "force_constant_n_a"),
+    "%": ("rated",),
+    "permille": ("rated",),
+    "V": ("gain",),
+}
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class CsvOptions(_Strict):
+    """Format of a CSV file."""
+
+    delimiter: str = Field(default=",", min_length=1, max_length=1, description="between the fields")
+    decimal_point: Literal[".", ","] = Field(default=".", description="of the numbers")
+    skip_lines: int = Field(default=0, ge=0, description="lines above the header")
+    skip_rows: int = Field(default=0, ge=0, description="rows between header and numbers, such as one of units")
+    column_names: tuple[str, ...] | None = Field(default=None, description="names for a file without a header")
+    encoding: str = Field(default="utf-8", description="of the text")
+
+    def format(self) -> CsvFormat:
+        return CsvFormat(**self.model_dump())
+
+
+class TimeColumn(_Strict):
+    """The column of time stamps."""
+
+    column: str = Field(description="name in the file")
+    unit: Literal["s", "ms", "us", "ns", "min", "d", "date"] = Field(
+        description="of the stamps; d: days, date: text such as 2024-03-01 12:00:00.001 or 12:00:00.001"
+    )
+
+
+class ChannelSource(_Strict):
+    """Source of a channel. NAME[i] is column i (from 0) of the matrix NAME in a .mat file."""
+
+    column: str = Field(description="name in the file")
+    unit: str = Field(description="of the column, such as mm, deg, rpm, counts, A, V")
+    scale: float = Field(default=1.0, description="factor beside the unit")
+    offset: float = Field(default=0.0, description="added after scaling, in the SI unit of the channel")
+    wraps_at: PositiveFloat | None = Field(
+        default=None, description="range of a counter or angle that starts again, in the unit of the column"
+    )
+    sign: Literal[1, -1] = Field(default=1, description="-1 if the column is positive the other way")
+    counts_per_rev: PositiveFloat | None = Field(default=None, description="unit counts, rotary encoder")
+    counts_per_m: PositiveFloat | None = Field(default=None, description="unit counts, linear encoder")
+    torque_constant_n_m_a: PositiveFloat | None = Field(default=None, description="unit A, torque")
+    force_constant_n_a: PositiveFloat | None = Field(default=None, description="unit A, force")
+    rated: PositiveFloat | None = Field(default=None, description="unit % or permille: rated value in SI")
+    gain: float | str | None = Field(
+        default=None, description="unit V: SI unit per volt, a number or the name of a scalar in a .mat file"
+    )
+
+    @model_validator(mode="after")
+    def _has_the_constant_of_its_unit(self) -> Self:
+        wanted = _CONSTANTS.get(self.unit, ())
+        for fields in _CONSTANTS.values():
+            for field in fields:
+                if getattr(self, field) is not None and field not in wanted:
+                    raise FieldError(
+                        (field,), f"is of no use for the unit {self.unit!r}; remove it or correct the unit"
+                    )
+        if wanted and sum(getattr(self, field) is not None for field in wanted) != 1:
+            raise FieldError(("unit",), f"{self.unit!r} needs exactly one of {', '.join(wanted)}; add it")
+        return self
+
+    def factor_to(self, si: str, lead_m: float | None, gain: float = 1.0) -> float | None:
+        """Factor from the column to the SI unit `si`, with sign and scale; None if the unit does not convert.
+
+        `gain` is the value of a gain that is given by name.
+        """
+        own, constant = self.unit, 1.0
+        if self.counts_per_rev is not None:
+            own, constant = "rad", 2 * pi / self.counts_per_rev
+        elif self.counts_per_m is not None:
+            own, constant = "m", 1 / self.counts_per_m
+        elif self.torque_constant_n_m_a is not None:
+            own, constant = "N m", self.torque_constant_n_m_a
+        elif self.force_constant_n_a is not None:
+            own, constant = "N", self.force_constant_n_a
+        elif self.rated is not None:
+            own, constant = si, self.rated * (1e-2 if self.unit == "%" else 1e-3)
+        elif self.gain is not None:
+            own, constant = si, gain if isinstance(self.gain, str) else self.gain
+        factor = si_factor(own, si, lead_m)
+        return None if factor is None else self.sign * self.scale * constant * factor
+
+
+class RecordingMap(_Strict):
+    """A map: the clock (a time column or a sample rate) and the source of each channel."""
+
+    about: str = Field(description="what is imported and where it comes from")
+    time: TimeColumn | None = Field(default=None, description="column of time stamps")
+    sample_rate_hz: PositiveFloat | None = Field(default=None, description="instead of a column of time stamps")
+    resample_hz: PositiveFloat | None = Field(
+        default=None, description="rate to which stamps with uneven steps are interpolated"
+    )
+    rows_per_sample: float | None = Field(
+        default=None, gt=1.0, description="of a logger that ran faster than the loop: each sample is kept once"
+    )
+    missing: Literal["refuse", "leave_out"] = Field(
+        default="refuse",
+        description="rows without a value in up to 5 % of the file: refuse the file, or leave them out",
+    )
+    csv: CsvOptions = Field(default=CsvOptions(), description="how a CSV file is written")
+    lead_m: PositiveFloat | None = Field(default=None, description="lead of the screw, to convert angle and length")
+    channels: dict[str, ChannelSource] = Field(description="channel name -> where it comes from")
+
+    @property
+    def axis(self) -> AxisChannels:
+        """Names of the channels of this kind of axis."""
+        return AXIS_CHANNELS[AxisKind.of(self.channels)]
+
+    @model_validator(mode="after")
+    def _is_complete(self) -> Self:
+        if (self.time is None) == (self.sample_rate_hz is None):
+            raise FieldError(
+                ("time",),
+                "given neither or both of time and sample_rate_hz, allowed one; "
+                "name the column of time stamps, or the rate if there is none",
+            )
+        for name, source in self.channels.items():
+            if name not in CHANNELS or name == "time_s":
+                known = ", ".join(channel for channel in CHANNELS if channel != "time_s")
+                raise FieldError(("channels", name), f"is no channel, allowed {known}; correct the name")
+            si = CHANNELS[name].unit
+            if source.factor_to(si, self.lead_m) is None:
+                allowed = [*units_of(si, self.lead_m), *_CONSTANTS]
+                lead = "" if self.lead_m else " (angle and length convert if lead_m is given)"
+                raise FieldError(
+                    ("channels", name, "unit"),
+                    f"given {source.unit!r}, allowed {', '.join(allowed)}{lead}; correct the unit",
+                )
+        axis = self.axis
+        if not {axis.motor_position, axis.motor_velocity} & set(self.channels):
+            raise FieldError(
+                ("channels",),
+                f"{axis.motor_position} is missing, and {axis.motor_velocity} too (motor_position_m, "
+                "motor_velocity_m_s on a linear axis); add one",
+            )
+        if not {axis.torque, axis.torque_command, axis.table_position} & set(self.channels):
+            raise FieldError(
+                ("channels",),
+                f"{axis.torque} and {axis.torque_command} are missing; add one, or {axis.table_position} to tell the "
+                "transmission alone",
+            )
+        return self

@@ -1,0 +1,70 @@
+"""Write a drafted map as YAML with comments that explain its keys and how each value was found."""
+
+import json
+import re
+
+from hil.channels import CHANNELS
+from hil.importing.map_draft import MapDraft
+
+_PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_\[\]]*")
+_RESERVED = {"true", "false", "null", "yes", "no", "on", "off"}
+_KEYS = """\
+# Each channel: value [SI] = sign x scale x factor(unit) x column + offset. Keys of a channel:
+#   column  name in the file; NAME[i] is column i (from 0) of the matrix NAME of a .mat file
+#   unit    m mm um in | rad deg rev counts | m/s mm/s m/min rad/s deg/s rpm | N kN | N m mN m | A V % permille
+#   sign    -1 if the column is positive the other way
+#   scale   factor beside the unit (1);  offset: added afterwards, in SI (0)
+#   wraps_at                                  range of a counter or angle that starts again, in the unit of the column
+#   counts_per_rev, counts_per_m              for the unit counts
+#   torque_constant_n_m_a, force_constant_n_a for the unit A
+#   rated   N m or N at 100 %, for the units % and permille;  gain: N m or N per volt, for the unit V
+"""
+
+
+def map_text(draft: MapDraft) -> str:
+    """The map as text of a YAML file."""
+    content, clock = draft.content(), draft.clock
+    lines = [f"# Map of {draft.table.path.name}, drafted by hil import. Correct it and import again with --map."]
+    if draft.unsure:
+        lines += ["# Please check:", *(f"#   - {note}" for note in draft.unsure)]
+    lines += [f"about: {_scalar(content['about'])}"]
+    if clock.column is not None:
+        lines += [f"time:                     # {clock.how}", f"  column: {_scalar(clock.column)}"]
+        lines += [f"  unit: {clock.unit}                 # s, ms, us, ns, min, d (days), date (text)"]
+    else:
+        lines += [f"sample_rate_hz: {clock.rate_hz!r}   # instead of time stamps; {clock.how}"]
+    if clock.resample_hz is not None:
+        lines += [f"resample_hz: {clock.resample_hz!r}   # for rows that are missing or taken at uneven moments"]
+    if draft.rows_per_sample is not None:
+        lines += [f"rows_per_sample: {draft.rows_per_sample!r}   # each sample stands in so many rows and is kept once"]
+    if draft.missing:
+        lines += ["missing: leave_out          # rows without a value; refuse: do not import such a file"]
+    options = content.get("csv")
+    if isinstance(options, dict):
+        lines += ["csv:                      # how the text file is written"]
+        lines += [f"  {key}: {_value(value)}" for key, value in options.items()]
+    if draft.lead_m is not None:
+        lines += [f"lead_m: {draft.lead_m!r}   # m per revolution of the motor; {draft.lead_how}"]
+    lines += _KEYS.rstrip().splitlines()
+    lines += ["channels:"]
+    for one in draft.channels:
+        lines += [f"  {one.channel}:   # {CHANNELS[one.channel].meaning} [{CHANNELS[one.channel].unit}]; {one.how}"]
+        lines += [f"    {key}: {_value(value)}" for key, value in one.entry.items()]
+    if draft.left_out:
+        lines += ["# Columns that are not used:", *(f"#   {name}: {why}" for name, why in draft.left_out.items())]
+    return "\n".join(line.replace("\t", " ") if line.startswith("#") else line for line in lines) + "\n"
+
+
+def _value(value: object) -> str:
+    if isinstance(value, list):
+        return "[" + ", ".join(_scalar(item) for item in value) + "]"
+    return _scalar(value) if isinstance(value, str) else repr(value)
+
+
+def _scalar(value: object) -> str:
+    text = str(value)
+    return (
+        text
+        if _PLAIN.fullmatch(text) and text.lower() not in _RESERVED and "[" not in text
+        else json.dumps(text, ensure_ascii=False)
+    )

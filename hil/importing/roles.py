@@ -1,0 +1,300 @@
+"""Decide which column is which channel, from names first and from the relations of the data where names do not say."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from hil.arrays import FloatArray
+from hil.errors import InputError
+from hil.importing.column_names import Label, Quantity
+from hil.importing.computed_position import computed_one
+from hil.importing.relations import (
+    MotionColumns,
+    derivative_of,
+    driven,
+    motion,
+    noise,
+    proportional,
+    roughness,
+    smoothed,
+)
+from hil.quantities import UNITS
+
+SAME_POSITION = 0.98  # share from which a column is another reading of a position: following errors are below 5 %
+FOLLOWED = 0.5  # share of a set-point that a controlled motion follows: less is another axis or no loop
+IS_DERIVATIVE = 0.9  # share from which a column is the velocity of another: counting and filters leave a few per cent
+IS_DRIVEN = 0.4  # share of an unnamed effort that one mass with friction explains: gravity and springs may be more
+SAME_COLUMN = 1e-6  # of the travel: a copy in another unit deviates by printed digits, a second sensor by more
+SMOOTH = 0.3  # roughness of a motion; rows without order have 1.4
+_UNIT_RANK = ("N m", "N", "A", "mA", "%", "permille", None, "V", "mV")  # torques and forces by their SI unit
+
+
+@dataclass
+class Roles:
+    """Name of the column of each role (None: not recorded), and notes on ignored columns and uncertain choices."""
+
+    motor: str | None = None
+    motor_velocity: str | None = None
+    table: str | None = None
+    command: str | None = None
+    velocity_command: str | None = None
+    unfollowed: str | None = None  # a set-point that the motion does not follow
+    effort: str | None = None
+    effort_command: str | None = None
+    axis: str = ""
+    left_out: dict[str, str] = field(default_factory=dict)
+    unsure: list[str] = field(default_factory=list)
+    how: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def used(self) -> list[str]:
+        """Columns with a role."""
+        positions = (self.motor, self.motor_velocity, self.table, self.command, self.unfollowed, self.velocity_command)
+        return [name for name in (*positions, self.effort, self.effort_command) if name]
+
+
+def find_roles(
+    where: str, columns: dict[str, FloatArray], labels: dict[str, Label], period_s: float, axis: str | None
+) -> Roles:
+    """Find the columns of one axis among `columns` (n,) without the clock, finite, on a regular clock.
+
+    `axis` is the number of the axis in the names. Raises InputError: no motion, columns interchanged.
+    """
+    roles = Roles()
+    labels = _of_one_axis(where, dict(labels), columns, roles, axis)
+    frozen = [name for name in columns if name in labels and np.ptp(columns[name]) == 0.0]
+    roles.left_out |= {name: f"constant at {columns[name][0]:g}" for name in frozen}
+    labels = {name: label for name, label in labels.items() if name not in frozen}
+    live = {name: columns[name] for name in columns if name in labels}
+    labels = _with_quantities(live, labels, period_s, roles)
+    of = {kind: [name for name in live if labels[name].quantity is kind] for kind in Quantity}
+    for name in of[Quantity.OTHER] + of[Quantity.ACCELERATION]:
+        roles.left_out.setdefault(name, f"{labels[name].quantity} by its name, not needed")
+    _positions(live, labels, of[Quantity.POSITION], roles)
+    moved = motion(live[roles.motor], period_s) if roles.motor else None
+    _velocities(where, live, labels, of[Quantity.VELOCITY], moved, period_s, roles)
+    _efforts(live, labels, of[Quantity.EFFORT], roles)
+    _refuse_frozen(where, frozen, columns, roles)
+    return roles
+
+
+def _refuse_frozen(where: str, frozen: list[str], columns: dict[str, FloatArray], roles: Roles) -> None:
+    if roles.motor is None and roles.motor_velocity is None:
+        told = f"; constant are {', '.join(frozen)}" if frozen else ""
+        raise InputError(
+            f"{where}: no column is the measured position of the axis (columns: {', '.join(columns)}{told}); "
+            "record it, or write its column into a map: hil import FILE --map MAP.yaml"
+        )
+
+
+def _of_one_axis(
+    where: str, labels: dict[str, Label], columns: dict[str, FloatArray], roles: Roles, axis: str | None
+) -> dict[str, Label]:
+    """Leave out the columns of other axes: numbers in the names count axes if more than one has position and effort."""
+    numbers = sorted({one.number for one in labels.values() if one.number})
+    both = [
+        number
+        for number in numbers
+        if {Quantity.POSITION, Quantity.EFFORT}
+        <= {one.quantity for name, one in labels.items() if one.number == number and name in columns}
+    ]
+    if axis is not None and axis not in numbers:
+        raise InputError(
+            f"{where}: given axis {axis!r}, allowed {', '.join(numbers) or 'none: its columns have no numbers'}"
+        )
+    if len(both) < 2 and axis is None:
+        return labels
+    roles.axis = axis or both[0]
+    others = [number for number in both if number != roles.axis]
+    if others:
+        another = "" if axis else f", for another: --axis {others[0]}"
+        roles.unsure.append(
+            f"axis: the file holds the axes {', '.join(both)}; {roles.axis} is taken{another}; what another moving arm "
+            "does to it is not modelled, and may look like a spring, a force or friction"
+        )
+    for name, one in list(labels.items()):
+        if one.number and one.number != roles.axis:
+            roles.left_out[name] = f"of axis {one.number}"
+            labels.pop(name)
+    return {name: replace(one, number="") for name, one in labels.items()}
+
+
+def _with_quantities(
+    live: dict[str, FloatArray], labels: dict[str, Label], period_s: float, roles: Roles
+) -> dict[str, Label]:
+    """Give the columns whose names say nothing a quantity by their relations to a position."""
+    told, labels = labels, dict(labels)
+    for name in live:  # a letter is a name by chance: the data say more, where they say something
+        if told[name].letter and told[name].unit is None:
+            labels[name] = replace(told[name], quantity=Quantity.UNKNOWN)
+    unnamed = [name for name in live if labels[name].quantity is Quantity.UNKNOWN]
+    positions = [name for name in live if labels[name].quantity is Quantity.POSITION]
+    if not unnamed:
+        return labels
+
+    def become(name: str, quantity: Quantity, how: str) -> None:
+        labels[name] = replace(labels[name], quantity=quantity)
+        roles.how[name] = how
+        roles.unsure.append(f"{name}: its name says nothing; {how}")
+
+    if not positions:
+        smooth = [name for name in unnamed if roughness(live[name]) < SMOOTH]
+        named = [name for name in smooth if told[name].quantity is Quantity.POSITION]
+        scores = {name: _as_position(name, live, period_s) for name in named or smooth}
+        if named and max(scores.values()) < IS_DRIVEN:
+            scores = {name: _as_position(name, live, period_s) for name in smooth}
+        best = max(scores, key=lambda name: scores[name], default=None)
+        if best is None or scores[best] < IS_DRIVEN:
+            return told
+        become(best, Quantity.POSITION, "a position: other columns follow from its derivatives")
+        positions, unnamed = [best], [name for name in unnamed if name != best]
+    for name in unnamed:
+        moved = {position: motion(live[position], period_s) for position in positions}
+        if any(proportional(live[name], live[position]).share > SAME_POSITION for position in positions):
+            become(name, Quantity.POSITION, f"a position: it follows {positions[0]}")
+        elif any(derivative_of(live[name], one, period_s).share > IS_DERIVATIVE for one in moved.values()):
+            become(name, Quantity.VELOCITY, f"a velocity: it is the derivative of {positions[0]}")
+        elif any(_accelerates(live[name], one, period_s) for one in moved.values()):
+            become(name, Quantity.ACCELERATION, f"an acceleration: the second derivative of {positions[0]}")
+        elif max(driven(live[name], one, period_s).share for one in moved.values()) > IS_DRIVEN:
+            become(
+                name,
+                Quantity.EFFORT,
+                f"torque, force, current or voltage: inertia and friction of {positions[0]} explain it",
+            )
+        elif told[name].quantity is not Quantity.UNKNOWN:
+            labels[name] = told[name]
+        else:
+            roles.left_out[name] = "no relation to the motion is found"
+    return labels
+
+
+def _as_position(name: str, live: dict[str, FloatArray], period_s: float) -> float:
+    """Sum over the other columns of what they have to do with `name` as a position."""
+    moved = motion(live[name], period_s)
+    total = 0.0
+    for other, values in live.items():
+        if other == name or proportional(values, live[name]).share > SAME_POSITION:
+            continue
+        total += max(derivative_of(values, moved, period_s).share, driven(values, moved, period_s).share)
+    return total - 0.01 * noise(live[name])
+
+
+def _accelerates(values: FloatArray, moved: MotionColumns, period_s: float) -> bool:
+    return proportional(smoothed(values, period_s), moved.acceleration).share > IS_DERIVATIVE
+
+
+def _positions(live: dict[str, FloatArray], labels: dict[str, Label], names: list[str], roles: Roles) -> None:
+    """Tell set-point, motor and second encoder."""
+    names = list(names)
+    for name in names[1:]:
+        first = next((one for one in names[: names.index(name)] if _copies(live[one], live[name])), None)
+        if first is not None and (labels[name].command, labels[name].table) == (
+            labels[first].command,
+            labels[first].table,
+        ):
+            roles.left_out[name] = f"a copy of {first}"
+            names.remove(name)
+    commands = [name for name in names if labels[name].command]
+    measured = [name for name in names if name not in commands]
+    if not commands and len(measured) > 1:
+        plain = [name for name in measured if not (labels[name].motor or labels[name].table or labels[name].measured)]
+        commands, why = computed_one({name: live[name] for name in measured}, plain)
+        roles.unsure += [f"{name}: taken for the set-point, because {why}" for name in commands]
+        measured = [name for name in measured if name not in commands]
+    if not measured:
+        return
+    far = [name for name in measured if labels[name].table]
+    near = [name for name in measured if not labels[name].table] or far
+    roles.motor = next((name for name in near if labels[name].motor), None) or min(
+        near, key=lambda name: (not labels[name].measured, int(labels[name].number or 0), near.index(name))
+    )
+    rest = [name for name in (*far, *near) if name != roles.motor]
+    if rest:
+        roles.table = rest[0]
+        if not labels[rest[0]].table:
+            roles.unsure.append(
+                f"{rest[0]}: taken for the second encoder and {roles.motor} for the motor's; exchange them if not"
+            )
+    for name in rest[1:]:
+        roles.left_out[name] = "a third position"
+    if commands:
+        shares = {name: proportional(live[name], live[roles.motor]).share for name in commands}
+        best = max(commands, key=lambda name: shares[name])
+        for name in commands:
+            roles.left_out[name] = "another set-point"
+        if shares[best] < FOLLOWED:
+            roles.unfollowed = best
+            roles.left_out[best] = f"a set-point that {roles.motor} does not follow (share {shares[best]:.2f})"
+            roles.unsure.append(f"{best}: {roles.motor} does not follow it (share {shares[best]:.2f}); it is not used")
+        else:
+            roles.command = roles.left_out.pop(best, None) and best
+
+
+def _copies(first: FloatArray, second: FloatArray) -> bool:
+    factor = proportional(second, first).factor
+    left = second - factor * first
+    return bool(factor != 0.0 and np.ptp(left) < SAME_COLUMN * np.ptp(second))
+
+
+def _velocities(
+    where: str,
+    live: dict[str, FloatArray],
+    labels: dict[str, Label],
+    names: list[str],
+    moved: MotionColumns | None,
+    period_s: float,
+    roles: Roles,
+) -> None:
+    commands = [name for name in names if labels[name].command]
+    measured = [name for name in names if not labels[name].command]
+    roles.velocity_command = commands[0] if commands else None
+    if moved is None or roles.motor is None:
+        near = [name for name in measured if not labels[name].table]
+        roles.motor_velocity = next(iter(near or measured), None)
+        return
+    for name in measured:
+        share = derivative_of(live[name], moved, period_s).share
+        if share < 0.5:
+            inverse = derivative_of(live[roles.motor], motion(live[name], period_s), period_s).share
+            if inverse > IS_DERIVATIVE:
+                raise InputError(
+                    f"{where}: {roles.motor} is the derivative of {name}: position and velocity are interchanged; "
+                    "correct the names of the columns"
+                )
+            roles.unsure.append(
+                f"{name}: named a velocity, but it is not the derivative of {roles.motor} (share {share:.2f})"
+            )
+            roles.left_out[name] = "no velocity of this motion"
+        elif share < SAME_POSITION:
+            roles.unsure.append(
+                f"{name}: is the derivative of {roles.motor} only in part (share {share:.2f}): filtered or late"
+            )
+            roles.left_out[name] = "velocity of the motion, follows from the position"
+        else:
+            roles.left_out[name] = "velocity of the motion, follows from the position"
+
+
+def _efforts(live: dict[str, FloatArray], labels: dict[str, Label], names: list[str], roles: Roles) -> None:
+    """Tell commanded and measured effort; of several the one at the motor, in the unit nearest to torque."""
+
+    def rank(name: str) -> tuple[bool, int]:
+        si = UNITS.get(unit := labels[name].unit or labels[name].electric or "", (unit,))[0]
+        return labels[name].table, _UNIT_RANK.index(si if si in _UNIT_RANK else None)
+
+    voltage = [name for name in names if (labels[name].unit or labels[name].electric) in _UNIT_RANK[-2:]]
+    commands = [name for name in names if labels[name].command or name in voltage]
+    measured = [name for name in names if name not in commands]
+    commands = [name for name in commands if name not in voltage] or commands
+    roles.effort = min(measured, key=rank, default=None)
+    roles.effort_command = min(commands, key=rank, default=None)
+    if roles.effort and roles.effort_command:
+        one, other = labels[roles.effort], labels[roles.effort_command]
+        if (one.unit or one.electric) != (other.unit or other.electric):
+            roles.left_out[roles.effort_command] = f"in another unit than {roles.effort}"
+            roles.effort_command = None
+        elif len(measured) > 1 and not one.measured:
+            roles.unsure.append(f"{roles.effort}: taken for the measured torque")
+    for name in names:
+        if name not in (roles.effort, roles.effort_command):
+            roles.left_out.setdefault(name, "another torque, force, current or voltage")

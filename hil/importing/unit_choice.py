@@ -1,0 +1,115 @@
+"""Choose the units of columns: by their names, by their relations to columns with a unit, else by their size."""
+
+import re
+from dataclasses import dataclass
+from math import pi
+
+import numpy as np
+
+from hil.arrays import FloatArray
+from hil.importing.column_names import Label
+from hil.quantities import UNITS
+
+MATCH = 0.02  # relative deviation of a factor between two columns from that of two units: above following errors
+LENGTHS = ("m", "mm", "um", "in")
+ANGLES = ("rad", "deg", "rev", "mrad")
+LINEAR_SPEEDS = ("m/s", "mm/s", "m/min", "mm/min")
+ANGULAR_SPEEDS = ("rad/s", "deg/s", "rpm", "rev/s")
+# Largest travel read in a unit: axes travel metres at most, joints a few turns
+_LONGEST_M, _MOST_RAD = 5.0, 13.0
+_WHOLE = 1e-5  # relative deviation from whole quarters of a turn: that of six digits
+_LEAST_COUNTS = 200.0  # travel in whole numbers from which they are counts of an encoder
+_COORDINATE = r"q(pos)?\d*([_ ].*)?"  # joint angle, as robotics writes it: q, q1, q_ref
+_ANGLE = "angle|winkel|theta|phi|rot|joint|gelenk"
+_LENGTH = "weg|hub|stroke|course|displ|linear"
+_JOINT_STATE = r"(^|[^a-z])effort(\W|\d|$)"  # effort, effort[0], .effort0, effort.elbow
+
+
+@dataclass(frozen=True)
+class UnitChoice:
+    """A unit, and a note if it is not sure."""
+
+    unit: str
+    note: str = ""
+
+
+def is_length(unit: str) -> bool:
+    return UNITS.get(unit, ("", 1.0))[0] in ("m", "m/s")
+
+
+def are_counts(values: FloatArray) -> bool:
+    """True for whole numbers that travel far."""
+    return bool(np.ptp(values) > _LEAST_COUNTS and np.all(values == np.round(values)))
+
+
+def gives_force(effort: Label | None) -> bool:
+    """True if the motor gives a force."""
+    return effort is not None and effort.unit in ("N", "kN")
+
+
+def prefers_length(positions: list[str], effort: Label | None) -> bool | None:
+    """True or False if names of the positions or the unit of the effort tell a length or an angle, else None."""
+    words = " ".join(positions).lower()
+    if gives_force(effort):
+        return True
+    if any(re.fullmatch(_COORDINATE, name.lower()) for name in positions) or re.search(_ANGLE, words):
+        return False
+    if re.search(_LENGTH, words):
+        return True
+    return False if effort and UNITS.get(effort.unit or "", ("",))[0] == "N m" else None
+
+
+def unit_by_convention(effort: Label | None) -> UnitChoice | None:
+    """rad where a torque without a unit is called effort, as in sensor_msgs/JointState of ROS."""
+    if effort is None or effort.unit or not re.search(_JOINT_STATE, effort.column.lower()):
+        return None
+    return UnitChoice("rad", f"{effort.column}: named as in a joint state of ROS; rad and N m are taken")
+
+
+def position_unit(
+    column: str, values: FloatArray, named: str | None, hints: list[tuple[float, str]], prefers_length: bool | None
+) -> UnitChoice:
+    """Unit of a position (n,).
+
+    `hints` are (factor, unit): values = factor x a column in that unit (a position, or the integral of a velocity);
+    `prefers_length` is what other columns say of the axis, None if nothing.
+    """
+    if named is not None:
+        return UnitChoice(named)
+    for factor, unit in hints:
+        si, known = UNITS.get(unit, (None, 1.0))
+        for candidate in (*LENGTHS, *ANGLES):
+            own_si, own = UNITS[candidate]
+            if own_si == si and abs(abs(factor) * own / known - 1.0) < MATCH:
+                return UnitChoice(candidate, f"{column}: {candidate}, by its factor to a column in {unit}")
+    travel = float(np.ptp(values))
+    if are_counts(values):
+        return UnitChoice("counts", f"{column}: whole numbers, taken for counts")
+    if prefers_length is None:  # this program is for linear axes first
+        return _by_size(column, travel, length=True, why="angle or length is not said")
+    return _by_size(column, travel, prefers_length, "no unit is given")
+
+
+def _by_size(column: str, travel: float, length: bool, why: str) -> UnitChoice:
+    small, large, most = ("m", "mm", _LONGEST_M) if length else ("rad", "deg", _MOST_RAD)
+    quarters = travel / (0.5 * pi)
+    whole = not length and abs(quarters - round(quarters)) < _WHOLE * quarters  # of a set-point in radians
+    unit = small if travel < most or whole else large
+    return UnitChoice(unit, f"{column}: {why}; {unit} is taken for a travel of {travel:.4g}")
+
+
+def velocity_unit(column: str, named: str | None, factor: float, position: str) -> UnitChoice:
+    """Unit of a velocity = factor x derivative of a position in the unit `position`."""
+    if named is not None:
+        return UnitChoice(named)
+    si, per = UNITS.get(position, ("rad", 1.0))
+    candidates = LINEAR_SPEEDS if si == "m" else ANGULAR_SPEEDS
+    for candidate in candidates:
+        if abs(abs(factor) * UNITS[candidate][1] / per - 1.0) < MATCH:
+            return UnitChoice(candidate)
+    return UnitChoice(candidates[0], f"{column}: no unit is given; {candidates[0]} is taken")
+
+
+def misfit(factor: float, unit: str, other: str) -> float:
+    """Ratio by which values in `unit` = factor x values in `other` contradict the two units; 1 if they agree."""
+    return abs(factor) * UNITS[unit][1] / UNITS[other][1]

@@ -180,7 +180,7 @@ def diagnose(
     left = torque_left(owner, nominal, final, held_out)
     notes += [*notes_on(table, proof, forms, verdict, explanation, final), *ended(final), *on_torque(left)]
     notes += [note for note in (refit.note, experiment.note if experiment else "") if note]
-    notes += [] if bench.law_known else untold(data)
+    notes += [] if data.observability.closed_loop else untold(data)
     notes += [stopped(explanation, budget_s)] if explanation.stopped_at else []
     result = Result(
         verdict=verdict,
@@ -211,7 +211,7 @@ def diagnose(
     said = " ".join(text for text in ((told, law.advice) if found or change else (law.advice, told)) if text)
     result = result.model_copy(update={"statement": said})
     after = bench if as_given else diagnosed_bench(bench, final)
-    if not bench.law_known:  # what was set aside stays in the file
+    if not data.observability.closed_loop:  # what was set aside stays in the file
         after = after.model_copy(update={"control": believed.control})
     after = after.model_copy(update={"encoders": believed.encoders})
     return Diagnosis(result, after, bench, data, held_out, explanation, proof, final, experiment, change)

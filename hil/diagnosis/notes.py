@@ -22,7 +22,7 @@ def notes_on(
     """Notes on the figures, on terms that were dropped or not validated, and on those that explain too little."""
     lost = (
         []
-        if not final.bench.law_known
+        if not final.data.observability.closed_loop
         else [
             unstable(run)
             for run in final.data.runs[:1]
@@ -38,7 +38,7 @@ def notes_on(
             "response of the axis to it. Random disturbances of the axis therefore count as mismatch."
         )
     blocks = [name for name, entry in table.items() if entry.mode is Mode.BLOCKS]
-    if blocks and explanation.nominal.bench.law_known and not lost:
+    if blocks and explanation.nominal.data.observability.closed_loop and not lost:
         notes.append(
             f"Figures of {', '.join(blocks)} are block by block, with measured inputs: in closed loop the twin "
             "deviates from the recording by more than the noise although every block is at its floor (chaotic loop)."

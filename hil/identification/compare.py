@@ -114,7 +114,7 @@ class Comparison:
         if not self.held and table is not None:
             return table.deviation.rms / max(table.noise, TABLE_ACCURACY_M)
         values = self.channels[0].values - self.channel("motor_position").values
-        return rms(values[self.measured.judged]) / max(self.measured.noise.table_m, TABLE_ACCURACY_M)
+        return rms(values[self.measured.evaluated]) / max(self.measured.noise.table_m, TABLE_ACCURACY_M)
 
     @property
     def explained(self) -> bool:
@@ -188,22 +188,23 @@ def compare(
         fitted = fit_nominal(data, partial(_figures_of, measured, data))
         bench = fitted.bench
     progress("simulating", None)
-    channels, datum = _closed_loop(measured, bench) if bench.law_known else ([], 0.0)
+    closed_loop = measured.observability.closed_loop
+    channels, datum = _closed_loop(measured, bench) if closed_loop else ([], 0.0)
     progress("block by block", None)
     blocks = compare_blocks(Hypothesis(bench), data)
-    if not bench.law_known:
+    if not closed_loop:
         blocks = tuple(block for block in blocks if block.deviation.name != CONTROLLER_BLOCK)
     inverse, remarks = _inverse_dynamics(recording) if bench.axis.linear else (None, [])
     notes = (*_notes(measured, bench, fitted, datum), *remarks)
     if not channels:
-        notes = (unstable(measured) if bench.law_known else _UNKNOWN_LAW, *notes)
+        notes = (unstable(measured) if closed_loop else _UNKNOWN_LAW, *notes)
     return Comparison(recording, measured, bench, tuple(channels), blocks, fitted, inverse, notes)
 
 
 def _figures_of(measured: Measured, data: Dataset, hypothesis: Hypothesis) -> dict[str, float]:
     """Every rms deviation that a comparison with a hypothesis reports; infinite in closed loop if it is unstable."""
     found = rms_of_channels(hypothesis, data)
-    if not hypothesis.bench.law_known:
+    if not measured.observability.closed_loop:
         return found
     channels, _ = _closed_loop(measured, hypothesis.resolved.bench)
     return (
@@ -218,22 +219,24 @@ def _closed_loop(measured: Measured, bench: Bench) -> tuple[list[Deviation], flo
     response = bench.twin().simulate(
         measured.position_command_m, measured.velocity_command_m_s, measured.start, measured.table_m
     )
-    if not stays(differences(measured.response, response, bench, measured.judged), measured.response, measured.judged):
+    if not stays(
+        differences(measured.response, response, bench, measured.evaluated), measured.response, measured.evaluated
+    ):
         return [], 0.0
     ratio = bench.axis.ratio_m_rad
-    datum = datum_m(measured.response, response, ratio, measured.judged)
+    datum = datum_m(measured.response, response, ratio, measured.evaluated)
     # the datum of the encoder that closes the position loop is that of the set-points
     of_table, of_motor = (0.0, -datum) if bench.gains.position_from_table else (datum, 0.0)
-    judged, linear = measured.judged, bench.axis.linear
+    evaluated, linear = measured.evaluated, bench.axis.linear
     motor_m, simulated_m = ratio * measured.motor, ratio * response.motor_position
     if measured.table_m.size:
         channels = motion_channels(measured, measured.table_m - of_table, response.table_position_m)
         label = "motor position at the table"
-        channels.append(Deviation("motor_position", label, "m", motor_m - of_motor, simulated_m, judged))
+        channels.append(Deviation("motor_position", label, "m", motor_m - of_motor, simulated_m, evaluated))
     else:
         channels = motion_channels(measured, motor_m, simulated_m)
     name, label, unit = ("force_n", "motor force", "N") if linear else ("torque_n_m", "motor torque", "N m")
-    channels.append(Deviation(name, label, unit, measured.torque, response.torque, judged))
+    channels.append(Deviation(name, label, unit, measured.torque, response.torque, evaluated))
     return channels, datum
 
 
@@ -263,7 +266,7 @@ def _notes(measured: Measured, bench: Bench, fit: FitResult | None, datum: float
             f"law and the periods of the bench file (velocity loop {1e3 * measured.period_s:g} ms). A drive with "
             "another control law or period deviates from the twin even if the axis is modelled exactly."
         )
-    if measured.torque_is_command:
+    if not measured.observability.torque_and_command:
         notes.append(
             "Only one of torque and torque command is recorded: the drive cannot be compared, and the noise of the "
             "torque is the noise of its command, caused by the encoder through the controller."

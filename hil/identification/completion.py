@@ -5,7 +5,7 @@
     torque     = its command or the reverse; where neither was recorded, J a + D v + Fc sign(v) of the bench
 
 The set-points then only tell motion from rest; nothing is simulated from them. A torque that the bench gives is an
-input for the twin and no measurement: the residuals of motor and torque are left out (`Measured.unseen`).
+input for the twin and no measurement: the residuals of motor and torque are left out (`Observability.hidden`).
 """
 
 from collections.abc import Sequence

@@ -148,7 +148,7 @@ def fit_law(
             run.response,
             run.speed_set_point if by_loop else np.empty(0),
             run.start,
-            run.judged.start,
+            run.evaluated.start,
             run.noise.torque,
         )
         for run in runs

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
@@ -13,6 +14,7 @@ from hil.errors import InputError
 from hil.identification.command_timing import unknown_share
 from hil.identification.measured import Measured
 from hil.identification.noise import Laps
+from hil.identification.observability import Observability, common
 from hil.identification.rest import creeping, resting
 from hil.twin.axis import Response, Start
 from hil.twin.stepping.loops import LEAST_TICKS
@@ -49,6 +51,11 @@ class Dataset:
         default_factory=dict, init=False, repr=False
     )
 
+    @cached_property
+    def observability(self) -> Observability:
+        """Inputs and outputs of the axis that all recordings make known."""
+        return common(run.observability for run in self.runs)
+
     def over(self, runs: Sequence[Measured]) -> "Dataset":
         """Other recordings of the same axis with the same observer and travel."""
         return Dataset(tuple(runs), self.bench, self.observer_s, self.travel_m)
@@ -77,7 +84,7 @@ class Dataset:
     @property
     def rows(self) -> int:
         """Number of evaluated rows of all runs."""
-        return sum(run.motor[run.judged].size for run in self.runs)
+        return sum(run.motor[run.evaluated].size for run in self.runs)
 
     @property
     def laps(self) -> list[tuple[int, Laps]]:
@@ -93,13 +100,13 @@ def prepare_dataset(runs: Sequence[Measured], bench: Bench) -> Dataset:
     Raises InputError for a torque that is 0 throughout.
     """
     for run in runs:
-        if run.noise.torque <= 0.0 and "motor" not in run.unseen:
+        if run.noise.torque <= 0.0 and run.observability.torque_measured:
             raise InputError(
                 f"{run.name}: torque: given 0 throughout, allowed a recorded torque; leave the channel out"
             )
     wanted = max(np.sqrt(run.noise.motor * inertia(bench) / (TORQUE_ACCURACY * run.noise.torque)) for run in runs)
     fastest_s = FASTEST_OBSERVER_TICKS * runs[0].period_s
-    wanted = fastest_s if any("motor" in run.unseen for run in runs) else wanted
+    wanted = wanted if all(run.observability.torque_measured for run in runs) else fastest_s
     observer_s = float(np.clip(wanted, fastest_s, max(SLOWEST_OBSERVER_S, fastest_s)))
     return Dataset(tuple(runs), bench, observer_s, max(float(np.ptp(run.position_command_m)) for run in runs))
 
@@ -155,11 +162,11 @@ def sensor_noise(run: Measured, bench: Bench, observer_s: float) -> dict[str, Fl
     a = 1.0 - run.period_s / observer_s
     impulse = np.zeros(round(20.0 * observer_s / run.period_s) + 3)
     impulse[0] = 1.0
-    numerator = [0.5, 0.0, -0.5] if run.integrated else [1.0, -2.0, 1.0]
+    numerator = [1.0, -2.0, 1.0] if run.observability.position_measured else [0.5, 0.0, -0.5]
     passed = lfilter(numerator, [1.0, -2.0 * a, a * a], impulse)
     table, torque = (np.full(run.motor.shape, noise) for noise in (run.noise.table_m, run.noise.torque))
     found = {"motor": run.motor_noise * np.linalg.norm(passed), "table": table, "torque": torque, "command": torque}
-    if run.sampled and run.torque_is_command:  # its noise drives the twin too
+    if run.observability.noisy_torque_input:  # its noise drives the twin too
         for name, response in impulse_responses(run, bench, observer_s).items():
             found[name] = np.hypot(found[name], run.noise.torque * np.linalg.norm(response))
     return found
@@ -173,7 +180,7 @@ def unknown_input(run: Measured, bench: Bench, observer_s: float) -> dict[str, F
     """
     rows = run.motor.shape
     found = {name: np.zeros(rows) for name in ("motor", "table", "torque", "command")}
-    if run.sampled:
+    if run.observability.torque_between_rows_unknown:
         unknown = unknown_torque(run, bench)
         for name, response in impulse_responses(run, bench, observer_s).items():
             found[name] = np.sqrt(np.convolve(unknown**2, response**2)[: rows[0]])

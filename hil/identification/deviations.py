@@ -41,14 +41,14 @@ _DRIVE = (Stage.CURRENT, Stage.CHANNEL)
 
 @dataclass(frozen=True, eq=False)
 class Deviation:
-    """A channel (n,), measured and simulated, evaluated over the rows `judged`."""
+    """A channel (n,), measured and simulated, with the rows that are evaluated."""
 
     name: str
     label: str
     unit: str
     measured: FloatArray
     simulated: FloatArray
-    judged: slice
+    evaluated: slice
 
     @property
     def values(self) -> FloatArray:
@@ -58,17 +58,17 @@ class Deviation:
     @cached_property
     def rms(self) -> float:
         """Root mean square of measured less simulated."""
-        return rms(self.values[self.judged])
+        return rms(self.values[self.evaluated])
 
     @cached_property
     def peak(self) -> float:
         """Largest absolute deviation."""
-        return float(np.max(np.abs(self.values[self.judged])))
+        return float(np.max(np.abs(self.values[self.evaluated])))
 
     @cached_property
     def relative(self) -> float:
         """rms of the deviation over rms of the measured channel; 0 where the channel is 0 throughout."""
-        return self.rms / (rms(self.measured[self.judged]) or np.inf)
+        return self.rms / (rms(self.measured[self.evaluated]) or np.inf)
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,31 +94,31 @@ def compare_blocks(hypothesis: Hypothesis, data: Dataset) -> tuple[BlockDeviatio
         )
     else:
         remark = ""
-    judged = run.judged
+    evaluated = run.evaluated
     command = run.torque_command - left["command"]
-    controller = Deviation(CONTROLLER_BLOCK, f"{name} command", unit, run.torque_command, command, judged)
+    controller = Deviation(CONTROLLER_BLOCK, f"{name} command", unit, run.torque_command, command, evaluated)
     blocks = [BlockDeviation(controller, "set-points, measured positions", 0.0, remark)]
-    if not run.torque_is_command:
-        drive = Deviation("drive", name, unit, run.torque, run.torque - left["torque"], judged)
+    if run.observability.torque_and_command:
+        drive = Deviation("drive", name, unit, run.torque, run.torque - left["torque"], evaluated)
         blocks.append(BlockDeviation(drive, f"measured {name} command", run.noise.torque))
     held = _mechanics(hypothesis, run, data.observer_s)
     torque = inertia(data.bench) / data.observer_s**2  # torque per innovation
-    motor = Deviation(MOTOR_BLOCK, name, unit, run.torque, run.torque + torque * held["motor"], judged)
+    motor = Deviation(MOTOR_BLOCK, name, unit, run.torque, run.torque + torque * held["motor"], evaluated)
     inputs = f"measured {name}, held on the measured motor position"
     remark = f"deviation: {name} missing in the twin's mechanics, up to {0.5 / np.pi / data.observer_s:.0f} Hz"
-    blocks.append(BlockDeviation(motor, inputs, torque * rms(scale["motor"][judged]), remark))
+    blocks.append(BlockDeviation(motor, inputs, torque * rms(scale["motor"][evaluated]), remark))
     if "table" in held:
         stretch = run.table_m - bench.axis.ratio_m_rad * run.motor
-        stretch = stretch - np.mean(stretch[judged])
+        stretch = stretch - np.mean(stretch[evaluated])
         label = "table less motor position"
-        table = Deviation(TABLE_BLOCK, label, "m", stretch, stretch - held["table"], judged)
+        table = Deviation(TABLE_BLOCK, label, "m", stretch, stretch - held["table"], evaluated)
         blocks.append(BlockDeviation(table, "measured motor position (twin held on it)", run.noise.table_m))
     return tuple(blocks)
 
 
 def _mechanics(hypothesis: Hypothesis, run: Measured, observer_s: float) -> dict[str, FloatArray]:
     """Residuals (n,) of motor and table with the measured torque as input."""
-    return differences(*held_on_motor(hypothesis, run, observer_s), hypothesis.bench, run.judged)
+    return differences(*held_on_motor(hypothesis, run, observer_s), hypothesis.bench, run.evaluated)
 
 
 def held_on_motor(hypothesis: Hypothesis, run: Measured, observer_s: float) -> tuple[Response, Response]:
@@ -156,4 +156,4 @@ def motion_channels(measured: Measured, position: FloatArray, simulated: FloatAr
     ):
         pair = [np.gradient(values, period_s) for values in pair]
         entries.append((name, label, unit, pair[0], pair[1]))
-    return [Deviation(*entry, measured.judged) for entry in entries]
+    return [Deviation(*entry, measured.evaluated) for entry in entries]

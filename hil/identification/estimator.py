@@ -106,9 +106,9 @@ class Fit:
         return self.energy(lambda ratio: max(ratio - 1.0, 0.0))
 
     def energy(self, of: Callable[[float], float]) -> float:
-        """Sum of a function of the noise ratios over all channels and judged rows."""
+        """Sum of a function of the noise ratios over all channels and evaluated rows."""
         pairs = zip(self.data.runs, self.noise_ratios, strict=True)
-        return float(sum(run.motor[run.judged].size * of(ratio) for run, found in pairs for ratio in found.values()))
+        return float(sum(run.motor[run.evaluated].size * of(ratio) for run, found in pairs for ratio in found.values()))
 
     @cached_property
     def missed_torque(self) -> float:

@@ -58,7 +58,7 @@ def _pair(label: str, channel: Deviation) -> Panel:
 
 
 def _difference(label: str, channel: Deviation, noise: float) -> Panel:
-    values = np.where(np.arange(channel.measured.size) < channel.judged.start, 0.0, channel.values)
+    values = np.where(np.arange(channel.measured.size) < channel.evaluated.start, 0.0, channel.values)
     return Panel(label, channel.unit, (Line("measured - simulated", values, DEVIATION),), noise)
 
 

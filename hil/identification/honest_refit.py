@@ -54,7 +54,8 @@ def never_worse(fit: Fit, figures: Callable[[Hypothesis], Figures], enough: Figu
     `figures` gives the rms of each channel, `enough` the rms of a channel that is explained.
     """
     hypothesis = fit.hypothesis
-    before = figures(hypothesis.owner)
+    given = hypothesis.given
+    before = figures(given)
 
     def worse(at: Hypothesis) -> tuple[str, ...]:
         found = figures(at)
@@ -68,9 +69,9 @@ def never_worse(fit: Fit, figures: Callable[[Hypothesis], Figures], enough: Figu
     full = worse(hypothesis)
     if not full:
         return Refit(fit, 1.0, ())
-    begin = hypothesis.owner.x
+    begin = given.x
     between = ((share, hypothesis.moved(begin + share * (hypothesis.x - begin))) for share in _SHARES)
-    share, at = next(((share, point) for share, point in between if not worse(point)), (0.0, hypothesis.owner))
+    share, at = next(((share, point) for share, point in between if not worse(point)), (0.0, given))
     estimator = fit.estimator
     return Refit(replace(estimator.evaluate(at), jacobian=estimator.jacobian(at), converged=fit.converged), share, full)
 
@@ -80,7 +81,7 @@ def rms_of_channels(hypothesis: Hypothesis, data: Dataset) -> dict[str, float]:
     bench = hypothesis.bench
     blocks = hypothesis.residuals(data).channels
     found = {f"{name}{BLOCK}": _over_runs([part[name] for part in blocks], data) for name in _names(data)}
-    if not bench.law_known:
+    if not data.observability.closed_loop:
         return found
     if not holds(hypothesis, data):
         return found | {f"{name}{CLOSED}": math.inf for name in _names(data)}
@@ -100,33 +101,33 @@ def rms_at_floor(data: Dataset) -> dict[str, float]:
 def _names(data: Dataset) -> list[str]:
     run = data.runs[0]
     given = ("motor", "table", "torque") if run.table_m.size else ("motor", "torque")
-    return [name for name in given if name not in run.unseen]
+    return [name for name in given if name not in run.observability.hidden]
 
 
 def _over_runs(parts: Sequence[FloatArray], data: Dataset) -> float:
     with np.errstate(over="ignore"):  # the observer of a hypothesis may be unstable too
-        return rms(np.concatenate([part[run.judged] for part, run in zip(parts, data.runs, strict=True)]))
+        return rms(np.concatenate([part[run.evaluated] for part, run in zip(parts, data.runs, strict=True)]))
 
 
 def holds(hypothesis: Hypothesis, data: Dataset) -> bool:
     """True if the twin keeps to the recordings in closed loop, see `stays`."""
     left = hypothesis.residuals(data, closed=True).channels
-    return all(stays(channels, run.response, run.judged) for channels, run in zip(left, data.runs, strict=True))
+    return all(stays(channels, run.response, run.evaluated) for channels, run in zip(left, data.runs, strict=True))
 
 
-def stays(residuals: Mapping[str, FloatArray], measured: Response, judged: slice) -> bool:
+def stays(residuals: Mapping[str, FloatArray], measured: Response, evaluated: slice) -> bool:
     """True if a closed loop is stable: residuals (n,) of motor and torque stay within the range of their channel (rms).
 
     A torque limit bounds an unstable loop: then its torque swings from limit to limit. False also if the residual of
     the torque exceeds the torque's standard deviation and changes from tick to tick several times as much.
     """
-    motor, torque = residuals["motor"][judged], residuals["torque"][judged]
+    motor, torque = residuals["motor"][evaluated], residuals["torque"][evaluated]
     if not np.isfinite(motor).all() or not np.isfinite(torque).all():
         return False
     with np.errstate(over="ignore"):
-        if rms(motor) > np.ptp(measured.motor_position[judged]) or rms(torque) > np.ptp(measured.torque[judged]):
+        if rms(motor) > np.ptp(measured.motor_position[evaluated]) or rms(torque) > np.ptp(measured.torque[evaluated]):
             return False
-    given = measured.torque[judged]
+    given = measured.torque[evaluated]
     return rms(torque) <= float(np.std(given)) or rms(np.diff(torque)) <= _SWINGS * rms(np.diff(given))
 
 

@@ -105,8 +105,8 @@ class Hypothesis:
         return start.moved(np.concatenate([self.x[: self.nominal_count], start.x[self.nominal_count :]]))
 
     @property
-    def owner(self) -> "Hypothesis":
-        """The hypothesis with the nominal parameters of the bench."""
+    def given(self) -> "Hypothesis":
+        """The hypothesis with the nominal parameters as the bench file gives them."""
         return self.moved(np.concatenate([self._initial[: self.nominal_count], self.x[self.nominal_count :]]))
 
     # --- parameters ---
@@ -161,8 +161,8 @@ class Hypothesis:
         return known_coordinates(self.bench.mechanisms)
 
     @property
-    def given(self) -> list[float]:
-        """Nominal parameters (`nominal_count`,) as the bench has them."""
+    def bench_values(self) -> list[float]:
+        """Nominal parameters (`nominal_count`,) as the bench file gives them."""
         delay_s = self.bench.torque_delay_s
         return [
             *(float(getattr(self.bench.axis, name)) for name in self.bench.axis.NOMINAL),
@@ -172,7 +172,7 @@ class Hypothesis:
 
     @cached_property
     def _initial(self) -> FloatArray:
-        values = [*self.given, *(value for term in self.terms for value in term.values)]
+        values = [*self.bench_values, *(value for term in self.terms for value in term.values)]
         return np.array([c.x(value) for c, value in zip(self.coordinates, values, strict=True)])
 
     @property
@@ -190,7 +190,7 @@ class Hypothesis:
             max(step, 1e-3 if one.name in ("damping_ratio", DELAY) else 0.0 if one.logarithmic else LITTLE_STEP)
             for one in self.coordinates[:of_axis]
         ]
-        starts = [*self.given[of_axis:], *(value for term in self.terms for value in term.values)]
+        starts = [*self.bench_values[of_axis:], *(value for term in self.terms for value in term.values)]
         for coordinate, start in zip(self.coordinates[of_axis:], starts, strict=True):
             own = step
             if coordinate.role is Role.PERIOD:
@@ -273,16 +273,16 @@ class Hypothesis:
     def blocks(
         self, run: Measured, observer_s: float, fast: bool = False, rests: Measured | None = None
     ) -> dict[str, FloatArray]:
-        """Measured less twin with each block fed measured inputs, per channel (n,); 0 for channels that are unseen.
+        """Measured less twin with each block fed measured inputs, per channel (n,); 0 for hidden channels.
 
         The motor rests where it does in `rests`, by default in the run.
         """
         twin = self.twin(observer_s, fast, run)
         measured, rest = self.undelayed(twin, run), resting(rests or run, twin.slow_velocity)
         predicted = twin.observe(run.position_command_m, run.velocity_command_m_s, measured, run.start, rest)
-        found = differences(measured, predicted, self.bench, run.judged)
+        found = differences(measured, predicted, self.bench, run.evaluated)
         found["command"] = measured.torque_command - predicted.torque_command
-        return found | {name: np.zeros(run.motor.size) for name in run.unseen}
+        return found | {name: np.zeros(run.motor.size) for name in run.observability.hidden}
 
     def residuals(self, data: Dataset, closed: bool = False, fast: bool = False) -> Residuals:
         """Residuals on a data set, block by block or in closed loop; `fast`: with the steps of a search."""
@@ -291,7 +291,7 @@ class Hypothesis:
             self._done[key] = Residuals(
                 data,
                 tuple(
-                    differences(run.response, self.respond(run), self.bench, run.judged)
+                    differences(run.response, self.respond(run), self.bench, run.evaluated)
                     if closed
                     else self.blocks(run, data.observer_s, fast)
                     for run in data.runs

@@ -113,14 +113,14 @@ def correlation_time(residual: FloatArray) -> float:
 def effective_samples(fit: Fit) -> float:
     """Independent rows of a fit's residuals: rows of each part over its correlation time, weighted by energy.
 
-    A channel that is unseen counts as one at its white noise, as it is where control law and torque are known: the
+    A hidden channel counts as one at its white noise, as it is where control law and torque are known: the
     least evidence of a search was calibrated with it.
     """
     weight = total = 0.0
     parts = fit.residuals.parts
     for (run, channel), part in parts.items():
-        unseen = channel in fit.data.runs[run].unseen
-        energy = float(part.size) if unseen else float(part @ part)
+        hidden = channel in fit.data.runs[run].observability.hidden
+        energy = float(part.size) if hidden else float(part @ part)
         weight += energy * part.size / correlation_time(part)
         total += energy
     return weight / max(total, 1e-300) * len(parts) + 1.0

@@ -33,7 +33,7 @@ class LawErrors:
 
 @dataclass(frozen=True, eq=False)
 class LawFit:
-    """A control law on recordings; `runs` is what is recorded less what the law gives, over the judged rows."""
+    """A control law on recordings; `runs` is what is recorded less what the law gives, over the evaluated rows."""
 
     settings: Settings
     terms: tuple[Term, ...]

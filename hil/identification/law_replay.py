@@ -28,7 +28,7 @@ from hil.twin.stepping.loops import INTEGRATOR_S
 SETPOINT_ROWS, FEEDBACK_ROWS = 40.0, 12.0
 _SCANNED = 6000  # rows in which delays are looked for: seconds of motion at a usual rate
 _EACH = 8.0  # rows: delays that are tried one by one, longer ones by two
-_BEFORE = 50  # rows before the first judged one
+_BEFORE = 50  # rows before the first evaluated one
 _SAME = 0.01  # relative difference of the squares that two solutions leave, up to which they count as equal
 
 
@@ -51,7 +51,7 @@ class LawRows:
     measured: Response
     speed_set_point: FloatArray  # (0,) if it is not recorded, or not used
     start: Start
-    judged: int  # first row that is evaluated
+    first_evaluated: int
     noise: float  # standard deviation of the torque command
 
     def feedback_m(self, gains: Gains) -> FloatArray:
@@ -94,7 +94,7 @@ class LawRows:
             velocity_command_m_s=self.velocity_command_m_s[row:],
             measured=Response(*(values[row:] for values in self.measured)),
             speed_set_point=self.speed_set_point[row:],
-            judged=max(self.judged - row, 0),
+            first_evaluated=max(self.first_evaluated - row, 0),
         )
 
 
@@ -116,7 +116,7 @@ def position_loop(gains: Gains, rows: LawRows) -> FloatArray:
 
 
 def residuals(rows: LawRows, settings: Settings, twin: Twin, cut: int, weight: float) -> Parts:
-    """Residuals of a control law: recorded less computed values at the judged rows, without the first `cut` rows.
+    """Residuals of a control law: recorded less computed values at the evaluated rows, without the first `cut` rows.
 
     `twin` has the mechanisms on the inputs of the controller. `weight` is the velocity gain with which a deviation of
     the speed set-point counts as one of the command.
@@ -143,7 +143,7 @@ def residuals(rows: LawRows, settings: Settings, twin: Twin, cut: int, weight: f
         start = start._replace(torque=float(first.torque_command[0] - proportional[0]))
     command = law.measured.torque_command - controller.command(position, velocity, law.measured, start)
     with np.errstate(over="ignore", invalid="ignore"):
-        return Parts(*(_finite(one[law.judged :] / rows.noise) for one in (command, speed)))
+        return Parts(*(_finite(one[law.first_evaluated :] / rows.noise) for one in (command, speed)))
 
 
 def _finite(values: FloatArray) -> FloatArray:
@@ -155,7 +155,7 @@ def to_explain(rows: LawRows, gains: Gains) -> FloatArray:
 
     It is what passes the integrator that follows the command: a slow one is followed without any law.
     """
-    return high_pass(rows.measured.torque_command, gains.period_s)[rows.judged :] / rows.noise
+    return high_pass(rows.measured.torque_command, gains.period_s)[rows.first_evaluated :] / rows.noise
 
 
 def high_pass(values: FloatArray, period_s: float) -> FloatArray:
@@ -209,7 +209,7 @@ def _tables(runs: Sequence[LawRows], base: Settings, cuts: Sequence[int]) -> tup
         law = run.delayed(base).since(cut)
         motor = law.measured.motor_position
         step = 2 if gains.two_sample_mean else 1  # rows of a difference: the first ones have none
-        keep = slice(max(law.judged - step, 0), None)
+        keep = slice(max(law.first_evaluated - step, 0), None)
         held = np.arange(motor.size) // gains.position_ticks * gains.position_ticks
         inputs = np.stack([law.position_command_m - law.feedback_m(gains), law.velocity_command_m_s], axis=1)[held]
         if law.speed_set_point.size:
@@ -281,7 +281,7 @@ def find_delays(run: LawRows, base: Settings) -> tuple[float, float]:
 
     The misfit has several minima over the delay of the set-points, and one valley near the least of them.
     """
-    short = run.since(max(run.judged - _BEFORE, 0)).until(_SCANNED)
+    short = run.since(max(run.first_evaluated - _BEFORE, 0)).until(_SCANNED)
 
     def left(late: float, old: float, cut: int) -> float:
         return _left([short], base._replace(setpoint_rows=late, feedback_rows=old), [cut])

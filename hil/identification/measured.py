@@ -20,8 +20,9 @@ from hil.bench.bench_file import Bench
 from hil.channels import SPEED_SET_POINT, AxisKind
 from hil.control import cascade
 from hil.errors import InputError
-from hil.identification.completion import completed, position_is_measured, rows_are_ticks, torque_is_measured
+from hil.identification.completion import completed
 from hil.identification.noise import Laps, Noise, estimate_noise, find_laps, moving, white_noise
+from hil.identification.observability import Observability, observability
 from hil.recording.recording import Recording
 from hil.recording.stamps import check_finite
 from hil.twin.axis import Response, Start
@@ -53,15 +54,12 @@ class Measured:
     table_m: FloatArray  # empty without a linear encoder
     torque_command: FloatArray
     torque: FloatArray
-    torque_is_command: bool  # only one of the two was recorded
     start: Start
     noise: Noise
+    observability: Observability
     left_out: int = 0  # rows of the recording before the first tick of the position loop
-    unseen: frozenset[str] = frozenset()  # channels of the twin whose input or output is unknown: their residual is 0
-    integrated: bool = False  # the motor position is the sum of its measured velocity
-    sampled: bool = False  # the rows are samples of the torque, which changes between them
     speed_set_point: FloatArray = field(default_factory=lambda: np.empty(0))  # of unknown scale; empty if not recorded
-    lead_in: int = 0  # first rows, which are simulated and not evaluated
+    lead_in: int = 0  # first rows, which give the twin its state and are not evaluated
 
     @cached_property
     def torque_gap(self) -> FloatArray:
@@ -103,7 +101,7 @@ class Measured:
         return moving(self.velocity_command_m_s)
 
     @cached_property
-    def judged(self) -> slice:
+    def evaluated(self) -> slice:
         """Rows that are evaluated: from the first motion on, and after the start has settled.
 
         Before the first motion the state of friction is unknown. In a recording that begins in motion elastic modes
@@ -166,37 +164,27 @@ def take(recording: Recording, bench: Bench) -> Measured:
     )
     speed = _column(recording, SPEED_SET_POINT)[first:] if SPEED_SET_POINT in recording.columns else np.empty(0)
     noise = estimate_noise(bench, velocity, motor, table, command, torque, recording.period_s)
-    integrated = not position_is_measured(recording)
-    if integrated:
+    known = observability(recording, bench)
+    if not known.position_measured:
         noise = replace(noise, motor=recording.period_s * white_noise(_column(recording, names.motor_velocity)))
+    start = _start(gains, (position, velocity, motor, feedback), command)
     return Measured(
-        recording.name,
-        recording.kind,
-        recording.period_s,
-        position,
-        velocity,
-        motor,
-        table,
-        command,
-        torque,
-        bool(np.array_equal(command, torque)),
-        _start(gains, (position, velocity, motor, feedback), command)._replace(
-            time_s=recording.start_s + first * recording.period_s
-        ),
-        noise,
-        first,
-        _unseen(recording, bench),
-        integrated,
-        not bench.law_known and torque_is_measured(recording) and not rows_are_ticks(recording),
-        speed if np.any(speed) else np.empty(0),
-        max(int(recording.metadata.get(LEAD_IN, 0)) - first, 0),
+        name=recording.name,
+        kind=recording.kind,
+        period_s=recording.period_s,
+        position_command_m=position,
+        velocity_command_m_s=velocity,
+        motor=motor,
+        table_m=table,
+        torque_command=command,
+        torque=torque,
+        start=start._replace(time_s=recording.start_s + first * recording.period_s),
+        noise=noise,
+        observability=known,
+        left_out=first,
+        speed_set_point=speed if np.any(speed) else np.empty(0),
+        lead_in=max(int(recording.metadata.get(LEAD_IN, 0)) - first, 0),
     )
-
-
-def _unseen(recording: Recording, bench: Bench) -> frozenset[str]:
-    if bench.law_known:
-        return frozenset()
-    return frozenset({"command"} if torque_is_measured(recording) else {"command", "torque", "motor"})
 
 
 def bench_of(recording: Recording) -> Bench:

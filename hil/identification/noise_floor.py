@@ -74,7 +74,7 @@ def noise_response(hypothesis: Hypothesis, run: Measured) -> dict[str, float]:
     def moved(share: float) -> dict[str, float]:
         other = twin.simulate(run.position_command_m, run.velocity_command_m_s, run.start, run.table_m, share * misread)
         return {
-            name: rms((a - b)[run.judged])
+            name: rms((a - b)[run.evaluated])
             for name, a, b in (
                 ("motor", other.motor_position, quiet.motor_position),
                 ("table", other.table_position_m, quiet.table_position_m),
@@ -95,7 +95,7 @@ def noise_response(hypothesis: Hypothesis, run: Measured) -> dict[str, float]:
 
 def sensor_noise(run: Measured) -> dict[str, float]:
     """rms noise of the sensors of motor, table and torque over a run."""
-    return {"motor": rms(run.motor_noise[run.judged]), "table": run.noise.table_m, "torque": run.noise.torque}
+    return {"motor": rms(run.motor_noise[run.evaluated]), "table": run.noise.table_m, "torque": run.noise.torque}
 
 
 def rms(values: FloatArray) -> float:
@@ -118,7 +118,7 @@ def unrepeated(hypothesis: Hypothesis, data: Dataset) -> float:
     noise that reaches the motion depends on the parameters.
     """
     residuals = hypothesis.residuals(data)
-    least = 0.0 if hypothesis.bench.law_known else 1.0
+    least = 0.0 if data.observability.closed_loop else 1.0
     return sum(
         max(laps.difference(values) ** 2, least) * laps.first.size
         for run, laps in data.laps
@@ -140,7 +140,7 @@ def noise_ratios(hypothesis: Hypothesis, data: Dataset) -> tuple[dict[str, float
             added = _amplified_by_transmission(hypothesis, run, channels["table"], data.observer_s)
             ratios["table"] /= max(1.0, 1.0 + added / run.noise.table_m**2)
         if ratios["motor"] > 1.0 and "table" in ratios:
-            scale, part = data.scales()[index]["motor"][run.judged], residuals.parts[index, "motor"]
+            scale, part = data.scales()[index]["motor"][run.evaluated], residuals.parts[index, "motor"]
             noise = 1.0 + _returned_to_motor(hypothesis, run, channels, data.observer_s, scale)
             ratios["motor"] = float(np.mean(part**2 / noise))
         found.append(ratios)
@@ -154,8 +154,8 @@ def _amplified_by_transmission(hypothesis: Hypothesis, run: Measured, table: Flo
     """
     noise = run.motor_noise * np.random.default_rng(0).standard_normal(run.motor.size)
     noisy = hypothesis.blocks(replace(run, motor=run.motor + noise), observer_s, rests=run)["table"]
-    added = float(np.var((noisy - table)[run.judged]))
-    return added - float(np.mean((hypothesis.bench.axis.ratio_m_rad * run.motor_noise[run.judged]) ** 2))
+    added = float(np.var((noisy - table)[run.evaluated]))
+    return added - float(np.mean((hypothesis.bench.axis.ratio_m_rad * run.motor_noise[run.evaluated]) ** 2))
 
 
 def _returned_to_motor(
@@ -180,7 +180,7 @@ def _returned_to_motor(
         offset = count * rng.random()
         read = place + _misread(place + offset, count, 0.0, rng)
         other = hypothesis.blocks(replace(run, table_m=read), observer_s, rests=run)["motor"]
-        added += ((other - quiet)[run.judged] / scale) ** 2 / _READINGS
+        added += ((other - quiet)[run.evaluated] / scale) ** 2 / _READINGS
     near = maximum_filter1d(added, 2 * round(_NEAR_S / run.period_s) + 1) > 1.0
     if not near.any() or not np.isfinite(added).all():
         return np.zeros(scale.size)

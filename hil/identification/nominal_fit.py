@@ -86,7 +86,7 @@ def fit_nominal(data: Dataset, figures: Callable[[Hypothesis], Figures] | None =
     refit = never_worse(found, figures or partial(rms_of_channels, data=data), rms_at_floor(data))
     found = refit.fit
     hypothesis = found.hypothesis
-    entries = zip(hypothesis.nominal, hypothesis.given, hypothesis.values, standard_errors(found), strict=False)
+    entries = zip(hypothesis.nominal, hypothesis.bench_values, hypothesis.values, standard_errors(found), strict=False)
     parameters = tuple(
         FittedParameter(name, before, value, error, name in found.at_bound)
         for name, before, value, error in entries

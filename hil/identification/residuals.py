@@ -43,18 +43,18 @@ class Residuals:
 
     @cached_property
     def vector(self) -> FloatArray:
-        """Weighted residuals (m,) of the judged rows, run after run and channel after channel."""
+        """Weighted residuals (m,) of the evaluated rows, run after run and channel after channel."""
         return np.concatenate([part for _, part in self._weighted()])
 
     @cached_property
     def parts(self) -> dict[tuple[int, str], FloatArray]:
-        """Weighted residuals of the judged rows by (index of the run, channel): size one or less at the noise floor."""
+        """Weighted residuals of the evaluated rows by (index of the run, channel); size <= 1 at the noise floor."""
         return dict(zip(self._keys(), np.split(self.vector, self.splits), strict=True))
 
     @cached_property
     def splits(self) -> tuple[int, ...]:
         """Rows of `vector` at which the parts after the first begin."""
-        lengths = [self.data.runs[run].motor[self.data.runs[run].judged].size for run, _ in self._keys()]
+        lengths = [self.data.runs[run].motor[self.data.runs[run].evaluated].size for run, _ in self._keys()]
         return tuple(int(row) for row in np.cumsum(lengths)[:-1])
 
     def split(self, values: FloatArray) -> list[FloatArray]:
@@ -67,7 +67,7 @@ class Residuals:
     def _weighted(self) -> Iterator[tuple[str, FloatArray]]:
         scales = self.data.scales(self.torque_accuracy)
         for run, scale, channels in zip(self.data.runs, scales, self.channels, strict=True):
-            rows = run.judged
+            rows = run.evaluated
             for name, values in channels.items():
                 yield name, _bounded(values[rows], scale[name][rows])
 
@@ -78,17 +78,17 @@ def _bounded(values: FloatArray, scale: FloatArray) -> FloatArray:
         return np.clip(np.nan_to_num(values / scale, nan=_LOST), -_LOST, _LOST)
 
 
-def datum_m(measured: Response, simulated: Response, ratio_m: float, judged: slice) -> float:
+def datum_m(measured: Response, simulated: Response, ratio_m: float, evaluated: slice) -> float:
     """Datum of the linear encoder less that of a simulation [m]; 0 without a linear encoder.
 
-    It is the mean difference of table less motor position over the rows judged.
+    It is the mean difference of table less motor position over the evaluated rows.
     """
     if not measured.table_position_m.size:
         return 0.0
-    return float(np.mean(_stretch(measured, simulated, ratio_m)[judged]))
+    return float(np.mean(_stretch(measured, simulated, ratio_m)[evaluated]))
 
 
-def differences(measured: Response, simulated: Response, bench: Bench, judged: slice) -> dict[str, FloatArray]:
+def differences(measured: Response, simulated: Response, bench: Bench, evaluated: slice) -> dict[str, FloatArray]:
     """Measured less simulated (n,): motor [rad or m], table less motor [m], torque [N m or N], free of the datums.
 
     Values are not finite where the simulation is not. Without a linear encoder there is no "table".
@@ -96,9 +96,9 @@ def differences(measured: Response, simulated: Response, bench: Bench, judged: s
     ratio_m = bench.axis.ratio_m_rad
     with np.errstate(invalid="ignore", over="ignore"):  # a hypothesis may be unstable
         motor = measured.motor_position - simulated.motor_position
-        found = {"motor": motor - np.mean(motor[judged]) if bench.gains.position_from_table else motor}
+        found = {"motor": motor - np.mean(motor[evaluated]) if bench.gains.position_from_table else motor}
         if measured.table_position_m.size:
-            found["table"] = _stretch(measured, simulated, ratio_m) - datum_m(measured, simulated, ratio_m, judged)
+            found["table"] = _stretch(measured, simulated, ratio_m) - datum_m(measured, simulated, ratio_m, evaluated)
         found["torque"] = measured.torque - simulated.torque
     return found
 

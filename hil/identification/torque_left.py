@@ -117,7 +117,7 @@ def _sliding(run: Measured, slowest: float) -> NDArray[np.bool_]:
     window, rows = _window(run), np.zeros(run.motor.size, dtype=bool)
     if run.motor.size < 4 * window:
         return rows
-    rows[run.judged] = (np.abs(_derivative(run, 1)) > slowest)[run.judged]
+    rows[run.evaluated] = (np.abs(_derivative(run, 1)) > slowest)[run.evaluated]
     rows[:window] = rows[-window:] = False
     return rows
 

@@ -100,7 +100,7 @@ def _free_shifts(estimator: Estimator, at: Hypothesis, index: int) -> FloatArray
                 window = term.windows[number]
                 run, at_s = runs[window.run], term.edges(window)[edge]
                 span_s = min(at_s, at_s + shift_s) - _BESIDE_S, max(at_s, at_s + shift_s) + _BESIDE_S
-                rows = slice(*np.searchsorted(run.time_s[run.judged], span_s))
+                rows = slice(*np.searchsorted(run.time_s[run.evaluated], span_s))
                 change = sum(
                     float(np.sum(part[rows] ** 2 - base.parts[key][rows] ** 2))
                     for key, part in moved.parts.items()
@@ -146,7 +146,7 @@ def _window_slopes(estimator: Estimator, at: Hypothesis, index: int) -> csc_arra
     term, inside = at.terms[index], _inside(estimator, at.terms[index])
     base = estimator.residuals(at)
     runs = estimator.data.runs
-    times = [(runs[run].name, runs[run].time_s[runs[run].judged]) for run, _ in base.parts]
+    times = [(runs[run].name, runs[run].time_s[runs[run].evaluated]) for run, _ in base.parts]
     step = LAST_EDGE_STEP_S
     changes: tuple[tuple[float, Callable[[int, Window], Window], int], ...] = (
         (step, lambda _, one: one._replace(later_s=one.later_s + step), 0),

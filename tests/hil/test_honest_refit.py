@@ -46,7 +46,7 @@ def test_a_fit_that_sacrifices_a_channel_is_shortened_or_left(data: Dataset) -> 
     assert refit.share < 1.0
     assert "torque (in closed loop)" in refit.worse
     assert "worse than the bench file" in refit.note
-    before, after = figures(wrong.hypothesis.owner), figures(refit.fit.hypothesis)
+    before, after = figures(wrong.hypothesis.given), figures(refit.fit.hypothesis)
     assert all(after[name] <= 1.01 * max(before[name], rms_at_floor(data)[name]) for name in before)
 
 

@@ -38,7 +38,7 @@ def acting(found: Fit) -> tuple[str, str] | None:
     """Block and element if the reaction torque isolates the table or the linear encoder, else None."""
     fitted, runs = found.bench, found.data.runs
     chain = fitted.axis.physics().chain
-    if len(chain.names) < 2 or not all(run.table_m.size and "motor" not in run.unseen for run in runs):
+    if len(chain.names) < 2 or not all(run.table_m.size and run.observability.torque_measured for run in runs):
         return None
     stiffness, table_inertia = stiffness_between(chain), float(chain.inertia_kg_m2[chain.table, chain.table])
     observer_s, felt, off, moved = found.data.observer_s, list[FloatArray](), list[FloatArray](), list[FloatArray]()
@@ -47,7 +47,7 @@ def acting(found: Fit) -> tuple[str, str] | None:
         table = smooth(_observed(blocks["table"] / fitted.axis.ratio_m_rad, run, observer_s), run.period_s)
         table = smooth(table, run.period_s)  # like the torque, which is smoothed twice too
         speed = np.gradient(table, run.period_s)
-        rows = np.flatnonzero(seen.sliding[run.judged]) + (run.judged.start or 0)
+        rows = np.flatnonzero(seen.sliding[run.evaluated]) + (run.evaluated.start or 0)
         felt.append(smooth(seen.torque, run.period_s)[rows])
         off.append(stiffness * (table[rows] - np.mean(table[rows])) if rows.size else table[rows])
         moved.append(-table_inertia * np.gradient(speed, run.period_s)[rows])

@@ -34,7 +34,7 @@ def energies(hypothesis: Hypothesis, data: Dataset, reference: Hypothesis | None
         rows = np.sum([_arising(name, values, run) ** 2 for name, values in parts.items()], axis=0)
         if reference is None:
             rows = rows - len(parts)
-        rows[: run.judged.start] = 0.0
+        rows[: run.evaluated.start] = 0.0
         result.append(Energy(run, rows, parts))
     return result
 

@@ -36,14 +36,14 @@ def change_figure(diagnosis: Diagnosis) -> Figure:
     axes = figure.subplots(len(change.runs), 1, squeeze=False)[:, 0]
     nominal = diagnosis.explanation.nominal
     for axis, run in zip(axes, change.runs, strict=True):
-        channel = "table" if "motor" in run.unseen else "motor"
+        channel = "motor" if run.observability.torque_measured else "table"
         before = _residual(nominal.on(diagnosis.train.over([run])), channel)
         after = np.full(run.motor.size, np.nan)
         for part in change.parts:
             (own,) = part.data.runs
             if own.name == run.name:
-                after[: own.motor.size][own.judged] = _residual(part, channel)[own.judged]
-        drawn = run.judged
+                after[: own.motor.size][own.evaluated] = _residual(part, channel)[own.evaluated]
+        drawn = run.evaluated
         time_s, lines = run.time_s[drawn], [before[drawn], after[drawn]]
         chosen = thin([np.nan_to_num(values) for values in lines], DRAWN_ROWS)
         factor, unit = reading_unit(unit_of_channel(diagnosis, channel), float(np.abs(lines[0]).max()))

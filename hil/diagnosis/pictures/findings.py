@@ -205,11 +205,11 @@ def _over_time(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:
     size = {name: float(np.sqrt(np.mean(values**2))) / noise(view.run, name) for name, values in view.modelled.items()}
     channel = max(size, key=lambda name: size[name])
     measured, modelled = view.residual(channel, False), view.residual(channel, True)
-    factor, unit = reading_unit(unit_of_channel(diagnosis, channel), float(np.abs(measured[view.run.judged]).max()))
+    factor, unit = reading_unit(unit_of_channel(diagnosis, channel), float(np.abs(measured[view.run.evaluated]).max()))
     figure = Figure(figsize=(10.0, 6.4), layout="constrained")
     axes = figure.subplots(2, 1)
-    middle = view.run.judged.start + int(np.argmax(np.abs(modelled[view.run.judged])))
-    for axis, rows in zip(axes, (slice(view.run.judged.start, None), around(middle, view.run, 0.3)), strict=True):
+    middle = view.run.evaluated.start + int(np.argmax(np.abs(modelled[view.run.evaluated])))
+    for axis, rows in zip(axes, (slice(view.run.evaluated.start, None), around(middle, view.run, 0.3)), strict=True):
         chosen = thin((measured[rows], modelled[rows]), DRAWN_ROWS)
         time = view.run.time_s[rows][chosen]
         axis.plot(time, measured[rows][chosen] * factor, color=MEASURED, linewidth=2.4, alpha=0.5, label=POINTS)

@@ -61,7 +61,9 @@ def friction_over_speed(diagnosis: Diagnosis, views: Sequence[View]) -> Captione
     unit = "N" if diagnosis.owner.axis.linear else "N m"
     style_axis(axis, f"friction [{unit}]", f"speed of the table [{unit_of_speed}]", "Friction over speed")
     axis.legend(frameon=False, ncols=2)
-    how = "simulated from the same set-points" if final.bench.law_known else "held on the measured motion"
+    how = (
+        "simulated from the same set-points" if final.data.observability.closed_loop else "held on the measured motion"
+    )
     return Captioned(
         figure,
         "Motor torque - inertia × acceleration where the acceleration is small: median and quartiles of the samples in "
@@ -74,7 +76,7 @@ def _answer(final: Fit, view: View) -> tuple[FloatArray, FloatArray]:
 
     Without a control law the torque is the measured one with the disturbance that the twin lacks.
     """
-    if not final.bench.law_known:
+    if not final.data.observability.closed_loop:
         return view.run.motor, view.run.torque + view.torque.torque - view.torque_modelled.torque
     response = final.hypothesis.respond(view.run)
     return response.motor_position, response.torque
@@ -90,7 +92,7 @@ def _friction_of(final: Fit, run: Measured, motor: FloatArray, torque: FloatArra
     # the slip of a stick-slip cycle is shorter than the filter window; at higher speed J a is known well
     share = np.where(np.abs(velocity) > 0.05 * np.abs(velocity).max(), 1.0, 0.1)
     rows = (np.abs(inertial) < share * coulomb) & (np.abs(velocity) > 0.0)
-    rows[: run.judged.start + window] = rows[-window:] = False
+    rows[: run.evaluated.start + window] = rows[-window:] = False
     return velocity[rows], friction[rows]
 
 
@@ -143,7 +145,7 @@ def torque_over_command(diagnosis: Diagnosis, views: Sequence[View]) -> Captione
 
 def _cloud(axis: Axes, x: FloatArray, curves: Sequence[Curve], run: Measured, factor: float = 1.0) -> None:
     """Scatter the judged rows of curves over x; the measured points are large and pale."""
-    rows = np.arange(run.judged.start, x.size, max(x.size // CLOUD_POINTS, 1))
+    rows = np.arange(run.evaluated.start, x.size, max(x.size // CLOUD_POINTS, 1))
     for curve in curves:
         size, alpha = (5.0, 0.4) if curve.label == "measured" else (1.5, 0.8)
         axis.plot(
@@ -179,4 +181,4 @@ def _reversal(run: Measured) -> slice:
 def _steepest(values: FloatArray, run: Measured) -> slice:
     """Rows about the fastest change of a signal (n,)."""
     rows = np.convolve(np.abs(np.diff(values)), np.ones(20), "same")
-    return around(int(np.argmax(rows[run.judged])) + run.judged.start, run, STEEPEST_S)
+    return around(int(np.argmax(rows[run.evaluated])) + run.evaluated.start, run, STEEPEST_S)

@@ -48,7 +48,7 @@ def location_figure(diagnosis: Diagnosis) -> Figure:
     starts = np.arange(0, rows.size, size)
     power = np.maximum(np.add.reduceat(rows, starts), 0.0) / size
     axes["time"].fill_between(run.time_s[starts], power, color=DEVIATION, alpha=0.45, linewidth=0.0, step="post")
-    what = "speed set-point" if diagnosis.final.bench.law_known else "speed"  # without a law it may be the measured one
+    what = "speed set-point" if run.observability.closed_loop else "speed"  # without a law it may be the measured one
     style_axis(axes["time"], ENERGY, "time [s]", f"Over time: {run.name}; grey: {what}")
     set_point = axes["time"].twinx()
     set_point.plot(run.time_s, factor * run.velocity_command_m_s, color=COMMAND, linewidth=0.7)
@@ -83,7 +83,7 @@ def residual_panels(diagnosis: Diagnosis, run: Measured) -> list[Panel]:
 
 
 def _judged(values: FloatArray, run: Measured) -> FloatArray:
-    return np.where(np.arange(values.size) < run.judged.start, 0.0, values)
+    return np.where(np.arange(values.size) < run.evaluated.start, 0.0, values)
 
 
 def _shares(axis: Axes, shares: dict[str, float], heading: str) -> None:

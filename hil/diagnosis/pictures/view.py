@@ -138,4 +138,4 @@ def position(diagnosis: Diagnosis, view: View) -> FloatArray:
 def around(row: int, run: Measured, half_s: float) -> slice:
     """Evaluated rows within +- `half_s` of a row."""
     half = round(half_s / run.period_s)
-    return slice(max(row - half, run.judged.start), min(row + half, run.motor.size))
+    return slice(max(row - half, run.evaluated.start), min(row + half, run.motor.size))

@@ -33,7 +33,7 @@ def force_over_time(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:
         owner = diagnosis.residuals(diagnosis.explanation.owner, run)["motor"]
         of_owner = disturbance(run, owner, inertia(diagnosis.owner), observer_s).torque / ratio
         curves = view.torque_modelled.torque / ratio, view.torque.torque / ratio, of_owner
-        rows = slice(run.judged.start, None)
+        rows = slice(run.evaluated.start, None)
         chosen = thin(tuple(values[rows] for values in curves), DRAWN_ROWS)
         looks = (
             ("modelled by the event", SIMULATED, 3.0, 0.5),

@@ -120,9 +120,9 @@ def _problems(run: Measured, bench: Bench, derived: set[str]) -> Iterator[str]:
     if names.velocity_command not in derived:  # a derived channel has no unit of its own to be wrong
         found += _set_point_problems(run, names.velocity_command)
     yield from found
-    if bench.law_known:  # else the saturated rows obey the plant like the others
+    if run.observability.closed_loop:  # else the saturated rows obey the plant like the others
         yield from _saturation(run, bench, moving)
-    if not found and "torque" not in run.unseen:  # the check of the torque needs a valid measured motion
+    if not found and run.observability.torque_measured:  # the check of the torque needs a valid measured motion
         yield from _torque_problems(run, bench)
 
 
@@ -157,7 +157,7 @@ def _torque_problems(run: Measured, bench: Bench) -> Iterator[str]:
     names, unit = AXIS_CHANNELS[run.kind], "N" if bench.axis.linear else "N m"
     physics = bench.axis.physics()
     inertia = float(physics.chain.inertia_kg_m2.sum())
-    if not run.torque_is_command:
+    if run.observability.torque_and_command:
         slope = _slope(run.torque_command, run.torque)
         if slope < 0.0 and _correlation(run.torque_command, run.torque) < -0.5:
             yield (

@@ -25,13 +25,13 @@ def untold(data: Dataset) -> list[str]:
 
 def _of_torque(run: Measured) -> list[str]:
     names = AXIS_CHANNELS[run.kind]
-    if "torque" in run.unseen:
+    if not run.observability.torque_measured:
         return [
             f"No torque is recorded: only the transmission was judged, from {names.motor_position} to "
             f"{names.table_position}. Friction and loads of the motor side and the drive cannot be told, and of masses "
             f"and stiffness only their ratio; record {names.torque} or {names.torque_command}."
         ]
-    if run.torque_is_command:
+    if not run.observability.torque_and_command:
         return [
             f"Only one of {names.torque} and {names.torque_command} is recorded: an effect of the drive shows only as "
             "wrong motion. Record both to tell drive and motor apart."

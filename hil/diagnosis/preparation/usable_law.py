@@ -54,7 +54,7 @@ class LawCheck:
         """The runs, without the command of the controller if they are too coarse to test it."""
         if not self.coarse:
             return list(runs)
-        return [replace(run, unseen=run.unseen | {"command"}) for run in runs]
+        return [replace(run, observability=replace(run.observability, law_testable=False)) for run in runs]
 
 
 def replayable(bench: Bench, recordings: Sequence[Recording]) -> LawCheck:

@@ -77,7 +77,7 @@ def _of_fit(found: Fit, reversals: bool) -> list[Event]:
     return [
         event
         for run, channels in pairs
-        if "motor" not in run.unseen
+        if run.observability.torque_measured
         for event in _of_run(run, disturbance(run, channels["motor"], axis, observer_s), reversals)
     ]
 
@@ -90,7 +90,7 @@ def _of_run(run: Measured, seen: Disturbance, reversals: bool) -> list[Event]:
     turns = np.diff(np.signbit(seen.velocity), append=np.signbit(seen.velocity[-1])).astype(float)
     turning = np.convolve(turns, np.ones(2 * round(_REVERSAL_S / run.period_s) + 1), "same") > 0.5
     usable = seen.sliding if reversals else seen.sliding & ~turning
-    usable = usable & (np.arange(usable.size) >= run.judged.start - first)
+    usable = usable & (np.arange(usable.size) >= run.evaluated.start - first)
 
     def means(values: FloatArray) -> FloatArray:
         whole = (values * usable)[:rows].reshape(-1, block)

@@ -211,7 +211,7 @@ def constant_inside(found: Fit, base: Fit) -> bool:
         run = found.data.runs[number]
         if channel != "motor":
             continue
-        time_s, within = run.time_s[run.judged], np.zeros(part.size, dtype=bool)
+        time_s, within = run.time_s[run.evaluated], np.zeros(part.size, dtype=bool)
         for one in term.windows:
             if one.run == run.name:
                 within |= (time_s >= term.at(one)[start]) & (time_s < term.at(one)[end])

@@ -68,7 +68,7 @@ def explain(data: Dataset, progress: Progress = lambda text: None, deadline_s: f
     step("refitting the nominal parameters")
     base = fit_nominal_parameters(data, deadline_s=deadline_s)
     require_finite(base)
-    owner, nominal = base.estimator.evaluate(base.hypothesis.owner), base
+    owner, nominal = base.estimator.evaluate(base.hypothesis.given), base
     rivals, needed, first = dict[Key, list[RivalFit]](), dict[Key, float](), list[Candidate]()
     tried, fitted = [effects(())], set[str]()
     while len(base.terms) < MOST_TERMS:

@@ -28,7 +28,7 @@ def refuting(found: Fit, without: Fit, owner: Fit) -> set[str]:
     gains = dict[str, float]()
     for run, ratios, before in zip(found.data.runs, found.noise_ratios, without.noise_ratios, strict=True):
         for channel, ratio in ratios.items():
-            gains[channel] = gains.get(channel, 0.0) + run.motor[run.judged].size * (before[channel] - ratio)
+            gains[channel] = gains.get(channel, 0.0) + run.motor[run.evaluated].size * (before[channel] - ratio)
     most = PAID * sum(max(gain, 0.0) for gain in gains.values())
     return {
         channel

@@ -247,7 +247,7 @@ def observable(mechanism: Mechanism, variant: Variant, bench: Bench) -> bool:
 
 def judged(effect: str, runs: Sequence[Measured]) -> bool:
     """True if input and output of the block of a mechanism are known in the recordings."""
-    return not any(BY_ID[effect].block is _BLOCK_OF[channel] for run in runs for channel in run.unseen)
+    return not any(BY_ID[effect].block is _BLOCK_OF[channel] for run in runs for channel in run.observability.hidden)
 
 
 def claimable(term: Term, bench: Bench, runs: Sequence[Measured] = ()) -> bool:

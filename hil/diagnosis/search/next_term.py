@@ -49,7 +49,7 @@ def next_term(
     drives the twin with its error: terms that pass less of it leave less than the noise, so that nothing below the
     floor is evidence.
     """
-    if base.at_floor and any(run.sampled or run.torque_is_command for run in base.data.runs):
+    if base.at_floor and not base.data.observability.exact_input:
         return [], None
     bits = 1.0 - float(np.exp(-NEEDED / base.rows))  # share of white residuals whose removal gives evidence of NEEDED
     promising = [one for one in candidates if one.share > bits and one.share * base.cost > MATERIAL * base.rows]

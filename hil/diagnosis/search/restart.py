@@ -67,7 +67,7 @@ def again(found: Fit, evaluations: int) -> Fit:
     stuck = set(found.at_bound).intersection(found.hypothesis.nominal)
     if not found.terms or not stuck or found.at_floor or found.estimator.expired:
         return found
-    owner, axis = found.hypothesis.rebased.owner, axis_facts(found.data.bench, found.data.runs)
+    owner, axis = found.hypothesis.rebased.given, axis_facts(found.data.bench, found.data.runs)
     starts = [
         owner.replaced(index, replace(term, variant=variant, values=BY_ID[term.effect].typical_values(axis)))
         for index, term in enumerate(found.terms)

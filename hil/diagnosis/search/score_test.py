@@ -127,7 +127,7 @@ def _events(base: Fit) -> list[StartPoint]:
     if any(term.windows for term in base.terms):
         return []
     # events may have led the fitted parameters astray, those of the bench file may be wrong
-    points = (base, base.estimator.evaluate(base.hypothesis.owner))
+    points = (base, base.estimator.evaluate(base.hypothesis.given))
     found = [(one, event_term(events, base.bench.axis.ratio_m_rad)) for one in points if (events := detect(one))]
     terms = [term for _, term in sorted(found, key=lambda pair: _criterion(*pair))[:1]]
     return [

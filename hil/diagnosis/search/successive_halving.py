@@ -56,7 +56,7 @@ def owner_points(base: Fit) -> list[FloatArray]:
     Fitted parameters may compensate for missing physics. A mechanism between motor and table changes the fitted springs
     and shares of the masses; friction and total mass remain right.
     """
-    hypothesis, owner = base.hypothesis, base.hypothesis.owner.x
+    hypothesis, owner = base.hypothesis, base.hypothesis.given.x
     bench, axis = hypothesis.bench, hypothesis.bench.axis
     if not axis.SPRINGS:
         return [owner]

@@ -89,7 +89,7 @@ class CrossValidation:
 def cross_validate(nominal: Fit, final: Fit, held_out: Dataset) -> CrossValidation:
     """Ablate every term; drop those that held-out recordings or laps refute, the most harmful first."""
     dropped: list[Ablation] = []
-    owner = nominal.estimator.evaluate(nominal.hypothesis.owner)
+    owner = nominal.estimator.evaluate(nominal.hypothesis.given)
     while True:
         ablations = _ablate(owner, nominal, final, held_out)
         harmful = [ablation for ablation in ablations if ablation.refuted]

@@ -107,7 +107,7 @@ def _moment(alone: Fit) -> int | None:
     if not cuts or not alone.jacobian.shape[1]:
         return None
     best = min(cuts, key=lambda cut: _left(normal[cut]) + _left(normal[-1] - normal[cut]))
-    return run.judged.indices(run.motor.size)[0] + (best + 1) * block
+    return run.evaluated.indices(run.motor.size)[0] + (best + 1) * block
 
 
 def _left(normal: FloatArray) -> float:

@@ -107,7 +107,7 @@ def _seen(fit: Fit, index: int) -> list[Seen]:
         return []
 
     def edges(window: Window) -> tuple[float, float]:  # one before the first row that is evaluated is not told
-        first, *_, last = runs[window.run].time_s[runs[window.run].judged].tolist()
+        first, *_, last = runs[window.run].time_s[runs[window.run].evaluated].tolist()
         start, end = term.edges(window)
         return min(max(start, first), last), min(max(end, first), last)
 
@@ -164,7 +164,7 @@ def _impulse(one: Seen) -> float:
 
 
 def _continues(before: Seen, after: Seen) -> bool:
-    last_s, first_s = before.run.time_s[-1], after.run.time_s[after.run.judged.start]
+    last_s, first_s = before.run.time_s[-1], after.run.time_s[after.run.evaluated.start]
     cut_s, period_s = after.run.start.time_s, after.run.period_s
     following = before.run is not after.run and cut_s - 2.0 * period_s < last_s < max(cut_s, first_s) + 2.0 * period_s
     near = abs(before.values[1] - last_s) < _CUT_S and abs(after.values[0] - first_s) < _CUT_S

@@ -106,8 +106,10 @@ def corrections(owner: Bench, found: Fit) -> dict[str, Correction]:
     bench's mechanisms are among them.
     """
     hypothesis = found.hypothesis
-    told = ("damping_ratio",) if any("motor" in run.unseen for run in found.data.runs) else hypothesis.nominal
-    entries = zip(hypothesis.given, hypothesis.coordinates, hypothesis.values, standard_errors(found), strict=False)
+    told = hypothesis.nominal if found.data.observability.torque_measured else ("damping_ratio",)
+    entries = zip(
+        hypothesis.bench_values, hypothesis.coordinates, hypothesis.values, standard_errors(found), strict=False
+    )
     return {
         one.name: Correction(
             nominal=before,

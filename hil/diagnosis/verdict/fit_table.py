@@ -73,7 +73,7 @@ class _ChannelTable:
 
     def _rms(self, hypothesis: Hypothesis, data: Dataset) -> float:
         pairs = zip(self._of(hypothesis, data), data.runs, strict=True)
-        return rms(np.concatenate([values[run.judged] for values, run in pairs]))
+        return rms(np.concatenate([values[run.evaluated] for values, run in pairs]))
 
     def _floors(self, data: Dataset) -> list[tuple[float, bool]]:
         """Floor of each run, True if from repeated laps.
@@ -96,14 +96,16 @@ class _ChannelTable:
         """
         run = data.runs[index]
         if self.mode is Mode.BLOCKS:
-            return rms(data.noise[index][self.channel][run.judged])
+            return rms(data.noise[index][self.channel][run.evaluated])
         return math.hypot(sensor_noise(run)[self.channel], self.noise[run][self.channel])
 
 
 def closed_loop_held(nominal: Fit, final: Fit, held_out: Dataset) -> bool:
     """True if the control law is known, and refitted and final twin keep to all recordings in closed loop."""
     sets = [data for data in (final.data, held_out) if data.runs]
-    return final.bench.law_known and all(holds(fit.hypothesis, data) for fit in (nominal, final) for data in sets)
+    return final.data.observability.closed_loop and all(
+        holds(fit.hypothesis, data) for fit in (nominal, final) for data in sets
+    )
 
 
 def fit_table(owner: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> dict[str, ChannelFit]:
@@ -117,9 +119,9 @@ def fit_table(owner: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> dict[s
     result = {}
     for channel, recorded in channel_names(final.bench, train.runs[0]).items():
         shown = train.runs[0]
-        if channel == "command" or channel in shown.unseen:
+        if channel == "command" or channel in shown.observability.hidden:
             continue
-        if channel == "torque" and shown.torque_is_command and not held:  # the twin was given it
+        if channel == "torque" and not shown.observability.torque_and_command and not held:  # the twin was given it
             continue
         figures = {
             mode: [table.figures(data, held_out if data is train else train) for data in sets]
@@ -129,7 +131,7 @@ def fit_table(owner: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> dict[s
         mode = modes[0]
         if held:
             closed, block = (max(one.after_rms / one.noise_floor_rms for one in figures[mode]) for mode in figures)
-            chaotic = closed > STRAYS >= block and not train.runs[0].torque_is_command
+            chaotic = closed > STRAYS >= block and shown.observability.torque_and_command
             mode = Mode.BLOCKS if chaotic else Mode.CLOSED_LOOP
         result[recorded] = ChannelFit(
             unit="rad" if final.bench.axis.turns and channel == "table" else CHANNELS[recorded].unit,

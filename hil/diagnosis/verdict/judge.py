@@ -49,8 +49,8 @@ def judge(owner: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> Verdict:
         left = unexplained_share(nominal, final, held_out)
         above = max(final.on(data).worst_ratio for data in (final.data, held_out) if data.runs)
         # where inputs are open, or nothing is known of the control law, something is left beside any name
-        open_inputs = not final.bench.law_known or any(
-            run.sampled or run.noise.coarse for run in (*final.data.runs, *held_out.runs)
+        open_inputs = not final.data.observability.closed_loop or any(
+            run.noise.coarse for run in (*final.data.runs, *held_out.runs)
         )
         if (
             names_stand(left, above)

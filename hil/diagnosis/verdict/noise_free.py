@@ -20,7 +20,7 @@ from hil.identification.estimator import Fit
 
 def energy_without_noise(found: Fit, without: Fit) -> float | None:
     """The energy of the equation in units of noise^2; None if the response in closed loop is not known or stable."""
-    if not found.bench.law_known or any(run.sampled for run in found.data.runs):
+    if not found.data.observability.closed_loop:
         return None
     removed = 0.0
     for index, (run, scales) in enumerate(zip(found.data.runs, found.data.scales(), strict=True)):
@@ -41,6 +41,6 @@ def energy_without_noise(found: Fit, without: Fit) -> float | None:
         )
         for name, values in own.items():
             with np.errstate(over="ignore", invalid="ignore"):  # without the term a twin may be unstable
-                change = ((other[name] - values) / scales[name])[run.judged]
+                change = ((other[name] - values) / scales[name])[run.evaluated]
                 removed += float(change @ change)
     return removed if np.isfinite(removed) else None

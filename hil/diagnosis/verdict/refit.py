@@ -21,7 +21,7 @@ def reported_refit(nominal: Fit) -> Refit:
     plain least squares leaves: residuals of a motion may fall for a wrong mass.
     """
     data = nominal.data
-    plain = None if any("motor" in run.unseen for run in data.runs) else fit_plain(data)
+    plain = fit_plain(data) if data.observability.torque_measured else None
     by_plain = None if plain is None else left_by_plain(plain, data)
     floors = rms_at_floor(data) | ({} if by_plain is None else {_TORQUE: by_plain})
 
@@ -37,7 +37,7 @@ def reported_refit(nominal: Fit) -> Refit:
 
 def torque_left(owner: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> TorqueLeft | None:
     """Shares of the held-out torque that the twins and the plain model leave; None if that cannot be told."""
-    if not held_out.runs or any("motor" in run.unseen for run in held_out.runs):
+    if not held_out.runs or not held_out.observability.torque_measured:
         return None
     plain = fit_plain(nominal.data)
     if plain is None:

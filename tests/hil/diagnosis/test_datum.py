@@ -49,7 +49,7 @@ def test_a_recording_may_begin_on_one_flank_of_a_gap(rest_s: float, shift_m: flo
     columns["time_s"] = np.arange(rows.size) * whole.period_s
     columns["table_position_m"] = columns["table_position_m"] + shift_m
     (run,) = prepare([changed(whole, **columns)], OWNER)
-    table = Hypothesis(OWNER, (PLAY,)).blocks(run, FASTEST_OBSERVER_S)["table"][run.judged]
+    table = Hypothesis(OWNER, (PLAY,)).blocks(run, FASTEST_OBSERVER_S)["table"][run.evaluated]
     assert np.sqrt(np.mean(table**2)) < 2.0 * run.noise.table_m
 
 

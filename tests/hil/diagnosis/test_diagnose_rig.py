@@ -95,7 +95,7 @@ def test_the_diagnosed_bench_is_a_bench_and_explains(folder: str, tmp_path: Path
     assert {entry.effect for entry in bench.mechanisms} == {finding.effect for finding in diagnosis.result.missing}
     run = take(read_recording(rig(folder) / "holdout.csv"), bench)
     answer = bench.twin().simulate(run.position_command_m, run.velocity_command_m_s, run.start, run.table_m)
-    left = (run.torque - answer.torque)[run.judged]
+    left = (run.torque - answer.torque)[run.evaluated]
     entry = diagnosis.result.fit["torque_n_m"]
     assert entry.validate_ is not None
     if entry.mode == "closed_loop":

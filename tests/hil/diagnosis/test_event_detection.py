@@ -29,7 +29,7 @@ def prepared(pushes: list[Push], name: str = "emps_symmetric") -> tuple[Fit, lis
     owner = load_bench(name)
     first, last = ([take(part, owner) for part in parts] for parts in split([pushed(pushes)]))
     data = prepare_dataset(first, owner)
-    cut_s = last[0].time_s[last[0].judged.start]
+    cut_s = last[0].time_s[last[0].evaluated.start]
     assert not any(push.start_s < cut_s < push.end_s for push in pushes)
     nominal = fit_nominal_parameters(data)
     there = replace(nominal.estimator, data=data.over(last)).evaluate(nominal.hypothesis)
@@ -57,10 +57,10 @@ def test_emps_itself_has_no_event() -> None:
 )
 def test_windows_in_emps_are_found_at_once(pushes: list[Push]) -> None:
     nominal, inside, *_ = prepared(pushes)
-    start = nominal.estimator.evaluate(nominal.hypothesis.owner)
+    start = nominal.estimator.evaluate(nominal.hypothesis.given)
     for _ in range(2):
         term = event_term(detect(start), 1.0)
-        start = fit_windows(nominal.estimator.evaluate(nominal.hypothesis.owner.with_term(term)))
+        start = fit_windows(nominal.estimator.evaluate(nominal.hypothesis.given.with_term(term)))
     assert_found(windows(start), inside)
 
 
@@ -98,7 +98,7 @@ def test_a_window_about_a_reversal_is_found_beside_others() -> None:
 def test_a_row_after_a_cut_in_motion_is_evaluated() -> None:
     owner = load_bench("emps_symmetric")
     first, last = [take(part, owner) for (part,) in split([emps_recording()])]
-    assert last.time_s[last.judged.start] == pytest.approx(first.time_s[-1] + PERIOD_S)
+    assert last.time_s[last.evaluated.start] == pytest.approx(first.time_s[-1] + PERIOD_S)
 
 
 def test_without_an_event_the_held_out_part_gets_none() -> None:

@@ -13,7 +13,7 @@ from hil.diagnosis.search.harm import harmed, refuting
 
 def fit(motor: float, table: float) -> Any:
     """What is compared of a fit: mean square over noise of two channels in one run of 1000 rows."""
-    run = SimpleNamespace(motor=np.zeros(1000), judged=slice(None))
+    run = SimpleNamespace(motor=np.zeros(1000), evaluated=slice(None))
     return SimpleNamespace(noise_ratios=({"motor": motor, "table": table},), data=SimpleNamespace(runs=(run,)))
 
 

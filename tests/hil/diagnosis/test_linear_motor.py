@@ -91,7 +91,7 @@ def test_a_slow_motion_does_not_make_the_axis_heavier() -> None:
     slow = moved([(0.15, 0.06)])
     bench = reduced(BENCH, [slow])
     found = fit_nominal_parameters(prepare_dataset(prepare([slow], bench), bench))
-    owner = found.estimator.evaluate(found.hypothesis.owner)
+    owner = found.estimator.evaluate(found.hypothesis.given)
     assert found.missed_torque <= 1.01 * owner.missed_torque
     assert found.bench.axis.physics().chain.inertia_kg_m2.sum() == pytest.approx(11.5)
 

@@ -58,7 +58,7 @@ def test_values_of_known_mechanisms_are_fitted_and_numbered() -> None:
     known = hypothesis.nominal[len(OWNER.axis.NOMINAL) :]
     assert {"cogging_torque.amplitude_n_m", "cogging_torque_2.amplitude_n_m"} <= set(known)
     assert len(known) == 8
-    assert hypothesis.values == pytest.approx(hypothesis.given)
+    assert hypothesis.values == pytest.approx(hypothesis.bench_values)
     names = list(hypothesis.nominal)
     x = hypothesis.x.copy()
     x[names.index("cogging_torque_2.amplitude_n_m")] *= 1.5

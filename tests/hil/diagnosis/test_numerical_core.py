@@ -56,11 +56,11 @@ def test_evidence_of_a_useless_regressor_on_autoregressive_noise_is_rarely_posit
     """One random regressor is fitted to noise of a correlation of 20 rows, 200 times over."""
     run = take(recorded(OWNER), OWNER)
     data = dataset([run], OWNER)
-    rng, size = np.random.default_rng(1), run.motor[run.judged].size
+    rng, size = np.random.default_rng(1), run.motor[run.evaluated].size
 
     def fit_of(noise: FloatArray, parameters: int) -> Fit:
         channel = np.zeros(run.motor.size)
-        channel[run.judged] = noise * run.noise.torque
+        channel[run.evaluated] = noise * run.noise.torque
         hypothesis = Hypothesis(OWNER).moved(np.zeros(parameters))
         return Fit(hypothesis, Residuals(data, ({"torque": channel},)), np.zeros((size, 0)), Estimator(data))
 

@@ -54,8 +54,8 @@ def diagnosis_of(effect: str, times: float = 3.0) -> Diagnosis:
 
 def test_only_evaluated_rows_are_enlarged() -> None:
     run = take(recorded(OWNER), OWNER)
-    assert run.judged.start > 0
-    assert around(0, run, 0.3).start == run.judged.start
+    assert run.evaluated.start > 0
+    assert around(0, run, 0.3).start == run.evaluated.start
 
 
 @pytest.mark.parametrize("effect", BY_ID)

@@ -48,7 +48,7 @@ def test_wrong_parameters_are_placed_where_they_show_and_not_where_they_seem_to_
     """A heavier table loads the spring as a force on it would."""
     runs = (take(recorded(bench(table_mass_kg=1.5 * OWNER.axis.table_mass_kg)), OWNER),)
     refitted = fit_nominal_parameters(prepare_dataset(runs, OWNER))
-    owner = refitted.estimator.evaluate(refitted.hypothesis.owner)
+    owner = refitted.estimator.evaluate(refitted.hypothesis.given)
     assert acting(owner) is not None
     assert locate(owner, refitted).block in ("motor_side", "transmission")
 

@@ -106,7 +106,7 @@ def test_what_explains_more_is_named_unless_there_is_an_objection(monkeypatch: p
 
 def explained(cost: float, motor: float, table: float) -> Any:
     """Stand-in for a fit: its cost, and the mean squares of motor and table residuals over their noise."""
-    run = SimpleNamespace(motor=np.zeros(1000), judged=slice(None))
+    run = SimpleNamespace(motor=np.zeros(1000), evaluated=slice(None))
     data = SimpleNamespace(runs=(run,))
     return SimpleNamespace(
         cost=cost, rows=2000, excess=0.0, terms=(), data=data, noise_ratios=({"motor": motor, "table": table},)

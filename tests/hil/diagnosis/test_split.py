@@ -36,8 +36,8 @@ def test_a_part_that_begins_in_motion_has_rows_before_it_that_are_not_evaluated(
     lead = held_out.metadata[LEAD_IN]
     assert lead == len(held_out) / 2 == ROWS - len(train)
     assert held_out.start_s + lead * PERIOD_S == pytest.approx(len(train) * PERIOD_S)
-    assert take(held_out, BENCH).judged.start == lead
-    assert take(train, BENCH).judged.start < lead
+    assert take(held_out, BENCH).evaluated.start == lead
+    assert take(train, BENCH).evaluated.start < lead
 
 
 def test_a_part_that_begins_at_rest_has_none() -> None:

@@ -65,7 +65,7 @@ def read_case(folder: Path) -> PeerCase:
         bench,
         train,
         held_out,
-        nominal.estimator.evaluate(nominal.hypothesis.owner),
+        nominal.estimator.evaluate(nominal.hypothesis.given),
         nominal,
         scene(train, nominal.bench, nominal.residuals.channels, nominal.data.observer_s),
     )

@@ -180,7 +180,7 @@ def _window(time_s: FloatArray, scene: Scene) -> FloatArray:
 
 def _judged(run: Measured) -> NDArray[np.bool_]:
     rows = np.zeros(run.motor.size, dtype=bool)
-    rows[run.judged] = True
+    rows[run.evaluated] = True
     return rows
 
 

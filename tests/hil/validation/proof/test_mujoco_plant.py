@@ -26,7 +26,7 @@ def test_the_nominal_axis_leaves_as_little_as_with_the_simulated_axis() -> None:
     def left(recording: Recording) -> dict[str, float]:
         measured, bench = take(recording, axis.true_bench), axis.true_bench
         (channels,) = Hypothesis(bench).residuals(Dataset((measured,), bench), closed=True).channels
-        return {name: float(np.sqrt(np.mean(values[measured.judged] ** 2))) for name, values in channels.items()}
+        return {name: float(np.sqrt(np.mean(values[measured.evaluated] ** 2))) for name, values in channels.items()}
 
     ours, theirs = left(Recording("run", simulated, axis.period_s)), left(record_mujoco(axis, None, run, 5))
     assert theirs["torque"] == pytest.approx(ours["torque"], rel=0.02)

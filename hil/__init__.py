@@ -31,7 +31,7 @@ if TYPE_CHECKING:
         simulate,
     )
     from hil.bench.bench_file import Bench, load_bench
-    from hil.diagnosis.diagnose import Diagnosis
+    from hil.diagnosis.diagnosis import Diagnosis
     from hil.diagnosis.result import Verdict
     from hil.errors import FieldError, HilError, InputError
     from hil.identification.compare import Comparison, compare
@@ -73,7 +73,7 @@ _MODULE_OF = {
     "Mechanism": "hil.twin.mechanism",
     "LIBRARY": "hil.twin.library",
     "Comparison": "hil.identification.compare",
-    "Diagnosis": "hil.diagnosis.diagnose",
+    "Diagnosis": "hil.diagnosis.diagnosis",
     "Verdict": "hil.diagnosis.result",
     # errors
     "HilError": "hil.errors",

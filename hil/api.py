@@ -19,7 +19,7 @@ from hil.errors import FieldError, HilError, InputError
 
 if TYPE_CHECKING:
     from hil.bench.bench_file import Bench
-    from hil.diagnosis.diagnose import Diagnosis
+    from hil.diagnosis.diagnosis import Diagnosis
     from hil.diagnosis.experiment import Experiment
     from hil.identification.nominal_fit import FitResult
     from hil.investigation import Investigation

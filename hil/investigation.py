@@ -6,7 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hil.bench.bench_file import Bench
-from hil.diagnosis.diagnose import NEXT_EXPERIMENT, Diagnosis, diagnose
+from hil.diagnosis.diagnose import diagnose
+from hil.diagnosis.diagnosis import Diagnosis
+from hil.diagnosis.experiment import NEXT_EXPERIMENT
 from hil.diagnosis.wording import titles
 from hil.errors import HilError, InputError
 from hil.files.output import write_json

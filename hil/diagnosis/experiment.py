@@ -18,14 +18,14 @@ import numpy as np
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
 from hil.diagnosis.candidate_motions import candidates, reach
-from hil.diagnosis.search.forward_selection import Explanation
+from hil.diagnosis.criteria import CRITERIA
+from hil.diagnosis.stages import Searched
 from hil.diagnosis.verdict.findings import rivals_of
-from hil.diagnosis.verdict.judge import not_testable
+from hil.diagnosis.verdict.testability import not_testable
 from hil.diagnosis.wording import title
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Estimator, Fit
 from hil.identification.hypothesis import Hypothesis
-from hil.identification.inference import ALIKE, TIED
 from hil.identification.measured import Measured
 from hil.identification.parallel import in_parallel
 from hil.identification.terms import SAME, ambiguous, compatible
@@ -35,7 +35,7 @@ from hil.quantities import digits
 from hil.twin.axis import Start
 from hil.twin.library import BY_ID
 
-_SURE = 2.0  # factor on the visibility needed: a margin for the difference of a real recording from its simulation
+NEXT_EXPERIMENT = "next_experiment.yaml"  # its profile, beside the result
 
 Question = tuple[str, ...]  # two effects to be distinguished, or one to be shown
 Answers = Mapping[Question, float]
@@ -55,7 +55,7 @@ class Experiment:
 
 @dataclass(frozen=True, eq=False)
 class _Alternative:
-    """An explanation of the recordings; `known` is R of their Jacobian J_o = Q R."""
+    """An searched of the recordings; `known` is R of their Jacobian J_o = Q R."""
 
     effect: str
     hypothesis: Hypothesis
@@ -63,18 +63,18 @@ class _Alternative:
     estimator: Estimator
 
     def on(self, run: Measured) -> Fit:
-        """The explanation evaluated on another run."""
+        """The searched evaluated on another run."""
         data = self.estimator.data.over([run])
         return replace(self.estimator, data=data).evaluate(self.hypothesis)
 
 
-def separating(explanation: Explanation, final: Fit, held_out: Dataset) -> Experiment | None:
+def separating(searched: Searched, final: Fit, held_out: Dataset) -> Experiment | None:
     """Design the motion that separates the terms of `final` from their tied rivals; None if there are none.
 
     Of the motions that separate most pairs it is the one with the most evidence per second for the hardest pair.
     """
     train = final.data
-    pairs = [pair for index in range(len(final.terms)) for pair in permutations(_group(explanation, final, index), 2)]
+    pairs = [pair for index in range(len(final.terms)) for pair in permutations(_group(searched, final, index), 2)]
     if not pairs:
         if not any(map(ambiguous, final.terms)):
             return None
@@ -86,7 +86,7 @@ def separating(explanation: Explanation, final: Fit, held_out: Dataset) -> Exper
 
     def enough(trajectory: Trajectory) -> float:
         # with the existing recordings, the difference must refute the rival (see `RivalFit.tied`)
-        return max(TIED, ALIKE * (known + channels * len(trajectory)))
+        return max(CRITERIA.tied, CRITERIA.alike * (known + channels * len(trajectory)))
 
     def answers(trajectory: Trajectory) -> Answers:
         found, least = dict.fromkeys(asked, np.inf), enough(trajectory)
@@ -112,7 +112,7 @@ def separating(explanation: Explanation, final: Fit, held_out: Dataset) -> Exper
         best.profile,
         best.effects,
         f"{best.what} is expected to distinguish {_pairs(best.answered)}, with "
-        f"evidence of {digits(best.worth)} or more, where {TIED:g} is very strong.",
+        f"evidence of {digits(best.worth)} or more, where {CRITERIA.tied:g} is very strong.",
     )
 
 
@@ -125,7 +125,7 @@ def showing(found: Fit, hidden: Sequence[str], held_out: Dataset) -> Experiment 
     def answers(trajectory: Trajectory) -> Answers:
         there = expected.on(_imagined(expected, trajectory, found.data.runs[0]))
         there = replace(there, jacobian=there.estimator.jacobian(there.hypothesis))
-        still = not_testable(there, hidden, _SURE)
+        still = not_testable(there, hidden, CRITERIA.visible)
         return {(effect,): float(effect not in still) for effect in hidden}
 
     best = _best(
@@ -187,11 +187,11 @@ def _best(
     return best if best and best.answered else None
 
 
-def _group(explanation: Explanation, final: Fit, index: int) -> list[_Alternative]:
+def _group(searched: Searched, final: Fit, index: int) -> list[_Alternative]:
     """Return the final fit, and a fit with each tied rival of one of its terms."""
     term, rebased = final.terms[index], final.hypothesis.rebased
     group = [_alternative(term.effect, final)]
-    for rival in rivals_of(explanation, term):
+    for rival in rivals_of(searched, term):
         if rival.tied:
             other = rival.terms[-1]
             replaced = rebased.replaced(index, other)
@@ -210,7 +210,7 @@ def _alternative(effect: str, found: Fit) -> _Alternative:
 
 
 def _imagined(truth: _Alternative, trajectory: Trajectory, like: Measured) -> Measured:
-    """Simulate the recording of a trajectory under an explanation: without noise, with the noise level of `like`."""
+    """Simulate the recording of a trajectory under an searched: without noise, with the noise level of `like`."""
     position, velocity = np.array(trajectory.position_m), np.array(trajectory.velocity_m_s)
     start = Start(float(position[0]))
     answer = truth.hypothesis.twin().simulate(position, velocity, start)
@@ -229,7 +229,7 @@ def _imagined(truth: _Alternative, trajectory: Trajectory, like: Measured) -> Me
 
 
 def _left(other: _Alternative, run: Measured) -> float:
-    """Energy of the residuals of an explanation on a run, its parameters refitted to first order."""
+    """Energy of the residuals of an searched on a run, its parameters refitted to first order."""
     there = other.on(run)
     slope = np.concatenate([other.known, there.estimator.jacobian(there.hypothesis)])
     target = np.concatenate([np.zeros(len(other.known)), there.residuals.vector])

@@ -1,35 +1,45 @@
-"""Notes of a diagnosis: on the noise floor, on terms that were dropped, and on how search and fit ended."""
+"""Notes of a diagnosis: on the figures, on terms that were dropped, on the fit, and on what was not observable."""
 
 from collections.abc import Container
 
+from hil.bench.bench_file import Bench
+from hil.channels import AXIS_CHANNELS
 from hil.diagnosis.result import ChannelFit, Mode, TorqueLeft, Verdict
-from hil.diagnosis.search.forward_selection import Explanation
-from hil.diagnosis.verdict.cross_validation import CrossValidation
+from hil.diagnosis.stages import Judged, Searched
 from hil.diagnosis.wording import title, titles
+from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit, FitStatus
 from hil.identification.honest_refit import holds, unstable
+from hil.identification.measured import Measured
 from hil.quantities import digits, percent
+from hil.twin.library import LIBRARY
+from hil.twin.mechanism import Block, Mechanism
 
 
 def notes_on(
+    judged: Judged,
     table: dict[str, ChannelFit],
-    proof: CrossValidation,
     forms: Container[int],
-    verdict: Verdict,
-    explanation: Explanation,
-    final: Fit,
+    left: TorqueLeft | None,
+    experiment: str,
+    budget_s: float,
 ) -> list[str]:
-    """Notes on the figures, on terms that were dropped or not validated, and on those that explain too little."""
-    lost = (
-        []
-        if not final.data.observability.closed_loop
-        else [
-            unstable(run)
-            for run in final.data.runs[:1]
-            if not all(holds(fit.hypothesis, final.data) for fit in (explanation.nominal, final))
-        ]
-    )
-    notes = [*lost]
+    """All notes, in the order in which they are read."""
+    searched, final = judged.tested.searched, judged.final
+    notes = [*searched.prepared.notes, *_on_figures(judged, table), *_on_terms(judged, forms)]
+    notes += [*_on_fit(final), *on_torque(left)]
+    notes += filter(None, (judged.tested.refit.note, experiment))
+    notes += [] if final.data.observability.closed_loop else not_observable(searched.prepared.train)
+    return [*notes, _stopped(searched, budget_s)] if searched.stopped_at else notes
+
+
+def _on_figures(judged: Judged, table: dict[str, ChannelFit]) -> list[str]:
+    """Notes on the figures of the fit: how they were simulated, and where their noise floor is from."""
+    final, notes = judged.final, []
+    closed_loop = final.data.observability.closed_loop
+    if closed_loop and not all(holds(fit.hypothesis, final.data) for fit in (judged.nominal, final)):
+        notes.append(unstable(final.data.runs[0]))
+    lost = bool(notes)
     if any(entry.floor_from == "repeated_laps" for entry in table.values()):
         notes.append("The noise floor is the part of the residuals that does not repeat from lap to lap.")
     else:
@@ -38,28 +48,34 @@ def notes_on(
             "response of the axis to it. Random disturbances of the axis therefore count as mismatch."
         )
     blocks = [name for name, entry in table.items() if entry.mode is Mode.BLOCKS]
-    if blocks and explanation.nominal.data.observability.closed_loop and not lost:
+    if blocks and closed_loop and not lost:
         notes.append(
             f"Figures of {', '.join(blocks)} are block by block, with measured inputs: in closed loop the twin "
             "deviates from the recording by more than the noise although every block is at its floor (chaotic loop)."
         )
-    notes += [f"{title(ablation.term.effect)} was dropped: {ablation.refuted}." for ablation in proof.dropped]
+    return notes
+
+
+def _on_terms(judged: Judged, forms: Container[int]) -> list[str]:
+    """Notes on terms that were dropped or not validated, and on those that explain too little."""
+    proof, searched = judged.tested.proof, judged.tested.searched
+    notes = [f"{title(ablation.term.effect)} was dropped: {ablation.refuted}." for ablation in proof.dropped]
     notes += [
         f"{title(ablation.term.effect)} has no visible effect in the held-out recordings: it is not validated by them."
         for index, ablation in enumerate(proof.ablations)
         if index not in forms and ablation.gain is not None and not ablation.shown
     ]
-    if verdict is Verdict.UNEXPLAINED and explanation.terms and not final.terms:
-        tried = ", ".join(title(term.effect) for term in explanation.terms)
+    if judged.verdict is Verdict.UNEXPLAINED and searched.terms and not judged.final.terms:
+        tried = ", ".join(title(term.effect) for term in searched.terms)
         notes.append(f"The closest mechanisms ({tried}) explain less than half of the mismatch; none is reported.")
     return notes
 
 
-def stopped(explanation: Explanation, budget_s: float) -> str:
+def _stopped(searched: Searched, budget_s: float) -> str:
     """Note on a search that ended with its time budget."""
-    others = titles(explanation.not_tried) if explanation.not_tried else "no mechanism"
+    others = titles(searched.not_tried) if searched.not_tried else "no mechanism"
     return (
-        f"The search ended with its time budget of {digits(budget_s)} s before {explanation.stopped_at}: this is the "
+        f"The search ended with its time budget of {digits(budget_s)} s before {searched.stopped_at}: this is the "
         f"best explanation so far. Not fitted beside it: {others}. No next experiment was designed."
     )
 
@@ -70,7 +86,7 @@ def at_bound(found: Fit) -> tuple[str, ...]:
     return tuple(name for name in found.at_bound if name in nominal)
 
 
-def ended(final: Fit) -> list[str]:
+def _on_fit(final: Fit) -> list[str]:
     """Notes on a final fit that did not converge, or in which a parameter ended at its bound."""
     notes = []
     if final.status is FitStatus.OUT_OF_STEPS:
@@ -97,4 +113,50 @@ def on_torque(left: TorqueLeft | None) -> list[str]:
         f"least squares of inertia, friction and offset ({percent(left.plain)}): no term describes a "
         "torque on the axis, such as friction of another form, gravity or another arm, and the fit to the motion "
         "takes it for inertia or friction."
+    ]
+
+
+def not_observable(data: Dataset) -> list[str]:
+    """Notes for recordings of a bench whose control law is unknown."""
+    run, bench = data.runs[0], data.bench
+    controller = titles([mechanism.id for mechanism in LIBRARY if mechanism.block is Block.CONTROLLER])
+    return [
+        "The control law is unknown: the plant was judged alone, block by block, from measured torque to measured "
+        "motion. There is no figure in closed loop and no next experiment, and no mismatch was assigned to the "
+        f"controller. {controller.capitalize()} cannot be tested: that needs recorded set-points, and the law under "
+        "`control` of the bench file.",
+        *_without_torque(run),
+        *_with_one_encoder(run, bench),
+    ]
+
+
+def _without_torque(run: Measured) -> list[str]:
+    names = AXIS_CHANNELS[run.kind]
+    if not run.observability.torque_measured:
+        return [
+            f"No torque is recorded: only the transmission was judged, from {names.motor_position} to "
+            f"{names.table_position}. Friction and loads of the motor side and the drive cannot be told, and of masses "
+            f"and stiffness only their ratio; record {names.torque} or {names.torque_command}."
+        ]
+    if not run.observability.torque_and_command:
+        return [
+            f"Only one of {names.torque} and {names.torque_command} is recorded: an effect of the drive shows only as "
+            "wrong motion. Record both to tell drive and motor apart."
+        ]
+    return []
+
+
+def _on_motor(mechanism: Mechanism) -> bool:
+    """True if a form of a mechanism shows in the motor's motion."""
+    return any(variant.motor_alone for variant in mechanism.variants)
+
+
+def _with_one_encoder(run: Measured, bench: Bench) -> list[str]:
+    if bench.has_table_encoder:
+        return []
+    hidden = titles([mechanism.id for mechanism in LIBRARY if mechanism.needs_table and not _on_motor(mechanism)])
+    names = AXIS_CHANNELS[run.kind]
+    return [
+        f"Only one position is recorded: {hidden} cannot be tested; record both {names.motor_position} and "
+        f"{names.table_position}."
     ]

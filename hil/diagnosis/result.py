@@ -195,6 +195,25 @@ class AxisChange(_Part):
     parameters: tuple[ChangedParameter, ...]
 
 
+class RuleAnswer(_Part):
+    """Answer of one rule of `hil.diagnosis.acceptance` on a candidate."""
+
+    rule: str
+    accepted: bool
+    text: str = Field(description="what holds, or why the candidate is not named")
+    figures: dict[str, float | str | None] = Field(description="measured quantities; null where not finite")
+
+
+class Candidate(_Part):
+    """A mechanism that was fitted, and its ledger: the rules in the order in which they were asked."""
+
+    effect: str
+    variant: str = ""
+    beside: tuple[str, ...] = Field((), description="terms that it was added to")
+    named: bool = Field(description="true if it is one of the findings")
+    rules: tuple[RuleAnswer, ...]
+
+
 class NextExperiment(_Part):
     """Motion that separates mechanisms that the recorded motion cannot."""
 
@@ -232,6 +251,7 @@ class Result(_Part):
     torque_left: TorqueLeft | None = Field(None, description="null without held-out motion or recorded torque")
     next_experiment: NextExperiment | None = None
     time_budget: TimeBudget | None = Field(None, description="null if the search was completed")
+    considered: tuple[Candidate, ...] = Field((), description="every mechanism that was fitted, in order")
     notes: tuple[str, ...] = ()
     runtime_s: NotNegative
 

@@ -3,11 +3,10 @@
 import math
 from collections.abc import Sequence
 
+from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.result import AT_FLOOR, AxisChange, Correction, Finding, FitFigures, Result, Verdict
 from hil.diagnosis.wording import title
 from hil.quantities import percent, quantity
-
-LIKELY = 0.5  # confidence from which an effect is more likely there than not
 
 
 def statement(result: Result) -> str:
@@ -25,7 +24,7 @@ def statement(result: Result) -> str:
             else (f"does not decrease: {after} instead of {before}")
         )
         surest = max(one.confidence for one in result.missing)
-        doubt = "" if surest >= LIKELY else f", doubtful by its confidence ({percent(surest)})"
+        doubt = "" if surest >= CRITERIA.likely else f", doubtful by its confidence ({percent(surest)})"
         where = "held-out" if entry.validate_ else "these"
         return (
             f"Missing physics{doubt}: {named} With all of it the residual of {name} on {where} recordings {change} "
@@ -95,7 +94,7 @@ def _left(result: Result) -> str:
 
 def _sentences(found: Sequence[Finding]) -> str:
     """The sentences of findings that are more likely there than not, and the names of the others."""
-    likely = [one for one in found if one.confidence >= LIKELY] or found
+    likely = [one for one in found if one.confidence >= CRITERIA.likely] or found
     doubtful = ", ".join(f"{title(one.effect)} ({percent(one.confidence)})" for one in found if one not in likely)
     sentences = " ".join(one.sentence for one in likely)
     return f"{sentences} Doubtful, by their confidence: {doubtful}." if doubtful else sentences

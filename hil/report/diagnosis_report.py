@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from hil.diagnosis.diagnose import NEXT_EXPERIMENT, Diagnosis
+from hil.diagnosis.diagnosis import Diagnosis
+from hil.diagnosis.experiment import NEXT_EXPERIMENT
 from hil.diagnosis.pictures.change import CAPTION
 from hil.diagnosis.pictures.findings import finding_figure, term_of
 from hil.diagnosis.pictures.location import residual_panels
@@ -15,6 +16,7 @@ from hil.motion.profile import write_profile
 from hil.quantities import change, digits, percent, quantity, reading_unit
 from hil.report import plots
 from hil.report.compare_report import write_bench
+from hil.report.ledger_report import ledger_section
 from hil.report.page import Number, Page
 from hil.twin.library import BY_ID
 
@@ -44,7 +46,7 @@ def write_diagnosis(diagnosis: Diagnosis, folder: Path) -> None:
         page.items(
             [
                 f"{what.capitalize()}: {text}."
-                for what, text in where(result.location, diagnosis.owner.axis.turns).items()
+                for what, text in where(result.location, diagnosis.given_bench.axis.turns).items()
             ]
         )
         page.picture(
@@ -64,6 +66,7 @@ def write_diagnosis(diagnosis: Diagnosis, folder: Path) -> None:
         or "Every mechanism of the library would show in these recordings at a typical strength."
     )
     _next_experiment(page, diagnosis, folder)
+    ledger_section(page, result)
     page.heading("How it was judged")
     repeated = diagnosis.experiment.note if diagnosis.experiment else ""
     page.items(
@@ -81,7 +84,7 @@ def write_diagnosis(diagnosis: Diagnosis, folder: Path) -> None:
 def _lead(diagnosis: Diagnosis) -> str:
     seconds = sum(run.motor.size * run.period_s for run in diagnosis.train.runs)
     held_out = ", ".join(run.name for run in diagnosis.held_out.runs) or "nothing"
-    bench = f"bench {diagnosis.owner.name} ({diagnosis.owner.axis.model})"
+    bench = f"bench {diagnosis.given_bench.name} ({diagnosis.given_bench.axis.model})"
     ended = " · ended by its time budget, see How it was judged" if diagnosis.result.time_budget else ""
     return f"{seconds:.1f} s of training, held out: {held_out} · {bench}{ended}"
 
@@ -91,7 +94,7 @@ def _finding(page: Page, diagnosis: Diagnosis, index: int, folder: Path) -> None
     mechanism = BY_ID[finding.effect]
     name = title(finding.effect)
     name = f"Explains a part: {name}" if diagnosis.result.partial else name.capitalize()
-    turns = diagnosis.owner.axis.turns
+    turns = diagnosis.given_bench.axis.turns
     page.heading(f"{index + 1}. {name}: {of_load(mechanism.element_of(term.variant), turns)}")
     figure, caption = finding_figure(diagnosis, term)
     again = f"_{term.slot + 1}" if term.slot else ""
@@ -168,7 +171,7 @@ def _fit(page: Page, diagnosis: Diagnosis, folder: Path) -> None:
         ("without", "training", "held out", "kept"),
         [
             (
-                label(ablation.term, diagnosis.owner),
+                label(ablation.term, diagnosis.given_bench),
                 Number(f"{digits(ablation.train)} ×"),
                 Number(f"{digits(ablation.held_out)} ×" if ablation.held_out is not None else "–"),
                 answer,

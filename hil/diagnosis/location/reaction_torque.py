@@ -14,6 +14,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from hil.arrays import FloatArray
+from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.search.disturbance import disturbance, smooth
 from hil.identification.dataset import inertia
 from hil.identification.estimator import Fit
@@ -27,10 +28,10 @@ ENCODER = (Block.SENSOR.value, "linear encoder")
 # Least share of k e in the torque, and least correlation of both, for a force on the table. On development axes the
 # share was 0.9 to 5 for forces, at most 0.6 for errors of the transmission, and 0.1 for errors of encoders.
 _PASSED, _ALONE = 0.7, 0.5
-# The linear encoder is at fault if the expected reaction torque exceeds `_STANDS_OUT` times the usual torque for more
+# The linear encoder is at fault if the expected reaction torque exceeds `stands_out` times the usual torque for more
 # than `_FEW_S` and its share is below `_MISSING`: errors of the linear encoder had at most 0.02, those of the
 # transmission 0.5 and more. `_FEW_S` is some ten windows of the moving mean: fewer rows may be a single impact.
-_STANDS_OUT, _MISSING, _FEW_S = 5.0, 0.25, 0.05
+_MISSING, _FEW_S = 0.25, 0.05
 _DEVIATION = 1.4826  # standard deviation of Gaussian noise over the median of its size
 
 
@@ -57,7 +58,7 @@ def acting(found: Fit) -> tuple[str, str] | None:
     size = float(np.linalg.norm(torque - torque.mean()) * np.linalg.norm(force))
     if _share(torque - torque.mean(), force) > _PASSED and torque @ force > _ALONE * size:
         return TABLE
-    clear = np.abs(reaction) > _STANDS_OUT * _DEVIATION * np.median(np.abs(torque))
+    clear = np.abs(reaction) > CRITERIA.stands_out * _DEVIATION * np.median(np.abs(torque))
     if np.count_nonzero(clear) * runs[0].period_s > _FEW_S and _share(torque[clear], reaction[clear]) < _MISSING:
         return ENCODER
     return None

@@ -18,7 +18,7 @@ from hil.identification.estimator import Fit
 from hil.quantities import reading_unit
 
 if TYPE_CHECKING:
-    from hil.diagnosis.diagnose import Diagnosis
+    from hil.diagnosis.diagnosis import Diagnosis
 
 DRAWN_ROWS = 6000  # several per pixel
 CAPTION = (
@@ -34,7 +34,7 @@ def change_figure(diagnosis: Diagnosis) -> Figure:
         raise InputError("change: the axis did not change between or during these recordings")
     figure = Figure(figsize=(10.0, 1.0 + 2.4 * len(change.runs)), layout="constrained")
     axes = figure.subplots(len(change.runs), 1, squeeze=False)[:, 0]
-    nominal = diagnosis.explanation.nominal
+    nominal = diagnosis.nominal
     for axis, run in zip(axes, change.runs, strict=True):
         channel = "motor" if run.observability.torque_measured else "table"
         before = _residual(nominal.on(diagnosis.train.over([run])), channel)

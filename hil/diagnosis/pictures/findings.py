@@ -37,7 +37,7 @@ from hil.twin.mechanism import Picture
 from hil.twin.parameter import Role
 
 if TYPE_CHECKING:
-    from hil.diagnosis.diagnose import Diagnosis
+    from hil.diagnosis.diagnosis import Diagnosis
 
 BINS = 120  # points that a figure of this width resolves
 SAMPLES_PER_BIN = 60  # on average; a shorter recording gets wider bins, so that medians stay smooth
@@ -54,9 +54,8 @@ def finding_figure(diagnosis: Diagnosis, term: Term) -> Captioned:
     train, held_out = diagnosis.train.runs, diagnosis.held_out.runs
     runs = (*train, *held_out) if every else held_out or train
     figure, caption = picture(diagnosis, [view_of(diagnosis, run, term) for run in runs])
-    return Captioned(
-        labelled(figure, diagnosis.owner.axis.turns), f"{caption} Recordings: {', '.join(run.name for run in runs)}."
-    )
+    names = ", ".join(run.name for run in runs)
+    return Captioned(labelled(figure, diagnosis.given_bench.axis.turns), f"{caption} Recordings: {names}.")
 
 
 def term_of(diagnosis: Diagnosis, index: int) -> Term:
@@ -134,7 +133,7 @@ def _over_turn(per_torque: bool = False) -> Drawer:
     """Make a picture over the motor angle, or over the position where no revolution is known."""
 
     def picture(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:
-        known = diagnosis.owner.axis.physics().turn_known
+        known = diagnosis.given_bench.axis.physics().turn_known
         label, x_of, unit = ("motor angle", angle, "deg") if known else ("position", position, "mm")
         return _residual_over(label, x_of, unit, bins=240, per_torque=per_torque)(diagnosis, views)
 
@@ -160,7 +159,7 @@ def _torque_over_command(diagnosis: Diagnosis, views: Sequence[View]) -> Caption
     view = longest(views)
     if float(np.sqrt(np.mean(view.modelled["torque"] ** 2))) >= 0.2 * view.run.noise.torque:
         return torque_over_command(diagnosis, views)
-    unit = "N" if diagnosis.owner.axis.linear else "N m"
+    unit = "N" if diagnosis.given_bench.axis.linear else "N m"
     return _residual_over("torque command", lambda _, view: view.run.torque_command, unit)(diagnosis, views)
 
 
@@ -170,7 +169,7 @@ def _spectrum(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:
     axis = figure.subplots()
     channel = "table" if "table" in views[0].measured else "motor"
     for label, fit, colour in (
-        ("nominal twin, refitted", diagnosis.explanation.nominal, COMMAND),
+        ("nominal twin, refitted", diagnosis.nominal, COMMAND),
         ("twin with the findings", diagnosis.final, SIMULATED),
     ):
         spectra = [
@@ -189,7 +188,7 @@ def _spectrum(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:
         if found_hz is not None:
             axis.axvline(found_hz, color=DEVIATION, linewidth=1.0, linestyle="--", label=f"{found_hz:.3g} Hz")
     # here the motor's residual is a position, not converted to a torque
-    linear = diagnosis.owner.axis.linear or (channel == "table" and not diagnosis.owner.axis.turns)
+    linear = diagnosis.given_bench.axis.linear or (channel == "table" and not diagnosis.given_bench.axis.turns)
     unit = "m" if linear else "rad"
     label = CHANNEL_LABELS["table"] if channel == "table" else "motor position"
     style_axis(axis, f"{label} [{unit}/√Hz]", "frequency [Hz]", "Spectrum of the residual")

@@ -21,7 +21,7 @@ from hil.identification.measured import Measured
 from hil.quantities import reading_unit
 
 if TYPE_CHECKING:
-    from hil.diagnosis.diagnose import Diagnosis
+    from hil.diagnosis.diagnosis import Diagnosis
 
 CLOUD_POINTS = 8000  # of a scatter plot: more points overlap
 REVERSAL_S, STEEPEST_S = 0.4, 0.05  # shown before and after: a reversal with its ramps, a step of the current loop
@@ -30,8 +30,8 @@ REVERSAL_S, STEEPEST_S = 0.4, 0.05  # shown before and after: a reversal with it
 def friction_over_speed(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:
     """Draw motor torque - J a over speed, measured and of the twin, beside the friction laws."""
     final = diagnosis.final
-    factor, unit_of_speed = speed_unit(diagnosis.owner.axis.turns)
-    to_read = factor * diagnosis.owner.axis.ratio_m_rad
+    factor, unit_of_speed = speed_unit(diagnosis.given_bench.axis.turns)
+    to_read = factor * diagnosis.given_bench.axis.ratio_m_rad
     fastest = max(float(np.abs(view.torque.velocity).max()) for view in views)
     edges = np.geomspace(1e-3 * fastest, fastest, 45)
     figure = Figure(figsize=(10.0, 5.6), layout="constrained")
@@ -51,14 +51,14 @@ def friction_over_speed(diagnosis: Diagnosis, views: Sequence[View]) -> Captione
         label = f"twin with the findings, {name}"
         axis.plot(speed * to_read, friction, color=SIMULATED, marker=".", linestyle=dash, linewidth=1.8, label=label)
     for name, fit, dash in (
-        ("bench file", diagnosis.explanation.owner, ":"),
-        ("nominal twin, refitted", diagnosis.explanation.nominal, "-."),
+        ("bench file", diagnosis.searched.given, ":"),
+        ("nominal twin, refitted", diagnosis.nominal, "-."),
     ):
         physics = fit.bench.axis.physics()
         law = physics.coulomb_n_m + physics.viscous_n_m_s_rad * edges
         axis.plot(edges * to_read, law, color=COMMAND, linestyle=dash, label=name)
     axis.set_xscale("log")
-    unit = "N" if diagnosis.owner.axis.linear else "N m"
+    unit = "N" if diagnosis.given_bench.axis.linear else "N m"
     style_axis(axis, f"friction [{unit}]", f"speed of the table [{unit_of_speed}]", "Friction over speed")
     axis.legend(frameon=False, ncols=2)
     how = (
@@ -105,7 +105,7 @@ def _one_direction(found: Sequence[tuple[FloatArray, FloatArray]], sign: float) 
 def lost_motion(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:
     """Draw table - motor position over the acceleration and, at one reversal, over time."""
     run = longest(views).run
-    stretch = run.table_m - diagnosis.owner.axis.ratio_m_rad * run.motor
+    stretch = run.table_m - diagnosis.given_bench.axis.ratio_m_rad * run.motor
     stretch = stretch - np.mean(stretch)  # the zero of the linear encoder is arbitrary
     factor, unit = reading_unit(unit_of_channel(diagnosis, "table"), float(np.abs(stretch).max()))
     curves = three_curves(diagnosis, run, "table", stretch)
@@ -129,7 +129,7 @@ def torque_over_command(diagnosis: Diagnosis, views: Sequence[View]) -> Captione
     """Draw torque over its command and over time, measured and of both twins."""
     run = longest(views).run
     curves = three_curves(diagnosis, run, "torque", run.torque)
-    unit = "N" if diagnosis.owner.axis.linear else "N m"
+    unit = "N" if diagnosis.given_bench.axis.linear else "N m"
     figure = Figure(figsize=(10.0, 5.2), layout="constrained")
     left, right = figure.subplots(1, 2)
     _cloud(left, run.torque_command, curves, run)

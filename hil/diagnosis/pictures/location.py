@@ -19,7 +19,7 @@ from hil.identification.estimator import Fit
 from hil.identification.measured import Measured
 
 if TYPE_CHECKING:
-    from hil.diagnosis.diagnose import Diagnosis
+    from hil.diagnosis.diagnosis import Diagnosis
 
 BINS = 40  # as in the location
 TIME_BIN_S = 0.05  # resolves single moves
@@ -37,7 +37,7 @@ def location_figure(diagnosis: Diagnosis) -> Figure:
     _shares(axes["phase"], {title(phase.kind): phase.share for phase in phase_shares(seen)}, "Phase of motion")
     excess = np.concatenate([energy.rows for energy in seen])
     position = np.concatenate([1e3 * energy.run.position_command_m for energy in seen])
-    factor, unit = speed_unit(diagnosis.owner.axis.turns)
+    factor, unit = speed_unit(diagnosis.given_bench.axis.turns)
     speed = np.concatenate([factor * np.abs(energy.run.velocity_command_m_s) for energy in seen])
     _density(axes["position"], position, excess)
     style_axis(axes["position"], ENERGY, "position of the table [mm]", "Mean over the travel")
@@ -59,15 +59,15 @@ def location_figure(diagnosis: Diagnosis) -> Figure:
 def reference_fit(diagnosis: Diagnosis) -> Fit:
     """Return the fit whose mismatch is located: that of the bench file if only parameters are wrong, else the refit."""
     if diagnosis.result.verdict in (Verdict.PARAMETER_ERROR, Verdict.NO_MISMATCH):
-        return diagnosis.explanation.owner
-    return diagnosis.explanation.nominal
+        return diagnosis.searched.given
+    return diagnosis.nominal
 
 
 def residual_panels(diagnosis: Diagnosis, run: Measured) -> list[Panel]:
     """Residual of each channel of a run before and after, with the noise floor as a band."""
     held_out = any(run is other for other in diagnosis.held_out.runs)
     panels = []
-    for channel, recorded in channel_names(diagnosis.owner, run).items():
+    for channel, recorded in channel_names(diagnosis.given_bench, run).items():
         if recorded not in diagnosis.result.fit:
             continue
         entry = diagnosis.result.fit[recorded]

@@ -18,7 +18,7 @@ from hil.identification.measured import Measured
 from hil.identification.terms import Term
 
 if TYPE_CHECKING:
-    from hil.diagnosis.diagnose import Diagnosis
+    from hil.diagnosis.diagnosis import Diagnosis
 
 BIN_SAMPLES_MIN = 8  # samples of a drawn bin: quartiles of fewer have a large variance
 CHANNEL_LABELS = {
@@ -79,9 +79,7 @@ def view_of(diagnosis: Diagnosis, run: Measured, term: Term) -> View:
 
 def three_curves(diagnosis: Diagnosis, run: Measured, channel: str, measured: FloatArray) -> list[Curve]:
     """A signal (n,) measured, simulated by the refitted nominal twin, and simulated by the final twin."""
-    nominal, final = (
-        measured - diagnosis.residuals(fit, run)[channel] for fit in (diagnosis.explanation.nominal, diagnosis.final)
-    )
+    nominal, final = (measured - diagnosis.residuals(fit, run)[channel] for fit in (diagnosis.nominal, diagnosis.final))
     return [
         Curve("nominal twin, refitted", nominal, COMMAND),
         Curve("measured", measured, MEASURED),
@@ -96,7 +94,7 @@ def longest(views: Sequence[View]) -> View:
 
 def unit_of_channel(diagnosis: Diagnosis, channel: str) -> str:
     """SI unit of a residual."""
-    axis = diagnosis.owner.axis
+    axis = diagnosis.given_bench.axis
     if channel == "table":
         return "rad" if axis.turns else "m"
     return "N" if axis.linear else "N m"
@@ -105,7 +103,7 @@ def unit_of_channel(diagnosis: Diagnosis, channel: str) -> str:
 def label_of_channel(diagnosis: Diagnosis, channel: str) -> str:
     """Axis label of the residual of a channel, with "force" for "torque" on a linear axis."""
     label = CHANNEL_LABELS[channel]
-    return label.replace("torque", "force") if diagnosis.owner.axis.linear else label
+    return label.replace("torque", "force") if diagnosis.given_bench.axis.linear else label
 
 
 def noise(run: Measured, channel: str) -> float:
@@ -126,13 +124,13 @@ def binned(x: FloatArray, y: FloatArray, edges: FloatArray) -> tuple[FloatArray,
 
 def angle(diagnosis: Diagnosis, view: View) -> FloatArray:
     """Angle of the motor within its revolution [deg]."""
-    turned = view.run.motor * diagnosis.owner.axis.physics().angle_per_unit
+    turned = view.run.motor * diagnosis.given_bench.axis.physics().angle_per_unit
     return np.asarray(np.degrees(np.mod(turned, 2.0 * np.pi)))
 
 
 def position(diagnosis: Diagnosis, view: View) -> FloatArray:
     """Position by the motor encoder [mm]."""
-    return np.asarray(1e3 * diagnosis.owner.axis.ratio_m_rad * view.run.motor)
+    return np.asarray(1e3 * diagnosis.given_bench.axis.ratio_m_rad * view.run.motor)
 
 
 def around(row: int, run: Measured, half_s: float) -> slice:

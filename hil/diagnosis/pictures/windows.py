@@ -15,7 +15,7 @@ from hil.figures.panels import COMMAND, DEVIATION, MEASURED, SIMULATED, thin
 from hil.identification.dataset import inertia
 
 if TYPE_CHECKING:
-    from hil.diagnosis.diagnose import Diagnosis
+    from hil.diagnosis.diagnosis import Diagnosis
 
 MOST_RUNS = 4  # panels of a figure; those with windows first
 DRAWN_ROWS = 6000  # several per pixel
@@ -25,13 +25,13 @@ def force_over_time(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:
     """Draw the force that the owner's twin lacks and that of the twin without the event, with its windows shaded."""
     shown = sorted(views, key=lambda view: not view.term.windows_of(view.run.name))[:MOST_RUNS]
     shown.sort(key=lambda view: view.run.start.time_s)
-    ratio = diagnosis.owner.axis.ratio_m_rad
+    ratio = diagnosis.given_bench.axis.ratio_m_rad
     figure = Figure(figsize=(10.0, 2.6 + 2.2 * len(shown)), layout="constrained")
     axes = np.atleast_1d(figure.subplots(len(shown), 1))
     for axis, view in zip(axes, shown, strict=True):
         run, observer_s = view.run, diagnosis.train.observer_s
-        owner = diagnosis.residuals(diagnosis.explanation.owner, run)["motor"]
-        of_owner = disturbance(run, owner, inertia(diagnosis.owner), observer_s).torque / ratio
+        owner = diagnosis.residuals(diagnosis.searched.given, run)["motor"]
+        of_owner = disturbance(run, owner, inertia(diagnosis.given_bench), observer_s).torque / ratio
         curves = view.torque_modelled.torque / ratio, view.torque.torque / ratio, of_owner
         rows = slice(run.evaluated.start, None)
         chosen = thin(tuple(values[rows] for values in curves), DRAWN_ROWS)

@@ -19,13 +19,13 @@ from itertools import combinations
 from typing import NamedTuple
 
 from hil.bench.bench_file import Bench
+from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.preparation.usable_law import LawCheck, set_aside
 from hil.diagnosis.result import Correction
 from hil.diagnosis.search.initial_values import axis_facts
 from hil.identification.control_law import counting_noise, fit_law
-from hil.identification.law_fit import REPLAYED, LawFit, preferred, sure
+from hil.identification.law_fit import LawFit, preferred, sure
 from hil.identification.measured import Measured
-from hil.identification.noise_floor import FLOOR
 from hil.identification.terms import Term
 from hil.quantities import digits, unit_of
 from hil.twin.library import LIBRARY
@@ -35,10 +35,7 @@ _COARSE = (
     "The control law reproduces the commands to the noise that the steps of the recorded positions make in a replay. "
     "It was not tested further, because the control loop may have seen finer positions."
 )
-_SURE = 3.0  # standard errors from which a gain differs from that of the bench
 _SETPOINT_DELAY, _FEEDBACK_DELAY = "setpoint_delay_s", "feedback_delay_s"
-_REMOVED = 0.5  # share of the mean square above the noise that further parts of a law must remove
-_MATERIAL = 1e-3  # relative change of a gain that is worth a correction: settings have three digits
 
 
 def check_law(runs: Sequence[Measured], bench: Bench) -> LawCheck:
@@ -46,7 +43,7 @@ def check_law(runs: Sequence[Measured], bench: Bench) -> LawCheck:
     if not bench.law_known:
         return LawCheck(bench)
     given = fit_law(runs, bench, free=False)
-    if given.ratio <= FLOOR:
+    if given.ratio <= CRITERIA.floor:
         return LawCheck(bench)
     if _is_coarse(runs, given):
         return LawCheck(bench, coarse=True, notes=(_COARSE,))
@@ -54,13 +51,13 @@ def check_law(runs: Sequence[Measured], bench: Bench) -> LawCheck:
     # a recorded speed set-point may be another one: then the chain of both loops tells more
     for by_loop in (True, False) if all(run.speed_set_point.size for run in runs) else (False,):
         found.append(_best(runs, bench, given, by_loop))
-        if found[-1].ratio <= FLOOR:
+        if found[-1].ratio <= CRITERIA.floor:
             return _accepted(bench, found[-1])
         if _is_coarse(runs, found[-1]):
             law = _accepted(bench, found[-1])
             return replace(law, coarse=True, notes=(*law.notes, _COARSE))
     for one in found:
-        if one.left <= REPLAYED:
+        if one.left <= CRITERIA.replayed:
             return _accepted(bench, one)
     return _refused(bench, given, found[0])
 
@@ -75,21 +72,23 @@ def _best(runs: Sequence[Measured], bench: Bench, given: LawFit, by_loop: bool) 
     for level in _candidates(runs, bench):
         fits = [fit_law(runs, bench, one.terms, free=one.free, delays=one.delays, by_loop=by_loop) for one in level]
         tried += fits
-        right = [one for one in fits if one.ratio <= FLOOR]
+        right = [one for one in fits if one.ratio <= CRITERIA.floor]
         if right:
             break
     coarse = next((one for one in tried if one not in right and _is_coarse(runs, one)), None)
     if not right:
         return coarse or preferred(tried)
     found = preferred(right)
-    return coarse if coarse and found.ratio - 1.0 > _REMOVED * (coarse.ratio - 1.0) else found
+    return coarse if coarse and found.ratio - 1.0 > CRITERIA.law_parts * (coarse.ratio - 1.0) else found
 
 
 def _is_coarse(runs: Sequence[Measured], found: LawFit) -> bool:
     """True if noise that the recorded positions make in a replay explains what the law leaves."""
     allowed = [1.0 + (counting_noise(run, found.gains) / run.noise.torque) ** 2 for run in runs]
     each = zip(found.runs, allowed, strict=True)
-    return max(float(part @ part) / part.size / most for run, most in each for part in run if part.size) <= FLOOR
+    return (
+        max(float(part @ part) / part.size / most for run, most in each for part in run if part.size) <= CRITERIA.floor
+    )
 
 
 class _Candidate(NamedTuple):
@@ -165,7 +164,7 @@ def _gain(bench: Bench, found: LawFit, name: str, error: float) -> dict[str, Cor
         return {}
     share = name == "velocity_feedforward"
     std = error * (1.0 if share else abs(value))
-    if abs(value - nominal) <= max(_SURE * std, _MATERIAL * (1.0 if share else abs(nominal))):
+    if abs(value - nominal) <= max(CRITERIA.sigmas * std, CRITERIA.setting * (1.0 if share else abs(nominal))):
         return {}
     return {name: Correction(nominal=nominal, value=value, std=std, unit=unit_of(name))}
 
@@ -199,8 +198,8 @@ def _refused(bench: Bench, given: LawFit, best: LawFit) -> LawCheck:
         why += (
             f" in the velocity loop and {100.0 * best.left_of_speed:.0f} % in the speed set-point of the position loop"
         )
-        corrections |= _of_velocity_loop(bench, best) if best.left_of_command <= REPLAYED else {}
-        corrections |= _of_position_loop(bench, best) if best.left_of_speed <= REPLAYED else {}
+        corrections |= _of_velocity_loop(bench, best) if best.left_of_command <= CRITERIA.replayed else {}
+        corrections |= _of_position_loop(bench, best) if best.left_of_speed <= CRITERIA.replayed else {}
     told = f" One loop follows its settings with {_told(corrections)}." if corrections else ""
     advice = f"Check the controller's settings: the control law of the bench is not that of the recording, {why}.{told}"
     return replace(set_aside(bench, why), corrections=corrections, advice=advice, mismatch=True)

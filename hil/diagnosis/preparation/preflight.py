@@ -7,6 +7,7 @@ A negative J without positive friction Fc shows a wrong sign; J and Fc far from 
 
 import math
 from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,27 +42,40 @@ _TORQUE_UNITS = misread_factors("mN m", "uN m", "N cm", "kN m", "kgf m", "kgf cm
 }
 
 
-def prepare(recordings: Sequence[Recording], bench: Bench) -> list[Measured]:
+class Preflight(NamedTuple):
+    """Recordings prepared for the twin, none if they cannot be diagnosed, and one line per problem."""
+
+    runs: list[Measured]
+    problems: tuple[str, ...]
+
+    def accepted(self) -> list[Measured]:
+        """The prepared recordings; raises InputError with all problems if there are any."""
+        if self.problems:
+            raise InputError("\n".join(self.problems))
+        return self.runs
+
+
+def preflight(recordings: Sequence[Recording], bench: Bench) -> Preflight:
     """Check recordings and prepare them for the twin.
 
-    Raises InputError with one line per problem: missing channels, too short, no motion, a frozen or copied channel, a
-    wrong sign or unit of a position or of the torque, saturation in most of the motion.
+    Problems are missing channels, too short, no motion, a frozen or copied channel, a wrong sign or unit of a position
+    or of the torque, saturation in most of the motion.
     """
     if not recordings:
-        raise InputError("given no recording, allowed one or more; give the recordings to diagnose")
+        return Preflight([], ("given no recording, allowed one or more; give the recordings to diagnose",))
     recordings = [completed(recording, bench) for recording in recordings]
-    found = [problem for recording in recordings for problem in _raw_problems(recording, bench)]
-    if found:
-        raise InputError("\n".join(found))
-    runs = [take(recording, bench) for recording in recordings]
-    found = [
+    if problems := [problem for recording in recordings for problem in _raw_problems(recording, bench)]:
+        return Preflight([], tuple(problems))
+    try:
+        runs = [take(recording, bench) for recording in recordings]
+    except InputError as error:  # the bench is of another axis, or values are damaged
+        return Preflight([], (str(error),))
+    problems = [
         f"{run.name}: {problem}"
         for run, recording in zip(runs, recordings, strict=True)
         for problem in _problems(run, bench, set(recording.metadata.get(DERIVED, {})))
     ]
-    if found:
-        raise InputError("\n".join(found))
-    return runs
+    return Preflight(runs, tuple(problems))
 
 
 def _raw_problems(recording: Recording, bench: Bench) -> Iterator[str]:

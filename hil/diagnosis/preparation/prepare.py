@@ -1,43 +1,32 @@
 """Prepare recordings for a diagnosis: check the control law, complete channels, split, refuse, build the data sets."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from hil.bench.bench_file import Bench
 from hil.diagnosis.preparation.law_check import check_law
-from hil.diagnosis.preparation.preflight import prepare
+from hil.diagnosis.preparation.preflight import preflight
 from hil.diagnosis.preparation.split import held_out_note, same, split
-from hil.diagnosis.preparation.usable_law import LawCheck, at_set_points, replayable
+from hil.diagnosis.preparation.usable_law import at_set_points, replayable
 from hil.diagnosis.preparation.usable_parts import usable_parts
+from hil.diagnosis.stages import Prepared
 from hil.errors import InputError
 from hil.identification.completion import completed, reduced
-from hil.identification.dataset import Dataset, prepare_dataset
+from hil.identification.dataset import prepare_dataset
 from hil.recording.recording import Recording
 
 
-@dataclass(frozen=True)
-class Prepared:
-    """Data sets for training and validation, the bench with the control law that may be used, and notes."""
-
-    train: Dataset
-    held_out: Dataset  # without runs if nothing was held out
-    bench: Bench
-    law: LawCheck
-    notes: tuple[str, ...]
-
-
-def prepare_diagnosis(train: Sequence[Recording], validate: Sequence[Recording], bench: Bench) -> Prepared:
+def prepare(train: Sequence[Recording], validate: Sequence[Recording], bench: Bench) -> Prepared:
     """Prepare recordings, cut at their gaps; without `validate` a third of each is held out.
 
     Raises InputError with all reasons if the recordings cannot be diagnosed.
     """
-    usable, proof = usable_parts(train, bench, not validate), usable_parts(validate, bench, False)
-    notes = (*usable.notes, *proof.notes)
-    train, whole, validate = list(usable.recordings), list(usable.whole), list(proof.recordings or usable.held_out)
+    parts, proof = usable_parts(train, bench, not validate), usable_parts(validate, bench, False)
+    notes = (*parts.notes, *proof.notes)
+    train, whole, validate = list(parts.recordings), list(parts.whole), list(proof.recordings or parts.held_out)
     law = replayable(bench, [*train, *whole, *validate])
     train, whole, validate = ([law.marked(run) for run in runs] for runs in (train, whole, validate))
-    judged = reduced(law.bench, [*train, *whole, *validate])
-    train, whole, validate = ([completed(run, judged) for run in runs] for runs in (train, whole, validate))
+    usable = reduced(law.bench, [*train, *whole, *validate])
+    train, whole, validate = ([completed(run, usable) for run in runs] for runs in (train, whole, validate))
     if not validate:
         train, validate = split(train)
         train += whole
@@ -49,13 +38,13 @@ def prepare_diagnosis(train: Sequence[Recording], validate: Sequence[Recording],
             "of another motion; leave it out of one of them"
         )
     runs = [*train, *validate]
-    prepared = prepare(runs, judged)
-    if judged.law_known:
-        law = at_set_points(prepared, judged)
-        law = check_law(prepared[: len(train)], judged) if law.bench is judged else law
-        if law.bench is not judged:
-            judged = reduced(law.bench, runs)
-            prepared = prepare(runs, judged)
-    prepared = law.judged(prepared)
-    data = prepare_dataset(prepared[: len(train)], judged)
-    return Prepared(data, data.over(prepared[len(train) :]), judged, law, (*notes, *law.notes))
+    measured = preflight(runs, usable).accepted()
+    if usable.law_known:
+        law = at_set_points(measured, usable)
+        law = check_law(measured[: len(train)], usable) if law.bench is usable else law
+        if law.bench is not usable:
+            usable = reduced(law.bench, runs)
+            measured = preflight(runs, usable).accepted()
+    measured = law.without_command(measured)
+    data = prepare_dataset(measured[: len(train)], usable)
+    return Prepared(data, data.over(measured[len(train) :]), usable, bench, law, (*notes, *law.notes))

@@ -50,7 +50,7 @@ class LawCheck:
             return Verdict.PARAMETER_ERROR
         return of_plant
 
-    def judged(self, runs: Sequence[Measured]) -> list[Measured]:
+    def without_command(self, runs: Sequence[Measured]) -> list[Measured]:
         """The runs, without the command of the controller if they are too coarse to test it."""
         if not self.coarse:
             return list(runs)

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from hil.bench.bench_file import Bench
-from hil.diagnosis.preparation.preflight import prepare
+from hil.diagnosis.preparation.preflight import preflight
 from hil.diagnosis.preparation.split import split
 from hil.diagnosis.preparation.usable_law import replayable
 from hil.errors import InputError
@@ -62,9 +62,6 @@ def usable_parts(recordings: Sequence[Recording], bench: Bench, to_split: bool) 
 
 def _reason(parts: Sequence[Recording], bench: Bench) -> str:
     """Why parts cannot be diagnosed, in one line; empty if they can."""
-    try:
-        law = replayable(bench, parts)
-        prepare([law.marked(part) for part in parts], reduced(law.bench, parts))
-    except InputError as error:
-        return str(error).splitlines()[0]
-    return ""
+    law = replayable(bench, parts)
+    problems = preflight([law.marked(part) for part in parts], reduced(law.bench, parts)).problems
+    return problems[0].splitlines()[0] if problems else ""

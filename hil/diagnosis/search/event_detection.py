@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hil.arrays import FloatArray
+from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.search.change_points import Segment, joined, segments, standing_out
 from hil.diagnosis.search.disturbance import Disturbance, disturbance
 from hil.identification.dataset import inertia
@@ -22,13 +23,10 @@ BLOCK_S = 0.005  # an edge to be refined by simulation
 SHORTEST, EDGE = 3, 6  # blocks of the shortest window; blocks in which the observer follows an edge
 _MOST_BLOCKS = 6000  # the time of a partition grows with their square: half a second
 _REVERSAL_S = 0.05  # about a reversal friction is known least
-_STANDS_OUT = 5.0  # level over the rms of what the windows leave: 1 in 10^6 of Gaussian blocks
-_PENALTY = 20.0  # beside 3 log n of the three values of a window: that of a term in the search (NEEDED)
 _ALIKE = 0.25  # levels of adjacent windows that differ less are one
 _ROUNDS = 3  # windows found in one round do not count as motion or noise in the next; then they stay
 _REWEIGHTED = 40  # iterations of the regression
 _LEAST_USUAL = 0.3  # of the blocks without an event: else which level is none cannot be told
-_FAINT = 1e-3  # of the energy of all windows, in the faintest together: 3 % of their rms
 _SMOOTH_BLOCKS = 8  # the noise of a block is that of means over 40 ms: longer than the observer remembers
 
 
@@ -62,7 +60,7 @@ def faint(windows: Sequence[tuple[float, float, float]]) -> list[bool]:
     """True for windows (start, end, level) that hold next to nothing of the energy of all, weakest first."""
     energies = np.array([level**2 * (end_s - start_s) for start_s, end_s, level in windows])
     found, order = np.zeros(len(windows), dtype=bool), np.argsort(energies)
-    found[order] = np.cumsum(energies[order]) < _FAINT * energies.sum()
+    found[order] = np.cumsum(energies[order]) < CRITERIA.faint * energies.sum()
     return [bool(one) for one in found]
 
 
@@ -106,7 +104,7 @@ def _of_run(run: Measured, seen: Disturbance, reversals: bool) -> list[Event]:
     usual, rest = weights, values
     for _ in range(_ROUNDS):
         rest = values - _explained(columns, values, usual)
-        found = standing_out(rest, weights, _windows(rest, weights), _STANDS_OUT, EDGE)
+        found = standing_out(rest, weights, _windows(rest, weights), CRITERIA.stands_out, EDGE)
         usual = weights.copy()
         for one in found:
             usual[one.first : one.last] = 0.0
@@ -130,7 +128,7 @@ def _beyond_reversals(rest: FloatArray, weights: FloatArray, near: NDArray[np.bo
         return True
     others = near & (weights > 0.0)
     others[max(one.first - EDGE, 0) : one.last + EDGE] = False
-    return abs(one.level) > _STANDS_OUT * float(np.sqrt(np.mean(rest[others] ** 2) if others.any() else np.inf))
+    return abs(one.level) > CRITERIA.stands_out * float(np.sqrt(np.mean(rest[others] ** 2) if others.any() else np.inf))
 
 
 def _explained(columns: FloatArray, values: FloatArray, weights: FloatArray) -> FloatArray:
@@ -151,7 +149,9 @@ def _windows(rest: FloatArray, weights: FloatArray) -> list[Segment]:
         noise = _noise(rest, beside)
         if noise <= 0.0:
             break
-        cut = joined(segments(rest, weights, noise**2, 3.0 * np.log(rest.size) + _PENALTY), weights, EDGE, _ALIKE)
+        cut = joined(
+            segments(rest, weights, noise**2, 3.0 * np.log(rest.size) + CRITERIA.evidence), weights, EDGE, _ALIKE
+        )
         before, found = found, [one for one in cut if weights[one.first : one.last].sum() >= SHORTEST]
         beside = weights.copy()
         for one in found:

@@ -1,12 +1,16 @@
 """Events of a recording as a term of a hypothesis: windows in which a constant force acts, fitted and revised."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
 from hil.arrays import FloatArray
+from hil.diagnosis.acceptance import is_constant
+from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.search.event_detection import BLOCK_S, EDGE, Event, detect, faint, left_over
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
@@ -18,12 +22,6 @@ from hil.twin.library import BY_ID, LIBRARY
 from hil.twin.parameter import Role
 
 EVENT = next((mechanism for mechanism in LIBRARY if mechanism.transient), None)
-_EVIDENCE = 20.0  # BIC difference for the events of a held-out recording: that of a term in the search (NEEDED)
-_MATERIAL = 0.02  # least energy per row that they remove, in units of noise^2: that of a term in the search (MATERIAL)
-_SIGMAS = 3.0  # standard errors of the force of a window: 0.3 % of Gaussian ones are above without a force
-_OF_CONSTANT = 4.0  # energy per row left inside windows over that outside: twice the rms, for edges between two rows
-_OF_FORM = 0.0025  # of the energy inside windows, 1/20 in rms: so little is left by a constant, not by another form
-_OF_BLOW = 0.25  # of the energy inside a window: the best constant leaves 0.19 of half a sine, 0.25 of a triangle
 
 
 def event_term(found: Sequence[Event], ratio: float) -> Term:
@@ -89,7 +87,7 @@ def with_events_of(held_out: Dataset, final: Fit) -> Fit:
     if index is not None:
         windows = dict.fromkeys(one._replace(run=run.name) for run in held_out.runs for one in at.terms[index].windows)
         choices.append(replace(at.resolved.terms[index], windows=tuple(windows)))
-    best, evidence = final, _EVIDENCE
+    best, evidence = final, CRITERIA.evidence
     for choice in choices:
         longer = at.with_term(choice) if index is None else _joined(at, index, choice)
         fitted = _completed(fit_windows(there.evaluate(longer), others=False), others=False)
@@ -97,7 +95,11 @@ def with_events_of(held_out: Dataset, final: Fit) -> Fit:
         if _index(fitted) is None or fitted.hypothesis.x.size != longer.x.size:
             continue
         gain = against(fitted, before)
-        if gain > evidence and before.cost - fitted.cost > _MATERIAL * before.rows and constant_inside(fitted, before):
+        if (
+            gain > evidence
+            and before.cost - fitted.cost > CRITERIA.material * before.rows
+            and is_constant(inside_windows(fitted, before))
+        ):
             own = final.estimator.residuals(fitted.hypothesis)
             more = np.zeros((final.rows, fitted.hypothesis.x.size - at.x.size))
             slopes = np.hstack([final.jacobian, more]) if final.jacobian.size else final.jacobian
@@ -131,7 +133,7 @@ def _completed(found: Fit, others: bool = True) -> Fit:
     if more:
         longer = _joined(found.hypothesis, index, event_term(more, found.bench.axis.ratio_m_rad))
         again = fit_windows(found.estimator.evaluate(longer), others=others)
-        found = again if against(again, found) > _EVIDENCE * len(more) else found
+        found = again if against(again, found) > CRITERIA.evidence * len(more) else found
     names, refuted = {run.name for run in found.data.runs}, set[tuple[Window, Window]]()
     while True:
         term = found.terms[index]
@@ -183,7 +185,7 @@ def _trimmed(found: Fit, others: bool = True) -> Fit:
         for one in term.windows
         if one.run not in names
         or (
-            abs(at.at(one)[strength]) > _SIGMAS * next(errors)[2]
+            abs(at.at(one)[strength]) > CRITERIA.sigmas * next(errors)[2]
             and not weak[one]
             and at.edges(one)[1] > at.edges(one)[0]
         )
@@ -195,16 +197,26 @@ def _trimmed(found: Fit, others: bool = True) -> Fit:
     return fit_windows(found.estimator.evaluate(_with_windows(found.hypothesis, index, kept)), others=others)
 
 
-def constant_inside(found: Fit, base: Fit) -> bool:
-    """True if a constant force explains the windows of a fit nearly whole, or as well as the rest of its recordings.
+class InsideWindows(NamedTuple):
+    """Motor residuals of a fit with a force: energy inside its windows, `left` and `before` it, and mean squares inside
+    and outside [noise^2]; `one_push`: the windows follow each other in one recording.
 
     A force of another form, such as friction at one place, leaves more inside. What happens once is no law of place or
-    speed: a blow or a push by hand has any form, of which windows that follow each other explain most. `base` is the
-    fit without the force.
+    speed: a blow or a push by hand has any form, of which windows that follow each other explain most.
     """
+
+    left: float
+    before: float
+    mean: float
+    mean_outside: float
+    one_push: bool
+
+
+def inside_windows(found: Fit, base: Fit) -> InsideWindows | None:
+    """What the force of a fit leaves within its windows; None without one. `base` is the fit without the force."""
     index = _index(found)
     if index is None:
-        return True
+        return None
     start, end = BY_ID[found.terms[index].effect].indices(Role.EDGE)
     term, inside, outside, before = found.terms[index], list[FloatArray](), list[FloatArray](), 0.0
     for (number, channel), part in found.residuals.parts.items():
@@ -219,12 +231,8 @@ def constant_inside(found: Fit, base: Fit) -> bool:
         outside.append(part[~within] ** 2)
         before += float(np.sum(base.residuals.parts[number, channel][within] ** 2))
     left, rest = np.concatenate(inside), np.concatenate(outside)
-    share = _OF_BLOW if _one_push(term) else _OF_FORM
-    return (
-        float(np.sum(left)) <= share * before
-        or not left.size
-        or bool(np.mean(left) <= _OF_CONSTANT * max(float(np.mean(rest)), 1.0))
-    )
+    mean, mean_outside = (float(np.mean(part)) if part.size else math.nan for part in (left, rest))
+    return InsideWindows(float(np.sum(left)), before, mean, mean_outside, _one_push(term))
 
 
 def _one_push(term: Term) -> bool:

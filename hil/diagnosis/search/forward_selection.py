@@ -6,18 +6,22 @@ that are no longer needed are removed: a first term may have imitated two causes
 
 import math
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
+from hil.diagnosis.acceptance import NEEDED
+from hil.diagnosis.criteria import CRITERIA
+from hil.diagnosis.ledger import Considered, accepted, examine
+from hil.diagnosis.search.addition import removed
 from hil.diagnosis.search.events import beside_loads, revised
 from hil.diagnosis.search.initial_values import axis_facts, claimable
-from hil.diagnosis.search.next_term import CLEAR, MATERIAL, MOST, NEEDED, Progress, gain, next_term
+from hil.diagnosis.search.next_term import Round, next_term
 from hil.diagnosis.search.restart import again
 from hil.diagnosis.search.rivals import ENDED, RivalFit, chosen, ended
-from hil.diagnosis.search.score_test import Candidate, screen_library
-from hil.identification.dataset import Dataset
+from hil.diagnosis.search.score_test import screen_library
+from hil.diagnosis.stages import Prepared, Progress, Searched
 from hil.identification.estimator import Fit
 from hil.identification.inference import against, whitening
 from hil.identification.nominal_fit import fit_nominal_parameters, require_finite
@@ -27,31 +31,19 @@ from hil.twin.library import BY_ID
 from hil.twin.physics import Active
 
 MOST_TERMS = 8  # at once: more than an engineer can act on; limits the duration of a search
-# After this many terms that leave more than `MOST` of the energy above the floor the search ends.
-_IN_VAIN = 3
 
 
-@dataclass(frozen=True, eq=False)
-class Explanation:
-    """Result of the search: the fit at the bench's parameters, the nominal refit, the final fit and its rivals."""
+@dataclass(frozen=True)
+class Need:
+    """What a term explains beside all others: evidence (BIC difference), energy [noise^2], rows of the residuals."""
 
-    owner: Fit
-    nominal: Fit
-    final: Fit
-    rivals: dict[Key, list[RivalFit]] = field(default_factory=dict)
-    needed: dict[Key, float] = field(default_factory=dict)  # evidence that each term is needed
-    candidates: tuple[Candidate, ...] = ()  # of the first score test
-    stopped_at: str = ""  # step of the search at which the time was over; empty if it was completed
-    not_tried: tuple[str, ...] = ()  # ids that were not fitted beside the terms found
-
-    @property
-    def terms(self) -> tuple[Term, ...]:
-        """The mechanisms found, with their fitted values."""
-        return self.final.terms
+    evidence: float
+    gain: float
+    rows: int
 
 
-def explain(data: Dataset, progress: Progress = lambda text: None, deadline_s: float = math.inf) -> Explanation:
-    """Search for the mechanisms that the twin of a bench lacks on the recordings of a data set.
+def search(prepared: Prepared, progress: Progress = lambda text: None, deadline_s: float = math.inf) -> Searched:
+    """Search for the mechanisms that the twin of a bench lacks on the training recordings.
 
     After `deadline_s` of the monotonic clock the search ends with the best explanation so far. Raises HilError if the
     twin of the axis is unstable.
@@ -66,35 +58,36 @@ def explain(data: Dataset, progress: Progress = lambda text: None, deadline_s: f
             progress(text)
 
     step("refitting the nominal parameters")
-    base = fit_nominal_parameters(data, deadline_s=deadline_s)
+    base = fit_nominal_parameters(prepared.train, deadline_s=deadline_s)
     require_finite(base)
-    owner, nominal = base.estimator.evaluate(base.hypothesis.given), base
-    rivals, needed, first = dict[Key, list[RivalFit]](), dict[Key, float](), list[Candidate]()
+    given, nominal = base.estimator.evaluate(base.hypothesis.given), base
+    rivals, needed, considered = dict[Key, list[RivalFit]](), dict[Key, float](), list[Considered]()
     tried, fitted = [effects(())], set[str]()
     while len(base.terms) < MOST_TERMS:
         step(f"screening the library beside {len(base.terms)} terms")
         if stopped_at:
             break
-        candidates = screen_library(base)
-        first = first or candidates
-        reference = beside_loads(nominal, base)
-        found, best = next_term(base, owner, reference, candidates, step)
-        fitted = {fit.terms[-1].effect for fit in found if not base.estimator.expired}
-        if best is None:
+        round_ = Round(base, beside_loads(nominal, base), given)
+        additions = next_term(round_, screen_library(base), step)
+        fitted = {one.fit.terms[-1].effect for one in additions.fits if not base.estimator.expired}
+        considered += additions.considered
+        if additions.best is None:
+            considered += [one.considered for one in additions.fits]
             break
-        best, others = chosen(best, found, base, reference, owner)
-        rivals[best.terms[-1].key] = others
-        found = []  # their residuals are not needed any more
-        best, needed = _pruned(best, reference)
+        choice = chosen(additions.best, additions.fits, round_)
+        considered += choice.considered
+        rivals[choice.named.fit.terms[-1].key] = choice.rivals
+        del additions  # their residuals are not needed any more
+        best, needed = _pruned(choice.named.fit, round_.reference)
         # to convergence: the residual of an unfinished fit resembles other mechanisms
         base = revised(claimed(best.refit(ENDED, slopes=best.jacobian)))
-        if not base.terms and base.cost < nominal.cost - NEEDED:
+        if not base.terms and base.cost < nominal.cost - CRITERIA.evidence:
             nominal = base  # the term has only led the nominal parameters out of a local minimum
             continue
         if effects(base.terms) in tried:
             break  # the term that was added has been removed again
         tried.append(effects(base.terms))
-        if len(base.terms) >= _IN_VAIN and base.excess > MOST * nominal.excess:
+        if len(base.terms) >= CRITERIA.in_vain and base.excess > CRITERIA.most_left * nominal.excess:
             break
     step("fitting the explanation to convergence")
     final = ended(again(revised(base).refit(ENDED), ENDED))
@@ -102,8 +95,8 @@ def explain(data: Dataset, progress: Progress = lambda text: None, deadline_s: f
     present = {*fitted, *(term.effect for term in final.terms)}
     not_tried = tuple(effect for effect in BY_ID if effect not in present) if stopped_at else ()
     rivals = {key: value for key, value in rivals.items() if key in kept}
-    owner, nominal, final = (fit.without_deadline() for fit in (owner, nominal, final))
-    return Explanation(owner, nominal, final, rivals, needed, tuple(first), stopped_at, not_tried)
+    given, nominal, final = (fit.without_deadline() for fit in (given, nominal, final))
+    return Searched(prepared, given, nominal, final, rivals, needed, tuple(considered), stopped_at, not_tried)
 
 
 def _without(found: Fit, index: int) -> Fit:
@@ -145,12 +138,12 @@ def _beyond(found: Fit, index: int) -> Term | None:
     return other if compatible([*others, other]) else None
 
 
-def _pruned(found: Fit, nominal: Fit) -> tuple[Fit, dict[Key, float]]:
+def _pruned(found: Fit, reference: Fit) -> tuple[Fit, dict[Key, float]]:
     """Remove terms without evidence, weakest first; return the fit and the evidence for the remaining terms."""
 
     def ablated(index: int) -> tuple[float, Fit]:
         other = _without(found, index)
-        if found.cost > CLEAR * other.cost:
+        if found.cost > CRITERIA.clear * other.cost:
             other = other.refit(ENDED, slopes=other.jacobian)
         return against(found, other, filters), other
 
@@ -158,7 +151,8 @@ def _pruned(found: Fit, nominal: Fit) -> tuple[Fit, dict[Key, float]]:
         filters = whitening(found)
         pairs = in_parallel([partial(ablated, index) for index in range(len(found.terms))])
         evidence, rest = min(pairs, key=lambda pair: pair[0])
-        if evidence >= NEEDED and gain(rest, found, nominal) >= MATERIAL * found.rows:
+        need = Need(evidence, removed(rest, found, reference), found.rows)
+        if accepted(examine(NEEDED, need, CRITERIA)):
             return found, {term.key: value for term, (value, _) in zip(found.terms, pairs, strict=True)}
         found = rest
     return found, {}

@@ -4,15 +4,21 @@ The named one is the first that can be the cause. An explanation whose evidence 
 is an objection to it: a reason beside its evidence.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hil.diagnosis.search.next_term import objection, valid, worthwhile
+from hil.diagnosis.acceptance import COMPARED, paying
+from hil.diagnosis.criteria import CRITERIA
+from hil.diagnosis.ledger import Considered, Ledger, accepted, examine, refusal
+from hil.diagnosis.search.addition import Addition
+from hil.diagnosis.search.next_term import Round, first_standing
 from hil.identification.coordinates import LAST_EDGE_STEP_S
 from hil.identification.estimator import Fit, FitStatus
-from hil.identification.inference import TIED, Filter, against, between, refuted, whitening
+from hil.identification.inference import Filter, against, between, refuted, whitening
 from hil.identification.terms import FRICTION, Term
 from hil.twin.library import BY_ID
 
@@ -25,7 +31,7 @@ class RivalFit:
     """Another explanation of the same residual and the evidence against it (BIC difference; < 0 favours it).
 
     `reduced` is its mean squared weighted residual, `more` its energy per row in units of noise^2 less that of the
-    chosen explanation, whose mean square is `named`. `objection` is why it cannot be the cause, `behind` why the other
+    named explanation, whose mean square is `named`. `objection` is why it cannot be the cause, `behind` why the other
     is named though the evidence favours this one. The fit itself is not kept: its residuals and derivatives grow with
     the recordings.
     """
@@ -39,88 +45,118 @@ class RivalFit:
     behind: str = ""
 
     @classmethod
-    def of(cls, fit: Fit, evidence: float, more: float = np.inf) -> "RivalFit":
+    def of(cls, fit: Fit, evidence: float, more: float = np.inf) -> RivalFit:
         """The explanation by a fit."""
         return cls(fit.terms, fit.reduced, evidence, more)
 
     @property
+    def ledger(self) -> Ledger:
+        """Answers of the rules that compare it with the named explanation."""
+        return examine(COMPARED, self, CRITERIA)
+
+    @property
     def tied(self) -> bool:
         """True if neither its evidence nor an objection refutes it."""
-        return not self.objection and not refuted(self.evidence, self.more)
+        return accepted(self.ledger)
 
 
-def chosen(best: Fit, found: Sequence[Fit], base: Fit, reference: Fit, owner: Fit) -> tuple[Fit, list[RivalFit]]:
-    """Return the explanation to name, converged, and its rivals, the strongest first.
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """The explanation to name, converged, its rivals, the strongest first, and the ledgers of all of them."""
 
-    `best` is the first of `found` so far: those near it are ended too, and may then come before it. `base` is the fit
-    without the last term, `reference` and `owner` as in `next_term`.
+    named: Addition
+    rivals: list[RivalFit]
+    considered: tuple[Considered, ...]
+
+
+def chosen(best: Addition, additions: Sequence[Addition], search: Round) -> Choice:
+    """Choose the explanation to name.
+
+    `best` is the first of the additions so far: those near it are ended too, and may then come before it.
     """
-    begun = [one for one in found if one is not best]
-    if not best.jacobian.size:  # only evaluated so far, since the fitted ones were rejected
-        best = replace(best.estimator, edge_step_s=LAST_EDGE_STEP_S).fit(best.hypothesis)
-    best = (valid([ended(best)]) or [best])[0]
-    others = [ended(one) if one.cost < _NEAR * best.cost else one for one in begun]
-    order = sorted([best, *valid(others)], key=lambda fit: fit.cost)
-    best = worthwhile([one for one in order if one.jacobian.size], base, reference, owner) or best
-    standing = [one for one in order if one is not best and not objection(one, best, base, owner)]
+    begun = [one for one in additions if one is not best]
+    fit = best.fit
+    if not fit.jacobian.size:  # only evaluated so far, since the fitted ones were rejected
+        fit = replace(fit.estimator, edge_step_s=LAST_EDGE_STEP_S).fit(fit.hypothesis)
+    started = best if fit is best.fit else search.addition(fit)
+    converged = _ended(started, search)
+    best = converged if converged.valid else started
+    others = [_ended(one, search) if one.fit.cost < _NEAR * best.fit.cost else one for one in begun]
+    order = sorted([best, *(one for one in others if one.valid)], key=lambda one: one.fit.cost)
+    best = first_standing([one for one in order if one.fit.jacobian.size]) or best
+    standing = [one for one in order if one is not best and not objection(one, best)]
     named = _on_fewest_parts(_simplest(best, standing), [best, *standing])
-    filters = whitening(named)
-    rivals = [_compared(one, named, base, owner, filters) for one in order if one is not named]
-    return named, sorted(rivals, key=lambda rival: rival.evidence)
+    filters = whitening(named.fit)
+    compared = [(one, _compared(one, named, filters)) for one in order if one is not named]
+    considered = (named.considered, *(one.considered.asked(rival.ledger) for one, rival in compared))
+    return Choice(named, sorted((rival for _, rival in compared), key=lambda rival: rival.evidence), considered)
 
 
-def ended(found: Fit) -> Fit:
+def ended(fit: Fit) -> Fit:
     """The fit, continued if it ran out of steps: only then its cost refutes it."""
-    return found.refit(ENDED, slopes=found.jacobian) if found.status is FitStatus.OUT_OF_STEPS else found
+    return fit.refit(ENDED, slopes=fit.jacobian) if fit.status is FitStatus.OUT_OF_STEPS else fit
 
 
-def _simplest(best: Fit, others: Sequence[Fit]) -> Fit:
+def objection(one: Addition, named: Addition) -> str:
+    """Why a term cannot be named instead of another, whatever it explains; empty if it can."""
+    if reason := refusal(one.form):
+        return reason
+    worse = sorted(paying(one.harm) - paying(named.harm))
+    return f"with it the training recordings are reproduced worse in {', '.join(worse)}" if worse else ""
+
+
+def _ended(one: Addition, search: Round) -> Addition:
+    fit = ended(one.fit)
+    return one if fit is one.fit else search.addition(fit)
+
+
+def _simplest(best: Addition, others: Sequence[Addition]) -> Addition:
     """Return the explanation with the fewest parameters of those that the evidence does not separate.
 
     Constant torque and direction-dependent Coulomb friction are equal on every motion; friction is preferred, since
     most axes are horizontal.
     """
-    tied = [best, *(other for other in others if other.jacobian.size and against(best, other) < TIED)]
-    return min(tied, key=lambda found: (found.hypothesis.free, found.terms[-1].key[:2] != (FRICTION, 0)))
+    near = [one for one in others if one.fit.jacobian.size and against(best.fit, one.fit) < CRITERIA.tied]
+    return min([best, *near], key=lambda one: (one.fit.hypothesis.free, one.fit.terms[-1].key[:2] != (FRICTION, 0)))
 
 
-def _on_fewest_parts(best: Fit, others: Sequence[Fit]) -> Fit:
+def _on_fewest_parts(best: Addition, others: Sequence[Addition]) -> Addition:
     """Return the explanation on the fewest parts of the axis of those that are not refuted.
 
     What a part does that is found already needs no second cause elsewhere.
     """
-    filters = whitening(best)
-    tied = [
+    filters = whitening(best.fit)
+    near = [
         one
         for one in others
         if one is not best
-        and one.jacobian.size
-        and one.hypothesis.free <= best.hypothesis.free
-        and not refuted(between(best, one, filters), _more(one, best))
+        and one.fit.jacobian.size
+        and one.fit.hypothesis.free <= best.fit.hypothesis.free
+        and not refuted(between(best.fit, one.fit, filters), _more(one, best))
     ]
-    return min([best, *tied], key=_parts)
+    return min([best, *near], key=_parts)
 
 
-def _parts(found: Fit) -> int:
-    return len({BY_ID[term.effect].element_of(term.variant) for term in found.terms})
+def _parts(one: Addition) -> int:
+    return len({BY_ID[term.effect].element_of(term.variant) for term in one.fit.terms})
 
 
-def _more(one: Fit, named: Fit) -> float:
-    return (one.cost - named.cost) / named.rows
+def _more(one: Addition, named: Addition) -> float:
+    return (one.fit.cost - named.fit.cost) / named.fit.rows
 
 
-def _compared(one: Fit, named: Fit, base: Fit, owner: Fit, filters: Sequence[Filter]) -> RivalFit:
+def _compared(one: Addition, named: Addition, filters: Sequence[Filter]) -> RivalFit:
     """Compare an explanation with the named one; what is refuted by its evidence needs no other reason."""
-    evidence, more = between(named, one, filters), _more(one, named)
-    reason = "" if refuted(evidence, more) else objection(one, named, base, owner)
+    evidence, more = between(named.fit, one.fit, filters), _more(one, named)
+    reason = "" if refuted(evidence, more) else objection(one, named)
     behind = _behind(one, named) if evidence < 0.0 else ""
-    return RivalFit(one.terms, one.reduced, evidence, more, named.reduced, reason, behind)
+    return RivalFit(one.fit.terms, one.fit.reduced, evidence, more, named.fit.reduced, reason, behind)
 
 
-def _behind(one: Fit, named: Fit) -> str:
+def _behind(one: Addition, named: Addition) -> str:
     """Why an explanation with better evidence and no objection is not the named one."""
     if _parts(one) > _parts(named):
         return "it acts on more parts of the axis"
-    if one.hypothesis.free > named.hypothesis.free:
+    if one.fit.hypothesis.free > named.fit.hypothesis.free:
         return "it has more parameters"
     return "its part of the mismatch is too small for a name"

@@ -12,6 +12,7 @@ import numpy as np
 
 from hil.arrays import FloatArray, SingleArray
 from hil.bench.bench_file import Bench
+from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.search.initial_values import likenesses, observable
 from hil.diagnosis.search.score_test import Candidate, offered
 from hil.identification.coordinates import LAST_EDGE_STEP_S, TRUST
@@ -38,7 +39,6 @@ LONG = 25  # evaluations of a last fit
 # leader's second fit, and its gain above the share _BEHIND of the leader's: unconverged fits may be far from their end.
 _BEATEN, _LEVEL, _BEHIND = 5.0, 1.5, 0.5
 _SOLVED = 1e-9  # damping of a step that solves the normal equations, over their diagonal: only against singular ones
-_HOPELESS = 0.02  # share of the residual energy over that of the first candidate: below, a candidate is not fitted
 _EDGE_SHIFTS_S = np.arange(-15, 16) * 0.005  # tried shifts of an edge: its valley is narrower than a step of the fit
 
 
@@ -47,7 +47,9 @@ def race(base: Fit, candidates: Sequence[Candidate]) -> list[Fit]:
 
     The best is converged in all its variants, others only if their cost is near it.
     """
-    return _Race(base, [one for one in candidates[:_STARTED] if one.share > _HOPELESS * candidates[0].share]).run()
+    return _Race(
+        base, [one for one in candidates[:_STARTED] if one.share > CRITERIA.hopeless * candidates[0].share]
+    ).run()
 
 
 def owner_points(base: Fit) -> list[FloatArray]:

@@ -8,30 +8,27 @@ also falls if its strength is within its standard error, if it worsens a channel
 if it changes only what the noise of the sensors does, see `noise_free`.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
 
+from hil.diagnosis.acceptance import HELD_OUT
+from hil.diagnosis.criteria import CRITERIA
+from hil.diagnosis.ledger import Ledger, examine, refusal
+from hil.diagnosis.search.addition import Harm, harm
 from hil.diagnosis.search.forward_selection import claimed
-from hil.diagnosis.search.harm import refuting
 from hil.diagnosis.search.initial_values import axis_facts
-from hil.diagnosis.search.next_term import MATERIAL
 from hil.diagnosis.verdict.noise_free import energy_without_noise
-from hil.diagnosis.wording import channel_names
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
-from hil.identification.inference import TIED, between, standard_errors
-from hil.identification.noise_floor import REPEATS, unrepeated
+from hil.identification.inference import between, standard_errors
+from hil.identification.noise_floor import unrepeated
 from hil.identification.parallel import in_parallel
 from hil.identification.terms import Term
 from hil.twin.library import BY_ID
 from hil.twin.parameter import Role
-
-_MOTION = (
-    0.5  # least share of the gain of a term that it has on motion without noise: about 1 where it acts on the motion
-)
-_ACTS = 0.1  # least change of the held-out residual per row, over that in training, from which a term acts there
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +39,7 @@ class Ablation:
     that does not repeat from lap to lap. `gain` is the evidence for the term on the held-out recordings. They are None
     without held-out recordings or laps, and for an event, whose `train` is the ratio over all recordings. `acts`: the
     term changes the held-out residuals as it does those in training. `clear`: its strength is above its standard error.
-    `worse`: channels of training recordings that it harms. `quiet`: it hardly acts on motion without noise.
+    `quiet`: it hardly acts on motion without noise. `harm`: each channel with it and without it.
     """
 
     term: Term
@@ -53,28 +50,23 @@ class Ablation:
     laps: float | None
     acts: bool = False
     clear: bool = True
-    worse: tuple[str, ...] = ()
     quiet: bool = False
+    harm: Mapping[str, Harm] = field(default_factory=dict)
+
+    @property
+    def ledger(self) -> Ledger:
+        """Answers of the rules on held-out recordings."""
+        return examine(HELD_OUT, self, CRITERIA)
 
     @property
     def refuted(self) -> str:
-        """Why the term is not named; empty if it stands. Held-out motion without its effect does not refute it."""
-        if self.gain is not None and self.gain < (0.0 if self.acts else -TIED):
-            return "it improves the fit to the training recordings, but worsens that to held-out recordings"
-        if self.laps is not None and self.laps < REPEATS:
-            return "it improves the fit to the training recordings, but worsens that to repeated laps"
-        if not self.clear:
-            return "its strength is below its standard error"
-        if self.quiet:
-            return "it changes what the noise of the sensors does in the twin, and hardly the motion"
-        if self.worse:
-            return f"with it the training recordings are reproduced worse in {', '.join(self.worse)}"
-        return ""
+        """Why the term is not named; empty if it stands."""
+        return refusal(self.ledger)
 
     @property
     def shown(self) -> bool:
         """True if held-out recordings support the term."""
-        return self.gain is not None and self.gain > TIED
+        return self.gain is not None and self.gain > CRITERIA.tied
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,9 +81,9 @@ class CrossValidation:
 def cross_validate(nominal: Fit, final: Fit, held_out: Dataset) -> CrossValidation:
     """Ablate every term; drop those that held-out recordings or laps refute, the most harmful first."""
     dropped: list[Ablation] = []
-    owner = nominal.estimator.evaluate(nominal.hypothesis.given)
+    given = nominal.estimator.evaluate(nominal.hypothesis.given)
     while True:
-        ablations = _ablate(owner, nominal, final, held_out)
+        ablations = _ablate(given, nominal, final, held_out)
         harmful = [ablation for ablation in ablations if ablation.refuted]
         if not harmful:
             return CrossValidation(final, tuple(ablations), tuple(dropped))
@@ -113,7 +105,7 @@ def explained_share(before: Fit, after: Fit) -> float:
     return min(max(1.0 - left / was, 0.0), 1.0) if was > 0.0 else float(left == 0.0)
 
 
-def _ablate(owner: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> list[Ablation]:
+def _ablate(given: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> list[Ablation]:
     rebased = final.hypothesis.rebased
 
     def without(index: int) -> Fit:
@@ -139,10 +131,10 @@ def _ablate(owner: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> list[Abl
             more,
             gain,
             unrepeated(other.hypothesis, other.data) / differs if differs > 0.0 else None,
-            bool(there and own_held_out and _change(own_held_out, there) > _ACTS * _change(final, other)),
+            bool(there and own_held_out and _change(own_held_out, there) > CRITERIA.acts * _change(final, other)),
             clear[index],
-            _worse(final, other, owner),
             _quiet(final, other),
+            harm(final, other, given),
         )
 
     return [ablation(index, term, other) for index, (term, other) in enumerate(zip(final.terms, fits, strict=True))]
@@ -171,13 +163,9 @@ def _clear(found: Fit) -> list[bool]:
 def _quiet(found: Fit, without: Fit) -> bool:
     """True if a term removes too little on motion without noise: less than a term must, and not most of its gain."""
     removed = energy_without_noise(found, without)
-    return removed is not None and removed < min(MATERIAL * found.rows, _MOTION * (without.cost - found.cost))
-
-
-def _worse(found: Fit, without: Fit, owner: Fit) -> tuple[str, ...]:
-    """Names of the channels by which a term is refuted."""
-    names = channel_names(found.bench, found.data.runs[0])
-    return tuple(sorted(names[channel] for channel in refuting(found, without, owner)))
+    return removed is not None and removed < min(
+        CRITERIA.material * found.rows, CRITERIA.on_motion * (without.cost - found.cost)
+    )
 
 
 def _gain(found: Fit, without: Fit) -> float:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hil.arrays import FloatArray
+from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.result import AxisChange, ChangedParameter, Value
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
@@ -14,9 +15,7 @@ from hil.identification.measured import SETTLE_IN_MOTION_S, Measured
 from hil.identification.nominal_fit import fit_nominal_parameters
 from hil.quantities import unit_of
 
-_SURE = 3.0  # standard errors from which two values differ
 _BLOCK_S = 0.02  # resolution of the moment: several time constants of the observer
-_MOST = 0.9  # of the energy above the noise that a change explains; less has another cause
 _SHORTEST = 0.1  # of the judged rows: a shorter part tells no parameters
 
 
@@ -63,7 +62,7 @@ def _changed_within(alone: Fit) -> Change | None:
     fits = _each(alone.data, [run.until(row), replace(run, lead_in=row + settling)])
     left = sum(fit.excess for fit in fits) / alone.excess
     found = _differing(fits)
-    if left > 1.0 - _MOST or not found:
+    if left > 1.0 - CRITERIA.change or not found:
         return None
     told = AxisChange(recording=run.name, moment_s=float(run.time_s[row]), parts=("before", "after"), parameters=found)
     return Change(told, (run,), tuple(fits), left)
@@ -81,7 +80,7 @@ def _differing(fits: Sequence[Fit]) -> tuple[ChangedParameter, ...]:
     told, stuck = [], {name for fit in fits for name in fit.at_bound}  # a value at its bound is not identifiable
     for index, coordinate in enumerate(fits[0].hypothesis.coordinates):
         least, most = int(np.argmin(values[:, index])), int(np.argmax(values[:, index]))
-        sure = _SURE * float(np.hypot(*errors[[least, most], index]))
+        sure = CRITERIA.sigmas * float(np.hypot(*errors[[least, most], index]))
         if coordinate.name not in stuck and values[most, index] - values[least, index] > sure:
             unit = unit_of(coordinate.name)
             pairs = zip(values[:, index], errors[:, index], strict=True)

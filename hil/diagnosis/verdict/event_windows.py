@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hil.arrays import FloatArray
+from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.result import EventWindow, PulseTrain, Value
 from hil.diagnosis.turning import of_load
 from hil.diagnosis.wording import unit_in, value_in_words
@@ -21,9 +22,7 @@ from hil.quantities import quantity
 from hil.twin.library import BY_ID
 from hil.twin.parameter import Role
 
-# Largest deviation of a strength from the common one, in standard errors and as a share: what a model that is right to
-# its noise leaves, and what real axes leave.
-_SIGMAS, _SHARE = 3.0, 0.05
+_SHARE = 0.05  # largest deviation of a strength from the common one, beside its standard errors: what real axes leave
 _REGULAR_S = 0.005  # largest deviation of an edge from a period: a controlled event repeats more exactly
 _LEAST_ERROR_S = 1e-4  # of an edge in the fit of a period: ten times finer than the rows of a recording at 1 kHz
 _FEWEST = 3  # windows of a train: two always have a period
@@ -175,7 +174,7 @@ def _common(strengths: FloatArray, errors: FloatArray) -> tuple[float, float] | 
     """Weighted mean of strengths (w,) and its standard error; None where they differ."""
     weights = 1.0 / np.maximum(errors, 1e-3 * np.abs(strengths)) ** 2
     mean, error = float(np.average(strengths, weights=weights)), float(weights.sum() ** -0.5)
-    fits = np.abs(strengths - mean) <= np.maximum(_SIGMAS * errors, _SHARE * abs(mean))
+    fits = np.abs(strengths - mean) <= np.maximum(CRITERIA.sigmas * errors, _SHARE * abs(mean))
     return (mean, error) if bool(fits.all()) else None
 
 
@@ -201,7 +200,7 @@ def train_of(edges: FloatArray, errors: FloatArray) -> tuple[PulseTrain, FloatAr
     covariance = np.linalg.inv(columns.T @ (columns / error[:, None] ** 2))
     solved = covariance @ columns.T @ (seen / error**2)
     fitted, spread = columns @ solved, np.sqrt(np.sum(columns @ covariance * columns, axis=1))
-    if np.any(np.abs(seen - fitted) > np.maximum(_REGULAR_S, _SIGMAS * error)):
+    if np.any(np.abs(seen - fitted) > np.maximum(_REGULAR_S, CRITERIA.sigmas * error)):
         return None
     start_s, period_s, width_s = solved.tolist()
     train = PulseTrain(start_s=start_s, width_s=width_s, period_s=period_s, count=count)

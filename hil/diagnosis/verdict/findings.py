@@ -10,24 +10,23 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from hil.bench.bench_file import Bench, MechanismEntry
+from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.result import Correction, Finding, Rival, Value
-from hil.diagnosis.search.forward_selection import Explanation
 from hil.diagnosis.search.initial_values import claimable
 from hil.diagnosis.search.rivals import RivalFit
+from hil.diagnosis.stages import Searched
+from hil.diagnosis.verdict.confidence import confidence
 from hil.diagnosis.verdict.cross_validation import Ablation
 from hil.diagnosis.verdict.event_windows import describe_event
-from hil.diagnosis.verdict.judge import confidence
 from hil.diagnosis.wording import sentence, title, unit_in
 from hil.identification.coordinates import DELAY
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
-from hil.identification.inference import TIED, standard_errors
+from hil.identification.inference import standard_errors
 from hil.identification.terms import FRICTION, LOAD, SAME, Key, Term, ambiguous
 from hil.quantities import digits, unit_of
 from hil.twin.library import BY_ID, LIBRARY
 from hil.twin.parameter import Dimension, Role
-
-_SURE = 3.0  # standard errors from which friction that the bench leaves out is told
 
 
 def renamed(found: Fit) -> Fit:
@@ -47,7 +46,7 @@ def renamed(found: Fit) -> Fit:
 
 
 def findings(
-    explanation: Explanation,
+    searched: Searched,
     final: Fit,
     ablations: Sequence[Ablation],
     forms: Mapping[int, int],
@@ -62,7 +61,7 @@ def findings(
         if index in forms:
             continue
         errors = deviations[final.hypothesis.columns(index)]
-        rivals = rivals_of(explanation, term)
+        rivals = rivals_of(searched, term)
         tied = [rival.terms[-1].effect for rival in rivals if rival.tied]
         if ambiguous(term):
             tied += [
@@ -70,7 +69,7 @@ def findings(
             ]
         margin = min(
             (rival.evidence for rival in rivals if rival.terms[-1].effect not in tied),
-            default=explanation.needed.get(_key(explanation, term), math.inf),
+            default=searched.needed.get(key_in_search(searched, term), math.inf),
         )
         event = describe_event(final, index, held_out) if term.windows else None
         result.append(
@@ -121,7 +120,7 @@ def corrections(owner: Bench, found: Fit) -> dict[str, Correction]:
         if one.name in told
         and one.name not in (*found.at_bound, DELAY)
         and not math.isclose(value, before)
-        and (before or value > _SURE * std)
+        and (before or value > CRITERIA.sigmas * std)
     }
 
 
@@ -167,16 +166,16 @@ def _factor(ablation: Ablation) -> float:
     return min(ablation.train, ablation.held_out)
 
 
-def _key(explanation: Explanation, term: Term) -> Key:
+def key_in_search(searched: Searched, term: Term) -> Key:
     """Key of a term in the search, before it was renamed."""
-    known = set(explanation.rivals) | set(explanation.needed)
+    known = set(searched.rivals) | set(searched.needed)
     return term.key if term.key in known or term.effect not in SAME else replace(term, effect=LOAD).key
 
 
-def rivals_of(explanation: Explanation, term: Term) -> list[RivalFit]:
+def rivals_of(searched: Searched, term: Term) -> list[RivalFit]:
     """Other mechanisms than the term's own, each in its best variant, the strongest first."""
     best: dict[str, RivalFit] = {}
-    known = explanation.rivals.get(_key(explanation, term), [])
+    known = searched.rivals.get(key_in_search(searched, term), [])
     for rival in sorted(known, key=lambda found: (bool(found.objection), found.evidence)):
         other = rival.terms[-1]
         if other.effect != term.effect and not (ambiguous(other) and ambiguous(term)):
@@ -197,12 +196,12 @@ def rival_in_words(rival: RivalFit, term: Term) -> str:
 def _evidence(rival: RivalFit) -> str:
     """The evidence between a rival and the named term, on the side that it supports."""
     side = "against it" if rival.evidence >= 0.0 else "for it"
-    return f"evidence {side} {digits(abs(rival.evidence))}, where {TIED:g} is very strong"
+    return f"evidence {side} {digits(abs(rival.evidence))}, where {CRITERIA.tied:g} is very strong"
 
 
 def _tie(rival: RivalFit) -> str:
     """Reason why a rival counts as equivalent and, if the evidence favours it, why the other term is named."""
-    if rival.evidence >= TIED:
+    if rival.evidence >= CRITERIA.tied:
         return f"{_evidence(rival)}, but the difference is below the model accuracy"
     return f"{_evidence(rival)}{f', but {rival.behind}' if rival.behind else ''}"
 
@@ -237,13 +236,9 @@ _FALLING, _DRAG = next(
     for index, variant in enumerate(mechanism.variants)
     if variant.form_of
 )
-# Share of the energy of the Stribeck law up to which drag is part of its form. Beside the best law fitted to an
-# arctangent over 5 to 150 Stribeck velocities (Coulomb and viscous friction free) drag takes up to 1.3 %; on five such
-# contacts of development cases up to 1.0 %.
-OF_ITS_FORM = 0.02
 
 
-def form_of(explanation: Explanation, ablations: Sequence[Ablation]) -> dict[int, int]:
+def form_of(searched: Searched, ablations: Sequence[Ablation]) -> dict[int, int]:
     """Return the index of a drag term that is part of a Stribeck term -> index of that term.
 
     It is empty if the drag term is tied with another mechanism, which may be the true cause.
@@ -253,7 +248,7 @@ def form_of(explanation: Explanation, ablations: Sequence[Ablation]) -> dict[int
         (index for index, ablation in enumerate(ablations) if (ablation.term.effect, ablation.term.variant) == _DRAG),
         None,
     )
-    if law is None or drag is None or any(rival.tied for rival in rivals_of(explanation, ablations[drag].term)):
+    if law is None or drag is None or any(rival.tied for rival in rivals_of(searched, ablations[drag].term)):
         return {}
     takes, whole = ablations[drag].train - 1.0, ablations[law].train - 1.0  # in units of the energy with both
-    return {drag: law} if takes < OF_ITS_FORM * whole else {}
+    return {drag: law} if takes < CRITERIA.part_of_form * whole else {}

@@ -1,67 +1,78 @@
-"""Verdict, confidence of a finding, and mechanisms that the motion cannot show.
+"""Verdict on plant and control law, from the fits at the bench file's values, refitted, and with terms."""
 
-The confidence of a finding answers whether this effect is there, not whether everything is explained:
-
-    p = 1 / (1 + exp(-s)),   s = a - b ln(1 + e / (factor - 1)) - c ln+(1 / (factor - 1)) - d ln+(1000 / (1 + margin))
-
-with ln+ = max(ln, 0). factor is the residual energy without the term over that with it, so that 1 / (factor - 1) is the
-energy left over that which the term explains, and e ten times the share of what is left that is above the noise floor.
-It falls with a small energy gain, more so beside a residual that has structure, and with a close rival.
-
-A mechanism is testable if one of its variants, at a typical strength, changes the residuals r [noise] by more than the
-evidence that a finding needs:
-
-    visible = | (1 - P) (r(with) - r(without)) |^2,   P: projection on the derivatives by the nominal parameters
-"""
-
-import math
-from collections.abc import Collection
-from dataclasses import replace
+from dataclasses import dataclass
 
 import numpy as np
 
+from hil.diagnosis.acceptance import EXPLAINED
+from hil.diagnosis.criteria import CRITERIA
+from hil.diagnosis.ledger import Ledger, accepted, examine
 from hil.diagnosis.result import Verdict
-from hil.diagnosis.search.initial_values import axis_facts, judged, observable
-from hil.diagnosis.search.next_term import MATERIAL, MOST, NEEDED
+from hil.diagnosis.stages import Judged, Tested
 from hil.diagnosis.verdict.cross_validation import explained_share
+from hil.diagnosis.verdict.each_alone import Change, changed
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.inference import against
-from hil.identification.noise_floor import FLOOR
-from hil.identification.parallel import POOL
-from hil.identification.terms import Term
-from hil.twin.library import BY_ID, LIBRARY
-
-# Reject findings if the unexplained share > 5 % and share x worst residual (in noise rms) > 0.25, for instance a share
-# of 1/20 at 5 times the noise or 1/6 at 1.5. The true mechanism in another form leaves less.
-_MUCH, _FAR = 0.05, 0.25
-# Largest mean square over noise on held-out recordings of a twin that lacks nothing: errors of fitted parameters may
-# leave as much rms there as the noise twice.
-_ELSEWHERE = 4.0
 
 
-def judge(owner: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> Verdict:
-    """Give the verdict from the fits with the parameters of the bench file, refitted, and with terms.
+@dataclass(frozen=True)
+class Remainder:
+    """What all terms together leave: share of the energy above the floor, largest mean square of a channel over noise.
 
-    If the terms are rejected, the first two decide. What they reproduce in training must hold on held-out recordings.
+    `open_inputs`: inputs of the twin are open or nothing is known of the control law, so that something is left beside
+    any name. `at_floor`: the training recordings are explained.
     """
-    if final.terms:
-        left = unexplained_share(nominal, final, held_out)
-        above = max(final.on(data).worst_ratio for data in (final.data, held_out) if data.runs)
-        # where inputs are open, or nothing is known of the control law, something is left beside any name
-        open_inputs = not final.data.observability.closed_loop or any(
-            run.noise.coarse for run in (*final.data.runs, *held_out.runs)
-        )
-        if (
-            names_stand(left, above)
-            or (open_inputs and left <= MOST)
-            or (final.at_floor and (left <= MOST or above <= FLOOR))
-        ):
-            return Verdict.MISSING_PHYSICS
-    wrong = not owner.at_floor and refit_matters(owner, nominal)
-    if not nominal.at_floor or (held_out.runs and (nominal if wrong else owner).on(held_out).worst_ratio > _ELSEWHERE):
+
+    left: float
+    above: float
+    open_inputs: bool
+    at_floor: bool
+
+
+def judge(tested: Tested) -> Judged:
+    """Give the verdict; where terms do not explain the mismatch, parameters of the axis may have changed."""
+    searched, final, refit = tested.searched, tested.proof.final, tested.refit
+    held_out, law = searched.prepared.held_out, searched.prepared.law
+    of_plant, change = verdict_on_plant(searched.given, searched.nominal, final, held_out), None
+    if of_plant is Verdict.UNEXPLAINED and not searched.stopped_at:
+        change = _better(changed(refit.fit, held_out), searched.nominal, final, held_out)
+    if change and change.explains_all:
+        of_plant = Verdict.AXIS_CHANGED
+    verdict = law.verdict(of_plant)
+    is_part = verdict is Verdict.UNEXPLAINED and not change and explains_most(searched.nominal, final, held_out)
+    if not is_part and of_plant is not Verdict.MISSING_PHYSICS:
+        final = searched.given if of_plant is Verdict.NO_MISMATCH else refit.fit
+    # a parameter error is located and measured against the parameters of the bench file
+    before = searched.given if of_plant is Verdict.PARAMETER_ERROR else refit.fit
+    return Judged(tested, of_plant, verdict, change, is_part, refit.fit, before, final)
+
+
+def verdict_on_plant(given: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> Verdict:
+    """Give the verdict on the plant.
+
+    If the terms are rejected, the first two fits decide. What they reproduce in training must hold on held-out
+    recordings.
+    """
+    if final.terms and accepted(explanation(nominal, final, held_out)):
+        return Verdict.MISSING_PHYSICS
+    wrong = not given.at_floor and refit_matters(given, nominal)
+    plain = nominal if wrong else given
+    if not nominal.at_floor or (held_out.runs and plain.on(held_out).worst_ratio > CRITERIA.elsewhere):
         return Verdict.UNEXPLAINED
     return Verdict.PARAMETER_ERROR if wrong else Verdict.NO_MISMATCH
+
+
+def explanation(nominal: Fit, final: Fit, held_out: Dataset) -> Ledger:
+    """Answer of the rule on all terms together."""
+    coarse = any(run.noise.coarse for run in (*final.data.runs, *held_out.runs))
+    measured = Remainder(
+        left=unexplained_share(nominal, final, held_out),
+        above=max(final.on(data).worst_ratio for data in (final.data, held_out) if data.runs),
+        open_inputs=coarse or not final.data.observability.closed_loop,
+        at_floor=final.at_floor,
+    )
+    return examine(EXPLAINED, measured, CRITERIA)
 
 
 def unexplained_share(nominal: Fit, final: Fit, held_out: Dataset) -> float:
@@ -72,79 +83,18 @@ def unexplained_share(nominal: Fit, final: Fit, held_out: Dataset) -> float:
 
 def explains_most(nominal: Fit, final: Fit, held_out: Dataset) -> bool:
     """True if the terms explain most of the mismatch, whatever is left above the noise."""
-    return bool(final.terms) and unexplained_share(nominal, final, held_out) <= MOST
+    return bool(final.terms) and unexplained_share(nominal, final, held_out) <= CRITERIA.most_left
 
 
-def names_stand(left: float, above: float) -> bool:
-    """True if findings are accepted.
-
-    `left` is the unexplained share of the energy above the floor, `above` the largest mean square of a channel over its
-    noise. False for values that are not a number.
-    """
-    return left <= MOST and (left <= _MUCH or above <= FLOOR or left * above**0.5 <= _FAR)
-
-
-def refit_matters(owner: Fit, nominal: Fit) -> bool:
+def refit_matters(given: Fit, nominal: Fit) -> bool:
     """True if evidence and a material share of energy support the refitted nominal parameters."""
     paid = nominal.hypothesis.x.size * float(np.log(nominal.rows))
-    return against(nominal, owner) - paid > NEEDED and owner.cost - nominal.cost > MATERIAL * nominal.rows
+    enough = against(nominal, given) - paid > CRITERIA.evidence
+    return enough and given.cost - nominal.cost > CRITERIA.material * nominal.rows
 
 
-# a, b, c, d. c and d: maximum likelihood on 167 findings of early development cases and 249 later ones (PROOF.md lists
-# the seeds), between the two. b and the ten: with them a term that explains nearly all beside a large remainder is
-# sure, and one of 5 % is not; on 51 findings of 60 sealed cases (seed 20261208, all right) the log likelihood is -1.25.
-OFFSET, LEFT, FACTOR, MARGIN = 4.5, 1.0, 0.8, 0.2
-_STRUCTURE = 10.0
-# Limits of the arguments. Without a clearly needed term the energy doubles; a gain of 1 % is as weak as none; a rival
-# at odds of exp(-500) is refuted whatever the model discrepancy.
-_DOUBLED, _LEAST = 1.0, 0.01
-_PLENTY = 1000.0
-
-
-def confidence(left: float, factor: float, margin: float) -> float:
-    """Probability that the effect of a finding is there, in [0, 1].
-
-    `left`: largest remaining rms of all channels and recordings in units of noise. `factor`: residual energy without
-    the term over that with it. `margin`: evidence against the best rival that is not equivalent (BIC difference).
-    """
-    if not math.isfinite(left):
-        return 0.0
-    little = max(math.log(_DOUBLED / max(factor - 1.0, _LEAST)), 0.0)
-    close = max(math.log(_PLENTY / (1.0 + min(max(margin, 0.0), _PLENTY))), 0.0)
-    unexplained = max(left**2 - FLOOR, 0.0) / max(left**2, FLOOR) / max(factor - 1.0, _LEAST)
-    score = OFFSET - LEFT * math.log(1.0 + _STRUCTURE * unexplained) - FACTOR * little - MARGIN * close
-    return 1.0 / (1.0 + math.exp(-score))
-
-
-def not_testable(found: Fit, asked: Collection[str] = tuple(BY_ID), margin: float = 1.0) -> tuple[str, ...]:
-    """Ids of the mechanisms in `asked` that the data of a fit cannot show, in the library's order.
-
-    `margin` multiplies the visibility that is needed: more than one for simulated recordings.
-    """
-    bench, hypothesis = found.bench, found.hypothesis.rebased
-    present = {term.effect for term in found.terms} | {entry.effect for entry in bench.mechanisms}
-    axis = axis_facts(bench, found.data.runs)
-    nuisance, _ = np.linalg.qr(found.jacobian[:, : hypothesis.nominal_count])
-    search = replace(found.estimator, fast=True)
-    unchanged = search.residuals(hypothesis).vector
-    enough = margin * max(NEEDED, MATERIAL * found.rows)
-
-    def visible(effect: str, variant: int) -> bool:
-        changed = hypothesis.with_term(Term(effect, variant, BY_ID[effect].typical_values(axis)))
-        change = search.residuals(changed).vector - unchanged
-        change -= nuisance @ (nuisance.T @ change)
-        return float(change @ change) > enough
-
-    wanted = [
-        mechanism
-        for mechanism in LIBRARY
-        if mechanism.id in asked and mechanism.id not in present and (bench.axis.turns or not mechanism.turning)
-    ]
-    jobs = [
-        (mechanism.id, number)
-        for mechanism in wanted
-        for number, variant in enumerate(mechanism.variants)
-        if observable(mechanism, variant, bench) and judged(mechanism.id, found.data.runs)
-    ]
-    shown = {effect for (effect, _), seen in zip(jobs, POOL.map(lambda job: visible(*job), jobs), strict=True) if seen}
-    return tuple(mechanism.id for mechanism in wanted if mechanism.id not in shown)
+def _better(change: Change | None, nominal: Fit, final: Fit, held_out: Dataset) -> Change | None:
+    """The change of the axis, unless the terms leave less."""
+    if change and final.terms and unexplained_share(nominal, final, held_out) < change.left:
+        return None
+    return change

@@ -8,7 +8,8 @@ import pytest
 from diagnosis_runs import RIG
 
 from hil.bench.bench_file import Bench, load_bench
-from hil.diagnosis.diagnose import Diagnosis, diagnose
+from hil.diagnosis.diagnose import diagnose
+from hil.diagnosis.diagnosis import Diagnosis
 from hil.diagnosis.preparation.law_check import check_law
 from hil.identification.compare import compare
 from hil.identification.measured import take

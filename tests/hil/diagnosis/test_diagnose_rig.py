@@ -13,7 +13,8 @@ import pytest
 from diagnosis_runs import rig
 
 from hil.bench.bench_file import load_bench
-from hil.diagnosis.diagnose import Diagnosis, diagnose
+from hil.diagnosis.diagnose import diagnose
+from hil.diagnosis.diagnosis import Diagnosis
 from hil.diagnosis.result import schema
 from hil.identification.measured import take
 from hil.recording.recording import read_recording

@@ -10,7 +10,8 @@ from diagnosis_runs import bench, evaluated, recorded
 from emps_windows import Push, assert_found, emps_recording, irregular, pushed, regular
 
 from hil.bench.bench_file import load_bench
-from hil.diagnosis.diagnose import Diagnosis, diagnose
+from hil.diagnosis.diagnose import diagnose
+from hil.diagnosis.diagnosis import Diagnosis
 from hil.diagnosis.preparation.split import split
 from hil.diagnosis.search.events import constant_inside
 from hil.diagnosis.verdict.event_windows import Seen, joined

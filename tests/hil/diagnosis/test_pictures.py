@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from diagnosis_runs import bench, dataset, evaluated, recorded
 
-from hil.diagnosis.diagnose import Diagnosis
+from hil.diagnosis.diagnosis import Diagnosis
 from hil.diagnosis.pictures.findings import finding_figure
 from hil.diagnosis.pictures.view import around
 from hil.diagnosis.result import Result, Unexplained, Verdict

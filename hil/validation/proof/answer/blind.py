@@ -101,7 +101,8 @@ def _code() -> dict[str, str]:
 def diagnose_case(case: Path, answers: Path) -> None:
     """Diagnose one case and write the answer to a folder of its name."""
     from hil.bench.bench_file import load_bench
-    from hil.diagnosis.diagnose import NEXT_EXPERIMENT, diagnose
+    from hil.diagnosis.diagnose import diagnose
+    from hil.diagnosis.experiment import NEXT_EXPERIMENT
     from hil.recording.recording import read_recording
 
     answer = answers / case.name

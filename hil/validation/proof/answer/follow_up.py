@@ -11,7 +11,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from hil.diagnosis.diagnose import NEXT_EXPERIMENT
+from hil.diagnosis.experiment import NEXT_EXPERIMENT
 from hil.errors import HilError
 from hil.motion.profile import load_profile
 from hil.motion.trajectory import plan

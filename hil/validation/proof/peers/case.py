@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from hil.bench.bench_file import Bench, load_bench
-from hil.diagnosis.preparation.preflight import prepare
+from hil.diagnosis.preparation.preflight import preflight
 from hil.diagnosis.result import Verdict
 from hil.diagnosis.search.initial_values import scene
 from hil.diagnosis.verdict.judge import refit_matters
@@ -58,7 +58,7 @@ def read_case(folder: Path) -> PeerCase:
     """Read a case folder and refit the nominal parameters. Raises InputError as the diagnosis does."""
     bench = load_bench(folder / "bench.yaml")
     names = (*_TRAIN, *_HELD_OUT)
-    runs = prepare([read_recording(folder / f"{name}.parquet") for name in names], bench)
+    runs = preflight([read_recording(folder / f"{name}.parquet") for name in names], bench).accepted()
     train, held_out = tuple(runs[: len(_TRAIN)]), tuple(runs[len(_TRAIN) :])
     nominal = fit_nominal_parameters(prepare_dataset(train, bench))
     return PeerCase(

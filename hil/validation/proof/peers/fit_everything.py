@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from hil.arrays import FloatArray
+from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.search.initial_values import StartPoint, starts
-from hil.diagnosis.search.next_term import MATERIAL
 from hil.diagnosis.search.score_test import Candidate, screen_library
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
@@ -41,7 +41,7 @@ def fit_everything(case: PeerCase, evaluations: int = EVALUATIONS) -> dict[str, 
     ]
     grown = dict(zip(significant, POOL.map(lambda index: _without(found, index), significant), strict=True))
     named = sorted(
-        (index for index in significant if grown[index] > MATERIAL * found.rows),
+        (index for index in significant if grown[index] > CRITERIA.material * found.rows),
         key=lambda index: -grown[index],
     )
     return case.answer([terms[index].effect for index in named])

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hil.arrays import FloatArray
-from hil.diagnosis.search.next_term import MATERIAL
+from hil.diagnosis.criteria import CRITERIA
 from hil.identification.measured import Measured
 from hil.validation.proof.peers.case import PeerCase
 from hil.validation.proof.peers.terms import MAKERS, Effects
@@ -108,7 +108,7 @@ def named(found: Sequence[tuple[Equation, Sequence[int]]]) -> list[str]:
         for effect in energies:
             energies[effect] = sum(energy for effects, energy in terms if effect in effects)
         best = max(energies, key=lambda effect: energies[effect])
-        if energies[best] < MATERIAL:
+        if energies[best] < CRITERIA.material:
             break
         names.append(best)
         terms = [(effects, energy) for effects, energy in terms if best not in effects]

@@ -17,7 +17,7 @@ from scipy.signal import correlate
 from scipy.stats import norm
 
 from hil.arrays import FloatArray
-from hil.diagnosis.search.next_term import MATERIAL
+from hil.diagnosis.criteria import CRITERIA
 from hil.identification.measured import Measured
 from hil.validation.proof.peers.case import PeerCase
 from hil.validation.proof.peers.regressors import Equation, equations
@@ -57,7 +57,7 @@ def _outside(equation: Equation, bound: float) -> list[tuple[float, str]]:
         products = memory * _autocorrelation(term)
         variance = max(float(products[0] + 2.0 * products[1:].sum()), 1.0) / error.size
         energy = correlation**2 * float(np.mean(error**2)) / equation.noise**2
-        if abs(correlation) > bound * variance**0.5 and energy > MATERIAL:
+        if abs(correlation) > bound * variance**0.5 and energy > CRITERIA.material:
             found.append((energy, (negative if correlation < 0.0 else positive)[0]))
     return found
 

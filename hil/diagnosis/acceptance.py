@@ -1,0 +1,271 @@
+"""What a mechanism must show before it is named: all constants of evidence, and the table of rules.
+
+Each rule is a pure function of measured quantities (`hil.diagnosis.ledger`). `promises` decides before a candidate is
+fitted; the rules are asked at six moments:
+
+    VALUES     on the fitted values of a candidate
+    ADDED      on the fit with one more term, against the fit without it; HARMLESS: and its channels
+    NEEDED     on each term, once a later one stands beside it
+    COMPARED   on another explanation of the same residual, against the named one
+    HELD_OUT   on each term of the final fit, by the recordings that nothing was fitted to
+    EXPLAINED  on all terms together
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from hil.diagnosis.criteria import CRITERIA, Criteria
+from hil.diagnosis.ledger import Answer, Rule
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from hil.diagnosis.search.addition import Addition, Harm
+    from hil.diagnosis.search.events import InsideWindows
+    from hil.diagnosis.search.forward_selection import Need
+    from hil.diagnosis.search.rivals import RivalFit
+    from hil.diagnosis.verdict.cross_validation import Ablation
+    from hil.diagnosis.verdict.judge import Remainder
+
+
+def _values(of: Addition, c: Criteria) -> Answer:
+    return of.valid, {}
+
+
+def promises(share: float, cost: float, rows: int, c: Criteria = CRITERIA) -> bool:
+    """True if a score, a share of the residual energy `cost` over so many rows, promises the evidence of a term.
+
+    Rao's score test: what a linear step explains bounds what a small effect can explain. Without it a mechanism is not
+    fitted.
+    """
+    enough = 1.0 - math.exp(-c.evidence / rows)  # share of white residuals whose removal gives the evidence of a term
+    return share > enough and share * cost > c.material * rows
+
+
+def _evidence(of: Addition | Need, c: Criteria) -> Answer:
+    return of.evidence >= c.evidence, {"evidence": of.evidence, "needed": c.evidence}
+
+
+def _material(of: Addition | Need, c: Criteria) -> Answer:
+    return of.gain >= c.material * of.rows, {"removed": of.gain / of.rows, "needed": c.material}
+
+
+def _worth(of: Addition, c: Criteria) -> Answer:
+    share = c.worth if of.beside < c.several else c.series
+    return of.gain >= share * of.excess, {"share": of.gain / (of.excess or 1.0), "needed": share}
+
+
+def _laps(of: Addition, c: Criteria) -> Answer:
+    left, before = of.unrepeated
+    return c.repeats * left <= before, {"ratio": left / before if before else 1.0}
+
+
+def _constant(of: Addition, c: Criteria) -> Answer | None:
+    seen = of.inside
+    if seen is None:
+        return None
+    return is_constant(seen, c), {"left": seen.left / (seen.before or 1.0)}
+
+
+def is_constant(seen: InsideWindows | None, c: Criteria = CRITERIA) -> bool:
+    """True if a constant force explains its windows nearly whole, or as well as the rest of their recordings."""
+    if seen is None:
+        return True
+    share = c.push if seen.one_push else c.form
+    return seen.left <= share * seen.before or seen.mean <= c.inside * max(seen.mean_outside, 1.0)
+
+
+def _channels(of: Addition | Ablation, c: Criteria) -> Answer:
+    worse = paying(of.harm, c)
+    return not worse, {"channels": ", ".join(sorted(worse))} if worse else {}
+
+
+def paying(channels: Mapping[str, Harm], c: Criteria = CRITERIA) -> set[str]:
+    """Channels above their noise with which a term pays for others.
+
+    Such a channel is worse in a recording than without the term and by the bench file, and loses more than a share of
+    what the term explains, or is worse than by the bench file at all.
+    """
+
+    def harmed(ratio: float, *others: float) -> bool:
+        return ratio > max(c.floor, c.worse * min(others))
+
+    return {
+        name
+        for name, one in channels.items()
+        if any(harmed(*ratios) for ratios in one.ratios)
+        and (-one.gain > c.paid * one.total or any(harmed(ratio, given) for ratio, _, given in one.ratios))
+    }
+
+
+def _not_behind(of: RivalFit, c: Criteria) -> Answer:
+    stands = not (of.evidence >= c.tied and of.more >= c.alike)
+    return stands, {"against": of.evidence, "more": of.more}
+
+
+def _no_objection(of: RivalFit, c: Criteria) -> Answer:
+    return not of.objection, {"objection": of.objection} if of.objection else {}
+
+
+def _predicts(of: Ablation, c: Criteria) -> Answer | None:
+    if of.gain is None:
+        return None
+    return of.gain >= (0.0 if of.acts else -c.tied), {"evidence": of.gain}
+
+
+def _repeats(of: Ablation, c: Criteria) -> Answer | None:
+    return None if of.laps is None else (of.laps >= c.repeats, {"ratio": of.laps})
+
+
+def _strength(of: Ablation, c: Criteria) -> Answer:
+    return of.clear, {}
+
+
+def _moves(of: Ablation, c: Criteria) -> Answer:
+    return not of.quiet, {}
+
+
+def _explains(of: Remainder, c: Criteria) -> Answer:
+    """Little is left; where inputs are open, or every channel is at its floor, most is explained."""
+    stands = (
+        names_stand(of.left, of.above, c)
+        or (of.open_inputs and of.left <= c.most_left)
+        or (of.at_floor and (of.left <= c.most_left or of.above <= c.floor))
+    )
+    return stands, {"left": of.left, "above": of.above}
+
+
+def names_stand(left: float, above: float, c: Criteria = CRITERIA) -> bool:
+    """True if terms that leave a share `left` of the energy above the floor explain a mismatch.
+
+    `above` is the largest mean square of a channel over its noise. False for values that are not a number.
+    """
+    return left <= c.most_left and (left <= c.little or above <= c.floor or left * above**0.5 <= c.far)
+
+
+_EVIDENCE: Rule[Addition | Need] = Rule(
+    "evidence",
+    "the evidence for it is {evidence} (BIC difference), needed {needed}",
+    "the evidence for it is {evidence} (BIC difference), needed {needed}",
+    "Schwarz 1978; Kass and Raftery 1995, with the price of a search over the library",
+    _evidence,
+)
+_MATERIAL: Rule[Addition | Need] = Rule(
+    "material energy",
+    "it removes {removed} noise² per row, needed {needed}",
+    "it removes {removed} noise² per row, needed {needed}",
+    "two correct simulations of one axis differ by less",
+    _material,
+)
+VALUES: tuple[Rule[Addition], ...] = (
+    Rule(
+        "values",
+        "its values are valid for the mechanism, and its block is observed",
+        "its values are not valid for the mechanism, or its block is not observed",
+        "the condition of each mechanism (`Mechanism.is_valid`): else its name does not apply",
+        _values,
+    ),
+)
+FORM: tuple[Rule[Addition], ...] = (
+    Rule(
+        "repeated laps",
+        "repeated laps are reproduced as well as without it",
+        "with it the repeated laps are reproduced worse",
+        "what repeats with the motion is no matter of chance",
+        _laps,
+    ),
+    Rule(
+        "constant force",
+        "the force is constant within its windows",
+        "the force is not constant within its windows",
+        "an external force; what depends on place or speed leaves its form inside",
+        _constant,
+    ),
+)
+ADDED: tuple[Rule[Addition], ...] = (
+    _EVIDENCE,
+    _MATERIAL,
+    Rule(
+        "share of the mismatch",
+        "it removes {share} of the energy above the noise, needed {needed}",
+        "it removes {share} of the energy above the noise, needed {needed}: such terms are a series of another effect",
+        "many small terms are a series expansion of one effect",
+        _worth,
+    ),
+    *FORM,
+)
+HARMLESS: tuple[Rule[Addition], ...] = (
+    Rule(
+        "channels",
+        "it makes no channel worse",
+        "with it the training recordings are reproduced worse in {channels}",
+        "a real effect pays with no channel for another",
+        _channels,
+    ),
+)
+NEEDED: tuple[Rule[Addition | Need], ...] = (_EVIDENCE, _MATERIAL)
+COMPARED: tuple[Rule[RivalFit], ...] = (
+    Rule(
+        "beside the named one",
+        "the recordings do not separate them: evidence against it {against}, {more} noise² per row more",
+        "the named one explains more: evidence against it {against}, {more} noise² per row more",
+        "a rival is refuted by very strong evidence and by more than the model discrepancy",
+        _not_behind,
+    ),
+    Rule(
+        "as the cause",
+        "nothing speaks against it as the cause",
+        "{objection}",
+        "the conditions of a term",
+        _no_objection,
+    ),
+)
+HELD_OUT: tuple[Rule[Ablation], ...] = (
+    Rule(
+        "held-out recordings",
+        "held-out recordings are reproduced no worse with it",
+        "it improves the fit to the training recordings, but worsens that to held-out recordings",
+        "prediction; motion without its effect does not refute it",
+        _predicts,
+    ),
+    Rule(
+        "repeated laps, held out",
+        "repeated laps are reproduced as well as without it",
+        "it improves the fit to the training recordings, but worsens that to repeated laps",
+        "what repeats with the motion is no matter of chance",
+        _repeats,
+    ),
+    Rule(
+        "strength",
+        "its strength is above its standard error",
+        "its strength is below its standard error",
+        "sandwich estimator of `standard_errors`",
+        _strength,
+    ),
+    Rule(
+        "motion without noise",
+        "it acts on the motion, not only on the noise of the sensors",
+        "it changes what the noise of the sensors does in the twin, and hardly the motion",
+        "`verdict.noise_free`",
+        _moves,
+    ),
+    Rule(
+        "channels, all terms",
+        "it makes no channel worse",
+        "with it the training recordings are reproduced worse in {channels}",
+        "a real effect pays with no channel for another",
+        _channels,
+    ),
+)
+EXPLAINED: tuple[Rule[Remainder], ...] = (
+    Rule(
+        "explains the mismatch",
+        "all terms leave {left} of the energy above the noise",
+        "all terms leave {left} of the energy above the noise; a channel is at {above} times its noise (mean square)",
+        "the true mechanism in another form leaves little",
+        _explains,
+    ),
+)
+RULES = (*VALUES, *ADDED, *HARMLESS, *COMPARED, *HELD_OUT, *EXPLAINED)

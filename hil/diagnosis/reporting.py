@@ -1,0 +1,127 @@
+"""Report a verdict: location, findings, figures, the next experiment, notes, and the statement."""
+
+import time
+
+import numpy as np
+
+from hil.bench.bench_file import Bench
+from hil.diagnosis.experiment import NEXT_EXPERIMENT, Experiment, separating, showing
+from hil.diagnosis.location.locate import locate, shown_in
+from hil.diagnosis.notes import at_bound, notes_on
+from hil.diagnosis.result import AT_FLOOR, Location, NextExperiment, Result, TimeBudget, Unexplained, Verdict
+from hil.diagnosis.stages import Judged, Progress, Reported
+from hil.diagnosis.statement import statement
+from hil.diagnosis.verdict.findings import corrections, diagnosed_bench, findings, form_of
+from hil.diagnosis.verdict.fit_table import closed_loop_held, fit_table
+from hil.diagnosis.verdict.judge import unexplained_share
+from hil.diagnosis.verdict.ledgers import ledgers
+from hil.diagnosis.verdict.refit import torque_left
+from hil.diagnosis.verdict.testability import not_testable
+from hil.diagnosis.wording import channel_names, where_in_short
+from hil.identification.estimator import Fit
+from hil.identification.noise_floor import FLOOR
+from hil.quantities import digits
+
+
+def report(judged: Judged, progress: Progress, begin_s: float, budget_s: float) -> Reported:
+    """Report a verdict; `begin_s` is the begin of the diagnosis on the monotonic clock, `budget_s` its time budget."""
+    searched, proof = judged.tested.searched, judged.tested.proof
+    prepared, nominal, final = searched.prepared, judged.nominal, judged.final
+    bench, held_out, law = prepared.bench, prepared.held_out, prepared.law
+
+    progress("locating")
+    location = _location(judged)
+    progress("comparing the fits with the noise floor")
+    table = fit_table(searched.given, nominal, final, held_out)
+    forms = form_of(searched, proof.ablations)
+    found = findings(searched, proof.final, proof.ablations, forms, held_out) if judged.has_findings else ()
+    progress("testing which mechanisms this motion can show")
+    hidden = not_testable(final if judged.has_findings else nominal)
+    progress("designing the next experiment")
+    experiment = _experiment(judged, hidden)
+    left = torque_left(searched.given, nominal, final, held_out)
+    result = Result(
+        verdict=judged.verdict,
+        statement="",
+        location=location,
+        missing=() if judged.is_part else found,
+        partial=found if judged.is_part else (),
+        change=judged.change.told if judged.change else None,
+        parameter_corrections=law.corrections | ({} if judged.keeps_bench else corrections(bench, final)),
+        not_identifiable=() if judged.keeps_bench else at_bound(final),
+        fit=table,
+        not_testable=hidden,
+        unexplained=_unexplained(judged, location),
+        torque_left=left,
+        next_experiment=NextExperiment(profile=NEXT_EXPERIMENT, separates=experiment.separates)
+        if experiment and experiment.profile
+        else None,
+        time_budget=TimeBudget(budget_s=budget_s, stopped_before=searched.stopped_at, not_tried=searched.not_tried)
+        if searched.stopped_at
+        else None,
+        considered=ledgers(judged),
+        notes=tuple(notes_on(judged, table, forms, left, experiment.note if experiment else "", budget_s)),
+        runtime_s=time.monotonic() - begin_s,
+    )
+    of_plant = statement(result.model_copy(update={"verdict": judged.of_plant}))
+    # settings of the controller come after what is found on the machine
+    sentences = (of_plant, law.advice) if found or judged.change else (law.advice, of_plant)
+    result = result.model_copy(update={"statement": " ".join(filter(None, sentences))})
+    return Reported(judged, result, _bench(judged), experiment)
+
+
+def _location(judged: Judged) -> Location | None:
+    """Where the mismatch is: that of the plant, or the control law if only this differs from the bench."""
+    held_out = judged.tested.searched.prepared.held_out
+    if judged.verdict is not judged.of_plant:
+        return Location(block="controller", element="settings of the control law", channels=())
+    if judged.verdict is Verdict.NO_MISMATCH:
+        return None
+    seen, goal = shown_in(judged.before, held_out), judged.nominal if judged.is_part else judged.final
+    return locate(seen, seen if goal is judged.before else goal)
+
+
+def _experiment(judged: Judged, hidden: tuple[str, ...]) -> Experiment | None:
+    """The next motion.
+
+    With findings only their rivals are in question; without, the cause may be a mechanism that the motion cannot show.
+    """
+    searched = judged.tested.searched
+    held_out = searched.prepared.held_out
+    if not closed_loop_held(judged.nominal, judged.final, held_out) or searched.stopped_at or judged.change:
+        return None
+    if judged.verdict is Verdict.MISSING_PHYSICS:
+        return separating(searched, judged.tested.proof.final, held_out)
+    return showing(judged.nominal, hidden, held_out)
+
+
+def _bench(judged: Judged) -> Bench:
+    """The bench with what was found; a control law that was set aside, and encoders, stay as they were in the file."""
+    prepared = judged.tested.searched.prepared
+    bench = prepared.bench if judged.keeps_bench else diagnosed_bench(prepared.bench, judged.final)
+    if not prepared.bench.law_known:
+        bench = bench.model_copy(update={"control": prepared.bench_file.control})
+    return bench.model_copy(update={"encoders": prepared.bench_file.encoders})
+
+
+def _unexplained(judged: Judged, location: Location | None) -> Unexplained:
+    """Unexplained share of the energy above the floor, and the channels above their noise."""
+    final, held_out, change = judged.final, judged.tested.searched.prepared.held_out, judged.change
+    none = judged.of_plant is Verdict.NO_MISMATCH
+    share = 0.0 if none else unexplained_share(judged.before, final, held_out)
+    fits: tuple[Fit, ...] = final.on(final.data), final.on(held_out)
+    if change:
+        share, fits = change.left, change.parts
+    worst: dict[str, float] = {}
+    names = channel_names(final.bench, final.data.runs[0])
+    for fit in fits:
+        for ratios in fit.noise_ratios:
+            for name, ratio in ratios.items():
+                worst[names[name]] = max(worst.get(names[name], 0.0), ratio)
+    above = {name: float(np.sqrt(ratio)) for name, ratio in worst.items() if ratio > FLOOR}
+    if not above:
+        return Unexplained(share=share, description=AT_FLOOR)
+    text = ", ".join(f"{name} at {digits(above[name])} × noise rms" for name in sorted(above, key=lambda n: -above[n]))
+    if judged.of_plant is Verdict.UNEXPLAINED and not final.terms and location is not None:
+        text += f"; {where_in_short(location, final.bench.axis.turns)}"
+    return Unexplained(share=share, description=f"Residuals above the noise, block by block: {text}.")

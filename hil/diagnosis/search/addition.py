@@ -1,0 +1,139 @@
+"""A fit with one more term than its base, and what the rules of `acceptance.ADDED` ask of it.
+
+Quantities are computed when a rule asks for them: each is a simulation or more.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+from hil.diagnosis.acceptance import ADDED, FORM, HARMLESS, VALUES
+from hil.diagnosis.criteria import CRITERIA
+from hil.diagnosis.ledger import Considered, Ledger, accepted, examine
+from hil.diagnosis.search.events import InsideWindows, inside_windows
+from hil.diagnosis.search.initial_values import claimable
+from hil.diagnosis.wording import channel_names
+from hil.identification.estimator import Fit
+from hil.identification.inference import against
+from hil.identification.noise_floor import unrepeated
+
+
+@dataclass(frozen=True)
+class Harm:
+    """One channel with a term: `ratios` are its mean squares over noise in each recording with the term, without it and
+    by the bench file; `gain` is the energy that the term removes from it, `total` that from all channels that gain.
+    """
+
+    ratios: tuple[tuple[float, float, float], ...]
+    gain: float
+    total: float
+
+
+@dataclass(frozen=True, eq=False)
+class Addition:
+    """A fit with one more term than its `base`.
+
+    `reference` is the nominal fit beside the loads of the base: what the terms before it are measured against. `given`
+    is the fit at the values of the bench file.
+    """
+
+    fit: Fit
+    base: Fit
+    reference: Fit
+    given: Fit
+
+    @cached_property
+    def evidence(self) -> float:
+        """Evidence for the term (BIC difference)."""
+        return against(self.fit, self.base)
+
+    @cached_property
+    def gain(self) -> float:
+        """Energy that the term removes, see `removed`."""
+        return removed(self.base, self.fit, self.reference)
+
+    @property
+    def rows(self) -> int:
+        """Number of residuals."""
+        return self.base.rows
+
+    @property
+    def excess(self) -> float:
+        """Energy of the base above the noise floor."""
+        return self.base.excess
+
+    @property
+    def beside(self) -> int:
+        """Number of terms of the base."""
+        return len(self.base.terms)
+
+    @cached_property
+    def unrepeated(self) -> tuple[float, float]:
+        """Energy of the differences between laps with the term and without it."""
+        return unrepeated(self.fit.hypothesis, self.fit.data), unrepeated(self.base.hypothesis, self.base.data)
+
+    @cached_property
+    def inside(self) -> InsideWindows | None:
+        """What a force leaves within its windows; None for a permanent term."""
+        return inside_windows(self.fit, self.base)
+
+    @cached_property
+    def harm(self) -> Mapping[str, Harm]:
+        """Each recorded channel with the term."""
+        return harm(self.fit, self.base, self.given)
+
+    @cached_property
+    def valid(self) -> bool:
+        """True if the term has values of its mechanism that the sensors can show."""
+        return claimable(self.fit.terms[-1], self.fit.bench, self.fit.data.runs)
+
+    @cached_property
+    def values(self) -> Ledger:
+        """Answer of the rule on the values of the term."""
+        return examine(VALUES, self, CRITERIA)
+
+    @cached_property
+    def conditions(self) -> Ledger:
+        """Answers of the rules on evidence, size and form."""
+        return examine(ADDED, self, CRITERIA)
+
+    @cached_property
+    def form(self) -> Ledger:
+        """Answers of the rules on its form alone: whether the term can be the cause, whatever it explains."""
+        return examine(FORM, self, CRITERIA)
+
+    @cached_property
+    def harmless(self) -> Ledger:
+        """Answer of the rule on channels that pay."""
+        return examine(HARMLESS, self, CRITERIA)
+
+    @property
+    def stands(self) -> bool:
+        """True if the term has evidence, is material, and can be the cause."""
+        return accepted(self.conditions)
+
+    @property
+    def considered(self) -> Considered:
+        """The candidate and its ledger; channels are in it where the choice has asked for them."""
+        return Considered.of(self.fit.terms, (*self.conditions, *self.__dict__.get("harmless", ())))
+
+
+def removed(without: Fit, fit: Fit, reference: Fit) -> float:
+    """Energy that a term removes, by channel, less the share that may be due to the form of the terms before it."""
+    parts = (one.residuals.parts.values() for one in (without, fit, reference))
+    return sum(
+        max(float(a @ a - b @ b) - CRITERIA.form * max(float(n @ n - a @ a), 0.0), 0.0)
+        for a, b, n in zip(*parts, strict=True)
+    )
+
+
+def harm(fit: Fit, without: Fit, given: Fit) -> dict[str, Harm]:
+    """Each recorded channel with the last term of a fit, without it, and by the bench file."""
+    names, gains = channel_names(fit.bench, fit.data.runs[0]), dict[str, float]()
+    ratios = dict[str, list[tuple[float, float, float]]]()
+    for run, *each in zip(fit.data.runs, fit.noise_ratios, without.noise_ratios, given.noise_ratios, strict=True):
+        for channel, ratio in each[0].items():
+            gains[channel] = gains.get(channel, 0.0) + run.motor[run.evaluated].size * (each[1][channel] - ratio)
+            ratios.setdefault(channel, []).append((ratio, each[1][channel], each[2][channel]))
+    total = sum(max(gain, 0.0) for gain in gains.values())
+    return {names[channel]: Harm(tuple(own), gains[channel], total) for channel, own in ratios.items()}

@@ -1,0 +1,14 @@
+"""Test the terms of a search on held-out recordings."""
+
+from hil.diagnosis.search.events import with_events_of
+from hil.diagnosis.stages import Searched, Tested
+from hil.diagnosis.verdict.cross_validation import cross_validate
+from hil.diagnosis.verdict.findings import renamed
+from hil.diagnosis.verdict.refit import reported_refit
+
+
+def test_on_held_out(searched: Searched) -> Tested:
+    """Test the terms of a search, with the events of the held-out recordings, and refit the nominal parameters."""
+    nominal, held_out = searched.nominal, searched.prepared.held_out
+    proof = cross_validate(nominal, with_events_of(held_out, renamed(searched.final)), held_out)
+    return Tested(searched, proof, reported_refit(nominal))

@@ -1,0 +1,53 @@
+"""Ledgers of all candidates that were fitted, with the answers of the verdict on those that were found."""
+
+import math
+from dataclasses import replace
+
+from hil.diagnosis.ledger import Considered, Entry, Ledger
+from hil.diagnosis.result import Candidate, RuleAnswer
+from hil.diagnosis.stages import Judged
+from hil.diagnosis.verdict.findings import key_in_search
+from hil.diagnosis.verdict.judge import explanation
+from hil.twin.library import BY_ID
+
+
+def ledgers(judged: Judged) -> tuple[Candidate, ...]:
+    """The candidates in the order in which they were fitted.
+
+    One that was found has the answers on held-out recordings too, and that on all terms together. A term that the
+    search did not add itself (another form, an event of a held-out recording) has these alone.
+    """
+    searched, proof = judged.tested.searched, judged.tested.proof
+    together: Ledger = ()
+    if proof.final.terms:
+        together = explanation(searched.nominal, proof.final, searched.prepared.held_out)
+    answers, more = {index: _candidate(one, False) for index, one in enumerate(searched.considered)}, list[Candidate]()
+    for ablation, kept in [*((one, True) for one in proof.ablations), *((one, False) for one in proof.dropped)]:
+        term, effect = ablation.term, key_in_search(searched, ablation.term)[0]
+        places = [index for index, one in enumerate(searched.considered) if one.effect == effect and one.accepted]
+        # the same torque may be named by a more frequent cause of it
+        before = replace(searched.considered[places[-1]], effect=term.effect) if places else None
+        found = before or Considered(term.effect, term.variant, (), ())
+        answer = _candidate(found.asked(ablation.ledger).asked(together if kept else ()), kept and judged.has_findings)
+        if places:
+            answers[places[-1]] = answer
+        else:
+            more.append(answer)
+    return (*answers.values(), *more)
+
+
+def _candidate(one: Considered, named: bool) -> Candidate:
+    return Candidate(
+        effect=one.effect,
+        variant=BY_ID[one.effect].forms[one.variant],
+        beside=one.beside,
+        named=named,
+        rules=tuple(map(_answer, one.ledger)),
+    )
+
+
+def _answer(entry: Entry) -> RuleAnswer:
+    figures = {
+        name: value if isinstance(value, str) or math.isfinite(value) else None for name, value in entry.figures.items()
+    }
+    return RuleAnswer(rule=entry.rule, accepted=entry.accepted, text=entry.text, figures=figures)

@@ -12,6 +12,8 @@ import pytest
 from numpy.typing import NDArray
 
 from hil.bench.bench_file import Bench, load_bench
+from hil.diagnosis.preparation.usable_law import LawCheck
+from hil.diagnosis.stages import Prepared, Searched
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Estimator, Fit
 from hil.identification.hypothesis import Hypothesis
@@ -125,3 +127,13 @@ def rows_of(run: Measured, rows: slice | NDArray[np.bool_]) -> Measured:
     return replace(
         run, **{name: value[rows] for name, value in arrays.items() if isinstance(value, np.ndarray) and value.size}
     )
+
+
+def prepared(train: Dataset, held_out: Dataset | None = None) -> Prepared:
+    """Data sets as a diagnosis prepares them, with the bench of the first as it stands in its file."""
+    return Prepared(train, held_out or train.over([]), train.bench, train.bench, LawCheck(train.bench))
+
+
+def searched(given: Fit, nominal: Fit, final: Fit, *found: Any) -> Searched:
+    """Result of a search on the data set of the final fit; `found`: rivals, and the need of each term."""
+    return Searched(prepared(final.data), given, nominal, final, *found)

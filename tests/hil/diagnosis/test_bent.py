@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis_runs import bench, evaluated, recorded
+from diagnosis_runs import bench, evaluated, prepared, recorded
 
 from hil.bench.bench_file import Bench, MechanismEntry, load_bench
 from hil.diagnosis.search import next_term
-from hil.diagnosis.search.forward_selection import explain
+from hil.diagnosis.search.forward_selection import search
 from hil.diagnosis.search.restart import from_owner, may_hide, unbent
 from hil.diagnosis.search.score_test import screen_library
 from hil.identification.dataset import prepare_dataset
@@ -50,7 +50,9 @@ def test_it_is_fitted_although_the_refit_leaves_next_to_nothing() -> None:
 def test_it_is_named_where_what_is_left_matters() -> None:
     owner, truth = stiff_owner()
     for terms in ((LOST,), ()):
-        found = explain(prepare_dataset([take(recorded(truth, *terms, torque_noise_n_m=NOISE_N_M), owner)], owner))
+        found = search(
+            prepared(prepare_dataset([take(recorded(truth, *terms, torque_noise_n_m=NOISE_N_M), owner)], owner))
+        )
         assert [term.effect for term in found.terms] == [term.effect for term in terms]
 
 
@@ -83,7 +85,7 @@ def test_where_a_screen_beside_the_refit_finds_nothing_the_owners_values_are_sea
     first = from_owner(base)[0]
     assert first.cost < 1.1 * base.rows < 0.1 * base.cost
     monkeypatch.setattr(next_term, "race", lambda base, candidates: [])
-    (spring,) = explain(prepare_dataset([run], owner)).terms
+    (spring,) = search(prepared(prepare_dataset([run], owner))).terms
     assert spring.effect == "spring_load"
     assert spring.values == pytest.approx(pulled.values, rel=0.02)
-    assert explain(prepare_dataset([plain], owner)).terms == ()
+    assert search(prepared(prepare_dataset([plain], owner))).terms == ()

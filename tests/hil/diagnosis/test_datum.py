@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from diagnosis_runs import bench, changed, dataset, recorded
 
-from hil.diagnosis.preparation.preflight import prepare
+from hil.diagnosis.preparation.preflight import preflight
 from hil.identification.compare import compare
 from hil.identification.dataset import FASTEST_OBSERVER_S
 from hil.identification.hypothesis import Hypothesis
@@ -22,7 +22,7 @@ def test_residuals_are_the_same_wherever_its_zero_lies(shift_m: float, terms: tu
     recording = recorded(OWNER, PLAY)
     shifted = changed(recording, table_position_m=recording["table_position_m"] + shift_m)
     hypothesis = Hypothesis(OWNER, terms)
-    data = (dataset(prepare([run], OWNER), OWNER) for run in (recording, shifted))
+    data = (dataset(preflight([run], OWNER).accepted(), OWNER) for run in (recording, shifted))
     known, moved = (hypothesis.residuals(one).vector for one in data)
     np.testing.assert_allclose(moved, known, atol=1e-3 * np.std(known))
 
@@ -48,7 +48,7 @@ def test_a_recording_may_begin_on_one_flank_of_a_gap(rest_s: float, shift_m: flo
     columns = {name: values[rows] for name, values in whole.columns.items()}
     columns["time_s"] = np.arange(rows.size) * whole.period_s
     columns["table_position_m"] = columns["table_position_m"] + shift_m
-    (run,) = prepare([changed(whole, **columns)], OWNER)
+    (run,) = preflight([changed(whole, **columns)], OWNER).accepted()
     table = Hypothesis(OWNER, (PLAY,)).blocks(run, FASTEST_OBSERVER_S)["table"][run.evaluated]
     assert np.sqrt(np.mean(table**2)) < 2.0 * run.noise.table_m
 
@@ -79,7 +79,7 @@ def test_where_the_loop_goes_by_the_table_the_motor_has_the_datum(shift_rad: flo
     assert owner.gains.position_from_table
     recording = recorded(owner, PLAY)
     shifted = changed(recording, motor_position_rad=recording["motor_position_rad"] + shift_rad)
-    data = dataset(prepare([recording, shifted], owner), owner)
+    data = dataset(preflight([recording, shifted], owner).accepted(), owner)
     known, moved = Hypothesis(owner, (PLAY,)).residuals(data, closed=True).channels
     for channel, noise in (("motor", 1e-6 / owner.axis.ratio_m_rad), ("table", 0.3e-6), ("torque", 0.015)):
         assert np.std(moved[channel] - known[channel]) < noise, channel

@@ -7,15 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from diagnosis_runs import bench, dataset, fitted, moves, recorded
+from diagnosis_runs import bench, dataset, fitted, moves, recorded, searched
 
 from hil.bench.bench_file import Bench
 from hil.bench.hardware import SetPointLimits
 from hil.diagnosis.candidate_motions import candidates, reach
 from hil.diagnosis.experiment import Experiment, separating, showing
-from hil.diagnosis.search.forward_selection import Explanation
 from hil.diagnosis.search.rivals import RivalFit
-from hil.diagnosis.verdict.judge import not_testable
+from hil.diagnosis.verdict.testability import not_testable
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
@@ -41,7 +40,7 @@ NONE = dataset([], OWNER)
 def designed(right: Fit, *others: Fit, tied: bool = False) -> Experiment:
     """The experiment for a fit and its rivals, as evidence on these recordings has them, or taken as tied."""
     rivals = [RivalFit.of(other, 0.0 if tied else against(right, other)) for other in others]
-    found = separating(Explanation(right, right, right, {right.terms[-1].key: rivals}), right, NONE)
+    found = separating(searched(right, right, right, {right.terms[-1].key: rivals}), right, NONE)
     assert found is not None
     return found
 
@@ -90,7 +89,7 @@ def test_a_cause_without_rivals_needs_no_experiment() -> None:
     play = Term("backlash", 0, (20e-6,))
     train = runs(ONE_WAY, play)
     right, nominal = fitted(Hypothesis(OWNER, (play,)), train), fitted(Hypothesis(OWNER), train)
-    assert separating(Explanation(nominal, nominal, right), right, NONE) is None
+    assert separating(searched(nominal, nominal, right), right, NONE) is None
 
 
 def test_what_a_motion_hides_is_shown_by_another() -> None:

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import diagnosis_runs
 import pytest
-from diagnosis_runs import bench, dataset, recorded
+from diagnosis_runs import bench, dataset, recorded, searched
 
 from hil.bench.bench_file import Bench, MechanismEntry
-from hil.diagnosis.search.forward_selection import Explanation
 from hil.diagnosis.search.rivals import RivalFit
 from hil.diagnosis.search.score_test import screen_library
 from hil.diagnosis.verdict.cross_validation import cross_validate
@@ -34,9 +33,9 @@ def test_friction_that_differs_with_speed_is_no_constant_load() -> None:
     truth, load = Term("asymmetric_friction", 1, (0.15,)), Term("constant_load", 0, (0.1,))
     train, held_out = runs(truth), runs(truth, seed=2)
     plain, right, rival = fitted(train), fitted(train, truth), fitted(train, load)
-    explanation = Explanation(plain, plain, right, {truth.key: [RivalFit.of(rival, 500.0)]}, {truth.key: 900.0})
+    search = searched(plain, plain, right, {truth.key: [RivalFit.of(rival, 500.0)]}, {truth.key: 900.0})
     final = renamed(right)
-    (found,) = findings(explanation, final, cross_validate(plain, final, held_out).ablations, {}, held_out)
+    (found,) = findings(search, final, cross_validate(plain, final, held_out).ablations, {}, held_out)
     assert (found.effect, found.variant, found.equivalents) == ("asymmetric_friction", "with speed", ())
     assert [other.effect for other in found.rivals] == ["constant_load"]
     value = found.parameters["offset_torque_n_m"]
@@ -76,9 +75,9 @@ def test_a_mechanism_is_offered_again_at_another_order() -> None:
 def test_two_of_a_name_are_two_findings_with_two_entries() -> None:
     train, held_out = runs(SIX, FIFTEEN), runs(SIX, FIFTEEN, seed=2)
     plain, right = fitted(train), fitted(train, SIX, FIFTEEN)
-    explanation = Explanation(plain, plain, right, {}, {SIX.key: 900.0, FIFTEEN.key: 800.0})
+    search = searched(plain, plain, right, {}, {SIX.key: 900.0, FIFTEEN.key: 800.0})
     proof = cross_validate(plain, right, held_out)
-    found = findings(explanation, proof.final, proof.ablations, {}, held_out)
+    found = findings(search, proof.final, proof.ablations, {}, held_out)
     assert [finding.effect for finding in found] == ["cogging_torque", "cogging_torque"]
     orders = [finding.parameters["cycles_per_rev"].value for finding in found]
     assert orders == pytest.approx([6.0, 15.0], abs=0.02)

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import pytest
-from diagnosis_runs import bench, dataset, fitted, recorded
+from diagnosis_runs import bench, dataset, fitted, recorded, searched
 
+from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.result import Finding
-from hil.diagnosis.search.forward_selection import Explanation
 from hil.diagnosis.search.rivals import RivalFit
 from hil.diagnosis.verdict.cross_validation import CrossValidation, cross_validate
-from hil.diagnosis.verdict.findings import OF_ITS_FORM, diagnosed_bench, findings, form_of
+from hil.diagnosis.verdict.findings import diagnosed_bench, findings, form_of
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.inference import standard_errors
 from hil.identification.measured import take
@@ -28,7 +28,7 @@ def drag(share: float, variant: int = 0) -> Term:
     return Term("nonlinear_viscous_friction", variant, (share * COULOMB / 100.0**2,))
 
 
-def judged(
+def diagnosed(
     terms: Sequence[Term], rivals: Mapping[Key, Term] | None = None
 ) -> tuple[CrossValidation, dict[int, int], tuple[Finding, ...]]:
     """Findings on recordings of these terms with these terms fitted, and with tied rivals of a term."""
@@ -44,14 +44,14 @@ def judged(
         key: [RivalFit.of(fitted(Hypothesis(OWNER, (rival,)), train, evaluations=1), 0.0)]
         for key, rival in (rivals or {}).items()
     }
-    explanation = Explanation(plain, plain, right, tied, {term.key: 900.0 for term in terms})
-    forms = form_of(explanation, proof.ablations)
-    return proof, forms, findings(explanation, proof.final, proof.ablations, forms, held_out)
+    search = searched(plain, plain, right, tied, {term.key: 900.0 for term in terms})
+    forms = form_of(search, proof.ablations)
+    return proof, forms, findings(search, proof.final, proof.ablations, forms, held_out)
 
 
 @pytest.mark.parametrize("terms", [(FALLING, drag(0.02)), (drag(0.02), FALLING)])
 def test_a_little_drag_is_the_form_of_a_falling_curve(terms: tuple[Term, ...]) -> None:
-    proof, forms, found = judged(terms)
+    proof, forms, found = diagnosed(terms)
     falling, little = terms.index(FALLING), 1 - terms.index(FALLING)
     assert forms == {little: falling}
     assert proof.ablations[little].shown, "it does help: that is not why it is no cause"
@@ -70,7 +70,7 @@ def test_a_little_drag_is_the_form_of_a_falling_curve(terms: tuple[Term, ...]) -
 
 def test_a_drag_that_may_be_something_else_is_told() -> None:
     load = Term("torque_constant_saturation", 0, (0.01,))
-    _, forms, found = judged((FALLING, drag(0.02)), {drag(0.02).key: load})
+    _, forms, found = diagnosed((FALLING, drag(0.02)), {drag(0.02).key: load})
     assert forms == {}
     assert [finding.equivalents for finding in found if finding.effect == "nonlinear_viscous_friction"] == [
         ("torque_constant_saturation",)
@@ -78,9 +78,9 @@ def test_a_drag_that_may_be_something_else_is_told() -> None:
 
 
 def test_much_drag_is_a_cause_of_its_own() -> None:
-    proof, forms, found = judged((FALLING, drag(0.5)))
+    proof, forms, found = diagnosed((FALLING, drag(0.5)))
     smaller, larger = sorted(ablation.train - 1.0 for ablation in proof.ablations)
-    assert smaller > OF_ITS_FORM * larger
+    assert smaller > CRITERIA.part_of_form * larger
     assert forms == {}
     assert sorted(finding.effect for finding in found) == ["nonlinear_viscous_friction", "stribeck_friction"]
     assert not any(finding.form for finding in found)
@@ -96,8 +96,8 @@ def test_much_drag_is_a_cause_of_its_own() -> None:
     ids=["cogging", "thinning", "low speed alone"],
 )
 def test_nothing_else_is_a_form_however_little_it_takes(terms: tuple[Term, ...]) -> None:
-    proof, forms, found = judged(terms)
+    proof, forms, found = diagnosed(terms)
     smaller, larger = sorted(ablation.train - 1.0 for ablation in proof.ablations)
-    assert smaller < OF_ITS_FORM * larger
+    assert smaller < CRITERIA.part_of_form * larger
     assert forms == {}
     assert len(found) == 2

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from diagnosis_runs import bench, changed, dataset, evaluated, fitted, recorded, rows_of
+from diagnosis_runs import bench, changed, dataset, evaluated, fitted, recorded, rows_of, searched
 
 from hil.bench.bench_file import Bench
+from hil.diagnosis.acceptance import names_stand
 from hil.diagnosis.result import Verdict
-from hil.diagnosis.search.forward_selection import Explanation
 from hil.diagnosis.search.rivals import RivalFit
 from hil.diagnosis.verdict.cross_validation import cross_validate, explained_share
 from hil.diagnosis.verdict.findings import diagnosed_bench, findings, renamed
-from hil.diagnosis.verdict.judge import judge, names_stand, not_testable
+from hil.diagnosis.verdict.judge import verdict_on_plant
+from hil.diagnosis.verdict.testability import not_testable
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
@@ -42,7 +43,7 @@ def believed(found: Dataset, *terms: Term, **axis: float) -> Fit:
 def test_a_twin_at_the_noise_has_no_mismatch() -> None:
     found = runs()
     right = believed(found)
-    assert judge(right, right, right, runs(seed=2)) is Verdict.NO_MISMATCH
+    assert verdict_on_plant(right, right, right, runs(seed=2)) is Verdict.NO_MISMATCH
 
 
 @pytest.mark.parametrize(("damping", "noise_rad"), [(0.03, 1e-4), (0.01, 2e-4), (0.005, 2e-4)])
@@ -79,35 +80,35 @@ def test_counts_of_the_table_encoder_pull_at_a_resting_motor_and_are_no_physics(
 def test_a_trifle_is_no_parameter_error() -> None:
     found = runs()
     almost = believed(found, coulomb_torque_n_m=1.1002)
-    assert judge(almost, believed(found), believed(found), NONE) is Verdict.NO_MISMATCH
+    assert verdict_on_plant(almost, believed(found), believed(found), NONE) is Verdict.NO_MISMATCH
 
 
 def test_wrong_parameters_are_a_parameter_error() -> None:
     found = runs(coulomb_torque_n_m=1.4)
     wrong, right = believed(found), believed(found, coulomb_torque_n_m=1.4)
-    assert judge(wrong, right, right, runs(seed=2, coulomb_torque_n_m=1.4)) is Verdict.PARAMETER_ERROR
+    assert verdict_on_plant(wrong, right, right, runs(seed=2, coulomb_torque_n_m=1.4)) is Verdict.PARAMETER_ERROR
 
 
 def test_a_term_that_explains_is_missing_physics() -> None:
     found = runs(LOAD)
     plain = believed(found)
-    assert judge(plain, plain, believed(found, LOAD), runs(LOAD, seed=2)) is Verdict.MISSING_PHYSICS
+    assert verdict_on_plant(plain, plain, believed(found, LOAD), runs(LOAD, seed=2)) is Verdict.MISSING_PHYSICS
 
 
 def test_a_mismatch_without_a_term_or_with_a_poor_one_is_unexplained() -> None:
     found, held_out = runs(PLAY, LOAD), runs(PLAY, LOAD, seed=2)
     plain = believed(found)
-    assert judge(plain, plain, plain, held_out) is Verdict.UNEXPLAINED
+    assert verdict_on_plant(plain, plain, plain, held_out) is Verdict.UNEXPLAINED
     poor = believed(found, Term("constant_load", 0, (0.02,)))
     assert explained_share(plain.on(held_out), poor.on(held_out)) < 0.5
-    assert judge(plain, plain, poor, held_out) is Verdict.UNEXPLAINED
+    assert verdict_on_plant(plain, plain, poor, held_out) is Verdict.UNEXPLAINED
 
 
 def test_a_name_that_is_not_believed_beside_a_twin_at_the_noise_is_no_mismatch() -> None:
     """A term may reduce one channel and increase another: if all are at the noise without it, it is not reported."""
     found = runs()
     plain, made_up = believed(found), believed(found, LOAD)
-    assert judge(plain, plain, made_up, runs(seed=2)) is Verdict.NO_MISMATCH
+    assert verdict_on_plant(plain, plain, made_up, runs(seed=2)) is Verdict.NO_MISMATCH
 
 
 @pytest.mark.parametrize(
@@ -147,9 +148,9 @@ def test_what_makes_held_out_recordings_worse_than_a_refit_is_dropped_and_has_no
     nominal, found = fit_nominal_parameters(train), believed(train, term)
     proof = cross_validate(nominal, found, held_out)
     assert [ablation.term for ablation in proof.dropped] == [term]
-    assert judge(nominal, nominal, proof.final, held_out) is Verdict.UNEXPLAINED
+    assert verdict_on_plant(nominal, nominal, proof.final, held_out) is Verdict.UNEXPLAINED
     # nor is it believed where it was not dropped
-    assert judge(nominal, nominal, found, held_out) is Verdict.UNEXPLAINED
+    assert verdict_on_plant(nominal, nominal, found, held_out) is Verdict.UNEXPLAINED
 
 
 def test_a_term_that_speaks_of_one_lap_only_is_dropped_unless_it_is_seen_there() -> None:
@@ -173,12 +174,10 @@ def test_a_term_that_held_out_recordings_do_not_show_may_stay() -> None:
 def test_a_constant_load_is_called_by_its_commoner_name_and_both_are_listed() -> None:
     train = runs(LOAD)
     plain, loaded = believed(train), fitted(Hypothesis(OWNER, (LOAD,)), train, evaluations=8)
-    explanation = Explanation(
-        plain, plain, loaded, {LOAD.key: [RivalFit.of(plain_with(train), 500.0)]}, {LOAD.key: 900.0}
-    )
+    search = searched(plain, plain, loaded, {LOAD.key: [RivalFit.of(plain_with(train), 500.0)]}, {LOAD.key: 900.0})
     final = renamed(loaded)
     proof = cross_validate(plain, final, runs(LOAD, seed=2))
-    (found,) = findings(explanation, proof.final, proof.ablations, {}, runs(LOAD, seed=2))
+    (found,) = findings(search, proof.final, proof.ablations, {}, runs(LOAD, seed=2))
     assert found.effect == "asymmetric_friction"
     assert found.equivalents == ("constant_load",)
     assert [rival.effect for rival in found.rivals] == ["spring_load"]

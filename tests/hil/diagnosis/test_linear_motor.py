@@ -10,7 +10,7 @@ import pytest
 
 from hil.bench.bench_file import Bench
 from hil.diagnosis.diagnose import diagnose
-from hil.diagnosis.preparation.preflight import prepare
+from hil.diagnosis.preparation.preflight import preflight
 from hil.diagnosis.preparation.split import held_out_note, split
 from hil.errors import InputError
 from hil.identification.completion import reduced
@@ -90,7 +90,7 @@ def test_a_slow_motion_does_not_make_the_axis_heavier() -> None:
     """Its inertia is a hundredth of the cogging: a heavier twin only answers less to the force it lacks."""
     slow = moved([(0.15, 0.06)])
     bench = reduced(BENCH, [slow])
-    found = fit_nominal_parameters(prepare_dataset(prepare([slow], bench), bench))
+    found = fit_nominal_parameters(prepare_dataset(preflight([slow], bench).accepted(), bench))
     owner = found.estimator.evaluate(found.hypothesis.given)
     assert found.missed_torque <= 1.01 * owner.missed_torque
     assert found.bench.axis.physics().chain.inertia_kg_m2.sum() == pytest.approx(11.5)
@@ -130,7 +130,7 @@ def test_training_moves_both_ways() -> None:
 def test_friction_that_varies_is_no_wrong_sign() -> None:
     """On a slow move the force follows the cogging, not the acceleration; of a wrong sign friction is negative."""
     slow = moved([(0.15, 0.06)])
-    prepare([slow], BENCH)
+    preflight([slow], BENCH).accepted()
     turned = replace(slow, columns=slow.columns | {"force_n": -slow.columns["force_n"]})
     with pytest.raises(InputError, match="wrong sign"):
-        prepare([turned], BENCH)
+        preflight([turned], BENCH).accepted()

@@ -5,16 +5,17 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from diagnosis_runs import bench, dataset, evaluated, recorded
+from diagnosis_runs import bench, dataset, evaluated, recorded, searched
 
 from hil.diagnosis.diagnosis import Diagnosis
 from hil.diagnosis.pictures.findings import finding_figure
 from hil.diagnosis.pictures.view import around
 from hil.diagnosis.result import Result, Unexplained, Verdict
-from hil.diagnosis.search.forward_selection import Explanation
 from hil.diagnosis.search.initial_values import axis_facts
+from hil.diagnosis.stages import Judged, Reported, Tested
 from hil.diagnosis.verdict.cross_validation import CrossValidation
 from hil.figures.drawing import save
+from hil.identification.honest_refit import Refit
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.measured import take
 from hil.identification.terms import Term
@@ -37,9 +38,12 @@ def diagnosis_of(effect: str, times: float = 3.0) -> Diagnosis:
     runs = [take(recorded(OWNER, term), OWNER)]
     data = dataset(runs, OWNER)
     plain, right = evaluated(Hypothesis(OWNER), data), evaluated(Hypothesis(OWNER, (term,)), data)
-    explanation, proof = Explanation(plain, plain, right), CrossValidation(right, (), ())
+    proof = CrossValidation(right, (), ())
+    tested = Tested(searched(plain, plain, right), proof, Refit(plain, ""))
+    verdict = Verdict.MISSING_PHYSICS
+    judged = Judged(tested, verdict, verdict, None, False, plain, plain, right)
     result = Result(
-        verdict=Verdict.MISSING_PHYSICS,
+        verdict=verdict,
         statement="",
         location=None,
         missing=(),
@@ -49,7 +53,7 @@ def diagnosis_of(effect: str, times: float = 3.0) -> Diagnosis:
         unexplained=Unexplained(share=0.0, description=""),
         runtime_s=0.0,
     )
-    return Diagnosis(result, OWNER, OWNER, data, dataset([], OWNER), explanation, proof, right)
+    return Diagnosis(Reported(judged, result, OWNER, None))
 
 
 def test_only_evaluated_rows_are_enlarged() -> None:

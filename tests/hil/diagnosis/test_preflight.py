@@ -9,7 +9,7 @@ import pytest
 from diagnosis_runs import bench, changed, recorded
 
 from hil.bench.bench_file import load_bench
-from hil.diagnosis.preparation.preflight import _factor_between, prepare, regress
+from hil.diagnosis.preparation.preflight import _factor_between, preflight, regress
 from hil.errors import InputError
 from hil.identification.terms import Term
 from hil.recording.recording import Recording
@@ -24,7 +24,7 @@ def run() -> Recording:
 
 def refused(recording: Recording) -> str:
     with pytest.raises(InputError) as error:
-        prepare([recording], OWNER)
+        preflight([recording], OWNER).accepted()
     return str(error.value)
 
 
@@ -46,11 +46,11 @@ def part(recording: Recording, rows: slice) -> Recording:
 def test_physics_is_no_reason_to_refuse(terms: tuple[Term, ...]) -> None:
     """With parameters wrong by 30 % beside it."""
     truth = bench(motor_mass_kg=240.0, table_mass_kg=270.0, coulomb_torque_n_m=1.5)
-    assert len(prepare([recorded(truth, *terms)], OWNER)) == 1
+    assert len(preflight([recorded(truth, *terms)], OWNER).accepted()) == 1
 
 
 def test_the_regression_finds_inertia_and_friction(run: Recording) -> None:
-    found = regress(prepare([run], OWNER)[0])
+    found = regress(preflight([run], OWNER).accepted()[0])
     assert found is not None
     (inertia, viscous, coulomb, offset), _ = found
     axis = OWNER.axis
@@ -72,7 +72,7 @@ def test_motion_in_one_direction_tells_no_friction_and_no_unit(run: Recording) -
         "torque_n_m": 8.0 + run["torque_n_m"] - run["torque_command_n_m"],
         "torque_command_n_m": None,
     }
-    prepared = prepare([changed(run, **columns)], OWNER)[0]
+    prepared = preflight([changed(run, **columns)], OWNER).accepted()[0]
     found = regress(prepared)
     assert found is not None
     assert found[1][2] == math.inf
@@ -84,7 +84,7 @@ def test_too_short(run: Recording) -> None:
 
 def test_no_recording() -> None:
     with pytest.raises(InputError, match="given no recording"):
-        prepare([], OWNER)
+        preflight([], OWNER).accepted()
 
 
 def test_without_excitation(run: Recording) -> None:
@@ -174,7 +174,7 @@ def test_all_reasons_are_given_at_once(run: Recording) -> None:
 
 def test_a_linear_axis_is_not_for_a_rotary_bench(run: Recording) -> None:
     with pytest.raises(InputError, match="give the bench of this axis"):
-        prepare([run], load_bench("emps"))
+        preflight([run], load_bench("emps")).accepted()
 
 
 def test_an_axis_that_lags_on_short_strokes_is_not_taken_for_another_unit() -> None:

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hil.diagnosis.result import SCHEMA_FILE, Result, schema
-from hil.diagnosis.verdict.judge import confidence
+from hil.diagnosis.verdict.confidence import confidence
 
 KEYS = {
     "schema_version",

@@ -11,8 +11,11 @@ import pytest
 from diagnosis_runs import bench, dataset, fitted, recorded
 
 from hil.bench.bench_file import Bench
+from hil.channels import AxisKind
 from hil.diagnosis.diagnose import diagnose
-from hil.diagnosis.search import next_term, rivals
+from hil.diagnosis.search import rivals
+from hil.diagnosis.search.addition import Addition
+from hil.diagnosis.search.next_term import Round, first_standing
 from hil.diagnosis.search.rivals import RivalFit, chosen
 from hil.diagnosis.verdict.findings import rival_in_words
 from hil.identification.hypothesis import Hypothesis
@@ -88,41 +91,47 @@ def test_evidence_is_on_the_side_of_the_fit_with_less_cost() -> None:
 def test_what_explains_more_is_named_unless_there_is_an_objection(monkeypatch: pytest.MonkeyPatch) -> None:
     data = dataset([take(recorded(OWNER, LOAD), OWNER)], OWNER)
     base = fitted(Hypothesis(OWNER), data, evaluations=4)
-    right, wrong = (fitted(Hypothesis(OWNER, (term,)), data, evaluations=8) for term in (LOAD, OTHER))
-    named, others = chosen(wrong, [right, wrong], base, base, base)
-    assert named.terms[-1].effect == LOAD.effect
-    assert [one.terms[-1].effect for one in others] == [OTHER.effect]
-    assert others[0].evidence > 0.0
-    assert not others[0].tied
+    fits = [fitted(Hypothesis(OWNER, (term,)), data, evaluations=8) for term in (LOAD, OTHER)]
+    search = Round(base, base, base)
+    right, wrong = map(search.addition, fits)
+    choice = chosen(wrong, [right, wrong], search)
+    assert choice.named.fit.terms[-1].effect == LOAD.effect
+    (rival,) = choice.rivals
+    assert rival.terms[-1].effect == OTHER.effect
+    assert rival.evidence > 0.0
+    assert not rival.tied
+    assert [(one.effect, one.accepted) for one in choice.considered] == [(LOAD.effect, True), (OTHER.effect, False)]
 
-    monkeypatch.setattr(rivals, "worthwhile", lambda found, *_: found[-1])
-    monkeypatch.setattr(rivals, "objection", lambda found, *_: "it is excluded" if found.terms[-1] != OTHER else "")
-    named, others = chosen(wrong, [right, wrong], base, base, base)
-    assert named.terms[-1].effect == OTHER.effect
-    assert others[0].evidence < 0.0
-    assert others[0].objection == "it is excluded"
-    assert not others[0].tied
+    monkeypatch.setattr(rivals, "first_standing", lambda additions: additions[-1])
+    monkeypatch.setattr(
+        rivals, "objection", lambda one, *_: "it is excluded" if one.fit.terms[-1].effect != OTHER.effect else ""
+    )
+    choice = chosen(wrong, [right, wrong], search)
+    assert choice.named.fit.terms[-1].effect == OTHER.effect
+    (rival,) = choice.rivals
+    assert rival.evidence < 0.0
+    assert rival.objection == "it is excluded"
+    assert not rival.tied
+    assert choice.considered[1].ledger[-1].text == "it is excluded"
 
 
 def explained(cost: float, motor: float, table: float) -> Any:
     """Stand-in for a fit: its cost, and the mean squares of motor and table residuals over their noise."""
-    run = SimpleNamespace(motor=np.zeros(1000), evaluated=slice(None))
+    run = SimpleNamespace(motor=np.zeros(1000), evaluated=slice(None), kind=AxisKind.ROTARY)
     data = SimpleNamespace(runs=(run,))
-    return SimpleNamespace(
-        cost=cost, rows=2000, excess=0.0, terms=(), data=data, noise_ratios=({"motor": motor, "table": table},)
-    )
+    ratios = ({"motor": motor, "table": table},)
+    return SimpleNamespace(cost=cost, rows=2000, excess=0.0, terms=(), data=data, noise_ratios=ratios, bench=OWNER)
 
 
 def test_a_little_harm_does_not_set_aside_what_explains_nearly_all(monkeypatch: pytest.MonkeyPatch) -> None:
     """An eccentric pulley explained nine tenths of what play left, and a third more remained in the motor."""
-    monkeypatch.setattr(next_term, "against", lambda better, worse: 1000.0)
-    monkeypatch.setattr(next_term, "gain", lambda without, found, nominal: 1e6)
-    monkeypatch.setattr(next_term, "ill_formed", lambda found, base: "")
-    base, owner = explained(5e5, 12.0, 1000.0), explained(6e5, 16.0, 1100.0)
-    most, play = explained(4e4, 16.0, 75.0), explained(3e5, 6.0, 60.0)
-    assert next_term.worthwhile([most, play], base, base, owner) is most
-    below = explained(4e4, 25.0, 75.0)  # worse than by the bench file
-    assert next_term.worthwhile([below, play], base, base, owner) is play
+    for name, value in {"evidence": 1000.0, "gain": 1e6, "unrepeated": (0.0, 0.0), "inside": None}.items():
+        monkeypatch.setattr(Addition, name, value)
+    search = Round(base := explained(5e5, 12.0, 1000.0), base, explained(6e5, 16.0, 1100.0))
+    most, play = (search.addition(fit) for fit in (explained(4e4, 16.0, 75.0), explained(3e5, 6.0, 60.0)))
+    assert first_standing([most, play]) is most
+    below = search.addition(explained(4e4, 25.0, 75.0))  # worse than by the bench file
+    assert first_standing([below, play]) is play
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from diagnosis_runs import bench, dataset, recorded
 
 from hil.bench.bench_file import load_bench
 from hil.diagnosis.diagnose import diagnose
-from hil.diagnosis.preparation.preflight import prepare
+from hil.diagnosis.preparation.preflight import preflight
 from hil.diagnosis.search.score_test import Candidate
 from hil.diagnosis.search.successive_halving import _Race, _soft, owner_points
 from hil.identification.coordinates import CHATTER_STEP, LAST_EDGE_STEP_S
@@ -84,7 +84,7 @@ def test_play_on_a_light_nut_beside_wrong_springs() -> None:
 def test_a_start_is_compared_beside_the_parameters_that_the_mismatch_has_bent() -> None:
     """Friction that falls as the axis warms up bends the fitted friction: beside it a start at the truth costs more."""
     truth, drift = bench(), Term("friction_drift", 0, (-0.5, 1.5))
-    data = prepare_dataset(prepare([recorded(truth, drift, times=2)], truth), truth)
+    data = prepare_dataset(preflight([recorded(truth, drift, times=2)], truth).accepted(), truth)
     base = fit_nominal_parameters(data)
     weak = Term("friction_drift", 0, (0.01, 1.5))
     contest = _Race(base, [Candidate(drift, 0.5, (weak,))])

@@ -14,9 +14,9 @@ from scipy.interpolate import CubicSpline
 from hil.bench.bench_file import Bench, load_bench
 from hil.bench.control_section import UnknownControl
 from hil.diagnosis.diagnose import diagnose
-from hil.diagnosis.preparation.prepare import prepare_diagnosis
+from hil.diagnosis.preparation.prepare import prepare
 from hil.diagnosis.result import Result
-from hil.diagnosis.search.next_term import next_term
+from hil.diagnosis.search.next_term import Round, next_term
 from hil.diagnosis.search.score_test import Candidate
 from hil.errors import InputError
 from hil.identification.compare import compare
@@ -146,8 +146,9 @@ def test_the_noise_of_a_sampled_torque_is_no_evidence() -> None:
     """An axis without any effect whose torque was only measured: a delay of half a row would average its noise."""
     recording = changed(recorded(KNOWN, times=2, torque_noise_n_m=0.05), torque_command_n_m=None)
     recording = replace(recording, metadata={**recording.metadata, "source": "log.csv"})
-    found = fit_nominal_parameters(prepare_diagnosis([recording], [], OWNER).train)
+    found = fit_nominal_parameters(prepare([recording], [], OWNER).train)
     delay_s = found.hypothesis.values[found.hypothesis.nominal.index("torque_delay_s")]
     assert abs(delay_s) < 0.1 * recording.period_s
     candidates = [Candidate(COGGING, 0.9)]
-    assert next_term(found, found, found, candidates, print) == ([], None)
+    additions = next_term(Round(found, found, found), candidates, print)
+    assert (additions.fits, additions.best) == ([], None)

@@ -13,7 +13,7 @@ import hil
 from hil.bench.bench_file import load_bench
 from hil.commands.compare import compare as compare_command
 from hil.commands.identify import identify
-from hil.diagnosis.preparation.prepare import prepare_diagnosis
+from hil.diagnosis.preparation.prepare import prepare
 from hil.diagnosis.preparation.usable_parts import usable_parts
 from hil.errors import InputError
 from hil.recording.recording import Recording, write_parquet
@@ -49,7 +49,7 @@ def test_the_usable_parts_are_taken_and_the_others_named() -> None:
 
 
 def test_the_parts_are_diagnosed_as_recordings_of_one_axis() -> None:
-    prepared = prepare_diagnosis([cut((1800, 2100), (3900, ROWS))], [], BENCH)
+    prepared = prepare([cut((1800, 2100), (3900, ROWS))], [], BENCH)
     assert [run.name for run in prepared.train.runs] == ["cut (part 1)"]
     assert [run.name for run in prepared.held_out.runs] == ["cut (part 2)"]
     assert any("gaps in time" in note for note in prepared.notes)
@@ -57,7 +57,7 @@ def test_the_parts_are_diagnosed_as_recordings_of_one_axis() -> None:
 
 
 def test_of_a_long_part_a_third_is_held_out_and_a_short_one_is_trained_on() -> None:
-    prepared = prepare_diagnosis([cut((1800, 2000))], [], BENCH)
+    prepared = prepare([cut((1800, 2000))], [], BENCH)
     assert [run.name for run in prepared.train.runs] == ["cut (part 2) (first part)", "cut (part 1)"]
     assert [run.name for run in prepared.held_out.runs] == ["cut (part 2) (last part)"]
 

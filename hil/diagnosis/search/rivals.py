@@ -13,7 +13,7 @@ from hil.diagnosis.search.next_term import objection, valid, worthwhile
 from hil.identification.coordinates import LAST_EDGE_STEP_S
 from hil.identification.estimator import Fit, FitStatus
 from hil.identification.inference import TIED, Filter, against, between, refuted, whitening
-from hil.identification.terms import FRICTION, Term
+from hil.identification.terms import Term, is_frequent
 from hil.twin.library import BY_ID
 
 _NEAR = 1.1  # cost over that of the chosen explanation, up to which the fit of a rival is ended before it is compared
@@ -77,11 +77,10 @@ def ended(found: Fit) -> Fit:
 def _simplest(best: Fit, others: Sequence[Fit]) -> Fit:
     """Return the explanation with the fewest parameters of those that the evidence does not separate.
 
-    Constant torque and direction-dependent Coulomb friction are equal on every motion; friction is preferred, since
-    most axes are horizontal.
+    Of two mechanisms with the same torque on every motion the more frequent cause is preferred.
     """
     tied = [best, *(other for other in others if other.jacobian.size and against(best, other) < TIED)]
-    return min(tied, key=lambda found: (found.hypothesis.free, found.terms[-1].key[:2] != (FRICTION, 0)))
+    return min(tied, key=lambda found: (found.hypothesis.free, not is_frequent(found.terms[-1])))
 
 
 def _on_fewest_parts(best: Fit, others: Sequence[Fit]) -> Fit:

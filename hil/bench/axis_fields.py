@@ -22,6 +22,7 @@ class BenchSection(BaseModel):
 
 
 FRICTION = ("coulomb_torque_n_m", "viscous_torque_n_m_s_rad")
+RATIOS = ("damping_ratio",)  # nominal parameters of any axis that are below 1
 
 
 class Driven(BenchSection):

@@ -28,7 +28,7 @@ from hil.identification.estimator import Estimator, Fit
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.measured import Measured
 from hil.identification.parallel import in_parallel
-from hil.identification.terms import SAME, ambiguous, compatible
+from hil.identification.terms import compatible, same_torque
 from hil.motion.profile import Profile
 from hil.motion.trajectory import Trajectory, plan
 from hil.quantities import digits
@@ -76,9 +76,9 @@ def separating(searched: Searched, final: Fit, held_out: Dataset) -> Experiment 
     train = final.data
     pairs = [pair for index in range(len(final.terms)) for pair in permutations(_group(searched, final, index), 2)]
     if not pairs:
-        if not any(map(ambiguous, final.terms)):
+        if not (same := list(dict.fromkeys(filter(None, map(same_torque, final.terms))))):
             return None
-        return Experiment(None, (), f"No motion distinguishes {_pairs([SAME])}: both cause the same torque on each.")
+        return Experiment(None, (), f"No motion distinguishes {_pairs(same)}: both cause the same torque on each.")
 
     asked: set[Question] = {tuple(sorted((truth.effect, other.effect))) for truth, other in pairs}
 

@@ -148,13 +148,13 @@ def _without_torque(run: Measured) -> list[str]:
 
 def _on_motor(mechanism: Mechanism) -> bool:
     """True if a form of a mechanism shows in the motor's motion."""
-    return any(variant.motor_alone for variant in mechanism.variants)
+    return any(variant.observable is not None and variant.observable(False) for variant in mechanism.variants)
 
 
 def _with_one_encoder(run: Measured, bench: Bench) -> list[str]:
     if bench.has_table_encoder:
         return []
-    hidden = titles([mechanism.id for mechanism in LIBRARY if mechanism.needs_table and not _on_motor(mechanism)])
+    hidden = titles([one.id for one in LIBRARY if one.search.needs_table and not _on_motor(one)])
     names = AXIS_CHANNELS[run.kind]
     return [
         f"Only one position is recorded: {hidden} cannot be tested; record both {names.motor_position} and "

@@ -70,7 +70,7 @@ def sentence(term: Term, bench: Bench) -> str:
     """Describe a term in a sentence with its values, and its variant in brackets."""
     mechanism, axis = BY_ID[term.effect], bench.axis
     variant = mechanism.variants[term.variant]
-    told_by = variant if variant.sentence else mechanism
+    told_by = variant.text or mechanism.text
     text, opposite = told_by.sentence, told_by.reversed
     given = list(term.values)
     if given[mechanism.strength] < 0.0 and opposite:

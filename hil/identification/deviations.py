@@ -36,7 +36,7 @@ from hil.twin.stepping.stages import stage_of
 
 LOW_PASS_HZ, LOW_PASS_ORDER = 100.0, 4  # as in the inverse-dynamics identification of EMPS
 CONTROLLER_BLOCK, MOTOR_BLOCK, TABLE_BLOCK = "controller", "motor and load", "transmission and table"
-_DRIVE = (Stage.CURRENT, Stage.CHANNEL)
+_DRIVE = (Stage.CURRENT, Stage.CHANNEL, Stage.ANSWER)
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hil.arrays import FloatArray
+from hil.bench.axis_fields import RATIOS
 from hil.bench.bench_file import Bench, MechanismEntry
 from hil.identification.coordinates import (
     ANY,
@@ -36,6 +37,7 @@ from hil.identification.rest import resting
 from hil.identification.terms import Term, push_n, repeats
 from hil.twin.axis import COARSE_STEP_S, FINE_STEP_S, Response, Twin
 from hil.twin.library import BY_ID
+from hil.twin.mechanism import Contact
 from hil.twin.mechanisms.channel_time_skew import delayed
 from hil.twin.parameter import Role
 from hil.twin.physics import Active
@@ -140,10 +142,9 @@ class Hypothesis:
         found = []
         for name in self.bench.axis.NOMINAL:
             value = float(getattr(self.bench.axis, name))
-            if name == "damping_ratio":
+            if name in RATIOS:
                 found.append(Coordinate(name, max(value, 0.01), True, 1e-4, 0.9))
-                continue
-            if value > 0.0:
+            elif value > 0.0:
                 found.append(Coordinate(name, value, True, value / TRUST, value * TRUST))
             else:  # friction that the bench leaves out
                 found.append(Coordinate(name, LITTLE, False, 0.0, ANY))
@@ -187,7 +188,7 @@ class Hypothesis:
         angle_rad = travel_m / self.bench.axis.ratio_m_rad * self.bench.axis.physics().angle_per_unit
         of_axis = self.nominal_count - len(self._known)
         found = [
-            max(step, 1e-3 if one.name in ("damping_ratio", DELAY) else 0.0 if one.logarithmic else LITTLE_STEP)
+            max(step, 1e-3 if one.name in (*RATIOS, DELAY) else 0.0 if one.logarithmic else LITTLE_STEP)
             for one in self.coordinates[:of_axis]
         ]
         starts = [*self.bench_values[of_axis:], *(value for term in self.terms for value in term.values)]
@@ -211,7 +212,7 @@ class Hypothesis:
     def _chatters(self) -> bool:
         """True with play, in which a nut may chatter."""
         effects = (*(term.effect for term in self.terms), *(entry.effect for entry in self.bench.mechanisms))
-        return any(variant.play for effect in effects for variant in BY_ID[effect].variants)
+        return any(variant.contact is Contact.PLAY for effect in effects for variant in BY_ID[effect].variants)
 
     @cached_property
     def values(self) -> list[float]:

@@ -17,8 +17,8 @@ Key = tuple[str, int, int]
 
 # Periods (or orders) further apart than this factor are two causes: a travel of ten periods resolves 10 %.
 _APART = 1.1
-# Equal on every motion: direction-dependent Coulomb friction is symmetric friction plus a constant torque.
-SAME = FRICTION, LOAD = next((mechanism.id, mechanism.same_as) for mechanism in LIBRARY if mechanism.same_as)
+# Frequent and rare cause of a torque that is the same on every motion, each in its first variant.
+_SAME = tuple((mechanism.id, rarer) for mechanism in LIBRARY if (rarer := mechanism.same_torque(0)))
 
 
 class Window(NamedTuple):
@@ -92,9 +92,20 @@ def push_n(terms: Sequence[Term], run: str, time_s: FloatArray, period_s: float)
     return push
 
 
-def ambiguous(one: Term | Active) -> bool:
-    """True for constant load and asymmetric Coulomb friction, which no motion distinguishes."""
-    return one.effect in SAME and one.variant == 0
+def same_torque(one: Term | Active) -> tuple[str, ...]:
+    """Frequent and rare cause that no motion distinguishes, of which this is one; empty for any other mechanism."""
+    return next((pair for pair in _SAME if one.effect in pair and one.variant == 0), ())
+
+
+def ambiguous(one: Term | Active, other: Term | Active | None = None) -> bool:
+    """True if another mechanism has the same torque on every motion: `other`, or any."""
+    pair = same_torque(one)
+    return bool(pair) and (other is None or pair == same_torque(other))
+
+
+def is_frequent(one: Term | Active) -> bool:
+    """True for the frequent one of two causes that no motion distinguishes."""
+    return one.effect in same_torque(one)[:1]
 
 
 def is_load(term: Term) -> bool:
@@ -104,9 +115,9 @@ def is_load(term: Term) -> bool:
 
 def repeats(one: Term | Active, other: Term | Active) -> bool:
     """True if two mechanisms are the same: equal effect and period, order or, without these, variant; or both
-    `ambiguous`."""
+    the same torque."""
     if one.effect != other.effect:
-        return ambiguous(one) and ambiguous(other)
+        return ambiguous(one, other)
     for parameter, value, other_value in zip(BY_ID[one.effect].parameters, one.values, other.values, strict=True):
         if parameter.role in (Role.PERIOD, Role.ORDER):
             return max(value, other_value) < _APART * min(value, other_value)

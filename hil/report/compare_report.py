@@ -11,10 +11,10 @@ from hil.identification.deviations import BlockDeviation, Deviation
 from hil.identification.figures import block_panels, motion_panels
 from hil.identification.inverse_dynamics import InverseDynamics
 from hil.identification.nominal_fit import FitResult
+from hil.identification.terms import ambiguous
 from hil.quantities import change, digits, percent, quantity
 from hil.report import plots
 from hil.report.page import Number, Page
-from hil.twin.library import BY_ID
 
 PARAMETER_HEADERS = ("parameter", "bench file", "fitted", "standard error", "change")
 
@@ -156,7 +156,8 @@ def _inverse_dynamics(page: Page, result: Comparison, fit: InverseDynamics) -> N
         "Least-squares fit of the force to the measured motion, F = M a + Fv v + Fc sign(v) + F0; relative error "
         f"{percent(fit.relative_error)}."
     )
-    offset = next((entry.active().values[0] for entry in result.bench.mechanisms if BY_ID[entry.effect].same_as), 0.0)
+    known = [entry.active() for entry in result.bench.mechanisms]
+    offset = next((one.values[0] for one in known if ambiguous(one)), 0.0)
     rows = (
         ("mass M", "kg", fit.inertia, fit.inertia_std_error, axis.mass_kg),
         ("viscous friction Fv", "N s/m", fit.viscous, fit.viscous_std_error, axis.viscous_force_n_s_m),

@@ -4,7 +4,7 @@ The same packed arrays and kernel serve offline simulation in closed loop and th
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from hil.arrays import FloatArray
 from hil.control import cascade
-from hil.twin.mechanism import Stage, Variant
+from hil.twin.mechanism import Stage
 from hil.twin.physics import Active, Physics
 from hil.twin.stepping import loops
 from hil.twin.stepping.records import Arrays, Axis, pack, start_memory
@@ -179,7 +179,7 @@ class Twin:
             self._axis(start),
         )
         # lateness of an input is taken back, that of the answer is simulated
-        return self._recorded(Response(*channels), lambda variant: variant.name == _ANSWER)
+        return self._recorded(Response(*channels), (Stage.ANSWER,))
 
     def command(
         self,
@@ -196,11 +196,7 @@ class Twin:
 
     def undelayed(self, measured: Response) -> Response:
         """Undo the lateness that active mechanisms give to measured inputs."""
-
-        def present(variant: Variant) -> bool:
-            return variant.name != _ANSWER and bool(not variant.needs_table or measured.table_position_m.size)
-
-        return self._recorded(measured, present, -1.0)
+        return self._recorded(measured, (Stage.CHANNEL,), -1.0)
 
     def _axis(self, start: Start) -> Axis:
         return Axis(*self.arrays(), *self.state(start))
@@ -212,11 +208,11 @@ class Twin:
         )
 
     def _recorded(
-        self, response: Response, which: Callable[[Variant], bool] = lambda _: True, times: float = 1.0
+        self, response: Response, stages: Sequence[Stage] = (Stage.CHANNEL, Stage.ANSWER), times: float = 1.0
     ) -> Response:
         """Apply active mechanisms of the recording to the channels, with their parameters multiplied."""
         for active in self.active:
-            if active.form.stage is Stage.CHANNEL and which(active.form):
+            if active.form.stage in stages:
                 values = tuple(times * value for value in active.values)
                 response = Response(*active.form.contribution(tuple(response), values, self.gains.period_s))
         return response

@@ -48,15 +48,15 @@ class Stage(StrEnum):
     BRISTLE = "bristle"  # + stiffness of the contact before sliding; 0 is rigid contact
     TABLE_SHARE = "table_share"  # + share of the friction that acts on the table
     TABLE_VISCOUS_SHARE = "table_viscous_share"  # that share -> share of the viscous friction
-    TRANSMISSION = "transmission"  # deflection of the transmission [motor units] -> the deflection its
-    # nominal spring would need for the same torque
+    TRANSMISSION = "transmission"  # deflection [motor units] -> that of the nominal spring for the same torque
     SCREW = "screw"  # x factor on the stiffness of the screw between its bearing and the nut
     TABLE_FORCE = "table_force"  # + force on the table [N]
     MOTOR_READING = "motor_reading"  # motor position -> reading of its encoder
     TABLE_READING = "table_reading"  # table position -> reading of its encoder
     VELOCITY_FILTER = "velocity_filter"  # time constant of the controller's velocity filter [s]
     CHAIN = "chain"  # changes the chain itself, before its modes are taken
-    CHANNEL = "channel"  # changes recorded channels after the simulation
+    CHANNEL = "channel"  # changes recorded channels that the controller reads, after the simulation
+    ANSWER = "answer"  # changes a recorded channel that no block reads
 
 
 class Moment(NamedTuple):
@@ -92,78 +92,99 @@ class Picture(StrEnum):
     SPECTRUM = "spectrum"
 
 
+class Contact(StrEnum):
+    """Contact that the kernel computes in another way, by the name of its switch."""
+
+    PLAY = "play"  # the flanks of the transmission push only: contacts open and close
+    SLIPS = "slips"  # friction of Maxwell slip elements
+
+
 Points = Sequence[tuple[float, ...]]
 _AT_BOUND = 1e-6  # of the upper bound: a fit ends there or far below
 _ROUNDING = 1e-15  # of the upper bound: rounding of a fit that ends at the lower one
 
 
 @dataclass(frozen=True)
-class Variant:
-    """Form of a mechanism, searched separately.
+class Text:
+    """Finding in an engineer's words; names parameters, viscous_speed, wave and variant in braces."""
 
-    `contribution` is compiled (`numba.njit`) for stages in the stepping kernel; for Stage.CHAIN it is
-    `(chain, parameters) -> chain`, for Stage.CHANNEL `(channels, parameters, period_s) -> channels`, both plain Python.
+    sentence: str
+    picture: Picture = Picture.TIME  # of all variants
+    reversed: str = ""  # of a negative strength, which it gives without the sign; without: `sentence`
+    # (number of windows, True at equal intervals) -> sentence of an event; may also name count, and width and period
+    of_windows: Callable[[int, bool], str] | None = None
+
+
+@dataclass(frozen=True)
+class Variant:
+    """Form of a mechanism, searched separately; text, element and starts replace those of the mechanism.
+
+    `contribution` is compiled (`numba.njit`) for stages of the stepping kernel. For the others it is plain Python: for
+    Stage.CHAIN `(chain, parameters) -> chain`, for CHANNEL and ANSWER `(channels, parameters, period_s) -> channels`.
     """
 
     stage: Stage
     contribution: Callable[..., Any]
     name: str = ""
-    sentence: str = ""  # if it differs from the mechanism's
-    reversed: str = ""  # that sentence for a negative strength
-    element: str = ""  # if it differs from the mechanism's
-    starts: Callable[[Scene], Points] | None = None  # if they differ from the mechanism's
+    text: Text | None = None
+    element: str = ""
+    starts: Callable[[Scene], Points] | None = None
+    proportional: bool = True  # the change is proportional to the strength
+    observable: Callable[[bool], bool] | None = None  # (the axis has a table encoder) -> its encoders show it
+    contact: Contact | None = None
+
+
+@dataclass(frozen=True)
+class SearchHints:
+    """Starting values of a search, and its relations to other mechanisms; changes the way to an answer."""
+
+    starts: Callable[[Scene], Points] | None = None  # parameter values at which a search begins
+    typical: Callable[[AxisFacts], tuple[float, ...]] | None = None  # values that an engineer calls a defect
     proportional: bool = True  # the change is proportional to the strength
     needs_table: bool = False  # not observable without a linear encoder
-    sign: float = 1.0  # of its strength where its effect is nearly that of the first variant
-    motor_alone: bool = False  # for an axis with one encoder: the reaction on the motor shows it
-    form_of: str = ""  # id of a friction law whose form a small contribution corrects
-    play: bool = False  # the flanks of the transmission push only: contacts open and close
-    slips: bool = False  # the contact is of Maxwell slip elements
+    shifts_time: bool = False  # many values are local minima: starts are ranked at their own values
+    screw_locked: bool = False  # at one slow speed, a share of Coulomb friction that repeats with the screw
+    beside: str = ""  # id of a mechanism without which this one is seldom seen: fitted together if it leaves more
+    # (largest stretch of the transmission [m]) -> starts from the bench file's springs: refitted ones hide the effect
+    restarts: Callable[[float], Points] = lambda stretch_m: ()
+    # (values, variant, other) -> values at which the other variant has nearly the same effect
+    as_variant: Callable[[Sequence[float], int, int], Sequence[float]] = lambda values, variant, other: values
+    # (variant) -> rank: a variant of lower rank is named unless one of higher rank leaves clearly less energy
+    rank: Callable[[int], int] = lambda variant: 0
 
 
 @dataclass(frozen=True)
 class Mechanism:
-    """Description of one mechanism for twin, search, report and scoring.
+    """One mechanism for twin, search, report and scoring; what it alone needs is a function of its own, not a flag.
 
-    Required are physics, text and bounds. All other fields have defaults: `starts` and `typical` follow from the
-    dimensions and roles of the parameters.
+    Its fields are its physics. Without hints, `starts` and `typical` follow from the dimensions and roles of the
+    parameters.
     """
 
     id: str
     block: Block
     element: str  # the part of the axis an engineer would point at
-    sentence: str  # finding in an engineer's words; may name parameters, viscous_speed, wave, variant in braces
     equation: str
     source: str
     parameters: tuple[Parameter, ...]
     variants: tuple[Variant, ...]
-    starts: Callable[[Scene], Points] | None = None  # parameter values at which a search begins
-    typical: Callable[[AxisFacts], tuple[float, ...]] | None = None  # values that an engineer calls a defect
+    text: Text
+    search: SearchHints = SearchHints()
     valid: Callable[[Sequence[float], int, AxisFacts], bool] | None = None  # (values, variant, axis): name applies
-    # id and values of the mechanism that it is where its values are not valid, of (values, axis); without: none
+    # (values, axis) -> id and values of the mechanism that it is where its values are not valid; without: none
     beyond: Callable[[Sequence[float], AxisFacts], tuple[str, tuple[float, ...]]] | None = None
-    proportional: bool = True  # the change is proportional to the strength
-    neutral_at_zero: bool = True  # without effect where the strength is zero
-    neutral: Callable[[AxisFacts], float] | None = None  # strength without effect, if it is finite and not 0
-    needs_table: bool = False  # not observable without a linear encoder
-    turning: bool = False  # only where the load turns
-    part_of_wave: bool = False  # told by motion over part of its wavelength
-    # force on the table [N], mean over each tick that begins at times (n,) [s], of (times, period, values): an event of
-    # the recording in which it is found, not expected in another one
+    # (variant) -> id of a rarer cause whose first variant is the same torque on every motion; "" without one
+    same_torque: Callable[[int], str] = lambda variant: ""
+    # (variant) -> id of a friction law whose form a small contribution corrects; "" without one
+    corrects: Callable[[int], str] = lambda variant: ""
+    neutral: Callable[[AxisFacts], float] | None = None  # strength without effect, also infinite; without: 0
+    # (values, axis) -> travel that tells it [m]; without: its wavelength
+    told_by_m: Callable[[Sequence[float], AxisFacts], float] | None = None
+    # (start of each tick (n,) [s], period [s], values) -> mean force on the table [N]: an event of one recording
     over_time: Callable[[FloatArray, float, Sequence[float]], FloatArray] | None = None
-    reversed: str = ""  # sentence of a negative strength, which it gives without the sign; without: `sentence`
-    repeated: str = ""  # sentence of several such events; may also name count
-    periodic: str = ""  # sentence of several at equal intervals; may also name count, width and period
-    shifts_time: bool = False  # many values are local minima: starts are ranked at their own values
+    turning: bool = False  # only where the load turns
     softens: bool = False  # changes the stiffness of a spring of the chain
     most: int = 1  # number that may act at once, with periods or orders of their own, or as different variants
-    screw_locked: bool = False  # at one slow speed, a share of Coulomb friction that repeats with the screw
-    first_unless_clear: bool = False  # an earlier variant is named unless a later one leaves clearly less energy
-    same_as: str = ""  # id of a less common cause whose first variant is the same torque as this one's
-    hidden_starts: tuple[tuple[float, ...], ...] = ()  # starts where refitted springs hide it; the first value is in
-    # units of the largest stretch of the transmission
-    beside: str = ""  # id of a mechanism without which this one is seldom seen: fitted together if it leaves more
-    picture: Picture = Picture.TIME
 
     @property
     def transient(self) -> bool:
@@ -207,24 +228,26 @@ class Mechanism:
 
     def start_points(self, variant: int, scene: Scene) -> list[tuple[float, ...]]:
         """Parameter values (points of `names`) at which a search for a variant begins, within bounds."""
-        given = self.variants[variant].starts or self.starts
+        given = self.variants[variant].starts or self.search.starts
         points = given(scene) if given else product(*(default_starts(p, scene) for p in self.parameters))
         return [self._inside(point) for point in points]
 
     def typical_values(self, axis: AxisFacts) -> tuple[float, ...]:
         """Values that an engineer would call a defect."""
-        return self.typical(axis) if self.typical else self._inside([default_typical(p, axis) for p in self.parameters])
+        if self.search.typical:
+            return self.search.typical(axis)
+        return self._inside([default_typical(p, axis) for p in self.parameters])
 
     def element_of(self, variant: int) -> str:
         """The part of the axis that a variant points at."""
         return self.variants[variant].element or self.element
 
     def is_valid(self, values: Sequence[float], variant: int, axis: AxisFacts) -> bool:
-        """Check that the effect has a size, that the motion passes a whole wave of it, that its name applies, and that
-        the sensors can show it."""
+        """Check that the effect has a size, that the motion tells it, that its name applies, and that the sensors can
+        show it."""
         if not self._has_size(values):
             return False
-        if not self.part_of_wave and self.wavelength_m(values, axis) > axis.travel_m:
+        if (self.told_by_m or self.wavelength_m)(values, axis) > axis.travel_m:
             return False
         if not axis.turn_known and self.once_per_turn:
             return False
@@ -233,7 +256,7 @@ class Mechanism:
     def wavelength_m(self, values: Sequence[float], axis: AxisFacts) -> float:
         """Length along the travel in which the effect repeats [m]; 0 if it is not periodic in position or angle.
 
-        With a phase but no period or order it repeats once per revolution, of the load if it is `turning`.
+        With a phase but no period or order it repeats once per revolution, of the load if it turns.
         """
         period_m = self.named(Role.PERIOD, values)
         if period_m is not None:
@@ -250,7 +273,13 @@ class Mechanism:
 
     def size(self, values: Sequence[float], axis: AxisFacts) -> float:
         """Distance of the strength from the value without effect, in the unit of the strength."""
-        return abs(values[self.strength] - (self.neutral(axis) if self.neutral else 0.0))
+        neutral = self.neutral(axis) if self.neutral else 0.0
+        return abs(values[self.strength] - (neutral if math.isfinite(neutral) else 0.0))
+
+    @property
+    def neutral_at_zero(self) -> bool:
+        """True if it is without effect where the strength is zero."""
+        return self.neutral is None
 
     def _has_size(self, values: Sequence[float]) -> bool:
         """Check that a strength is off the bound at which there is no effect, and off its largest value.

@@ -48,7 +48,7 @@ POINTS, CURVE = "measured - twin without this term", "modelled by this term"
 
 def finding_figure(diagnosis: Diagnosis, term: Term) -> Captioned:
     """Draw the evidence for a term of the final hypothesis, on the held-out recordings if there are any."""
-    picture = PICTURES[BY_ID[term.effect].picture]
+    picture = PICTURES[BY_ID[term.effect].text.picture]
     # a friction curve needs every feed of every recording
     every = picture is friction_over_speed or bool(term.windows)  # an event is in any of them
     train, held_out = diagnosis.train.runs, diagnosis.held_out.runs

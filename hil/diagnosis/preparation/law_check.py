@@ -106,8 +106,7 @@ def _candidates(runs: Sequence[Measured], bench: Bench) -> list[list[_Candidate]
         for mechanism in LIBRARY
         for index, variant in enumerate(mechanism.variants)
         if variant.stage in (Stage.VELOCITY_FILTER, Stage.CHANNEL)
-        and variant.name != "torque"
-        and (table or not variant.needs_table)
+        and (variant.observable is None or variant.observable(table))
         and mechanism.id not in {entry.effect for entry in bench.mechanisms}
     ]
     # two variants of one mechanism shift the same channels

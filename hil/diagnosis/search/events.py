@@ -21,20 +21,20 @@ from hil.identification.window_fit import fit_windows, window_errors
 from hil.twin.library import BY_ID, LIBRARY
 from hil.twin.parameter import Role
 
-EVENT = next((mechanism for mechanism in LIBRARY if mechanism.transient), None)
+EVENTS = tuple(mechanism.id for mechanism in LIBRARY if mechanism.transient)
 
 
-def event_term(found: Sequence[Event], ratio: float) -> Term:
-    """Make one term of events; the strongest gives its values."""
-    assert EVENT is not None
+def event_term(effect: str, found: Sequence[Event], ratio: float) -> Term:
+    """Make one term of events, all with one effect; the strongest gives its values."""
+    mechanism = BY_ID[effect]
     first = max(found, key=lambda one: abs(one.level))
-    start, end = EVENT.indices(Role.EDGE)
-    values = [0.0] * len(EVENT.parameters)
-    values[EVENT.strength], values[start], values[end] = first.level / ratio, first.start_s, first.end_s
+    start, end = mechanism.indices(Role.EDGE)
+    values = [0.0] * len(mechanism.parameters)
+    values[mechanism.strength], values[start], values[end] = first.level / ratio, first.start_s, first.end_s
     windows = tuple(
         Window(one.run, one.start_s - first.start_s, one.end_s - first.end_s, one.level / first.level) for one in found
     )
-    return Term(EVENT.id, 0, tuple(values), windows=windows)
+    return Term(effect, 0, tuple(values), windows=windows)
 
 
 def beside_loads(nominal: Fit, found: Fit) -> Fit:
@@ -60,7 +60,8 @@ def revised(found: Fit) -> Fit:
     best = fit_windows(found)
     events = detect(found)
     if events:
-        other = found.hypothesis.replaced(index, event_term(events, found.bench.axis.ratio_m_rad))
+        shown = event_term(found.terms[index].effect, events, found.bench.axis.ratio_m_rad)
+        other = found.hypothesis.replaced(index, shown)
         again = fit_windows(found.estimator.evaluate(other))
         best = again if against(again, best) > 0.0 else best
     return _trimmed(_completed(best if best.cost <= found.cost or against(best, found) > 0.0 else found))
@@ -73,7 +74,7 @@ def with_events_of(held_out: Dataset, final: Fit) -> Fit:
     of the training recordings at the same times, whichever the recordings support best. An event is no prediction: it
     is found in each recording.
     """
-    if EVENT is None or not held_out.runs:
+    if not EVENTS or not held_out.runs:
         return final
     index, at = _index(final), final.hypothesis
     there = replace(final.estimator, data=held_out)
@@ -83,7 +84,7 @@ def with_events_of(held_out: Dataset, final: Fit) -> Fit:
     # terms may depend on the motion, which strong events disturb: some show only beside the nominal twin
     for beside in (before, plain) if at.terms else (before,):
         if found := detect(beside):
-            choices.append(event_term(found, final.bench.axis.ratio_m_rad))
+            choices += [event_term(effect, found, final.bench.axis.ratio_m_rad) for effect in EVENTS]
     if index is not None:
         windows = dict.fromkeys(one._replace(run=run.name) for run in held_out.runs for one in at.terms[index].windows)
         choices.append(replace(at.resolved.terms[index], windows=tuple(windows)))
@@ -131,7 +132,8 @@ def _completed(found: Fit, others: bool = True) -> Fit:
         return found
     more = left_over(found)
     if more:
-        longer = _joined(found.hypothesis, index, event_term(more, found.bench.axis.ratio_m_rad))
+        added = event_term(found.terms[index].effect, more, found.bench.axis.ratio_m_rad)
+        longer = _joined(found.hypothesis, index, added)
         again = fit_windows(found.estimator.evaluate(longer), others=others)
         found = again if against(again, found) > CRITERIA.evidence * len(more) else found
     names, refuted = {run.name for run in found.data.runs}, set[tuple[Window, Window]]()

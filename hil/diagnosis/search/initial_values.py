@@ -173,7 +173,7 @@ def starts(scene: Scene, bench: Bench, runs: Sequence[Measured] = ()) -> list[St
             if not observable(mechanism, variant, bench):
                 continue
             strength, phase = mechanism.strength, next(iter(phases), -1)
-            if not (mechanism.proportional and variant.proportional):
+            if not (mechanism.search.proportional and variant.proportional):
                 strength = phase = -1
             found += [
                 StartPoint(mechanism.id, number, point, strength, phase, max(len(phases), 1), windows=windows)
@@ -195,14 +195,14 @@ def likenesses(terms: Sequence[Term], bench: Bench) -> list[list[Term]]:
     *rest, last = terms
     physics = bench.axis.physics()
     lead_m = 2.0 * np.pi * bench.axis.ratio_m_rad / physics.angle_per_unit
-    if not BY_ID[last.effect].screw_locked or physics.coulomb_n_m <= 0.0:
+    if not BY_ID[last.effect].search.screw_locked or physics.coulomb_n_m <= 0.0:
         return []
     size, place = _size_and_place(BY_ID[last.effect])
     share = last.values[size] / _unit(BY_ID[last.effect], physics.coulomb_n_m)
     order = _other(BY_ID[last.effect], last.values[place], lead_m)
     found = []
     for mechanism in sorted(LIBRARY, key=lambda one: one.parameters[0].dimension is not Dimension.TORQUE):
-        if not mechanism.screw_locked or mechanism.id == last.effect:
+        if not mechanism.search.screw_locked or mechanism.id == last.effect:
             continue
         size, place = _size_and_place(mechanism)
         repeats, bounds = _other(mechanism, order, lead_m), mechanism.parameters[place]
@@ -237,12 +237,12 @@ _BLOCK_OF = {"command": Block.CONTROLLER, "torque": Block.DRIVE, "motor": Block.
 
 def observable(mechanism: Mechanism, variant: Variant, bench: Bench) -> bool:
     """True if the encoders of a bench can show a variant of a mechanism."""
-    if variant.motor_alone:
-        return not bench.has_table_encoder
+    if variant.observable is not None:
+        return variant.observable(bench.has_table_encoder)
     if bench.has_table_encoder:
         return True
     felt = bool(bench.axis.SPRINGS) or not mechanism.in_transmission  # by the motor, as a reaction of the table
-    return felt and not (mechanism.needs_table or variant.needs_table)
+    return felt and not mechanism.search.needs_table
 
 
 def judged(effect: str, runs: Sequence[Measured]) -> bool:

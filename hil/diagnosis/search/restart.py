@@ -5,11 +5,11 @@ a spring on a table, 47 times the noise, the projection removed 94 % and the ref
 than noise is left, the library is screened again at the parameters of the bench file, without the projection.
 
 A nut without preload is softer within its gap. A refit of other springs in series and of their damping absorbs most of
-that, and the local score test finds no descent direction. So preload loss is fitted from the springs of the bench file.
-With a single spring it is equal to a softer spring.
+that, and the local score test finds no descent direction. So such a mechanism is fitted from the springs of the bench
+file (`SearchHints.restarts`). With a single spring it is equal to a softer spring.
 
 Some mechanisms are seldom alone: a table with play stays where it is by its own friction, and without it coasts through
-the gap. Each of the two alone fits worse than a wrong one, so they are fitted together (`Mechanism.beside`).
+the gap. Each of the two alone fits worse than a wrong one, so they are fitted together (`SearchHints.beside`).
 
 A fit that leaves more than noise while a nominal parameter is at its bound may be a local minimum: there the mechanisms
 found are fitted once more, from the parameters of the bench file and typical values, in each form of their laws.
@@ -29,7 +29,6 @@ from hil.identification.parallel import in_parallel
 from hil.identification.terms import Term, compatible
 from hil.twin.library import BY_ID, LIBRARY
 
-_EFFECT, _STARTS = next((mechanism.id, mechanism.hidden_starts) for mechanism in LIBRARY if mechanism.hidden_starts)
 _FIRST, _SECOND = 8, 20  # evaluations: a fit starts farther from its minimum than those of a race
 _NARROWEST_M = 1e-6  # least first gap, if the deflection between motor and table is negligible
 
@@ -44,7 +43,7 @@ def from_owner(base: Fit) -> list[Fit]:
 
 def companion(base: Fit, found: Fit) -> Term | None:
     """The mechanism to fit together with the last term of a fit; None without one that the base can take."""
-    effect = BY_ID[found.terms[-1].effect].beside
+    effect = BY_ID[found.terms[-1].effect].search.beside
     if not effect:
         return None
     term = Term(effect, 0, BY_ID[effect].typical_values(axis_facts(base.bench, base.data.runs)))
@@ -56,9 +55,8 @@ def together(base: Fit, found: Fit, other: Term) -> list[Fit]:
     """Fit mechanisms like the last term of a fit beside another term, from the parameters of the bench; best first."""
     owner = base.hypothesis.moved(owner_points(base)[0]).with_term(other)
     beside = base.estimator.fit(owner, evaluations=_SECOND, fixed=range(owner.nominal_count))
-    likely = [
-        one for one in screen_library(beside) if BY_ID[one.term.effect].beside == other.effect and one.share > 0.0
-    ]
+    alike = [one for one in screen_library(beside) if BY_ID[one.term.effect].search.beside == other.effect]
+    likely = [one for one in alike if one.share > 0.0]
     return race(beside, likely) if likely else []
 
 
@@ -79,21 +77,24 @@ def again(found: Fit, evaluations: int) -> Fit:
 
 
 def may_hide(base: Fit) -> bool:
-    """True if the axis has several springs and a linear encoder, and preload loss is compatible with its terms."""
+    """True if the axis has several springs and a linear encoder, and springs may hide a mechanism beside its terms."""
+    several = len(base.bench.axis.physics().chain.names) > 2
+    return several and bool(base.data.runs[0].table_m.size) and bool(_hidden(base))
+
+
+def _hidden(base: Fit) -> list[Term]:
+    """Starts of all mechanisms that springs may hide and that are compatible with the terms of the base."""
+    widest_m = max(stretches(base.data.runs, base.bench.axis.ratio_m_rad)[1], _NARROWEST_M)
+    starts = [Term(one.id, 0, tuple(values)) for one in LIBRARY for values in one.search.restarts(widest_m)]
     known = [entry.active() for entry in base.hypothesis.kept]
-    return (
-        len(base.bench.axis.physics().chain.names) > 2
-        and bool(base.data.runs[0].table_m.size)
-        and compatible((*base.terms, Term(_EFFECT, 0, _STARTS[0]), *known))
-    )
+    return [start for start in starts if compatible((*base.terms, start, *known))]
 
 
 def unbent(base: Fit) -> Fit:
-    """Fit the base with preload loss from the springs of the bench file."""
-    widest_m = max(stretches(base.data.runs, base.bench.axis.ratio_m_rad)[1], _NARROWEST_M)
+    """Fit the base with a mechanism that springs may hide, from the springs of the bench file."""
     owner = base.hypothesis.moved(owner_points(base)[-1])
     search = replace(base.estimator, torque_accuracy=SEARCH_ACCURACY, fast=True)
-    starts = [owner.with_term(Term(_EFFECT, 0, (share * widest_m, *rest))) for share, *rest in _STARTS]
+    starts = [owner.with_term(term) for term in _hidden(base)]
     held = search.jacobian(owner)
     first = [partial(search.fit, start, soft=SOFT, evaluations=_FIRST, held=held) for start in starts]
     best = min(in_parallel(first), key=lambda found: found.cost)

@@ -19,7 +19,7 @@ from hil.diagnosis.search.next_term import Round, first_standing
 from hil.identification.coordinates import LAST_EDGE_STEP_S
 from hil.identification.estimator import Fit, FitStatus
 from hil.identification.inference import Filter, against, between, refuted, whitening
-from hil.identification.terms import FRICTION, Term
+from hil.identification.terms import Term, is_frequent
 from hil.twin.library import BY_ID
 
 _NEAR = 1.1  # cost over that of the chosen explanation, up to which the fit of a rival is ended before it is compared
@@ -113,11 +113,10 @@ def _ended(one: Addition, search: Round) -> Addition:
 def _simplest(best: Addition, others: Sequence[Addition]) -> Addition:
     """Return the explanation with the fewest parameters of those that the evidence does not separate.
 
-    Constant torque and direction-dependent Coulomb friction are equal on every motion; friction is preferred, since
-    most axes are horizontal.
+    Of two mechanisms with the same torque on every motion the more frequent cause is preferred.
     """
     near = [one for one in others if one.fit.jacobian.size and against(best.fit, one.fit) < CRITERIA.tied]
-    return min([best, *near], key=lambda one: (one.fit.hypothesis.free, one.fit.terms[-1].key[:2] != (FRICTION, 0)))
+    return min([best, *near], key=lambda one: (one.fit.hypothesis.free, not is_frequent(one.fit.terms[-1])))
 
 
 def _on_fewest_parts(best: Addition, others: Sequence[Addition]) -> Addition:

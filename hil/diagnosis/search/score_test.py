@@ -16,7 +16,7 @@ from scipy.linalg import qr
 
 from hil.arrays import FloatArray
 from hil.diagnosis.search.event_detection import detect
-from hil.diagnosis.search.events import event_term
+from hil.diagnosis.search.events import EVENTS, event_term
 from hil.diagnosis.search.initial_values import StartPoint, claimable, scene, starts
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
@@ -101,7 +101,7 @@ def screen_library(base: Fit) -> list[Candidate]:
     views = [_view(base, False), _view(base, True)]
     for candidate in screen(base, points, views):
         best.setdefault(candidate.term.effect, []).append(candidate)
-    best = {effect: _nearest_first(same) if BY_ID[effect].shifts_time else same for effect, same in best.items()}
+    best = {effect: _nearest_first(same) if BY_ID[effect].search.shifts_time else same for effect, same in best.items()}
     # a tuned start replaces the grid of its mechanism
     tuned = {effect: _tuned(base, same[0], views) for effect, same in best.items()}
     best = {effect: same if tuned[effect] is same[0] else [tuned[effect]] for effect, same in best.items()}
@@ -112,7 +112,7 @@ def screen_library(base: Fit) -> list[Candidate]:
             replace(term, slot=slot)
             for term in (same[0].term, *same[0].others, *(other.term for other in same[1:_OTHERS]))
         ]
-        if not BY_ID[effect].proportional:
+        if not BY_ID[effect].search.proportional:
             begun = [term for term in begun if claimable(term, base.bench, base.data.runs)]
         if not begun or not claimable(begun[0], base.bench, base.data.runs):
             return None
@@ -128,7 +128,10 @@ def _events(base: Fit) -> list[StartPoint]:
         return []
     # events may have led the fitted parameters astray, those of the bench file may be wrong
     points = (base, base.estimator.evaluate(base.hypothesis.given))
-    found = [(one, event_term(events, base.bench.axis.ratio_m_rad)) for one in points if (events := detect(one))]
+    shown = [(one, events) for one in points if (events := detect(one))]
+    found = [
+        (one, event_term(effect, events, base.bench.axis.ratio_m_rad)) for one, events in shown for effect in EVENTS
+    ]
     terms = [term for _, term in sorted(found, key=lambda pair: _criterion(*pair))[:1]]
     return [
         StartPoint(term.effect, 0, term.values, BY_ID[term.effect].strength, windows=term.windows)
@@ -149,7 +152,7 @@ def offered(new: Term, hypothesis: Hypothesis, terms: Sequence[Term]) -> bool:
     It may replace another variant of a mechanism of the bench.
     """
     known = [entry.active() for entry in hypothesis.kept]
-    fitted = BY_ID[new.effect].over_time is None
+    fitted = not BY_ID[new.effect].transient
     if fitted and any(repeats(new, other) and new.variant == other.variant for other in known):
         return False
     return compatible((*terms, new, *(other for other in known if not repeats(new, other))))
@@ -174,7 +177,7 @@ def _nearest_first(same: Sequence[Candidate]) -> list[Candidate]:
 def _tuned(base: Fit, best: Candidate, views: Sequence[_View]) -> Candidate:
     """Move a start with a frequency to a higher score: a resonance is narrower than the grid of starts."""
     mechanism, variant = BY_ID[best.term.effect], best.term.variant
-    if mechanism.proportional or not mechanism.indices(Role.FREQUENCY):
+    if mechanism.search.proportional or not mechanism.indices(Role.FREQUENCY):
         return best
     for number in range(_ROUNDS):
         points = []

@@ -266,21 +266,18 @@ def _edges_moved(fit: Fit) -> Fit:
 
 
 def _as_variant(term: Term, variant: int) -> Term:
-    """The term in another variant, with the sign of the strength that gives nearly the same effect."""
-    mechanism = BY_ID[term.effect]
-    values = list(term.values)
-    values[mechanism.strength] *= mechanism.variants[variant].sign * mechanism.variants[term.variant].sign
+    """The term in another variant, at values that give nearly the same effect."""
+    values = BY_ID[term.effect].search.as_variant(term.values, term.variant, variant)
     return replace(term, variant=variant, values=tuple(values))
 
 
 def _rather(fit: Fit, known: Fit) -> bool:
     """True if a fit is to stand for its mechanism rather than another one of the same mechanism."""
     mine, other = fit.terms[-1], known.terms[-1]
-    if not BY_ID[mine.effect].first_unless_clear or mine.variant == other.variant:
+    rank, of_known = (BY_ID[one.effect].search.rank(one.variant) for one in (mine, other))
+    if rank == of_known:
         return fit.cost < known.cost
-    if mine.variant < other.variant:
-        return not _behind(fit, known)
-    return _behind(known, fit)
+    return not _behind(fit, known) if rank < of_known else _behind(known, fit)
 
 
 def _behind(worse: Fit, better: Fit) -> bool:

@@ -81,11 +81,8 @@ def describe_event(final: Fit, index: int, held_out: Dataset) -> EventReport:
     strongest = max(seen, key=lambda one: abs(one.values[2]))
     found = dict(zip(names, (value_of(first, 0), value_of(last, 1), value_of(strongest, 2)), strict=True))
     parameters = {name: found[name] for name in mechanism.names}
-    text = mechanism.sentence
-    if train is not None:
-        text = mechanism.periodic
-    elif _different(seen) > 1:
-        text = mechanism.repeated
+    of_windows = mechanism.text.of_windows
+    text = of_windows(_different(seen), train is not None) if of_windows else mechanism.text.sentence
     words = {one.name: value_in_words(parameters[one.name].value, one, bench) for one in mechanism.parameters}
     words["count"] = str(train.count if train else _different(seen))
     if train is not None:

@@ -9,6 +9,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from hil.bench.axis_fields import RATIOS
 from hil.bench.bench_file import Bench, MechanismEntry
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.result import Correction, Finding, Rival, Value
@@ -23,24 +24,26 @@ from hil.identification.coordinates import DELAY
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.inference import standard_errors
-from hil.identification.terms import FRICTION, LOAD, SAME, Key, Term, ambiguous
+from hil.identification.terms import Key, Term, ambiguous, same_torque
 from hil.quantities import digits, unit_of
-from hil.twin.library import BY_ID, LIBRARY
+from hil.twin.library import BY_ID
 from hil.twin.parameter import Dimension, Role
 
 
 def renamed(found: Fit) -> Fit:
-    """The fit with a constant load renamed to asymmetric friction, where that is valid and the bench has no load.
+    """The fit with a rare cause renamed to the frequent one of the same torque, where that is valid.
 
-    Both cause the same torque; asymmetric friction is the more frequent cause.
+    A name that the fit or the bench has already stays.
     """
     hypothesis = found.hypothesis
-    if any(one.effect == FRICTION for one in found.terms) or any(e.effect == LOAD for e in hypothesis.bench.mechanisms):
-        return found
+    named, known = {term.effect for term in found.terms}, {entry.effect for entry in hypothesis.bench.mechanisms}
 
     def called(term: Term, fitted: Term) -> Term:
-        rather = term.effect == LOAD and claimable(replace(fitted, effect=FRICTION), found.bench, found.data.runs)
-        return replace(term, effect=FRICTION) if rather else term
+        frequent, rare = same_torque(term) or ("", "")
+        if term.effect != rare or frequent in named or rare in known:
+            return term
+        rather = claimable(replace(fitted, effect=frequent), found.bench, found.data.runs)
+        return replace(term, effect=frequent) if rather else term
 
     return replace(found, hypothesis=replace(hypothesis, terms=tuple(map(called, hypothesis.terms, found.terms))))
 
@@ -63,10 +66,8 @@ def findings(
         errors = deviations[final.hypothesis.columns(index)]
         rivals = rivals_of(searched, term)
         tied = [rival.terms[-1].effect for rival in rivals if rival.tied]
-        if ambiguous(term):
-            tied += [
-                name for name in SAME if name != term.effect and claimable(replace(term, effect=name), bench, runs)
-            ]
+        others = [name for name in same_torque(term) if name != term.effect]
+        tied += [name for name in others if claimable(replace(term, effect=name), bench, runs)]
         margin = min(
             (rival.evidence for rival in rivals if rival.terms[-1].effect not in tied),
             default=searched.needed.get(key_in_search(searched, term), math.inf),
@@ -105,7 +106,7 @@ def corrections(owner: Bench, found: Fit) -> dict[str, Correction]:
     bench's mechanisms are among them.
     """
     hypothesis = found.hypothesis
-    told = hypothesis.nominal if found.data.observability.torque_measured else ("damping_ratio",)
+    told = hypothesis.nominal if found.data.observability.torque_measured else RATIOS
     entries = zip(
         hypothesis.bench_values, hypothesis.coordinates, hypothesis.values, standard_errors(found), strict=False
     )
@@ -169,7 +170,7 @@ def _factor(ablation: Ablation) -> float:
 def key_in_search(searched: Searched, term: Term) -> Key:
     """Key of a term in the search, before it was renamed."""
     known = set(searched.rivals) | set(searched.needed)
-    return term.key if term.key in known or term.effect not in SAME else replace(term, effect=LOAD).key
+    return term.key if term.key in known or not ambiguous(term) else replace(term, effect=same_torque(term)[-1]).key
 
 
 def rivals_of(searched: Searched, term: Term) -> list[RivalFit]:
@@ -178,7 +179,7 @@ def rivals_of(searched: Searched, term: Term) -> list[RivalFit]:
     known = searched.rivals.get(key_in_search(searched, term), [])
     for rival in sorted(known, key=lambda found: (bool(found.objection), found.evidence)):
         other = rival.terms[-1]
-        if other.effect != term.effect and not (ambiguous(other) and ambiguous(term)):
+        if other.effect != term.effect and not ambiguous(other, term):
             best.setdefault(other.effect, rival)
     return list(best.values())
 
@@ -230,25 +231,18 @@ def _needed(ablation: Ablation) -> str:
     return f"{text}, {digits(ablation.held_out)} × on the held-out ones"
 
 
-_FALLING, _DRAG = next(
-    (variant.form_of, (mechanism.id, index))
-    for mechanism in LIBRARY
-    for index, variant in enumerate(mechanism.variants)
-    if variant.form_of
-)
-
-
 def form_of(searched: Searched, ablations: Sequence[Ablation]) -> dict[int, int]:
-    """Return the index of a drag term that is part of a Stribeck term -> index of that term.
+    """Return the index of a term that corrects the form of a friction law, such as drag -> index of that law's term.
 
-    It is empty if the drag term is tied with another mechanism, which may be the true cause.
+    A term that is tied with another mechanism, which may be the true cause, is no part of a law.
     """
-    law = next((index for index, ablation in enumerate(ablations) if ablation.term.effect == _FALLING), None)
-    drag = next(
-        (index for index, ablation in enumerate(ablations) if (ablation.term.effect, ablation.term.variant) == _DRAG),
-        None,
-    )
-    if law is None or drag is None or any(rival.tied for rival in rivals_of(searched, ablations[drag].term)):
-        return {}
-    takes, whole = ablations[drag].train - 1.0, ablations[law].train - 1.0  # in units of the energy with both
-    return {drag: law} if takes < CRITERIA.part_of_form * whole else {}
+    found = {}
+    of_effect = {ablation.term.effect: index for index, ablation in enumerate(ablations)}
+    for index, ablation in enumerate(ablations):
+        law = of_effect.get(BY_ID[ablation.term.effect].corrects(ablation.term.variant))
+        if law is None or any(rival.tied for rival in rivals_of(searched, ablation.term)):
+            continue
+        # in units of the energy with both
+        if ablation.train - 1.0 < CRITERIA.part_of_form * (ablations[law].train - 1.0):
+            found[index] = law
+    return found

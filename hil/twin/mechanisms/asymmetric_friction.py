@@ -4,7 +4,8 @@ from collections.abc import Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, Stage, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, SearchHints, Stage, Text, Variant
+from hil.twin.mechanisms import constant_load
 from hil.twin.parameter import Dimension, Parameter, Role
 from hil.twin.scene import AxisFacts
 
@@ -30,8 +31,6 @@ MECHANISM = Mechanism(
     id="asymmetric_friction",
     block=Block.MOTOR_SIDE,
     element="ball nut, seals and guideways",
-    sentence="Friction in positive direction is {offset_torque_n_m} above the mean of both directions.",
-    reversed="Friction in positive direction is {offset_torque_n_m} below the mean of both directions.",
     equation="T_f = Fc sign(v) + T_0; at rest T_0 - Fc <= T_f <= T_0 + Fc; with speed: T_0 |v| / v_r, v_r = Fc / c",
     source="Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30 (1994) 1083, direction dependence; its "
     "slope over speed differs by direction too: Armstrong-Hélouvry, Control of Machines with Friction (1991)",
@@ -42,19 +41,21 @@ MECHANISM = Mechanism(
             Stage.DRAG,
             _offset_with_speed,
             "with speed",
-            sentence=(
+            text=Text(
                 "Friction differs by direction, the more the faster: at {viscous_speed}, where viscous friction "
-                "equals Coulomb friction, it is {offset_torque_n_m} above the mean of both in positive direction."
-            ),
-            reversed=(
-                "Friction differs by direction, the more the faster: at {viscous_speed}, where viscous friction "
-                "equals Coulomb friction, it is {offset_torque_n_m} below the mean of both in positive direction."
+                "equals Coulomb friction, it is {offset_torque_n_m} above the mean of both in positive direction.",
+                reversed="Friction differs by direction, the more the faster: at {viscous_speed}, where viscous "
+                "friction equals Coulomb friction, it is {offset_torque_n_m} below the mean of both in positive "
+                "direction.",
             ),
         ),
     ),
-    starts=lambda s: [(0.05 * s.coulomb,)],
-    typical=lambda a: (0.1 * a.friction,),
+    text=Text(
+        "Friction in positive direction is {offset_torque_n_m} above the mean of both directions.",
+        Picture.FRICTION,
+        reversed="Friction in positive direction is {offset_torque_n_m} below the mean of both directions.",
+    ),
+    search=SearchHints(typical=lambda a: (0.1 * a.friction,)),
     valid=_valid,
-    picture=Picture.FRICTION,
-    same_as="constant_load",
+    same_torque=lambda variant: "" if variant else constant_load.MECHANISM.id,
 )

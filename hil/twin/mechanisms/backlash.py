@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, Stage, Variant
+from hil.twin.mechanism import Block, Contact, Mechanism, Moment, Picture, Row, SearchHints, Stage, Text, Variant
 from hil.twin.mechanisms import table_side_friction
 from hil.twin.parameter import Dimension, Parameter, Role
 from hil.twin.scene import AxisFacts
@@ -32,7 +32,6 @@ MECHANISM = Mechanism(
     id="backlash",
     block=Block.TRANSMISSION,
     element="ball nut and thrust bearing",
-    sentence="There are {gap_m} of lost motion between screw and table.",
     equation="T = k dz(q, gap/2): no torque while |q| < gap/2",
     source="Nordin and Gutman, Automatica 38 (2002) 1633, dead-zone model",
     parameters=(Parameter("gap_m", Dimension.LENGTH, 0.0, 0.05, role=Role.STRENGTH),),
@@ -41,22 +40,23 @@ MECHANISM = Mechanism(
             Stage.TRANSMISSION,
             _free_play,
             "oiled flanks",
-            sentence="There are {gap_m} of lost motion between screw and table (oiled flanks resist parting).",
+            text=Text("There are {gap_m} of lost motion between screw and table (oiled flanks resist parting)."),
         ),
         Variant(
             Stage.TRANSMISSION,
             _free_play,
             "dry flanks",
-            sentence="There are {gap_m} of lost motion between screw and table (dry flanks only push).",
-            play=True,
+            text=Text("There are {gap_m} of lost motion between screw and table (dry flanks only push)."),
+            contact=Contact.PLAY,
         ),
     ),
-    starts=lambda s: [(f * s.stretch,) for f in (0.5, 1.0, 2.0, 4.0)],
-    typical=lambda a: (3e-6,),
+    text=Text("There are {gap_m} of lost motion between screw and table.", Picture.LOST_MOTION),
+    search=SearchHints(
+        starts=lambda s: [(f * s.stretch,) for f in (0.5, 1.0, 2.0, 4.0)],
+        proportional=False,
+        needs_table=True,
+        beside=table_side_friction.MECHANISM.id,
+    ),
     valid=_valid,
-    proportional=False,
-    needs_table=True,
-    beside=table_side_friction.MECHANISM.id,
-    picture=Picture.LOST_MOTION,
     softens=True,
 )

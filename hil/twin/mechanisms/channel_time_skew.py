@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 
 from hil.arrays import FloatArray
-from hil.twin.mechanism import Block, Mechanism, Stage, Variant
+from hil.twin.mechanism import Block, Mechanism, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
 from hil.twin.scene import Scene
 
@@ -65,7 +65,7 @@ def delayed(samples: FloatArray, periods: float) -> FloatArray:
     Interpolation between neighbours would average their noise, which a fit would take for evidence. The ends are
     continued by point reflection, the line between them is delayed by itself.
     """
-    if periods == 0.0:
+    if periods == 0.0 or not samples.size:
         return samples
     ends = min(_ENDS + math.ceil(abs(periods)), samples.size - 1)
     more = _odd_length(samples.size + 2 * ends) - samples.size - ends
@@ -77,22 +77,31 @@ def delayed(samples: FloatArray, periods: float) -> FloatArray:
     return np.asarray(late[ends : ends + samples.size], dtype=np.float64)
 
 
+_MOTOR = 2  # its variant: a motor position that is late is nearly like another channel that is early
+
+
+def _as_variant(values: Sequence[float], variant: int, other: int) -> Sequence[float]:
+    return [-values[0]] if (variant == _MOTOR) != (other == _MOTOR) else values
+
+
 MECHANISM = Mechanism(
     id="channel_time_skew",
     block=Block.SENSOR,
     element="time stamps of a channel",
-    sentence="The channel {variant} is recorded {delay_s} late against the others.",
-    reversed="The channel {variant} is recorded {delay_s} early against the others.",
     equation="y_recorded(t) = y(t - delay)",
     source="Laakso et al., IEEE Signal Processing Magazine 13 (1996) 30, fractional delay",
     parameters=(Parameter("delay_s", Dimension.TIME, -_MOST_S, _MOST_S, role=Role.STRENGTH),),
     variants=(
-        Variant(Stage.CHANNEL, _late_table, "table_position", needs_table=True),
-        Variant(Stage.CHANNEL, _late_torque, "torque", starts=_torque_starts, proportional=False),
-        Variant(Stage.CHANNEL, _late_motor, "motor_position", sign=-1.0),
+        Variant(Stage.CHANNEL, _late_table, "table_position", observable=lambda table_encoder: table_encoder),
+        Variant(Stage.ANSWER, _late_torque, "torque", starts=_torque_starts, proportional=False),
+        Variant(Stage.CHANNEL, _late_motor, "motor_position"),
     ),
-    first_unless_clear=True,  # motor position and torque are the clock unless their relation says otherwise
-    starts=lambda s: [(2e-4,)],
-    typical=lambda a: (2e-4,),
-    shifts_time=True,
+    text=Text(
+        "The channel {variant} is recorded {delay_s} late against the others.",
+        reversed="The channel {variant} is recorded {delay_s} early against the others.",
+    ),
+    # motor position and torque are the clock unless their relation says otherwise: the first variant is named
+    search=SearchHints(
+        lambda s: [(2e-4,)], lambda a: (2e-4,), shifts_time=True, as_variant=_as_variant, rank=lambda variant: variant
+    ),
 )

@@ -4,7 +4,7 @@ import math
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, Stage, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
 
 
@@ -17,7 +17,6 @@ MECHANISM = Mechanism(
     id="cogging_torque",
     block=Block.MOTOR_SIDE,
     element="motor magnets and teeth",
-    sentence="The motor cogs with {amplitude_n_m}, {wave}.",
     equation="T = u + A sin(n theta + phi)",
     source="Jahns and Soong, IEEE Trans. Industrial Electronics 43 (1996) 321, cogging torque",
     parameters=(
@@ -26,9 +25,11 @@ MECHANISM = Mechanism(
         Parameter("phase_rad", Dimension.ANGLE, -2.0 * math.pi, 2.0 * math.pi, role=Role.PHASE),
     ),
     variants=(Variant(Stage.MOTOR_TORQUE, _cogging),),
-    starts=lambda s: [(0.01 * s.coulomb, order, 0.0) for order in s.orders],
-    typical=lambda a: (0.02 * a.rated_torque, 12.0, 0.0),
-    picture=Picture.MOTOR_ANGLE,
+    text=Text("The motor cogs with {amplitude_n_m}, {wave}.", Picture.MOTOR_ANGLE),
+    search=SearchHints(
+        lambda s: [(0.01 * s.coulomb, order, 0.0) for order in s.orders],
+        lambda a: (0.02 * a.rated_torque, 12.0, 0.0),
+        screw_locked=True,
+    ),
     most=2,
-    screw_locked=True,
 )

@@ -5,7 +5,7 @@ A positive load pulls the axis in the negative direction: it takes a positive mo
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, Stage, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
 
 
@@ -18,12 +18,13 @@ MECHANISM = Mechanism(
     id="constant_load",
     block=Block.MOTOR_SIDE,
     element="weight or counterbalance of the axis",
-    sentence="A constant load of {load_torque_n_m}, such as a weight, acts on the axis, also at standstill.",
     equation="T = u - T_load",
     source="Groß, Hamann and Wiegärtner, Electrical Feed Drives in Automation (2001), weight of an axis",
     parameters=(Parameter("load_torque_n_m", Dimension.TORQUE, -1e4, 1e4, role=Role.STRENGTH),),
     variants=(Variant(Stage.MOTOR_TORQUE, _load),),
-    starts=lambda s: [(0.05 * s.coulomb,)],
-    typical=lambda a: (0.1 * a.friction,),
-    picture=Picture.FRICTION,
+    text=Text(
+        "A constant load of {load_torque_n_m}, such as a weight, acts on the axis, also at standstill.",
+        Picture.FRICTION,
+    ),
+    search=SearchHints(typical=lambda a: (0.1 * a.friction,)),
 )

@@ -2,7 +2,7 @@
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, Stage, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
 
 
@@ -16,14 +16,14 @@ MECHANISM = Mechanism(
     id="cumulative_lead_error",
     block=Block.TRANSMISSION,
     element="ball screw",
-    sentence="The lead is wrong: the table goes {slope_m_m} too far for each metre of travel.",
-    reversed="The lead is wrong: the table goes {slope_m_m} too little for each metre of travel.",
     equation="x = (1 + s) r theta",
     source="ISO 3408-3:2006, mean travel deviation",
     parameters=(Parameter("slope_m_m", Dimension.RATIO, -5e-3, 5e-3, role=Role.STRENGTH),),
     variants=(Variant(Stage.TRANSMISSION, _longer_lead),),
-    starts=lambda s: [(1e-6 / s.travel_m,)],
-    typical=lambda a: (20e-6,),
-    needs_table=True,
-    picture=Picture.POSITION_TABLE,
+    text=Text(
+        "The lead is wrong: the table goes {slope_m_m} too far for each metre of travel.",
+        Picture.POSITION_TABLE,
+        reversed="The lead is wrong: the table goes {slope_m_m} too little for each metre of travel.",
+    ),
+    search=SearchHints(lambda s: [(1e-6 / s.travel_m,)], lambda a: (20e-6,), needs_table=True),
 )

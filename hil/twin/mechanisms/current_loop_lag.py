@@ -4,7 +4,7 @@ import math
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, Stage, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
 
 
@@ -29,7 +29,6 @@ MECHANISM = Mechanism(
     id="current_loop_lag",
     block=Block.DRIVE,
     element="current loop of the drive",
-    sentence="The motor current follows its command with a time constant of {time_constant_s}.",
     equation="tau dT/dt = u - T",
     source="Leonhard, Control of Electrical Drives, 3rd ed. (2001), current loop as an equivalent lag",
     parameters=(Parameter("time_constant_s", Dimension.TIME, 1e-5, 0.05, role=Role.STRENGTH),),
@@ -37,8 +36,6 @@ MECHANISM = Mechanism(
         Variant(Stage.CURRENT, _lagging_current, "measured"),
         Variant(Stage.TORQUE, _lagging_current, "hidden"),
     ),
-    starts=lambda s: [(2e-4,), (1e-3,)],
-    typical=lambda a: (5e-4,),
-    proportional=False,
-    picture=Picture.DRIVE_LAW,
+    text=Text("The motor current follows its command with a time constant of {time_constant_s}.", Picture.DRIVE_LAW),
+    search=SearchHints(lambda s: [(2e-4,), (1e-3,)], lambda a: (5e-4,), proportional=False),
 )

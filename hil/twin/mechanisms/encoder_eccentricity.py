@@ -7,7 +7,7 @@ import math
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, Stage, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
 
 
@@ -20,7 +20,6 @@ MECHANISM = Mechanism(
     id="encoder_eccentricity",
     block=Block.SENSOR,
     element="motor encoder",
-    sentence="The motor encoder sits off centre: it errs by {amplitude_rad} once per revolution.",
     equation="theta_read = theta + A sin(theta + phi), A = eccentricity / graduation radius",
     source="Heidenhain, Angle Encoders without Integral Bearing (catalogue), eccentricity of the graduation",
     parameters=(
@@ -28,7 +27,8 @@ MECHANISM = Mechanism(
         Parameter("phase_rad", Dimension.ANGLE, -2.0 * math.pi, 2.0 * math.pi, role=Role.PHASE),
     ),
     variants=(Variant(Stage.MOTOR_READING, _eccentric_reading),),
-    starts=lambda s: [(1e-4, 0.0)],
-    typical=lambda a: (2e-4 / a.angle_per_unit, 0.0),
-    picture=Picture.MOTOR_ANGLE_TABLE,
+    text=Text(
+        "The motor encoder sits off centre: it errs by {amplitude_rad} once per revolution.", Picture.MOTOR_ANGLE_TABLE
+    ),
+    search=SearchHints(typical=lambda a: (2e-4 / a.angle_per_unit, 0.0)),
 )

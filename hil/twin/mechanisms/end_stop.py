@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, Stage, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
 from hil.twin.scene import AxisFacts, Scene
 
@@ -48,7 +48,6 @@ MECHANISM = Mechanism(
     id="end_stop",
     block=Block.TABLE,
     element="buffer, bellows or cover at an end of the travel",
-    sentence="From {edge_m} to the upper end of the travel, an elastic stop of {stiffness_n_m} pushes the table back.",
     equation="F_table = -k max(x - x0, 0) at the upper end, k max(x0 - x, 0) at the lower end",
     source="Hunt and Crossley, J. Appl. Mech. 42 (1975) 440, contact with a stop; Johnson, Contact Mechanics (1985): "
     "linear as Hooke's law, since a buffer is no sphere",
@@ -62,13 +61,18 @@ MECHANISM = Mechanism(
             Stage.TABLE_FORCE,
             _below,
             "lower end",
-            sentence="From {edge_m} to the lower end of the travel, an elastic stop of {stiffness_n_m} pushes the "
-            "table back.",
+            text=Text(
+                "From {edge_m} to the lower end of the travel, an elastic stop of {stiffness_n_m} pushes the "
+                "table back."
+            ),
             starts=lambda s: _at(s, upper=False),
         ),
     ),
-    typical=lambda a: (100.0 * a.friction / a.ratio, 0.1),
+    text=Text(
+        "From {edge_m} to the upper end of the travel, an elastic stop of {stiffness_n_m} pushes the table back.",
+        Picture.POSITION,
+    ),
+    search=SearchHints(typical=lambda a: (100.0 * a.friction / a.ratio, 0.1)),
     valid=_is_at_an_end,
     most=2,  # one at each end
-    picture=Picture.POSITION,
 )

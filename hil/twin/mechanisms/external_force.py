@@ -6,8 +6,17 @@ import numpy as np
 from numba import njit
 
 from hil.arrays import FloatArray
-from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, Stage, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
+
+_ONE = "From {start_s} to {end_s} a force of {force_n} acts on the table (positive forwards)."
+_SEVERAL = (
+    "In {count} windows from {start_s} to {end_s} forces of up to {force_n} act on the table (positive forwards)."
+)
+_PERIODIC = (
+    "From {start_s} to {end_s} a force of {force_n} (positive forwards) acts on the table {count} times, for "
+    "{width_s} every {period_s}."
+)
 
 
 @njit
@@ -27,11 +36,14 @@ def _pushes(time_s: FloatArray, period_s: float, values: Sequence[float]) -> Flo
     return np.asarray(force_n / period_s * np.maximum(overlap_s, 0.0), dtype=np.float64)
 
 
+def _sentence(windows: int, periodic: bool) -> str:
+    return _PERIODIC if periodic else _SEVERAL if windows > 1 else _ONE
+
+
 MECHANISM = Mechanism(
     id="external_force",
     block=Block.TABLE,
     element="surroundings of the table",
-    sentence="From {start_s} to {end_s} a force of {force_n} acts on the table (positive forwards).",
     equation="F_table = F for start <= t < end, else 0",
     source="Newton's second law; such as the pneumatic cylinder that loads the table of the source's test bench",
     parameters=(
@@ -40,12 +52,10 @@ MECHANISM = Mechanism(
         Parameter("end_s", Dimension.TIME, 0.0, 1e5, role=Role.EDGE),
     ),
     variants=(Variant(Stage.TABLE_FORCE, _push),),
-    starts=lambda s: [(s.window[2] / s.ratio or 1.0, s.window[0], s.window[1])],
-    typical=lambda a: (0.2 * a.friction / a.ratio, 0.5 * a.duration_s, 0.5 * a.duration_s + 1.0),
+    text=Text(_ONE, Picture.FORCE, of_windows=_sentence),
+    search=SearchHints(
+        lambda s: [(s.window[2] / s.ratio or 1.0, s.window[0], s.window[1])],
+        lambda a: (0.2 * a.friction / a.ratio, 0.5 * a.duration_s, 0.5 * a.duration_s + 1.0),
+    ),
     over_time=_pushes,
-    picture=Picture.FORCE,
-    repeated="In {count} windows from {start_s} to {end_s} forces of up to {force_n} act on the table (positive "
-    "forwards).",
-    periodic="From {start_s} to {end_s} a force of {force_n} (positive forwards) acts on the table {count} times, for "
-    "{width_s} every {period_s}.",
 )

@@ -4,7 +4,7 @@ import math
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Row, Stage, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
 
 
@@ -20,7 +20,6 @@ MECHANISM = Mechanism(
     id="friction_drift",
     block=Block.MOTOR_SIDE,
     element="lubricant of nut and bearings",
-    sentence="Friction changes by a share of {fraction} while the axis runs, within about {time_constant_s}.",
     equation="F(t) = F (1 + a (1 - exp(-t/tau)))",
     source="Bittencourt and Gunnarsson, ASME J. Dynamic Systems, Measurement, and Control 134 (2012) 051013",
     parameters=(
@@ -28,6 +27,6 @@ MECHANISM = Mechanism(
         Parameter("time_constant_s", Dimension.TIME, 1.0, 1e4),
     ),
     variants=(Variant(Stage.FRICTION_SCALE, _warming),),
-    starts=lambda s: [(0.05, f * s.duration_s) for f in (0.2, 1.0, 5.0)],
-    typical=lambda a: (0.2, 600.0),
+    text=Text("Friction changes by a share of {fraction} while the axis runs, within about {time_constant_s}."),
+    search=SearchHints(lambda s: [(0.05, f * s.duration_s) for f in (0.2, 1.0, 5.0)], lambda a: (0.2, 600.0)),
 )

@@ -5,7 +5,7 @@ A guide out of line, a cover or a cable that is dragged along, or a nut that wea
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, Stage, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
 
 
@@ -18,12 +18,12 @@ MECHANISM = Mechanism(
     id="friction_gradient",
     block=Block.MOTOR_SIDE,
     element="guideways, covers or ball screw",
-    sentence="Friction changes along the travel by {slope_1_m}, as a share of its level at position zero.",
     equation="F = Fc (1 + s x)",
     source="Armstrong-Hélouvry, Control of Machines with Friction (1991), position-dependent friction",
     parameters=(Parameter("slope_1_m", Dimension.PER_LENGTH, -20.0, 20.0, role=Role.STRENGTH),),
     variants=(Variant(Stage.COULOMB, _rising_level),),
-    starts=lambda s: [(0.1 / s.travel_m,)],
-    typical=lambda a: (1.0,),
-    picture=Picture.FRICTION_ALONG_TRAVEL,
+    text=Text(
+        "Friction changes along the travel by {slope_1_m}, as a share of its level at position zero.",
+        Picture.FRICTION_ALONG_TRAVEL,
+    ),
 )

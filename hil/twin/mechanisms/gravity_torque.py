@@ -7,7 +7,7 @@ import math
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, Stage, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
 
 
@@ -20,7 +20,6 @@ MECHANISM = Mechanism(
     id="gravity_torque",
     block=Block.TABLE,
     element="weight of the arm",
-    sentence="Gravity turns the load with up to {gravity_torque_n_m}.",
     equation="T_load = -m g r sin(q + q0)",
     source="Spong, Hutchinson and Vidyasagar, Robot Modeling and Control (2006), sec. 7.4, gravity of a link",
     parameters=(
@@ -28,9 +27,8 @@ MECHANISM = Mechanism(
         Parameter("angle_rad", Dimension.ANGLE, -2.0 * math.pi, 2.0 * math.pi, role=Role.PHASE),
     ),
     variants=(Variant(Stage.TABLE_FORCE, _pull_down),),
-    starts=lambda s: [(0.1 * s.coulomb / s.ratio, 0.0)],
-    typical=lambda a: (0.5 * a.friction / a.ratio, 0.0),
-    picture=Picture.POSITION,
+    text=Text("Gravity turns the load with up to {gravity_torque_n_m}.", Picture.POSITION),
+    search=SearchHints(lambda s: [(0.1 * s.coulomb / s.ratio, 0.0)], lambda a: (0.5 * a.friction / a.ratio, 0.0)),
+    told_by_m=lambda values, a: 0.0,
     turning=True,
-    part_of_wave=True,
 )

@@ -8,7 +8,7 @@ import math
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, Stage, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
 
 
@@ -21,7 +21,6 @@ MECHANISM = Mechanism(
     id="load_encoder_eccentricity",
     block=Block.SENSOR,
     element="load encoder",
-    sentence="The load encoder sits off centre: it errs by {amplitude_rad} once per revolution of the load.",
     equation="q_read = q + A sin(q + phi), A = eccentricity / graduation radius",
     source="Heidenhain, Angle Encoders without Integral Bearing (catalogue), eccentricity of the graduation",
     parameters=(
@@ -29,9 +28,10 @@ MECHANISM = Mechanism(
         Parameter("phase_rad", Dimension.ANGLE, -2.0 * math.pi, 2.0 * math.pi, role=Role.PHASE),
     ),
     variants=(Variant(Stage.TABLE_READING, _eccentric_reading),),
-    starts=lambda s: [(1e-5, 0.0)],
-    typical=lambda a: (2e-4, 0.0),
-    needs_table=True,
+    text=Text(
+        "The load encoder sits off centre: it errs by {amplitude_rad} once per revolution of the load.",
+        Picture.POSITION_TABLE,
+    ),
+    search=SearchHints(lambda s: [(1e-5, 0.0)], lambda a: (2e-4, 0.0), needs_table=True),
     turning=True,
-    picture=Picture.POSITION_TABLE,
 )

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, Stage, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
 from hil.twin.scene import AxisFacts, Scene
 
@@ -47,10 +47,6 @@ MECHANISM = Mechanism(
     id="local_friction",
     block=Block.MOTOR_SIDE,
     element="ball screw, guideways or covers",
-    sentence="From {begin_m} to {end_m} of the travel, friction is higher by a share of {fraction}; it changes over "
-    "{flank_m} at either end.",
-    reversed="From {begin_m} to {end_m} of the travel, friction is lower by a share of {fraction}; it changes over "
-    "{flank_m} at either end.",
     equation="F = Fc (1 + a s(x)), s = 1 in the zone, 0 outside, straight flanks; half height at `from` and `to`",
     source="Armstrong-Hélouvry, Control of Machines with Friction (1991), position-dependent friction",
     parameters=(
@@ -60,8 +56,13 @@ MECHANISM = Mechanism(
         Parameter("flank_m", Dimension.LENGTH, _STEEPEST_M, 1.0),
     ),
     variants=(Variant(Stage.COULOMB, _level_in_zone),),
-    starts=_starts,
-    typical=lambda a: (0.5, 0.1, 0.15, 0.01),
+    text=Text(
+        "From {begin_m} to {end_m} of the travel, friction is higher by a share of {fraction}; it changes over "
+        "{flank_m} at either end.",
+        Picture.FRICTION_ALONG_TRAVEL,
+        reversed="From {begin_m} to {end_m} of the travel, friction is lower by a share of {fraction}; it changes over "
+        "{flank_m} at either end.",
+    ),
+    search=SearchHints(_starts, lambda a: (0.5, 0.1, 0.15, 0.01)),
     valid=_is_zone,
-    picture=Picture.FRICTION_ALONG_TRAVEL,
 )

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, Stage, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
 from hil.twin.scene import AxisFacts
 
@@ -32,7 +32,6 @@ MECHANISM = Mechanism(
     id="periodic_force",
     block=Block.TABLE,
     element="surroundings of the table",
-    sentence="A force of {force_n} at {frequency_hz} acts on the table all the time.",
     equation="F_table = F sin(2 pi f t + phi)",
     source="ISO 20816-1:2016, vibration of machines; Newton's second law",
     parameters=(
@@ -41,8 +40,10 @@ MECHANISM = Mechanism(
         Parameter("phase_rad", Dimension.ANGLE, -2.0 * math.pi, 2.0 * math.pi, role=Role.PHASE),
     ),
     variants=(Variant(Stage.TABLE_FORCE, _shake),),
-    starts=lambda s: [(0.1 * s.coulomb / s.ratio, frequency_hz, 0.0) for frequency_hz in s.lines_hz],
-    typical=lambda a: (0.2 * a.friction / a.ratio, 7.0, 0.0),
+    text=Text("A force of {force_n} at {frequency_hz} acts on the table all the time.", Picture.SPECTRUM),
+    search=SearchHints(
+        lambda s: [(0.1 * s.coulomb / s.ratio, frequency_hz, 0.0) for frequency_hz in s.lines_hz],
+        lambda a: (0.2 * a.friction / a.ratio, 7.0, 0.0),
+    ),
     valid=_valid,
-    picture=Picture.SPECTRUM,
 )

@@ -7,7 +7,7 @@ import math
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, Stage, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
 
 
@@ -25,8 +25,6 @@ MECHANISM = Mechanism(
     id="periodic_lead_error",
     block=Block.TRANSMISSION,
     element="ball screw",
-    sentence="The lead errs with the angle of the screw: by {amplitude_m} once, {amplitude_2_m} twice and "
-    "{amplitude_3_m} three times per revolution.",
     equation="x = r theta + sum over n = 1, 2, 3 of A_n sin(n theta + phi_n)",
     source="ISO 3408-3:2006, travel variation within 2 pi rad; ISO 230-2, bidirectional positioning",
     parameters=(
@@ -38,7 +36,10 @@ MECHANISM = Mechanism(
         Parameter("phase_3_rad", Dimension.ANGLE, -2.0 * math.pi, 2.0 * math.pi, 0.0, role=Role.PHASE),
     ),
     variants=(Variant(Stage.TRANSMISSION, _wobble),),
-    starts=lambda s: [(0.5e-6, 0.0, 0.0, 0.0, 0.0, 0.0)],
-    typical=lambda a: (2e-6, 0.0),
-    picture=Picture.SCREW_ANGLE,
+    text=Text(
+        "The lead errs with the angle of the screw: by {amplitude_m} once, {amplitude_2_m} twice and "
+        "{amplitude_3_m} three times per revolution.",
+        Picture.SCREW_ANGLE,
+    ),
+    search=SearchHints(lambda s: [(0.5e-6, 0.0, 0.0, 0.0, 0.0, 0.0)], lambda a: (2e-6, 0.0)),
 )

@@ -4,7 +4,7 @@ import math
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, Stage, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
 
 
@@ -20,7 +20,6 @@ MECHANISM = Mechanism(
     id="position_dependent_friction",
     block=Block.MOTOR_SIDE,
     element="ball nut and screw",
-    sentence="Friction varies by a share of {fraction} along the travel, with a period of {period_m}.",
     equation="F = Fc (1 + a sin(2 pi x / p + phi))",
     source="Armstrong-Hélouvry, Control of Machines with Friction (1991), position-dependent friction",
     parameters=(
@@ -29,9 +28,10 @@ MECHANISM = Mechanism(
         Parameter("phase_rad", Dimension.ANGLE, -2.0 * math.pi, 2.0 * math.pi, role=Role.PHASE),
     ),
     variants=(Variant(Stage.COULOMB, _level_along_travel),),
-    starts=lambda s: [(0.05, p, 0.0) for p in s.friction_periods],
-    typical=lambda a: (0.1, 0.1, 0.0),
-    picture=Picture.FRICTION_ALONG_TRAVEL,
+    text=Text(
+        "Friction varies by a share of {fraction} along the travel, with a period of {period_m}.",
+        Picture.FRICTION_ALONG_TRAVEL,
+    ),
+    search=SearchHints(typical=lambda a: (0.1, 0.1, 0.0), screw_locked=True),
     most=2,
-    screw_locked=True,
 )

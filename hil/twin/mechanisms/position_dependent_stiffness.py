@@ -2,7 +2,7 @@
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Row, Stage, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
 
 
@@ -15,12 +15,11 @@ MECHANISM = Mechanism(
     id="position_dependent_stiffness",
     block=Block.TRANSMISSION,
     element="screw between bearing and nut",
-    sentence="The stiffness of the screw changes by a share of {relative_slope} for each metre of travel.",
     equation="T = k max(1 + s x, 0) q,   k: torsion and axial give of the screw, one after the other",
     source="Zaeh, Oertli and Milberg, CIRP Annals 53 (2004) 289, screw stiffness over the position of its nut",
     parameters=(Parameter("relative_slope", Dimension.PER_LENGTH, -10.0, 10.0, role=Role.STRENGTH),),
     variants=(Variant(Stage.SCREW, _stiffness_along_travel),),
-    starts=lambda s: [(0.1 / s.travel_m,)],
-    typical=lambda a: (0.5,),
+    text=Text("The stiffness of the screw changes by a share of {relative_slope} for each metre of travel."),
+    search=SearchHints(typical=lambda a: (0.5,)),
     softens=True,
 )

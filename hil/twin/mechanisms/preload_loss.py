@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, Stage, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, SearchHints, Stage, Text, Variant
 from hil.twin.mechanisms import table_side_friction
 from hil.twin.parameter import Dimension, Parameter, Role
 from hil.twin.scene import AxisFacts
@@ -31,7 +31,6 @@ MECHANISM = Mechanism(
     id="preload_loss",
     block=Block.TRANSMISSION,
     element="preload of ball nut and thrust bearing",
-    sentence="Over {zone_m} around zero load the transmission has {stiffness_ratio} of its stiffness: preload is lost.",
     equation="T = k e(q), de/dq = rho for |q| < zone/2, else 1",
     source="ISO 3408-4:2006, axial rigidity of preloaded nuts; Feng and Pan, Int. J. Machine Tools 52 (2012) 85",
     parameters=(
@@ -39,15 +38,20 @@ MECHANISM = Mechanism(
         Parameter("stiffness_ratio", Dimension.RATIO, 0.0, 1.0),
     ),
     variants=(Variant(Stage.TRANSMISSION, _soft_zone),),
-    starts=lambda s: (
-        [(f * s.stretch, 0.4) for f in (0.5, 1.0, 2.0)] + [(f * s.most_stretch, 0.4) for f in (0.5, 1.0, 1.5)]
+    text=Text(
+        "Over {zone_m} around zero load the transmission has {stiffness_ratio} of its stiffness: preload is lost.",
+        Picture.LOST_MOTION,
     ),
-    typical=lambda a: (3e-6, 0.5),
+    search=SearchHints(
+        lambda s: (
+            [(f * s.stretch, 0.4) for f in (0.5, 1.0, 2.0)] + [(f * s.most_stretch, 0.4) for f in (0.5, 1.0, 1.5)]
+        ),
+        lambda a: (3e-6, 0.5),
+        proportional=False,
+        needs_table=True,
+        beside=table_side_friction.MECHANISM.id,
+        restarts=lambda stretch_m: [(f * stretch_m, ratio) for f, ratio in ((1.0, 0.15), (1.0, 0.4), (0.5, 0.15))],
+    ),
     valid=_valid,
-    proportional=False,
-    needs_table=True,
-    beside=table_side_friction.MECHANISM.id,
-    picture=Picture.LOST_MOTION,
     softens=True,
-    hidden_starts=((1.0, 0.15), (1.0, 0.4), (0.5, 0.15)),
 )

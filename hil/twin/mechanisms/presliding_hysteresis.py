@@ -3,9 +3,11 @@
 Where a share of the friction acts on the table, the same share of the stiffness does.
 """
 
+import math
+
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Row, Stage, Variant
+from hil.twin.mechanism import Block, Contact, Mechanism, Moment, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
 
 
@@ -18,7 +20,6 @@ MECHANISM = Mechanism(
     id="presliding_hysteresis",
     block=Block.MOTOR_SIDE,
     element="ball nut and guideways",
-    sentence="Before it slides, the contact yields like a spring of {stiffness_n_m_rad}.",
     equation="F = sigma z, dz/dt = v (1 - sigma z sign(v) / F(v)); Maxwell slip: F = sum of f_i, df_i/dt = k_i v while "
     "|f_i| < y_i",
     source="Dahl, A solid friction model (1968); Canudas de Wit et al., IEEE Trans. Automatic Control 40 (1995) 419; "
@@ -30,15 +31,18 @@ MECHANISM = Mechanism(
             Stage.BRISTLE,
             _contact_stiffness,
             "Maxwell slip",
-            sentence=(
+            text=Text(
                 "Before it slides, the contact yields like a spring of {stiffness_n_m_rad}, and like it again from "
                 "wherever it turns."
             ),
-            slips=True,
+            contact=Contact.SLIPS,
         ),
     ),
-    starts=lambda s: [(s.coulomb * s.ratio / d,) for d in (0.3e-6, 1e-6, 4e-6, 16e-6)],
-    typical=lambda a: (a.friction * a.ratio / 5e-6,),
-    proportional=False,
-    neutral_at_zero=False,
+    text=Text("Before it slides, the contact yields like a spring of {stiffness_n_m_rad}."),
+    search=SearchHints(
+        lambda s: [(s.coulomb * s.ratio / d,) for d in (0.3e-6, 1e-6, 4e-6, 16e-6)],
+        lambda a: (a.friction * a.ratio / 5e-6,),
+        proportional=False,
+    ),
+    neutral=lambda a: math.inf,
 )

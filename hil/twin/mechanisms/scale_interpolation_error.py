@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, Stage, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
 from hil.twin.scene import AxisFacts, Scene
 
@@ -45,7 +45,6 @@ MECHANISM = Mechanism(
     id="scale_interpolation_error",
     block=Block.SENSOR,
     element="linear encoder",
-    sentence="The linear encoder errs by {amplitude_m} within each signal period of {period_m}.",
     equation="x_read = x + A sin(2 pi x / p + phi)",
     source="Heydemann, Quadrature fringe measurement errors in interferometers, Applied Optics 20 (1981) 3382",
     parameters=(
@@ -54,9 +53,9 @@ MECHANISM = Mechanism(
         Parameter("phase_rad", Dimension.ANGLE, -2.0 * math.pi, 2.0 * math.pi, role=Role.PHASE),
     ),
     variants=(Variant(Stage.TABLE_READING, _interpolated_reading),),
-    starts=_starts,
-    typical=lambda a: (max(0.5 * (a.table_count_m or 1e-7), 1e-7), 20e-6, 0.0),
+    text=Text(
+        "The linear encoder errs by {amplitude_m} within each signal period of {period_m}.", Picture.SIGNAL_PERIOD
+    ),
+    search=SearchHints(_starts, lambda a: (max(0.5 * (a.table_count_m or 1e-7), 1e-7), 20e-6, 0.0), needs_table=True),
     valid=_valid,
-    needs_table=True,
-    picture=Picture.SIGNAL_PERIOD,
 )

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, Stage, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, SearchHints, Stage, Text, Variant
 from hil.twin.mechanisms.constant_load import MECHANISM as LOAD
 from hil.twin.parameter import Dimension, Parameter, Role
 from hil.twin.scene import AxisFacts, Scene
@@ -34,7 +34,6 @@ MECHANISM = Mechanism(
     id="spring_load",
     block=Block.TABLE,
     element="cable chain, hoses or counterbalance",
-    sentence="A spring of {stiffness_n_m} pulls the table towards {rest_position_m}.",
     equation="F_table = -k (x - x0)",
     source="Hooke's law; Groß, Hamann and Wiegärtner, Electrical Feed Drives in Automation (2001), load forces",
     parameters=(
@@ -42,9 +41,8 @@ MECHANISM = Mechanism(
         Parameter("rest_position_m", Dimension.LENGTH, -_REACH_M, _REACH_M),
     ),
     variants=(Variant(Stage.TABLE_FORCE, _pull_to_rest),),
-    starts=_starts,
-    typical=lambda a: (0.5 * a.friction / a.ratio, 0.0),
+    text=Text("A spring of {stiffness_n_m} pulls the table towards {rest_position_m}.", Picture.POSITION),
+    search=SearchHints(_starts, lambda a: (0.5 * a.friction / a.ratio, 0.0)),
     valid=_valid,
     beyond=lambda values, a: (LOAD.id, (-values[0] * values[1] * a.ratio,)),
-    picture=Picture.POSITION,
 )

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, Stage, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
 from hil.twin.scene import AxisFacts
 
@@ -45,7 +45,6 @@ MECHANISM = Mechanism(
     id="stribeck_friction",
     block=Block.MOTOR_SIDE,
     element="ball nut and guideways",
-    sentence="Friction falls from {static_torque_n_m} at rest as speed passes {stribeck_velocity_rad_s}.",
     equation="F(v) = Fc + (Fs - Fc) s(v/vs); s(u) = exp(-u^2), exp(-u) or 1/(1 + u^2)",
     source="Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30 (1994) 1083: Gaussian; Tustin (1947): "
     "exponential; Hess and Soom (1990): Lorentzian",
@@ -58,11 +57,14 @@ MECHANISM = Mechanism(
         Variant(Stage.COULOMB, _exponential, "exponential"),
         Variant(Stage.COULOMB, _lorentzian, "Lorentzian"),
     ),
-    starts=lambda s: [(1.3 * s.coulomb, f * s.peak_speed) for f in (0.003, 0.01, 0.04)],
-    typical=lambda a: (1.5 * a.friction, 2e-3 / a.ratio),
+    text=Text(
+        "Friction falls from {static_torque_n_m} at rest as speed passes {stribeck_velocity_rad_s}.", Picture.FRICTION
+    ),
+    search=SearchHints(
+        lambda s: [(1.3 * s.coulomb, f * s.peak_speed) for f in (0.003, 0.01, 0.04)],
+        lambda a: (1.5 * a.friction, 2e-3 / a.ratio),
+        proportional=False,
+    ),
     valid=_valid,
-    proportional=False,
-    picture=Picture.FRICTION,
-    neutral_at_zero=False,
     neutral=lambda a: a.coulomb,
 )

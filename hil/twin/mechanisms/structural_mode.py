@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from hil.arrays import FloatArray
-from hil.twin.mechanism import Block, Mechanism, Picture, Stage, Variant
+from hil.twin.mechanism import Block, Mechanism, Picture, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
 from hil.twin.scene import AxisFacts
 from hil.twin.structure.chain import Chain
@@ -113,7 +113,6 @@ MECHANISM = Mechanism(
     id="structural_mode",
     block=Block.TABLE,
     element="machine base, column or screw torsion",
-    sentence="A structure of {mass_ratio} of the table's mass sways at {frequency_hz}, damped by {damping_ratio}.",
     equation="m_a x_a'' + k_a (x_a - x) = 0, k_a = m_a (2 pi f)^2, m_a = mu m_table, damped by xi where the table "
     "is held; or a base of m_table / mu under the axis, which sways with the table at f",
     source="Den Hartog, Mechanical Vibrations, 4th ed. (1956), auxiliary mass on a spring",
@@ -128,7 +127,7 @@ MECHANISM = Mechanism(
             Stage.CHAIN,
             _with_yielding_base,
             "yielding base",
-            sentence=(
+            text=Text(
                 "The machine base yields: it sways with the table at {frequency_hz}, damped by {damping_ratio}; "
                 "the table has {mass_ratio} of its mass."
             ),
@@ -137,20 +136,25 @@ MECHANISM = Mechanism(
             Stage.CHAIN,
             _with_flexible_load,
             "flexible load",
-            element="load on an elastic arm, shaft or belt",
-            sentence=(
+            text=Text(
                 "The load is flexible: an inertia {mass_ratio} times that of the rest of the axis swings against a "
                 "motor at rest with {frequency_hz} (antiresonance of the motor), damped by {damping_ratio}."
             ),
+            element="load on an elastic arm, shaft or belt",
             # an arm or a bar swings at some hertz; behind a belt or a gear it may be most of the inertia
             starts=lambda s: [(f, 0.03, ratio) for f in np.geomspace(1.5, 100.0, 13) for ratio in (0.3, 3.0)],
-            motor_alone=True,
+            observable=lambda table_encoder: not table_encoder,
         ),
     ),
-    starts=lambda s: [(f, 0.03, 0.15) for f in np.geomspace(12.0, 240.0, 13)],
-    typical=lambda a: (40.0, 0.03, 0.1),
+    text=Text(
+        "A structure of {mass_ratio} of the table's mass sways at {frequency_hz}, damped by {damping_ratio}.",
+        Picture.SPECTRUM,
+    ),
+    search=SearchHints(
+        lambda s: [(f, 0.03, 0.15) for f in np.geomspace(12.0, 240.0, 13)],
+        lambda a: (40.0, 0.03, 0.1),
+        proportional=False,
+        needs_table=True,
+    ),
     valid=_valid,
-    proportional=False,
-    needs_table=True,
-    picture=Picture.SPECTRUM,
 )

@@ -2,7 +2,7 @@
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Row, Stage, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
 
 
@@ -16,13 +16,13 @@ MECHANISM = Mechanism(
     id="table_side_viscous_friction",
     block=Block.TABLE,
     element="guideways",
-    sentence="The share of the viscous friction on the motor is {share} less than that of Coulomb friction.",
-    reversed="The share of the viscous friction on the table is {share} less than that of Coulomb friction.",
     equation="F_table = s Fc sign(v) + s' Fv v; s' = s + d (1 - s) for d > 0, s + d s for d < 0; F_motor = F - F_table",
     source="Altintas, Verl, Brecher, Uriarte and Pritschow, Machine tool feed drives, CIRP Annals 60 (2011) 779",
     parameters=(Parameter("share", Dimension.RATIO, -1.0, 1.0, role=Role.STRENGTH),),
     variants=(Variant(Stage.TABLE_VISCOUS_SHARE, _more_on_table),),
-    starts=lambda s: [(0.1,), (-0.1,)],  # one has no effect beside a share of 0 or 1
-    typical=lambda a: (0.5,),
-    needs_table=True,
+    text=Text(
+        "The share of the viscous friction on the motor is {share} less than that of Coulomb friction.",
+        reversed="The share of the viscous friction on the table is {share} less than that of Coulomb friction.",
+    ),
+    search=SearchHints(lambda s: [(0.1,), (-0.1,)], lambda a: (0.5,), needs_table=True),
 )

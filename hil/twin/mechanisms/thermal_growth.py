@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Row, Stage, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
 from hil.twin.scene import AxisFacts
 
@@ -29,7 +29,6 @@ MECHANISM = Mechanism(
     id="thermal_growth",
     block=Block.TRANSMISSION,
     element="ball screw",
-    sentence="The screw grows by {relative_growth} of its length as it warms up, within about {time_constant_s}.",
     equation="x = (1 + g (1 - exp(-t/tau))) r theta",
     source="ISO 230-3, thermal effects; Bryan, CIRP Annals 39 (1990) 645",
     parameters=(
@@ -37,8 +36,11 @@ MECHANISM = Mechanism(
         Parameter("time_constant_s", Dimension.TIME, 1.0, 1e4),
     ),
     variants=(Variant(Stage.TRANSMISSION, _grown_lead),),
-    starts=lambda s: [(1e-6 / s.travel_m, f * s.duration_s) for f in (0.2, 1.0, 5.0)],
-    typical=lambda a: (50e-6, 1800.0),
+    text=Text("The screw grows by {relative_growth} of its length as it warms up, within about {time_constant_s}."),
+    search=SearchHints(
+        lambda s: [(1e-6 / s.travel_m, f * s.duration_s) for f in (0.2, 1.0, 5.0)],
+        lambda a: (50e-6, 1800.0),
+        needs_table=True,
+    ),
     valid=_valid,
-    needs_table=True,
 )

@@ -4,7 +4,7 @@ import math
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, Stage, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
 
 
@@ -22,12 +22,12 @@ MECHANISM = Mechanism(
     id="torque_constant_saturation",
     block=Block.DRIVE,
     element="motor iron",
-    sentence="The torque constant falls with current: T = u (1 - c u^2), c = {coefficient_1_n2_m2}.",
     equation="T = u (1 - c u^2) up to where that is greatest, |u| = 1 / sqrt(3 c), and no more beyond",
     source="Krishnan, Permanent Magnet Synchronous and Brushless DC Motor Drives (2010), magnetic saturation",
     parameters=(Parameter("coefficient_1_n2_m2", Dimension.INVERSE_TORQUE_SQUARED, 0.0, 1.0, role=Role.STRENGTH),),
     variants=(Variant(Stage.TORQUE, _saturating_torque_constant),),
-    starts=lambda s: [(0.02 / s.peak_torque**2,)],
-    typical=lambda a: (0.1 / (3.0 * a.rated_torque) ** 2,),
-    picture=Picture.DRIVE_LAW,
+    text=Text(
+        "The torque constant falls with current: T = u (1 - c u^2), c = {coefficient_1_n2_m2}.", Picture.DRIVE_LAW
+    ),
+    search=SearchHints(lambda s: [(0.02 / s.peak_torque**2,)], lambda a: (0.1 / (3.0 * a.rated_torque) ** 2,)),
 )

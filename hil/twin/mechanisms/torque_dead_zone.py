@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, Stage, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
 from hil.twin.scene import AxisFacts
 
@@ -31,7 +31,6 @@ MECHANISM = Mechanism(
     id="torque_dead_zone",
     block=Block.DRIVE,
     element="servo amplifier",
-    sentence="The drive gives no torque for commands below {half_width_n_m}.",
     equation="T = 0 for |u| <= w, else u - w sign(u); as a gate: else u",
     source="Tao and Kokotović, Adaptive Control of Systems with Actuator and Sensor Nonlinearities (1996)",
     parameters=(Parameter("half_width_n_m", Dimension.TORQUE, 0.0, 1e3, role=Role.STRENGTH),),
@@ -41,9 +40,9 @@ MECHANISM = Mechanism(
         Variant(Stage.CURRENT, _gate, "measured gate"),
         Variant(Stage.TORQUE, _gate, "hidden gate"),
     ),
-    starts=lambda s: [(f * s.coulomb,) for f in (0.03, 0.15)],
-    typical=lambda a: (0.05 * a.friction,),
-    proportional=False,
-    picture=Picture.DRIVE_LAW,
+    text=Text("The drive gives no torque for commands below {half_width_n_m}.", Picture.DRIVE_LAW),
+    search=SearchHints(
+        lambda s: [(f * s.coulomb,) for f in (0.03, 0.15)], lambda a: (0.05 * a.friction,), proportional=False
+    ),
     valid=_valid,
 )

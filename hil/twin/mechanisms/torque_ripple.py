@@ -4,7 +4,7 @@ import math
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, Stage, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
 
 
@@ -17,7 +17,6 @@ MECHANISM = Mechanism(
     id="torque_ripple",
     block=Block.DRIVE,
     element="motor windings and current measurement",
-    sentence="The torque per ampere varies by a share of {fraction}, {wave}.",
     equation="T = u (1 + a sin(n theta + phi))",
     source="Jahns and Soong, IEEE Trans. Industrial Electronics 43 (1996) 321, ripple torque",
     parameters=(
@@ -26,9 +25,11 @@ MECHANISM = Mechanism(
         Parameter("phase_rad", Dimension.ANGLE, -2.0 * math.pi, 2.0 * math.pi, role=Role.PHASE),
     ),
     variants=(Variant(Stage.TORQUE, _rippling_torque),),
-    starts=lambda s: [(0.01, order, 0.0) for order in dict.fromkeys((*s.ripple_orders, *s.orders))],
-    typical=lambda a: (0.02, 6.0, 0.0),
-    picture=Picture.MOTOR_ANGLE_PER_TORQUE,
+    text=Text("The torque per ampere varies by a share of {fraction}, {wave}.", Picture.MOTOR_ANGLE_PER_TORQUE),
+    search=SearchHints(
+        lambda s: [(0.01, order, 0.0) for order in dict.fromkeys((*s.ripple_orders, *s.orders))],
+        lambda a: (0.02, 6.0, 0.0),
+        screw_locked=True,
+    ),
     most=2,
-    screw_locked=True,
 )

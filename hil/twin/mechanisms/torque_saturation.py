@@ -1,10 +1,11 @@
 """Torque saturation: the drive gives less than commanded."""
 
+import math
 from collections.abc import Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, Stage, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
 from hil.twin.scene import AxisFacts
 
@@ -28,7 +29,6 @@ MECHANISM = Mechanism(
     id="torque_saturation",
     block=Block.DRIVE,
     element="current limit of the drive",
-    sentence="The drive gives at most {limit_n_m}, less than the controller may command.",
     equation="T = min(max(u, -limit), limit)",
     source="Åström and Rundqwist, Integrator windup and how to avoid it, American Control Conf. (1989) 1693",
     parameters=(Parameter("limit_n_m", Dimension.TORQUE, 1e-3, 1e5, role=Role.STRENGTH),),
@@ -36,10 +36,12 @@ MECHANISM = Mechanism(
         Variant(Stage.CURRENT, _limited_torque, "measured"),
         Variant(Stage.TORQUE, _limited_torque, "hidden"),
     ),
-    starts=lambda s: [(f * s.peak_torque,) for f in (0.999, 0.95, 0.85, 0.7)],
-    typical=lambda a: (2.5 * a.rated_torque,),
-    proportional=False,
-    picture=Picture.DRIVE_LAW,
-    neutral_at_zero=False,
+    text=Text("The drive gives at most {limit_n_m}, less than the controller may command.", Picture.DRIVE_LAW),
+    search=SearchHints(
+        lambda s: [(f * s.peak_torque,) for f in (0.999, 0.95, 0.85, 0.7)],
+        lambda a: (2.5 * a.rated_torque,),
+        proportional=False,
+    ),
     valid=_valid,
+    neutral=lambda a: math.inf,
 )

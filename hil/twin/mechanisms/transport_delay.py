@@ -4,7 +4,7 @@ import math
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, Stage, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
 
 _OLDEST = 14  # age in ticks of the oldest command kept: 12 ticks of delay, a fraction, and its step
@@ -35,7 +35,6 @@ MECHANISM = Mechanism(
     id="transport_delay",
     block=Block.DRIVE,
     element="fieldbus and drive processing",
-    sentence="The torque command acts {delay_s} later than the controller believes.",
     equation="T(t) = u(t - delay), u held over a control period",
     source="Åström and Wittenmark, Computer-Controlled Systems, 3rd ed. (1997), systems with time delay",
     parameters=(Parameter("delay_s", Dimension.TIME, 0.0, _MOST_S, role=Role.STRENGTH),),
@@ -43,9 +42,11 @@ MECHANISM = Mechanism(
         Variant(Stage.CURRENT, _delayed_command, "measured"),
         Variant(Stage.TORQUE, _delayed_command, "hidden"),
     ),
-    starts=lambda s: [(delay_s,) for delay_s in (1.5e-4, 7e-4, *s.delays_s(0.0, _MOST_S))],
-    typical=lambda a: (5e-4,),
-    proportional=False,
-    shifts_time=True,
-    picture=Picture.DRIVE_LAW,
+    text=Text("The torque command acts {delay_s} later than the controller believes.", Picture.DRIVE_LAW),
+    search=SearchHints(
+        lambda s: [(delay_s,) for delay_s in (1.5e-4, 7e-4, *s.delays_s(0.0, _MOST_S))],
+        lambda a: (5e-4,),
+        proportional=False,
+        shifts_time=True,
+    ),
 )

@@ -2,7 +2,7 @@
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Row, Stage, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
 
 
@@ -15,12 +15,10 @@ MECHANISM = Mechanism(
     id="velocity_filter_lag",
     block=Block.CONTROLLER,
     element="velocity feedback of the controller",
-    sentence="The controller filters its velocity feedback with a time constant of {time_constant_s}.",
     equation="tau dv_f/dt = v - v_f",
     source="Brown, Schneider and Mulligan, IEEE Trans. Industrial Electronics 39 (1992) 11, filtered differences",
     parameters=(Parameter("time_constant_s", Dimension.TIME, 1e-5, 0.05, role=Role.STRENGTH),),
     variants=(Variant(Stage.VELOCITY_FILTER, _time_constant),),
-    starts=lambda s: [(2e-4,), (1e-3,)],
-    typical=lambda a: (5e-4,),
-    proportional=False,
+    text=Text("The controller filters its velocity feedback with a time constant of {time_constant_s}."),
+    search=SearchHints(lambda s: [(2e-4,), (1e-3,)], lambda a: (5e-4,), proportional=False),
 )

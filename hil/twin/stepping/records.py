@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from hil.arrays import FloatArray
 from hil.control import cascade
 from hil.twin.library import BY_ID, SLOTS
-from hil.twin.mechanism import PARAMETERS, WIDTH
+from hil.twin.mechanism import PARAMETERS, WIDTH, Contact
 from hil.twin.physics import Active, Physics
 from hil.twin.stepping.contact import ELEMENTS
 from hil.twin.stepping.stages import KERNEL_STAGES
@@ -147,8 +147,8 @@ def pack(
     # s^T C s: resists the two sides of the transmission moving apart as two bodies. Play removes it; for a lead error
     # the table's place with the error counts. The rest of the damping drives no mode.
     c["damper"] = -shapes.damper @ shapes.table_side
-    c["play"] = any(one.form.play for one in active)
-    c["slips"] = any(one.form.slips for one in active)
+    for contact in Contact:
+        c[contact.value] = any(one.form.contact is contact for one in active)
     c["coupled"] = given is not None
     c["any_active"] = c["coupled"] or codes["slots"].any()
     # a spring's change beside the modes is held over a step, and modes of a long chain are faster than a coarse one

@@ -11,7 +11,7 @@ from numba import njit
 from hil.twin.library import SLOTS
 from hil.twin.mechanism import Mechanism, Stage
 
-_OUTSIDE = (Stage.VELOCITY_FILTER, Stage.CHAIN, Stage.CHANNEL)
+_OUTSIDE = (Stage.VELOCITY_FILTER, Stage.CHAIN, Stage.CHANNEL, Stage.ANSWER)
 KERNEL_STAGES = tuple(stage for stage in Stage if stage not in _OUTSIDE)
 
 

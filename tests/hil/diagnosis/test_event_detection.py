@@ -59,7 +59,7 @@ def test_windows_in_emps_are_found_at_once(pushes: list[Push]) -> None:
     nominal, inside, *_ = prepared(pushes)
     start = nominal.estimator.evaluate(nominal.hypothesis.given)
     for _ in range(2):
-        term = event_term(detect(start), 1.0)
+        term = event_term("external_force", detect(start), 1.0)
         start = fit_windows(nominal.estimator.evaluate(nominal.hypothesis.given.with_term(term)))
     assert_found(windows(start), inside)
 

@@ -19,7 +19,7 @@ def test_a_negative_delay_is_early() -> None:
         assert text.startswith(f"The channel table_position is recorded {said}")
 
 
-@pytest.mark.parametrize("mechanism", [one for one in LIBRARY if one.reversed], ids=lambda one: one.id)
+@pytest.mark.parametrize("mechanism", [one for one in LIBRARY if one.text.reversed], ids=lambda one: one.id)
 def test_the_sentence_of_a_negative_strength_has_the_same_values(mechanism) -> None:
     values = [0.5 * parameter.high for parameter in mechanism.parameters]
     forwards = sentence(Term(mechanism.id, 0, tuple(values)), load_bench("reference"))

@@ -1,5 +1,7 @@
 """The library: complete, well-formed, compiled; every mechanism is neutral at zero strength and finite."""
 
+import dataclasses
+from collections import defaultdict
 from pathlib import Path
 from string import Formatter
 
@@ -12,7 +14,7 @@ from numba import float64, typeof
 
 from hil.twin import mechanisms
 from hil.twin.library import BY_ID, LIBRARY
-from hil.twin.mechanism import PARAMETERS, WIDTH, Block, Mechanism, Moment, Stage
+from hil.twin.mechanism import PARAMETERS, WIDTH, Block, Mechanism, Moment, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Role
 from hil.twin.scene import AxisFacts
 from hil.twin.structure.chain import two_mass
@@ -84,7 +86,8 @@ NEUTRAL = {
     "gravity_torque": {"gravity_torque_n_m": 0.0, "angle_rad": 1.0},
 }
 
-STEPPED = [mechanism for mechanism in LIBRARY if mechanism.variants[0].stage not in (Stage.CHAIN, Stage.CHANNEL)]
+OUTSIDE = (Stage.CHAIN, Stage.CHANNEL, Stage.ANSWER)  # plain Python
+STEPPED = [mechanism for mechanism in LIBRARY if mechanism.variants[0].stage not in OUTSIDE]
 SUFFIX = {
     Dimension.TORQUE: "_n_m",
     Dimension.MOTOR_SPEED: "_rad_s",
@@ -129,23 +132,41 @@ def test_bounds_units_and_text(mechanism) -> None:
         assert parameter.low < parameter.high
         assert parameter.name.endswith(SUFFIX.get(parameter.dimension, ""))
     known = {*mechanism.names, *(["wave"] if mechanism.indices(Role.ORDER) else [])}
-    assert fields(mechanism.sentence) <= known | ({"variant"} if all(mechanism.forms) else set())
-    assert mechanism.sentence.endswith(".")
+    assert fields(mechanism.text.sentence) <= known | ({"variant"} if all(mechanism.forms) else set())
+    assert mechanism.text.sentence.endswith(".")
     for variant in mechanism.variants:
-        if variant.sentence:
-            assert fields(variant.sentence) <= {*mechanism.names, "viscous_speed"}
-            assert variant.sentence.endswith(".")
-            assert not variant.reversed or fields(variant.reversed) == fields(variant.sentence)
+        if variant.text:
+            assert fields(variant.text.sentence) <= {*mechanism.names, "viscous_speed"}
+            assert variant.text.sentence.endswith(".")
+            assert not variant.text.reversed or fields(variant.text.reversed) == fields(variant.text.sentence)
             assert len(mechanism.variants) > 1
     assert mechanism.element
     assert mechanism.equation
     assert mechanism.source
 
 
+def own(record, kind):
+    """Fields of a record that differ from their default and are no function."""
+    given = [field.name for field in dataclasses.fields(kind) if getattr(record, field.name) != field.default]
+    return {name for name in given if not callable(getattr(record, name))}
+
+
+def test_what_one_mechanism_alone_needs_is_a_function_of_its_own() -> None:
+    """No flag of the general records serves a single mechanism; a variant may replace what its mechanism says."""
+    users = defaultdict(set)
+    for one in LIBRARY:
+        replaced = {field.name for field in dataclasses.fields(Mechanism)}
+        names = own(one, Mechanism) | own(one.search, SearchHints) | own(one.text, Text)
+        for name in names.union(*(own(variant, Variant) - replaced for variant in one.variants)):
+            users[name].add(one.id)
+    assert users.keys() > {"needs_table", "most", "beside", "softens", "contact", "turning"}
+    assert {name: found for name, found in users.items() if len(found) == 1} == {}
+
+
 @each
 def test_variants_differ_by_name_and_act_in_the_kernel_or_outside(mechanism) -> None:
     assert len(set(mechanism.forms)) == len(mechanism.variants) > 0
-    assert len({variant.stage in (Stage.CHAIN, Stage.CHANNEL) for variant in mechanism.variants}) == 1
+    assert len({variant.stage in OUTSIDE for variant in mechanism.variants}) == 1
 
 
 @each_stepped

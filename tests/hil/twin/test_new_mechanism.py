@@ -13,7 +13,7 @@ SUPPORT = Path(__file__).parents[2] / "support"
 MECHANISM = """
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Stage, Variant
+from hil.twin.mechanism import Block, Mechanism, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
 
 
@@ -26,11 +26,11 @@ MECHANISM = Mechanism(
     id="quadratic_load",
     block=Block.MOTOR_SIDE,
     element="bent guideway",
-    sentence="A load rises with the square of the position, to {bowl_n_m} at 50 mm.",
     equation="T = u - T_50 (x / 50 mm)^2",
     source="made up for this test",
     parameters=(Parameter("bowl_n_m", Dimension.TORQUE, -10.0, 10.0, role=Role.STRENGTH),),
     variants=(Variant(Stage.MOTOR_TORQUE, _bowl),),
+    text=Text("A load rises with the square of the position, to {bowl_n_m} at 50 mm."),
 )
 """
 

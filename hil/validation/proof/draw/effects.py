@@ -19,7 +19,7 @@ FormAndParameters = tuple[str, dict[str, float]]
 NOT_DRAWN = ("end_stop", "friction_gradient", "local_friction", "periodic_force", "table_side_viscous_friction")
 # drawn axes move a table: an effect of a load that turns is not among theirs
 LIBRARY: tuple[str, ...] = tuple(name for name in CATALOGUE if not BY_ID[name].turning and name not in NOT_DRAWN)
-NEED_TABLE = frozenset(name for name in LIBRARY if BY_ID[name].needs_table or BY_ID[name].in_transmission)
+NEED_TABLE = frozenset(name for name in LIBRARY if BY_ID[name].search.needs_table or BY_ID[name].in_transmission)
 _SOFTEST = 0.8  # share of the stiffness that may be lost over the travel: the spring stays positive
 
 

@@ -71,6 +71,21 @@ class Criteria:
     setting: float = 1e-3  # relative change of a gain that is a correction: settings have three digits
     visible: float = 2.0  # factor on the evidence that a designed motion must show, which is simulated
 
+    # Closed-loop rms over its floor above which the loop counts as chaotic if the block is below: a margin for the
+    # uncertainty of the closed-loop floor.
+    strays: float = 1.15
+    # Location: share of the energy in a window or a range (the rest is spread by the observer and by noise), largest
+    # share of the motion that a range covers, and level of significance of a range.
+    concentrated: float = 0.8
+    narrow: float = 0.5
+    significance: float = 0.01
+    # Least share of a force on the table in the torque on the motor, and least correlation of both: on development axes
+    # the share was 0.9 to 5 for forces, at most 0.6 for errors of the transmission, and 0.1 for errors of encoders. The
+    # linear encoder is at fault below `missing`: its errors had at most 0.02, those of the transmission 0.5 and more.
+    felt: float = 0.7
+    correlated: float = 0.5
+    missing: float = 0.25
+
     # Confidence, see `verdict.judge`: offset and weights of energy left, small gain and close rival. The last two:
     # maximum likelihood on 167 and 249 findings of development cases, between the two. The others: with them a term
     # that explains nearly all beside a large remainder is sure, and one of 5 % is not.

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hil.arrays import FloatArray
+from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.location.periodicity import lock
 from hil.diagnosis.location.reaction_torque import acting
 from hil.diagnosis.location.residual_energy import Energy, energies, without_terms
@@ -30,13 +31,10 @@ BLOCKS = {
     "table": ("transmission", "ball screw, nut and linear encoder"),
 }
 
-CONCENTRATED = 0.8  # share of the energy in a window or a range: the rest is spread by the observer and by noise
-NARROW = 0.5  # largest share of the motion that a reported range covers; a wider one gives no location
-SURE = 0.01  # level of significance of a range; two ranges are tested per diagnosis
 CREEP = 0.05  # of the top speed: below, Stribeck friction dominates
 ACCELERATING = 0.02  # of the top acceleration: below is rounding of the set-points
 AFTER_REVERSAL_S = 0.06  # duration of a reversal: flanks and friction have changed sides by then
-_SHUFFLES = 199  # permutations: the least number that resolves SURE twice (1 / 200)
+_SHUFFLES = 199  # permutations: the least number that resolves `significance` twice (1 / 200)
 _BLOCK_S = 0.1  # block of a permutation: longer than the correlation of residuals
 _BINS = 40  # resolution of a range: 2.5 % of the motion
 _WINDOWS = 5  # time windows that are reported: more are not read
@@ -111,8 +109,8 @@ def windows(energy: Energy) -> tuple[tuple[float, float], ...]:
     starts = np.arange(0, energy.rows.size, size)
     blocks = np.maximum(np.add.reduceat(energy.rows, starts), 0.0)
     order = np.argsort(blocks)[::-1]
-    enough = int(np.searchsorted(np.cumsum(blocks[order]), CONCENTRATED * blocks.sum())) + 1
-    if blocks.sum() <= 0.0 or enough > NARROW * blocks.size:
+    enough = int(np.searchsorted(np.cumsum(blocks[order]), CRITERIA.concentrated * blocks.sum())) + 1
+    if blocks.sum() <= 0.0 or enough > CRITERIA.narrow * blocks.size:
         return ()
     chosen = np.zeros(blocks.size + 2, dtype=bool)
     chosen[1:-1][order[:enough]] = True
@@ -139,17 +137,17 @@ def _range(labels: Sequence[FloatArray], seen: Sequence[Energy]) -> tuple[float,
         visited = np.concatenate([[0.0], np.cumsum(time)]) / time.sum()
         best = (1.0, 0, _BINS)
         for first in range(_BINS):
-            last = int(np.searchsorted(total, total[first] + CONCENTRATED * total[-1]))
+            last = int(np.searchsorted(total, total[first] + CRITERIA.concentrated * total[-1]))
             if last <= _BINS:
                 best = min(best, (float(visited[last] - visited[first]), first, last))
         return best
 
     share, first, last = spread([energy.rows for energy in seen])
-    if last - first > NARROW * _BINS:
+    if last - first > CRITERIA.narrow * _BINS:
         return None
     random = np.random.default_rng(0)
     null = [spread([_dealt(energy.rows, size, random) for energy in seen])[0] for _ in range(_SHUFFLES)]
-    if (1 + sum(value <= share for value in null)) / (1 + _SHUFFLES) > SURE:
+    if (1 + sum(value <= share for value in null)) / (1 + _SHUFFLES) > CRITERIA.significance:
         return None
     width = (high - low) / _BINS
     return low + first * width, low + last * width

@@ -25,13 +25,9 @@ from hil.twin.structure.chain import Chain
 TABLE = (Block.TABLE.value, "table, its guides and external forces")
 ENCODER = (Block.SENSOR.value, "linear encoder")
 
-# Least share of k e in the torque, and least correlation of both, for a force on the table. On development axes the
-# share was 0.9 to 5 for forces, at most 0.6 for errors of the transmission, and 0.1 for errors of encoders.
-_PASSED, _ALONE = 0.7, 0.5
-# The linear encoder is at fault if the expected reaction torque exceeds `stands_out` times the usual torque for more
-# than `_FEW_S` and its share is below `_MISSING`: errors of the linear encoder had at most 0.02, those of the
-# transmission 0.5 and more. `_FEW_S` is some ten windows of the moving mean: fewer rows may be a single impact.
-_MISSING, _FEW_S = 0.25, 0.05
+# The linear encoder is at fault if the expected reaction torque stands out of the usual one for longer than this and is
+# missing: some ten windows of the moving mean. Fewer rows may be a single impact.
+_FEW_S = 0.05
 _DEVIATION = 1.4826  # standard deviation of Gaussian noise over the median of its size
 
 
@@ -56,10 +52,13 @@ def acting(found: Fit) -> tuple[str, str] | None:
     if torque.size == 0:
         return None
     size = float(np.linalg.norm(torque - torque.mean()) * np.linalg.norm(force))
-    if _share(torque - torque.mean(), force) > _PASSED and torque @ force > _ALONE * size:
+    if _share(torque - torque.mean(), force) > CRITERIA.felt and torque @ force > CRITERIA.correlated * size:
         return TABLE
     clear = np.abs(reaction) > CRITERIA.stands_out * _DEVIATION * np.median(np.abs(torque))
-    if np.count_nonzero(clear) * runs[0].period_s > _FEW_S and _share(torque[clear], reaction[clear]) < _MISSING:
+    if (
+        np.count_nonzero(clear) * runs[0].period_s > _FEW_S
+        and _share(torque[clear], reaction[clear]) < CRITERIA.missing
+    ):
         return ENCODER
     return None
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.channels import CHANNELS
+from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.result import ChannelFit, FitFigures, Mode
 from hil.diagnosis.wording import channel_names
 from hil.identification.dataset import Dataset
@@ -21,10 +22,6 @@ from hil.identification.honest_refit import holds
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.measured import Measured
 from hil.identification.noise_floor import floor, noise_response, rms, sensor_noise
-
-# Closed-loop rms over its floor above which the loop counts as chaotic if the block is below: a margin for the
-# uncertainty of the closed-loop floor.
-STRAYS = 1.15
 
 
 def channel_residuals(hypothesis: Hypothesis, data: Dataset, mode: Mode) -> tuple[dict[str, FloatArray], ...]:
@@ -131,7 +128,7 @@ def fit_table(owner: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> dict[s
         mode = modes[0]
         if held:
             closed, block = (max(one.after_rms / one.noise_floor_rms for one in figures[mode]) for mode in figures)
-            chaotic = closed > STRAYS >= block and shown.observability.torque_and_command
+            chaotic = closed > CRITERIA.strays >= block and shown.observability.torque_and_command
             mode = Mode.BLOCKS if chaotic else Mode.CLOSED_LOOP
         result[recorded] = ChannelFit(
             unit="rad" if final.bench.axis.turns and channel == "table" else CHANNELS[recorded].unit,

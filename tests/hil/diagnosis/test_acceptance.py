@@ -1,0 +1,167 @@
+"""The ledger of evidence: one set of constants, and rules that accept or refute measured quantities."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import FrozenInstanceError, fields
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hil.diagnosis import acceptance
+from hil.diagnosis.acceptance import ADDED, COMPARED, EXPLAINED, FORM, HARMLESS, HELD_OUT, RULES, VALUES, promises
+from hil.diagnosis.criteria import CRITERIA, Criteria
+from hil.diagnosis.ledger import Considered, accepted, examine, refusal
+from hil.diagnosis.search.addition import Harm
+from hil.diagnosis.search.events import InsideWindows
+
+# A new constant needs a sealed draw that improves beyond its interval, or it takes the place of another (CONTRIBUTING).
+CONSTANTS = 47
+RULE_COUNT = 15
+
+ROOT = Path(acceptance.__file__).parent
+
+
+def addition(**quantities: Any) -> Any:
+    """A term that passes every rule, but for the quantities given."""
+    usual = {
+        "valid": True,
+        "evidence": 500.0,
+        "gain": 900.0,
+        "rows": 1000,
+        "excess": 1000.0,
+        "beside": 0,
+        "unrepeated": (100.0, 100.0),
+        "inside": None,
+        "harm": {},
+    }
+    return SimpleNamespace(**(usual | quantities))
+
+
+def test_the_number_of_constants_and_rules_does_not_grow() -> None:
+    assert len(fields(Criteria)) <= CONSTANTS
+    assert len(RULES) <= RULE_COUNT
+
+
+def test_criteria_are_frozen_and_each_rule_has_its_own_name_and_a_reason() -> None:
+    with pytest.raises(FrozenInstanceError):
+        CRITERIA.evidence = 1.0  # type: ignore[misc]
+    assert len({rule.name for rule in RULES}) == len(RULES)
+    assert all(rule.reason and rule.asks and rule.refusal for rule in RULES)
+
+
+def test_every_constant_of_evidence_is_used() -> None:
+    sources = "".join(path.read_text() for path in ROOT.rglob("*.py"))
+    unused = [one.name for one in fields(Criteria) if f".{one.name}" not in sources]
+    assert unused == []
+
+
+@pytest.mark.parametrize(
+    ("quantities", "rule"),
+    [
+        ({"evidence": 19.9}, "evidence"),
+        ({"evidence": math.nan}, "evidence"),
+        ({"gain": 19.0}, "material energy"),
+        ({"gain": 21.0, "excess": 1100.0}, "share of the mismatch"),
+        ({"gain": 90.0, "beside": 2}, "share of the mismatch"),
+        ({"unrepeated": (106.0, 100.0)}, "repeated laps"),
+        ({"inside": InsideWindows(0.01, 1.0, 5.0, 1.0, False)}, "constant force"),
+    ],
+)
+def test_a_term_is_refuted_by_the_first_rule_that_it_fails(quantities: dict[str, Any], rule: str) -> None:
+    ledger = examine(ADDED, addition(**quantities), CRITERIA)
+    assert not accepted(ledger)
+    assert ledger[-1].rule == rule
+    assert refusal(ledger) == ledger[-1].text
+    assert all(entry.accepted for entry in ledger[:-1])
+
+
+@pytest.mark.parametrize(
+    "quantities",
+    [
+        {},
+        {"evidence": 20.0},
+        {"gain": 20.0},
+        {"gain": 100.0, "beside": 2},
+        {"unrepeated": (105.0, 100.0)},
+        {"inside": InsideWindows(0.2, 1.0, 50.0, 1.0, True)},  # one push may have any form
+        {"inside": InsideWindows(0.01, 1.0, 3.9, 1.0, False)},  # as well as outside
+        {"inside": InsideWindows(0.002, 1.0, 50.0, 1.0, False)},  # nearly whole
+    ],
+)
+def test_a_term_at_the_bounds_is_accepted(quantities: dict[str, Any]) -> None:
+    assert accepted(examine(ADDED, addition(**quantities), CRITERIA))
+
+
+@given(st.floats(0.0, 1e6), st.floats(0.0, 1e6))
+def test_more_evidence_and_energy_never_turn_accepted_into_refuted(evidence: float, gain: float) -> None:
+    before, after = (
+        accepted(examine(ADDED, addition(evidence=evidence + more, gain=gain + more), CRITERIA)) for more in (0.0, 10.0)
+    )
+    assert after or not before
+
+
+def test_form_and_values_are_asked_alone_too() -> None:
+    assert accepted(examine(FORM, addition(evidence=-1.0), CRITERIA))
+    assert not accepted(examine(VALUES, addition(valid=False), CRITERIA))
+
+
+def test_a_channel_that_pays_is_named() -> None:
+    harm = {"motor": Harm(((2.0, 1.0, 3.0),), -20.0, 100.0), "table": Harm(((1.0, 9.0, 9.0),), 100.0, 100.0)}
+    (entry,) = examine(HARMLESS, addition(harm=harm), CRITERIA)
+    assert not entry.accepted
+    assert entry.text == "with it the training recordings are reproduced worse in motor"
+
+
+@pytest.mark.parametrize(
+    ("evidence", "more", "objection", "tied"),
+    [(9.9, 1.0, "", True), (500.0, 0.004, "", True), (10.0, 0.005, "", False), (-3.0, 0.0, "it is late", False)],
+)
+def test_a_rival_is_tied_or_refuted(evidence: float, more: float, objection: str, tied: bool) -> None:
+    rival: Any = SimpleNamespace(evidence=evidence, more=more, objection=objection)
+    assert accepted(examine(COMPARED, rival, CRITERIA)) is tied
+
+
+@pytest.mark.parametrize(
+    ("quantities", "rule"),
+    [
+        ({"gain": -1.0, "acts": True}, "held-out recordings"),
+        ({"gain": -11.0}, "held-out recordings"),
+        ({"laps": 0.94}, "repeated laps, held out"),
+        ({"clear": False}, "strength"),
+        ({"quiet": True}, "motion without noise"),
+    ],
+)
+def test_held_out_recordings_refute(quantities: dict[str, Any], rule: str) -> None:
+    usual = {"gain": None, "acts": False, "laps": None, "clear": True, "quiet": False, "harm": {}}
+    passing: Any = SimpleNamespace(**usual)
+    assert accepted(examine(HELD_OUT, passing, CRITERIA))
+    refuted: Any = SimpleNamespace(**(usual | quantities))
+    assert examine(HELD_OUT, refuted, CRITERIA)[-1].rule == rule
+
+
+def test_open_inputs_leave_something_beside_a_right_name() -> None:
+    measured = {"left": 0.3, "above": 4.0, "open_inputs": False, "at_floor": False}
+    closed: Any = SimpleNamespace(**measured)
+    opened: Any = SimpleNamespace(**(measured | {"open_inputs": True}))
+    assert not accepted(examine(EXPLAINED, closed, CRITERIA))
+    assert accepted(examine(EXPLAINED, opened, CRITERIA))
+
+
+def test_a_score_must_promise_evidence_and_energy() -> None:
+    rows = 1000
+    share = 1.0 - math.exp(-CRITERIA.evidence / rows)
+    assert promises(1.01 * share, 1e6, rows)
+    assert not promises(0.99 * share, 1e6, rows)
+    assert not promises(1.01 * share, CRITERIA.material * rows, rows)
+
+
+def test_answers_after_a_refusal_are_left_out() -> None:
+    passed, failed = (examine(ADDED, addition(evidence=value), CRITERIA) for value in (500.0, 1.0))
+    one = Considered("any", 0, (), passed)
+    assert one.asked(failed).ledger == (*passed, *failed)
+    assert one.asked(failed).asked(passed).ledger == (*passed, *failed)

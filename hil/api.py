@@ -127,8 +127,8 @@ def fit_nominal(recordings: Recording | Sequence[Recording], bench: Bench) -> Fi
     Returns the fitted bench, its parameters with standard errors, and whether the fit converged. Raises InputError if
     recording and bench do not belong together, HilError if no parameters give a finite response.
     """
-    from hil.identification.completion import reduced
     from hil.identification.dataset import prepare_dataset
+    from hil.identification.derived_channels import reduced
     from hil.identification.measured import take
     from hil.identification.nominal_fit import fit_nominal as fit
 

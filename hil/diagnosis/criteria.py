@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from hil.identification.inference import ALIKE, TIED
-from hil.identification.law_fit import REPLAYED
+from hil.identification.law.result import REPLAYED
 from hil.identification.noise_floor import FLOOR, REPEATS
 
 

@@ -220,7 +220,6 @@ def _imagined(truth: _Alternative, trajectory: Trajectory, like: Measured) -> Me
         position_command_m=position,
         velocity_command_m_s=velocity,
         start=start,
-        left_out=0,
         motor=answer.motor_position,
         table_m=answer.table_position_m if like.table_m.size else like.table_m,
         torque_command=answer.torque_command,

@@ -5,7 +5,7 @@ from hil.drafting.plant_values import PlantValues, TransmissionValues
 from hil.drafting.sensor_values import noise_of, torque_delay_s
 from hil.errors import InputError
 from hil.identification.friction import identify_friction
-from hil.identification.law_fit import sure
+from hil.identification.law.result import sure
 from hil.recording.recording import Recording
 
 MUCH_LEFT = 0.3  # share of the torque unexplained, from which it is as large as a usual friction

@@ -12,7 +12,7 @@ from hil.drafting.plant_values import PlantValues, TransmissionValues, plant_val
 from hil.drafting.ratio_values import gear_of, lead_of
 from hil.drafting.sensor_values import noise_of
 from hil.errors import InputError
-from hil.identification.completion import with_position
+from hil.identification.derived_channels import with_position
 from hil.importing.by_map import STEP
 from hil.importing.usual_values import ROTARY_LEAD_M
 from hil.quantities import digits

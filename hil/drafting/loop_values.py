@@ -1,6 +1,6 @@
 """Gains of a cascaded control law from set-points, motion and torque command, without a bench.
 
-The fit is that of `hil.identification.control_law`, from a closed form, at every period of the position loop, with both
+The fit is that of `hil.identification.law.fit`, from a closed form, at every period of the position loop, with both
 velocity estimates, with and without an integrator and delays; the best of these is refined, also with a feed-forward of
 the last difference of the position set-points.
 """
@@ -15,9 +15,10 @@ import numpy as np
 from hil.channels import SPEED_SET_POINT, AxisKind
 from hil.control.cascade import Gains, make_gains
 from hil.drafting.estimate import BenchValue
-from hil.identification.control_law import fit_settings
-from hil.identification.law_fit import REPLAYED, LawFit, preferred, sure
-from hil.identification.law_replay import LawRows, Settings, closed_form, find_delays, first_tick
+from hil.identification.law.closed_form import closed_form, find_delays, first_tick
+from hil.identification.law.fit import fit_settings
+from hil.identification.law.replay import LawRows, Settings
+from hil.identification.law.result import REPLAYED, LawFit, preferred, sure
 from hil.identification.parallel import one_blas_thread
 from hil.identification.terms import Term
 from hil.recording.recording import Recording

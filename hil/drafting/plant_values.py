@@ -16,7 +16,7 @@ from hil.drafting.estimate import BlockFit, Estimate, fit_blocks
 from hil.errors import InputError
 from hil.identification.friction import identify_friction
 from hil.identification.inverse_dynamics import CORNER, CUT_AT_START, inverse_dynamics_columns
-from hil.identification.noise import white_noise
+from hil.identification.sensor_noise import white_noise
 from hil.importing.relations import direction, motion, smoothed
 from hil.recording.recording import Recording
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from hil.identification.noise import white_noise
+from hil.identification.sensor_noise import white_noise
 from hil.importing.relations import lead_rows
 from hil.recording.recording import Recording
 

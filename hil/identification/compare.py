@@ -13,9 +13,16 @@ import numpy as np
 from hil.bench.bench_file import Bench
 from hil.bench.hardware import DriveMode
 from hil.errors import InputError
-from hil.identification.completion import completed, reduced
 from hil.identification.dataset import Dataset, prepare_dataset
-from hil.identification.deviations import (
+from hil.identification.derived_channels import completed, reduced
+from hil.identification.honest_refit import rms_of_channels, stays, unstable
+from hil.identification.hypothesis import Hypothesis
+from hil.identification.inverse_dynamics import InverseDynamics, fit_inverse_dynamics
+from hil.identification.measured import SETTLE_S, Measured, take
+from hil.identification.noise_floor import FLOOR, rms
+from hil.identification.nominal_fit import MOST_STEPS, FitResult, fit_nominal
+from hil.identification.residuals import datum_m, differences
+from hil.identification.twin_deviation import (
     CONTROLLER_BLOCK,
     LOW_PASS_HZ,
     MOTOR_BLOCK,
@@ -25,13 +32,6 @@ from hil.identification.deviations import (
     compare_blocks,
     motion_channels,
 )
-from hil.identification.honest_refit import rms_of_channels, stays, unstable
-from hil.identification.hypothesis import Hypothesis
-from hil.identification.inverse_dynamics import InverseDynamics, fit_inverse_dynamics
-from hil.identification.measured import SETTLE_S, Measured, take
-from hil.identification.noise_floor import FLOOR, rms
-from hil.identification.nominal_fit import MOST_STEPS, FitResult, fit_nominal
-from hil.identification.residuals import datum_m, differences
 from hil.recording.recording import Recording
 
 if TYPE_CHECKING:
@@ -203,12 +203,12 @@ def compare(
 
 def _figures_of(measured: Measured, data: Dataset, hypothesis: Hypothesis) -> dict[str, float]:
     """Every rms deviation that a comparison with a hypothesis reports; infinite in closed loop if it is unstable."""
-    found = rms_of_channels(hypothesis, data)
+    figures = rms_of_channels(hypothesis, data)
     if not measured.observability.closed_loop:
-        return found
+        return figures
     channels, _ = _closed_loop(measured, hypothesis.resolved.bench)
     return (
-        found
+        figures
         | {name: math.inf for name in ("velocity_m_s", "acceleration_m_s2", "jerk_m_s3")}
         | {channel.name: channel.rms for channel in channels if channel.name not in ("torque_n_m", "force_n")}
     )

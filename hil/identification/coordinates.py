@@ -2,9 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
+from hil.bench.axis_fields import RATIOS
 from hil.bench.bench_file import MechanismEntry
 from hil.twin.library import BY_ID
 from hil.twin.parameter import Parameter, Role
@@ -25,6 +27,14 @@ LITTLE, LITTLE_STEP, ANY = 1e-3, 1e-2, 1e6
 DELAY, MOST_DELAY = "torque_delay_s", 1.5
 
 
+class Motion(NamedTuple):
+    """Extent of the motion that recordings show: of the table, of the motor, and in time."""
+
+    travel_m: float
+    angle_rad: float
+    duration_s: float
+
+
 @dataclass(frozen=True)
 class Coordinate:
     """One entry of the parameter vector: value = scale exp(x) if logarithmic, else scale x."""
@@ -35,6 +45,7 @@ class Coordinate:
     low: float
     high: float
     parameter: Parameter | None = None  # of a mechanism; None for one of the axis
+    least_step: float = 0.0  # of x in a forward difference
 
     def value(self, x: float) -> float:
         """Physical value of x."""
@@ -64,6 +75,36 @@ class Coordinate:
         """True for an instant at which a window begins or ends."""
         return self.role is Role.EDGE
 
+    def step(self, start: float, least: float, edge_step_s: float, motion: Motion) -> float:
+        """Step of x in a forward difference, for a parameter of a mechanism that begins at `start`."""
+        step = least
+        if self.role is Role.PERIOD:
+            step = 0.01 * start / (2.0 * np.pi * max(motion.travel_m, start))
+        elif self.edge:  # residuals change near the edge only: a wide step reaches it
+            step = edge_step_s / max(abs(start), EDGE_STEP_S)
+        elif self.role is Role.ORDER:
+            step = 0.01 / (start * max(motion.angle_rad, 1.0))
+        elif self.role is Role.LINE:
+            step = 0.01 / (2.0 * np.pi * start * max(motion.duration_s, 1.0 / start))
+        if self.logarithmic:
+            return step
+        return min(step if self.edge else max(step, 1e-3), 0.1 * (self.high - self.low) / self.scale)
+
+
+def axis_coordinate(name: str, value: float) -> Coordinate:
+    """The coordinate of a nominal parameter of the axis with its value in the bench file."""
+    if name in RATIOS:
+        return Coordinate(name, max(value, 0.01), True, 1e-4, 0.9, least_step=1e-3)
+    if value > 0.0:
+        return Coordinate(name, value, True, value / TRUST, value * TRUST)
+    return Coordinate(name, LITTLE, False, 0.0, ANY, least_step=LITTLE_STEP)  # friction that the bench leaves out
+
+
+def delay_coordinate(delay_s: float, period_s: float) -> Coordinate:
+    """The coordinate of the delay of a recorded torque."""
+    most_s = MOST_DELAY * period_s
+    return Coordinate(DELAY, period_s, False, delay_s - most_s, delay_s + most_s, least_step=1e-3)
+
 
 def coordinate_of(name: str, parameter: Parameter, start: float) -> Coordinate:
     """The coordinate of a mechanism's parameter, scaled by its starting value if it has no scale of its own."""
@@ -87,13 +128,15 @@ def known_values(entries: Sequence[MechanismEntry]) -> list[tuple[int, str, floa
 
 def known_coordinates(entries: Sequence[MechanismEntry]) -> tuple[Coordinate, ...]:
     """Coordinates of `known_values`, named EFFECT.PARAMETER, of the second entry of an effect EFFECT_2.PARAMETER."""
-    found = []
+    coordinates = []
     for index, name, value in known_values(entries):
         effect = entries[index].effect
         number = sum(other.effect == effect for other in entries[: index + 1])
         parameter = next(one for one in BY_ID[effect].parameters if one.name == name)
-        found.append(coordinate_of(f"{effect}_{number}.{name}" if number > 1 else f"{effect}.{name}", parameter, value))
-    return tuple(found)
+        coordinates.append(
+            coordinate_of(f"{effect}_{number}.{name}" if number > 1 else f"{effect}.{name}", parameter, value)
+        )
+    return tuple(coordinates)
 
 
 def with_values(entries: Sequence[MechanismEntry], values: Sequence[float]) -> tuple[MechanismEntry, ...]:

@@ -22,11 +22,12 @@ import numpy as np
 from hil.arrays import FloatArray, SingleArray
 from hil.bench.bench_file import Bench
 from hil.identification.coordinates import EDGE_STEP_S
-from hil.identification.dataset import TORQUE_ACCURACY, Dataset, inertia
+from hil.identification.dataset import Dataset
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.levenberg_marquardt import broyden, damped_step, normal_equations, robust_loss
 from hil.identification.noise_floor import FLOOR, noise_ratios
 from hil.identification.parallel import POOL
+from hil.identification.residual_scales import TORQUE_ACCURACY, inertia
 from hil.identification.residuals import Residuals
 from hil.identification.terms import Term
 
@@ -108,7 +109,9 @@ class Fit:
     def energy(self, of: Callable[[float], float]) -> float:
         """Sum of a function of the noise ratios over all channels and evaluated rows."""
         pairs = zip(self.data.runs, self.noise_ratios, strict=True)
-        return float(sum(run.motor[run.evaluated].size * of(ratio) for run, found in pairs for ratio in found.values()))
+        return float(
+            sum(run.motor[run.evaluated].size * of(ratio) for run, ratios in pairs for ratio in ratios.values())
+        )
 
     @cached_property
     def missed_torque(self) -> float:

@@ -12,8 +12,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from hil.identification.compare import Comparison
-    from hil.identification.deviations import Deviation
     from hil.identification.friction import FrictionResult
+    from hil.identification.twin_deviation import Deviation
 
 MOVE_MARGIN_S = 0.1  # standstill shown before and after the fastest move: enough for the settling
 

@@ -33,19 +33,10 @@ SAME = 1.01  # growth of a rms that is none: rounding of the noise over some tho
 
 
 class Refit(NamedTuple):
-    """A fit that is not worse than the bench file, the share of the way to the full fit, and what prevents more."""
+    """A fit that is not worse than the bench file."""
 
     fit: Fit
-    share: float
-    worse: tuple[str, ...]  # channels in which the full fit is worse than the bench file
-
-    @property
-    def note(self) -> str:
-        """Sentence on a fit that was shortened; empty for a full one."""
-        if not self.worse:
-            return ""
-        kept = f"{100.0 * self.share:g} % of its change was taken" if self.share else "the bench's values were kept"
-        return f"The refit without new physics would be worse than the bench file in {'; '.join(self.worse)}: {kept}."
+    note: str = ""  # sentence on a fit that was shortened
 
 
 def never_worse(fit: Fit, figures: Callable[[Hypothesis], Figures], enough: Figures) -> Refit:
@@ -58,44 +49,48 @@ def never_worse(fit: Fit, figures: Callable[[Hypothesis], Figures], enough: Figu
     before = figures(given)
 
     def worse(at: Hypothesis) -> tuple[str, ...]:
-        found = figures(at)
+        after = figures(at)
         # "not less or equal" also holds for values that are not a number
         return tuple(
             name
             for name, value in before.items()
-            if not found.get(name, math.inf) <= max(SAME * value, enough.get(name, 0.0))
+            if not after.get(name, math.inf) <= max(SAME * value, enough.get(name, 0.0))
         )
 
     full = worse(hypothesis)
     if not full:
-        return Refit(fit, 1.0, ())
+        return Refit(fit)
     begin = given.x
     between = ((share, hypothesis.moved(begin + share * (hypothesis.x - begin))) for share in _SHARES)
     share, at = next(((share, point) for share, point in between if not worse(point)), (0.0, given))
     estimator = fit.estimator
-    return Refit(replace(estimator.evaluate(at), jacobian=estimator.jacobian(at), converged=fit.converged), share, full)
+    kept = f"{100.0 * share:g} % of its change was taken" if share else "the bench's values were kept"
+    return Refit(
+        replace(estimator.evaluate(at), jacobian=estimator.jacobian(at), converged=fit.converged),
+        f"The refit without new physics would be worse than the bench file in {'; '.join(full)}: {kept}.",
+    )
 
 
 def rms_of_channels(hypothesis: Hypothesis, data: Dataset) -> dict[str, float]:
     """Residual rms of each channel over all runs, block by block and, with a control law, in closed loop."""
     bench = hypothesis.bench
     blocks = hypothesis.residuals(data).channels
-    found = {f"{name}{BLOCK}": _over_runs([part[name] for part in blocks], data) for name in _names(data)}
+    figures = {f"{name}{BLOCK}": _over_runs([part[name] for part in blocks], data) for name in _names(data)}
     if not data.observability.closed_loop:
-        return found
+        return figures
     if not holds(hypothesis, data):
-        return found | {f"{name}{CLOSED}": math.inf for name in _names(data)}
+        return figures | {f"{name}{CLOSED}": math.inf for name in _names(data)}
     closed, ratio = hypothesis.residuals(data, closed=True).channels, bench.axis.ratio_m_rad
     for name in _names(data):
         parts = [part[name] + ratio * part["motor"] if name == "table" else part[name] for part in closed]
-        found[f"{name}{CLOSED}"] = _over_runs(parts, data)
-    return found
+        figures[f"{name}{CLOSED}"] = _over_runs(parts, data)
+    return figures
 
 
 def rms_at_floor(data: Dataset) -> dict[str, float]:
     """Residual rms of each channel up to which it is explained, by the names of `rms_of_channels`."""
-    found = {name: FLOOR**0.5 * _over_runs([scale[name] for scale in data.noise], data) for name in _names(data)}
-    return {name + mode: level for name, level in found.items() for mode in (BLOCK, CLOSED)}
+    floors = {name: FLOOR**0.5 * _over_runs([scale[name] for scale in data.noise], data) for name in _names(data)}
+    return {name + mode: level for name, level in floors.items() for mode in (BLOCK, CLOSED)}
 
 
 def _names(data: Dataset) -> list[str]:

@@ -13,19 +13,15 @@ from typing import NamedTuple
 import numpy as np
 
 from hil.arrays import FloatArray
-from hil.bench.axis_fields import RATIOS
 from hil.bench.bench_file import Bench, MechanismEntry
 from hil.identification.coordinates import (
-    ANY,
     CHATTER_STEP,
     DELAY,
-    EDGE_STEP_S,
-    LITTLE,
-    LITTLE_STEP,
-    MOST_DELAY,
-    TRUST,
     Coordinate,
+    Motion,
+    axis_coordinate,
     coordinate_of,
+    delay_coordinate,
     known_coordinates,
     known_values,
     with_values,
@@ -33,13 +29,12 @@ from hil.identification.coordinates import (
 from hil.identification.dataset import FASTEST_OBSERVER_S, Dataset
 from hil.identification.measured import Measured
 from hil.identification.residuals import Residuals, differences
-from hil.identification.rest import resting
+from hil.identification.standstill import resting
 from hil.identification.terms import Term, push_n, repeats
 from hil.twin.axis import COARSE_STEP_S, FINE_STEP_S, Response, Twin
 from hil.twin.library import BY_ID
 from hil.twin.mechanism import Contact
 from hil.twin.mechanisms.channel_time_skew import delayed
-from hil.twin.parameter import Role
 from hil.twin.physics import Active
 
 # Longest internal steps of the twin in a search, fine and coarse: block by block, residuals differ from those at the
@@ -139,23 +134,15 @@ class Hypothesis:
     @cached_property
     def coordinates(self) -> tuple[Coordinate, ...]:
         """Coordinates of x."""
-        found = []
-        for name in self.bench.axis.NOMINAL:
-            value = float(getattr(self.bench.axis, name))
-            if name in RATIOS:
-                found.append(Coordinate(name, max(value, 0.01), True, 1e-4, 0.9))
-            elif value > 0.0:
-                found.append(Coordinate(name, value, True, value / TRUST, value * TRUST))
-            else:  # friction that the bench leaves out
-                found.append(Coordinate(name, LITTLE, False, 0.0, ANY))
+        axis = self.bench.axis
+        coordinates = [axis_coordinate(name, float(getattr(axis, name))) for name in axis.NOMINAL]
         if DELAY in self.nominal:
-            delay_s, most_s = self.bench.torque_delay_s or 0.0, MOST_DELAY * self.bench.period_s
-            found.append(Coordinate(DELAY, self.bench.period_s, False, delay_s - most_s, delay_s + most_s))
-        found += self._known
+            coordinates.append(delay_coordinate(self.bench.torque_delay_s or 0.0, self.bench.period_s))
+        coordinates += self._known
         for index, term in enumerate(self.terms):
             for parameter, start in zip(BY_ID[term.effect].parameters, term.values, strict=True):
-                found.append(coordinate_of(f"{index}.{parameter.name}", parameter, start))
-        return tuple(found)
+                coordinates.append(coordinate_of(f"{index}.{parameter.name}", parameter, start))
+        return tuple(coordinates)
 
     @cached_property
     def _known(self) -> tuple[Coordinate, ...]:
@@ -186,27 +173,11 @@ class Hypothesis:
         """Steps (p,) of x for forward differences; `travel_m` and `duration_s` of the recordings."""
         step = CHATTER_STEP if self._chatters else 1e-4
         angle_rad = travel_m / self.bench.axis.ratio_m_rad * self.bench.axis.physics().angle_per_unit
-        of_axis = self.nominal_count - len(self._known)
-        found = [
-            max(step, 1e-3 if one.name in (*RATIOS, DELAY) else 0.0 if one.logarithmic else LITTLE_STEP)
-            for one in self.coordinates[:of_axis]
-        ]
+        motion, of_axis = Motion(travel_m, angle_rad, duration_s), self.nominal_count - len(self._known)
+        steps = [max(step, one.least_step) for one in self.coordinates[:of_axis]]
         starts = [*self.bench_values[of_axis:], *(value for term in self.terms for value in term.values)]
-        for coordinate, start in zip(self.coordinates[of_axis:], starts, strict=True):
-            own = step
-            if coordinate.role is Role.PERIOD:
-                own = 0.01 * start / (2.0 * np.pi * max(travel_m, start))
-            elif coordinate.edge:  # residuals change near the edge only: a wide step reaches it
-                own = edge_step_s / max(abs(start), EDGE_STEP_S)
-            elif coordinate.role is Role.ORDER:
-                own = 0.01 / (start * max(angle_rad, 1.0))
-            elif coordinate.role is Role.LINE:
-                own = 0.01 / (2.0 * np.pi * start * max(duration_s, 1.0 / start))
-            if not coordinate.logarithmic:
-                tenth = 0.1 * (coordinate.high - coordinate.low) / coordinate.scale
-                own = min(own if coordinate.edge else max(own, 1e-3), tenth)
-            found.append(own)
-        return np.array(found)
+        of_mechanisms = zip(self.coordinates[of_axis:], starts, strict=True)
+        return np.array([*steps, *(one.step(start, step, edge_step_s, motion) for one, start in of_mechanisms)])
 
     @property
     def _chatters(self) -> bool:
@@ -267,9 +238,9 @@ class Hypothesis:
 
     def undelayed(self, twin: Twin, run: Measured) -> Response:
         """Measured channels without the lateness that terms, and a delay of the torque, give them."""
-        found, periods = twin.undelayed(run.response), (self.resolved.bench.torque_delay_s or 0.0) / run.period_s
-        command, torque = (delayed(part, periods) for part in (found.torque_command, found.torque))
-        return found._replace(torque_command=command, torque=torque) if periods else found
+        channels, periods = twin.undelayed(run.response), (self.resolved.bench.torque_delay_s or 0.0) / run.period_s
+        command, torque = (delayed(part, periods) for part in (channels.torque_command, channels.torque))
+        return channels._replace(torque_command=command, torque=torque) if periods else channels
 
     def blocks(
         self, run: Measured, observer_s: float, fast: bool = False, rests: Measured | None = None
@@ -281,9 +252,9 @@ class Hypothesis:
         twin = self.twin(observer_s, fast, run)
         measured, rest = self.undelayed(twin, run), resting(rests or run, twin.slow_velocity)
         predicted = twin.observe(run.position_command_m, run.velocity_command_m_s, measured, run.start, rest)
-        found = differences(measured, predicted, self.bench, run.evaluated)
-        found["command"] = measured.torque_command - predicted.torque_command
-        return found | {name: np.zeros(run.motor.size) for name in run.observability.hidden}
+        residuals = differences(measured, predicted, self.bench, run.evaluated)
+        residuals["command"] = measured.torque_command - predicted.torque_command
+        return residuals | {name: np.zeros(run.motor.size) for name in run.observability.hidden}
 
     def residuals(self, data: Dataset, closed: bool = False, fast: bool = False) -> Residuals:
         """Residuals on a data set, block by block or in closed loop; `fast`: with the steps of a search."""

@@ -32,9 +32,9 @@ ALIKE = 0.005
 _SOKAL = 5.0  # window of the autocorrelation sum in correlation times (Sokal 1997)
 
 
-def whitening(found: Fit) -> list[Filter]:
+def whitening(fit: Fit) -> list[Filter]:
     """Prediction-error filters (order + 1,), first coefficient 1, of each part of a fit's residuals."""
-    return [_prediction_error_filter(part) for part in found.residuals.parts.values()]
+    return [_prediction_error_filter(part) for part in fit.residuals.parts.values()]
 
 
 def _prediction_error_filter(part: FloatArray) -> Filter:
@@ -47,13 +47,13 @@ def _prediction_error_filter(part: FloatArray) -> Filter:
 
 def whitened(values: FloatArray, splits: Sequence[int], filters: Sequence[Filter]) -> FloatArray:
     """Filter values (m,) or (m, k) part by part."""
-    found = np.empty_like(values)
+    filtered = np.empty_like(values)
     for (begin, end), taps in zip(pairwise((0, *splits, len(values))), filters, strict=True):
-        found[begin:end] = lfilter(taps, [1.0], values[begin:end], axis=0)
-    return found
+        filtered[begin:end] = lfilter(taps, [1.0], values[begin:end], axis=0)
+    return filtered
 
 
-def against(better: Fit, worse: Fit, filters: Sequence[Filter] | None = None) -> float:
+def bic_gain(better: Fit, worse: Fit, filters: Sequence[Filter] | None = None) -> float:
     """Return BIC(worse) - BIC(better); > 0 favours `better`. `filters`: by default those of `better`.
 
     It is the larger of two values: on plain residuals with their number of independent rows, sensitive to slow
@@ -74,12 +74,12 @@ def against(better: Fit, worse: Fit, filters: Sequence[Filter] | None = None) ->
     return float(max(plain, white - more * np.log(better.rows)))
 
 
-def between(named: Fit, rival: Fit, filters: Sequence[Filter] | None = None) -> float:
+def bic_margin(named: Fit, rival: Fit, filters: Sequence[Filter] | None = None) -> float:
     """Return BIC(rival) - BIC(named); < 0 favours the rival. `filters`: by default those of `named`.
 
     Both residuals are whitened by the filter of the fit with less cost: that of the other would hide what it leaves.
     """
-    return against(named, rival, filters) if named.cost <= rival.cost else -against(rival, named)
+    return bic_gain(named, rival, filters) if named.cost <= rival.cost else -bic_gain(rival, named)
 
 
 def by_energy(better: Fit, worse: Fit) -> float:
@@ -179,7 +179,7 @@ def _within(covariance: FloatArray, width: FloatArray) -> FloatArray:
     return np.asarray(covariance - gain @ np.linalg.solve(both, gain.T), dtype=np.float64)
 
 
-def standard_errors(found: Fit) -> list[float]:
+def standard_errors(fit: Fit) -> list[float]:
     """Standard error of each physical parameter, robust against coloured residuals (sandwich estimator):
 
         A^-1 B A^-1,   A = J^T J
@@ -191,11 +191,11 @@ def standard_errors(found: Fit) -> list[float]:
     recorded torque, is told to within these. A controller replayed bit-identically leaves no noise; then the error is
     1/100 of the step of the forward difference.
     """
-    hypothesis = found.hypothesis
+    hypothesis = fit.hypothesis
     low, high = hypothesis.bounds
     width = (high - low)[: hypothesis.nominal_count]
-    errors = _largest([_within(one, width) for one in _covariances(found.jacobian, found.residuals)])
-    steps = found.estimator.steps(hypothesis)
+    errors = _largest([_within(one, width) for one in _covariances(fit.jacobian, fit.residuals)])
+    steps = fit.estimator.steps(hypothesis)
     return [
         float(max(error, _LEAST * step) * (abs(value) if coordinate.logarithmic else abs(coordinate.scale)))
         for error, step, value, coordinate in zip(errors, steps, hypothesis.values, hypothesis.coordinates, strict=True)

@@ -20,9 +20,10 @@ from hil.bench.bench_file import Bench
 from hil.channels import SPEED_SET_POINT, AxisKind
 from hil.control import cascade
 from hil.errors import InputError
-from hil.identification.completion import completed
-from hil.identification.noise import Laps, Noise, estimate_noise, find_laps, moving, white_noise
+from hil.identification.derived_channels import completed
+from hil.identification.laps import Laps, find_laps
 from hil.identification.observability import Observability, observability
+from hil.identification.sensor_noise import Noise, estimate_noise, moving, white_noise
 from hil.recording.recording import Recording
 from hil.recording.stamps import check_finite
 from hil.twin.axis import Response, Start
@@ -57,7 +58,6 @@ class Measured:
     start: Start
     noise: Noise
     observability: Observability
-    left_out: int = 0  # rows of the recording before the first tick of the position loop
     speed_set_point: FloatArray = field(default_factory=lambda: np.empty(0))  # of unknown scale; empty if not recorded
     lead_in: int = 0  # first rows, which give the twin its state and are not evaluated
 
@@ -181,7 +181,6 @@ def take(recording: Recording, bench: Bench) -> Measured:
         start=start._replace(time_s=recording.start_s + first * recording.period_s),
         noise=noise,
         observability=known,
-        left_out=first,
         speed_set_point=speed if np.any(speed) else np.empty(0),
         lead_in=max(int(recording.metadata.get(LEAD_IN, 0)) - first, 0),
     )

@@ -9,8 +9,7 @@ median over blocks of rows: an event in one lap does not repeat either, but is n
 the noise of the encoders moves the axis: see `noise_response`.
 """
 
-from dataclasses import dataclass, replace
-from typing import Literal
+from dataclasses import replace
 
 import numpy as np
 from scipy.ndimage import maximum_filter1d
@@ -18,8 +17,8 @@ from scipy.ndimage import maximum_filter1d
 from hil.arrays import FloatArray
 from hil.identification.dataset import Dataset
 from hil.identification.hypothesis import Hypothesis
+from hil.identification.laps import Laps
 from hil.identification.measured import Measured
-from hil.identification.noise import Laps
 
 # Mean square of a channel over its noise up to which it is explained: 25 % above the noise in rms. An unmodelled effect
 # as large as the noise makes 41 %. An encoder at rest has a constant error of up to half a count, whose square is three
@@ -37,19 +36,9 @@ _READINGS = 4  # of the table's encoder: the steps at rest are few, and their pl
 _HALF = 0.75  # response to half the noise over that to all of it: 0.5 in a linear loop, 1 in a chaotic one
 
 
-@dataclass(frozen=True)
-class Floor:
-    """Noise floor of one channel in its unit, and its source."""
-
-    rms: float
-    source: Literal["repeated_laps", "white_noise"]
-
-
-def floor(residual: FloatArray, white: float, laps: Laps | None) -> Floor:
-    """Noise floor of a residual (n,): its non-repeatable part, at least the sensor's `white` noise."""
-    if laps is None:
-        return Floor(white, "white_noise")
-    return Floor(max(laps.noise(residual), white), "repeated_laps")
+def floor(residual: FloatArray, white: float, laps: Laps | None) -> float:
+    """Noise floor (rms) of a residual (n,): its non-repeatable part, at least the sensor's `white` noise."""
+    return white if laps is None else max(laps.noise(residual), white)
 
 
 def noise_response(hypothesis: Hypothesis, run: Measured) -> dict[str, float]:
@@ -133,7 +122,7 @@ def noise_ratios(hypothesis: Hypothesis, data: Dataset) -> tuple[dict[str, float
     transmission amplifies, that of the motor for the counts of the table encoder that the transmission returns to it.
     """
     residuals = hypothesis.residuals(data)
-    found = []
+    of_runs = []
     for index, (run, channels) in enumerate(zip(data.runs, residuals.channels, strict=True)):
         ratios = {name: float(part @ part) / part.size for (of, name), part in residuals.parts.items() if of == index}
         if ratios.get("table", 0.0) > 1.0:
@@ -143,8 +132,8 @@ def noise_ratios(hypothesis: Hypothesis, data: Dataset) -> tuple[dict[str, float
             scale, part = data.scales()[index]["motor"][run.evaluated], residuals.parts[index, "motor"]
             noise = 1.0 + _returned_to_motor(hypothesis, run, channels, data.observer_s, scale)
             ratios["motor"] = float(np.mean(part**2 / noise))
-        found.append(ratios)
-    return tuple(found)
+        of_runs.append(ratios)
+    return tuple(of_runs)
 
 
 def _amplified_by_transmission(hypothesis: Hypothesis, run: Measured, table: FloatArray, observer_s: float) -> float:

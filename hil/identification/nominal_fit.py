@@ -56,21 +56,21 @@ def fit_nominal_parameters(data: Dataset, evaluations: int = _SECOND, deadline_s
     bench file, and the fit that misses less torque is taken.
     """
     estimator, begin = Estimator(data, deadline_s=deadline_s), Hypothesis(data.bench)
-    found = estimator.fit(begin, soft=SOFT, evaluations=_FIRST).refit(evaluations)
+    fit = estimator.fit(begin, soft=SOFT, evaluations=_FIRST).refit(evaluations)
     masses = [index for index, name in enumerate(begin.nominal) if name in data.bench.axis.MASSES]
-    stuck = set(found.at_bound) & set(data.bench.axis.MASSES)
-    if not stuck and found.missed_torque <= estimator.evaluate(begin).missed_torque:
-        return found
+    stuck = set(fit.at_bound) & set(data.bench.axis.MASSES)
+    if not stuck and fit.missed_torque <= estimator.evaluate(begin).missed_torque:
+        return fit
     kept = estimator.fit(begin, soft=SOFT, evaluations=_FIRST, fixed=masses).refit(evaluations, fixed=masses)
-    return min(found, kept, key=lambda fit: fit.missed_torque)
+    return min(fit, kept, key=lambda fit: fit.missed_torque)
 
 
-def require_finite(found: Fit) -> None:
+def require_finite(fit: Fit) -> None:
     """Raise HilError if residuals of a fit are not finite: the twin, or its observer, is unstable."""
-    if not all(np.isfinite(values).all() for channels in found.residuals.channels for values in channels.values()):
+    if not all(np.isfinite(values).all() for channels in fit.residuals.channels for values in channels.values()):
         raise HilError(
-            f"the fit of {', '.join(found.bench.axis.NOMINAL)} has no finite result: the twin of this axis is unstable "
-            f"at a period of {found.data.runs[0].period_s:g} s; check masses, stiffness, units and signs, or give a "
+            f"the fit of {', '.join(fit.bench.axis.NOMINAL)} has no finite result: the twin of this axis is unstable "
+            f"at a period of {fit.data.runs[0].period_s:g} s; check masses, stiffness, units and signs, or give a "
             "recording with more motion"
         )
 
@@ -81,15 +81,15 @@ def fit_nominal(data: Dataset, figures: Callable[[Hypothesis], Figures] | None =
     `figures` are those in which the fit must not be worse than the bench file, by default the rms of each channel, see
     `honest_refit`. Raises HilError if the residuals are not finite.
     """
-    found = fit_nominal_parameters(data, MOST_STEPS)
-    require_finite(found)
-    refit = never_worse(found, figures or partial(rms_of_channels, data=data), rms_at_floor(data))
-    found = refit.fit
-    hypothesis = found.hypothesis
-    entries = zip(hypothesis.nominal, hypothesis.bench_values, hypothesis.values, standard_errors(found), strict=False)
+    fit = fit_nominal_parameters(data, MOST_STEPS)
+    require_finite(fit)
+    refit = never_worse(fit, figures or partial(rms_of_channels, data=data), rms_at_floor(data))
+    fit = refit.fit
+    hypothesis = fit.hypothesis
+    entries = zip(hypothesis.nominal, hypothesis.bench_values, hypothesis.values, standard_errors(fit), strict=False)
     parameters = tuple(
-        FittedParameter(name, before, value, error, name in found.at_bound)
+        FittedParameter(name, before, value, error, name in fit.at_bound)
         for name, before, value, error in entries
         if name != DELAY
     )
-    return FitResult(found.bench, parameters, found.status, refit.note)
+    return FitResult(fit.bench, parameters, fit.status, refit.note)

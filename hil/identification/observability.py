@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from hil.bench.bench_file import Bench
-from hil.identification.completion import position_is_measured, rows_are_ticks, torque_is_measured
+from hil.identification.derived_channels import position_is_measured, rows_are_ticks, torque_is_measured
 from hil.recording.recording import Recording
 
 

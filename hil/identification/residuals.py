@@ -12,7 +12,8 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
-from hil.identification.dataset import TORQUE_ACCURACY, Dataset
+from hil.identification.dataset import Dataset
+from hil.identification.residual_scales import TORQUE_ACCURACY
 from hil.twin.axis import Response
 
 _LOST = 1e6  # bound of weighted residuals: beyond, an unstable hypothesis is not resolved further
@@ -96,11 +97,13 @@ def differences(measured: Response, simulated: Response, bench: Bench, evaluated
     ratio_m = bench.axis.ratio_m_rad
     with np.errstate(invalid="ignore", over="ignore"):  # a hypothesis may be unstable
         motor = measured.motor_position - simulated.motor_position
-        found = {"motor": motor - np.mean(motor[evaluated]) if bench.gains.position_from_table else motor}
+        residuals = {"motor": motor - np.mean(motor[evaluated]) if bench.gains.position_from_table else motor}
         if measured.table_position_m.size:
-            found["table"] = _stretch(measured, simulated, ratio_m) - datum_m(measured, simulated, ratio_m, evaluated)
-        found["torque"] = measured.torque - simulated.torque
-    return found
+            residuals["table"] = _stretch(measured, simulated, ratio_m) - datum_m(
+                measured, simulated, ratio_m, evaluated
+            )
+        residuals["torque"] = measured.torque - simulated.torque
+    return residuals
 
 
 def _stretch(measured: Response, simulated: Response, ratio_m: float) -> FloatArray:

@@ -130,11 +130,11 @@ def free_slot(effect: str, beside: Sequence[Term]) -> int:
     return next(slot for slot in count() if slot not in used)
 
 
-def compatible(found: Sequence[Term | Active]) -> bool:
+def compatible(mechanisms: Sequence[Term | Active]) -> bool:
     """True if mechanisms can act at once: none more often than allowed and none repeated."""
-    effects = [one.effect for one in found]
+    effects = [one.effect for one in mechanisms]
     return all(effects.count(effect) <= BY_ID[effect].most for effect in effects) and not any(
-        repeats(one, other) for one, other in combinations(found, 2)
+        repeats(one, other) for one, other in combinations(mechanisms, 2)
     )
 
 

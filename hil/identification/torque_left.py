@@ -26,9 +26,9 @@ from scipy.signal import lfilter, savgol_filter
 
 from hil.arrays import FloatArray
 from hil.identification.dataset import Dataset
-from hil.identification.deviations import held_on_motor
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.measured import Measured
+from hil.identification.twin_deviation import held_on_motor
 
 _SMOOTH_S, _FEWEST = 0.021, 5  # window of the derivatives: passes some 20 Hz; rows of a parabola that averages
 _ADDED = 0.01  # of the torque's standard deviation: far above rounding, and an axis that slides goes on sliding

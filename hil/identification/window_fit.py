@@ -31,17 +31,17 @@ _SEEN = 9.0  # growth of the energy in units of noise^2: three standard errors
 _LEAST_GAIN = 1e-6  # relative to the cost, as for other fits
 
 
-def fit_windows(found: Fit, evaluations: int = 16, others: bool = True) -> Fit:
+def fit_windows(fit: Fit, evaluations: int = 16, others: bool = True) -> Fit:
     """Fit the windows of the event in a fit, with the other parameters (`others`) or alone; then those once more.
 
     Returns the fit itself if it has no event in its runs.
     """
-    estimator, at = found.estimator, found.hypothesis.rebased if others else found.hypothesis
-    index = _event(found)
+    estimator, at = fit.estimator, fit.hypothesis.rebased if others else fit.hypothesis
+    index = next((index for index, term in enumerate(at.terms) if _inside(estimator, term)), None)
     if index is None:
-        return found
+        return fit
     inside = _inside(estimator, at.terms[index])
-    slopes = _other_slopes(estimator, at, index) if others else np.empty((found.rows, 0))
+    slopes = _other_slopes(estimator, at, index) if others else np.empty((fit.rows, 0))
     free = [column for column in range(at.x.size) if column not in range(at.x.size)[at.columns(index)]]
     free = free if others else []
     residuals, damping = estimator.residuals(at), 1e-3
@@ -69,19 +69,19 @@ def fit_windows(found: Fit, evaluations: int = 16, others: bool = True) -> Fit:
     return estimator.fit(_referred(at, index), evaluations=4) if others else estimator.evaluate(at)
 
 
-def window_errors(found: Fit, index: int) -> FloatArray:
+def window_errors(fit: Fit, index: int) -> FloatArray:
     """Standard errors (w, 3) of start, end and strength of the windows of a term in the runs of a fit.
 
     An edge at rest, where friction holds the force, may lie anywhere there: its error is at least `_free_shifts`.
     """
-    at = found.hypothesis.rebased
-    inside = _inside(found.estimator, at.terms[index])
-    edges = _window_slopes(found.estimator, at, index).toarray()
-    both = np.hstack([_other_slopes(found.estimator, at, index), edges])
-    errors = sandwich(both, found.residuals)[-3 * len(inside) :].reshape(3, -1).T
+    at = fit.hypothesis.rebased
+    inside = _inside(fit.estimator, at.terms[index])
+    edges = _window_slopes(fit.estimator, at, index).toarray()
+    both = np.hstack([_other_slopes(fit.estimator, at, index), edges])
+    errors = sandwich(both, fit.residuals)[-3 * len(inside) :].reshape(3, -1).T
     term = at.resolved.terms[index]
     strength = abs(term.values[BY_ID[term.effect].strength])
-    errors[:, :2] = np.maximum(errors[:, :2], _free_shifts(found.estimator, at, index))
+    errors[:, :2] = np.maximum(errors[:, :2], _free_shifts(fit.estimator, at, index))
     return np.asarray(np.maximum(errors, [0.01 * LAST_EDGE_STEP_S] * 2 + [0.0]) * [1.0, 1.0, strength])
 
 
@@ -90,7 +90,7 @@ def _free_shifts(estimator: Estimator, at: Hypothesis, index: int) -> FloatArray
     term, inside = at.terms[index], _inside(estimator, at.terms[index])
     base = estimator.residuals(at)
     runs = {run.name: run for run in estimator.data.runs}
-    found = np.zeros((len(inside), 2))
+    shifts = np.zeros((len(inside), 2))
     for edge, sign in product((0, 1), (-1.0, 1.0)):
         free = np.ones(len(inside), dtype=bool)
         for shift_s in (sign * size_s for size_s in _SHIFTS_S):
@@ -107,19 +107,12 @@ def _free_shifts(estimator: Estimator, at: Hypothesis, index: int) -> FloatArray
                     if estimator.data.runs[key[0]] is run
                 )
                 free[place] &= change < _SEEN
-            found[free, edge] = np.maximum(found[free, edge], abs(shift_s))
-    return found
+            shifts[free, edge] = np.maximum(shifts[free, edge], abs(shift_s))
+    return shifts
 
 
 def _later(_: int, window: Window, by_s: tuple[float, float]) -> Window:
     return window._replace(later_s=window.later_s + by_s[0], end_later_s=window.end_later_s + by_s[1])
-
-
-def _event(found: Fit) -> int | None:
-    return next(
-        (index for index, term in enumerate(found.hypothesis.terms) if _inside(found.estimator, term)),
-        None,
-    )
 
 
 def _inside(estimator: Estimator, term: Term) -> list[int]:

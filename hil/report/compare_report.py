@@ -7,11 +7,11 @@ from hil.bench.bench_file import Bench
 from hil.figures.drawing import save
 from hil.files.output import write_json, write_text
 from hil.identification.compare import EXPLAINED, Comparison
-from hil.identification.deviations import BlockDeviation, Deviation
 from hil.identification.figures import block_panels, motion_panels
 from hil.identification.inverse_dynamics import InverseDynamics
 from hil.identification.nominal_fit import FitResult
 from hil.identification.terms import ambiguous
+from hil.identification.twin_deviation import BlockDeviation, Deviation
 from hil.quantities import change, digits, percent, quantity
 from hil.report import plots
 from hil.report.page import Number, Page

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hil.identification.command_timing import is_held, unknown_share
+from hil.identification.residual_scales import unknown_share
+from hil.identification.sensor_noise import is_held
 
 PERIOD_S, INERTIA, VISCOUS, FINE = 0.02, 0.04, 0.4, 100
 

@@ -17,9 +17,9 @@ from hil.bench.control_section import without_law
 from hil.errors import InputError
 from hil.identification.compare import Comparison, compare
 from hil.identification.dataset import prepare_dataset
-from hil.identification.deviations import low_pass
 from hil.identification.measured import bench_of, take
 from hil.identification.nominal_fit import fit_nominal
+from hil.identification.twin_deviation import low_pass
 from hil.importing.by_map import import_recording
 from hil.recording.recording import Recording, read_recording
 from hil.report.compare_report import parameter_rows, rows_of, verdict, write_comparison

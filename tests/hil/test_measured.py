@@ -10,8 +10,8 @@ from scipy.signal import lfilter
 from hil.errors import InputError
 from hil.identification.dataset import prepare_dataset
 from hil.identification.measured import take
-from hil.identification.noise import _jitter_s, _of_drive, _rounding, white_noise
-from hil.identification.rest import resting
+from hil.identification.sensor_noise import _jitter_s, _of_drive, _rounding, white_noise
+from hil.identification.standstill import resting
 
 PERIOD_S = 1e-3
 

@@ -16,9 +16,9 @@ from scipy.signal import lfilter
 from hil.arrays import FloatArray
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.search.disturbance import disturbance, smooth
-from hil.identification.dataset import inertia
 from hil.identification.estimator import Fit
 from hil.identification.measured import Measured
+from hil.identification.residual_scales import inertia
 from hil.twin.mechanism import Block
 from hil.twin.structure.chain import Chain
 

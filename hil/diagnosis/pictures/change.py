@@ -13,8 +13,8 @@ from hil.diagnosis.search.disturbance import disturbance
 from hil.errors import InputError
 from hil.figures.drawing import legend_above, style_axis
 from hil.figures.panels import COMMAND, DEVIATION, SIMULATED, thin
-from hil.identification.dataset import inertia
 from hil.identification.estimator import Fit
+from hil.identification.residual_scales import inertia
 from hil.quantities import reading_unit
 
 if TYPE_CHECKING:

@@ -15,9 +15,9 @@ from hil.diagnosis.pictures.view import Captioned, Curve, View, around, binned, 
 from hil.diagnosis.turning import speed_unit
 from hil.figures.drawing import style_axis
 from hil.figures.panels import COMMAND, DEVIATION, MEASURED, SIMULATED
-from hil.identification.dataset import inertia
 from hil.identification.estimator import Fit
 from hil.identification.measured import Measured
+from hil.identification.residual_scales import inertia
 from hil.quantities import reading_unit
 
 if TYPE_CHECKING:

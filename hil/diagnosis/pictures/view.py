@@ -13,8 +13,8 @@ from hil.arrays import FloatArray
 from hil.diagnosis.location.residual_energy import without_terms
 from hil.diagnosis.search.disturbance import Disturbance, disturbance
 from hil.figures.panels import COMMAND, MEASURED, SIMULATED
-from hil.identification.dataset import inertia
 from hil.identification.measured import Measured
+from hil.identification.residual_scales import inertia
 from hil.identification.terms import Term
 
 if TYPE_CHECKING:

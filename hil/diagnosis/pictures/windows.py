@@ -12,7 +12,7 @@ from hil.diagnosis.pictures.view import Captioned, View
 from hil.diagnosis.search.disturbance import disturbance
 from hil.figures.drawing import style_axis
 from hil.figures.panels import COMMAND, DEVIATION, MEASURED, SIMULATED, thin
-from hil.identification.dataset import inertia
+from hil.identification.residual_scales import inertia
 
 if TYPE_CHECKING:
     from hil.diagnosis.diagnosis import Diagnosis

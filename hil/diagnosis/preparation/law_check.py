@@ -23,8 +23,8 @@ from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.preparation.usable_law import LawCheck, set_aside
 from hil.diagnosis.result import Correction
 from hil.diagnosis.search.initial_values import axis_facts
-from hil.identification.control_law import counting_noise, fit_law
-from hil.identification.law_fit import LawFit, preferred, sure
+from hil.identification.law.fit import counting_noise, fit_law
+from hil.identification.law.result import LawFit, preferred, sure
 from hil.identification.measured import Measured
 from hil.identification.terms import Term
 from hil.quantities import digits, unit_of

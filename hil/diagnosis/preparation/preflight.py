@@ -17,7 +17,7 @@ from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
 from hil.channels import AXIS_CHANNELS
 from hil.errors import InputError
-from hil.identification.completion import DERIVED, completed, torque_is_measured
+from hil.identification.derived_channels import DERIVED, completed, torque_is_measured
 from hil.identification.measured import LEAD_IN, Measured, take
 from hil.quantities import digits, misread_factors
 from hil.recording.recording import Recording

@@ -10,8 +10,8 @@ from hil.diagnosis.preparation.usable_law import at_set_points, replayable
 from hil.diagnosis.preparation.usable_parts import usable_parts
 from hil.diagnosis.stages import Prepared
 from hil.errors import InputError
-from hil.identification.completion import completed, reduced
 from hil.identification.dataset import prepare_dataset
+from hil.identification.derived_channels import completed, reduced
 from hil.recording.recording import Recording
 
 

@@ -8,7 +8,7 @@ from hil.diagnosis.preparation.preflight import preflight
 from hil.diagnosis.preparation.split import split
 from hil.diagnosis.preparation.usable_law import replayable
 from hil.errors import InputError
-from hil.identification.completion import reduced
+from hil.identification.derived_channels import reduced
 from hil.recording.recording import Recording
 
 

@@ -14,7 +14,7 @@ from hil.diagnosis.search.events import InsideWindows, inside_windows
 from hil.diagnosis.search.initial_values import claimable
 from hil.diagnosis.wording import channel_names
 from hil.identification.estimator import Fit
-from hil.identification.inference import against
+from hil.identification.inference import bic_gain
 from hil.identification.noise_floor import unrepeated
 
 
@@ -45,7 +45,7 @@ class Addition:
     @cached_property
     def evidence(self) -> float:
         """Evidence for the term (BIC difference)."""
-        return against(self.fit, self.base)
+        return bic_gain(self.fit, self.base)
 
     @cached_property
     def gain(self) -> float:

@@ -15,9 +15,9 @@ from hil.arrays import FloatArray
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.search.change_points import Segment, joined, segments, standing_out
 from hil.diagnosis.search.disturbance import Disturbance, disturbance
-from hil.identification.dataset import inertia
 from hil.identification.estimator import Fit
 from hil.identification.measured import Measured
+from hil.identification.residual_scales import inertia
 
 BLOCK_S = 0.005  # an edge to be refined by simulation
 SHORTEST, EDGE = 3, 6  # blocks of the shortest window; blocks in which the observer follows an edge

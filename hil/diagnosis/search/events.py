@@ -15,7 +15,7 @@ from hil.diagnosis.search.event_detection import BLOCK_S, EDGE, Event, detect, f
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
-from hil.identification.inference import against
+from hil.identification.inference import bic_gain
 from hil.identification.terms import Term, Window, is_load
 from hil.identification.window_fit import fit_windows, window_errors
 from hil.twin.library import BY_ID, LIBRARY
@@ -63,8 +63,8 @@ def revised(found: Fit) -> Fit:
         shown = event_term(found.terms[index].effect, events, found.bench.axis.ratio_m_rad)
         other = found.hypothesis.replaced(index, shown)
         again = fit_windows(found.estimator.evaluate(other))
-        best = again if against(again, best) > 0.0 else best
-    return _trimmed(_completed(best if best.cost <= found.cost or against(best, found) > 0.0 else found))
+        best = again if bic_gain(again, best) > 0.0 else best
+    return _trimmed(_completed(best if best.cost <= found.cost or bic_gain(best, found) > 0.0 else found))
 
 
 def with_events_of(held_out: Dataset, final: Fit) -> Fit:
@@ -95,7 +95,7 @@ def with_events_of(held_out: Dataset, final: Fit) -> Fit:
         fitted = _trimmed(fitted, others=False)
         if _index(fitted) is None or fitted.hypothesis.x.size != longer.x.size:
             continue
-        gain = against(fitted, before)
+        gain = bic_gain(fitted, before)
         if (
             gain > evidence
             and before.cost - fitted.cost > CRITERIA.material * before.rows
@@ -135,7 +135,7 @@ def _completed(found: Fit, others: bool = True) -> Fit:
         added = event_term(found.terms[index].effect, more, found.bench.axis.ratio_m_rad)
         longer = _joined(found.hypothesis, index, added)
         again = fit_windows(found.estimator.evaluate(longer), others=others)
-        found = again if against(again, found) > CRITERIA.evidence * len(more) else found
+        found = again if bic_gain(again, found) > CRITERIA.evidence * len(more) else found
     names, refuted = {run.name for run in found.data.runs}, set[tuple[Window, Window]]()
     while True:
         term = found.terms[index]
@@ -149,7 +149,7 @@ def _completed(found: Fit, others: bool = True) -> Fit:
         rest = (other for other in term.windows if other not in (one, two))
         single = _with_windows(found.hypothesis, index, (*rest, whole))
         fitted = fit_windows(found.estimator.evaluate(single), others=others)
-        if against(fitted, found) > 0.0:
+        if bic_gain(fitted, found) > 0.0:
             found = fitted
         else:
             refuted.add((one, two))

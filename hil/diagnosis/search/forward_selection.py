@@ -23,7 +23,7 @@ from hil.diagnosis.search.rivals import ENDED, RivalFit, chosen, ended
 from hil.diagnosis.search.score_test import screen_library
 from hil.diagnosis.stages import Prepared, Progress, Searched
 from hil.identification.estimator import Fit
-from hil.identification.inference import against, whitening
+from hil.identification.inference import bic_gain, whitening
 from hil.identification.nominal_fit import fit_nominal_parameters, require_finite
 from hil.identification.parallel import in_parallel
 from hil.identification.terms import Key, Term, compatible, effects, free_slot
@@ -145,7 +145,7 @@ def _pruned(found: Fit, reference: Fit) -> tuple[Fit, dict[Key, float]]:
         other = _without(found, index)
         if found.cost > CRITERIA.clear * other.cost:
             other = other.refit(ENDED, slopes=other.jacobian)
-        return against(found, other, filters), other
+        return bic_gain(found, other, filters), other
 
     while found.terms:
         filters = whitening(found)

@@ -17,8 +17,8 @@ import numpy as np
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
 from hil.diagnosis.search import disturbance as estimate
-from hil.identification.dataset import inertia
 from hil.identification.measured import Measured
+from hil.identification.residual_scales import inertia
 from hil.identification.terms import Term, Window, free_slot
 from hil.twin.library import BY_ID, LIBRARY
 from hil.twin.mechanism import Block, Mechanism, Variant

@@ -22,10 +22,10 @@ from hil.diagnosis.search.initial_values import axis_facts, stretches
 from hil.diagnosis.search.score_test import screen_library
 from hil.diagnosis.search.successive_halving import LONG, SEARCH_ACCURACY, owner_points, race
 from hil.identification.coordinates import LAST_EDGE_STEP_S
-from hil.identification.dataset import TORQUE_ACCURACY
 from hil.identification.estimator import Fit
 from hil.identification.nominal_fit import SOFT
 from hil.identification.parallel import in_parallel
+from hil.identification.residual_scales import TORQUE_ACCURACY
 from hil.identification.terms import Term, compatible
 from hil.twin.library import BY_ID, LIBRARY
 

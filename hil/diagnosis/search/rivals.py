@@ -18,7 +18,7 @@ from hil.diagnosis.search.addition import Addition
 from hil.diagnosis.search.next_term import Round, first_standing
 from hil.identification.coordinates import LAST_EDGE_STEP_S
 from hil.identification.estimator import Fit, FitStatus
-from hil.identification.inference import Filter, against, between, refuted, whitening
+from hil.identification.inference import Filter, bic_gain, bic_margin, refuted, whitening
 from hil.identification.terms import Term, is_frequent
 from hil.twin.library import BY_ID
 
@@ -115,7 +115,7 @@ def _simplest(best: Addition, others: Sequence[Addition]) -> Addition:
 
     Of two mechanisms with the same torque on every motion the more frequent cause is preferred.
     """
-    near = [one for one in others if one.fit.jacobian.size and against(best.fit, one.fit) < CRITERIA.tied]
+    near = [one for one in others if one.fit.jacobian.size and bic_gain(best.fit, one.fit) < CRITERIA.tied]
     return min([best, *near], key=lambda one: (one.fit.hypothesis.free, not is_frequent(one.fit.terms[-1])))
 
 
@@ -131,7 +131,7 @@ def _on_fewest_parts(best: Addition, others: Sequence[Addition]) -> Addition:
         if one is not best
         and one.fit.jacobian.size
         and one.fit.hypothesis.free <= best.fit.hypothesis.free
-        and not refuted(between(best.fit, one.fit, filters), _more(one, best))
+        and not refuted(bic_margin(best.fit, one.fit, filters), _more(one, best))
     ]
     return min([best, *near], key=_parts)
 
@@ -146,7 +146,7 @@ def _more(one: Addition, named: Addition) -> float:
 
 def _compared(one: Addition, named: Addition, filters: Sequence[Filter]) -> RivalFit:
     """Compare an explanation with the named one; what is refuted by its evidence needs no other reason."""
-    evidence, more = between(named.fit, one.fit, filters), _more(one, named)
+    evidence, more = bic_margin(named.fit, one.fit, filters), _more(one, named)
     reason = "" if refuted(evidence, more) else objection(one, named)
     behind = _behind(one, named) if evidence < 0.0 else ""
     return RivalFit(one.fit.terms, one.fit.reduced, evidence, more, named.fit.reduced, reason, behind)

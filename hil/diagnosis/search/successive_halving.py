@@ -16,13 +16,13 @@ from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.search.initial_values import likenesses, observable
 from hil.diagnosis.search.score_test import Candidate, offered
 from hil.identification.coordinates import LAST_EDGE_STEP_S, TRUST
-from hil.identification.dataset import TORQUE_ACCURACY, inertia
 from hil.identification.estimator import Estimator, Fit
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.inference import by_energy, refuted
 from hil.identification.levenberg_marquardt import damped_step, normal_equations, robust_loss
 from hil.identification.nominal_fit import SOFT
 from hil.identification.parallel import POOL, in_parallel
+from hil.identification.residual_scales import TORQUE_ACCURACY, inertia
 from hil.identification.terms import Term, compatible
 from hil.identification.window_fit import fit_windows
 from hil.twin.library import BY_ID

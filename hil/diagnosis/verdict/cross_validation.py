@@ -23,7 +23,7 @@ from hil.diagnosis.search.initial_values import axis_facts
 from hil.diagnosis.verdict.noise_free import energy_without_noise
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
-from hil.identification.inference import between, standard_errors
+from hil.identification.inference import bic_margin, standard_errors
 from hil.identification.noise_floor import unrepeated
 from hil.identification.parallel import in_parallel
 from hil.identification.terms import Term
@@ -170,4 +170,4 @@ def _quiet(found: Fit, without: Fit) -> bool:
 
 def _gain(found: Fit, without: Fit) -> float:
     """Evidence for the term on held-out recordings, negative where it harms."""
-    return between(found, without) + (found.hypothesis.free - without.hypothesis.free) * float(np.log(found.rows))
+    return bic_margin(found, without) + (found.hypothesis.free - without.hypothesis.free) * float(np.log(found.rows))

@@ -81,8 +81,7 @@ class _ChannelTable:
         runs = zip(data.runs, self._of(self.nominal, data), self._of(self.final, data), strict=True)
         for index, (run, *pair) in enumerate(runs):
             white = self._white(data, index)
-            best = min((floor(values, white, run.laps) for values in pair), key=lambda one: one.rms)
-            found.append((best.rms, best.source == "repeated_laps"))
+            found.append((min(floor(values, white, run.laps) for values in pair), run.laps is not None))
         return found
 
     def _white(self, data: Dataset, index: int) -> float:

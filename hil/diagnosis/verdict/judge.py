@@ -13,7 +13,7 @@ from hil.diagnosis.verdict.cross_validation import explained_share
 from hil.diagnosis.verdict.each_alone import Change, changed
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
-from hil.identification.inference import against
+from hil.identification.inference import bic_gain
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ def explains_most(nominal: Fit, final: Fit, held_out: Dataset) -> bool:
 def refit_matters(given: Fit, nominal: Fit) -> bool:
     """True if evidence and a material share of energy support the refitted nominal parameters."""
     paid = nominal.hypothesis.x.size * float(np.log(nominal.rows))
-    enough = against(nominal, given) - paid > CRITERIA.evidence
+    enough = bic_gain(nominal, given) - paid > CRITERIA.evidence
     return enough and given.cost - nominal.cost > CRITERIA.material * nominal.rows
 
 

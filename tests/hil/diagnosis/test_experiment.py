@@ -18,7 +18,7 @@ from hil.diagnosis.verdict.testability import not_testable
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
-from hil.identification.inference import TIED, against
+from hil.identification.inference import TIED, bic_gain
 from hil.identification.measured import take
 from hil.identification.terms import Term
 from hil.motion.profile import Profile, load_profile, write_profile
@@ -39,7 +39,7 @@ NONE = dataset([], OWNER)
 
 def designed(right: Fit, *others: Fit, tied: bool = False) -> Experiment:
     """The experiment for a fit and its rivals, as evidence on these recordings has them, or taken as tied."""
-    rivals = [RivalFit.of(other, 0.0 if tied else against(right, other)) for other in others]
+    rivals = [RivalFit.of(other, 0.0 if tied else bic_gain(right, other)) for other in others]
     found = separating(searched(right, right, right, {right.terms[-1].key: rivals}), right, NONE)
     assert found is not None
     return found
@@ -51,7 +51,7 @@ def test_a_motion_is_designed_that_separates_what_one_way_ties() -> None:
     train = runs(ONE_WAY, place)
     first = fitted(Hypothesis(OWNER, (place,)), train)
     second = fitted(Hypothesis(OWNER, (Term("friction_drift", 0, (0.006, 2.0)),)), train)
-    assert abs(against(first, second)) < TIED
+    assert abs(bic_gain(first, second)) < TIED
     found = designed(first, second)
     assert found.profile is not None
     assert found.separates == ("friction_drift", "position_dependent_friction")
@@ -60,7 +60,7 @@ def test_a_motion_is_designed_that_separates_what_one_way_ties() -> None:
         truth = right.terms
         both = dataset([*runs(ONE_WAY, *truth).runs, *runs(found.profile, *truth, seed=2).runs], OWNER)
         a, b = (fitted(other.hypothesis, both, evaluations=6) for other in (right, wrong))
-        assert against(a, b) > 10.0 * TIED
+        assert bic_gain(a, b) > 10.0 * TIED
 
 
 def test_no_motion_is_promised_that_gains_nothing() -> None:

@@ -14,7 +14,7 @@ from hil.bench.control_section import Control
 from hil.diagnosis.diagnose import diagnose
 from hil.diagnosis.preparation.law_check import check_law
 from hil.diagnosis.preparation.usable_law import LawCheck
-from hil.identification.control_law import fit_law
+from hil.identification.law.fit import fit_law
 from hil.identification.measured import take
 from hil.recording.recording import Recording
 

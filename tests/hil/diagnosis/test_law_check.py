@@ -12,7 +12,7 @@ from hil.bench.bench_file import Bench
 from hil.bench.control_section import Control
 from hil.diagnosis.diagnose import diagnose
 from hil.diagnosis.result import Result
-from hil.identification.control_law import fit_law
+from hil.identification.law.fit import fit_law
 from hil.identification.measured import take
 from hil.identification.terms import Term
 from hil.recording.recording import Recording

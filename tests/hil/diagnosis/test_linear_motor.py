@@ -13,8 +13,8 @@ from hil.diagnosis.diagnose import diagnose
 from hil.diagnosis.preparation.preflight import preflight
 from hil.diagnosis.preparation.split import held_out_note, split
 from hil.errors import InputError
-from hil.identification.completion import reduced
 from hil.identification.dataset import prepare_dataset
+from hil.identification.derived_channels import reduced
 from hil.identification.nominal_fit import fit_nominal_parameters
 from hil.recording.recording import Recording
 

@@ -11,7 +11,7 @@ from hil.diagnosis.verdict.cross_validation import cross_validate
 from hil.diagnosis.verdict.noise_free import energy_without_noise
 from hil.identification.dataset import Dataset
 from hil.identification.hypothesis import Hypothesis
-from hil.identification.inference import against
+from hil.identification.inference import bic_gain
 from hil.identification.measured import take
 from hil.identification.terms import Term
 from hil.motion.trajectory import plan
@@ -72,7 +72,7 @@ def test_a_filter_of_counts_gains_evidence_but_not_on_motion_without_noise() -> 
     data = constant_feed(owner)
     plain, found = fitted(Hypothesis(owner), data), fitted(Hypothesis(owner, (FLEXIBLE_LOAD,)), data)
     gained, alone = plain.cost - found.cost, energy_without_noise(found, plain)
-    assert against(found, plain) > 1000.0
+    assert bic_gain(found, plain) > 1000.0
     assert alone is not None
     assert alone < 0.05 * gained
     proof = cross_validate(plain, found, data.over(()))

@@ -12,7 +12,7 @@ from hil.diagnosis.search.score_test import screen
 from hil.errors import HilError
 from hil.identification.estimator import Estimator, Fit, FitStatus
 from hil.identification.hypothesis import Hypothesis
-from hil.identification.inference import against
+from hil.identification.inference import bic_gain
 from hil.identification.measured import take
 from hil.identification.nominal_fit import require_finite
 from hil.identification.residuals import Residuals
@@ -68,7 +68,7 @@ def test_evidence_of_a_useless_regressor_on_autoregressive_noise_is_rarely_posit
     for _ in range(200):
         noise, regressor = (lfilter([1.0], [1.0, -0.95], rng.standard_normal(size)) for _ in range(2))
         left = noise - regressor * (regressor @ noise) / (regressor @ regressor)
-        evidence.append(against(fit_of(left, 2), fit_of(noise, 1)))
+        evidence.append(bic_gain(fit_of(left, 2), fit_of(noise, 1)))
     assert np.mean(np.array(evidence) > 0.0) < 0.1
     assert max(evidence) < 10.0
 

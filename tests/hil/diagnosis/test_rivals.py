@@ -19,7 +19,7 @@ from hil.diagnosis.search.next_term import Round, first_standing
 from hil.diagnosis.search.rivals import RivalFit, chosen
 from hil.diagnosis.verdict.findings import rival_in_words
 from hil.identification.hypothesis import Hypothesis
-from hil.identification.inference import against, between
+from hil.identification.inference import bic_gain, bic_margin
 from hil.identification.measured import take
 from hil.identification.terms import Term
 from hil.recording.recording import Recording
@@ -84,8 +84,8 @@ LOAD, OTHER = Term("constant_load", 0, (0.4,)), Term("friction_gradient", 0, (0.
 def test_evidence_is_on_the_side_of_the_fit_with_less_cost() -> None:
     data = dataset([take(recorded(OWNER, LOAD), OWNER)], OWNER)
     right, wrong = (fitted(Hypothesis(OWNER, (term,)), data, evaluations=4) for term in (LOAD, OTHER))
-    assert between(right, wrong) == against(right, wrong) > 0.0
-    assert between(wrong, right) == -between(right, wrong)
+    assert bic_margin(right, wrong) == bic_gain(right, wrong) > 0.0
+    assert bic_margin(wrong, right) == -bic_margin(right, wrong)
 
 
 def test_what_explains_more_is_named_unless_there_is_an_objection(monkeypatch: pytest.MonkeyPatch) -> None:

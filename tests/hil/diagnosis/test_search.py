@@ -12,10 +12,11 @@ from hil.diagnosis.preparation.preflight import preflight
 from hil.diagnosis.search.score_test import Candidate
 from hil.diagnosis.search.successive_halving import _Race, _soft, owner_points
 from hil.identification.coordinates import CHATTER_STEP, LAST_EDGE_STEP_S
-from hil.identification.dataset import inertia, prepare_dataset
+from hil.identification.dataset import prepare_dataset
 from hil.identification.estimator import Estimator, Fit
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.nominal_fit import fit_nominal_parameters
+from hil.identification.residual_scales import inertia
 from hil.identification.residuals import Residuals
 from hil.identification.terms import Term
 

@@ -20,7 +20,7 @@ from hil.diagnosis.search.next_term import Round, next_term
 from hil.diagnosis.search.score_test import Candidate
 from hil.errors import InputError
 from hil.identification.compare import compare
-from hil.identification.completion import completed
+from hil.identification.derived_channels import completed
 from hil.identification.nominal_fit import fit_nominal_parameters
 from hil.identification.terms import Term
 from hil.recording.recording import Recording

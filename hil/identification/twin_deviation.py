@@ -23,10 +23,11 @@ import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
 from hil.arrays import FloatArray
-from hil.identification.dataset import Dataset, inertia
+from hil.identification.dataset import Dataset
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.measured import Measured
 from hil.identification.noise_floor import rms
+from hil.identification.residual_scales import inertia
 from hil.identification.residuals import differences
 from hil.twin.axis import Response
 from hil.twin.library import BY_ID
@@ -101,7 +102,7 @@ def compare_blocks(hypothesis: Hypothesis, data: Dataset) -> tuple[BlockDeviatio
     if run.observability.torque_and_command:
         drive = Deviation("drive", name, unit, run.torque, run.torque - left["torque"], evaluated)
         blocks.append(BlockDeviation(drive, f"measured {name} command", run.noise.torque))
-    held = _mechanics(hypothesis, run, data.observer_s)
+    held = differences(*held_on_motor(hypothesis, run, data.observer_s), hypothesis.bench, evaluated)
     torque = inertia(data.bench) / data.observer_s**2  # torque per innovation
     motor = Deviation(MOTOR_BLOCK, name, unit, run.torque, run.torque + torque * held["motor"], evaluated)
     inputs = f"measured {name}, held on the measured motor position"
@@ -114,11 +115,6 @@ def compare_blocks(hypothesis: Hypothesis, data: Dataset) -> tuple[BlockDeviatio
         table = Deviation(TABLE_BLOCK, label, "m", stretch, stretch - held["table"], evaluated)
         blocks.append(BlockDeviation(table, "measured motor position (twin held on it)", run.noise.table_m))
     return tuple(blocks)
-
-
-def _mechanics(hypothesis: Hypothesis, run: Measured, observer_s: float) -> dict[str, FloatArray]:
-    """Residuals (n,) of motor and table with the measured torque as input."""
-    return differences(*held_on_motor(hypothesis, run, observer_s), hypothesis.bench, run.evaluated)
 
 
 def held_on_motor(hypothesis: Hypothesis, run: Measured, observer_s: float) -> tuple[Response, Response]:

@@ -18,13 +18,13 @@ from scipy.signal import savgol_filter
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
 from hil.errors import InputError
-from hil.identification.noise import white_noise
+from hil.identification.sensor_noise import white_noise
 from hil.recording.recording import RESAMPLED, Recording
 
 SMOOTH_S = 0.021  # window of the derivatives of the motor position: passes some 20 Hz, averages encoder counts
 _SHORTEST = 5  # rows of a parabola: the fewest that average noise on both sides
 _REST = 5.0  # speed at rest in standard deviations of its noise: one row in a million is above
-_SLOW = 1e-3  # of the top speed: below lies rest, as for set-points (`noise.moving`)
+_SLOW = 1e-3  # of the top speed: below lies rest, as for set-points (`sensor_noise.moving`)
 DERIVED = "derived"  # key of the metadata: channel -> how it was derived
 FROM_BENCH = "inertia and friction of the bench over the measured motion; not measured"
 

@@ -17,19 +17,9 @@ from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
 from hil.control.cascade import Gains
 from hil.identification.inference import correlation_time
-from hil.identification.law_fit import LawErrors, LawFit
-from hil.identification.law_replay import (
-    FEEDBACK_ROWS,
-    SETPOINT_ROWS,
-    LawRows,
-    Parts,
-    Settings,
-    closed_form,
-    find_delays,
-    first_tick,
-    residuals,
-    to_explain,
-)
+from hil.identification.law.closed_form import FEEDBACK_ROWS, SETPOINT_ROWS, closed_form, find_delays, first_tick
+from hil.identification.law.replay import LawRows, Parts, Settings, residuals, to_explain
+from hil.identification.law.result import LawErrors, LawFit
 from hil.identification.measured import Measured
 from hil.identification.terms import Term
 from hil.twin.axis import Twin
@@ -158,9 +148,9 @@ def fit_law(
     if free and peak < gains.torque_limit_n_m:  # it never acted; gains that are far off would make it act
         gains = gains._replace(torque_limit_n_m=np.inf)
     base = Settings(gains, scale=_scale(rows, gains))
-    found = fit_settings(rows, base, bench.twin(), terms, free=free, delays=delays)
-    kept = found.gains._replace(torque_limit_n_m=bench.gains.torque_limit_n_m)
-    return replace(found, settings=found.settings._replace(gains=kept))
+    fit = fit_settings(rows, base, bench.twin(), terms, free=free, delays=delays)
+    kept = fit.gains._replace(torque_limit_n_m=bench.gains.torque_limit_n_m)
+    return replace(fit, settings=fit.settings._replace(gains=kept))
 
 
 def fit_settings(
@@ -190,8 +180,8 @@ def fit_settings(
     if not free or base.gains.position_ticks == 1:
         return _fitted(law, twin, rows, [0] * len(rows), most)
     cuts = range(base.gains.position_ticks)
-    found = [min(cuts, key=lambda cut, run=run: _fitted(law, twin, [run], [cut], most).cost) for run in rows]  # type: ignore[misc]
-    return _fitted(law, twin, rows, found, most)
+    first_ticks = [min(cuts, key=lambda cut, run=run: _fitted(law, twin, [run], [cut], most).cost) for run in rows]  # type: ignore[misc]
+    return _fitted(law, twin, rows, first_ticks, most)
 
 
 def _scale(rows: Sequence[LawRows], gains: Gains) -> float:
@@ -236,9 +226,9 @@ def _fitted(
         y = fit.x
     settings, terms = law.values(y)
     weight = settings.gains.velocity_gain_n_m_s_rad
-    found = parts(y, weight)
+    residual_parts = parts(y, weight)
     if y.size:
-        rows = sum(part.size / correlation_time(part) for run in found for part in run if part.size)
+        rows = sum(part.size / correlation_time(part) for run in residual_parts for part in run if part.size)
         variance = float(np.sum(fit.fun**2)) / max(rows - law.count, 1.0) * rows / fit.fun.size
         # one at its bound is kept there: near a feed-forward of 0 a delay of the set-points acts as another one
         inside = (y > low + _AT_BOUND) & (y < high - _AT_BOUND)
@@ -246,8 +236,8 @@ def _fitted(
         variances[inside] = np.diag(np.linalg.pinv(fit.jac[:, inside].T @ fit.jac[:, inside]))
         errors = law.errors(np.sqrt(variance * np.maximum(variances, 0.0)))
     asked = _rms([to_explain(run, settings.gains) for run in runs])
-    left = [_rms([run[loop] for run in found]) / max(asked, 1e-150) for loop in range(2)]
-    return LawFit(settings, terms, found, errors, law.count, left[0], left[1])
+    left = [_rms([run[loop] for run in residual_parts]) / max(asked, 1e-150) for loop in range(2)]
+    return LawFit(settings, terms, residual_parts, errors, law.count, left[0], left[1])
 
 
 def _rms(parts: Sequence[FloatArray]) -> float:

@@ -9,14 +9,14 @@ import numpy as np
 from hil.arrays import FloatArray
 from hil.control.cascade import Gains
 from hil.identification.inference import correlation_time
-from hil.identification.law_replay import Parts, Settings
+from hil.identification.law.replay import Parts, Settings
 from hil.identification.terms import Term
 
 # Share that a law may leave of the command (rms) and still be that of the recording: gains and structure leave tens of
 # per cent if they are wrong, mechanisms on the controller's inputs a few.
 REPLAYED = 0.05
-_SURE = 3.0  # standard errors from which a delay is told
-_LEAST_ROWS = 0.05  # delay in rows that is told: positions between two rows are interpolated
+SURE = 3.0  # standard errors from which a value differs from another: one in 400 normal errors is larger
+_LEAST_ROWS = 0.05  # least delay in rows that is significant: positions between two rows are interpolated
 
 
 @dataclass(frozen=True)
@@ -79,8 +79,8 @@ class LawFit:
 
 
 def sure(delay_rows: float, error_rows: float) -> bool:
-    """True if a delay is told: above its error, and above that of interpolation."""
-    return abs(delay_rows) > max(_SURE * error_rows, _LEAST_ROWS)
+    """True if a delay is significant: above its error, and above that of interpolation."""
+    return abs(delay_rows) > max(SURE * error_rows, _LEAST_ROWS)
 
 
 def preferred(fits: Sequence[LawFit]) -> LawFit:

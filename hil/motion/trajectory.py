@@ -1,7 +1,7 @@
 """Trajectories: the set-points of every tick, computed before the motion starts.
 
 Moves of a profile have sine-squared velocity ramps, as the path generator of the source (`hil.motion.sine_squared`).
-Approach, jog, stops and new targets are time-optimal (`hil.motion.time_optimal`). Both are evaluated in closed form;
+Approach, jog and stops are time-optimal (`hil.motion.time_optimal`). Both are evaluated in closed form;
 no derivative is numerical.
 """
 
@@ -18,12 +18,10 @@ from numpy.typing import NDArray
 from hil.errors import FieldError, InputError, field_name
 from hil.figures.panels import COMMAND, Line, Panel
 from hil.motion.pieces import MAX_DURATION_S, Array, Cubic, Motion, MotionLimits, MotionPhase, Move
-from hil.motion.time_optimal import MotionState, point_to_point, stop, time_optimal_duration_s
+from hil.motion.time_optimal import MotionState, point_to_point, stop
 
 if TYPE_CHECKING:
     from hil.motion.profile import Profile
-
-__all__ = ["SegmentRun", "Trajectory", "plan", "replan", "stop_from", "time_optimal_duration_s"]
 
 APPROACH = "approach to start"
 MAX_POSITION_M = 100.0  # as in a profile
@@ -117,7 +115,7 @@ def plan(profile: Profile, period_s: float, start_m: float | None = None) -> Tra
     notes: list[str] = []
     slot = 0
     if start_m is not None and start_m != profile.start_m:
-        approach = point_to_point(MotionState(start_m), profile.start_m, profile.motion_limits)
+        approach = point_to_point(start_m, profile.start_m, profile.motion_limits)
         profile.check_position(("start_m",), min(start_m, profile.start_m), max(start_m, profile.start_m))
         timed.append((0.0, APPROACH, "approach", 0, approach))
         slot = profile.slots(approach)
@@ -148,31 +146,15 @@ def stop_from(
     A velocity or acceleration beyond its limit is brought back in the shortest time. Raises InputError for
     values that are not finite and for a state so far beyond the limits that it takes more than an hour.
     """
-    state = MotionState(position_m, velocity_m_s, acceleration_m_s2)
-    return _single("stop", stop(state, limits), state, limits, period_s)
-
-
-def replan(
-    position_m: float,
-    velocity_m_s: float,
-    acceleration_m_s2: float,
-    target_m: float,
-    limits: MotionLimits,
-    period_s: float,
-) -> Trajectory:
-    """Time-optimal motion from any state to rest at target_m; states beyond the limits as in stop_from."""
-    state = MotionState(position_m, velocity_m_s, acceleration_m_s2)
-    return _single("replan", point_to_point(state, target_m, limits), state, limits, period_s)
-
-
-def _single(name: str, move: Move, state: MotionState, limits: MotionLimits, period_s: float) -> Trajectory:
     _check_period(period_s)
+    state = MotionState(position_m, velocity_m_s, acceleration_m_s2)
+    move = stop(state, limits)
     if move.duration_s > MAX_DURATION_S:
         raise InputError(
-            f"{name}: given {state}, from which it takes {move.duration_s:.6g} s within {limits}, "
+            f"stop: given {state}, from which it takes {move.duration_s:.6g} s within {limits}, "
             f"allowed up to {MAX_DURATION_S:.0f} s; raise the limits"
         )
-    run = SegmentRun(name, name, 0, 0.0, move.duration_s)
+    run = SegmentRun("stop", "stop", 0, 0.0, move.duration_s)
     return _sampled([move], (run,), period_s, move.notes)
 
 

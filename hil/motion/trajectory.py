@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -59,8 +59,7 @@ class Trajectory:
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
+        for value in vars(self).values():
             if isinstance(value, np.ndarray):
                 value.setflags(write=False)
 
@@ -81,6 +80,13 @@ class Trajectory:
     @property
     def duration_s(self) -> float:
         return float(self.time_s[-1])
+
+    def first(self, rows: int) -> Trajectory:
+        """Return the first rows."""
+        arrays: dict[str, Any] = {
+            name: value[:rows] for name, value in vars(self).items() if isinstance(value, np.ndarray)
+        }
+        return replace(self, **arrays)
 
     def plot(self) -> Any:
         """Draw position, velocity, acceleration and jerk over time; returns a matplotlib Figure."""

@@ -2,8 +2,7 @@
 
     python -m hil.validation.benchmarks.diagnosis [--cases 2x25,2x50,2x100,2x200,7x25,20x25,7x200]
 
-The simulated bench repeats the motion of `hil demo` with concealed cogging. An axis of n masses is a chain: the motor
-of the reference axis, its table in n - 1 equal parts, and its compliance in n - 1 equal springs.
+The simulated bench repeats the motion of `hil demo` with concealed cogging. An axis of n masses is `chain_of(n)`.
 Each diagnosis is a new process; the first one also compiles the kernels that are not yet in numba's cache.
 """
 
@@ -18,16 +17,12 @@ from typing import Annotated
 
 import typer
 
-from hil.bench.axis_models import SerialChain, TwoMass
-from hil.bench.bench_file import Bench
 from hil.bench.hardware import SimulatedEffect, SimulationSection
 from hil.loop.run import run_profile
-from hil.loop.simulated_bench import load_simulated
-from hil.motion.profile import Profile
-from hil.motion.trajectory import plan
 from hil.report.compare_report import write_bench
 from hil.report.console import table
 from hil.twin.mechanisms import cogging_torque
+from hil.validation.benchmarks.axis import chain_of, repeated
 from hil.validation.proof.draw.demo import LEARN, PROVE
 
 _HIL = (sys.executable, "-c", "from hil.cli import main; main()")
@@ -44,24 +39,6 @@ def measure(
     wanted = [case.split("x") for case in cases.split(",")]
     rows = [_row(int(masses), float(length_s)) for masses, length_s in wanted]
     table(("masses", "recording at 1 kHz", "diagnosis", "processor", "memory", "named"), rows)
-
-
-def chain_of(number: int) -> Bench:
-    """The reference bench as a chain of its motor and so many masses less one, with springs of equal stiffness."""
-    bench = load_simulated("reference")
-    axis = bench.axis
-    assert isinstance(axis, TwoMass)
-    at_motor = axis.ratio_m_rad**2
-    parts = number - 1
-    stiffness = axis.stiffness_n_m * at_motor * parts
-    chain = SerialChain(
-        lead_m=axis.lead_m,
-        inertias_kg_m2=(axis.motor_mass_kg * at_motor, *(axis.table_mass_kg * at_motor / parts,) * parts),
-        stiffnesses_n_m_rad=(stiffness,) * parts,
-        coulomb_torque_n_m=axis.coulomb_torque_n_m,
-        viscous_torque_n_m_s_rad=axis.viscous_torque_n_m_s_rad,
-    )
-    return bench.model_copy(update={"axis": chain, "name": f"chain_{number}"})
 
 
 def _row(masses: int, length_s: float) -> tuple[str, ...]:
@@ -92,15 +69,6 @@ def _row(masses: int, length_s: float) -> tuple[str, ...]:
         f"{masses}", f"{length_s:.0f} s", f"{took_s:.1f} s", f"{processor_s:.1f} s", f"{memory_gb:.2f} GB",
         ", ".join(found["effect"] for found in answer["missing"]),
     )  # fmt: skip
-
-
-def repeated(profile: Profile, length_s: float, period_s: float) -> Profile:
-    """A profile repeated to a length of about `length_s`."""
-    data = profile.model_dump(mode="json")
-    times = max(round(length_s / plan(profile, period_s).duration_s), 1)
-    return Profile.model_validate(
-        data | {"segments": [{"kind": "repeat", "times": times, "segments": data["segments"]}]}
-    )
 
 
 if __name__ == "__main__":

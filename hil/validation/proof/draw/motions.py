@@ -4,10 +4,7 @@ A good motion has the full travel, several feeds both ways, creep through revers
 accelerations. All are made of sine-squared moves (`hil.motion.profile`), from rest to rest.
 """
 
-from dataclasses import replace
 from typing import Any, Literal, get_args
-
-import numpy as np
 
 from hil.motion.profile import Profile
 from hil.motion.trajectory import Trajectory, plan
@@ -36,7 +33,8 @@ def poor(rng: Rng, axis: DrawnAxis, kind: Poor) -> Trajectory:
     of about 1 mm in one place; or one low feed back and forth with low acceleration."""
     if kind == "one_way":
         feed = axis.travel_m / rng.uniform(4.0, 8.0)
-        return _cut(_planned(axis, [_rest(0.2), _to(axis.travel_m, feed)]), 0.95)
+        whole = _planned(axis, [_rest(0.2), _to(axis.travel_m, feed)])
+        return whole.first(round(0.95 * len(whole)))
     if kind == "local":
         stroke, feed = rng.uniform(0.5e-3, 2e-3), axis.feed_m_s * rng.uniform(0.02, 0.05)
         laps = [_stroke(stroke, feed), _rest(0.1), _stroke(-stroke, feed), _rest(0.1)]
@@ -116,12 +114,3 @@ def _seconds(axis: DrawnAxis, segments: list[dict[str, Any]]) -> float:
 
 def _planned(axis: DrawnAxis, segments: list[dict[str, Any]], gentle: float = 1.0) -> Trajectory:
     return plan(_profile(axis, segments, gentle), axis.period_s)
-
-
-def _cut(trajectory: Trajectory, share: float) -> Trajectory:
-    """Return the first part of a trajectory."""
-    rows = slice(0, round(share * len(trajectory)))
-    arrays: dict[str, Any] = {
-        name: value[rows] for name, value in vars(trajectory).items() if isinstance(value, np.ndarray)
-    }
-    return replace(trajectory, **arrays)

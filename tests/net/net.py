@@ -52,10 +52,10 @@ def main() -> int:
     options = parser.parse_args()
     cases = [case for case in read_cases() if options.only in case["name"]]
     todo = [Path(case["name"]) for case in cases if not answer_file(options.out, case["name"]).exists()]
-    for number, name in enumerate(side_by_side(partial(answer, out=options.out), todo, options.jobs), 1):
-        path = answer_file(options.out, name)
+    for number, done in enumerate(side_by_side(partial(answer, out=options.out), todo, options.jobs), 1):
+        path = answer_file(options.out, done.name)
         print(
-            f"[{number}/{len(todo)}] {name}: {line(json.loads(path.read_text())) if path.exists() else SKIPPED}",
+            f"[{number}/{len(todo)}] {done.name}: {line(json.loads(path.read_text())) if path.exists() else SKIPPED}",
             flush=True,
         )
     found = {

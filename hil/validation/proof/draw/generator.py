@@ -11,6 +11,7 @@ from typing import Any, cast
 
 import numpy as np
 import yaml
+from pydantic import TypeAdapter
 
 from drivers.sim.effects import Effect
 from drivers.sim.reality import record
@@ -108,10 +109,7 @@ class Truth:
     @classmethod
     def from_json(cls, data: dict[str, Any]) -> "Truth":
         """Return the truth from plain data."""
-        effects = tuple(Concealed(**{**effect, "same_law": tuple(effect["same_law"])}) for effect in data["effects"])
-        return cls(
-            **{**data, "effects": effects, "rivals": tuple(data["rivals"]), "not_testable": tuple(data["not_testable"])}
-        )
+        return TypeAdapter(cls).validate_python(data)
 
 
 @dataclass(frozen=True, eq=False)

@@ -34,7 +34,7 @@ def answer_cases(
         place for place in cases_in(cases, out)[:first] if not all(answered(out / name / place.name) for name in names)
     ]
     for done in side_by_side(partial(answer_case, out=out, methods=names), todo, jobs):
-        print(done, flush=True)
+        print(done.name, flush=True)
 
 
 if __name__ == "__main__":

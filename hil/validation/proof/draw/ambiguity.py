@@ -35,8 +35,7 @@ def ambiguous(rng: Rng, effect: str | None, kind: Kind | None) -> CaseDraft | No
     if found is None or effect not in (None, found[0].id):
         return None
     first, second = found  # the effect and its rival
-    first_run, second_run, last_run = (motions.poor(rng, on.axis, how) for _ in range(3))
-    runs = (first_run, second_run, last_run)
+    runs = motions.poor(rng, on.axis, how)
     sizes = EffectSizes(on.axis, runs[:2])
     for _ in range(_STEPS):
         size = sizes.size([first])

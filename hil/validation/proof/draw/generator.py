@@ -31,14 +31,7 @@ from hil.validation.proof.draw.tiers import RECIPES
 from hil.validation.proof.draw.unknown_effects import NOVEL
 
 TIERS = tuple(RECIPES)
-BALANCED = {
-    "single": LIBRARY,
-    "ladder": LIBRARY,
-    "pair": LIBRARY,
-    "masked": LIBRARY,
-    "novel": NOVEL,
-    "less_known": LIBRARY,
-}
+BALANCED = {**dict.fromkeys(("single", "ladder", "pair", "masked", "less_known"), LIBRARY), "novel": NOVEL}
 RECORDINGS = ("train_1", "train_2", "holdout")
 _AXES = 300  # draws before a request counts as impossible
 # An engineer would stop an axis with more than this following error beyond that of the law, or share of limited torque.
@@ -181,23 +174,14 @@ def truth_of(name: str, tier: str, number: int, seed: int, draft: CaseDraft) -> 
     """Return the truth of a draft."""
     axis = draft.axis
     noise = {"torque": axis.sensors.torque_noise_n_m} | ({"table_m": axis.table_noise_m} if axis.has_table else {})
-    concealed = tuple(
-        Concealed(
-            effect.id,
-            effect.form,
-            dict(effect.parameters),
-            size,
-            expected.same_law(effect.id),
-            expected.block(effect.id),
-            expected.place(effect, axis),
-            expected.compared(effect, axis),
-        )
-        for effect, size in draft.effects
-    )
-    answer = (draft.verdict, concealed, draft.rivals, draft.not_testable)
-    return Truth(
-        name, tier, number, seed, axis.kind, *answer, dict(axis.true), dict(axis.believed), noise, draft.forgotten
-    )
+    concealed = []
+    for effect, size in draft.effects:
+        drawn = effect.id, effect.form, dict(effect.parameters), size
+        right = expected.same_law(effect.id), expected.block(effect.id), expected.place(effect, axis)
+        concealed.append(Concealed(*drawn, *right, expected.compared(effect, axis)))
+    answer = draft.verdict, tuple(concealed), draft.rivals, draft.not_testable
+    parameters = dict(axis.true), dict(axis.believed), noise
+    return Truth(name, tier, number, seed, axis.kind, *answer, *parameters, draft.forgotten)
 
 
 def _turn(names: tuple[str, ...], number: int, seed: int) -> str:

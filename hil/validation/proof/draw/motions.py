@@ -11,6 +11,7 @@ from hil.motion.trajectory import Trajectory, plan
 from hil.validation.proof.draw.axes import JERK_M_S3, DrawnAxis
 from hil.validation.proof.draw.axis_kinds import Rng, log_uniform
 
+Runs = tuple[Trajectory, Trajectory, Trajectory]  # two for training, one to hold out
 Poor = Literal["one_way", "local", "slow"]
 POOR: tuple[Poor, ...] = get_args(Poor)
 TRAINING_S, SHORT_S, HOLDOUT_S = 18.0, 12.0, 12.0
@@ -18,19 +19,18 @@ _CREEP_M_S = (0.6e-3, 12e-3)
 _TRIES = 5  # draws that do not fit into the time before a motion counts as full
 
 
-def training(rng: Rng, axis: DrawnAxis) -> tuple[Trajectory, Trajectory]:
-    """Draw two motions, a long and a short one."""
-    return _good(rng, axis, TRAINING_S), _good(rng, axis, SHORT_S)
+def good(rng: Rng, axis: DrawnAxis) -> Runs:
+    """Draw a long and a short motion for training, and one with other feeds, strokes and positions to hold out."""
+    return _good(rng, axis, TRAINING_S), _good(rng, axis, SHORT_S), _good(rng, axis, HOLDOUT_S)
 
 
-def holdout(rng: Rng, axis: DrawnAxis) -> Trajectory:
-    """Draw a motion with other feeds, strokes and positions."""
-    return _good(rng, axis, HOLDOUT_S)
+def poor(rng: Rng, axis: DrawnAxis, kind: Poor) -> Runs:
+    """Draw three motions with little excitation: one stroke in one direction, recorded until shortly before its end;
+    strokes of about 1 mm in one place; or one low feed back and forth with low acceleration."""
+    return _poor(rng, axis, kind), _poor(rng, axis, kind), _poor(rng, axis, kind)
 
 
-def poor(rng: Rng, axis: DrawnAxis, kind: Poor) -> Trajectory:
-    """Draw a motion with little excitation: one stroke in one direction, recorded until shortly before its end; strokes
-    of about 1 mm in one place; or one low feed back and forth with low acceleration."""
+def _poor(rng: Rng, axis: DrawnAxis, kind: Poor) -> Trajectory:
     if kind == "one_way":
         feed = axis.travel_m / rng.uniform(4.0, 8.0)
         whole = _planned(axis, [_rest(0.2), _to(axis.travel_m, feed)])

@@ -5,6 +5,7 @@ A recipe returns None if its draws failed on this axis; the next call draws anot
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from math import inf
 
 from hil.validation.proof.draw import motions
@@ -57,16 +58,6 @@ def pair(rng: Rng, effect: str | None, kind: Kind | None) -> CaseDraft | None:
     return two(rng, on, (first, str(rng.choice(others))), VISIBLE, VISIBLE, (0.0, inf))
 
 
-def null(rng: Rng, effect: str | None, kind: Kind | None) -> CaseDraft | None:
-    """Conceal nothing; the bench file is exact."""
-    return _nothing(rng, effect, kind, "exact", "no_mismatch")
-
-
-def parameters_only(rng: Rng, effect: str | None, kind: Kind | None) -> CaseDraft | None:
-    """Conceal nothing; the parameters of the bench file are wrong."""
-    return _nothing(rng, effect, kind, "wrong", "parameter_error")
-
-
 def masked(rng: Rng, effect: str | None, kind: Kind | None) -> CaseDraft | None:
     """Conceal a small effect behind noise and coarse encoders, or behind a larger effect."""
     hard = bool(rng.random() < 0.5)
@@ -100,7 +91,7 @@ def novel_physics(rng: Rng, effect: str | None, kind: Kind | None) -> CaseDraft 
 def insufficient(rng: Rng, effect: str | None, kind: Kind | None) -> CaseDraft | None:
     """Conceal an effect that good motions show, and record motions that do not: it must be reported as not testable."""
     on = stage(rng, kind)
-    poor = {how: tuple(motions.poor(rng, on.axis, how) for _ in range(3)) for how in motions.POOR}
+    poor = {how: motions.poor(rng, on.axis, how) for how in motions.POOR}
     unseen = {how: EffectSizes(on.axis, runs[:2]) for how, runs in poor.items()}
     for _ in range(TRIES):
         name = name_on(on.axis, effect, kind is not None, rng)
@@ -110,14 +101,8 @@ def insufficient(rng: Rng, effect: str | None, kind: Kind | None) -> CaseDraft |
         found, how = draw_effect(name, on.scale, rng), motions.POOR[int(rng.integers(len(motions.POOR)))]
         if unseen[how].evidence([found]) > _INVISIBLE or not VISIBLE[0] <= on.sizes.size([found]) <= VISIBLE[1]:
             continue
-        first, second, last = poor[how]
-        return CaseDraft(
-            on.axis,
-            (first, second, last),
-            "parameter_error",
-            ((found, unseen[how].size([found])),),
-            not_testable=same_law(name),
-        )
+        concealed = ((found, unseen[how].size([found])),)
+        return CaseDraft(on.axis, poor[how], "parameter_error", concealed, not_testable=same_law(name))
     return None
 
 
@@ -132,7 +117,8 @@ def less_known(rng: Rng, effect: str | None, kind: Kind | None) -> CaseDraft | N
     return replace(draft, not_testable=same_law(name), forgotten=ways[int(rng.integers(len(ways)))])
 
 
-def _nothing(rng: Rng, effect: str | None, kind: Kind | None, belief: Belief, verdict: str) -> CaseDraft:
+def _nothing(belief: Belief, verdict: str, rng: Rng, effect: str | None, kind: Kind | None) -> CaseDraft:
+    """Conceal nothing; the parameters of the bench file are exact or wrong."""
     if effect is not None:
         raise ValueError(f"effect: must be left out where nothing is concealed, got {effect!r}")
     on = stage(rng, kind, belief)
@@ -143,8 +129,8 @@ RECIPES: Mapping[str, Recipe] = {
     "single": single,
     "ladder": ladder,
     "pair": pair,
-    "null": null,
-    "parameters_only": parameters_only,
+    "null": partial(_nothing, "exact", "no_mismatch"),
+    "parameters_only": partial(_nothing, "wrong", "parameter_error"),
     "masked": masked,
     "novel": novel_physics,
     "ambiguous": ambiguous,

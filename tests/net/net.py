@@ -30,9 +30,9 @@ from hil.bench.bench_file import Bench, load_bench
 from hil.diagnosis.diagnose import diagnose
 from hil.importing.by_map import import_recording
 from hil.recording.recording import Recording, read_recording, write_parquet
-from hil.validation.proof.answer.worker_pool import side_by_side
 from hil.validation.proof.draw.expected import same_law
 from hil.validation.proof.draw.generator import draw
+from hil.validation.proof.worker_pool import side_by_side
 
 HERE = Path(__file__).parent
 REFERENCE = HERE / "answers.json"

@@ -17,9 +17,9 @@ from hil.motion.profile import load_profile
 from hil.motion.trajectory import plan
 from hil.recording.recording import write_parquet
 from hil.report.console import Progress
-from hil.validation.proof.answer.worker_pool import side_by_side
 from hil.validation.proof.draw.generator import Truth, draw, rerun
 from hil.validation.proof.seal import CASES
+from hil.validation.proof.worker_pool import side_by_side
 
 AGAIN = "again"
 _NEW = "train_3"

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import ruckig
 
 from hil.errors import FieldError, HilError, InputError
-from hil.motion.pieces import Cubic, MotionLimits, MotionPhase, Move, Piece, end_m
+from hil.motion.pieces import Cubic, MotionLimits, Move, Piece, end_m
 
 END_TOLERANCE_M = 1e-10
 
@@ -68,7 +68,7 @@ def jog(start_m: float, velocity_m_s: float, duration_s: float, limits: MotionLi
             f"given {duration_s:.6g} s, allowed at least {speed_up.duration_s:.6g} s "
             f"to reach {velocity_m_s:.6g} m/s; raise it or lower the velocity",
         )
-    constant = Cubic(constant_s, MotionPhase.CONSTANT_FEED, speed_up.end_m, velocity_m_s)
+    constant = Cubic(constant_s, speed_up.end_m, velocity_m_s)
     slow_down = stop(MotionState(end_m(constant), velocity_m_s), limits)
     return Move((*speed_up.pieces, constant, *slow_down.pieces), slow_down.end_m)
 
@@ -95,19 +95,11 @@ def _solve(order: ruckig.InputParameter) -> tuple[Piece, ...]:
         raise HilError(f"ruckig finds no trajectory within {limits}")
     profile = trajectory.profiles[0][0]
     return tuple(
-        Cubic(t, _phase(t, v, a, j), p, v, a, j)
+        Cubic(t, p, v, a, j)
         for part in (profile.brake, profile)
         for t, p, v, a, j in zip(part.t, part.p, part.v, part.a, part.j, strict=False)
         if t > 0
     )
-
-
-def _phase(duration_s: float, velocity: float, acceleration: float, jerk: float) -> MotionPhase:
-    mean_acceleration = acceleration + jerk * duration_s / 2
-    mean_velocity = velocity + duration_s * (acceleration / 2 + jerk * duration_s / 6)
-    if abs(mean_acceleration) < 1e-9 and jerk == 0:
-        return MotionPhase.CONSTANT_FEED if mean_velocity else MotionPhase.STANDSTILL
-    return MotionPhase.ACCELERATION if mean_acceleration * mean_velocity > 0 else MotionPhase.DECELERATION
 
 
 def _finite(name: str, value: float) -> float:

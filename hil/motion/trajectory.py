@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from hil.errors import FieldError, InputError, field_name
 from hil.figures.panels import COMMAND, Line, Panel
-from hil.motion.pieces import MAX_DURATION_S, Array, Cubic, Motion, MotionLimits, MotionPhase, Move
+from hil.motion.pieces import MAX_DURATION_S, Array, Cubic, Motion, MotionLimits, Move
 from hil.motion.time_optimal import MotionState, point_to_point, stop
 
 if TYPE_CHECKING:
@@ -43,8 +43,7 @@ class SegmentRun(NamedTuple):
 class Trajectory:
     """Set-points at t = k period_s; arrays of one length, read-only.
 
-    `segment` indexes `runs`, `phase` holds values of hil.motion.pieces.MotionPhase. The last sample is at rest.
-    `notes` say what was changed to hold the limits.
+    `segment` indexes `runs`. The last sample is at rest. `notes` say what was changed to hold the limits.
     """
 
     period_s: float
@@ -54,7 +53,6 @@ class Trajectory:
     acceleration_m_s2: Array
     jerk_m_s3: Array
     segment: NDArray[np.int32]
-    phase: NDArray[np.uint8]
     runs: tuple[SegmentRun, ...]
     notes: tuple[str, ...] = ()
 
@@ -175,21 +173,19 @@ def _sampled(
     time_s: Array = np.arange(count, dtype=np.float64) * period_s
     motion = Motion(*(np.zeros(count) for _ in range(4)))
     segment = np.zeros(count, np.int32)
-    phase = np.zeros(count, np.uint8)
     for index, (move, run) in enumerate(zip(moves, runs, strict=True)):
         start = round(run.start_s / period_s, 9)  # in ticks; whole where the grid is, so that laps are bit-identical
         end = count if index == len(runs) - 1 else _first_tick(run.end_s / period_s)
         segment[_first_tick(start) : end] = index
         begin_s = 0.0
-        for piece in (*move.pieces, Cubic(run.end_s - run.start_s, MotionPhase.STANDSTILL, move.end_m)):
+        for piece in (*move.pieces, Cubic(run.end_s - run.start_s, move.end_m)):
             end_s = begin_s + piece.duration_s
             ticks = slice(_first_tick(start + begin_s / period_s), min(end, _first_tick(start + end_s / period_s)))
             within_s = np.clip((np.arange(ticks.start, ticks.stop) - start) * period_s - begin_s, 0.0, piece.duration_s)
             for whole, part in zip(motion, piece.at(within_s), strict=True):
                 whole[ticks] = part
-            phase[ticks] = piece.phase
             begin_s = end_s
-    return Trajectory(period_s, time_s, *motion, segment, phase, runs, notes)
+    return Trajectory(period_s, time_s, *motion, segment, runs, notes)
 
 
 def _first_tick(instant: float) -> int:

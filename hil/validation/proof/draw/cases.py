@@ -8,7 +8,7 @@ from hil.validation.proof.draw import motions
 from hil.validation.proof.draw.axes import Belief, DrawnAxis, draw_axis
 from hil.validation.proof.draw.axis_kinds import Kind, Rng, log_uniform
 from hil.validation.proof.draw.effect_size import EffectSizes
-from hil.validation.proof.draw.effects import LIBRARY, DrawScale, applicable, draw_effect, scaled
+from hil.validation.proof.draw.effects import DrawScale, applicable, draw_effect, scaled
 from hil.validation.proof.draw.motions import Runs
 from hil.validation.proof.draw.unknown_effects import EncoderFault
 
@@ -55,19 +55,12 @@ def stage(rng: Rng, kind: Kind | None, belief: Belief = "wrong", hard: bool = Fa
     return AxisOnMotions(axis, runs, sizes, scale)
 
 
-def name_on(axis: DrawnAxis, effect: str | None, forced: bool, rng: Rng) -> str | None:
-    """Return the wanted effect, or any; None if it needs another kind of axis.
-
-    Raises ValueError for an effect that no axis has, or that the `forced` kind lacks.
-    """
+def name_on(axis: DrawnAxis, effect: str | None, rng: Rng) -> str | None:
+    """Return the wanted effect, or any; None if it needs another kind of axis."""
     names = applicable(axis)
     if effect is None:
         return str(rng.choice(names))
-    if effect in names:
-        return effect
-    if forced or effect not in LIBRARY:
-        raise ValueError(f"effect: must be one of {', '.join(names if forced else LIBRARY)}, got {effect!r}")
-    return None
+    return effect if effect in names else None
 
 
 def one(rng: Rng, on: AxisOnMotions, name: str, sizes: Sizes) -> CaseDraft | None:

@@ -120,10 +120,14 @@ def draw(tier: str, number: int, seed: int, effect: str | None = None, axis: Kin
     """Draw the case of a tier, number and seed; the same arguments give the same case.
 
     `effect` and `axis` fix what the tier would choose. Without them, consecutive numbers of a tier take all its effects
-    equally often. Raises ValueError for an unknown tier, and for an effect that the tier or kind of axis lacks.
+    equally often. Raises ValueError for an unknown tier, for an effect that the tier or kind of axis lacks, and if no
+    axis gave a case.
     """
     if tier not in RECIPES:
         raise ValueError(f"tier: must be one of {', '.join(TIERS)}, got {tier!r}")
+    allowed = () if tier in ("null", "parameters_only") else BALANCED.get(tier, LIBRARY)
+    if effect is not None and effect not in allowed:
+        raise ValueError(f"effect: must be one of {', '.join(allowed) or 'none'} in the tier {tier}, got {effect!r}")
     rng = np.random.default_rng([seed, number, TIERS.index(tier)])
     if effect is None and axis is None and tier in BALANCED:
         effect = _turn(BALANCED[tier], number, seed)

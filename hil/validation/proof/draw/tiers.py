@@ -17,7 +17,7 @@ from hil.validation.proof.draw.effect_size import EffectSizes
 from hil.validation.proof.draw.effects import applicable, draw_effect
 from hil.validation.proof.draw.expected import block, inseparable, same_law
 from hil.validation.proof.draw.less_known import possible
-from hil.validation.proof.draw.unknown_effects import NOVEL, EncoderFault, draw_novel, novel
+from hil.validation.proof.draw.unknown_effects import EncoderFault, draw_novel, novel
 
 Recipe = Callable[[Rng, str | None, Kind | None], CaseDraft | None]
 VISIBLE = (1.5, 100.0)  # sizes of an effect that is to be named, in units of noise
@@ -33,7 +33,7 @@ _OTHER_BLOCK = 0.8  # share of the pairs whose effects lie in different blocks
 def single(rng: Rng, effect: str | None, kind: Kind | None) -> CaseDraft | None:
     """Conceal one visible effect."""
     on = stage(rng, kind)
-    name = name_on(on.axis, effect, kind is not None, rng)
+    name = name_on(on.axis, effect, rng)
     return one(rng, on, name, VISIBLE) if name else None
 
 
@@ -41,7 +41,7 @@ def ladder(rng: Rng, effect: str | None, kind: Kind | None) -> CaseDraft | None:
     """Conceal one effect of 0.5 to 30 times the noise."""
     on = stage(rng, kind)
     wanted = float(rng.choice(RUNGS))
-    name = name_on(on.axis, effect, kind is not None, rng)
+    name = name_on(on.axis, effect, rng)
     found = at_size(draw_effect(name, on.scale, rng), wanted, on) if name else None
     return CaseDraft(on.axis, on.runs, "missing_physics", (found,)) if found else None
 
@@ -49,7 +49,7 @@ def ladder(rng: Rng, effect: str | None, kind: Kind | None) -> CaseDraft | None:
 def pair(rng: Rng, effect: str | None, kind: Kind | None) -> CaseDraft | None:
     """Conceal two effects, each visible beside the other, mostly in different blocks."""
     on = stage(rng, kind)
-    first = name_on(on.axis, effect, kind is not None, rng)
+    first = name_on(on.axis, effect, rng)
     if first is None:
         return None
     others = [name for name in applicable(on.axis) if name not in inseparable(first)]
@@ -62,7 +62,7 @@ def masked(rng: Rng, effect: str | None, kind: Kind | None) -> CaseDraft | None:
     """Conceal a small effect behind noise and coarse encoders, or behind a larger effect."""
     hard = bool(rng.random() < 0.5)
     on = stage(rng, kind, hard=hard)
-    name = name_on(on.axis, effect, kind is not None, rng)
+    name = name_on(on.axis, effect, rng)
     if name is None or hard:
         return one(rng, on, name, _MASKED) if name else None
     others = [other for other in applicable(on.axis) if other not in inseparable(name)]
@@ -73,9 +73,6 @@ def novel_physics(rng: Rng, effect: str | None, kind: Kind | None) -> CaseDraft 
     """Conceal physics that the library lacks."""
     on = stage(rng, kind)
     names = novel(on.axis)
-    possible = names if kind is not None else NOVEL
-    if effect is not None and effect not in possible:
-        raise ValueError(f"effect: must be one of {', '.join(possible)}, got {effect!r}")
     name = effect or str(rng.choice(names))
     for _ in range(TRIES if name in names else 0):
         found = draw_novel(name, on.scale, rng)
@@ -94,7 +91,7 @@ def insufficient(rng: Rng, effect: str | None, kind: Kind | None) -> CaseDraft |
     poor = {how: motions.poor(rng, on.axis, how) for how in motions.POOR}
     unseen = {how: EffectSizes(on.axis, runs[:2]) for how, runs in poor.items()}
     for _ in range(TRIES):
-        name = name_on(on.axis, effect, kind is not None, rng)
+        name = name_on(on.axis, effect, rng)
         # a recording that ends before the window of a force says nothing about its motion
         if name is None or name == "external_force":
             continue
@@ -109,7 +106,7 @@ def insufficient(rng: Rng, effect: str | None, kind: Kind | None) -> CaseDraft |
 def less_known(rng: Rng, effect: str | None, kind: Kind | None) -> CaseDraft | None:
     """Conceal one clear effect and forget a part of what is known; it is to be named, or said not to be testable."""
     on = stage(rng, kind)
-    name = name_on(on.axis, effect, kind is not None, rng)
+    name = name_on(on.axis, effect, rng)
     draft = one(rng, on, name, _CLEAR) if name else None
     if name is None or draft is None:
         return None
@@ -119,8 +116,6 @@ def less_known(rng: Rng, effect: str | None, kind: Kind | None) -> CaseDraft | N
 
 def _nothing(belief: Belief, verdict: str, rng: Rng, effect: str | None, kind: Kind | None) -> CaseDraft:
     """Conceal nothing; the parameters of the bench file are exact or wrong."""
-    if effect is not None:
-        raise ValueError(f"effect: must be left out where nothing is concealed, got {effect!r}")
     on = stage(rng, kind, belief)
     return CaseDraft(on.axis, on.runs, verdict)
 

@@ -16,6 +16,7 @@ from hil.arrays import FloatArray
 SMOOTH_S = 0.002  # standard deviation of the Gaussian: cut-off at 66 Hz
 _TRUNCATE = 8.0  # standard deviations: derivatives of a constant are zero to rounding
 _REACH = 4.0  # standard deviations with noticeable weight
+SWAY_DAMPING = 0.03  # damping ratio of a mass on a spring
 SLIDING_M_S = 1e-4  # at the table: what is slower counts as rest
 
 
@@ -75,8 +76,8 @@ def lagged(torque: FloatArray, time_constant_s: float, period_s: float) -> Float
     return np.asarray(torque - (torque - begins) * time_constant_s / period_s * (1.0 - pole), dtype=np.float64)
 
 
-def swayed(acceleration: FloatArray, frequency_hz: float, period_s: float, damping: float = 0.03) -> FloatArray:
+def swayed(acceleration: FloatArray, frequency_hz: float, period_s: float) -> FloatArray:
     """Return the acceleration (n,) of a mass on a spring on an accelerated base."""
     omega = 2.0 * math.pi * frequency_hz
-    b, a = bilinear([omega**2], [1.0, 2.0 * damping * omega, omega**2], 1.0 / period_s)
+    b, a = bilinear([omega**2], [1.0, 2.0 * SWAY_DAMPING * omega, omega**2], 1.0 / period_s)
     return np.asarray(lfilter(b, a, acceleration), dtype=np.float64)

@@ -17,7 +17,7 @@ from drivers.sim.reality import record
 from drivers.sim.sensors import Sensors
 from drivers.sim.servo import Servo, VelocityEstimate
 from hil.bench.bench_file import Bench
-from hil.validation.proof.draw.axis_kinds import KINDS, PARAMETERS, TRUTH, Kind, Rng, log_uniform, rigid_inertia
+from hil.validation.proof.draw.axis_kinds import KINDS, PARAMETERS, Kind, Rng, log_uniform, rigid_inertia, truth_of
 
 Belief = Literal["exact", "wrong"]
 
@@ -51,7 +51,7 @@ class DrawnAxis:
 
     def with_parameters(self, changes: Mapping[str, float]) -> AxisTruth:
         """Return the axis with other true parameters."""
-        return TRUTH[self.kind](dict(self.true) | dict(changes))
+        return truth_of(self.kind, {**self.true, **changes})
 
     @cached_property
     def bench(self) -> Bench:
@@ -137,7 +137,7 @@ def _drawn(rng: Rng, kind: Kind, belief: Belief, hard: bool) -> DrawnAxis:
     position_every = int(rng.choice((1, 2, 4)))
     feed_m_s = min(rng.uniform(0.15, 0.35) * sqrt(true.get("lead_m", 0.01) / 0.01), 0.45)
     acceleration = rng.uniform(1.0, 3.0)
-    truth = TRUTH[kind](true)
+    truth = truth_of(kind, true)
     servo = _servo(rng, truth, feed_m_s, acceleration, period_s, position_every)
     sensors = Sensors(
         motor_counts_per_rev=2.0 ** int(rng.integers(15, 18) if hard else rng.integers(17, 24)),

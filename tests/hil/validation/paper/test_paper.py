@@ -11,7 +11,7 @@ from hil.twin.structure.chain import RECONSTRUCTED_TABLE_1, one_mass
 from hil.validation.paper import PaperResult, Reproduction, run_paper, source
 from hil.validation.paper.row import Row
 
-NOTES = Path(__file__).parents[3] / "../shared/paper/paper-notes.md"
+NOTES = Path(__file__).parents[4] / "../shared/paper/paper-notes.md"
 
 
 @pytest.fixture(scope="module")

@@ -15,7 +15,7 @@ from hil.motion.pieces import MotionLimits
 from hil.motion.profile import load_profile
 from hil.motion.trajectory import Trajectory, plan, stop_from
 
-PROFILES = Path(__file__).parents[2] / "profiles"
+PROFILES = Path(__file__).parents[3] / "profiles"
 SHIPPED = sorted(PROFILES.glob("*.yaml"))
 PERIOD_S = 0.001
 LIMITS = MotionLimits(0.3, 2.0, 100.0)

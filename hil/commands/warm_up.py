@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from hil.compiled.kernel_cache import provide_kernel_cache
 from hil.report.console import out, progress
 
 
 def warm_up() -> None:
     """Compile all kernels now, so that no later command has to; for images and services."""
     compile_kernels()
-    out.print(f"All kernels are compiled in {_folder()}")
+    out.print(f"All kernels are compiled in {provide_kernel_cache()}")
 
 
 def compile_kernels() -> None:
@@ -53,13 +54,7 @@ def kernels_are_compiled() -> bool:
 
 
 def _mark() -> Path:
-    return _folder() / "compiled.txt"
-
-
-def _folder() -> Path:
-    from hil.compiled.kernel_cache import provide_kernel_cache
-
-    return provide_kernel_cache()
+    return provide_kernel_cache() / "compiled.txt"
 
 
 def _versions() -> str:

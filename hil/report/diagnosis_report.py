@@ -199,21 +199,17 @@ def torque_line(left: TorqueLeft) -> str:
 
 
 def _corrections(page: Page, result: Result) -> None:
-    if not result.parameter_corrections and not result.not_identifiable:
+    rows = [
+        (name, one.unit, *fitted_cells(one.nominal, one.value, one.std))
+        for name, one in result.parameter_corrections.items()
+    ]
+    if not rows and not result.not_identifiable:
         return
     page.heading("Parameters of the bench")
     if result.not_identifiable:
         page.text(f"Not identifiable from this motion: {', '.join(result.not_identifiable)}.")
-    if not result.parameter_corrections:
-        return
-    page.table(
-        ("parameter", "unit", "bench file", "fitted", "standard error", "change"),
-        [
-            (name, one.unit, *fitted_cells(one.nominal, one.value, one.std))
-            for name, one in result.parameter_corrections.items()
-        ],
-        left=(0, 1),
-    )
+    if rows:
+        page.table(("parameter", "unit", "bench file", "fitted", "standard error", "change"), rows, left=(0, 1))
 
 
 def _next_experiment(page: Page, diagnosis: Diagnosis, folder: Path) -> None:

@@ -53,16 +53,6 @@ class DrawnAxis:
         """Return the axis with other true parameters."""
         return truth_of(self.kind, {**self.true, **changes})
 
-    @cached_property
-    def bench(self) -> Bench:
-        """The bench as in the owner's file."""
-        return self._bench(self.believed)
-
-    @property
-    def true_bench(self) -> Bench:
-        """The bench with the true parameters."""
-        return self._bench(self.true)
-
     @property
     def nominal(self) -> tuple[str, ...]:
         """Names of the parameters that may be wrong."""
@@ -84,7 +74,9 @@ class DrawnAxis:
         motor_m = 2 * pi / self.sensors.motor_counts_per_rev * self.truth.screw_ratio_m_rad
         return sqrt((self.sensors.table_resolution_m**2 + motor_m**2) / 12 + self.sensors.table_noise_m**2)
 
-    def _bench(self, axis: Mapping[str, Any]) -> Bench:
+    @cached_property
+    def bench(self) -> Bench:
+        """The bench as in the owner's file."""
         servo, linear = self.servo, self.kind == "one_mass"
         control = {
             "position_gain_1_s": servo.position_gain_1_s,
@@ -105,7 +97,7 @@ class DrawnAxis:
         return Bench.model_validate(
             {
                 "name": "axis",
-                "axis": {"model": self.kind, **axis},
+                "axis": {"model": self.kind, **self.believed},
                 "control": control,
                 "encoders": {"motor": motor, "table": table},
                 # the owner knows the limits of the axis even if a recording does not reach them

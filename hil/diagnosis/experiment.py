@@ -116,21 +116,21 @@ def separating(searched: Searched, final: Fit, held_out: Dataset) -> Experiment 
     )
 
 
-def showing(found: Fit, hidden: Sequence[str], held_out: Dataset) -> Experiment | None:
+def showing(fit: Fit, hidden: Sequence[str], held_out: Dataset) -> Experiment | None:
     """Design the motion that shows most of the hidden mechanisms per second; None if none is hidden."""
     if not hidden:
         return None
-    expected = _alternative("", found)
+    expected = _alternative("", fit)
 
     def answers(trajectory: Trajectory) -> Answers:
-        there = expected.on(_imagined(expected, trajectory, found.data.runs[0]))
+        there = expected.on(_imagined(expected, trajectory, fit.data.runs[0]))
         there = replace(there, jacobian=there.estimator.jacobian(there.hypothesis))
         still = not_testable(there, hidden, CRITERIA.visible)
         return {(effect,): float(effect not in still) for effect in hidden}
 
     best = _best(
-        (*found.data.runs, *held_out.runs),
-        found.hypothesis.bench,
+        (*fit.data.runs, *held_out.runs),
+        fit.hypothesis.bench,
         len(hidden),
         answers,
         lambda _: 1.0,
@@ -200,13 +200,13 @@ def _group(searched: Searched, final: Fit, index: int) -> list[_Alternative]:
     return group
 
 
-def _alternative(effect: str, found: Fit) -> _Alternative:
+def _alternative(effect: str, fit: Fit) -> _Alternative:
     """Prediction of a fit for another motion."""
-    hypothesis = found.hypothesis
+    hypothesis = fit.hypothesis
     once = [index for index, term in enumerate(hypothesis.terms) if BY_ID[term.effect].transient]
     gone = [column for index in once for column in range(hypothesis.x.size)[hypothesis.columns(index)]]
-    known = np.asarray(np.linalg.qr(np.delete(found.jacobian, gone, axis=1), mode="r"), dtype=np.float64)
-    return _Alternative(effect, hypothesis.without(*once), known, found.estimator)
+    known = np.asarray(np.linalg.qr(np.delete(fit.jacobian, gone, axis=1), mode="r"), dtype=np.float64)
+    return _Alternative(effect, hypothesis.without(*once), known, fit.estimator)
 
 
 def _imagined(truth: _Alternative, trajectory: Trajectory, like: Measured) -> Measured:

@@ -80,10 +80,10 @@ def _stopped(searched: Searched, budget_s: float) -> str:
     )
 
 
-def at_bound(found: Fit) -> tuple[str, ...]:
+def at_bound(fit: Fit) -> tuple[str, ...]:
     """Nominal parameters of a fit that ended at the bound of the allowed range."""
-    nominal = {coordinate.name for coordinate in found.hypothesis.coordinates[: found.hypothesis.nominal_count]}
-    return tuple(name for name in found.at_bound if name in nominal)
+    nominal = {coordinate.name for coordinate in fit.hypothesis.coordinates[: fit.hypothesis.nominal_count]}
+    return tuple(name for name in fit.at_bound if name in nominal)
 
 
 def _on_fit(final: Fit) -> list[str]:

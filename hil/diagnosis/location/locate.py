@@ -40,20 +40,20 @@ _BINS = 40  # resolution of a range: 2.5 % of the motion
 _WINDOWS = 5  # time windows that are reported: more are not read
 
 
-def block_shares(found: Fit) -> dict[str, float]:
+def block_shares(fit: Fit) -> dict[str, float]:
     """Share of each channel in the energy above the noise floor."""
-    total = dict.fromkeys(found.noise_ratios[0], 0.0)
-    for run, ratios in zip(found.data.runs, found.noise_ratios, strict=True):
+    total = dict.fromkeys(fit.noise_ratios[0], 0.0)
+    for run, ratios in zip(fit.data.runs, fit.noise_ratios, strict=True):
         for name, ratio in ratios.items():
             total[name] += run.motor.size * max(ratio - 1.0, 0.0)
     whole = sum(total.values())
     return {name: value / whole if whole > 0.0 else 0.0 for name, value in total.items()}
 
 
-def locate(found: Fit, final: Fit) -> Location:
-    """Locate the deviation of `found` from its recordings; `final` is the fit with explaining terms, if any."""
-    bench, terms, data = final.hypothesis.bench, final.terms, found.data
-    shares = block_shares(found)
+def locate(fit: Fit, final: Fit) -> Location:
+    """Locate the deviation of a fit from its recordings; `final` is the fit with explaining terms, if any."""
+    bench, terms, data = final.hypothesis.bench, final.terms, fit.data
+    shares = block_shares(fit)
     names = channel_names(bench, data.runs[0])
     strongest = sorted((name for name in shares if shares[name] > 0.05), key=lambda name: -shares[name])
     strongest = strongest or [max(shares, key=lambda name: shares[name])]
@@ -61,10 +61,10 @@ def locate(found: Fit, final: Fit) -> Location:
     if terms:
         mechanism = BY_ID[terms[0].effect]
         block, element = mechanism.block.value, mechanism.element_of(terms[0].variant)
-    elif found is final and strongest[0] in ("motor", "table"):  # no refit removes it
-        block, element = acting(found) or (block, element)
+    elif fit is final and strongest[0] in ("motor", "table"):  # no refit removes it
+        block, element = acting(fit) or (block, element)
     # with findings the energy is that of their effect, which has no noise
-    seen = mismatch_energies(found, final)
+    seen = mismatch_energies(fit, final)
     locked = lock(seen, max(strongest, key=lambda name: shares[name]), bench, terms)
     return Location(
         block=block,
@@ -78,16 +78,16 @@ def locate(found: Fit, final: Fit) -> Location:
     )
 
 
-def shown_in(found: Fit, held_out: Dataset) -> Fit:
+def shown_in(fit: Fit, held_out: Dataset) -> Fit:
     """The fit on the recordings that show its mismatch: those of training, or the held-out ones if only they do."""
-    return found.on(held_out) if held_out.runs and found.at_floor else found
+    return fit.on(held_out) if held_out.runs and fit.at_floor else fit
 
 
-def mismatch_energies(found: Fit, final: Fit) -> list[Energy]:
-    """Energy of the effect of the terms of `final` by row, else that of the residuals of `found`."""
+def mismatch_energies(fit: Fit, final: Fit) -> list[Energy]:
+    """Energy of the effect of the terms of `final` by row, else that of the residuals of `fit`."""
     if final.terms:
-        return energies(without_terms(final.hypothesis), found.data, final.hypothesis)
-    return energies(found.hypothesis, found.data)
+        return energies(without_terms(final.hypothesis), fit.data, final.hypothesis)
+    return energies(fit.hypothesis, fit.data)
 
 
 def phase_shares(seen: Sequence[Energy]) -> tuple[Phase, ...]:

@@ -31,15 +31,15 @@ _FEW_S = 0.05
 _DEVIATION = 1.4826  # standard deviation of Gaussian noise over the median of its size
 
 
-def acting(found: Fit) -> tuple[str, str] | None:
+def acting(fit: Fit) -> tuple[str, str] | None:
     """Block and element if the reaction torque isolates the table or the linear encoder, else None."""
-    fitted, runs = found.bench, found.data.runs
+    fitted, runs = fit.bench, fit.data.runs
     chain = fitted.axis.physics().chain
     if len(chain.names) < 2 or not all(run.table_m.size and run.observability.torque_measured for run in runs):
         return None
     stiffness, table_inertia = stiffness_between(chain), float(chain.inertia_kg_m2[chain.table, chain.table])
-    observer_s, felt, off, moved = found.data.observer_s, list[FloatArray](), list[FloatArray](), list[FloatArray]()
-    for run, blocks in zip(runs, found.residuals.channels, strict=True):
+    observer_s, felt, off, moved = fit.data.observer_s, list[FloatArray](), list[FloatArray](), list[FloatArray]()
+    for run, blocks in zip(runs, fit.residuals.channels, strict=True):
         seen = disturbance(run, blocks["motor"], inertia(fitted), observer_s)
         table = smooth(_observed(blocks["table"] / fitted.axis.ratio_m_rad, run, observer_s), run.period_s)
         table = smooth(table, run.period_s)  # like the torque, which is smoothed twice too

@@ -37,13 +37,13 @@ def event_term(effect: str, found: Sequence[Event], ratio: float) -> Term:
     return Term(effect, 0, tuple(values), windows=windows)
 
 
-def beside_loads(nominal: Fit, found: Fit) -> Fit:
+def beside_loads(nominal: Fit, fit: Fit) -> Fit:
     """Fit the nominal parameters beside the loads of another fit (events, weight, spring, gravity): what the other
     terms are measured against. A load does not move with the speed, so nothing that it leaves is friction.
 
     Returns `nominal` without loads.
     """
-    loads = [term for term in found.terms if is_load(term)]
+    loads = [term for term in fit.terms if is_load(term)]
     if not loads:
         return nominal
     hypothesis = nominal.hypothesis
@@ -52,19 +52,19 @@ def beside_loads(nominal: Fit, found: Fit) -> Fit:
     return nominal.estimator.fit(hypothesis, evaluations=6)
 
 
-def revised(found: Fit) -> Fit:
+def revised(fit: Fit) -> Fit:
     """Fit the events of a fit again, also as they show beside its other terms; return the best."""
-    index = _index(found)
+    index = _index(fit)
     if index is None:
-        return found
-    best = fit_windows(found)
-    events = detect(found)
+        return fit
+    best = fit_windows(fit)
+    events = detect(fit)
     if events:
-        shown = event_term(found.terms[index].effect, events, found.bench.axis.ratio_m_rad)
-        other = found.hypothesis.replaced(index, shown)
-        again = fit_windows(found.estimator.evaluate(other))
+        shown = event_term(fit.terms[index].effect, events, fit.bench.axis.ratio_m_rad)
+        other = fit.hypothesis.replaced(index, shown)
+        again = fit_windows(fit.estimator.evaluate(other))
         best = again if bic_gain(again, best) > 0.0 else best
-    return _trimmed(_completed(best if best.cost <= found.cost or bic_gain(best, found) > 0.0 else found))
+    return _trimmed(_completed(best if best.cost <= fit.cost or bic_gain(best, fit) > 0.0 else fit))
 
 
 def with_events_of(held_out: Dataset, final: Fit) -> Fit:
@@ -125,32 +125,32 @@ def _joined(at: Hypothesis, index: int, more: Term) -> Hypothesis:
     return _with_windows(at, index, (*term.windows, *added))
 
 
-def _completed(found: Fit, others: bool = True) -> Fit:
+def _completed(fit: Fit, others: bool = True) -> Fit:
     """Add the windows that those of a fit leave, and make one of neighbours, where the evidence supports it."""
-    index = _index(found)
+    index = _index(fit)
     if index is None:
-        return found
-    more = left_over(found)
+        return fit
+    more = left_over(fit)
     if more:
-        added = event_term(found.terms[index].effect, more, found.bench.axis.ratio_m_rad)
-        longer = _joined(found.hypothesis, index, added)
-        again = fit_windows(found.estimator.evaluate(longer), others=others)
-        found = again if bic_gain(again, found) > CRITERIA.evidence * len(more) else found
-    names, refuted = {run.name for run in found.data.runs}, set[tuple[Window, Window]]()
+        added = event_term(fit.terms[index].effect, more, fit.bench.axis.ratio_m_rad)
+        longer = _joined(fit.hypothesis, index, added)
+        again = fit_windows(fit.estimator.evaluate(longer), others=others)
+        fit = again if bic_gain(again, fit) > CRITERIA.evidence * len(more) else fit
+    names, refuted = {run.name for run in fit.data.runs}, set[tuple[Window, Window]]()
     while True:
-        term = found.terms[index]
+        term = fit.terms[index]
         ordered = sorted((one for one in term.windows if one.run in names), key=lambda one: (one.run, one.later_s))
         pairs = [pair for pair in pairwise(ordered) if pair not in refuted and _touch(term, *pair)]
         if not pairs:
-            return found
+            return fit
         one, two = pairs[0]
         whole = max(one, two, key=lambda part: part.end_later_s - part.later_s)
         whole = whole._replace(later_s=one.later_s, end_later_s=two.end_later_s)
         rest = (other for other in term.windows if other not in (one, two))
-        single = _with_windows(found.hypothesis, index, (*rest, whole))
-        fitted = fit_windows(found.estimator.evaluate(single), others=others)
-        if bic_gain(fitted, found) > 0.0:
-            found = fitted
+        single = _with_windows(fit.hypothesis, index, (*rest, whole))
+        fitted = fit_windows(fit.estimator.evaluate(single), others=others)
+        if bic_gain(fitted, fit) > 0.0:
+            fit = fitted
         else:
             refuted.add((one, two))
 
@@ -167,19 +167,19 @@ def _with_windows(at: Hypothesis, index: int, windows: tuple[Window, ...]) -> Hy
     return Hypothesis(at.bench, terms, at.x)
 
 
-def _trimmed(found: Fit, others: bool = True) -> Fit:
+def _trimmed(fit: Fit, others: bool = True) -> Fit:
     """Leave out windows of the runs of a fit whose force is no larger than its error allows, and fit the others again.
 
     Such are windows at rest, where friction holds against a force. Faint ones and those without a length are left out
     too.
     """
-    index = _index(found)
+    index = _index(fit)
     if index is None:
-        return found
-    term, names = found.hypothesis.terms[index], {run.name for run in found.data.runs}
+        return fit
+    term, names = fit.hypothesis.terms[index], {run.name for run in fit.data.runs}
     strength = BY_ID[term.effect].strength
-    errors = iter(window_errors(found, index))
-    at = found.hypothesis.resolved.terms[index]
+    errors = iter(window_errors(fit, index))
+    at = fit.hypothesis.resolved.terms[index]
     inside = [one for one in term.windows if one.run in names]
     weak = dict(zip(inside, faint([(*at.edges(one), at.at(one)[strength]) for one in inside]), strict=True))
     kept = tuple(
@@ -193,10 +193,10 @@ def _trimmed(found: Fit, others: bool = True) -> Fit:
         )
     )
     if len(kept) == len(term.windows):
-        return found
+        return fit
     if not kept:
-        return found.estimator.fit(found.hypothesis.without(index))
-    return fit_windows(found.estimator.evaluate(_with_windows(found.hypothesis, index, kept)), others=others)
+        return fit.estimator.fit(fit.hypothesis.without(index))
+    return fit_windows(fit.estimator.evaluate(_with_windows(fit.hypothesis, index, kept)), others=others)
 
 
 class InsideWindows(NamedTuple):
@@ -214,15 +214,15 @@ class InsideWindows(NamedTuple):
     one_push: bool
 
 
-def inside_windows(found: Fit, base: Fit) -> InsideWindows | None:
+def inside_windows(fit: Fit, base: Fit) -> InsideWindows | None:
     """What the force of a fit leaves within its windows; None without one. `base` is the fit without the force."""
-    index = _index(found)
+    index = _index(fit)
     if index is None:
         return None
-    start, end = BY_ID[found.terms[index].effect].indices(Role.EDGE)
-    term, inside, outside, before = found.terms[index], list[FloatArray](), list[FloatArray](), 0.0
-    for (number, channel), part in found.residuals.parts.items():
-        run = found.data.runs[number]
+    start, end = BY_ID[fit.terms[index].effect].indices(Role.EDGE)
+    term, inside, outside, before = fit.terms[index], list[FloatArray](), list[FloatArray](), 0.0
+    for (number, channel), part in fit.residuals.parts.items():
+        run = fit.data.runs[number]
         if channel != "motor":
             continue
         time_s, within = run.time_s[run.evaluated], np.zeros(part.size, dtype=bool)
@@ -245,5 +245,5 @@ def _one_push(term: Term) -> bool:
     return len({one.run for one in term.windows}) == 1 and bool(np.all(gaps_s < EDGE * BLOCK_S))
 
 
-def _index(found: Fit) -> int | None:
-    return next((index for index, term in enumerate(found.hypothesis.terms) if term.windows), None)
+def _index(fit: Fit) -> int | None:
+    return next((index for index, term in enumerate(fit.hypothesis.terms) if term.windows), None)

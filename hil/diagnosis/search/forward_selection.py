@@ -99,60 +99,60 @@ def search(prepared: Prepared, progress: Progress = lambda text: None, deadline_
     return Searched(prepared, given, nominal, final, rivals, needed, tuple(considered), stopped_at, not_tried)
 
 
-def _without(found: Fit, index: int) -> Fit:
+def _without(fit: Fit, index: int) -> Fit:
     """Fit the hypothesis without one of the terms, in few evaluations."""
-    slopes = np.delete(found.jacobian, found.hypothesis.columns(index), axis=1)
-    return found.estimator.fit(found.hypothesis.without(index), evaluations=6, slopes=slopes)
+    slopes = np.delete(fit.jacobian, fit.hypothesis.columns(index), axis=1)
+    return fit.estimator.fit(fit.hypothesis.without(index), evaluations=6, slopes=slopes)
 
 
-def claimed(found: Fit) -> Fit:
+def claimed(fit: Fit) -> Fit:
     """Remove the terms whose values are not valid for their mechanism; where these are another's, that takes its place.
 
     A spring that rests out of reach is a weight.
     """
     while True:
-        terms, bench, runs = found.terms, found.bench, found.data.runs
+        terms, bench, runs = fit.terms, fit.bench, fit.data.runs
         lost = next((index for index, term in enumerate(terms) if not claimable(term, bench, runs)), None)
         if lost is None:
-            return found
-        other = _beyond(found, lost)
+            return fit
+        other = _beyond(fit, lost)
         if other is None:
-            rest = _without(found, lost)
-            found = rest.refit(ENDED, slopes=rest.jacobian)
+            rest = _without(fit, lost)
+            fit = rest.refit(ENDED, slopes=rest.jacobian)
         else:
-            found = found.estimator.fit(found.hypothesis.replaced(lost, other), evaluations=ENDED)
+            fit = fit.estimator.fit(fit.hypothesis.replaced(lost, other), evaluations=ENDED)
 
 
-def _beyond(found: Fit, index: int) -> Term | None:
+def _beyond(fit: Fit, index: int) -> Term | None:
     """The mechanism that a term is outside of its own valid values; None if it cannot stand beside the others."""
-    term, mechanism = found.terms[index], BY_ID[found.terms[index].effect]
+    term, mechanism = fit.terms[index], BY_ID[fit.terms[index].effect]
     if mechanism.beyond is None:
         return None
     others: list[Term | Active] = [
-        *found.terms[:index],
-        *found.terms[index + 1 :],
-        *(entry.active() for entry in found.hypothesis.kept),
+        *fit.terms[:index],
+        *fit.terms[index + 1 :],
+        *(entry.active() for entry in fit.hypothesis.kept),
     ]
-    effect, values = mechanism.beyond(term.values, axis_facts(found.bench, found.data.runs))
-    other = Term(effect, 0, values, slot=free_slot(effect, found.terms))
+    effect, values = mechanism.beyond(term.values, axis_facts(fit.bench, fit.data.runs))
+    other = Term(effect, 0, values, slot=free_slot(effect, fit.terms))
     return other if compatible([*others, other]) else None
 
 
-def _pruned(found: Fit, reference: Fit) -> tuple[Fit, dict[Key, float]]:
+def _pruned(fit: Fit, reference: Fit) -> tuple[Fit, dict[Key, float]]:
     """Remove terms without evidence, weakest first; return the fit and the evidence for the remaining terms."""
 
     def ablated(index: int) -> tuple[float, Fit]:
-        other = _without(found, index)
-        if found.cost > CRITERIA.clear * other.cost:
+        other = _without(fit, index)
+        if fit.cost > CRITERIA.clear * other.cost:
             other = other.refit(ENDED, slopes=other.jacobian)
-        return bic_gain(found, other, filters), other
+        return bic_gain(fit, other, filters), other
 
-    while found.terms:
-        filters = whitening(found)
-        pairs = in_parallel([partial(ablated, index) for index in range(len(found.terms))])
+    while fit.terms:
+        filters = whitening(fit)
+        pairs = in_parallel([partial(ablated, index) for index in range(len(fit.terms))])
         evidence, rest = min(pairs, key=lambda pair: pair[0])
-        need = Need(evidence, removed(rest, found, reference), found.rows)
+        need = Need(evidence, removed(rest, fit, reference), fit.rows)
         if accepted(examine(NEEDED, need, CRITERIA)):
-            return found, {term.key: value for term, (value, _) in zip(found.terms, pairs, strict=True)}
-        found = rest
-    return found, {}
+            return fit, {term.key: value for term, (value, _) in zip(fit.terms, pairs, strict=True)}
+        fit = rest
+    return fit, {}

@@ -41,17 +41,17 @@ def from_owner(base: Fit) -> list[Fit]:
     return race(owner, promising) if promising else []
 
 
-def companion(base: Fit, found: Fit) -> Term | None:
+def companion(base: Fit, fit: Fit) -> Term | None:
     """The mechanism to fit together with the last term of a fit; None without one that the base can take."""
-    effect = BY_ID[found.terms[-1].effect].search.beside
+    effect = BY_ID[fit.terms[-1].effect].search.beside
     if not effect:
         return None
     term = Term(effect, 0, BY_ID[effect].typical_values(axis_facts(base.bench, base.data.runs)))
     known = [entry.active() for entry in base.hypothesis.kept]
-    return term if compatible((*found.terms, term, *known)) else None
+    return term if compatible((*fit.terms, term, *known)) else None
 
 
-def together(base: Fit, found: Fit, other: Term) -> list[Fit]:
+def together(base: Fit, fit: Fit, other: Term) -> list[Fit]:
     """Fit mechanisms like the last term of a fit beside another term, from the parameters of the bench; best first."""
     owner = base.hypothesis.moved(owner_points(base)[0]).with_term(other)
     beside = base.estimator.fit(owner, evaluations=_SECOND, fixed=range(owner.nominal_count))

@@ -94,9 +94,9 @@ def cross_validate(nominal: Fit, final: Fit, held_out: Dataset) -> CrossValidati
             final = claimed(final.refit(30))
 
 
-def energy(found: Fit) -> float:
+def energy(fit: Fit) -> float:
     """Energy of the residuals block by block in units of noise^2, at least that of the noise."""
-    return found.energy(lambda ratio: max(ratio, 1.0))
+    return fit.energy(lambda ratio: max(ratio, 1.0))
 
 
 def explained_share(before: Fit, after: Fit) -> float:
@@ -140,34 +140,34 @@ def _ablate(given: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> list[Abl
     return [ablation(index, term, other) for index, (term, other) in enumerate(zip(final.terms, fits, strict=True))]
 
 
-def _change(found: Fit, without: Fit) -> float:
+def _change(fit: Fit, without: Fit) -> float:
     """Mean squared change of the residuals by a term, in units of noise^2."""
-    change = without.residuals.vector - found.residuals.vector
+    change = without.residuals.vector - fit.residuals.vector
     return float(change @ change) / change.size
 
 
-def _clear(found: Fit) -> list[bool]:
+def _clear(fit: Fit) -> list[bool]:
     """For each term, whether one of its strengths differs from no effect by more than its standard error."""
-    if not found.jacobian.size:  # evaluated, not fitted
-        return [True] * len(found.terms)
-    errors, axis = standard_errors(found), axis_facts(found.bench, found.data.runs)
+    if not fit.jacobian.size:  # evaluated, not fitted
+        return [True] * len(fit.terms)
+    errors, axis = standard_errors(fit), axis_facts(fit.bench, fit.data.runs)
     result = []
-    for index, term in enumerate(found.terms):
-        mechanism, own = BY_ID[term.effect], errors[found.hypothesis.columns(index)]
+    for index, term in enumerate(fit.terms):
+        mechanism, own = BY_ID[term.effect], errors[fit.hypothesis.columns(index)]
         sizes = {place: abs(term.values[place]) for place in mechanism.indices(Role.STRENGTH)}
         sizes[mechanism.strength] = mechanism.size(term.values, axis)
         result.append(any(size > own[place] for place, size in sizes.items()))
     return result
 
 
-def _quiet(found: Fit, without: Fit) -> bool:
+def _quiet(fit: Fit, without: Fit) -> bool:
     """True if a term removes too little on motion without noise: less than a term must, and not most of its gain."""
-    removed = energy_without_noise(found, without)
+    removed = energy_without_noise(fit, without)
     return removed is not None and removed < min(
-        CRITERIA.material * found.rows, CRITERIA.on_motion * (without.cost - found.cost)
+        CRITERIA.material * fit.rows, CRITERIA.on_motion * (without.cost - fit.cost)
     )
 
 
-def _gain(found: Fit, without: Fit) -> float:
+def _gain(fit: Fit, without: Fit) -> float:
     """Evidence for the term on held-out recordings, negative where it harms."""
-    return bic_margin(found, without) + (found.hypothesis.free - without.hypothesis.free) * float(np.log(found.rows))
+    return bic_margin(fit, without) + (fit.hypothesis.free - without.hypothesis.free) * float(np.log(fit.rows))

@@ -30,22 +30,22 @@ from hil.twin.library import BY_ID
 from hil.twin.parameter import Dimension, Role
 
 
-def renamed(found: Fit) -> Fit:
+def renamed(fit: Fit) -> Fit:
     """The fit with a rare cause renamed to the frequent one of the same torque, where that is valid.
 
     A name that the fit or the bench has already stays.
     """
-    hypothesis = found.hypothesis
-    named, known = {term.effect for term in found.terms}, {entry.effect for entry in hypothesis.bench.mechanisms}
+    hypothesis = fit.hypothesis
+    named, known = {term.effect for term in fit.terms}, {entry.effect for entry in hypothesis.bench.mechanisms}
 
     def called(term: Term, fitted: Term) -> Term:
         frequent, rare = same_torque(term) or ("", "")
         if term.effect != rare or frequent in named or rare in known:
             return term
-        rather = claimable(replace(fitted, effect=frequent), found.bench, found.data.runs)
+        rather = claimable(replace(fitted, effect=frequent), fit.bench, fit.data.runs)
         return replace(term, effect=frequent) if rather else term
 
-    return replace(found, hypothesis=replace(hypothesis, terms=tuple(map(called, hypothesis.terms, found.terms))))
+    return replace(fit, hypothesis=replace(hypothesis, terms=tuple(map(called, hypothesis.terms, fit.terms))))
 
 
 def findings(
@@ -98,17 +98,17 @@ def findings(
     return tuple(finding for _, finding in sorted(result, key=lambda pair: -pair[0]))
 
 
-def corrections(owner: Bench, found: Fit) -> dict[str, Correction]:
+def corrections(owner: Bench, fit: Fit) -> dict[str, Correction]:
     """Nominal parameters of the bench file and as fitted; without a torque only the damping of the transmission.
 
     Motion alone gives the ratio of stiffness and mass, and nothing of the motor side. A parameter that ended at the
     bound of the allowed range, or was left as it is, has no correction. Values of the
     bench's mechanisms are among them.
     """
-    hypothesis = found.hypothesis
-    told = hypothesis.nominal if found.data.observability.torque_measured else RATIOS
+    hypothesis = fit.hypothesis
+    told = hypothesis.nominal if fit.data.observability.torque_measured else RATIOS
     entries = zip(
-        hypothesis.bench_values, hypothesis.coordinates, hypothesis.values, standard_errors(found), strict=False
+        hypothesis.bench_values, hypothesis.coordinates, hypothesis.values, standard_errors(fit), strict=False
     )
     return {
         one.name: Correction(
@@ -119,13 +119,13 @@ def corrections(owner: Bench, found: Fit) -> dict[str, Correction]:
         )
         for before, one, value, std in entries
         if one.name in told
-        and one.name not in (*found.at_bound, DELAY)
+        and one.name not in (*fit.at_bound, DELAY)
         and not math.isclose(value, before)
         and (before or value > CRITERIA.sigmas * std)
     }
 
 
-def diagnosed_bench(owner: Bench, found: Fit) -> Bench:
+def diagnosed_bench(owner: Bench, fit: Fit) -> Bench:
     """Bench file with the parameters and permanent terms of a fit; every other command accepts it.
 
     An event is not expected in another recording.
@@ -136,12 +136,10 @@ def diagnosed_bench(owner: Bench, found: Fit) -> Bench:
             variant=BY_ID[term.effect].forms[term.variant],
             parameters=dict(zip(BY_ID[term.effect].names, _normal(term).values, strict=True)),
         )
-        for term in found.terms
+        for term in fit.terms
         if not term.windows
     )
-    return found.bench.model_copy(
-        update={"name": f"{owner.name}_diagnosed", "mechanisms": found.hypothesis.kept + entries}
-    )
+    return fit.bench.model_copy(update={"name": f"{owner.name}_diagnosed", "mechanisms": fit.hypothesis.kept + entries})
 
 
 def _normal(term: Term) -> Term:

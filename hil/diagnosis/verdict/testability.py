@@ -19,18 +19,18 @@ from hil.identification.terms import Term
 from hil.twin.library import BY_ID, LIBRARY
 
 
-def not_testable(found: Fit, asked: Collection[str] = tuple(BY_ID), margin: float = 1.0) -> tuple[str, ...]:
+def not_testable(fit: Fit, asked: Collection[str] = tuple(BY_ID), margin: float = 1.0) -> tuple[str, ...]:
     """Ids of the mechanisms in `asked` that the data of a fit cannot show, in the library's order.
 
     `margin` multiplies the visibility that is needed: more than one for simulated recordings.
     """
-    bench, hypothesis = found.bench, found.hypothesis.rebased
-    present = {term.effect for term in found.terms} | {entry.effect for entry in bench.mechanisms}
-    axis = axis_facts(bench, found.data.runs)
-    nuisance, _ = np.linalg.qr(found.jacobian[:, : hypothesis.nominal_count])
-    search = replace(found.estimator, fast=True)
+    bench, hypothesis = fit.bench, fit.hypothesis.rebased
+    present = {term.effect for term in fit.terms} | {entry.effect for entry in bench.mechanisms}
+    axis = axis_facts(bench, fit.data.runs)
+    nuisance, _ = np.linalg.qr(fit.jacobian[:, : hypothesis.nominal_count])
+    search = replace(fit.estimator, fast=True)
     unchanged = search.residuals(hypothesis).vector
-    enough = margin * max(CRITERIA.evidence, CRITERIA.material * found.rows)
+    enough = margin * max(CRITERIA.evidence, CRITERIA.material * fit.rows)
 
     def visible(effect: str, variant: int) -> bool:
         changed = hypothesis.with_term(Term(effect, variant, BY_ID[effect].typical_values(axis)))
@@ -47,7 +47,7 @@ def not_testable(found: Fit, asked: Collection[str] = tuple(BY_ID), margin: floa
         (mechanism.id, number)
         for mechanism in wanted
         for number, variant in enumerate(mechanism.variants)
-        if observable(mechanism, variant, bench) and judged(mechanism.id, found.data.runs)
+        if observable(mechanism, variant, bench) and judged(mechanism.id, fit.data.runs)
     ]
     shown = {effect for (effect, _), seen in zip(jobs, POOL.map(lambda job: visible(*job), jobs), strict=True) if seen}
     return tuple(mechanism.id for mechanism in wanted if mechanism.id not in shown)

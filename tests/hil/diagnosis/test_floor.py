@@ -141,7 +141,7 @@ def test_a_loop_that_sticks_and_slips_has_no_noise_of_its_own_making() -> None:
 
 def test_a_push_in_one_lap_is_no_noise() -> None:
     rng, rows = np.random.default_rng(3), np.arange(12_000)
-    laps = Laps(rows, rows + 12_000, 12.0)
+    laps = Laps(rows, rows + 12_000)
     residual = 0.2 * rng.standard_normal(24_000)
     calm = laps.noise(residual)
     residual[3_000:4_500] += 5.0

@@ -147,15 +147,15 @@ def names_stand(left: float, above: float, c: Criteria = CRITERIA) -> bool:
 
 _EVIDENCE: Rule[Addition | Need] = Rule(
     "evidence",
-    "the evidence for it is {evidence} (BIC difference), needed {needed}",
-    "the evidence for it is {evidence} (BIC difference), needed {needed}",
+    "the evidence for it is {evidence:.0f} (BIC difference), needed {needed:.0f}",
+    "the evidence for it is {evidence:.0f} (BIC difference), needed {needed:.0f}",
     "Schwarz 1978; Kass and Raftery 1995, with the price of a search over the library",
     _evidence,
 )
 _MATERIAL: Rule[Addition | Need] = Rule(
     "material energy",
-    "it removes {removed} noise² per row, needed {needed}",
-    "it removes {removed} noise² per row, needed {needed}",
+    "it removes {removed:.3g} noise² per row, needed {needed:.3g}",
+    "it removes {removed:.3g} noise² per row, needed {needed:.3g}",
     "two correct simulations of one axis differ by less",
     _material,
 )
@@ -189,8 +189,8 @@ ADDED: tuple[Rule[Addition], ...] = (
     _MATERIAL,
     Rule(
         "share of the mismatch",
-        "it removes {share} of the energy above the noise, needed {needed}",
-        "it removes {share} of the energy above the noise, needed {needed}: such terms are a series of another effect",
+        "it removes {share:.1%} of the energy above the noise, needed {needed:.0%}",
+        "it removes {share:.1%} of the energy above the noise, needed {needed:.0%}: such terms are a series of another effect",
         "many small terms are a series expansion of one effect",
         _worth,
     ),
@@ -209,8 +209,8 @@ NEEDED: tuple[Rule[Addition | Need], ...] = (_EVIDENCE, _MATERIAL)
 COMPARED: tuple[Rule[RivalFit], ...] = (
     Rule(
         "beside the named one",
-        "the recordings do not separate them: evidence against it {against}, {more} noise² per row more",
-        "the named one explains more: evidence against it {against}, {more} noise² per row more",
+        "the recordings do not separate them: evidence against it {against:.0f}, {more:.3g} noise² per row more",
+        "the named one explains more: evidence against it {against:.0f}, {more:.3g} noise² per row more",
         "a rival is refuted by very strong evidence and by more than the model discrepancy",
         _not_behind,
     ),
@@ -262,8 +262,8 @@ HELD_OUT: tuple[Rule[Ablation], ...] = (
 EXPLAINED: tuple[Rule[Remainder], ...] = (
     Rule(
         "explains the mismatch",
-        "all terms leave {left} of the energy above the noise",
-        "all terms leave {left} of the energy above the noise; a channel is at {above} times its noise (mean square)",
+        "all terms leave {left:.1%} of the energy above the noise",
+        "all terms leave {left:.1%} of the energy above the noise; a channel is at {above:.3g} times its noise (mean square)",
         "the true mechanism in another form leaves little",
         _explains,
     ),

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from typing import Any, Generic, NamedTuple, TypeVar
 
 from hil.identification.terms import Term
-from hil.quantities import digits
 
 Figures = Mapping[str, float | str]
 Answer = tuple[bool, Figures]
@@ -73,8 +72,7 @@ def examine(rules: Sequence[Rule[_M]], measured: _M, criteria: Any) -> Ledger:
         if answer is None:
             continue
         accepts, figures = answer
-        words = {name: one if isinstance(one, str) else digits(one) for name, one in figures.items()}
-        entries.append(Entry(rule.name, accepts, (rule.asks if accepts else rule.refusal).format(**words), figures))
+        entries.append(Entry(rule.name, accepts, (rule.asks if accepts else rule.refusal).format(**figures), figures))
         if not accepts:
             break
     return tuple(entries)

@@ -21,9 +21,9 @@ _BAR = 12  # characters of the longest bar: three columns fit into 80
 def latency(
     period: Annotated[
         list[float] | None,
-        typer.Option(min=1e-4, max=1.0, help="Period [s], repeatable. Default: 0.004, 0.001 and 0.0005."),
+        typer.Option(min=1e-4, max=1.0, help="Period in s, repeatable. Default: 0.004, 0.001 and 0.0005."),
     ] = None,
-    seconds: Annotated[float, typer.Option(min=0.1, max=86400.0, help="Duration at each period [s].")] = 10.0,
+    seconds: Annotated[float, typer.Option(min=0.1, max=86400.0, help="Duration in s at each period.")] = 10.0,
     busy: Annotated[bool, typer.Option("--load", help="Keep every core busy with an ordinary process.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:

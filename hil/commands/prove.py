@@ -22,7 +22,7 @@ def prove(
         typer.Option("--out", help="Folder for cases, answers and scores; continues an interrupted proof"),
     ] = None,
     cases: Annotated[int | None, typer.Option("--cases", help="Number of cases; default: 40")] = None,
-    full: Annotated[bool, typer.Option("--full", help="The whole proof, about 1200 cases: takes many hours")] = False,
+    full: Annotated[bool, typer.Option("--full", help="The whole proof, 1340 cases: takes many hours")] = False,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the draw")] = 1,
     plant: Annotated[
         PlantChoice,
@@ -48,7 +48,7 @@ def prove(
         str | None,
         typer.Option(
             "--scheduler",
-            help="Diagnose on a dask.distributed cluster, as tcp://10.0.0.1:8786; needs hil-servo[cluster]",
+            help="Diagnose on a dask.distributed cluster, as tcp://10.0.0.1:8786; needs the extra cluster of hil-servo",
         ),
     ] = None,
     show: Annotated[

@@ -191,7 +191,7 @@ def grant_findings(grants: tuple[Grant, ...]) -> Iterator[MachineFinding]:
     }  # fmt: skip
     for grant in grants:
         reasons = next((value for key, value in what.items() if grant.setting.startswith(key)), None)
-        why, command = reasons or ("the loop asks for it when it arms", "see systemd/README.md")
+        why, command = reasons or ("the loop asks for it when it arms", "see docs/service.md")
         if grant.refused:
             yield MachineFinding(Level.CHANGE, grant.setting, f"refused: {grant.refused}", why, command)
         else:

@@ -156,7 +156,7 @@ def check_punctual(jitter: Jitter, p99_limit_s: float) -> None:
     if jitter.p99_s > p99_limit_s:
         raise NotPunctual(
             f"drive.jitter_p99: the loop is late by {jitter.text}; allowed p99 {1e6 * p99_limit_s:.0f} us",
-            "take load off the machine, give the rights for real-time scheduling (systemd/README.md), raise the budget "
+            "take load off the machine, give the rights for real-time scheduling (docs/service.md), raise the budget "
             "in the bench file",
         )
 

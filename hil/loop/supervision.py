@@ -2,7 +2,7 @@
 
 A rule holds if one of its bits is set: `Limit` (compiled checks of the tick), conditions of the drive or of the linear
 encoder, or a sign of the loop itself. The first rule in `RULES` that holds names the end of a run; any that holds may
-require a quick stop. ARCHITECTURE.md shows the table; a test compares them.
+require a quick stop. docs/supervision.md shows the table; a test compares them.
 """
 
 from collections.abc import Callable, Iterator
@@ -225,7 +225,7 @@ def _explains(stall: Stall, passed: int, section: DriveSection) -> bool:
 
 
 def rules_table() -> str:
-    """The rules as the table of ARCHITECTURE.md."""
+    """Return the rules as the table of docs/supervision.md."""
     lines = ["| rule | condition | reaction | cycles | ending |", "|---|---|---|---|---|"]
     lines += [f"| {r.name} | {r.condition} | {r.reaction} | {r.cycles} | {r.ending} |" for r in RULES]
     return "\n".join(lines) + "\n"

@@ -1,6 +1,6 @@
 """The faults of the matrix: what happens, what the run may end with, and within how many cycles it must be detected.
 
-A bound is counted from the fault. Where a rule of ARCHITECTURE.md ("Supervision") counts from the passing of a bound,
+A bound is counted from the fault. Where a rule of docs/supervision.md counts from the passing of a bound,
 the time until the move can pass it is added (`MOVING_CYCLES`). None: nothing has to be detected.
 """
 

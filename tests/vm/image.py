@@ -143,7 +143,7 @@ def _install_dependencies(root: Path, wheel: Path, wheels: Path) -> None:
 
 
 def _install_project(root: Path, wheel: Path, bench: str) -> None:
-    """Install wheel and units as systemd/README.md says, and compile the kernels, for any processor, by this one."""
+    """Install wheel and units as docs/service.md says, and compile the kernels, for any processor, by this one."""
     inside = root / "opt/vm"
     shutil.rmtree(inside, ignore_errors=True)
     inside.mkdir(parents=True)

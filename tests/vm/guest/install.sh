@@ -1,4 +1,4 @@
-# sh install.sh BENCH.yaml, in a chroot of the guest's disk: wheel, units and CAN interface as systemd/README.md says, compiled kernels.
+# sh install.sh BENCH.yaml, in a chroot of the guest's disk: wheel, units and CAN interface as docs/service.md says, compiled kernels.
 cd /opt/vm
 /opt/hil-servo/.venv/bin/python -m pip install --quiet --isolated --no-index --no-deps --force-reinstall ./*.whl
 # numba compares the times of sources; a disk image keeps whole seconds

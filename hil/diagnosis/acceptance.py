@@ -190,7 +190,7 @@ ADDED: tuple[Rule[Addition], ...] = (
     Rule(
         "share of the mismatch",
         "it removes {share:.1%} of the energy above the noise, needed {needed:.0%}",
-        "it removes {share:.1%} of the energy above the noise, needed {needed:.0%}: such terms are a series of another effect",
+        "it removes {share:.1%} of the energy above the noise, needed {needed:.0%}: such terms are a series",
         "many small terms are a series expansion of one effect",
         _worth,
     ),
@@ -263,7 +263,7 @@ EXPLAINED: tuple[Rule[Remainder], ...] = (
     Rule(
         "explains the mismatch",
         "all terms leave {left:.1%} of the energy above the noise",
-        "all terms leave {left:.1%} of the energy above the noise; a channel is at {above:.3g} times its noise (mean square)",
+        "all terms leave {left:.1%} of the energy above the noise, a channel {above:.3g} times its noise (square)",
         "the true mechanism in another form leaves little",
         _explains,
     ),

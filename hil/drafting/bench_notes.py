@@ -11,7 +11,7 @@ from hil.recording.recording import Recording
 MUCH_LEFT = 0.3  # share of the torque unexplained, from which it is as large as a usual friction
 
 
-def told(
+def bench_notes(
     recording: Recording,
     plant: PlantValues,
     transmission: TransmissionValues | None,
@@ -32,44 +32,41 @@ def told(
             "masses and friction are assumed: no torque is recorded; two encoders tell the transmission, and of masses "
             "and stiffness their ratio"
         )
-    notes.append(
-        f"noise of {names.motor_position}: {noise_of(recording, names.motor_position):.3g} "
-        f"{'m' if linear else 'rad'} rms"
-    )
+    position_noise = noise_of(recording, names.motor_position)
+    notes.append(f"noise of {names.motor_position}: {position_noise:.3g} {'m' if linear else 'rad'} rms")
     delay_s = torque_delay_s(recording)
     if delay_s is not None:
         notes.append(f"{names.torque} follows {names.torque_command} after {1e3 * delay_s:.3g} ms (to half a row)")
     if transmission is not None:
-        micro = "urad" if turns else "um"
-        late = transmission.delay_s
-        if sure(late.value / recording.period_s, late.std_error / recording.period_s):
-            notes.append(
-                f"second encoder {'late' if late.value > 0 else 'early'} by {1e3 * abs(late.value):.3g} ms "
-                f"+-{1e3 * late.std_error:.2g}, from its difference over the velocity"
-            )
-            unsure.append(
-                f"the second encoder is {'late' if late.value > 0 else 'early'} by {1e3 * abs(late.value):.3g} ms; "
-                "the bench has no key for it"
-            )
-        if transmission.friction_m.significant:
-            notes.append(
-                f"second encoder differs by {2e6 * abs(transmission.friction_m.value):.3g} {micro} between directions: "
-                "lost motion, or friction over stiffness"
-            )
-        notes.append(
-            f"ratio, delay and stretch leave {1e6 * transmission.left_m:.3g} {micro} rms of the second encoder"
-        )
+        _of_transmission(transmission, recording.period_s, "urad" if turns else "um", notes, unsure)
     try:
         feeds = identify_friction(recording)
     except InputError:
         return notes, unsure
     notes.append(
         f"friction from {len(feeds.points)} constant feeds: Coulomb {feeds.coulomb:.4g} "
-        f"+-{feeds.coulomb_std_error:.2g}, "
-        f"viscous {feeds.viscous:.4g} +-{feeds.viscous_std_error:.2g}, offset {feeds.offset:.3g} "
-        f"+-{feeds.offset_std_error:.2g}"
+        f"+-{feeds.coulomb_std_error:.2g}, viscous {feeds.viscous:.4g} +-{feeds.viscous_std_error:.2g}, offset "
+        f"{feeds.offset:.3g} +-{feeds.offset_std_error:.2g}"
     )
     return notes, unsure
+
+
+def _of_transmission(
+    transmission: TransmissionValues, period_s: float, micro: str, notes: list[str], unsure: list[str]
+) -> None:
+    """Add delay, lost motion and remaining difference of the second encoder; `micro` is um or urad."""
+    late = transmission.delay_s
+    if sure(late.value / period_s, late.std_error / period_s):
+        delay = f"{'late' if late.value > 0 else 'early'} by {1e3 * abs(late.value):.3g} ms"
+        error = f"+-{1e3 * late.std_error:.2g}"
+        notes.append(f"second encoder {delay} {error}, from its difference over the velocity")
+        unsure.append(f"the second encoder is {delay}; the bench has no key for it")
+    if transmission.friction_m.significant:
+        notes.append(
+            f"second encoder differs by {2e6 * abs(transmission.friction_m.value):.3g} {micro} between directions: "
+            "lost motion, or friction over stiffness"
+        )
+    notes.append(f"ratio, delay and stretch leave {1e6 * transmission.left_m:.3g} {micro} rms of the second encoder")
 
 
 def _of_torque(

@@ -5,7 +5,7 @@ from math import hypot, log2, pi, sqrt
 
 from hil.channels import AxisKind
 from hil.drafting.assumed_plant import plant_or_assumed
-from hil.drafting.bench_notes import told
+from hil.drafting.bench_notes import bench_notes
 from hil.drafting.estimate import BenchValue, Estimate
 from hil.drafting.loop_values import loop_values
 from hil.drafting.plant_values import PlantValues, TransmissionValues, plant_values, transmission_values
@@ -15,7 +15,7 @@ from hil.errors import InputError
 from hil.identification.derived_channels import with_position
 from hil.importing.by_map import STEP
 from hil.importing.usual_values import ROTARY_LEAD_M
-from hil.quantities import digits
+from hil.quantities import digits, unit_of
 from hil.recording.quantum import count_of, is_decimal
 from hil.recording.recording import Recording
 from hil.twin.mechanisms import gravity_torque
@@ -52,24 +52,31 @@ def draft_bench(recording: Recording) -> BenchDraft:
     """
     recording = with_position(recording)
     parts = sorted(recording.parts(), key=len, reverse=True)
-    for number, part in enumerate(parts if len(parts) > 1 else ()):
+    if len(parts) == 1:
+        return _draft_part(recording)
+    for part in parts:
         try:
-            draft = draft_bench(part)
+            draft = _draft_part(part)
         except InputError:
-            if number == len(parts) - 1:
+            if part is parts[-1]:
                 raise
             continue
-        draft.name = recording.name
-        seconds = len(part) * part.period_s
-        draft.notes.insert(0, f"found in {part.name}, {seconds:.4g} s long, of {len(parts)} parts between gaps in time")
-        return draft
-    transmission = transmission_values(recording)
+        break
+    draft.name = recording.name
+    seconds = len(part) * part.period_s
+    draft.notes.insert(0, f"found in {part.name}, {seconds:.4g} s long, of {len(parts)} parts between gaps in time")
+    return draft
+
+
+def _draft_part(recording: Recording) -> BenchDraft:
+    """Draft the bench from a recording without gaps."""
+    transmission, ratio = transmission_values(recording), 1.0
     volts = turns = False
+    draft = BenchDraft(recording.name, recording.kind, "one_mass")
     if recording.kind is AxisKind.LINEAR:
         plant = plant_values(recording)
-        draft = BenchDraft(recording.name, recording.kind, "one_mass")
-        ratio = 1.0
-        _linear(draft, plant)
+        draft.axis.append(_value("mass_kg", plant.inertia, "kg"))
+        draft.axis += [_friction("coulomb_force_n", plant.coulomb), _friction("viscous_force_n_s_m", plant.viscous)]
     else:
         lead = lead_of(recording, transmission)
         ratio = lead.value / (2.0 * pi)
@@ -81,33 +88,30 @@ def draft_bench(recording: Recording) -> BenchDraft:
             lead = lead_of(recording, transmission)
         stiff = deflection is None or not deflection.significant
         volts = turns and stiff and _in_volts(recording) and plant.viscous.significant
-        model = {(True, True): "rotary_two_mass", (True, False): "rotary", (False, True): "two_mass"}.get(
-            (turns, deflection is not None), "rigid"
-        )
-        draft = BenchDraft(recording.name, recording.kind, model)
         if volts:
             draft.model = "dc_motor"
             _dc_motor(draft, plant, lead)
         elif turns:
+            draft.model = "rotary" if deflection is None else "rotary_two_mass"
             _turning(draft, plant, transmission, lead)
         else:
+            draft.model = "rigid" if deflection is None else "two_mass"
             _screw(draft, plant, deflection, lead)
     draft.control, draft.control_why = loop_values(recording, ratio)
     _encoders(draft, recording)
     _weight(draft, plant)
-    notes, unsure = told(recording, plant, transmission, "V" if volts else None, turns)
+    notes, unsure = bench_notes(recording, plant, transmission, "V" if volts else None, turns)
     draft.notes += notes
     draft.unsure += unsure
     return draft
 
 
 def _deflection_s2(transmission: TransmissionValues) -> Estimate | None:
-    """Deflection of the transmission over the load's acceleration; where it is not told, its standard error.
+    """Deflection of the transmission over the load's acceleration [s^2], else the standard error of it.
 
-    A diagnosis searches within a factor of `TRUST` of it: up to three standard errors, which are not told yet.
-
-    Two encoders show what a transmission does, which a rigid axis does not have: lead error, play, twist. None: the
-    second encoder is late, and no deflection is told beside its delay.
+    Two encoders show lead error, play and twist of a transmission, which a rigid axis does not have; a diagnosis
+    searches within a factor of `TRUST` of the deflection. None: the second encoder is late, and no deflection is told
+    beside its delay.
     """
     stretch = transmission.compliance_s2.scaled(-1.0)
     if stretch.significant and stretch.value > 0.0:
@@ -116,14 +120,6 @@ def _deflection_s2(transmission: TransmissionValues) -> Estimate | None:
         return None
     how = "not told by this motion: the standard error of the deflection over acceleration"
     return Estimate(max(stretch.value, stretch.std_error, _STIFFEST_S2), stretch.std_error, how)
-
-
-def _linear(draft: BenchDraft, plant: PlantValues) -> None:
-    draft.axis += [
-        _value("mass_kg", plant.inertia, "kg"),
-        _friction("coulomb_force_n", plant.coulomb, "N"),
-        _friction("viscous_force_n_s_m", plant.viscous, "N s/m"),
-    ]
 
 
 def _screw(draft: BenchDraft, plant: PlantValues, deflection: Estimate | None, lead: Estimate) -> None:
@@ -142,7 +138,7 @@ def _screw(draft: BenchDraft, plant: PlantValues, deflection: Estimate | None, l
         draft.unsure.append(
             "motor_mass_kg, table_mass_kg, stiffness_n_m: told are the sum of the masses and table mass over stiffness"
         )
-    _rotary_friction(draft, plant)
+    draft.axis += _rotary_friction(plant)
 
 
 def _in_volts(recording: Recording) -> bool:
@@ -160,7 +156,7 @@ def _dc_motor(draft: BenchDraft, plant: PlantValues, lead: Estimate) -> None:
     draft.axis += [
         _value("gear_ratio", Estimate(ROTARY_LEAD_M / lead.value, 0.0, lead.how), "motor per load"),
         _value("time_constant_s", Estimate(time_s, error_s, inertia.how), "s"),
-        _friction("coulomb_voltage_v", plant.coulomb, "V"),
+        _friction("coulomb_voltage_v", plant.coulomb),
         _value("voltage_constant_v_s_rad", slope, "V s/rad"),
     ]
     draft.notes.append("the voltage stands in the torque channels, 1 N m for 1 V: torques of a diagnosis are volts")
@@ -194,19 +190,12 @@ def _turning(draft: BenchDraft, plant: PlantValues, transmission: TransmissionVa
             "motor_inertia_kg_m2, load_inertia_kg_m2, stiffness_n_m_rad: told are the sum of the inertias at the "
             "motor and load inertia over stiffness"
         )
-    _rotary_friction(draft, plant)
+    draft.axis += _rotary_friction(plant)
 
 
 def _guess(half: Estimate) -> Estimate:
-    """Half of a sum whose split is not told: the other half may be all or nothing."""
+    """Half of a sum whose split is not identifiable; its standard error is the half itself."""
     return replace(half, std_error=half.value)
-
-
-def _rotary_friction(draft: BenchDraft, plant: PlantValues) -> None:
-    draft.axis += [
-        _friction("coulomb_torque_n_m", plant.coulomb, "N m"),
-        _friction("viscous_torque_n_m_s_rad", plant.viscous, "N m s/rad"),
-    ]
 
 
 def _stiffness(mass: Estimate, deflection: Estimate) -> Estimate:
@@ -232,38 +221,40 @@ def _value(key: str, estimate: Estimate, unit: str, more: str = "") -> BenchValu
     return BenchValue(key, estimate.value, f"{unit}, {_error(estimate)}", "; ".join(filter(None, (estimate.how, more))))
 
 
-def _friction(key: str, estimate: Estimate, unit: str) -> BenchValue:
-    if estimate.value > 0.0:
-        sure = "" if estimate.significant else "not identifiable from this motion; "
-        return BenchValue(key, estimate.value, f"{unit}, {_error(estimate)}", sure + estimate.how)
-    how = f"not identifiable from this motion: {estimate.value:.3g} is below 0; {estimate.how}"
-    return BenchValue(key, 0.0, f"{unit}, {_error(estimate)}", how)
+def _rotary_friction(plant: PlantValues) -> list[BenchValue]:
+    return [_friction("coulomb_torque_n_m", plant.coulomb), _friction("viscous_torque_n_m_s_rad", plant.viscous)]
+
+
+def _friction(key: str, estimate: Estimate) -> BenchValue:
+    sure = "" if estimate.significant else "not identifiable from this motion; "
+    how = sure + estimate.how
+    if not estimate.value > 0.0:
+        how = f"not identifiable from this motion: {estimate.value:.3g} is below 0; {estimate.how}"
+    return BenchValue(key, max(estimate.value, 0.0), f"{unit_of(key)}, {_error(estimate)}", how)
 
 
 def _encoders(draft: BenchDraft, recording: Recording) -> None:
-    names = recording.axis
-    step, noise = _step(recording, names.motor_position), noise_of(recording, names.motor_position)
-    how = "step of the positions" if step is not None else f"no step is seen; from the noise of {noise:.2g}"
-    step = step or max(noise * _STEPS_PER_NOISE, 1e-12)
-    if recording.kind is AxisKind.LINEAR:
-        draft.motor_encoder = BenchValue("resolution_m", float(f"{step:.4g}"), "m", how + _printed(step))
+    names, linear = recording.axis, recording.kind is AxisKind.LINEAR
+    step, how = _step(recording, names.motor_position, "")
+    if linear:
+        draft.motor_encoder = BenchValue("resolution_m", float(f"{step:.4g}"), "m", how)
     else:
         counts = max(round(2.0 * pi / step), 1)
         power = round(2 ** round(log2(counts)))
-        counts = power if abs(counts / power - 1.0) < 0.002 else counts
-        draft.motor_encoder = BenchValue("counts_per_rev", counts, "", how + _printed(step))
-    if names.table_position in recording.columns and recording.kind is AxisKind.ROTARY:
-        step, noise = _step(recording, names.table_position), noise_of(recording, names.table_position)
-        how = "step of the positions" if step is not None else f"no step is seen; from the noise of {noise:.2g} m"
-        step = min(max(step or noise * _STEPS_PER_NOISE, _FINEST_M), _COARSEST_M)
-        draft.table_encoder = BenchValue("resolution_m", float(f"{step:.4g}"), "m", how + _printed(step))
+        draft.motor_encoder = BenchValue(
+            "counts_per_rev", power if abs(counts / power - 1.0) < 0.002 else counts, "", how
+        )
+    if names.table_position in recording.columns and not linear:
+        step, how = _step(recording, names.table_position, " m")
+        step = min(max(step, _FINEST_M), _COARSEST_M)
+        draft.table_encoder = BenchValue("resolution_m", float(f"{step:.4g}"), "m", how)
 
 
-def _step(recording: Recording, channel: str) -> float | None:
-    """Step of a channel in its unit, before an import interpolated it; None where none is seen."""
+def _step(recording: Recording, channel: str, unit: str) -> tuple[float, str]:
+    """Step of a channel in its unit, before an import interpolated it, and how it was found: seen, or from noise."""
     origin = recording.metadata.get("channels", {}).get(channel, {})
-    return float(origin[STEP]) if STEP in origin else count_of(recording[channel])
-
-
-def _printed(step: float) -> str:
-    return " (perhaps the last digit of the file)" if is_decimal(step) else ""
+    step = float(origin[STEP]) if STEP in origin else count_of(recording[channel])
+    if step is None:
+        noise = noise_of(recording, channel)
+        return max(noise * _STEPS_PER_NOISE, 1e-12), f"no step is seen; from the noise of {noise:.2g}{unit}"
+    return step, "step of the positions" + (" (perhaps the last digit of the file)" if is_decimal(step) else "")

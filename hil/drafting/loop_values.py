@@ -40,7 +40,7 @@ _NOISE = 1e-4  # of the command: a scale of the residuals, of no influence on th
 
 
 class ControlValues(NamedTuple):
-    """Keys of the control section; if they are not known, none and the reason."""
+    """Keys of the control section; without a law that fits, no keys and the reason."""
 
     values: list[BenchValue]
     why: str = ""
@@ -48,81 +48,57 @@ class ControlValues(NamedTuple):
 
 def loop_values(recording: Recording, ratio_m_rad: float) -> ControlValues:
     """Draft the control section of a bench from a recording; `ratio_m_rad`: travel over motor angle."""
-    names, loop = recording.axis, fit_loops(recording, ratio_m_rad)
-    if loop is None or loop.left > REPLAYED:
-        why = "no set-points are recorded, or no gains reproduce the torque command"
-        if loop is not None:
-            torque, command = (recording.columns.get(name) for name in (names.torque, names.torque_command))
-            measured = command is None or (torque is not None and np.array_equal(command, torque))
-            why = f"the best cascaded law leaves {_left(loop)}"
-            why += "; its command is not recorded, the measured torque stands for it" if measured else ""
-        return ControlValues([], why)
-    linear, period_s = recording.kind is AxisKind.LINEAR, recording.period_s
-    gains, delays, errors = loop.gains, loop.settings, loop.errors
-    if sure(delays.feedback_rows, errors.feedback_rows):
+    names, loop, period_s = recording.axis, fit_loops(recording, ratio_m_rad), recording.period_s
+    if loop is None:
+        return ControlValues([], "no set-points are recorded, or no gains reproduce the torque command")
+    if loop.left > REPLAYED:
+        torque, command = (recording.columns.get(name) for name in (names.torque, names.torque_command))
+        measured = command is None or (torque is not None and np.array_equal(command, torque))
+        stands_for_it = "; its command is not recorded, the measured torque stands for it" if measured else ""
+        return ControlValues([], f"the best cascaded law leaves {_left(loop)}{stands_for_it}")
+    late_rows, error_rows = loop.settings.feedback_rows, loop.errors.feedback_rows
+    if sure(late_rows, error_rows):
         return ControlValues(
             [],
-            f"the cascaded law leaves {_left(loop)} with positions that are "
-            f"{1e3 * period_s * delays.feedback_rows:.3g} ms old, +-{1e3 * period_s * errors.feedback_rows:.1g}; "
-            "a delay of the loop is not simulated; if the drive filters its velocity instead, give its gains and "
-            "velocity_filter_time_constant_s",
+            f"the cascaded law leaves {_left(loop)} with positions that are {1e3 * period_s * late_rows:.3g} ms old, "
+            f"+-{1e3 * period_s * error_rows:.1g}; a delay of the loop is not simulated; if the drive filters its "
+            "velocity instead, give its gains and velocity_filter_time_constant_s",
         )
+    return ControlValues(_bench_values(loop, recording.kind, period_s))
+
+
+def _bench_values(loop: LawFit, kind: AxisKind, period_s: float) -> list[BenchValue]:
+    gains, delays, errors = loop.gains, loop.settings, loop.errors
+    position, velocity, integral = gains.position_gain_1_s, gains.velocity_gain_n_m_s_rad, gains.integral_gain_n_m_rad
+    linear = kind is AxisKind.LINEAR
+    key, unit = ("velocity_gain_n_s_m", "N s/m") if linear else ("velocity_gain_n_m_s_rad", "N m s/rad")
     how = f"the replayed law leaves {_left(loop)}"
+    best = f"of 1, 2, 4 and 8 rows {gains.position_ticks} fits best"
     values = [
-        BenchValue(
-            "position_gain_1_s",
-            gains.position_gain_1_s,
-            f"1/s, +-{gains.position_gain_1_s * errors.position_gain:.2g}",
-            how,
-        ),
+        BenchValue("position_gain_1_s", position, f"1/s, +-{position * errors.position_gain:.2g}", how),
         BenchValue("velocity_feedforward", gains.velocity_feedforward, f"1 is 100 %, +-{errors.feedforward:.2g}"),
-        BenchValue(
-            "position_period_s",
-            float(f"{gains.position_ticks * period_s:.9g}"),
-            "s",
-            f"of 1, 2, 4 and 8 rows {gains.position_ticks} fits best",
-        ),
-        BenchValue(
-            "velocity_gain_n_s_m" if linear else "velocity_gain_n_m_s_rad",
-            gains.velocity_gain_n_m_s_rad,
-            f"{'N s/m' if linear else 'N m s/rad'}, +-{gains.velocity_gain_n_m_s_rad * errors.velocity_gain:.2g}",
-        ),
+        BenchValue("position_period_s", float(f"{gains.position_ticks * period_s:.9g}"), "s", best),
+        BenchValue(key, velocity, f"{unit}, +-{velocity * errors.velocity_gain:.2g}"),
     ]
-    if gains.integral_gain_n_m_rad > 0.0:
-        time_s = gains.velocity_gain_n_m_s_rad / gains.integral_gain_n_m_rad
+    if integral > 0.0:
+        time_s = velocity / integral
         error_s = time_s * hypot(errors.velocity_gain, errors.integral_gain)
         values.append(BenchValue("velocity_integral_time_s", time_s, f"s, +-{error_s:.2g}"))
     if sure(delays.setpoint_rows, 0.0):
-        values.append(
-            BenchValue(
-                "setpoint_delay_s", period_s * delays.setpoint_rows, f"s, +-{period_s * errors.setpoint_rows:.2g}"
-            )
-        )
+        error = f"s, +-{period_s * errors.setpoint_rows:.2g}"
+        values.append(BenchValue("setpoint_delay_s", period_s * delays.setpoint_rows, error))
     if loop.terms:
-        values.append(
-            BenchValue(
-                "velocity_filter_time_constant_s",
-                loop.terms[0].values[0],
-                "s",
-                "better than without a filter, and than a delay",
-            )
-        )
+        (time_s,), how = loop.terms[0].values, "better than without a filter, and than a delay"
+        values.append(BenchValue("velocity_filter_time_constant_s", time_s, "s", how))
     if delays.differenced:
-        values.append(
-            BenchValue(
-                "velocity_setpoint", "backward_difference", "", "of the position set-points, better than as recorded"
-            )
-        )
-    values += [
+        how = "of the position set-points, better than as recorded"
+        values.append(BenchValue("velocity_setpoint", "backward_difference", "", how))
+    estimate = "two_sample_mean" if gains.two_sample_mean else "backward_difference"
+    return [
+        *values,
         BenchValue("velocity_period_s", float(f"{period_s:.9g}"), "s", "the period of the recording"),
-        BenchValue(
-            "velocity_estimate",
-            "two_sample_mean" if gains.two_sample_mean else "backward_difference",
-            "",
-            "the better of the two",
-        ),
+        BenchValue("velocity_estimate", estimate, "", "the better of the two"),
     ]
-    return ControlValues(values)
 
 
 def _left(loop: LawFit) -> str:

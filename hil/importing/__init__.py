@@ -1,1 +1,17 @@
-"""From a foreign file to a recording: columns, clock, roles, units and signs; a map of the file drafted and applied."""
+"""From a foreign file to a recording, in one direction. Without a map, `draft_map` writes one first.
+
+step                 modules                                                     result
+file to table        csv_dialect, mat_file, foreign_table (all columns)          `ForeignTable`
+                     foreign_columns (those that a map names)                    `Foreign`
+words                lexicon(.yaml), units, column_names, header_values          `Label`, `HeaderValue`
+clock                clock; hil.recording.stamps and row_clock                   `StampClock`, `RegularRows`
+rows                 wraps, held_samples, spikes, rows                           `KeptRows`
+roles                relations, computed_position, roles                         `Roles`
+refusal              damage                                                      InputError, notes
+units and signs      unit_choice, usual_values, encoder_counts,                  entries of the map
+                     effort_entry, channel_entries
+map                  map_file (its keys), map_draft, draft_map, map_text         `MapDraft`, the YAML file
+recording            by_map                                                      `Recording`
+
+A drafted map is applied like any other: `by_map` knows nothing of how it came about.
+"""

@@ -9,9 +9,9 @@ import numpy as np
 from hil.arrays import FloatArray
 from hil.channels import CHANNELS, AxisChannels
 from hil.files.yaml_model import load_model
-from hil.importing.complete_rows import complete_rows
-from hil.importing.foreign_files import FEW_MISSING, read_foreign
+from hil.importing.foreign_columns import FEW_MISSING, read_foreign
 from hil.importing.map_file import SECONDS, RecordingMap
+from hil.importing.rows import complete_rows
 from hil.importing.wraps import unwrapped
 from hil.recording.quantum import count_of
 from hil.recording.recording import CLOCK_NOTES, Recording, clock_metadata
@@ -103,7 +103,7 @@ def _derive(columns: dict[str, FloatArray], axis: AxisChannels, rows: RegularRow
     """Add the channels that follow from others; return how each was derived."""
     derived = {}
     if axis.velocity_command not in columns and axis.position_command in columns:
-        parts = np.split(columns[axis.position_command], [part.row for part in rows.parts[1:]])
+        parts = [columns[axis.position_command][piece] for piece in rows.pieces]
         columns[axis.velocity_command] = np.concatenate([np.gradient(part, rows.period_s) for part in parts])
         derived[axis.velocity_command] = f"central differences of {axis.position_command}"
     for name, other in ((axis.torque, axis.torque_command), (axis.torque_command, axis.torque)):
@@ -115,7 +115,7 @@ def _derive(columns: dict[str, FloatArray], axis: AxisChannels, rows: RegularRow
 
 def _describe_clock(rows: RegularRows) -> str:
     """Describe the largest deviation of the time stamps from start of the part + tick x period."""
-    parts = np.split(rows.columns["time_s"], [part.row for part in rows.parts[1:]])
+    parts = [rows.columns["time_s"][piece] for piece in rows.pieces]
     deviation_s = max(float(np.abs(part - part[0] - np.arange(part.size) * rows.period_s).max()) for part in parts)
     return f"period {rows.period_s:.9g} s; stamps within {deviation_s:.2g} s of start + tick x period"
 

@@ -6,44 +6,31 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.errors import InputError
-from hil.importing.column_names import Label, Quantity, label
+from hil.importing.column_names import Label, label
 from hil.importing.foreign_table import ForeignTable
-from hil.importing.header_values import Constant
+from hil.importing.lexicon import Constant, Quantity, lexicon
 from hil.importing.map_file import SECONDS
-from hil.recording.stamps import GAP_STEPS, REPEATS
+from hil.recording.stamps import REPEATS
 
 SLOWEST_HZ, FASTEST_HZ = 5.0, 2e5  # of recordings of an axis: outside lies a wrong unit of the stamps
-_RATE_NAMES = (
-    "fs",
-    "rate",
-    "sample_rate",
-    "sampling_rate",
-    "sample_rate_hz",
-    "sampling_frequency",
-    "fe",
-    "fa",
-    "abtastrate",
-)
-_PERIOD_NAMES = ("ts", "dt", "te", "ta", "period", "sample_time", "sampling_time", "period_s", "abtastzeit")
 
 
 @dataclass(frozen=True, eq=False)
 class StampClock:
-    """A column with its unit, or a rate [Hz]; `time_s` (n,) from 0; `resample_hz` if its steps are irregular."""
+    """A column with its unit, or a rate [Hz]; `time_s` (n,) from 0, not yet regular."""
 
     time_s: FloatArray
     column: str | None
     unit: str
     rate_hz: float | None
-    resample_hz: float | None
     how: str
     unsure: tuple[str, ...] = ()
 
 
 def find_clock(table: ForeignTable, labels: dict[str, Label], rate_hz: float | None) -> StampClock:
-    """Find the clock. `rate_hz` is what the user says; it counts more than stamps.
+    """Find the clock. `rate_hz`, the rate that the user gives, overrules a column of stamps.
 
-    Raises InputError: no clock, stamps that run back or repeat, rows in a wrong order.
+    Raises InputError: no clock, or a row without a stamp.
     """
     rows = len(next(iter(table.columns.values())))
     if rate_hz is not None:
@@ -67,22 +54,22 @@ def _says_time(remark: str) -> bool:
 
 
 def _of_rate(rows: int, rate_hz: float, how: str) -> StampClock:
-    return StampClock(np.arange(rows) / rate_hz, None, "s", rate_hz, None, how)
+    return StampClock(np.arange(rows) / rate_hz, None, "s", rate_hz, how)
 
 
 def _written_rate(table: ForeignTable) -> tuple[float, str] | None:
     for name, value in table.scalars.items():
         plain = name.lower()
-        if plain in _RATE_NAMES and SLOWEST_HZ <= value <= FASTEST_HZ:
+        if plain in lexicon().scalars.rate and SLOWEST_HZ <= value <= FASTEST_HZ:
             return value, f"scalar {name} of the file"
-        if plain in _PERIOD_NAMES and SLOWEST_HZ <= 1.0 / (value or 1e9) <= FASTEST_HZ:
+        if plain in lexicon().scalars.period and SLOWEST_HZ <= 1.0 / (value or 1e9) <= FASTEST_HZ:
             return 1.0 / value, f"scalar {name} of the file, as period in s"
     told = table.constants.get(Constant.RATE)
     return (told.value, f"header of the file: {told.text}") if told and SLOWEST_HZ <= told.value <= FASTEST_HZ else None
 
 
 def _column(table: ForeignTable, labels: dict[str, Label]) -> str | None:
-    """The column named as time; else the first that grows by nearly equal steps."""
+    """Column of stamps: one that is named so, else the first that grows by nearly equal steps; None without one."""
     named = [name for name in table.columns if labels[name].quantity is Quantity.TIME or name in table.dates]
     if named:
         return max(named, key=lambda name: _growing(table.columns[name]))
@@ -101,45 +88,28 @@ def _growing(values: FloatArray) -> float:
 
 def _of_column(table: ForeignTable, column: str, told: Label) -> StampClock:
     stamps = table.columns[column]
-    where = f"{table.path}: {column}"
     bad = np.flatnonzero(~np.isfinite(stamps))
     if bad.size:
         raise InputError(
-            f"{where}: row {bad[0] + 1} of the numbers has no time stamp; correct the row or cut before it"
-        )
-    steps = np.diff(stamps)
-    typical = float(np.median(steps))
-    repeats, back = float(np.mean(steps == 0.0)), float(np.mean(steps < 0.0))
-    if back > 0.0 or stamps[-1] == stamps[0]:
-        _refuse_order(where, stamps, steps)
-    unsure = []
-    gaps = np.any(steps > GAP_STEPS * np.median(steps[steps > 0.0]))
-    if repeats > REPEATS and not gaps:
-        unit = "date" if column in table.dates else _unit(told, float(np.mean(steps)))[0]
-        rate = (stamps.size - 1) / (float(stamps[-1] - stamps[0]) * SECONDS[unit])
-        unsure.append(
-            f"clock: {100 * repeats:.0f} % of the stamps in {column!r} repeat (too few digits); "
-            f"equal steps at {rate:.6g} Hz are taken instead"
-        )
-        return StampClock(
-            np.arange(stamps.size) / rate, None, "s", float(f"{rate:.6g}"), None, f"mean of {column}", tuple(unsure)
-        )
-    if 0.0 < repeats <= REPEATS:
-        row = int(np.flatnonzero(steps == 0.0)[0]) + 2
-        raise InputError(
-            f"{where}: row {row} of the numbers repeats the stamp of the row before; remove the duplicate row"
+            f"{table.path}: {column}: row {bad[0] + 1} of the numbers has no time stamp; correct the row, or cut the "
+            "file before it"
         )
     if column in table.dates:
-        unit = "date"
+        unit, note = "date", ""
     else:
-        unit, note = _unit(told, typical or float(np.mean(steps)))
-        unsure += [note] if note else []
+        steps = np.diff(stamps)
+        forward = steps[steps > 0.0]
+        few_digits = np.mean(steps == 0.0) > REPEATS
+        # without a step forwards there is no clock, which the rows then say
+        step = float(forward.sum() / steps.size if few_digits else np.median(forward)) if forward.size else 1.0
+        unit, note = _unit(told, step)
     how = "by its name" if told.quantity is Quantity.TIME else "grows by equal steps"
-    return StampClock((stamps - stamps[0]) * SECONDS[unit], column, unit, None, None, how, tuple(unsure))
+    time_s = (stamps - stamps[0]) * SECONDS[unit]
+    return StampClock(time_s, column, unit, None, how, (note,) if note else ())
 
 
 def _unit(told: Label, step: float) -> tuple[str, str]:
-    """Unit of the stamps, and a note where it is a guess or contradicts the name."""
+    """Unit of stamps with this step, and a note if it is guessed or if the name says another one."""
     plausible = [
         unit for unit in ("s", "ms", "us", "ns", "d") if SLOWEST_HZ <= 1.0 / (step * SECONDS[unit]) <= FASTEST_HZ
     ]
@@ -155,23 +125,3 @@ def _unit(told: Label, step: float) -> tuple[str, str]:
     if len(plausible) == 1:
         return best, ""
     return best, f"clock: the unit of {told.column!r} is not given; {best} is taken (steps of {step:g} {best})"
-
-
-def _refuse_order(where: str, stamps: FloatArray, steps: FloatArray) -> None:
-    sorted_steps = np.diff(np.sort(stamps))
-    regular = np.mean(np.abs(sorted_steps - np.median(sorted_steps)) < 0.05 * np.median(sorted_steps)) > 0.9
-    row = int(np.flatnonzero(steps < 0.0)[0]) + 2 if (steps < 0.0).any() else 1
-    backward = int(np.sum(steps < 0.0))
-    if not (steps != 0.0).any():
-        raise InputError(
-            f"{where}: the stamps are all {stamps[0]:g}; say the rate of the rows: hil import FILE --rate HZ"
-        )
-    if regular and backward > max(3, stamps.size // 100):
-        raise InputError(
-            f"{where}: the rows are out of order, in {backward} places time runs back; sort the file by "
-            f"{where.rsplit(': ', 1)[-1]}"
-        )
-    raise InputError(
-        f"{where}: time runs back at row {row} of the numbers, from {stamps[row - 2]:g} to {stamps[row - 1]:g}: two "
-        "recordings in one file, or rows out of order; cut the file there, or sort it"
-    )

@@ -1,4 +1,4 @@
-"""Tell a position that is computed, a set-point, from positions that are measured."""
+"""Tell a set-point from measured positions: it is computed, and has no noise but the rounding of its digits."""
 
 from typing import NamedTuple
 
@@ -7,23 +7,23 @@ import numpy as np
 from hil.arrays import FloatArray
 from hil.importing.relations import noise
 from hil.importing.unit_choice import are_counts
-from hil.recording.quantum import count_of
+from hil.recording.quantum import count_of, is_decimal
 
 QUIET = 0.3  # of the noise of the measured positions: a set-point is computed and has none but rounding
 _OF_COUNTS = 0.3  # of the noise that counting gives: less is a step by chance, as of a constant feed
 _OF_DIGITS = 2.0  # times the noise that rounding gives: more is a sensor's
-_DECIMAL = 1e-3  # relative deviation of a step from a power of ten: printed steps have few digits
+_DECIMAL = 1e-3  # relative deviation of a step from a power of ten: noise is in it
 
 
 class Computed(NamedTuple):
-    """The computed position (none or one name), and how it was told."""
+    """Name of the computed position (a list of one, or empty), and the reason."""
 
     names: list[str]
     why: str
 
 
 def computed_one(positions: dict[str, FloatArray], plain: list[str]) -> Computed:
-    """Find the set-point among positions (n,), of which `plain` have names that do not tell.
+    """Find the set-point among positions (n,); `plain` are those whose names say neither set-point nor encoder.
 
     It has clearly less noise than the others, or nothing but the rounding of its digits where the others have the
     counts of encoders. A column with such counts is no set-point.
@@ -42,13 +42,12 @@ def computed_one(positions: dict[str, FloatArray], plain: list[str]) -> Computed
 
 
 def _rounding(values: FloatArray, noise_abs: float) -> str:
-    """Say what the noise of a column is: that of "counts", of decimal "digits", or neither ("")."""
+    """Source of the noise of a column: "counts" of an encoder, rounding to decimal "digits", or neither ("")."""
     if are_counts(values):
         return "counts"
     step = count_of(values)
     if step is None:
         return ""
-    power = np.log10(step)
-    if abs(power - np.round(power)) < _DECIMAL / np.log(10.0):
+    if is_decimal(step, _DECIMAL):
         return "digits" if noise_abs < _OF_DIGITS * step / np.sqrt(12.0) else ""
     return "counts" if noise_abs > _OF_COUNTS * step / np.sqrt(12.0) else ""

@@ -2,11 +2,13 @@
 
 import csv
 import re
+from collections.abc import Collection
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 
 from hil.errors import InputError
+from hil.importing.lexicon import lexicon
 from hil.importing.map_file import CsvOptions
 from hil.importing.units import unit_named
 
@@ -14,7 +16,6 @@ SAMPLE_LINES = 400  # read to find the format: more than any preamble
 _DELIMITERS = (";", "\t", ",", "|", " ")
 _POINT = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 _COMMA = re.compile(r"[+-]?(\d+,?\d*|,\d+)([eE][+-]?\d+)?")
-_WORDS = {"", "nan", "inf", "-inf", "null", "none", "na", "n/a", "-"}  # stand for a missing number
 _COMMENT = re.compile(r"^\s*(#|%|//)+\s?")
 _UNIT = re.compile(r"[\[(]?\s*[a-zA-Zµμ°%‰Ω·/^*\d. _-]{0,14}\s*[\])]?")
 
@@ -33,16 +34,17 @@ def find_dialect(path: Path) -> CsvDialect:
     """Find the dialect of `path`. Raises InputError: empty, no text, or no rows of numbers."""
     lines, encoding = _sample(path)
     delimiter, point, width, first = _layout(path, lines)
-    told = tuple(lines[:first])
     above = [index for index in range(first) if lines[index].strip()]
     given: dict[str, object] = {"delimiter": delimiter, "decimal_point": point, "encoding": encoding}
-    paired = _paired_names(lines[:first], delimiter, width)
-    if paired:
+    channels = _second_fields(lines[:first], delimiter, width, lexicon().name_line)
+    if channels:  # a column of time beside each channel
+        names = tuple(name for index, channel in enumerate(channels, 1) for name in (f"time{index}", channel))
         # lines such as "SampleTime;1;SampleTime;1" are half numbers
         first = next(i for i in range(first, len(lines)) if _starts_with_number(lines[i], delimiter, point))
-        given |= {"skip_lines": first, "column_names": paired}
-        units = _paired_units(lines[:first], delimiter, width)
-        return CsvDialect(CsvOptions.model_validate(given), paired, units, tuple(lines[:first]))
+        given |= {"skip_lines": first, "column_names": names}
+        of_channels = _second_fields(lines[:first], delimiter, width, lexicon().unit_line) or [""] * len(channels)
+        units = tuple(text for unit in of_channels for text in ("", unit))
+        return CsvDialect(CsvOptions.model_validate(given), names, units, tuple(lines[:first]))
     unit_row: tuple[str, ...] = ()
     header = None
     for index in reversed(above[-4:]):
@@ -69,7 +71,7 @@ def find_dialect(path: Path) -> CsvDialect:
     repeated = [name for name in dict.fromkeys(names) if names.count(name) > 1 and name.strip()]
     if repeated:
         raise InputError(f"{path}: {repeated[0]!r} names two columns of the header, allowed one; rename or remove one")
-    return CsvDialect(CsvOptions.model_validate(given), names, unit_row or ("",) * width, told)
+    return CsvDialect(CsvOptions.model_validate(given), names, unit_row or ("",) * width, tuple(lines[:first]))
 
 
 def _starts_with_number(line: str, delimiter: str, point: str) -> bool:
@@ -77,36 +79,21 @@ def _starts_with_number(line: str, delimiter: str, point: str) -> bool:
     return bool(fields and fields[0] and _is_number(fields[0], point))
 
 
-def _paired_names(above: list[str], delimiter: str, width: int) -> tuple[str, ...]:
-    """Names of a file with a column of time beside each channel: "Name;Position;Name;Torque"; empty for others."""
+def _second_fields(above: list[str], delimiter: str, width: int, words: Collection[str]) -> list[str]:
+    """Every second field of the line whose other fields are `words`: "Name;Position;Name;Torque"; empty without one."""
     for line in above:
         fields = _fields(line, delimiter)
-        if len(fields) == width > 2 and width % 2 == 0 and {one.lower() for one in fields[::2]} == {"name"}:
-            return tuple(name for index, channel in enumerate(fields[1::2], 1) for name in (f"time{index}", channel))
-    return ()
+        if len(fields) == width > 2 and width % 2 == 0 and {one.lower() for one in fields[::2]} <= set(words):
+            return fields[1::2]
+    return []
 
 
-def _paired_units(above: list[str], delimiter: str, width: int) -> tuple[str, ...]:
-    """Units of such a file, from a line "Unit;mm;Unit;N m"; empty for each column without one."""
-    for line in above:
-        fields = _fields(line, delimiter)
-        if len(fields) == width and {one.lower() for one in fields[::2]} <= {"unit", "units", "einheit"}:
-            return tuple(text for unit in fields[1::2] for text in ("", unit))
-    return ("",) * width
-
-
-def number_of(text: str, decimal_point: str) -> float:
-    """Number of a field, NaN where it is none."""
+def number_of(text: str, decimal_point: str) -> float | None:
+    """Number of a field, NaN where it is empty or stands for a missing number; None for other text."""
     text = text.strip()
-    if not (_COMMA if decimal_point == "," else _POINT).fullmatch(text):
-        return float("nan")
-    return float(text.replace(",", "."))
-
-
-def is_missing(text: str) -> bool:
-    """True for an empty field or a word for a missing number; not for infinity."""
-    word = text.strip().lower()
-    return word in _WORDS and "inf" not in word
+    if (_COMMA if decimal_point == "," else _POINT).fullmatch(text):
+        return float(text.replace(",", "."))
+    return float("nan") if text.lower() in ("", *lexicon().missing) else None
 
 
 def _sample(path: Path) -> tuple[list[str], str]:
@@ -150,8 +137,7 @@ def _layout(path: Path, lines: list[str]) -> tuple[str, str, int, int]:
     if best is None or best[0] < 0.3:
         raise InputError(
             f"{path}: has no rows of numbers in two columns or more; give a text file with a header and rows of "
-            "numbers "
-            "separated by comma, semicolon, tab or blank"
+            "numbers separated by comma, semicolon, tab or blank"
         )
     _, _, delimiter, point, width = best
     # an export with quoted decimal commas between commas
@@ -180,7 +166,7 @@ def _fields(line: str, delimiter: str, strip: bool = True) -> list[str]:
 
 
 def _is_number(field: str, point: str) -> bool:
-    return bool((_COMMA if point == "," else _POINT).fullmatch(field)) or field.lower() in _WORDS
+    return number_of(field, point) is not None or field.lower() in lexicon().infinite
 
 
 def _units(fields: list[str]) -> bool:

@@ -1,5 +1,6 @@
 """Draft the map of a foreign file: its clock, its columns by role, and an entry for each channel."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -7,14 +8,14 @@ import numpy as np
 from hil.importing.channel_entries import ChannelEntries
 from hil.importing.clock import find_clock
 from hil.importing.column_names import label
-from hil.importing.complete_rows import complete_rows
-from hil.importing.even_rows import even_rows, filled_in, find_wraps, with_rate, without_duplicates
+from hil.importing.damage import jump_notes, limit_notes, refuse_damage, refuse_missing
 from hil.importing.foreign_table import read_table
 from hil.importing.held_samples import rows_per_slowest_sample
+from hil.importing.lexicon import Quantity
 from hil.importing.map_draft import MapDraft
-from hil.importing.oddities import jumps_told, limit_told, refuse_damage, refuse_missing
 from hil.importing.roles import find_roles
-from hil.importing.wraps import unwrapped
+from hil.importing.rows import at_regular_times, complete_rows, filled_in, without_duplicates
+from hil.importing.wraps import unwrapped, wrap_range
 
 
 def draft_map(path: Path, rate_hz: float | None = None, axis: str | None = None) -> MapDraft:
@@ -22,38 +23,46 @@ def draft_map(path: Path, rate_hz: float | None = None, axis: str | None = None)
 
     Raises InputError: a damaged file, no clock, no motion, no column that goes with it, contradicting columns.
     """
-    table, doubled = without_duplicates(read_table(path))
+    table = read_table(path)
+    distinct = without_duplicates(table.columns)
+    table = replace(table, columns=distinct.columns)
     labels = {name: label(name, table.units.get(name, "")) for name in table.columns}
     clock = find_clock(table, labels, rate_hz)
     columns = {name: values for name, values in table.columns.items() if name != clock.column}
-    wraps = find_wraps(columns, labels)
+    may_wrap = [name for name in columns if labels[name].quantity in (Quantity.POSITION, Quantity.UNKNOWN)]
+    wraps = {name: size for name in may_wrap if (size := wrap_range(columns[name])) is not None}
     columns |= {name: unwrapped(columns[name], size) for name, size in wraps.items()}
     filled = {n: filled_in(values, clock.time_s) for n, values in columns.items() if np.isfinite(values).any()}
-    live = even_rows(path, filled, clock.time_s)
-    roles = find_roles(str(path), live.columns, labels, live.period_s, axis)
+    regular = at_regular_times(path, filled, clock.time_s)
+    roles = find_roles(str(path), regular.longest_part(), labels, regular.period_s, axis)
     used = {name: columns[name] for name in roles.used}
     refuse_missing(path, used, table.texts)
     # only now it is known which columns must be complete, and which repeat when a sample does
     positions = [name for name in (roles.motor, roles.table) if name]
     ratio = rows_per_slowest_sample({name: filled[name] for name in used}, positions)
     complete = complete_rows(used | {"time_s": clock.time_s}, ratio if ratio > 1.0 else None, positions)
-    kept = {name: values[complete.rows] for name, values in filled.items()}
-    even = even_rows(path, kept, complete.columns["time_s"], judged_by=[n for n in used if n != roles.unfollowed])
-    jumps = [note for n in positions for note in jumps_told(n, kept[n], complete.columns["time_s"])]
+    kept, kept_s = {name: values[complete.rows] for name, values in filled.items()}, complete.columns["time_s"]
+    regular = at_regular_times(path, kept, kept_s, judged_by=[n for n in used if n != roles.unfollowed])
+    live = regular.longest_part()
+    refuse_damage(path, {name: filled[name] for name in used}, clock.time_s, live, roles, regular.period_s)
     measured = [name for name in (roles.effort, roles.effort_command) if name and not labels[name].command]
-    limits = [note for name in measured for note in limit_told(name, kept[name])]
-    refuse_damage(path, {name: filled[name] for name in used}, clock.time_s, even.columns, roles, even.period_s)
-    clock = with_rate(clock, even)
-    unwraps = [f"{name}: wraps at {wraps[name]:g}; it is unwrapped" for name in used if name in wraps]
-    notes = [*doubled, *clock.unsure, *complete.notes, *even.notes, *jumps, *limits, *unwraps]
-    draft = MapDraft(table, clock, unsure=[*notes, *roles.unsure], left_out=dict(roles.left_out))
-    draft.left_out |= dict(remark.split(": ", 1) for remark in table.remarks)
-    draft.unsure += [
-        f"{one.column}: its unit is not known" for one in labels.values() if one.odd_unit and one.column in used
-    ]
-    ChannelEntries(draft, labels, roles, even.columns, even.period_s).fill()
-    draft.missing = any(np.isnan(values).any() for values in used.values())
-    draft.rows_per_sample = ratio if ratio > 1.0 else None
+    draft = MapDraft(
+        table,
+        clock,
+        resample_hz=regular.rate_hz,
+        rows_per_sample=ratio if ratio > 1.0 else None,
+        missing=any(np.isnan(values).any() for values in used.values()),
+        left_out=roles.left_out | dict(remark.split(": ", 1) for remark in table.remarks),
+        unsure=[
+            *(*distinct.notes, *clock.unsure, *complete.notes, *regular.notes),
+            *(note for name in positions for note in jump_notes(name, kept[name], kept_s)),
+            *(note for name in measured for note in limit_notes(name, kept[name])),
+            *(f"{name}: wraps at {wraps[name]:g}; it is unwrapped" for name in used if name in wraps),
+            *roles.unsure,
+            *(f"{name}: its unit is not known" for name, one in labels.items() if one.odd_unit and name in used),
+        ],
+    )
+    ChannelEntries(draft, labels, roles, live, regular.period_s).fill()
     for entry in (one.entry for one in draft.channels if one.entry["column"] in wraps):
         entry["wraps_at"] = wraps[str(entry["column"])]
     return draft

@@ -30,7 +30,7 @@ class CountSize:
 
 
 def from_speed(per_unit: float, unit: str) -> CountSize:
-    """Size from counts per second = `per_unit` x a speed in `unit`."""
+    """Size of a count, for counts per second = `per_unit` x a speed in `unit`."""
     si, factor = UNITS[unit]
     per_si = abs(per_unit) / factor
     if si == "m/s":
@@ -41,7 +41,7 @@ def from_speed(per_unit: float, unit: str) -> CountSize:
 
 
 def from_length(column: str, per_unit: float, unit: str, length: str, force: bool) -> CountSize:
-    """Size from counts = `per_unit` x the length `length` in `unit`; `force`: the motor is linear."""
+    """Size of a count, for counts = `per_unit` x the column `length` in `unit`; `force`: the motor is linear."""
     per_m = abs(per_unit) / UNITS[unit][1]
     fits = [(counts, lead) for lead in LEADS_M for counts in COUNTS if abs(counts / (lead * per_m) - 1.0) < _USUAL]
     if force or not fits:
@@ -55,7 +55,7 @@ def from_length(column: str, per_unit: float, unit: str, length: str, force: boo
 
 
 def assumed(column: str) -> CountSize:
-    """A count of a micrometre, so that the shape of the motion can be judged."""
+    """Count of a micrometre, where nothing gives its size: lengths and masses are then in multiples of it."""
     note = (
         f"{column}: is in counts, and no other column tells their size; 1 um per count is taken: lengths, speeds, "
         "masses and stiffness are in multiples of it, and nothing is told per revolution. In the map correct "

@@ -17,12 +17,13 @@ from hil.arrays import FloatArray
 from hil.errors import InputError
 from hil.files import json_columns
 from hil.files.date_stamps import is_date, seconds_of
-from hil.files.input_file import check_file
-from hil.importing.csv_dialect import find_dialect, is_missing, number_of
-from hil.importing.foreign_files import ENDINGS, TEXT_ENDINGS, load_mat, parquet_dates
-from hil.importing.header_values import Constant, HeaderValue, header_values
+from hil.importing.csv_dialect import find_dialect, number_of
+from hil.importing.foreign_columns import check_foreign, format_of, parquet_dates
+from hil.importing.header_values import HeaderValue, header_values
+from hil.importing.lexicon import Constant
 from hil.importing.map_file import CsvOptions
-from hil.recording.arrow_files import MOST_BYTES, numbers, read_parquet, stored_unit
+from hil.importing.mat_file import load_mat
+from hil.recording.arrow_files import numbers, read_parquet, stored_unit
 
 MOST_ROWS = 200_000  # read of a text file for the draft: minutes of a recording
 WIDEST = 64  # columns of a matrix in a .mat file: a wider one is no table of channels
@@ -39,8 +40,8 @@ class ForeignTable:
     path: Path
     columns: dict[str, FloatArray]
     units: dict[str, str]
-    scalars: dict[str, float]
-    csv: CsvOptions
+    scalars: dict[str, float] = field(default_factory=dict)
+    csv: CsvOptions = field(default_factory=CsvOptions)
     constants: dict[Constant, HeaderValue] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
     dates: frozenset[str] = frozenset()
@@ -49,23 +50,16 @@ class ForeignTable:
 
 def read_table(path: Path) -> ForeignTable:
     """Read `path`. Raises InputError: no such file, empty, damaged, binary, another format, no columns of numbers."""
-    check_file(path, f"the path of a recording: {ENDINGS}", MOST_BYTES)
+    check_foreign(path)
     if path.stat().st_size == 0:
         raise InputError(f"{path}: the file is empty; give a file with rows of numbers")
-    ending = path.suffix.lower()
-    readers = {".mat": _mat, ".parquet": _parquet, ".json": _json} | dict.fromkeys(TEXT_ENDINGS, _text)
-    if ending not in readers:
-        raise InputError(
-            f"{path}: the ending {path.suffix!r} cannot be imported, allowed {ENDINGS}; "
-            "export the recording to one of them"
-        )
-    table = readers[ending](path)
+    readers = {".csv": _text, ".mat": _mat, ".parquet": _parquet, ".json": _json}
+    table = _equal_length(readers[format_of(path)](path))
     rows = max((values.size for values in table.columns.values()), default=0)
     if len(table.columns) < 2 or rows < 3:
         raise InputError(
-            f"{path}: given {len(table.columns)} columns of numbers with {rows} rows, allowed two columns and "
-            "three rows "
-            "or more; give a file with the channels of a motion"
+            f"{path}: given {len(table.columns)} columns of numbers with {rows} rows, allowed two columns and three "
+            "rows or more; give a file with the channels of a motion"
         )
     return table
 
@@ -92,12 +86,12 @@ def _text(path: Path) -> ForeignTable:
     dates, texts = set[str](), dict[str, str]()
     for index, name in enumerate(dialect.names):
         fields = [row[index] if index < len(row) else "" for row in rows]
-        values = np.array([number_of(field, options.decimal_point) for field in fields])
+        given = [number_of(field, options.decimal_point) for field in fields]
+        values = np.array(given, dtype=np.float64)  # NaN for text
         if np.isfinite(values).mean() > 0.01:
             columns[name] = values
-            text = next((f for f, bad in zip(fields, np.isnan(values), strict=True) if bad and not is_missing(f)), None)
-            if text is not None:
-                texts[name] = text
+            if None in given:
+                texts[name] = fields[given.index(None)]
         elif fields and is_date(fields[0]):
             columns[name] = seconds_of(fields)
             dates.add(name)
@@ -125,13 +119,10 @@ def _mat(path: Path) -> ForeignTable:
     remarks = [f"{name}: neither a number, a vector nor a matrix with a column per channel" for name in others]
     if not columns:
         raise InputError(
-            f"{path}: holds no vector of numbers (there are {', '.join(others) or 'no variables'}), allowed a "
-            "vector per "
-            "channel or a matrix with a column per channel; save the vectors themselves, not a structure"
+            f"{path}: holds no vector of numbers (there are {', '.join(others) or 'no variables'}), allowed a vector "
+            "per channel or a matrix with a column per channel; save the vectors themselves, not a structure"
         )
-    return _equal_length(
-        ForeignTable(path, columns, {}, scalars, CsvOptions(), header_values((), scalars), tuple(remarks))
-    )
+    return ForeignTable(path, columns, {}, scalars, constants=header_values((), scalars), remarks=tuple(remarks))
 
 
 def _parquet(path: Path) -> ForeignTable:
@@ -149,7 +140,7 @@ def _parquet(path: Path) -> ForeignTable:
             dates.add(one.name)
         else:
             remarks.append(f"{one.name}: {one.type} values, no numbers; convert the column to use it")
-    return ForeignTable(path, columns, units, {}, CsvOptions(), {}, tuple(remarks), frozenset(dates))
+    return ForeignTable(path, columns, units, remarks=tuple(remarks), dates=frozenset(dates))
 
 
 def _json(path: Path) -> ForeignTable:
@@ -163,21 +154,23 @@ def _json(path: Path) -> ForeignTable:
             columns[name] = seconds_of(values)
             dates.add(name)
         else:
-            remarks.append(
-                f"{name}: values such as {next(v for v in values if isinstance(v, str | bool | list | dict))!r}, "
-                "no numbers"
-            )
+            other = next(value for value in values if isinstance(value, str | bool | list | dict))
+            remarks.append(f"{name}: values such as {other!r}, no numbers")
     constants = header_values((), content.scalars)
-    return _equal_length(
-        ForeignTable(
-            path, columns, content.units, content.scalars, CsvOptions(), constants, tuple(remarks), frozenset(dates)
-        )
+    return ForeignTable(
+        path,
+        columns,
+        content.units,
+        content.scalars,
+        constants=constants,
+        remarks=tuple(remarks),
+        dates=frozenset(dates),
     )
 
 
 def _equal_length(table: ForeignTable) -> ForeignTable:
     """Keep the columns of the length that most have."""
-    if not table.columns:
+    if len({values.size for values in table.columns.values()}) < 2:
         return table
     lengths = Counter(values.size for values in table.columns.values() if values.size > 2)
     rows = max(lengths, key=lambda size: (lengths[size], size), default=0)

@@ -1,26 +1,15 @@
 """Constants that a file gives beside its columns: in lines above the numbers, or as scalars with a name.
 
 A line is "words [: = ; ,] number [unit]", as loggers and drives write it; a scalar has its unit in its name. The words
-are English, German, French, Italian and Spanish. They are compared without accents.
+are those of `lexicon.yaml`, compared without accents.
 """
 
 import re
 import unicodedata
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from enum import StrEnum
 
-
-class Constant(StrEnum):
-    """A constant, with its SI unit."""
-
-    RATE = "sampling rate in Hz"
-    TORQUE = "torque constant in N m/A"
-    FORCE = "force constant in N/A"
-    LEAD = "lead in m"
-    COUNTS = "counts per revolution"
-    RATED_TORQUE = "rated torque in N m"
-    RATED_FORCE = "rated force in N"
+from hil.importing.lexicon import Constant, ConstantWords, lexicon
 
 
 @dataclass(frozen=True)
@@ -31,44 +20,6 @@ class HeaderValue:
     text: str
 
 
-# words of a constant; a rate may end a longer text ("recorded with a sampling rate of 1 kHz")
-_WORDS = {
-    Constant.RATE: r"(.* )?(sampl\w* ?(rate|frequency|freq)|abtast ?(rate|frequenz)|(frequence|cadence|taux) "
-    r"d ?echantillonnage|(frecuencia|tasa|velocidad) de muestreo|(frequenza|velocita) di campionamento)( of| von)?",
-    Constant.TORQUE: r"(motor )?(torque|motor) ?constant|drehmoment ?konstante|constante de (couple|par)"
-    r"|costante di coppia",
-    Constant.FORCE: r"(motor )?force ?constant|kraft ?konstante|constante de (force|fuerza)|costante di forza",
-    Constant.LEAD: r"((ball ?)?screw |spindle )?lead|screw pitch|(spindel|gewinde)? ?steigung|pas de( la)? vis"
-    r"|passo( della)? vite|paso( del)? husillo",
-    Constant.COUNTS: r"(encoder )?(counts|increments|pulses) per rev\w*|cpr|(inkremente|impulse) (pro|je) umdrehung"
-    r"|(points|increments|impulsions) par tour|impulsi (per|al) giro|(pulsos|cuentas) por (vuelta|revolucion)",
-    Constant.RATED_TORQUE: r"(motor )?(rated|nominal) torque|nenn(dreh)?moment|couple nominal|par nominal"
-    r"|coppia nominale",
-    Constant.RATED_FORCE: r"(motor )?(rated|nominal) force|nennkraft|force nominale|fuerza nominal|forza nominale",
-}
-_PERIOD = (
-    r"(.* )?(sampl\w* ?(time|period|interval)|abtast ?(zeit|periode|intervall)|(periode|pas|temps) d ?echantillonnage"
-    r"|(periodo|tiempo|intervalo) de muestreo|(periodo|tempo|intervallo) di campionamento)( of| von)?"
-)
-# factor of a unit, in lower case without blanks and signs between, to the SI unit of the constant
-_UNITS = {
-    Constant.RATE: {"hz": 1.0, "khz": 1e3, "1/s": 1.0, "s/s": 1.0, "sps": 1.0},
-    Constant.TORQUE: {
-        "nm/a": 1.0,
-        "mnm/a": 1e-3,
-        "ncm/a": 1e-2,
-        "nma": 1.0,
-        "mnma": 1e-3,
-        "nmpera": 1.0,
-        "mnmpera": 1e-3,
-    },
-    Constant.FORCE: {"n/a": 1.0, "na": 1.0, "npera": 1.0},
-    Constant.LEAD: {"mm": 1e-3, "m": 1.0, "um": 1e-6, "in": 0.0254, "mm/rev": 1e-3, "mm/u": 1e-3, "mm/tr": 1e-3},
-    Constant.COUNTS: {"": 1.0, "counts": 1.0, "inc": 1.0, "1/rev": 1.0, "counts/rev": 1.0},
-    Constant.RATED_TORQUE: {"nm": 1.0, "mnm": 1e-3, "ncm": 1e-2},
-    Constant.RATED_FORCE: {"n": 1.0, "kn": 1e3},
-}
-_SECONDS = {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6}
 _LINE = re.compile(r"^(?P<name>\D*?)[\s:=;,|\t]*(?P<number>[+-]?\d[\d.,]*(e[+-]?\d+)?)(?P<rest>.*)$")
 _BRACKET = re.compile(r"[\[({](.*?)[\])}][\s:=;,|]*$")
 _SIGNS = re.compile(r"[\s·*.]+")  # between the parts of a unit
@@ -109,18 +60,22 @@ def _readings(match: re.Match[str]) -> tuple[str, float | None, list[str]]:
 def _constant(name: str, value: float | None, unit: str) -> tuple[Constant, float] | None:
     if value is None or value <= 0.0:
         return None
-    if re.fullmatch(f"({_PERIOD})", name) and unit in _SECONDS:
-        return Constant.RATE, 1.0 / (value * _SECONDS[unit])
-    for one, words in _WORDS.items():
-        if re.fullmatch(f"({words})", name) and unit in _UNITS[one]:
-            return one, value * _UNITS[one][unit]
+    for constant, known in lexicon().constants.items():
+        if unit in known.units and re.fullmatch(_pattern(known), name):
+            si = value * known.units[unit]
+            return (Constant.RATE, 1.0 / si) if constant is Constant.PERIOD else (constant, si)
     return None
+
+
+def _pattern(known: ConstantWords) -> str:
+    words = f"({known.words})"
+    return f"(.* )?{words}( ({'|'.join(lexicon().joints)}))?" if known.ends_a_text else words
 
 
 def _unit_of_name(name: str) -> tuple[str, str]:
     """Words and unit of the name of a scalar: torque_constant_nm_a -> torque_constant, nma."""
     tokens = _plain(re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name)).split()
-    units = {unit for known in (*_UNITS.values(), _SECONDS) for unit in known if unit}
+    units = {unit for known in lexicon().constants.values() for unit in known.units if unit}
     for take in (4, 3, 2, 1):
         unit = "".join(tokens[-take:])
         if len(tokens) > take and unit in units:

@@ -76,7 +76,7 @@ def kept_rows(columns: Mapping[str, FloatArray], ratio: float) -> NDArray[np.int
 
 
 def _phase(columns: Mapping[str, FloatArray], ratio: int, least: int = 1) -> int | None:
-    """First of every `ratio` rows at which nearly all new samples of a motion stand.
+    """Phase (0 to `ratio` - 1) of the rows with new samples: row modulo `ratio`, equal for nearly all of a motion.
 
     None if they are spread over other rows, too, or fewer than `least`.
     """
@@ -106,7 +106,7 @@ def lost_samples(columns: Mapping[str, FloatArray]) -> NDArray[np.bool_]:
 def _caught_up(
     columns: Mapping[str, FloatArray], rows: NDArray[np.intp], same: NDArray[np.bool_]
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Tell for each of the rows (k,) whether the next row catches up, and whether the rows around it can tell that.
+    """For each of the rows (k,): does the next row catch up, and can the rows around it tell that.
 
     The next row catches up if a column moves by equal steps around the row and by two of them in the step after it.
     Steps to and from other rows that repeat (`same`) do not count; at least `_REACH` others are needed.

@@ -6,7 +6,7 @@ import re
 from hil.channels import CHANNELS
 from hil.importing.map_draft import MapDraft
 
-_PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_\[\]]*")
+_PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _RESERVED = {"true", "false", "null", "yes", "no", "on", "off"}
 _KEYS = """\
 # Each channel: value [SI] = sign x scale x factor(unit) x column + offset. Keys of a channel:
@@ -23,30 +23,28 @@ _KEYS = """\
 
 def map_text(draft: MapDraft) -> str:
     """The map as text of a YAML file."""
-    content, clock = draft.content(), draft.clock
-    lines = [f"# Map of {draft.table.path.name}, drafted by hil import. Correct it and import again with --map."]
+    clock, name = draft.clock, draft.table.path.name
+    lines = [f"# Map of {name}, drafted by hil import. Correct it and import again with --map."]
     if draft.unsure:
         lines += ["# Please check:", *(f"#   - {note}" for note in draft.unsure)]
-    lines += [f"about: {_scalar(content['about'])}"]
+    lines += [f"about: {_value(f'{name}, map drafted from the file itself')}"]
     if clock.column is not None:
-        lines += [f"time:                     # {clock.how}", f"  column: {_scalar(clock.column)}"]
+        lines += [f"time:                     # {clock.how}", f"  column: {_value(clock.column)}"]
         lines += [f"  unit: {clock.unit}                 # s, ms, us, ns, min, d (days), date (text)"]
     else:
         lines += [f"sample_rate_hz: {clock.rate_hz!r}   # instead of time stamps; {clock.how}"]
-    if clock.resample_hz is not None:
-        lines += [f"resample_hz: {clock.resample_hz!r}   # for rows that are missing or taken at uneven moments"]
+    if draft.resample_hz is not None:
+        lines += [f"resample_hz: {draft.resample_hz!r}   # for rows that are missing or taken at uneven moments"]
     if draft.rows_per_sample is not None:
         lines += [f"rows_per_sample: {draft.rows_per_sample!r}   # each sample stands in so many rows and is kept once"]
     if draft.missing:
         lines += ["missing: leave_out          # rows without a value; refuse: do not import such a file"]
-    options = content.get("csv")
-    if isinstance(options, dict):
-        lines += ["csv:                      # how the text file is written"]
-        lines += [f"  {key}: {_value(value)}" for key, value in options.items()]
+    options = draft.table.csv.model_dump(exclude_defaults=True)
+    lines += ["csv:                      # how the text file is written"] if options else []
+    lines += [f"  {key}: {_value(value)}" for key, value in options.items()]
     if draft.lead_m is not None:
         lines += [f"lead_m: {draft.lead_m!r}   # m per revolution of the motor; {draft.lead_how}"]
-    lines += _KEYS.rstrip().splitlines()
-    lines += ["channels:"]
+    lines += [*_KEYS.rstrip().splitlines(), "channels:"]
     for one in draft.channels:
         lines += [f"  {one.channel}:   # {CHANNELS[one.channel].meaning} [{CHANNELS[one.channel].unit}]; {one.how}"]
         lines += [f"    {key}: {_value(value)}" for key, value in one.entry.items()]
@@ -56,15 +54,9 @@ def map_text(draft: MapDraft) -> str:
 
 
 def _value(value: object) -> str:
-    if isinstance(value, list):
-        return "[" + ", ".join(_scalar(item) for item in value) + "]"
-    return _scalar(value) if isinstance(value, str) else repr(value)
-
-
-def _scalar(value: object) -> str:
-    text = str(value)
-    return (
-        text
-        if _PLAIN.fullmatch(text) and text.lower() not in _RESERVED and "[" not in text
-        else json.dumps(text, ensure_ascii=False)
-    )
+    if isinstance(value, tuple):
+        return "[" + ", ".join(_value(item) for item in value) + "]"
+    if not isinstance(value, str):
+        return repr(value)
+    plain = _PLAIN.fullmatch(value) and value.lower() not in _RESERVED
+    return value if plain else json.dumps(value, ensure_ascii=False)

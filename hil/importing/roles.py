@@ -1,4 +1,4 @@
-"""Decide which column is which channel, from names first and from the relations of the data where names do not say."""
+"""Assign columns to roles (motor, table, set-points, torque): by their names, else by relations between the columns."""
 
 from dataclasses import dataclass, field, replace
 
@@ -6,8 +6,9 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.errors import InputError
-from hil.importing.column_names import Label, Quantity
+from hil.importing.column_names import Label
 from hil.importing.computed_position import computed_one
+from hil.importing.lexicon import Quantity
 from hil.importing.relations import (
     MotionColumns,
     derivative_of,
@@ -74,23 +75,19 @@ def find_roles(
     moved = motion(live[roles.motor], period_s) if roles.motor else None
     _velocities(where, live, labels, of[Quantity.VELOCITY], moved, period_s, roles)
     _efforts(live, labels, of[Quantity.EFFORT], roles)
-    _refuse_frozen(where, frozen, columns, roles)
-    return roles
-
-
-def _refuse_frozen(where: str, frozen: list[str], columns: dict[str, FloatArray], roles: Roles) -> None:
     if roles.motor is None and roles.motor_velocity is None:
         told = f"; constant are {', '.join(frozen)}" if frozen else ""
         raise InputError(
             f"{where}: no column is the measured position of the axis (columns: {', '.join(columns)}{told}); "
             "record it, or write its column into a map: hil import FILE --map MAP.yaml"
         )
+    return roles
 
 
 def _of_one_axis(
     where: str, labels: dict[str, Label], columns: dict[str, FloatArray], roles: Roles, axis: str | None
 ) -> dict[str, Label]:
-    """Leave out the columns of other axes: numbers in the names count axes if more than one has position and effort."""
+    """Leave out columns of other axes. Numbers in names count axes if two or more of them have position and effort."""
     numbers = sorted({one.number for one in labels.values() if one.number})
     both = [
         number
@@ -122,7 +119,7 @@ def _of_one_axis(
 def _with_quantities(
     live: dict[str, FloatArray], labels: dict[str, Label], period_s: float, roles: Roles
 ) -> dict[str, Label]:
-    """Give the columns whose names say nothing a quantity by their relations to a position."""
+    """Quantities of columns whose names give none, from their relations to a position."""
     told, labels = labels, dict(labels)
     for name in live:  # a letter is a name by chance: the data say more, where they say something
         if told[name].letter and told[name].unit is None:
@@ -157,11 +154,8 @@ def _with_quantities(
         elif any(_accelerates(live[name], one, period_s) for one in moved.values()):
             become(name, Quantity.ACCELERATION, f"an acceleration: the second derivative of {positions[0]}")
         elif max(driven(live[name], one, period_s).share for one in moved.values()) > IS_DRIVEN:
-            become(
-                name,
-                Quantity.EFFORT,
-                f"torque, force, current or voltage: inertia and friction of {positions[0]} explain it",
-            )
+            effort = "torque, force, current or voltage"
+            become(name, Quantity.EFFORT, f"{effort}: inertia and friction of {positions[0]} explain it")
         elif told[name].quantity is not Quantity.UNKNOWN:
             labels[name] = told[name]
         else:
@@ -170,7 +164,7 @@ def _with_quantities(
 
 
 def _as_position(name: str, live: dict[str, FloatArray], period_s: float) -> float:
-    """Sum over the other columns of what they have to do with `name` as a position."""
+    """Sum of the shares of the other columns that the derivatives of `name`, as a position, explain."""
     moved = motion(live[name], period_s)
     total = 0.0
     for other, values in live.items():
@@ -188,12 +182,10 @@ def _positions(live: dict[str, FloatArray], labels: dict[str, Label], names: lis
     """Tell set-point, motor and second encoder."""
     names = list(names)
     for name in names[1:]:
-        first = next((one for one in names[: names.index(name)] if _copies(live[one], live[name])), None)
-        if first is not None and (labels[name].command, labels[name].table) == (
-            labels[first].command,
-            labels[first].table,
-        ):
-            roles.left_out[name] = f"a copy of {first}"
+        alike = [one for one in names[: names.index(name)] if _copies(live[one], live[name])]
+        label, first = labels[name], labels[alike[0]] if alike else None
+        if first is not None and (label.command, label.table) == (first.command, first.table):
+            roles.left_out[name] = f"a copy of {alike[0]}"
             names.remove(name)
     commands = [name for name in names if labels[name].command]
     measured = [name for name in names if name not in commands]
@@ -255,6 +247,7 @@ def _velocities(
         return
     for name in measured:
         share = derivative_of(live[name], moved, period_s).share
+        roles.left_out[name] = "velocity of the motion, follows from the position"
         if share < 0.5:
             inverse = derivative_of(live[roles.motor], motion(live[name], period_s), period_s).share
             if inverse > IS_DERIVATIVE:
@@ -270,9 +263,6 @@ def _velocities(
             roles.unsure.append(
                 f"{name}: is the derivative of {roles.motor} only in part (share {share:.2f}): filtered or late"
             )
-            roles.left_out[name] = "velocity of the motion, follows from the position"
-        else:
-            roles.left_out[name] = "velocity of the motion, follows from the position"
 
 
 def _efforts(live: dict[str, FloatArray], labels: dict[str, Label], names: list[str], roles: Roles) -> None:

@@ -1,4 +1,4 @@
-"""Find single values of a position that its axis cannot have reached: read wrongly, or disturbed on the way."""
+"""Find spikes: single values of a position that the axis cannot have reached, from a wrong reading or a disturbance."""
 
 import numpy as np
 from numpy.typing import NDArray

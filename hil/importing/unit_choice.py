@@ -8,6 +8,7 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.importing.column_names import Label
+from hil.importing.lexicon import lexicon
 from hil.quantities import UNITS
 
 MATCH = 0.02  # relative deviation of a factor between two columns from that of two units: above following errors
@@ -20,8 +21,6 @@ _LONGEST_M, _MOST_RAD = 5.0, 13.0
 _WHOLE = 1e-5  # relative deviation from whole quarters of a turn: that of six digits
 _LEAST_COUNTS = 200.0  # travel in whole numbers from which they are counts of an encoder
 _COORDINATE = r"q(pos)?\d*([_ ].*)?"  # joint angle, as robotics writes it: q, q1, q_ref
-_ANGLE = "angle|winkel|theta|phi|rot|joint|gelenk"
-_LENGTH = "weg|hub|stroke|course|displ|linear"
 _JOINT_STATE = r"(^|[^a-z])effort(\W|\d|$)"  # effort, effort[0], .effort0, effort.elbow
 
 
@@ -34,6 +33,7 @@ class UnitChoice:
 
 
 def is_length(unit: str) -> bool:
+    """True for a unit of length or of linear speed."""
     return UNITS.get(unit, ("", 1.0))[0] in ("m", "m/s")
 
 
@@ -48,13 +48,15 @@ def gives_force(effort: Label | None) -> bool:
 
 
 def prefers_length(positions: list[str], effort: Label | None) -> bool | None:
-    """True or False if names of the positions or the unit of the effort tell a length or an angle, else None."""
+    """True for a length, False for an angle, by the names of the positions or the unit of the effort; else None."""
     words = " ".join(positions).lower()
     if gives_force(effort):
         return True
-    if any(re.fullmatch(_COORDINATE, name.lower()) for name in positions) or re.search(_ANGLE, words):
+    if any(re.fullmatch(_COORDINATE, name.lower()) for name in positions) or any(
+        word in words for word in lexicon().angle
+    ):
         return False
-    if re.search(_LENGTH, words):
+    if any(word in words for word in lexicon().length):
         return True
     return False if effort and UNITS.get(effort.unit or "", ("",))[0] == "N m" else None
 

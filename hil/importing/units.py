@@ -1,85 +1,23 @@
 """Spellings of units in files, and the unit that the name of a column holds."""
 
 import re
-import unicodedata
 
+from hil.importing.lexicon import UNITS_BY_CONSTANT, Quantity, lexicon, plain_spelling
 from hil.quantities import UNITS
 
-# spellings in lower case, without blanks, brackets and multiplication signs -> unit of a map
-_SPELLINGS = {
-    "s": "s sec secs second seconds sek sekunde sekunden seconde secondes segundo segundos secondi",
-    "ms": "ms msec millis millisecond milliseconds millisekunden",
-    "us": "us usec µs microseconds mikrosekunden",
-    "ns": "ns nsec nanoseconds",
-    "min": "min minutes minuten",
-    "m": "m meter metre metres meters mètre",
-    "mm": "mm millimeter millimetre",
-    "um": "um µm micron microns mikrometer",
-    "nm": "nanometer nanometre",
-    "in": "inch inches",
-    "ft": "ft foot feet",
-    "rad": "rad radian radians radianes radianti radiant",
-    "mrad": "mrad",
-    "deg": "deg degree degrees ° grad degre degres degré degrés grado grados gradi",
-    "mdeg": "mdeg millideg millidegree millidegrees m° mgrad",
-    "arcmin": "arcmin arcminutes",
-    "arcsec": "arcsec arcseconds",
-    "rev": "rev revs revolutions turn turns tr tours umdr umdrehungen u vueltas giri",
-    "m/s": "m/s mps m_s ms-1 ms^-1",
-    "mm/s": "mm/s mm_s mms-1",
-    "um/s": "um/s µm/s um_s",
-    "m/min": "m/min m_min",
-    "mm/min": "mm/min mm_min",
-    "in/s": "in/s in_s ips inch/s",
-    "in/min": "in/min in_min ipm inch/min",
-    "ft/s": "ft/s ft_s fps",
-    "ft/min": "ft/min ft_min fpm",
-    "rad/s": "rad/s rad_s rads-1 rads^-1",
-    "deg/s": "deg/s °/s deg_s grad/s degre/s degres/s grados/s gradi/s",
-    "rev/s": "rev/s rps u/s tr/s rev_s",
-    "rpm": "rpm u/min 1/min min-1 min^-1 /min tr/min t/min u_min tr_min rev/min",
-    "m/s^2": "m/s^2 m/s2 m/s² m_s2",
-    "mm/s^2": "mm/s^2 mm/s2 mm/s² mm_s2",
-    "rad/s^2": "rad/s^2 rad/s2 rad/s² rad_s2",
-    "deg/s^2": "deg/s^2 deg/s2 °/s² deg_s2",
-    "N m": "nm n_m newtonmeter",
-    "mN m": "mnm mn_m",
-    "N cm": "ncm n_cm",
-    "kN m": "knm kn_m",
-    "N": "n newton",
-    "kN": "kn",
-    "kgf": "kgf kp",
-    "lbf": "lbf lb lbs",
-    "kgf m": "kgfm kgf_m kgf-m kpm",
-    "kgf cm": "kgfcm kgf_cm kgf-cm kpcm",
-    "lbf ft": "lbfft lbf_ft lbf-ft ftlbf ft_lbf ft-lbf lbft lb_ft lb-ft ftlb ft_lb ft-lb ftlbs ft-lbs",
-    "lbf in": "lbfin lbf_in lbf-in inlbf in_lbf in-lbf lbin lb_in lb-in inlb in_lb in-lb inlbs in-lbs",
-    "ozf in": "ozfin ozf_in ozf-in inozf in_ozf in-ozf ozin oz_in oz-in inoz in_oz in-oz",
-    "A": "a amp amps ampere arms a_rms apk aeff a_eff",
-    "mA": "ma",
-    "V": "v volt volts",
-    "mV": "mv",
-    "%": "% percent pct prozent",
-    "permille": "‰ permille promille 0.1%",
-    "counts": "counts count cts cnt cnts inc incs inkr inkremente increments ticks pulses impulse lsb",
+_QUANTITY_OF_SI = {
+    "s": Quantity.TIME,
+    "m": Quantity.POSITION,
+    "rad": Quantity.POSITION,
+    "m/s": Quantity.VELOCITY,
+    "rad/s": Quantity.VELOCITY,
+    "m/s^2": Quantity.ACCELERATION,
+    "rad/s^2": Quantity.ACCELERATION,
 }
-_UNIT_OF = {spelling: unit for unit, spellings in _SPELLINGS.items() for spelling in spellings.split()}
-_KIND = {
-    "s": "time",
-    "m": "position",
-    "rad": "position",
-    "m/s": "velocity",
-    "rad/s": "velocity",
-    "m/s^2": "acceleration",
-    "rad/s^2": "acceleration",
-    "N m": "effort",
-    "N": "effort",
-}
-_ELECTRIC = ("A", "mA", "V", "mV", "%", "permille")
 QUANTITY_OF_UNIT = (
-    {unit: _KIND[si] for unit, (si, _) in UNITS.items() if si in _KIND}
-    | {"counts": "position"}
-    | dict.fromkeys(_ELECTRIC, "effort")
+    {unit: _QUANTITY_OF_SI.get(si, Quantity.EFFORT) for unit, (si, _) in UNITS.items() if si != "1"}
+    | dict.fromkeys(UNITS_BY_CONSTANT, Quantity.EFFORT)
+    | {"counts": Quantity.POSITION}
 )
 # one letter at the end of a name is a unit only after a word: x_m may be in metres, q_m of the motor
 _BRACKETS = re.compile(r"[\[(<{]\s*([^\])>}]*)\s*[\])>}]\s*$")
@@ -90,12 +28,11 @@ _WORD_IN = re.compile(r"\bin\s+(\S+)\s*$")  # Weg in mm
 
 def unit_named(text: str) -> str | None:
     """Unit of a map for a spelling in a file; None for an unknown one."""
-    key = unicodedata.normalize("NFKC", text).strip().lower().replace("μ", "µ")
-    key = re.sub(r"[\s·*⋅.]+", "", key)
+    key = plain_spelling(text)
     if key.startswith("%"):  # % of what is told by no spelling
         return "%"
-    counts = _UNIT_OF.get(_BITS.sub("", key)) == "counts"
-    return "counts" if counts else _UNIT_OF.get(key)
+    unit_of = lexicon().unit_of
+    return "counts" if unit_of.get(_BITS.sub("", key)) == "counts" else unit_of.get(key)
 
 
 def split_unit(name: str) -> tuple[str, str | None, bool]:

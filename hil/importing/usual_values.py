@@ -14,7 +14,7 @@ LEADS_M = (0.010, 0.005, 0.020, 0.004, 0.016, 0.0025, 0.002, 0.025, 0.040, 0.008
 
 
 def usual_lead(value_m: float) -> float:
-    """Lead with the digits of a usual one if it is that to 0.2 %."""
+    """The usual lead that is within 0.2 %, else the value itself [m]."""
     usual = next((lead for lead in LEADS_M if abs(value_m / lead - 1.0) < USUAL), None)
     return usual if usual is not None else value_m
 

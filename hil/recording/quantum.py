@@ -1,4 +1,4 @@
-"""Step of a quantised channel, as its values show it."""
+"""Quantisation step of a channel, from its values."""
 
 import numpy as np
 
@@ -11,10 +11,10 @@ _STEPS = (20, 60, 200, 600)  # largest differences that are counted, in steps
 DIGITS = 1e-6  # relative deviation from a power of ten below which a step is that of printed digits
 
 
-def is_decimal(step: float) -> bool:
-    """True for a power of ten: the last digit of the file rather than a count of the encoder."""
+def is_decimal(step: float, tolerance: float = DIGITS) -> bool:
+    """True for a power of ten within a relative tolerance: the last digit of the file, no count of an encoder."""
     power = np.log10(step)
-    return bool(abs(power - np.round(power)) < DIGITS / np.log(10.0))
+    return bool(abs(power - np.round(power)) < tolerance / np.log(10.0))
 
 
 def count_of(values: FloatArray) -> float | None:

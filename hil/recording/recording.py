@@ -34,7 +34,8 @@ from hil.recording.arrow_files import (
 from hil.recording.arrow_files import (
     METADATA_KEY as METADATA_KEY,
 )
-from hil.recording.stamps import CLOCK_TOLERANCE, RegularRows, check_finite, regular_rows
+from hil.recording.row_clock import CLOCK_TOLERANCE
+from hil.recording.stamps import RegularRows, check_finite, regular_rows
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

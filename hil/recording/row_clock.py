@@ -1,4 +1,4 @@
-"""Tell from the motion which clock the rows of a recording have: their number (equal ticks) or their time stamps.
+"""Decide from the motion whether rows were sampled at equal ticks (their number is the clock) or at their stamps.
 
 Over equal ticks a position sampled at time t deviates from the cubic through its neighbours by v x (t - tick). If the
 rows were taken at their stamps, the deviations are v x (stamp - tick); if they were taken at the ticks, they do not
@@ -17,6 +17,7 @@ from hil.arrays import FloatArray
 
 Ticks = NDArray[np.int64]
 
+CLOCK_TOLERANCE = 0.01  # of the period: what a step of a regular clock may deviate
 _NEAR, _FAR = 3, 5  # rows on each side for two estimates of the velocity, none of them in the cubic
 _BLOCK = 20  # rows: deviations are dependent over a few rows, blocks are not
 _ERRORS = 3.0  # standard errors between the share and the middle of both clocks
@@ -65,7 +66,7 @@ def row_clock(columns: Mapping[str, FloatArray], kept: list[slice], period_s: fl
     motion clearly says that rows are equal ticks, with rows missing where the stamps say so or with none missing.
     """
     stamps = [columns["time_s"][piece] for piece in kept]
-    whole = all(_at_whole_periods(times, period_s) for times in stamps)
+    whole = all(at_whole_periods(np.diff(times), period_s) for times in stamps)
     if whole:
         counts = [[np.r_[0, np.cumsum(np.round(np.diff(times) / period_s))].astype(np.int64) for times in stamps]]
     else:
@@ -80,7 +81,7 @@ def row_clock(columns: Mapping[str, FloatArray], kept: list[slice], period_s: fl
 
 
 def _follow(times: list[FloatArray], ticks: list[Ticks]) -> bool:
-    """True if stamps follow the ticks to half a period; they leave them where missing rows were not counted."""
+    """True if stamps stay within half a period of their ticks: all missing rows are counted."""
     period_s = slope(times, ticks)
     for time_s, at in zip(times, ticks, strict=True):
         late = (time_s - time_s[0]) / period_s - at
@@ -148,10 +149,10 @@ def slope(times: list[FloatArray], ticks: list[Ticks]) -> float:
     return round(product / power, 12)
 
 
-def _at_whole_periods(time_s: FloatArray, period_s: float) -> bool:
-    steps = np.diff(time_s)
+def at_whole_periods(steps: FloatArray, period_s: float) -> bool:
+    """True if every step (n,) is a whole multiple of the period, at least one."""
     whole = np.maximum(np.round(steps / period_s), 1.0) * period_s
-    return bool(np.all(np.abs(steps - whole) <= 0.01 * period_s))
+    return bool(np.all(np.abs(steps - whole) <= CLOCK_TOLERANCE * period_s))
 
 
 def _terms(time_s: FloatArray, values: FloatArray, ticks: Ticks, period_s: float) -> FloatArray:

@@ -1,15 +1,15 @@
-"""Turn the rows of a file into a regular clock: cut them at gaps, even out jitter of the stamps, and say both."""
+"""Give rows a regular clock: cut them at gaps, replace jittering stamps, interpolate missing rows; notes say so."""
 
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from hil.arrays import FloatArray
 from hil.errors import InputError
-from hil.recording.row_clock import RowClock, Ticks, row_clock, row_ticks, slope
+from hil.recording.row_clock import CLOCK_TOLERANCE, RowClock, Ticks, at_whole_periods, row_clock, row_ticks, slope
 
-CLOCK_TOLERANCE = 0.01  # of the period: what a step of a regular clock may deviate
 LARGEST = 1e12  # above every SI value of a channel, and of a clock in microseconds per day
 GAP_STEPS = 10.0  # of the clock: above, rows are missing and are not interpolated
 LEAST_ROWS = 50  # of a part: fewer show no motion
@@ -20,7 +20,7 @@ _TWO_RATES = 1.5  # ratio of typical steps at both ends: more than jitter and dr
 
 @dataclass(frozen=True)
 class PartStart:
-    """Where a part without gaps begins: its first row, and the time since the first row of the file [s]."""
+    """First row of a part without gaps, and its time since the first row of the file [s]."""
 
     row: int
     time_s: float
@@ -35,6 +35,17 @@ class RegularRows:
     parts: tuple[PartStart, ...]
     rate_hz: float | None
     notes: tuple[str, ...]
+
+    @property
+    def pieces(self) -> list[slice]:
+        """Rows of each part."""
+        edges = [*(part.row for part in self.parts), self.columns["time_s"].size]
+        return [slice(first, end) for first, end in pairwise(edges)]
+
+    def longest_part(self) -> dict[str, FloatArray]:
+        """Columns (m,) of the part with most rows, without the time."""
+        piece = max(self.pieces, key=lambda one: one.stop - one.start)
+        return {name: values[piece] for name, values in self.columns.items() if name != "time_s"}
 
 
 def check_finite(columns: Mapping[str, FloatArray], place: Callable[[int], str]) -> None:
@@ -79,7 +90,7 @@ def regular_rows(
     few_digits = bool(time_s.size >= LEAST_ROWS and np.mean(steps == 0.0) > REPEATS and steps.max() > 0.0)
     _refuse_order(time_s, steps, few_digits, place)
     typical = float(np.median(steps[steps > 0.0]))
-    at_ticks = period_s is not None and _at_ticks(steps, period_s)
+    at_ticks = bool(period_s and period_s > 0.0 and at_whole_periods(steps, period_s) and steps.min() < 1.5 * period_s)
     if period_s is not None and at_ticks:
         typical = period_s
     elif not few_digits:
@@ -99,12 +110,13 @@ def regular_rows(
     notes = _of_gaps(time_s, pieces, kept, typical)
     mean_s = float(np.sum(within) / within.size)
     if even and (rate_hz is None or _near(1.0 / rate_hz, mean_s)):
-        period_s = round(mean_s, 12)
-        return _joined([_taken(columns, piece) for piece in kept], time_s[0], period_s, None, notes)
+        parts = [{name: values[piece] for name, values in columns.items()} for piece in kept]
+        return _joined(parts, time_s[0], round(mean_s, 12), None, notes)
     if few_digits:
-        period_s = slope([time_s[piece] for piece in kept], [np.arange(piece.stop - piece.start) for piece in kept])
+        ticks: list[Ticks] = [np.arange(piece.stop - piece.start) for piece in kept]
+        period_s = slope([time_s[piece] for piece in kept], ticks)
         notes = (*notes, f"clock: stamps repeat (too few digits); equal steps of {period_s:.6g} s are taken")
-        return _joined([_counted(columns, piece, period_s) for piece in kept], time_s[0], period_s, None, notes)
+        return _joined(_at_ticks(columns, kept, ticks, period_s), time_s[0], period_s, None, notes)
     judged = {name: columns[name] for name in judged_by or columns} | {"time_s": time_s}
     clock, told = row_clock(judged, kept, typical)
     if clock is None:
@@ -116,9 +128,8 @@ def regular_rows(
         period_s = clock.period_s if rate_hz is None or whole_rate else 1.0 / rate_hz
         notes = (*notes, *_of_ticks(clock, None if whole_rate else rate_hz))
         if whole_rate:
-            parts = [_filled(columns, piece, at, period_s) for piece, at in zip(kept, clock.ticks, strict=True)]
             filled_hz = float(f"{1.0 / period_s:.9g}") if clock.missing else None
-            return _joined(parts, time_s[0], period_s, filled_hz, notes)
+            return _joined(_at_ticks(columns, kept, clock.ticks, period_s), time_s[0], period_s, filled_hz, notes)
     rate_hz = float(f"{1.0 / period_s:.9g}")
     parts = [_interpolated(columns, piece, rate_hz) for piece in kept]
     return _joined(parts, time_s[0], round(1.0 / rate_hz, 12), rate_hz, notes)
@@ -180,24 +191,26 @@ def _at_their_ticks(columns: Mapping[str, FloatArray], kept: list[slice], clock:
     return {**columns, "time_s": time_s}
 
 
-def _at_ticks(steps: FloatArray, period_s: float) -> bool:
-    """Return True if every step is a multiple of the period, and the shortest is one period."""
-    if not period_s > 0.0:
-        return False
-    ticks = np.round(steps / period_s)
-    return bool(ticks.min() == 1.0 and np.all(np.abs(steps - ticks * period_s) <= CLOCK_TOLERANCE * period_s))
-
-
 def _refuse_order(time_s: FloatArray, steps: FloatArray, few_digits: bool, place: Callable[[int], str]) -> None:
     bad = np.flatnonzero(steps < 0.0 if few_digits else steps <= 0.0)
-    if bad.size:
-        row = int(bad[0]) + 1
-        what = "runs back" if steps[row - 1] else "repeats (a duplicate row, or stamps with too few digits)"
-        raise InputError(
-            f"{place(row)}: time_s: {what}: "
-            f"given {time_s[row]:.9g} s after {time_s[row - 1]:.9g} s, allowed a growing time; "
-            "remove the row, or import the file with a sample rate"
-        )
+    if not bad.size:
+        return
+    row, back = int(bad[0]) + 1, int(np.sum(steps < 0.0))
+    advice = "remove the row, or import the file with a sample rate"
+    if time_s.min() == time_s.max():
+        problem = f"the stamps are all {time_s[0]:g} s"
+        advice = "say the rate of the rows: hil import FILE --rate HZ"
+    elif not steps[row - 1]:
+        problem = "repeats (a duplicate row, or stamps with too few digits)"
+    elif back > max(3, time_s.size // 100):
+        problem, advice = f"runs back in {back} places, the rows are out of order", "sort the file by its time"
+    else:
+        problem = "runs back"
+        advice = "two recordings in one file, or rows out of order: cut the file there, or sort it"
+    raise InputError(
+        f"{place(row)}: time_s: {problem}: given {time_s[row]:.9g} s after {time_s[row - 1]:.9g} s, "
+        f"allowed a growing time; {advice}"
+    )
 
 
 def _refuse_two_rates(steps: FloatArray, place: Callable[[int], str]) -> None:
@@ -231,31 +244,25 @@ def _of_gaps(time_s: FloatArray, pieces: list[slice], kept: list[slice], typical
     return (text + (f"; {lost} rows in parts of less than {LEAST_ROWS} are left out" if lost else ""),)
 
 
-def _taken(columns: Mapping[str, FloatArray], piece: slice) -> dict[str, FloatArray]:
-    return {name: values[piece] for name, values in columns.items()}
-
-
-def _counted(columns: Mapping[str, FloatArray], piece: slice, period_s: float) -> dict[str, FloatArray]:
-    """The rows of a part with equal steps from its first stamp on."""
-    taken = _taken(columns, piece)
-    return taken | {"time_s": taken["time_s"][0] + np.arange(piece.stop - piece.start) * period_s}
-
-
-def _filled(columns: Mapping[str, FloatArray], piece: slice, ticks: Ticks, period_s: float) -> dict[str, FloatArray]:
-    """The rows of a part at each of its ticks, linear where rows are missing."""
-    taken, grid = _taken(columns, piece), np.arange(ticks[-1] + 1)
-    columns = {name: np.interp(grid, ticks, values) for name, values in taken.items()}
-    return columns | {"time_s": taken["time_s"][0] + grid * period_s}
+def _at_ticks(
+    columns: Mapping[str, FloatArray], kept: list[slice], ticks: list[Ticks], period_s: float
+) -> list[dict[str, FloatArray]]:
+    """The rows of each part at each of its ticks, linear where rows are missing."""
+    parts = []
+    for piece, at in zip(kept, ticks, strict=True):
+        grid = np.arange(at[-1] + 1)
+        part = {name: np.interp(grid, at, values[piece]) for name, values in columns.items()}
+        parts.append(part | {"time_s": columns["time_s"][piece.start] + grid * period_s})
+    return parts
 
 
 def _interpolated(columns: Mapping[str, FloatArray], piece: slice, rate_hz: float) -> dict[str, FloatArray]:
     """The rows of a part, linear between them."""
-    taken = _taken(columns, piece)
-    time_s = taken["time_s"]
+    time_s = columns["time_s"][piece]
     # the last row counts although its time may be rounded down
     rows = int((time_s[-1] - time_s[0]) * rate_hz + 1e-6) + 1
     grid_s = time_s[0] + np.arange(rows) / rate_hz
-    return {name: np.interp(grid_s, time_s, values) for name, values in taken.items()} | {"time_s": grid_s}
+    return {name: np.interp(grid_s, time_s, values[piece]) for name, values in columns.items()} | {"time_s": grid_s}
 
 
 def _joined(

@@ -164,7 +164,7 @@ def test_uneven_stamps_are_interpolated_and_said(tmp_path: Path) -> None:
     uneven = AXIS["t"] + random.uniform(0.0, 4e-4, AXIS["t"].size)
     columns = {name: np.interp(uneven, AXIS["t"], values) for name, values in AXIS.items()} | {"t": uneven}
     path = write(tmp_path / "log.csv", renamed(columns, **NAMES))
-    assert draft_map(path).clock.resample_hz == pytest.approx(1000.0, rel=0.02)
+    assert draft_map(path).resample_hz == pytest.approx(1000.0, rel=0.02)
     assert imported(path).period_s == pytest.approx(1e-3, rel=0.02)
 
 

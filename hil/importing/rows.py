@@ -1,7 +1,8 @@
-"""Leave out rows of a foreign file that hold no new sample: a value is missing or off, or repeats the row before."""
+"""Rows of a foreign file: complete, one per sample of the loop, and at regular times."""
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,37 +10,46 @@ from numpy.typing import NDArray
 from hil.arrays import FloatArray
 from hil.importing.held_samples import kept_rows, lost_samples, slower
 from hil.importing.spikes import lone_values
-from hil.recording.stamps import REPEATS
+from hil.recording.stamps import LARGEST, REPEATS, RegularRows, regular_rows
 
 
 @dataclass(frozen=True, eq=False)
-class CompleteRows:
-    """Columns without NaN, with the number of each row in the file (from 0), and notes on what was left out."""
+class KeptRows:
+    """Columns of the rows that are kept, the number of each row in the file (from 0), and notes on the others."""
 
     columns: dict[str, FloatArray]
     rows: NDArray[np.intp]
     notes: tuple[str, ...]
 
 
+def without_duplicates(columns: Mapping[str, FloatArray]) -> KeptRows:
+    """Leave out rows that repeat the row before in every column (n,), its stamp too, where they are few.
+
+    Without a column that grows in all other rows, equal rows are those of an axis at rest.
+    """
+    same = np.r_[False, np.logical_and.reduce([np.diff(values) == 0.0 for values in columns.values()])]
+    stamped = any(bool(np.all(np.diff(values[~same]) > 0.0)) for values in columns.values())
+    if not same.any() or same.mean() > REPEATS or not stamped:
+        return KeptRows(dict(columns), np.arange(same.size), ())
+    note = (
+        f"duplicate rows: {same.sum()} repeat the row before with its stamp, first row {int(np.argmax(same)) + 1} of "
+        "the numbers; they are left out"
+    )
+    return KeptRows({name: values[~same] for name, values in columns.items()}, np.flatnonzero(~same), (note,))
+
+
 def complete_rows(
     columns: Mapping[str, FloatArray], rows_per_sample: float | None = None, positions: Collection[str] = ()
-) -> CompleteRows:
+) -> KeptRows:
     """Leave out rows of columns (n,) with NaN or a spike of `positions`, and those that repeat the row before.
 
     `rows_per_sample`: each sample stands in so many rows, of which one is kept. The clock then shows where rows are
     missing: single ones are interpolated, long stretches are gaps (`stamps.regular_rows`).
     """
-    notes = []
-    same = np.r_[False, np.logical_and.reduce([np.diff(values) == 0.0 for values in columns.values()])]
-    if same.mean() > REPEATS:  # stamps with too few digits
-        same[:] = False
-    if same.any():
-        notes.append(
-            f"duplicate rows: {same.sum()} repeat the row before with its stamp, first row "
-            f"{int(np.argmax(same)) + 1} of the numbers; they are left out"
-        )
+    distinct = without_duplicates(columns)
+    notes = [*distinct.notes]
     good = np.logical_and.reduce([np.isfinite(values) for values in columns.values()])
-    rows = np.flatnonzero(good & ~same)
+    rows = distinct.rows[good[distinct.rows]]
     if not good.all():
         lacking = ", ".join(name for name, values in columns.items() if not np.isfinite(values).all())
         first = int(np.flatnonzero(~good)[0]) + 1
@@ -72,4 +82,25 @@ def complete_rows(
                 f"{int(rows[off][0]) + 1} of the numbers; these rows are left out and interpolated"
             )
             rows = rows[~off]
-    return CompleteRows({name: values[rows] for name, values in columns.items()}, rows, tuple(notes))
+    return KeptRows({name: values[rows] for name, values in columns.items()}, rows, tuple(notes))
+
+
+def filled_in(values: FloatArray, time_s: FloatArray) -> FloatArray:
+    """A column (n,) with missing values interpolated, for relations only."""
+    good = np.isfinite(values)
+    return values if good.all() else np.interp(time_s, time_s[good], values[good])
+
+
+def at_regular_times(
+    path: Path, columns: Mapping[str, FloatArray], time_s: FloatArray, judged_by: Collection[str] = ()
+) -> RegularRows:
+    """Columns (n,) without missing values at regular times (`stamps.regular_rows`); unusually large ones are left out.
+
+    Raises InputError: two rates, time that repeats or runs back.
+    """
+    usual = {name: values for name, values in columns.items() if np.max(np.abs(values)) <= LARGEST}
+    return regular_rows(
+        usual | {"time_s": time_s},
+        lambda row: f"{path}: row {row + 1} of the numbers",
+        judged_by=[name for name in judged_by if name in usual],
+    )

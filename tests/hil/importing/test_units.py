@@ -2,7 +2,8 @@
 
 import pytest
 
-from hil.importing.column_names import Quantity, label
+from hil.importing.column_names import label
+from hil.importing.lexicon import Quantity
 from hil.importing.units import QUANTITY_OF_UNIT, split_unit, unit_named
 from hil.quantities import si_factor
 

@@ -9,7 +9,8 @@ import pytest
 from foreign_axis import axis, csv_text, renamed
 
 from hil.importing.draft_map import draft_map
-from hil.importing.header_values import Constant, header_values
+from hil.importing.header_values import header_values
+from hil.importing.lexicon import Constant
 
 AXIS = axis()
 

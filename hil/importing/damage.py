@@ -1,6 +1,6 @@
 """Refuse columns that are damaged: many values missing, spikes, jumps, a sign that turns, rows out of order.
 
-Jumps that are small beside the travel, as of a potentiometer that passes its gap, are told, and a torque at a limit.
+Notes tell jumps that are small beside the travel, as of a potentiometer that passes its gap, and a torque at a limit.
 """
 
 from pathlib import Path
@@ -9,7 +9,7 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.errors import InputError
-from hil.importing.foreign_files import FEW_MISSING
+from hil.importing.foreign_columns import FEW_MISSING
 from hil.importing.relations import NO_SPREAD, driven, motion, proportional, roughness
 from hil.importing.roles import Roles
 from hil.recording.stamps import GAP_STEPS
@@ -32,10 +32,23 @@ def refuse_missing(path: Path, columns: dict[str, FloatArray], texts: dict[str, 
         if name in texts:
             raise InputError(f"{path}: {name} has text and no number in some rows: {texts[name]!r}; correct the values")
         if np.isinf(values).any():
-            row = int(np.flatnonzero(np.isinf(values))[0]) + 1
+            row = int(np.argmax(np.isinf(values))) + 1
             raise InputError(f"{path}: {name} is infinite and no number in row {row} of the numbers; correct the value")
-        if np.mean(np.isnan(values)) > FEW_MISSING:
-            _refuse_missing(path, name, values)
+        missing = np.isnan(values)
+        if missing.mean() <= FEW_MISSING:
+            continue
+        steps = np.diff(np.flatnonzero(~missing))
+        if steps.size > 10 and steps.min() > 1 and np.ptp(steps) <= 1:
+            raise InputError(
+                f"{path}: {name} has a number only in every {round(float(np.median(steps)))}th row: two rates in one "
+                "file; export one rate, or leave the column out by a map"
+            )
+        first = int(np.argmax(missing))
+        after = " and never after" if 0 < first == np.sum(~missing) else ""
+        raise InputError(
+            f"{path}: {name} has no number in {100.0 * missing.mean():.3g} % of the rows, first in row {first + 1} of "
+            f"the numbers{after}; cut the file there or correct the values"
+        )
 
 
 def refuse_damage(
@@ -50,8 +63,7 @@ def refuse_damage(
     if roles.motor is not None and roughness(even[roles.motor]) > NO_ORDER:
         raise InputError(
             f"{path}: {roles.motor} jumps from row to row as if the rows were shuffled; sort the rows by time, or "
-            "export "
-            "the recording again"
+            "export the recording again"
         )
     command = roles.command or roles.unfollowed
     for position in filter(None, (roles.motor, roles.table, command)):
@@ -64,15 +76,14 @@ def refuse_damage(
         _refuse_turned_effort(path, effort, even[effort], roles.motor, even[roles.motor], period_s)
 
 
-def jumps_told(name: str, values: FloatArray, time_s: FloatArray) -> list[str]:
-    """Note on rows (n,) of a position that its axis cannot have reached; none where there are none."""
-    change, pause = np.diff(values), np.diff(time_s)
-    change[pause > GAP_STEPS * np.median(pause)] = 0.0
-    size = np.abs(change)
+def jump_notes(name: str, values: FloatArray, time_s: FloatArray) -> list[str]:
+    """Note on jumps of a position (n,) that the axis cannot make; empty without jumps."""
+    change = _changes(values, time_s)
+    size, way = np.abs(change), np.sign(change)
     moving = size[size > 0.0]
-    if np.unique(values).size < FEW_VALUES or moving.size < FEW_VALUES:
+    if moving.size < FEW_VALUES:
         return []
-    usual, way = float(np.quantile(moving, TOP)), np.sign(change)
+    usual = float(np.quantile(moving, TOP))
     beside = np.minimum(way * np.r_[0.0, change[:-1]], way * np.r_[change[1:], 0.0])
     rows = np.flatnonzero((size > FAR * usual) & (beside < ALONE * size))
     if not rows.size:
@@ -86,8 +97,8 @@ def jumps_told(name: str, values: FloatArray, time_s: FloatArray) -> list[str]:
     ]
 
 
-def limit_told(name: str, values: FloatArray) -> list[str]:
-    """Note on a torque (n,) that stays at its largest or least value; none for a command of few values."""
+def limit_notes(name: str, values: FloatArray) -> list[str]:
+    """Note on a torque (n,) that stays at its largest or least value; empty for a command of few values."""
     if np.unique(values).size < FEW_VALUES:
         return []
     held = np.r_[False, np.diff(values) == 0.0]
@@ -101,38 +112,19 @@ def limit_told(name: str, values: FloatArray) -> list[str]:
     return []
 
 
-def _refuse_missing(path: Path, name: str, values: FloatArray) -> None:
-    good = np.isfinite(values)
-    if good.all():
-        return
-    rows = np.flatnonzero(good)
-    steps = np.diff(rows)
-    share = 100.0 * (1.0 - good.mean())
-    if steps.size > 10 and steps.min() > 1 and np.ptp(steps) <= 1:
-        raise InputError(
-            f"{path}: {name} has a number only in every {round(float(np.median(steps)))}th row: two rates in one file; "
-            "export one rate, or leave the column out by a map"
-        )
-    first = int(np.flatnonzero(~good)[0]) + 1
-    end = rows.size > 0 and rows[-1] < first
-    raise InputError(
-        f"{path}: {name} has no number in {share:.3g} % of the rows, first in row {first} of the numbers"
-        + (" and never after" if end else "")
-        + "; cut the file there or correct the values"
-    )
+def _changes(values: FloatArray, time_s: FloatArray) -> FloatArray:
+    """Change from row to row (n - 1,), 0 over gaps of the clock; empty for a column of few values."""
+    if np.unique(values).size < FEW_VALUES:
+        return np.empty(0)
+    pause = np.diff(time_s)
+    return np.where(pause > GAP_STEPS * np.median(pause), 0.0, np.diff(values))
 
 
 def _refuse_jumps(path: Path, name: str, values: FloatArray, time_s: FloatArray, steps: bool) -> None:
-    """Refuse jumps, and spikes (one row away from both neighbours); not over gaps of the clock.
-
-    `steps` are allowed in a set-point.
-    """
-    change, pause = np.diff(values), np.diff(time_s)
-    change[pause > GAP_STEPS * np.median(pause)] = 0.0
+    """Refuse jumps, and spikes (one row away from both neighbours). `steps` are allowed in a set-point."""
+    change = _changes(values, time_s)
     size = np.abs(change)
-    around = np.maximum(np.r_[0.0, 0.0, size[:-2]], np.r_[size[2:], 0.0, 0.0])
-    if np.unique(values).size < FEW_VALUES:
-        return
+    around = np.maximum(np.r_[0.0, 0.0, size[:-2]], np.r_[size[2:], 0.0, 0.0])[: size.size]
     jumps = np.flatnonzero((size > JUMP * np.ptp(values)) & (size > SUDDEN * around))
     if not jumps.size:
         return
@@ -142,9 +134,8 @@ def _refuse_jumps(path: Path, name: str, values: FloatArray, time_s: FloatArray,
         raise InputError(
             f"{told} and back: a spike or a placeholder for a missing value; correct the row or cut before it"
         )
-    if steps:
-        return
-    raise InputError(f"{told}: rows are missing, or another recording follows; cut the file there")
+    if not steps:
+        raise InputError(f"{told}: rows are missing, or another recording follows; cut the file there")
 
 
 def _refuse_turned(path: Path, name: str, values: FloatArray, motor: str, position: FloatArray) -> None:
@@ -153,9 +144,8 @@ def _refuse_turned(path: Path, name: str, values: FloatArray, motor: str, positi
     first, last = (proportional(values[part], position[part]) for part in (slice(None, half), slice(half, None)))
     if min(first.share, last.share) > 0.9 and first.factor * last.factor < 0.0:
         raise InputError(
-            f"{path}: {name} follows {motor} in one half of the file and its negative in the other: a sign was "
-            "turned within "
-            "the recording; cut the file there"
+            f"{path}: {name} follows {motor} in one half of the file and its negative in the other: a sign was turned "
+            "within the recording; cut the file there"
         )
 
 
@@ -166,16 +156,14 @@ def _refuse_turned_effort(
     half = effort.size // 2
     if min(np.ptp(position[:half]), np.ptp(position[half:])) < NO_SPREAD * np.ptp(position):
         return
-    first = driven(effort[:half], motion(position[:half], period_s), period_s)
-    last = driven(effort[half:], motion(position[half:], period_s), period_s)
-    both = driven(effort, motion(position, period_s), period_s)
-    turned = np.concatenate([effort[:half], -effort[half:]])
-    if (
-        min(first.share, last.share) > TOLD
-        and driven(turned, motion(position, period_s), period_s).share > both.share + 0.5
-    ):
+
+    def share(values: FloatArray, part: slice) -> float:
+        return driven(values[part], motion(position[part], period_s), period_s).share
+
+    whole, turned = slice(None), np.concatenate([effort[:half], -effort[half:]])
+    halves = min(share(effort, slice(None, half)), share(effort, slice(half, None)))
+    if halves > TOLD and share(turned, whole) > share(effort, whole) + 0.5:
         raise InputError(
-            f"{path}: {name} accelerates {motor} forwards in one half of the file and backwards in the other: a "
-            "sign was "
-            "turned within the recording; cut the file there"
+            f"{path}: {name} accelerates {motor} forwards in one half of the file and backwards in the other: a sign "
+            "was turned within the recording; cut the file there"
         )

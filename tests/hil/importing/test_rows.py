@@ -1,15 +1,18 @@
-"""Repeated samples are kept once, lost ones found; counters that start again are unwrapped; dates become seconds."""
+"""Repeated samples are kept once, lost ones found; counters that start again are unwrapped."""
 
 from __future__ import annotations
+
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from hil.files.date_stamps import is_date, seconds_of
-from hil.importing.complete_rows import complete_rows
+from hil.importing.by_map import import_recording
 from hil.importing.held_samples import kept_rows, lost_samples, rows_per_sample, rows_per_slowest_sample, slower
+from hil.importing.rows import complete_rows
 from hil.importing.spikes import lone_values
 from hil.importing.wraps import unwrapped, wrap_range
+from hil.recording.recording import read_recording, write_parquet
 
 RANDOM = np.random.default_rng(12)
 T = np.arange(4000) * 1e-3
@@ -168,23 +171,29 @@ def test_other_jumps_are_no_wraps(values: np.ndarray) -> None:
     assert wrap_range(values) is None
 
 
-@pytest.mark.parametrize(
-    ("texts", "seconds"),
-    [
-        (["2024-03-01T12:00:00.001Z", "2024-03-01T12:00:01.001Z"], 1.0),
-        (["2024-02-29 23:59:59.5", "2024-03-01 00:00:00.5"], 1.0),
-        (["31.12.2023 23:59:59,5", "01.01.2024 00:00:00,75"], 1.25),
-        (["12:00:00.001", "12:00:00.003"], 0.002),
-        (["23:59:59.9", "00:00:00.1"], 0.2),
-        (["3/1/2024 11:59:59 AM", "3/1/2024 12:00:00 PM"], 1.0),
-        (["12:00:00:123", "12:00:00:125"], 0.002),
-    ],
-)
-def test_dates_and_times_of_day_are_seconds(texts: list[str], seconds: float) -> None:
-    assert is_date(texts[0])
-    assert np.diff(seconds_of(texts))[0] == pytest.approx(seconds, abs=1e-9)
-
-
-@pytest.mark.parametrize("text", ["", "1.5", "OK", "2024-03-01", "12"])
-def test_other_texts_are_no_dates(text: str) -> None:
-    assert not is_date(text)
+def test_a_belt_whose_stamps_jitter_is_imported_by_its_row_numbers(tmp_path: Path) -> None:
+    rng = np.random.default_rng(9)
+    ticks_s = np.arange(5000) * 4e-3
+    position_mm = np.round(300.0 * np.sin(2 * np.pi * 0.4 * ticks_s) + 60.0 * np.sin(2 * np.pi * 1.7 * ticks_s), 3)
+    stamps_s = ticks_s + rng.normal(0.0, 5e-5, ticks_s.size)
+    lost = rng.integers(100, 4900, 15)
+    rows = [f"{t:.5f};{x:.3f};{np.cos(t):.2f}" for t, x in zip(stamps_s, position_mm, strict=True)]
+    for row in lost:
+        rows[row] = f"{stamps_s[row]:.5f};;0.00"
+    (tmp_path / "run.csv").write_text("t;x;f\n" + "\n".join(rows) + "\n")
+    (tmp_path / "map.yaml").write_text(
+        "about: belt\ntime: {column: t, unit: s}\nresample_hz: 249.688\nmissing: leave_out\ncsv: {delimiter: ';'}\n"
+        "channels:\n  motor_position_m: {column: x, unit: mm}\n  force_n: {column: f, unit: N}\n"
+    )
+    recording = import_recording(tmp_path / "run.csv", tmp_path / "map.yaml")
+    assert len(recording) == ticks_s.size
+    assert recording.period_s == pytest.approx(4e-3, rel=1e-6)
+    there = np.setdiff1d(np.arange(ticks_s.size), lost)
+    np.testing.assert_allclose(recording["motor_position_m"][there], 1e-3 * position_mm[there], atol=1e-12)
+    notes = recording.metadata["clock_notes"]
+    assert any(
+        "the stamps jitter by 5" in note and "equal ticks of 4 ms: the row number is the clock" in note
+        for note in notes
+    )
+    write_parquet(recording, tmp_path / "run.parquet")
+    np.testing.assert_array_equal(read_recording(tmp_path / "run.parquet")["time_s"], recording["time_s"])

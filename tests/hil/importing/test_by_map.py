@@ -21,7 +21,7 @@ from hil.importing.by_map import import_recording
 from hil.quantities import UNITS, si_factor
 from hil.recording.recording import read_recording, write_parquet
 
-EMPS = Path(__file__).parents[2].parent / "shared" / "recordings" / "emps" / "DATA_EMPS.mat"
+EMPS = Path(__file__).parents[4] / "shared" / "recordings" / "emps" / "DATA_EMPS.mat"
 
 MAP: dict[str, Any] = {
     "about": "a rotary axis recorded by a drive",

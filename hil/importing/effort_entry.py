@@ -8,7 +8,8 @@ from hil.arrays import FloatArray
 from hil.channels import AxisKind
 from hil.importing.column_names import Label
 from hil.importing.foreign_table import ForeignTable
-from hil.importing.header_values import Constant, HeaderValue
+from hil.importing.header_values import HeaderValue
+from hil.importing.lexicon import Constant, lexicon
 from hil.importing.relations import EffortCause, MotionColumns, proportional
 from hil.quantities import UNITS
 
@@ -16,14 +17,12 @@ CAUSED = 0.3  # share of an effort explained by its motion from which its sign c
 TOGETHER = 0.25  # share of the variance that torque and command have in common, from which they have one cause
 _CONSTANT_KEY = {AxisKind.LINEAR: "force_constant_n_a", AxisKind.ROTARY: "torque_constant_n_m_a"}
 PART = 0.1  # of the effort: the inertia's part must exceed it, else the sign of friction decides
-# names of a torque or force constant without underscores and digits; others ("torque_limit", "tau_filter") are none
-_CONSTANT_NAMES = "gtau ktau kt km kf km torqueconstant forceconstant motorconstant drehmomentkonstante kraftkonstante"
 
 
 def effort_entry(
     told: Label, kind: AxisKind, table: ForeignTable, cause: EffortCause, sign: int
 ) -> tuple[dict[str, object], list[str]]:
-    """Entry of the map, and notes on what is unsure.
+    """Keys of the map beside the column, and notes on what is unsure.
 
     `cause` is what `relations.driven` gives for it, `sign` what `signs_of` does; constants are those of `table`.
     """
@@ -70,7 +69,7 @@ def _unit(told: Label, kind: AxisKind, table: ForeignTable) -> tuple[dict[str, o
     unit, column, scalars = told.unit or told.electric, told.column, table.scalars
     linear = kind is AxisKind.LINEAR
     si = "N" if linear else "N m"
-    entry: dict[str, object] = {"column": column, "unit": unit or si}
+    entry: dict[str, object] = {"unit": unit or si}
     if unit in ("mA", "mV"):
         entry |= {"unit": unit[1:], "scale": 1e-3}
         unit = unit[1:]
@@ -89,7 +88,7 @@ def _unit(told: Label, kind: AxisKind, table: ForeignTable) -> tuple[dict[str, o
     header = table.constants.get(Constant.FORCE if linear else Constant.TORQUE)
     if unit == "A" and header is not None:
         return entry | {_CONSTANT_KEY[kind]: header.value}, [_from(column, header)]
-    named = [name for name in scalars if re.sub(r"[^a-z]", "", name.lower()) in _CONSTANT_NAMES.split()]
+    named = [name for name in scalars if re.sub(r"[^a-z]", "", name.lower()) in lexicon().scalars.constant]
     if len(named) != 1:
         notes = [f"{column}: several scalars may be its constant ({', '.join(named)})"] if named else []
         if unit is None:

@@ -1,0 +1,146 @@
+"""The words of `lexicon.yaml` in five languages: names of columns, units and header constants. Read at first use."""
+
+import re
+import unicodedata
+from enum import StrEnum
+from functools import cache, cached_property
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, PositiveFloat, model_validator
+
+from hil.errors import FieldError
+from hil.files.yaml_model import load_model
+from hil.quantities import UNITS
+
+LEXICON = Path(__file__).with_name("lexicon.yaml")
+UNITS_BY_CONSTANT = ("counts", "A", "mA", "V", "mV", "%", "permille")  # units that become SI by a constant of the axis
+_LANGUAGE = re.compile("all|[a-z]{2}")
+
+
+class Quantity(StrEnum):
+    """Physical quantity of a column. OTHER is known, but no channel: errors, temperatures, states."""
+
+    TIME = "time"
+    POSITION = "position"
+    VELOCITY = "velocity"
+    ACCELERATION = "acceleration"
+    EFFORT = "effort"  # force, torque, current or voltage
+    OTHER = "other"
+    UNKNOWN = "unknown"
+
+
+class Constant(StrEnum):
+    """Constant that a file may give beside its columns."""
+
+    PERIOD = "period"  # [s], of the rows
+    RATE = "rate"  # [Hz], of the rows
+    TORQUE = "torque_constant"  # [N m/A]
+    FORCE = "force_constant"  # [N/A]
+    LEAD = "lead"  # [m]
+    COUNTS = "counts_per_rev"
+    RATED_TORQUE = "rated_torque"  # [N m]
+    RATED_FORCE = "rated_force"  # [N]
+
+
+def _lines(given: object) -> list[str]:
+    """The lines of all languages."""
+    lines: dict[str, Any] = given if isinstance(given, dict) else {"all": given}
+    for language, line in lines.items():
+        if not _LANGUAGE.fullmatch(language) or not isinstance(line, str):
+            raise ValueError(f"given {language}: {line!r}, allowed lines LANGUAGE: WORDS, such as de: weg hub")
+    return list(lines.values())
+
+
+def _words(given: object) -> tuple[str, ...]:
+    return tuple(word for line in _lines(given) for word in line.split())
+
+
+def _pattern(given: object) -> str:
+    pattern = "|".join(_lines(given))
+    try:
+        re.compile(pattern)
+    except re.error as error:
+        raise ValueError(f"given {pattern!r}, allowed regular expressions ({error})") from None
+    return pattern
+
+
+Words = Annotated[tuple[str, ...], BeforeValidator(_words)]
+
+
+class _Entry(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class ConstantWords(_Entry):
+    """Regular expression of the words of a constant, and factors of its units to SI."""
+
+    words: Annotated[str, BeforeValidator(_pattern)]
+    units: dict[str, PositiveFloat]
+    ends_a_text: bool = False
+
+
+class ScalarNames(_Entry):
+    """Whole names of scalars."""
+
+    rate: Words
+    period: Words
+    constant: Words
+
+
+class Lexicon(_Entry):
+    """The content of `lexicon.yaml`, words of all languages together; the file explains its keys."""
+
+    quantities: dict[Quantity, Words]
+    alone: Words
+    command: Words
+    measured: Words
+    motor: Words
+    table: Words
+    attached_after: Words
+    attached_before: Words
+    electric: dict[Literal["A", "V"], Words]
+    angle: Words
+    length: Words
+    units: dict[str, Words]
+    constants: dict[Constant, ConstantWords]
+    joints: Words
+    scalars: ScalarNames
+    missing: Words
+    infinite: Words
+    name_line: Words
+    unit_line: Words
+
+    @model_validator(mode="after")
+    def _is_complete(self) -> Self:
+        for field, given, allowed in (
+            ("quantities", self.quantities, set(Quantity) - {Quantity.UNKNOWN}),
+            ("constants", self.constants, set(Constant)),
+        ):
+            if set(given) != allowed:
+                raise FieldError((field,), f"given {', '.join(given)}, needed {', '.join(sorted(allowed))}; correct it")
+        for unit in self.units:
+            if unit not in UNITS and unit not in UNITS_BY_CONSTANT:
+                raise FieldError(("units", unit), "is no unit of a map; correct it")
+        spelled = [(plain_spelling(one), unit) for unit, spellings in self.units.items() for one in spellings]
+        for spelling, unit in spelled:
+            if self.unit_of[spelling] != unit:
+                raise FieldError(("units",), f"{spelling!r} stands for two units, allowed one; remove one")
+        return self
+
+    @cached_property
+    def unit_of(self) -> dict[str, str]:
+        """Unit of a map by the `plain_spelling` in files."""
+        return {plain_spelling(one): unit for unit, spellings in self.units.items() for one in spellings}
+
+
+def plain_spelling(unit: str) -> str:
+    """Text of a unit in lower case, without blanks, multiplication signs and points, with plain digits."""
+    key = unicodedata.normalize("NFKC", unit).strip().lower().replace("μ", "µ")
+    return re.sub(r"[\s·*⋅.]+", "", key)
+
+
+@cache
+def lexicon() -> Lexicon:
+    """The lexicon. Raises InputError with line and field if the file is damaged."""
+    return load_model(LEXICON, Lexicon)

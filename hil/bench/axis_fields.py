@@ -1,6 +1,6 @@
 """Fields that axis sections of a bench file share: bounded numbers, and the base of axes with a rotary motor."""
 
-from typing import Annotated
+from typing import Annotated, Any, ClassVar
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -21,30 +21,31 @@ class BenchSection(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-FRICTION = ("coulomb_torque_n_m", "viscous_torque_n_m_s_rad")
 RATIOS = ("damping_ratio",)  # nominal parameters of any axis that are below 1
 
 
-class Driven(BenchSection):
+class AxisSection(BenchSection):
+    """Base of the axis sections: its kind, and the parameters that the diagnosis refits before it looks for physics."""
+
+    MASSES: ClassVar[tuple[str, ...]] = ()
+    SPRINGS: ClassVar[tuple[str, ...]] = ()  # between motor and table
+    FRICTION: ClassVar[tuple[str, ...]] = ("coulomb_torque_n_m", "viscous_torque_n_m_s_rad")
+    NOMINAL: ClassVar[tuple[str, ...]] = ()  # the three together
+    linear: ClassVar[bool] = False  # the motor side is in m and N
+    turns: ClassVar[bool] = False  # the load turns
+    drive_unit: ClassVar[str] = "N m"  # of the torque channels: N m, N, or V of a motor driven by its voltage
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **kwargs: Any) -> None:
+        super().__pydantic_init_subclass__(**kwargs)
+        cls.NOMINAL = (*cls.MASSES, *cls.SPRINGS, *cls.FRICTION)
+
+
+class Driven(AxisSection):
     """An axis driven by a rotary motor; friction is given at the motor."""
 
     coulomb_torque_n_m: NotNegative = Field(description="Coulomb friction at the motor [N m]")
     viscous_torque_n_m_s_rad: NotNegative = Field(description="viscous friction at the motor [N m s/rad]")
-
-    @property
-    def linear(self) -> bool:
-        """True if the motor side is in m and N."""
-        return False
-
-    @property
-    def drive_unit(self) -> str:
-        """Unit of the torque channels: N m, N, or V of a motor that is driven by its voltage."""
-        return "N m"
-
-    @property
-    def turns(self) -> bool:
-        """True if the load turns."""
-        return False
 
     def chain(self) -> Chain:
         """The lumped chain of the axis."""

@@ -1,8 +1,4 @@
-"""Axis section of a bench file: one pydantic model per kind of axis.
-
-Each gives the twin's physics (`physics`) and names the parameters that the diagnosis refits before it looks for missing
-physics (`NOMINAL`): moving masses (`MASSES`), the springs between motor and table (`SPRINGS`), friction.
-"""
+"""Axis section of a bench file: one pydantic model per kind of axis, which gives the twin's physics."""
 
 from dataclasses import replace
 from math import pi
@@ -10,7 +6,7 @@ from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from hil.bench.axis_fields import FRICTION, BenchSection, Damping, Driven, Lead, NotNegative, Positive
+from hil.bench.axis_fields import AxisSection, Damping, Driven, Lead, NotNegative, Positive
 from hil.bench.turning_axes import DcMotor, Rotary, RotaryTwoMass
 from hil.errors import FieldError
 from hil.twin.physics import Physics
@@ -41,7 +37,6 @@ class TwoMass(Screw):
 
     MASSES: ClassVar[tuple[str, ...]] = ("motor_mass_kg", "table_mass_kg")
     SPRINGS: ClassVar[tuple[str, ...]] = ("stiffness_n_m", "damping_ratio")
-    NOMINAL: ClassVar[tuple[str, ...]] = (*MASSES, *SPRINGS, *FRICTION)
     model: Literal["two_mass"] = "two_mass"
     motor_mass_kg: Positive = Field(description="motor inertia as translation at the table [kg]")
     table_mass_kg: Positive = Field(description="table and screw at the table [kg]")
@@ -57,8 +52,6 @@ class Rigid(Screw):
     """A motor and a screw stiff enough to be one mass with the table."""
 
     MASSES: ClassVar[tuple[str, ...]] = ("mass_kg",)
-    SPRINGS: ClassVar[tuple[str, ...]] = ()
-    NOMINAL: ClassVar[tuple[str, ...]] = (*MASSES, *SPRINGS, *FRICTION)
     model: Literal["rigid"] = "rigid"
     mass_kg: Positive = Field(description="all moving mass and inertia at the table [kg]")
 
@@ -72,7 +65,6 @@ class SevenDofAxis(Screw):
 
     MASSES: ClassVar[tuple[str, ...]] = ("motor_inertia_kg_m2", "table_mass_kg")
     SPRINGS: ClassVar[tuple[str, ...]] = ("nut_support_stiffness_n_m", "coupling_stiffness_n_m_rad", "damping_ratio")
-    NOMINAL: ClassVar[tuple[str, ...]] = (*MASSES, *SPRINGS, *FRICTION)
     model: Literal["seven_dof"] = "seven_dof"
     lead_m: Lead = RECONSTRUCTED_TABLE_1.lead_m
     motor_inertia_kg_m2: Positive = RECONSTRUCTED_TABLE_1.motor_inertia_kg_m2
@@ -95,7 +87,6 @@ class SerialChain(Screw):
 
     MASSES: ClassVar[tuple[str, ...]] = ("inertia_scale",)
     SPRINGS: ClassVar[tuple[str, ...]] = ("stiffness_scale", "damping_ratio")
-    NOMINAL: ClassVar[tuple[str, ...]] = (*MASSES, *SPRINGS, *FRICTION)
     model: Literal["serial_chain"] = "serial_chain"
     inertias_kg_m2: tuple[Positive, ...] = Field(min_length=2, description="from motor to table [kg m^2]")
     stiffnesses_n_m_rad: tuple[Positive, ...] = Field(min_length=1, description="one fewer than inertias [N m/rad]")
@@ -122,12 +113,13 @@ class SerialChain(Screw):
         )
 
 
-class OneMass(BenchSection):
+class OneMass(AxisSection):
     """A linear axis: one mass, one encoder, newtons and metres."""
 
     MASSES: ClassVar[tuple[str, ...]] = ("mass_kg",)
-    SPRINGS: ClassVar[tuple[str, ...]] = ()
-    NOMINAL: ClassVar[tuple[str, ...]] = (*MASSES, *SPRINGS, "coulomb_force_n", "viscous_force_n_s_m")
+    FRICTION: ClassVar[tuple[str, ...]] = ("coulomb_force_n", "viscous_force_n_s_m")
+    linear: ClassVar[bool] = True
+    drive_unit: ClassVar[str] = "N"
     model: Literal["one_mass"] = "one_mass"
     mass_kg: Positive = Field(description="moving mass [kg]")
     coulomb_force_n: NotNegative = Field(description="Coulomb friction [N]")
@@ -138,21 +130,6 @@ class OneMass(BenchSection):
     def ratio_m_rad(self) -> float:
         """1: motor and table are both in metres."""
         return 1.0
-
-    @property
-    def linear(self) -> bool:
-        """True if the motor side is in m and N."""
-        return True
-
-    @property
-    def drive_unit(self) -> str:
-        """Unit of the torque channels."""
-        return "N"
-
-    @property
-    def turns(self) -> bool:
-        """True if the load turns."""
-        return False
 
     def physics(self) -> Physics:
         """The nominal physics of the twin."""

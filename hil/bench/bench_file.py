@@ -91,19 +91,6 @@ class Encoders(BenchSection):
     table: TableEncoder | None = TableEncoder()
 
 
-_SECTIONS = {
-    "schema_version",
-    "name",
-    "description",
-    "axis",
-    "control",
-    "encoders",
-    "mechanisms",
-    "drive",
-    "simulation",
-}
-
-
 class Bench(BenchSection):
     """A bench file."""
 
@@ -125,7 +112,7 @@ class Bench(BenchSection):
             return data
         data = dict(data)
         if "axis" not in data:
-            data["axis"] = {key: data.pop(key) for key in list(data) if key not in _SECTIONS}
+            data["axis"] = {key: data.pop(key) for key in list(data) if key not in cls.model_fields}
         if isinstance(data["axis"], dict) and "model" not in data["axis"]:
             data["axis"] = {"model": model_of(set(data["axis"])), **data["axis"]}
         data["control"] = with_law(data.get("control"))

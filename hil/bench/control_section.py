@@ -151,12 +151,8 @@ class UnknownControl(BenchSection):
 
 def without_law(control: Control) -> UnknownControl:
     """Return the section without its law; position feedback and torque limit are kept."""
-    return UnknownControl(
-        law="unknown",
-        position_feedback=control.position_feedback,
-        torque_limit_n_m=control.torque_limit_n_m,
-        force_limit_n=control.force_limit_n,
-    )
+    kept = control.model_dump(include={"position_feedback", "torque_limit_n_m", "force_limit_n"})
+    return UnknownControl(law="unknown", **kept)
 
 
 ControlSection = Annotated[Control | UnknownControl, Field(discriminator="law")]

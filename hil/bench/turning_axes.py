@@ -8,30 +8,16 @@ from typing import ClassVar, Literal
 
 from pydantic import Field
 
-from hil.bench.axis_fields import FRICTION, BenchSection, Damping, Driven, NotNegative, Positive
+from hil.bench.axis_fields import AxisSection, Damping, Driven, NotNegative, Positive
 from hil.twin.physics import Physics
 from hil.twin.structure.chain import Chain, one_mass, serial_chain
 
 
-class Turning(BenchSection):
+class Turning(AxisSection):
     """A load that turns, with a gear between motor and load."""
 
     gear_ratio: Positive = Field(1.0, description="motor revolutions per revolution of the load")
-
-    @property
-    def linear(self) -> bool:
-        """True if the motor side is in m and N."""
-        return False
-
-    @property
-    def drive_unit(self) -> str:
-        """Unit of the torque channels."""
-        return "N m"
-
-    @property
-    def turns(self) -> bool:
-        """True if the load turns."""
-        return True
+    turns: ClassVar[bool] = True
 
     @property
     def lead_m(self) -> float:
@@ -48,8 +34,6 @@ class Rotary(Turning, Driven):
     """A rotary axis of one inertia."""
 
     MASSES: ClassVar[tuple[str, ...]] = ("inertia_kg_m2",)
-    SPRINGS: ClassVar[tuple[str, ...]] = ()
-    NOMINAL: ClassVar[tuple[str, ...]] = (*MASSES, *SPRINGS, *FRICTION)
     model: Literal["rotary"] = "rotary"
     inertia_kg_m2: Positive = Field(description="all inertia at the motor [kg m^2]")
 
@@ -63,7 +47,6 @@ class RotaryTwoMass(Turning, Driven):
 
     MASSES: ClassVar[tuple[str, ...]] = ("motor_inertia_kg_m2", "load_inertia_kg_m2")
     SPRINGS: ClassVar[tuple[str, ...]] = ("stiffness_n_m_rad", "damping_ratio")
-    NOMINAL: ClassVar[tuple[str, ...]] = (*MASSES, *SPRINGS, *FRICTION)
     model: Literal["rotary_two_mass"] = "rotary_two_mass"
     motor_inertia_kg_m2: Positive = Field(description="motor and gear at the motor [kg m^2]")
     load_inertia_kg_m2: Positive = Field(description="load at its own shaft [kg m^2]")
@@ -91,17 +74,12 @@ class DcMotor(Turning):
     """
 
     MASSES: ClassVar[tuple[str, ...]] = ("time_constant_s",)
-    SPRINGS: ClassVar[tuple[str, ...]] = ()
-    NOMINAL: ClassVar[tuple[str, ...]] = (*MASSES, *SPRINGS, "coulomb_voltage_v", "voltage_constant_v_s_rad")
+    FRICTION: ClassVar[tuple[str, ...]] = ("coulomb_voltage_v", "voltage_constant_v_s_rad")
+    drive_unit: ClassVar[str] = "V"
     model: Literal["dc_motor"] = "dc_motor"
     time_constant_s: Positive = Field(description="mechanical time constant tau [s]")
     coulomb_voltage_v: NotNegative = Field(description="voltage that Coulomb friction takes, half the dead zone [V]")
     voltage_constant_v_s_rad: Positive = Field(description="voltage per speed k, back-EMF and viscous [V s/rad]")
-
-    @property
-    def drive_unit(self) -> str:
-        """Unit of the torque channels, which hold the voltage."""
-        return "V"
 
     def physics(self) -> Physics:
         """The nominal physics of the twin, 1 N m for 1 V."""

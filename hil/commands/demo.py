@@ -74,25 +74,27 @@ def demo(
 
 def _record(bench: Bench, folder: Path, virtual: bool) -> list[Recording]:
     """Record the two runs of the demo; in virtual time if the machine does not keep wall-clock time."""
-    from hil.errors import HilError
+    from hil.errors import HilError, InputError, StillPowered, StoppedByUser
     from hil.validation.proof.draw.demo import LEARN, PROVE
 
     recordings = []
     for name, profile in (("learn", LEARN), ("prove", PROVE)):
-        recording, why = _run(bench, profile, folder, name, virtual)
-        if recording is None and not virtual:
+        try:
+            recordings.append(_run(bench, profile, folder, name, virtual))
+        except (InputError, StillPowered, StoppedByUser):
+            raise
+        except HilError as why:
+            if virtual:
+                raise
             err.print(f"Failed in wall-clock time, as on a busy machine: {why}\nThe same moves again in virtual time.")
             virtual = True
-            recording, why = _run(bench, profile, folder, name, virtual)
-        if recording is None:
-            raise HilError(why)
-        recordings.append(recording)
+            recordings.append(_run(bench, profile, folder, name, virtual))
     return recordings
 
 
-def _run(bench: Bench, profile: Profile, folder: Path, name: str, virtual: bool) -> tuple[Recording | None, str]:
-    """Return the recording, or None and why the machine gave none that is worth reading; HilError for anything else."""
-    from hil.errors import HilError, InputError, StillPowered, StoppedByUser
+def _run(bench: Bench, profile: Profile, folder: Path, name: str, virtual: bool) -> Recording:
+    """Return the recording. Raises HilError if the machine gave none that is worth reading."""
+    from hil.errors import HilError, StoppedByUser
     from hil.loop.run import run_profile
     from hil.recording.recording import read_recording
 
@@ -102,23 +104,19 @@ def _run(bench: Bench, profile: Profile, folder: Path, name: str, virtual: bool)
             f"{profile.description} ..."
         )
 
-    try:
-        # a late tick harms nothing on a simulated bench: a busy machine is reported, not refused
-        result = run_profile(bench, profile, folder, name, virtual=virtual, force=True, planned=planned)
-    except (InputError, StillPowered, StoppedByUser):
-        raise
-    except HilError as error:  # while arming
-        return None, str(error)
-    stopped = f"stopped: {result.outcome.ending}: {result.outcome.reason}"
-    if result.outcome.stop_asked:
+    # a late tick harms nothing on a simulated bench: a busy machine is reported, not refused
+    result = run_profile(bench, profile, folder, name, virtual=virtual, force=True, planned=planned)
+    outcome = result.outcome
+    stopped = f"stopped: {outcome.ending}: {outcome.reason}"
+    if outcome.stop_asked:
         raise StoppedByUser(stopped)
     if not virtual:
         out.print(f"lateness of the ticks: {result.jitter.text}")
     if not result.complete or result.recording is None:
-        return None, stopped
-    if result.outcome.skipped:  # their rows are interpolated, and the control law cannot be replayed on them
-        return None, f"the loop was late and left out {result.outcome.skipped} of {result.outcome.rows} ticks"
-    return read_recording(result.recording), ""
+        raise HilError(stopped)
+    if outcome.skipped:  # their rows are interpolated, and the control law cannot be replayed on them
+        raise HilError(f"the loop was late and left out {outcome.skipped} of {outcome.rows} ticks")
+    return read_recording(result.recording)
 
 
 def _say(result: Result, truth: SimulationSection, believed: Bench) -> None:
@@ -132,31 +130,17 @@ def _say(result: Result, truth: SimulationSection, believed: Bench) -> None:
 
     (hidden,) = truth.effects
     found = next((finding for finding in result.missing if finding.effect == hidden.effect), None)
-    rows = []
     parameters = {parameter.name: parameter for parameter in BY_ID[hidden.effect].parameters}
+    rows = []
     for name, value in hidden.parameters.items():
-        parameter, seen = parameters[name], found.parameters[name] if found else None
-        unit = parameter.dimension.unit()
-        rows.append(
-            (
-                name,
-                "–",
-                quantity(math.remainder(value, 2.0 * math.pi) if parameter.role is Role.PHASE else value, unit),
-                quantity(seen.value, unit) if seen else "–",
-                quantity(seen.std, unit) if seen else "–",
-            )
-        )
+        true = math.remainder(value, 2.0 * math.pi) if parameters[name].role is Role.PHASE else value
+        unit, seen = parameters[name].dimension.unit(), found.parameters[name] if found else None
+        told = [quantity(one, unit) for one in (seen.value, seen.std)] if seen else ["–", "–"]
+        rows.append((name, "–", quantity(true, unit), *told))
     for name, value in truth.axis.items():
         unit, fitted = unit_of(name), result.parameter_corrections.get(name)
-        rows.append(
-            (
-                name,
-                f"{digits(getattr(believed.axis, name))} {unit}",
-                f"{digits(value)} {unit}",
-                f"{digits(fitted.value)} {unit}" if fitted else "–",
-                f"{digits(fitted.std)} {unit}" if fitted else "–",
-            )
-        )
+        told = [f"{digits(one)} {unit}" for one in (fitted.value, fitted.std)] if fitted else ["–", "–"]
+        rows.append((name, f"{digits(getattr(believed.axis, name))} {unit}", f"{digits(value)} {unit}", *told))
     table((title(hidden.effect), "bench file", "concealed", "found", "standard error"), rows)
     names = " and ".join(title(finding.effect) for finding in result.missing) or title(result.verdict)
     out.print(

@@ -1,18 +1,13 @@
 """hil friction."""
 
-from __future__ import annotations
-
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from hil.commands.options import Out
 from hil.commands.runs import read_run
 from hil.report.console import out, progress, table
-
-if TYPE_CHECKING:
-    from hil.bench.bench_file import Bench
 
 
 def friction(
@@ -31,7 +26,6 @@ def friction(
 ) -> None:
     """Identify Coulomb and viscous friction from constant feeds in both directions."""
     from hil.bench.bench_file import load_bench
-    from hil.commands.run import named
     from hil.commands.warm_up import compile_kernels
     from hil.errors import InputError
     from hil.files.output import default_folder, new_folder
@@ -45,21 +39,19 @@ def friction(
             "friction: given neither or both of a recording and --profile, allowed one; "
             "give a recording, or --profile with --bench to run it"
         )
-    load = load_bench if profile is None else load_simulated
-    believed = load(bench) if bench else None
-    if run is None and believed is None:
+    if bench is None and run is None:
         raise InputError("friction: --bench is missing; give the bench that --profile runs on")
+    believed = None
+    if bench is not None:
+        believed = load_bench(bench) if profile is None else load_simulated(bench)
     folder = folder or default_folder(f"friction-{(run or Path(str(bench))).stem}")
     if run is None:
         compile_kernels()
     with new_folder(folder) as part, progress() as tell:
-        if run is None:
-            assert believed is not None
-            assert bench is not None
-            assert profile is not None
+        if bench is not None and profile is not None:
             tell("running the feed sweep")
-            with named(bench, profile):
-                run = _run(believed, profile, part, virtual)
+            run = _run(bench, profile, part, virtual)
+        assert run is not None
         recording = read_run(run)
         if believed is None and "bench" in recording.metadata:
             believed = bench_of(recording)
@@ -70,12 +62,15 @@ def friction(
     out.print(f"\n{verdict(result, believed)}\n\nReport: {folder / 'friction.html'}")
 
 
-def _run(bench: Bench, profile: Path, folder: Path, virtual: bool) -> Path:
+def _run(bench: str, profile: Path, folder: Path, virtual: bool) -> Path:
+    from hil.commands.run import named
     from hil.errors import HilError
     from hil.loop.run import run_profile
+    from hil.loop.simulated_bench import load_simulated
     from hil.motion.profile import load_profile
 
-    ran = run_profile(bench, load_profile(profile), folder, "run", virtual=virtual)
+    with named(bench, profile):
+        ran = run_profile(load_simulated(bench), load_profile(profile), folder, "run", virtual=virtual)
     if not ran.complete or ran.recording is None:
         raise HilError(f"the feed sweep was not completed: {ran.outcome.ending}: {ran.outcome.reason}")
     return ran.recording

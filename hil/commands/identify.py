@@ -22,6 +22,7 @@ def identify(
     from hil.drafting.bench_text import bench_text
     from hil.drafting.draft_bench import draft_bench
     from hil.errors import InputError
+    from hil.files.output import write_text
 
     target = target or Path(f"{run.stem}.yaml")
     if target.exists():
@@ -31,10 +32,7 @@ def identify(
     recording = read_run(run)
     compile_kernels()
     draft = draft_bench(recording)
-    try:
-        target.write_text(bench_text(draft), encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{target}: cannot be written ({error}); choose a folder with rights and space") from None
+    write_text(target, bench_text(draft))
     load_bench(target)
     values = [*draft.axis, *draft.control]
     rows = [

@@ -18,8 +18,7 @@ def import_(
         typer.Option(
             "--map",
             help="Map of columns and units (YAML), or name of a shipped map: emps. Default: a map is drafted from "
-            "the file "
-            "and written beside the result.",
+            "the file and written beside the result.",
             show_default=False,
         ),
     ] = None,
@@ -66,6 +65,7 @@ def import_(
 def _drafted(source: Path, target: Path, rate_hz: float | None, axis: str | None) -> Path:
     """Draft a map beside the recording to write; return its path."""
     from hil.errors import InputError
+    from hil.files.output import write_text
     from hil.importing.draft_map import draft_map
     from hil.importing.map_text import map_text
 
@@ -73,10 +73,7 @@ def _drafted(source: Path, target: Path, rate_hz: float | None, axis: str | None
     if path.exists():
         raise InputError(f"{path}: the map exists and is not overwritten; import with --map {path}, or remove it")
     draft = draft_map(source, rate_hz, axis)
-    try:
-        path.write_text(map_text(draft), encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error}); choose a folder with rights and space") from None
+    write_text(path, map_text(draft))
     out.print(f"Map: {path}")
     if draft.unsure:
         err.print("Please check in the map:")

@@ -4,23 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from hil.compiled.kernel_cache import provide_kernel_cache
 from hil.report.console import out, progress
-
-_PROFILE = {
-    "schema_version": 1,
-    "limits": {"velocity_m_s": 0.1, "acceleration_m_s2": 1.0, "jerk_m_s3": 100.0},
-    "segments": [
-        {"kind": "dwell", "duration_s": 0.1},
-        {"kind": "sine_squared", "to_m": 0.01, "feed_m_s": 0.05},
-        {"kind": "dwell", "duration_s": 0.1},
-    ],
-}
 
 
 def warm_up() -> None:
     """Compile all kernels now, so that no later command has to; for images and services."""
     compile_kernels()
-    out.print(f"All kernels are compiled in {_folder()}")
+    out.print(f"All kernels are compiled in {provide_kernel_cache()}")
 
 
 def compile_kernels() -> None:
@@ -35,11 +26,11 @@ def compile_kernels() -> None:
         from hil.api import simulate
         from hil.bench.bench_file import load_bench
         from hil.control import cascade
-        from hil.motion.profile import Profile
         from hil.motion.trajectory import plan
+        from hil.validation.proof.draw.demo import from_rest, there_and_back
 
         bench = load_bench("reference")
-        motion = plan(Profile.model_validate(_PROFILE), bench.period_s)
+        motion = plan(from_rest("", there_and_back(0.01, 0.05)), bench.period_s)
         recording = simulate(bench, motion)
         tell(task, 0.5)
         bench.twin().simulate(motion.position_m, motion.velocity_m_s)  # read-only, of which numba makes another kernel
@@ -63,13 +54,7 @@ def kernels_are_compiled() -> bool:
 
 
 def _mark() -> Path:
-    return _folder() / "compiled.txt"
-
-
-def _folder() -> Path:
-    from hil.compiled.kernel_cache import provide_kernel_cache
-
-    return provide_kernel_cache()
+    return provide_kernel_cache() / "compiled.txt"
 
 
 def _versions() -> str:

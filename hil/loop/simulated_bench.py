@@ -64,7 +64,7 @@ def make_plant(bench: Bench, seed: int | None = None) -> Plant:
     seed = simulation.seed if seed is None else seed
     if not isinstance(seed, SupportsIndex) or seed.__index__() < 0:
         raise FieldError(("simulation", "seed"), f"given {seed!r}, allowed a whole number, 0 or more; correct it")
-    axis = _true_axis(bench.axis, simulation)
+    axis = true_axis(bench.axis, simulation)
     effects = []
     for number, entry in enumerate(simulation.effects):
         at = ("simulation", "effects", number)
@@ -120,7 +120,8 @@ class SimulatedNodes:
             self.serial.close()
 
 
-def _true_axis(believed: Axis, simulation: SimulationSection) -> AxisTruth:
+def true_axis(believed: Axis, simulation: SimulationSection) -> AxisTruth:
+    """Return the simulated axis: that of the bench file with the true values of `simulation`."""
     try:
         axis = type(believed).model_validate(believed.model_dump() | simulation.axis)
     except ValidationError as error:

@@ -14,7 +14,7 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.errors import FieldError
-from hil.motion.pieces import Array, Motion, MotionLimits, MotionPhase, Move, Piece, Ramp
+from hil.motion.pieces import Array, Motion, MotionLimits, Move, Piece, Ramp
 from hil.motion.sine_squared import ramp_duration_s
 
 # 64 samples per shortest period miss a peak by at most 1 - cos(pi/64) = 0.12 %
@@ -102,7 +102,6 @@ class Wave:
     """A windowed signal on a constant feed."""
 
     duration_s: float
-    phase: MotionPhase
     position_m: float
     feed_m_s: float
     scale_m: float  # metres per unit of the signal
@@ -140,7 +139,7 @@ def excitation(
             ("base_feed_m_s",),
             f"given {feed_m_s:.6g}, allowed less than {limits.velocity_m_s:.6g} m/s in magnitude; lower the feed",
         )
-    wave = Wave(duration_s, MotionPhase.EXCITATION, 0.0, 0.0, 1.0, fade_s, signal)
+    wave = Wave(duration_s, 0.0, 0.0, 1.0, fade_s, signal)
     samples = math.ceil(duration_s * signal.highest_frequency_hz * SAMPLES_PER_PERIOD) + 1
     motion = wave.at(np.linspace(0, duration_s, samples))
     largest_m, *peaks = (float(np.abs(values).max()) for values in motion)
@@ -161,9 +160,9 @@ def excitation(
     pieces: tuple[Piece, ...] = (wave,)
     if feed_m_s:
         pieces = (
-            Ramp(ramp_s, MotionPhase.ACCELERATION, start_m, 0.0, feed_m_s),
+            Ramp(ramp_s, start_m, 0.0, feed_m_s),
             wave,
-            Ramp(ramp_s, MotionPhase.DECELERATION, end_m, feed_m_s, 0.0),
+            Ramp(ramp_s, end_m, feed_m_s, 0.0),
         )
     return Move(pieces, end_m + feed_m_s * ramp_s / 2, notes, signal.highest_frequency_hz)
 

@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass
-from enum import IntEnum
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -12,17 +11,6 @@ from hil.errors import FieldError
 
 Array = FloatArray
 MAX_DURATION_S = 3600.0  # of a trajectory, which is held in memory
-
-
-class MotionPhase(IntEnum):
-    """Kind of motion at a set-point; stored as one byte per sample of a trajectory."""
-
-    STANDSTILL = 0
-    ACCELERATION = 1
-    CONSTANT_FEED = 2
-    DECELERATION = 3
-    REVERSAL = 4
-    EXCITATION = 5
 
 
 class Motion(NamedTuple):
@@ -53,8 +41,6 @@ class Piece(Protocol):
 
     @property
     def duration_s(self) -> float: ...
-    @property
-    def phase(self) -> MotionPhase: ...
 
     def at(self, time_s: Array) -> Motion:
         """Set-points at times within the piece."""
@@ -65,7 +51,6 @@ class Cubic:
     """Constant jerk: rest, constant feed, and the sections of ruckig."""
 
     duration_s: float
-    phase: MotionPhase
     position_m: float
     velocity_m_s: float = 0.0
     acceleration_m_s2: float = 0.0
@@ -81,7 +66,6 @@ class Ramp:
     """Change of velocity by the square of a sine, v = v0 + dv sin^2(pi t/(2 T)); see hil.motion.sine_squared."""
 
     duration_s: float
-    phase: MotionPhase
     position_m: float
     velocity_m_s: float
     end_velocity_m_s: float
@@ -119,4 +103,4 @@ def end_m(piece: Piece) -> float:
 
 def dwell(start_m: float, duration_s: float) -> Move:
     """Rest at start_m."""
-    return Move((Cubic(duration_s, MotionPhase.STANDSTILL, start_m),), start_m)
+    return Move((Cubic(duration_s, start_m),), start_m)

@@ -15,7 +15,7 @@ from hil.errors import FieldError, FieldPath
 from hil.motion.excitation import Chirp, Multisine, Spectrum, excitation
 from hil.motion.pieces import MotionLimits, Move, dwell
 from hil.motion.sine_squared import ramp_duration_s, reversals, sine_squared
-from hil.motion.time_optimal import MotionState, jog, point_to_point
+from hil.motion.time_optimal import jog, point_to_point
 
 Positive = Annotated[float, Field(gt=0)]
 Position = Annotated[float, Field(ge=-100, le=100)]
@@ -82,7 +82,7 @@ class ApproachSegment(_Travel):
     kind: Literal["approach"]
 
     def move(self, start_m: float, limits: MotionLimits) -> Move:
-        return point_to_point(MotionState(start_m), self.target_m(start_m), self.lowered(limits, self.feed_m_s))
+        return point_to_point(start_m, self.target_m(start_m), self.lowered(limits, self.feed_m_s))
 
 
 class DwellSegment(Part):

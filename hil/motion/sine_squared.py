@@ -13,7 +13,7 @@ both ends.
 import math
 
 from hil.errors import FieldError
-from hil.motion.pieces import Cubic, MotionLimits, MotionPhase, Move, Piece, Ramp
+from hil.motion.pieces import Cubic, MotionLimits, Move, Piece, Ramp
 
 
 def ramp_duration_s(step_m_s: float, limits: MotionLimits) -> float:
@@ -52,10 +52,10 @@ def sine_squared(start_m: float, end_m: float, limits: MotionLimits) -> Move:
         )
     velocity = math.copysign(feed, end_m - start_m)
     ramp_m = velocity * ramp_s / 2
-    pieces: list[Piece] = [Ramp(ramp_s, MotionPhase.ACCELERATION, start_m, 0.0, velocity)]
+    pieces: list[Piece] = [Ramp(ramp_s, start_m, 0.0, velocity)]
     if constant_s > 0:
-        pieces.append(Cubic(constant_s, MotionPhase.CONSTANT_FEED, start_m + ramp_m, velocity))
-    pieces.append(Ramp(ramp_s, MotionPhase.DECELERATION, end_m - ramp_m, velocity, 0.0))
+        pieces.append(Cubic(constant_s, start_m + ramp_m, velocity))
+    pieces.append(Ramp(ramp_s, end_m - ramp_m, velocity, 0.0))
     return Move(tuple(pieces), end_m, notes)
 
 
@@ -74,17 +74,15 @@ def reversals(start_m: float, stroke_m: float, cycles: int, limits: MotionLimits
             f"given {_feed(abs(feed))}, allowed a feed that the limits let turn "
             f"within {abs(stroke_m) * 1e3:.6g} mm; lower the feed or lengthen the stroke",
         )
-    pieces: list[Piece] = [Ramp(start_s, MotionPhase.ACCELERATION, start_m, 0.0, feed)]
+    pieces: list[Piece] = [Ramp(start_s, start_m, 0.0, feed)]
     position, velocity = start_m + ramp_m, feed
     for leg in range(1, 2 * cycles + 1):
         end_m = start_m if leg % 2 == 0 else start_m + stroke_m
         last = leg == 2 * cycles
         constant_end_m = end_m - math.copysign(ramp_m if last else turn_m, velocity)
-        pieces.append(Cubic((constant_end_m - position) / velocity, MotionPhase.CONSTANT_FEED, position, velocity))
+        pieces.append(Cubic((constant_end_m - position) / velocity, position, velocity))
         pieces.append(
-            Ramp(start_s, MotionPhase.DECELERATION, constant_end_m, velocity, 0.0)
-            if last
-            else Ramp(turn_s, MotionPhase.REVERSAL, constant_end_m, velocity, -velocity)
+            Ramp(start_s, constant_end_m, velocity, 0.0) if last else Ramp(turn_s, constant_end_m, velocity, -velocity)
         )
         position, velocity = constant_end_m, -velocity
     return Move(tuple(pieces), start_m)

@@ -1,4 +1,4 @@
-"""Time-optimal motion by ruckig: duration bound, approach, jog, stops and new targets from any state.
+"""Time-optimal motion by ruckig: approach, jog, and stops from any state.
 
 Its trajectories have the jerk -J, 0 or +J; each section becomes one Cubic piece, so that set-points are
 evaluated in closed form like those of every other move. (Berscheid, Kroeger: Jerk-limited real-time
@@ -14,13 +14,9 @@ from typing import NamedTuple
 import ruckig
 
 from hil.errors import FieldError, HilError, InputError
-from hil.motion.pieces import Cubic, MotionLimits, MotionPhase, Move, Piece, end_m
+from hil.motion.pieces import Cubic, MotionLimits, Move, Piece, end_m
 
 END_TOLERANCE_M = 1e-10
-
-
-class _Unsolved(HilError):
-    """ruckig finds no trajectory."""
 
 
 class MotionState(NamedTuple):
@@ -31,25 +27,18 @@ class MotionState(NamedTuple):
     acceleration_m_s2: float = 0.0
 
 
-def point_to_point(state: MotionState, target_m: float, limits: MotionLimits) -> Move:
-    """Time-optimal motion from any state to rest at target_m.
+def point_to_point(start_m: float, target_m: float, limits: MotionLimits) -> Move:
+    """Time-optimal motion from rest to rest at target_m.
 
-    Some states far beyond their limits ruckig cannot solve in one go; then the axis stops first and a note
-    says so. Raises InputError for a number that is not finite, HilError when ruckig finds no move from rest.
+    Raises InputError for a number that is not finite, HilError if ruckig finds no trajectory.
     """
-    order = _order(state, limits)
+    order = _order(MotionState(start_m), limits)
     order.target_position = [_finite("target_m", target_m)]
-    try:
-        pieces: tuple[Piece, ...] = _solve(order)
-        notes: tuple[str, ...] = ()
-    except _Unsolved:
-        if not (state.velocity_m_s or state.acceleration_m_s2):
-            raise
-        pieces, notes = stop(state, limits).pieces, ("stops first: ruckig finds no direct way to the target",)
-    # ruckig itself accepts 1e-8 m; a second, tiny move from the rest reached closes the remaining distance
+    pieces = _solve(order)
+    # ruckig itself accepts 1e-8 m; a second, tiny move closes the remaining distance
     if pieces and abs(end_m(pieces[-1]) - target_m) > END_TOLERANCE_M * max(1.0, abs(target_m)):
-        pieces += point_to_point(MotionState(end_m(pieces[-1])), target_m, limits).pieces
-    return Move(pieces, target_m, notes)
+        pieces += point_to_point(end_m(pieces[-1]), target_m, limits).pieces
+    return Move(pieces, target_m)
 
 
 def stop(state: MotionState, limits: MotionLimits) -> Move:
@@ -79,14 +68,9 @@ def jog(start_m: float, velocity_m_s: float, duration_s: float, limits: MotionLi
             f"given {duration_s:.6g} s, allowed at least {speed_up.duration_s:.6g} s "
             f"to reach {velocity_m_s:.6g} m/s; raise it or lower the velocity",
         )
-    constant = Cubic(constant_s, MotionPhase.CONSTANT_FEED, speed_up.end_m, velocity_m_s)
+    constant = Cubic(constant_s, speed_up.end_m, velocity_m_s)
     slow_down = stop(MotionState(end_m(constant), velocity_m_s), limits)
     return Move((*speed_up.pieces, constant, *slow_down.pieces), slow_down.end_m)
-
-
-def time_optimal_duration_s(stroke_m: float, limits: MotionLimits) -> float:
-    """Duration [s] that no move from rest to rest over the stroke within the limits can go below."""
-    return point_to_point(MotionState(0.0), stroke_m, limits).duration_s
 
 
 def _order(state: MotionState, limits: MotionLimits) -> ruckig.InputParameter:
@@ -100,34 +84,22 @@ def _order(state: MotionState, limits: MotionLimits) -> ruckig.InputParameter:
     return order
 
 
-def _unsolved(order: ruckig.InputParameter) -> _Unsolved:
-    limits = f"{order.max_velocity[0]:g} m/s, {order.max_acceleration[0]:g} m/s^2, {order.max_jerk[0]:g} m/s^3"
-    return _Unsolved(f"ruckig finds no trajectory within {limits}")
-
-
-def _solve(order: ruckig.InputParameter) -> tuple[Cubic, ...]:
+def _solve(order: ruckig.InputParameter) -> tuple[Piece, ...]:
     trajectory = ruckig.Trajectory(1)
     try:
-        result = ruckig.Ruckig(1).calculate(order, trajectory)
+        solved = ruckig.Ruckig(1).calculate(order, trajectory) in (ruckig.Result.Working, ruckig.Result.Finished)
     except ruckig.RuckigError:
-        raise _unsolved(order) from None
-    if result not in (ruckig.Result.Working, ruckig.Result.Finished):
-        raise _unsolved(order)
+        solved = False
+    if not solved:
+        limits = f"{order.max_velocity[0]:g} m/s, {order.max_acceleration[0]:g} m/s^2, {order.max_jerk[0]:g} m/s^3"
+        raise HilError(f"ruckig finds no trajectory within {limits}")
     profile = trajectory.profiles[0][0]
     return tuple(
-        Cubic(t, _phase(t, v, a, j), p, v, a, j)
+        Cubic(t, p, v, a, j)
         for part in (profile.brake, profile)
         for t, p, v, a, j in zip(part.t, part.p, part.v, part.a, part.j, strict=False)
         if t > 0
     )
-
-
-def _phase(duration_s: float, velocity: float, acceleration: float, jerk: float) -> MotionPhase:
-    mean_acceleration = acceleration + jerk * duration_s / 2
-    mean_velocity = velocity + duration_s * (acceleration / 2 + jerk * duration_s / 6)
-    if abs(mean_acceleration) < 1e-9 and jerk == 0:
-        return MotionPhase.CONSTANT_FEED if mean_velocity else MotionPhase.STANDSTILL
-    return MotionPhase.ACCELERATION if mean_acceleration * mean_velocity > 0 else MotionPhase.DECELERATION
 
 
 def _finite(name: str, value: float) -> float:

@@ -1,7 +1,7 @@
 """Trajectories: the set-points of every tick, computed before the motion starts.
 
 Moves of a profile have sine-squared velocity ramps, as the path generator of the source (`hil.motion.sine_squared`).
-Approach, jog, stops and new targets are time-optimal (`hil.motion.time_optimal`). Both are evaluated in closed form;
+Approach, jog and stops are time-optimal (`hil.motion.time_optimal`). Both are evaluated in closed form;
 no derivative is numerical.
 """
 
@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -17,13 +17,11 @@ from numpy.typing import NDArray
 
 from hil.errors import FieldError, InputError, field_name
 from hil.figures.panels import COMMAND, Line, Panel
-from hil.motion.pieces import MAX_DURATION_S, Array, Cubic, Motion, MotionLimits, MotionPhase, Move
-from hil.motion.time_optimal import MotionState, point_to_point, stop, time_optimal_duration_s
+from hil.motion.pieces import MAX_DURATION_S, Array, Cubic, Motion, MotionLimits, Move
+from hil.motion.time_optimal import MotionState, point_to_point, stop
 
 if TYPE_CHECKING:
     from hil.motion.profile import Profile
-
-__all__ = ["SegmentRun", "Trajectory", "plan", "replan", "stop_from", "time_optimal_duration_s"]
 
 APPROACH = "approach to start"
 MAX_POSITION_M = 100.0  # as in a profile
@@ -45,8 +43,7 @@ class SegmentRun(NamedTuple):
 class Trajectory:
     """Set-points at t = k period_s; arrays of one length, read-only.
 
-    `segment` indexes `runs`, `phase` holds values of hil.motion.pieces.MotionPhase. The last sample is at rest.
-    `notes` say what was changed to hold the limits.
+    `segment` indexes `runs`. The last sample is at rest. `notes` say what was changed to hold the limits.
     """
 
     period_s: float
@@ -56,13 +53,11 @@ class Trajectory:
     acceleration_m_s2: Array
     jerk_m_s3: Array
     segment: NDArray[np.int32]
-    phase: NDArray[np.uint8]
     runs: tuple[SegmentRun, ...]
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
+        for value in vars(self).values():
             if isinstance(value, np.ndarray):
                 value.setflags(write=False)
 
@@ -83,6 +78,13 @@ class Trajectory:
     @property
     def duration_s(self) -> float:
         return float(self.time_s[-1])
+
+    def first(self, rows: int) -> Trajectory:
+        """Return the first rows."""
+        arrays: dict[str, Any] = {
+            name: value[:rows] for name, value in vars(self).items() if isinstance(value, np.ndarray)
+        }
+        return replace(self, **arrays)
 
     def plot(self) -> Any:
         """Draw position, velocity, acceleration and jerk over time; returns a matplotlib Figure."""
@@ -117,7 +119,7 @@ def plan(profile: Profile, period_s: float, start_m: float | None = None) -> Tra
     notes: list[str] = []
     slot = 0
     if start_m is not None and start_m != profile.start_m:
-        approach = point_to_point(MotionState(start_m), profile.start_m, profile.motion_limits)
+        approach = point_to_point(start_m, profile.start_m, profile.motion_limits)
         profile.check_position(("start_m",), min(start_m, profile.start_m), max(start_m, profile.start_m))
         timed.append((0.0, APPROACH, "approach", 0, approach))
         slot = profile.slots(approach)
@@ -148,31 +150,15 @@ def stop_from(
     A velocity or acceleration beyond its limit is brought back in the shortest time. Raises InputError for
     values that are not finite and for a state so far beyond the limits that it takes more than an hour.
     """
-    state = MotionState(position_m, velocity_m_s, acceleration_m_s2)
-    return _single("stop", stop(state, limits), state, limits, period_s)
-
-
-def replan(
-    position_m: float,
-    velocity_m_s: float,
-    acceleration_m_s2: float,
-    target_m: float,
-    limits: MotionLimits,
-    period_s: float,
-) -> Trajectory:
-    """Time-optimal motion from any state to rest at target_m; states beyond the limits as in stop_from."""
-    state = MotionState(position_m, velocity_m_s, acceleration_m_s2)
-    return _single("replan", point_to_point(state, target_m, limits), state, limits, period_s)
-
-
-def _single(name: str, move: Move, state: MotionState, limits: MotionLimits, period_s: float) -> Trajectory:
     _check_period(period_s)
+    state = MotionState(position_m, velocity_m_s, acceleration_m_s2)
+    move = stop(state, limits)
     if move.duration_s > MAX_DURATION_S:
         raise InputError(
-            f"{name}: given {state}, from which it takes {move.duration_s:.6g} s within {limits}, "
+            f"stop: given {state}, from which it takes {move.duration_s:.6g} s within {limits}, "
             f"allowed up to {MAX_DURATION_S:.0f} s; raise the limits"
         )
-    run = SegmentRun(name, name, 0, 0.0, move.duration_s)
+    run = SegmentRun("stop", "stop", 0, 0.0, move.duration_s)
     return _sampled([move], (run,), period_s, move.notes)
 
 
@@ -187,21 +173,19 @@ def _sampled(
     time_s: Array = np.arange(count, dtype=np.float64) * period_s
     motion = Motion(*(np.zeros(count) for _ in range(4)))
     segment = np.zeros(count, np.int32)
-    phase = np.zeros(count, np.uint8)
     for index, (move, run) in enumerate(zip(moves, runs, strict=True)):
         start = round(run.start_s / period_s, 9)  # in ticks; whole where the grid is, so that laps are bit-identical
         end = count if index == len(runs) - 1 else _first_tick(run.end_s / period_s)
         segment[_first_tick(start) : end] = index
         begin_s = 0.0
-        for piece in (*move.pieces, Cubic(run.end_s - run.start_s, MotionPhase.STANDSTILL, move.end_m)):
+        for piece in (*move.pieces, Cubic(run.end_s - run.start_s, move.end_m)):
             end_s = begin_s + piece.duration_s
             ticks = slice(_first_tick(start + begin_s / period_s), min(end, _first_tick(start + end_s / period_s)))
             within_s = np.clip((np.arange(ticks.start, ticks.stop) - start) * period_s - begin_s, 0.0, piece.duration_s)
             for whole, part in zip(motion, piece.at(within_s), strict=True):
                 whole[ticks] = part
-            phase[ticks] = piece.phase
             begin_s = end_s
-    return Trajectory(period_s, time_s, *motion, segment, phase, runs, notes)
+    return Trajectory(period_s, time_s, *motion, segment, runs, notes)
 
 
 def _first_tick(instant: float) -> int:

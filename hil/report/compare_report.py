@@ -1,5 +1,6 @@
 """Report of `hil compare`: page, pictures, numbers, and the bench with fitted parameters."""
 
+import math
 from pathlib import Path
 
 from hil.bench.axis_models import OneMass
@@ -14,7 +15,7 @@ from hil.identification.nominal_fit import FitResult
 from hil.identification.terms import ambiguous
 from hil.quantities import change, digits, percent, quantity
 from hil.report import plots
-from hil.report.page import Number, Page
+from hil.report.page import Page
 
 PARAMETER_HEADERS = ("parameter", "bench file", "fitted", "standard error", "change")
 
@@ -36,6 +37,7 @@ def write_comparison(result: Comparison, folder: Path) -> None:
     page.table(
         ("block", "input", "output", "rms deviation", "largest deviation", "relative", "rms / noise"),
         [_block_row(block) for block in result.blocks],
+        left=(0, 1, 2),
     )
     page.plot(plots.over_time(time_s, block_panels(result), [150, 120] * len(result.blocks)))
     if result.fit is not None:
@@ -67,17 +69,17 @@ def rows_of(result: Comparison) -> list[tuple[str, ...]]:
 
 
 def parameter_rows(fit: FitResult) -> list[tuple[str, ...]]:
-    """Rows of the table of fitted parameters: name, bench file, fitted, standard error, change."""
+    """Rows of the table of fitted parameters with `PARAMETER_HEADERS`."""
     return [
-        (
-            parameter.name,
-            Number(digits(parameter.nominal, 4)),
-            Number(digits(parameter.value, 5)),
-            Number("at its bound" if parameter.at_bound else digits(parameter.standard_error, 2)),
-            Number(change(parameter.value, parameter.nominal)),
-        )
-        for parameter in fit.parameters
+        (one.name, *fitted_cells(one.nominal, one.value, math.inf if one.at_bound else one.standard_error))
+        for one in fit.parameters
     ]
+
+
+def fitted_cells(nominal: float, value: float, error: float) -> tuple[str, str, str, str]:
+    """Cells of a fitted value: bench file, fitted, standard error (infinite: at its bound), change."""
+    shown = "at its bound" if math.isinf(error) else digits(error, 2)
+    return digits(nominal, 4), digits(value, 5), shown, change(value, nominal)
 
 
 def verdict(result: Comparison) -> str:
@@ -123,24 +125,21 @@ def _lead(result: Comparison) -> str:
     )
 
 
-def _figures(deviation: Deviation) -> tuple[Number, ...]:
+def _figures(deviation: Deviation) -> tuple[str, str, str]:
     """Cells of rms, largest and relative deviation."""
-    rms, peak = (Number(quantity(value, deviation.unit)) for value in (deviation.rms, deviation.peak))
-    return rms, peak, Number(percent(deviation.relative))
+    unit = deviation.unit
+    return quantity(deviation.rms, unit), quantity(deviation.peak, unit), percent(deviation.relative)
 
 
 def _block_row(block: BlockDeviation) -> tuple[str, ...]:
     deviation = block.deviation
     over_noise = digits(deviation.rms / block.noise) if block.noise > 0.0 else "–"
-    return deviation.name, block.inputs, deviation.label, *_figures(deviation), Number(over_noise)
+    return deviation.name, block.inputs, deviation.label, *_figures(deviation), over_noise
 
 
 def _fit(page: Page, fit: FitResult) -> None:
     page.heading("Fitted parameters")
-    page.table(
-        PARAMETER_HEADERS,
-        parameter_rows(fit),
-    )
+    page.table(PARAMETER_HEADERS, parameter_rows(fit))
     page.text(
         "Fitted block by block as in hil diagnose, within a factor of three of the bench file, and in no channel worse "
         "than it. Standard errors count what the model leaves, with its correlation; a parameter at its bound is not "
@@ -166,8 +165,6 @@ def _inverse_dynamics(page: Page, result: Comparison, fit: InverseDynamics) -> N
     )
     page.table(
         ("parameter", "unit", "value", "standard error", "bench file"),
-        [
-            (name, unit, Number(digits(value, 5)), Number(digits(error, 2)), Number(digits(nominal, 5)))
-            for name, unit, value, error, nominal in rows
-        ],
+        [(*names, digits(value, 5), digits(error, 2), digits(nominal, 5)) for *names, value, error, nominal in rows],
+        left=(0, 1),
     )

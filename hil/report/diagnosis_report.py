@@ -13,11 +13,11 @@ from hil.diagnosis.wording import label, title, titles, where
 from hil.figures.drawing import save
 from hil.files.output import write_json
 from hil.motion.profile import write_profile
-from hil.quantities import change, digits, percent, quantity, reading_unit
+from hil.quantities import digits, percent, quantity, reading_unit
 from hil.report import plots
-from hil.report.compare_report import write_bench
+from hil.report.compare_report import fitted_cells, write_bench
 from hil.report.ledger_report import ledger_section
-from hil.report.page import Number, Page
+from hil.report.page import Page
 from hil.twin.library import BY_ID
 
 _FIT_HEADERS = (
@@ -107,16 +107,18 @@ def _finding(page: Page, diagnosis: Diagnosis, index: int, folder: Path) -> None
     page.table(
         ("parameter", "value", "standard error", "unit"),
         [(name, *_value(entry, scaled=not finding.windows)) for name, entry in finding.parameters.items()],
+        left=(0, 3),
     )
     if len(finding.windows) > 1:
         unit = finding.windows[0].strength.unit
-        page.table(("recording", "from [s]", "to [s]", f"strength [{unit}]"), _windows(finding))
+        page.table(("recording", "from [s]", "to [s]", f"strength [{unit}]"), _windows(finding), left=range(4))
     if finding.equivalents:
         page.text(f"This motion cannot distinguish it from: {titles(finding.equivalents)}.")
     if finding.rivals:
         page.table(
             ("alternative", "compared with this finding"),
             [(title(rival.effect), rival.evidence) for rival in finding.rivals],
+            left=(0, 1),
         )
 
 
@@ -130,8 +132,8 @@ def _change(page: Page, diagnosis: Diagnosis, folder: Path) -> None:
     for one in change.parameters:
         factor, unit = reading_unit(one.values[0].unit, max(abs(entry.value) for entry in one.values))
         cells = (f"{digits(entry.value * factor, 4)} ± {digits(entry.std * factor, 2)}" for entry in one.values)
-        rows.append((one.name, *map(Number, cells), unit))
-    page.table(("parameter", *change.parts, "unit"), rows)
+        rows.append((one.name, *cells, unit))
+    page.table(("parameter", *change.parts, "unit"), rows, left=(0, 1 + len(change.parts)))
     page.text(
         "The tables below are of one set of parameters for all recordings. No parameter of the axis is corrected."
     )
@@ -156,6 +158,7 @@ def _fit(page: Page, diagnosis: Diagnosis, folder: Path) -> None:
             for what, found in (("training", entry.train), ("held out", entry.validate_))
             if found is not None
         ],
+        left=(0, 1, 2),
     )
     run = (*diagnosis.held_out.runs, *diagnosis.train.runs)[0]
     save(diagnosis.plot("residuals"), folder / "residuals.png")
@@ -172,8 +175,8 @@ def _fit(page: Page, diagnosis: Diagnosis, folder: Path) -> None:
         [
             (
                 label(ablation.term, diagnosis.given_bench),
-                Number(f"{digits(ablation.train)} ×"),
-                Number(f"{digits(ablation.held_out)} ×" if ablation.held_out is not None else "–"),
+                f"{digits(ablation.train)} ×",
+                f"{digits(ablation.held_out)} ×" if ablation.held_out is not None else "–",
                 answer,
             )
             for answer, found in (("yes", kept), ("no", dropped))
@@ -196,27 +199,17 @@ def torque_line(left: TorqueLeft) -> str:
 
 
 def _corrections(page: Page, result: Result) -> None:
-    if not result.parameter_corrections and not result.not_identifiable:
+    rows = [
+        (name, one.unit, *fitted_cells(one.nominal, one.value, one.std))
+        for name, one in result.parameter_corrections.items()
+    ]
+    if not rows and not result.not_identifiable:
         return
     page.heading("Parameters of the bench")
     if result.not_identifiable:
         page.text(f"Not identifiable from this motion: {', '.join(result.not_identifiable)}.")
-    if not result.parameter_corrections:
-        return
-    page.table(
-        ("parameter", "unit", "bench file", "fitted", "standard error", "change"),
-        [
-            (
-                name,
-                entry.unit,
-                Number(digits(entry.nominal, 4)),
-                Number(digits(entry.value, 5)),
-                Number(digits(entry.std, 2)),
-                Number(change(entry.value, entry.nominal)),
-            )
-            for name, entry in result.parameter_corrections.items()
-        ],
-    )
+    if rows:
+        page.table(("parameter", "unit", "bench file", "fitted", "standard error", "change"), rows, left=(0, 1))
 
 
 def _next_experiment(page: Page, diagnosis: Diagnosis, folder: Path) -> None:
@@ -239,11 +232,11 @@ def _no_experiment(result: Result) -> str:
 def _value(entry: Value, scaled: bool = True) -> tuple[str, ...]:
     """Cells of a value, its standard error, and the unit in which both are shown: the SI unit if not `scaled`."""
     factor, unit = reading_unit(entry.unit, entry.value) if scaled else (1.0, entry.unit)
-    return Number(digits(entry.value * factor, 4)), Number(digits(entry.std * factor, 2)), unit
+    return digits(entry.value * factor, 4), digits(entry.std * factor, 2), unit
 
 
-def _figures(found: FitFigures, unit: str) -> list[Number]:
+def _figures(found: FitFigures, unit: str) -> list[str]:
     """Cells of a channel's rms values, and the last over the noise floor."""
     values = (found.owner_rms, found.before_rms, found.after_rms, found.noise_floor_rms)
     over_floor = digits(found.after_rms / found.noise_floor_rms) if found.noise_floor_rms > 0.0 else "–"
-    return [*(Number("unstable" if value is None else quantity(value, unit)) for value in values), Number(over_floor)]
+    return [*("unstable" if value is None else quantity(value, unit) for value in values), over_floor]

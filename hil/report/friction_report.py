@@ -10,7 +10,7 @@ from hil.figures.drawing import save
 from hil.files.output import write_json
 from hil.identification.friction import FrictionResult
 from hil.quantities import change, digits, quantity
-from hil.report.page import Number, Page
+from hil.report.page import Page
 
 SCHEMA_VERSION = 1
 
@@ -30,10 +30,7 @@ def write_friction(result: FrictionResult, name: str, bench: Bench | None, folde
         f"At constant feed the acceleration is zero: mean {units.quantity} = Coulomb × sign(speed) + viscous × speed "
         f"+ offset. The points scatter by {quantity(result.residual_rms, units.coulomb)} rms about the line."
     )
-    page.table(
-        ("", "value", "standard error", "bench file"),
-        [(row[0], *(Number(text) for text in row[1:])) for row in rows_of(result, bench)],
-    )
+    page.table(("", "value", "standard error", "bench file"), rows_of(result, bench))
     page.picture(
         save(result.plot(), folder / "friction.png"),
         f"Mean motor {units.quantity} over speed with the regression line; below, the residuals.",
@@ -50,12 +47,13 @@ def write_friction(result: FrictionResult, name: str, bench: Bench | None, folde
             "averaged over [s]",
         ),
         [
-            tuple(
-                Number(digits(value, 4))
+            [
+                digits(value, 4)
                 for value in (point.speed, point.torque, torque, point.feed_m_s * 60.0, point.start_s, point.duration_s)
-            )
+            ]
             for point, torque in zip(result.points, line.tolist(), strict=True)
         ],
+        left=(),
     )
     write_json(
         folder / "friction.json",

@@ -23,6 +23,7 @@ def ledger_section(page: Page, result: Result) -> None:
         page.table(
             ("rule", "accepted", "what was found"),
             [(answer.rule, "yes" if answer.accepted else "no", answer.text) for answer in one.rules],
+            left=(0, 2),
             mark=1,
         )
     page.text(f"{len(result.considered)} fits of mechanisms were considered; diagnosis.json has the ledger of each.")

@@ -1,7 +1,7 @@
 """Page of results: one HTML file that opens without a network, verdict at the top."""
 
 import base64
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +12,6 @@ from hil.figures.panels import GOOD, WARNING
 from hil.files.output import write_text
 
 _TEMPLATE = Path(__file__).with_name("page.html.j2")
-
-
-class Number(str):
-    """Text of a table cell that is a number: aligned to the right."""
 
 
 class Page:
@@ -38,10 +34,16 @@ class Page:
         """Add a list."""
         self._parts.append(("items", list(texts)))
 
-    def table(self, headers: Sequence[str], rows: Sequence[Sequence[str]], mark: int | None = None) -> None:
-        """Add a table. Columns of `Number` cells are aligned to the right. In column `mark`, "yes" and "reproduced"
-        are green, other texts orange."""
-        right = [bool(rows) and all(isinstance(row[i], Number) for row in rows) for i in range(len(headers))]
+    def table(
+        self,
+        headers: Sequence[str],
+        rows: Sequence[Sequence[str]],
+        left: Collection[int] = (0,),
+        mark: int | None = None,
+    ) -> None:
+        """Add a table. The columns `left` hold text, the others numbers, aligned to the right. In column `mark`, "yes"
+        and "reproduced" are green, other texts orange."""
+        right = [bool(rows) and at not in left and at != mark for at in range(len(headers))]
         self._parts.append(("table", {"headers": headers, "rows": rows, "right": right, "mark": mark}))
 
     def plot(self, model: Any) -> None:

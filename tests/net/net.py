@@ -30,9 +30,9 @@ from hil.bench.bench_file import Bench, load_bench
 from hil.diagnosis.diagnose import diagnose
 from hil.importing.by_map import import_recording
 from hil.recording.recording import Recording, read_recording, write_parquet
-from hil.validation.proof.answer.worker_pool import side_by_side
 from hil.validation.proof.draw.expected import same_law
 from hil.validation.proof.draw.generator import draw
+from hil.validation.proof.worker_pool import side_by_side
 
 HERE = Path(__file__).parent
 REFERENCE = HERE / "answers.json"
@@ -52,10 +52,10 @@ def main() -> int:
     options = parser.parse_args()
     cases = [case for case in read_cases() if options.only in case["name"]]
     todo = [Path(case["name"]) for case in cases if not answer_file(options.out, case["name"]).exists()]
-    for number, name in enumerate(side_by_side(partial(answer, out=options.out), todo, options.jobs), 1):
-        path = answer_file(options.out, name)
+    for number, done in enumerate(side_by_side(partial(answer, out=options.out), todo, options.jobs), 1):
+        path = answer_file(options.out, done.name)
         print(
-            f"[{number}/{len(todo)}] {name}: {line(json.loads(path.read_text())) if path.exists() else SKIPPED}",
+            f"[{number}/{len(todo)}] {done.name}: {line(json.loads(path.read_text())) if path.exists() else SKIPPED}",
             flush=True,
         )
     found = {

@@ -17,7 +17,7 @@ from hil.loop.clock import VirtualClock
 from hil.loop.devices import Rig
 from hil.loop.session import Session
 from hil.recording.writer import Recorder
-from hil.validation.benchmarks.axis import moves, trajectory, twenty_modes
+from hil.validation.benchmarks.axis import MOVES, trajectory, twenty_modes
 from hil.validation.benchmarks.figure import Figure, Reference, ReferenceKind, percentile
 
 LOOPS = 4
@@ -67,8 +67,8 @@ class Stopwatch(VirtualClock):
 
 
 def whole_cycle(interface: str) -> tuple[list[float], list[float]]:
-    """Durations [s] of the cycles of several runs on a bus, and of the excluded work of the devices."""
-    bench, profile = twenty_modes(interface), moves()
+    """Return durations [s] of the cycles of several runs on a bus, and of the excluded work of the devices."""
+    bench, limits = twenty_modes(interface), MOVES.motion_limits
     motion = trajectory(bench.gains.period_s)
     durations: list[float] = []
     devices: list[float] = []
@@ -78,9 +78,9 @@ def whole_cycle(interface: str) -> tuple[list[float], list[float]]:
             rig.set_up()
             if rig.ports:
                 watch.serve_apart(rig)
-            cycle = make_cycle(rig, 0.0, profile.motion_limits)
+            cycle = make_cycle(rig, 0.0, limits)
             with Recorder(folder, "bench", cycle.channels, bench.gains.period_s, {}) as recorder:
-                Session(rig, cycle, motion, profile.motion_limits, watch, recorder).run()
+                Session(rig, cycle, motion, limits, watch, recorder).run()
         if run:  # the first one compiles
             durations += [1e-9 * duration for duration in watch.durations_ns]
             devices += [1e-9 * duration for duration in watch.devices_ns]
@@ -88,8 +88,10 @@ def whole_cycle(interface: str) -> tuple[list[float], list[float]]:
 
 
 def frames_alone() -> tuple[float, float]:
-    """Median times [s] in which python-can alone carries the frames of a cycle on its virtual bus: what the loop's end
-    takes to send SYNC and RPDO and to receive two TPDOs, and both ends together."""
+    """Return the median times [s] in which python-can alone carries the frames of a cycle on its virtual bus.
+
+    What the loop's end takes to send SYNC and RPDO and to receive two TPDOs, and both ends together.
+    """
     config = BusConfig("virtual", "hil-bench-frames")
     sync = can.Message(arbitration_id=0x080, is_extended_id=False)
     pdo = can.Message(arbitration_id=0x205, data=bytes(8), is_extended_id=False)
@@ -114,7 +116,7 @@ def frames_alone() -> tuple[float, float]:
 
 
 def figures() -> list[Figure]:
-    """Cycle times on the in-process bus and through python-can."""
+    """Return cycle times on the in-process bus and through python-can."""
     inside, _ = whole_cycle("inprocess")
     outside, devices = whole_cycle("virtual")
     both = [sum(pair) for pair in zip(outside, devices, strict=True)]

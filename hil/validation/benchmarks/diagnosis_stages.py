@@ -6,6 +6,7 @@ The stages are told apart by the steps that the diagnosis itself announces; kern
 import subprocess
 import sys
 import tempfile
+from collections import defaultdict
 from pathlib import Path
 from time import perf_counter
 
@@ -39,7 +40,7 @@ class StageWatch:
     """Sums the time of each stage; called with the text of each step as it begins."""
 
     def __init__(self) -> None:
-        self.seconds: dict[str, float] = {}
+        self.seconds = defaultdict[str, float](float)
         self._stage, self._since = "", 0.0
 
     def __call__(self, step: str) -> None:
@@ -51,7 +52,7 @@ class StageWatch:
         """End the running stage."""
         now = perf_counter()
         if self._stage:
-            self.seconds[self._stage] = self.seconds.get(self._stage, 0.0) + now - self._since
+            self.seconds[self._stage] += now - self._since
         self._stage, self._since = "", now
 
 

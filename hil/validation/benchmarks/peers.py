@@ -6,7 +6,6 @@ constraint (`frictionloss`) and the loops at their periods. Each is optional and
 """
 
 from collections.abc import Callable
-from dataclasses import fields, replace
 from math import tanh
 from typing import Any
 
@@ -135,7 +134,8 @@ PEERS: tuple[tuple[str, _Peer], ...] = (
 
 def figures() -> list[Figure]:
     """Speed of the twin beside that of each peer that is installed."""
-    axis, motion = PeerAxis(), _first_second(trajectory(two_mass().gains.period_s))
+    axis, motion = PeerAxis(), trajectory(two_mass().gains.period_s)
+    motion = motion.first(round(DURATION_S / motion.period_s) + 1)
 
     def simulate() -> FloatArray:
         return axis.twin.simulate(motion.position_m, motion.velocity_m_s).table_position_m
@@ -161,10 +161,3 @@ def figures() -> list[Figure]:
             beside=tuple(beside),
         )
     ]
-
-
-def _first_second(motion: Trajectory) -> Trajectory:
-    rows = slice(round(DURATION_S / motion.period_s) + 1)
-    columns: dict[str, Any] = {field.name: getattr(motion, field.name) for field in fields(motion)}
-    arrays: dict[str, Any] = {name: values[rows] for name, values in columns.items() if isinstance(values, np.ndarray)}
-    return replace(motion, **arrays)

@@ -14,12 +14,12 @@ from hil.loop.virtual import compiled_ticks
 from hil.motion.trajectory import Trajectory
 from hil.recording.writer import Recorder
 from hil.twin.axis import Twin
-from hil.validation.benchmarks.axis import moves, trajectory, twenty_modes, two_mass
+from hil.validation.benchmarks.axis import MOVES, trajectory, twenty_modes, two_mass
 from hil.validation.benchmarks.figure import Figure, Reference, ReferenceKind, best_of
 
 REPEATS = 5
 ALONE_TICKS = 4000
-TWIN_LAPS, TWIN_REPEATS = 10, 15
+TWIN_REPEATS = 15
 
 
 def whole_bench(*, compiled: bool) -> float:
@@ -31,7 +31,7 @@ def whole_bench(*, compiled: bool) -> float:
 
 def _one_run(bench: Bench, motion: Trajectory, compiled: bool) -> float:
     """Duration [s] of one run. Nothing of a run is left for the next: freeing a ring of rows takes 1.4 ms."""
-    limits = moves().motion_limits
+    limits = MOVES.motion_limits
     with Rig(bench) as rig, tempfile.TemporaryDirectory() as folder:
         rig.set_up()
         cycle = make_cycle(rig, rig.drive.read(0.0).motor_position_rad, limits)
@@ -44,7 +44,7 @@ def _one_run(bench: Bench, motion: Trajectory, compiled: bool) -> float:
 
 def offline_twin(twin: Twin) -> float:
     """Times real time: a twin in closed loop over the moves."""
-    motion = trajectory(twin.gains.period_s, TWIN_LAPS)
+    motion = trajectory(twin.gains.period_s)
     seconds = best_of(lambda: twin.simulate(motion.position_m, motion.velocity_m_s), TWIN_REPEATS)
     return motion.duration_s / seconds
 

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from hil.quantities import digits
-from hil.report.page import Number, Page
+from hil.report.page import Page
 from hil.validation.paper import PaperResult, Reproduction
 
 
@@ -19,17 +19,10 @@ def write_paper(result: PaperResult, folder: Path) -> None:
     page.table(
         ("where", "quantity", "unit", "printed", "computed", "outcome", "why they differ"),
         [
-            (
-                row.where,
-                row.quantity,
-                row.unit,
-                Number(_value(row.printed)),
-                Number(_value(row.computed)),
-                row.verdict.value,
-                row.why,
-            )
+            (row.where, row.quantity, row.unit, _value(row.printed), _value(row.computed), row.verdict.value, row.why)
             for row in result.rows
         ],
+        left=(0, 1, 2, 6),
         mark=5,
     )
     page.heading("Modal matrix of the 7-dof model")
@@ -37,7 +30,7 @@ def write_paper(result: PaperResult, folder: Path) -> None:
     page.table(
         ("coordinate", *(f"{digits(float(hz))} Hz" for hz in result.frequencies_hz)),
         [
-            (name, *(Number(digits(float(value))) for value in row))
+            (name, *(digits(float(value)) for value in row))
             for name, row in zip(result.coordinates, result.modal_matrix, strict=True)
         ],
     )

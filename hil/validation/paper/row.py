@@ -44,13 +44,8 @@ class Row:
 
 def row(key: str, computed: float | None, printed: float | None = None, **details: Any) -> Row:
     """Build a row from the words of rows.yaml; `printed` for values worked out from a printed formula."""
-    words = _WORDS[key]
+    words = {"printed": printed, **_WORDS[key]}
     return Row(
-        words["where"],
-        words["quantity"].format(**details),
-        words["unit"],
-        words.get("printed") if printed is None else printed,
-        None if computed is None else float(computed),
-        words["tolerance"],
-        words["why"].format(**details),
+        computed=None if computed is None else float(computed),
+        **words | {text: words[text].format(**details) for text in ("quantity", "why")},
     )

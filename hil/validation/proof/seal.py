@@ -12,14 +12,12 @@ import json
 import os
 import shutil
 import subprocess
-from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from functools import partial
-from multiprocessing import get_context
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from hil.errors import HilError, InputError
 from hil.files.output import write_json
@@ -28,12 +26,11 @@ from hil.validation.proof.code import code_sha256, versions
 from hil.validation.proof.draw.generator import Truth, draw, write
 from hil.validation.proof.draw.mujoco_plant import draw_mujoco
 from hil.validation.proof.draw.plan import Planned
+from hil.validation.proof.worker_pool import side_by_side
 
 CASES, SEALED, SEAL = "cases", "sealed", "seal.json"
 _TRUTHS = f"{SEALED}/truths.json"
 _PACKAGE = Path(__file__).parents[2]
-
-_Argument = TypeVar("_Argument")
 
 
 def draw_cases(
@@ -48,38 +45,16 @@ def draw_cases(
         part = _part(folder, case.name)
         if not part.exists():
             todo.append(case)
-        elif {key: json.loads(part.read_text())["truth"][key] for key in ("tier", "number", "seed")} != {
-            "tier": case.tier,
-            "number": case.number,
-            "seed": seed,
-        }:
+            continue
+        truth = json.loads(part.read_text())["truth"]
+        if (truth["tier"], truth["number"], truth["seed"]) != (case.tier, case.number, seed):
             raise InputError(
                 f"{part}: given a case of another plan, allowed one of --seed {seed} and as many --cases; "
                 "give another --out"
             )
-    before = len(planned) - len(todo)
-    in_processes(
-        partial(_draw, folder, seed, plant),
-        todo,
-        jobs,
-        lambda done: progress("drawing cases", (before + done) / len(planned)),
-    )
-
-
-def in_processes(
-    work: Callable[[_Argument], None], todo: Sequence[_Argument], jobs: int, done: Callable[[int], None]
-) -> None:
-    """Call `work` for each argument in `jobs` processes; `done` gets the count so far."""
-    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
-        running = [pool.submit(work, argument) for argument in todo]
-        try:
-            for count, result in enumerate(as_completed(running), 1):
-                result.result()
-                done(count)
-        except BaseException:
-            for result in running:
-                result.cancel()
-            raise
+    drawn = side_by_side(partial(_draw, folder, seed, plant), todo, jobs)
+    for done, _ in enumerate(drawn, len(planned) - len(todo) + 1):
+        progress("drawing cases", done / len(planned))
 
 
 def seal(folder: Path, planned: Sequence[Planned], command: str, seed: int) -> dict[str, Any]:

@@ -18,7 +18,8 @@ from hil.motion.trajectory import plan
 from hil.recording.recording import write_parquet
 from hil.report.console import Progress
 from hil.validation.proof.draw.generator import Truth, draw, rerun
-from hil.validation.proof.seal import CASES, in_processes
+from hil.validation.proof.seal import CASES
+from hil.validation.proof.worker_pool import side_by_side
 
 AGAIN = "again"
 _NEW = "train_3"
@@ -35,12 +36,8 @@ def record_again(folder: Path, answers: Path, truths: Mapping[str, Truth], jobs:
         if truth.tier == "ambiguous" and (answers / name / NEXT_EXPERIMENT).exists()
     ]
     todo = [truths[name] for name in names if not (folder / AGAIN / CASES / name).exists()]
-    in_processes(
-        partial(_record, folder, answers),
-        todo,
-        jobs,
-        lambda done: progress("running proposed motions", done / len(todo)),
-    )
+    for done, _ in enumerate(side_by_side(partial(_record, folder, answers), todo, jobs), 1):
+        progress("running proposed motions", done / len(todo))
     return names
 
 

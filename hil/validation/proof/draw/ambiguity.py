@@ -27,16 +27,13 @@ _STEPS = 4  # of weakening until they cannot be separated
 
 def ambiguous(rng: Rng, effect: str | None, kind: Kind | None) -> CaseDraft | None:
     """Draft an effect, its rival, and motions that detect them but cannot separate them."""
-    if effect is not None and effect not in _EFFECTS:
-        raise ValueError(f"effect: must be one of {', '.join(sorted(_EFFECTS))}, got {effect!r}")
     on = stage(rng, kind)
     couple, how = _COUPLES[int(rng.integers(len(_COUPLES)))]
     found = couple(on.scale, rng)
     if found is None or effect not in (None, found[0].id):
         return None
     first, second = found  # the effect and its rival
-    first_run, second_run, last_run = (motions.poor(rng, on.axis, how) for _ in range(3))
-    runs = (first_run, second_run, last_run)
+    runs = motions.poor(rng, on.axis, how)
     sizes = EffectSizes(on.axis, runs[:2])
     for _ in range(_STEPS):
         size = sizes.size([first])
@@ -103,14 +100,4 @@ _COUPLES: tuple[tuple[Couple, Poor], ...] = (
     (_spring_or_load, "local"),
     (_encoder_or_screw, "slow"),
     (_scale_or_screw, "slow"),
-)
-_EFFECTS = frozenset(
-    {
-        "cogging_torque",
-        "position_dependent_friction",
-        "spring_load",
-        "encoder_eccentricity",
-        "periodic_lead_error",
-        "scale_interpolation_error",
-    }
 )

@@ -17,7 +17,7 @@ from drivers.sim.reality import record
 from drivers.sim.sensors import Sensors
 from drivers.sim.servo import Servo, VelocityEstimate
 from hil.bench.bench_file import Bench
-from hil.validation.proof.draw.axis_kinds import KINDS, PARAMETERS, TRUTH, Kind, Rng, log_uniform, rigid_inertia
+from hil.validation.proof.draw.axis_kinds import KINDS, PARAMETERS, Kind, Rng, log_uniform, rigid_inertia, truth_of
 
 Belief = Literal["exact", "wrong"]
 
@@ -51,17 +51,7 @@ class DrawnAxis:
 
     def with_parameters(self, changes: Mapping[str, float]) -> AxisTruth:
         """Return the axis with other true parameters."""
-        return TRUTH[self.kind](dict(self.true) | dict(changes))
-
-    @cached_property
-    def bench(self) -> Bench:
-        """The bench as in the owner's file."""
-        return self._bench(self.believed)
-
-    @property
-    def true_bench(self) -> Bench:
-        """The bench with the true parameters."""
-        return self._bench(self.true)
+        return truth_of(self.kind, {**self.true, **changes})
 
     @property
     def nominal(self) -> tuple[str, ...]:
@@ -84,7 +74,9 @@ class DrawnAxis:
         motor_m = 2 * pi / self.sensors.motor_counts_per_rev * self.truth.screw_ratio_m_rad
         return sqrt((self.sensors.table_resolution_m**2 + motor_m**2) / 12 + self.sensors.table_noise_m**2)
 
-    def _bench(self, axis: Mapping[str, Any]) -> Bench:
+    @cached_property
+    def bench(self) -> Bench:
+        """The bench as in the owner's file."""
         servo, linear = self.servo, self.kind == "one_mass"
         control = {
             "position_gain_1_s": servo.position_gain_1_s,
@@ -105,7 +97,7 @@ class DrawnAxis:
         return Bench.model_validate(
             {
                 "name": "axis",
-                "axis": {"model": self.kind, **axis},
+                "axis": {"model": self.kind, **self.believed},
                 "control": control,
                 "encoders": {"motor": motor, "table": table},
                 # the owner knows the limits of the axis even if a recording does not reach them
@@ -137,7 +129,7 @@ def _drawn(rng: Rng, kind: Kind, belief: Belief, hard: bool) -> DrawnAxis:
     position_every = int(rng.choice((1, 2, 4)))
     feed_m_s = min(rng.uniform(0.15, 0.35) * sqrt(true.get("lead_m", 0.01) / 0.01), 0.45)
     acceleration = rng.uniform(1.0, 3.0)
-    truth = TRUTH[kind](true)
+    truth = truth_of(kind, true)
     servo = _servo(rng, truth, feed_m_s, acceleration, period_s, position_every)
     sensors = Sensors(
         motor_counts_per_rev=2.0 ** int(rng.integers(15, 18) if hard else rng.integers(17, 24)),

@@ -5,12 +5,17 @@ from math import exp, log, pi
 from typing import Any, Literal
 
 import numpy as np
+from pydantic import TypeAdapter
 
-from drivers.sim.axis import AxisTruth, one_mass, serial_chain, seven_dof, two_mass
+from drivers.sim.axis import AxisTruth
+from hil.bench.axis_models import Axis
+from hil.bench.hardware import SimulationSection
+from hil.loop.simulated_bench import true_axis
 
 Rng = np.random.Generator
 Kind = Literal["two_mass", "seven_dof", "serial_chain", "one_mass"]
 KINDS: dict[Kind, float] = {"two_mass": 0.5, "seven_dof": 0.2, "serial_chain": 0.1, "one_mass": 0.2}  # shares
+_SECTION: TypeAdapter[Axis] = TypeAdapter(Axis)
 LEADS_M = (0.005, 0.010, 0.016, 0.020)
 
 
@@ -57,7 +62,7 @@ def _seven_dof(rng: Rng) -> dict[str, Any]:
         "coulomb_torque_n_m": 1.0,
         "viscous_torque_n_m_s_rad": 0.0,
     }
-    return true | _friction(rng, rigid_inertia(_seven_dof_truth(true)), true["lead_m"])
+    return true | _friction(rng, rigid_inertia(truth_of("seven_dof", true)), true["lead_m"])
 
 
 def _serial_chain(rng: Rng) -> dict[str, Any]:
@@ -96,29 +101,15 @@ def _friction(rng: Rng, inertia_kg_m2: float, lead_m: float) -> dict[str, float]
     }
 
 
+def truth_of(kind: Kind, true: Mapping[str, Any]) -> AxisTruth:
+    """Return the simulated axis with parameters by the names of a bench file."""
+    return true_axis(_SECTION.validate_python({"model": kind, **true}), SimulationSection())
+
+
 def rigid_inertia(truth: AxisTruth) -> float:
     """Return the inertia at the motor [kg m^2, kg] of the rigid axis, without the axial mass of the screw."""
     still = truth.mass_kg[truth.nut.axial] if truth.nut is not None and truth.nut.axial >= 0 else 0.0
     return float((sum(truth.mass_kg) - still) * truth.drive_ratio_m_rad**2)
-
-
-def _seven_dof_truth(p: Mapping[str, Any]) -> AxisTruth:
-    # parameters that a bench file does not name: reconstruction of the source's Table 1
-    return seven_dof(
-        lead_m=p["lead_m"], inertia_kg_m2=(p["motor_inertia_kg_m2"], 1.04e-4, 4.89e-5, 6.62e-4),
-        axial_mass_kg=(5.25, 3.49, p["table_mass_kg"]),
-        torsional_stiffness_n_m_rad=(3.94e4, p["coupling_stiffness_n_m_rad"], 4.17e3),
-        axial_stiffness_n_m=(1.96e8, 6.40e8, p["nut_support_stiffness_n_m"]), damping_ratio=p["damping_ratio"],
-        coulomb_torque_n_m=p["coulomb_torque_n_m"], viscous_torque_n_m_s_rad=p["viscous_torque_n_m_s_rad"])  # fmt: skip
-
-
-def _serial_truth(p: Mapping[str, Any]) -> AxisTruth:
-    square = (p["lead_m"] / (2 * pi)) ** 2
-    return serial_chain(
-        [p["inertia_scale"] * value / square for value in p["inertias_kg_m2"]],
-        [p["stiffness_scale"] * value / square for value in p["stiffnesses_n_m_rad"]],
-        lead_m=p["lead_m"], damping_ratio=p["damping_ratio"], coulomb_torque_n_m=p["coulomb_torque_n_m"],
-        viscous_torque_n_m_s_rad=p["viscous_torque_n_m_s_rad"])  # fmt: skip
 
 
 PARAMETERS: dict[Kind, Callable[[Rng], dict[str, Any]]] = {
@@ -126,10 +117,4 @@ PARAMETERS: dict[Kind, Callable[[Rng], dict[str, Any]]] = {
     "seven_dof": _seven_dof,
     "serial_chain": _serial_chain,
     "one_mass": _one_mass,
-}
-TRUTH: dict[Kind, Callable[[Mapping[str, Any]], AxisTruth]] = {
-    "two_mass": lambda p: two_mass(**p),
-    "seven_dof": _seven_dof_truth,
-    "serial_chain": _serial_truth,
-    "one_mass": lambda p: one_mass(p["mass_kg"], p["coulomb_force_n"], p["viscous_force_n_s_m"], p["screw_lead_m"]),
 }

@@ -4,15 +4,14 @@ from dataclasses import dataclass
 
 from drivers.sim.effects import Effect
 from drivers.sim.packing import StepTooLong
-from hil.motion.trajectory import Trajectory
 from hil.validation.proof.draw import motions
 from hil.validation.proof.draw.axes import Belief, DrawnAxis, draw_axis
 from hil.validation.proof.draw.axis_kinds import Kind, Rng, log_uniform
 from hil.validation.proof.draw.effect_size import EffectSizes
-from hil.validation.proof.draw.effects import LIBRARY, DrawScale, applicable, draw_effect, scaled
+from hil.validation.proof.draw.effects import DrawScale, applicable, draw_effect, scaled
+from hil.validation.proof.draw.motions import Runs
 from hil.validation.proof.draw.unknown_effects import EncoderFault
 
-Runs = tuple[Trajectory, Trajectory, Trajectory]
 Sizes = tuple[float, float]
 Sized = tuple[Effect, float]
 TRIES = 8  # draws on one axis before it is scaled or given up
@@ -50,25 +49,18 @@ class AxisOnMotions:
 def stage(rng: Rng, kind: Kind | None, belief: Belief = "wrong", hard: bool = False) -> AxisOnMotions:
     """Draw an axis and its motions."""
     axis = draw_axis(rng, kind, belief, hard)
-    train = motions.training(rng, axis)
-    sizes = EffectSizes(axis, train)
-    scale = DrawScale(axis, sizes.peak_torque(), min(motion.duration_s for motion in train))
-    return AxisOnMotions(axis, (*train, motions.holdout(rng, axis)), sizes, scale)
+    runs = motions.good(rng, axis)
+    sizes = EffectSizes(axis, runs[:2])
+    scale = DrawScale(axis, sizes.peak_torque(), min(motion.duration_s for motion in runs[:2]))
+    return AxisOnMotions(axis, runs, sizes, scale)
 
 
-def name_on(axis: DrawnAxis, effect: str | None, forced: bool, rng: Rng) -> str | None:
-    """Return the wanted effect, or any; None if it needs another kind of axis.
-
-    Raises ValueError for an effect that no axis has, or that the `forced` kind lacks.
-    """
+def name_on(axis: DrawnAxis, effect: str | None, rng: Rng) -> str | None:
+    """Return the wanted effect, or any; None if it needs another kind of axis."""
     names = applicable(axis)
     if effect is None:
         return str(rng.choice(names))
-    if effect in names:
-        return effect
-    if forced or effect not in LIBRARY:
-        raise ValueError(f"effect: must be one of {', '.join(names if forced else LIBRARY)}, got {effect!r}")
-    return None
+    return effect if effect in names else None
 
 
 def one(rng: Rng, on: AxisOnMotions, name: str, sizes: Sizes) -> CaseDraft | None:

@@ -21,7 +21,8 @@ def _reversal(stroke_m: float, feed_m_s: float) -> list[dict[str, Any]]:
     return [{"kind": "reversal", "stroke_m": stroke_m, "feed_m_s": feed_m_s}, REST]
 
 
-def _there_and_back(to_m: float, feed_m_s: float) -> list[dict[str, Any]]:
+def there_and_back(to_m: float, feed_m_s: float) -> list[dict[str, Any]]:
+    """Return the segments of a move to a position and back to 0, each with a rest."""
     return [
         part
         for target in (to_m, 0.0)
@@ -29,23 +30,24 @@ def _there_and_back(to_m: float, feed_m_s: float) -> list[dict[str, Any]]:
     ]
 
 
-def _profile(description: str, segments: list[dict[str, Any]]) -> Profile:
+def from_rest(description: str, segments: list[dict[str, Any]]) -> Profile:
+    """Return a profile that begins with a rest."""
     return Profile.model_validate(
         {"schema_version": 1, "description": description, "limits": LIMITS, "segments": [REST, *segments]}
     )
 
 
-LEARN = _profile(
+LEARN = from_rest(
     "creep through reversals, 100 mm at 7 and 22 m/min there and back",
     [
         *_reversal(0.002, 0.004),
         *_reversal(0.01, 0.02),
-        *_there_and_back(0.1, 0.116667),
-        {"kind": "repeat", "times": 2, "segments": _there_and_back(0.1, 0.366667)},
+        *there_and_back(0.1, 0.116667),
+        {"kind": "repeat", "times": 2, "segments": there_and_back(0.1, 0.366667)},
     ],
 )
-PROVE = _profile(
-    "another creep, 80 mm at 12 m/min there and back", [*_reversal(0.004, 0.008), *_there_and_back(0.08, 0.2)]
+PROVE = from_rest(
+    "another creep, 80 mm at 12 m/min there and back", [*_reversal(0.004, 0.008), *there_and_back(0.08, 0.2)]
 )
 
 # Effects to conceal: parameters by name with the range of the draw. Usual values of axes in service, well above the

@@ -11,6 +11,7 @@ from typing import Any, cast
 
 import numpy as np
 import yaml
+from pydantic import TypeAdapter
 
 from drivers.sim.effects import Effect
 from drivers.sim.reality import record
@@ -30,14 +31,7 @@ from hil.validation.proof.draw.tiers import RECIPES
 from hil.validation.proof.draw.unknown_effects import NOVEL
 
 TIERS = tuple(RECIPES)
-BALANCED = {
-    "single": LIBRARY,
-    "ladder": LIBRARY,
-    "pair": LIBRARY,
-    "masked": LIBRARY,
-    "novel": NOVEL,
-    "less_known": LIBRARY,
-}
+BALANCED = {**dict.fromkeys(("single", "ladder", "pair", "masked", "less_known"), LIBRARY), "novel": NOVEL}
 RECORDINGS = ("train_1", "train_2", "holdout")
 _AXES = 300  # draws before a request counts as impossible
 # An engineer would stop an axis with more than this following error beyond that of the law, or share of limited torque.
@@ -108,10 +102,7 @@ class Truth:
     @classmethod
     def from_json(cls, data: dict[str, Any]) -> "Truth":
         """Return the truth from plain data."""
-        effects = tuple(Concealed(**{**effect, "same_law": tuple(effect["same_law"])}) for effect in data["effects"])
-        return cls(
-            **{**data, "effects": effects, "rivals": tuple(data["rivals"]), "not_testable": tuple(data["not_testable"])}
-        )
+        return TypeAdapter(cls).validate_python(data)
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,10 +120,14 @@ def draw(tier: str, number: int, seed: int, effect: str | None = None, axis: Kin
     """Draw the case of a tier, number and seed; the same arguments give the same case.
 
     `effect` and `axis` fix what the tier would choose. Without them, consecutive numbers of a tier take all its effects
-    equally often. Raises ValueError for an unknown tier, and for an effect that the tier or kind of axis lacks.
+    equally often. Raises ValueError for an unknown tier, for an effect that the tier or kind of axis lacks, and if no
+    axis gave a case.
     """
     if tier not in RECIPES:
         raise ValueError(f"tier: must be one of {', '.join(TIERS)}, got {tier!r}")
+    allowed = () if tier in ("null", "parameters_only") else BALANCED.get(tier, LIBRARY)
+    if effect is not None and effect not in allowed:
+        raise ValueError(f"effect: must be one of {', '.join(allowed) or 'none'} in the tier {tier}, got {effect!r}")
     rng = np.random.default_rng([seed, number, TIERS.index(tier)])
     if effect is None and axis is None and tier in BALANCED:
         effect = _turn(BALANCED[tier], number, seed)
@@ -183,23 +178,14 @@ def truth_of(name: str, tier: str, number: int, seed: int, draft: CaseDraft) -> 
     """Return the truth of a draft."""
     axis = draft.axis
     noise = {"torque": axis.sensors.torque_noise_n_m} | ({"table_m": axis.table_noise_m} if axis.has_table else {})
-    concealed = tuple(
-        Concealed(
-            effect.id,
-            effect.form,
-            dict(effect.parameters),
-            size,
-            expected.same_law(effect.id),
-            expected.block(effect.id),
-            expected.place(effect, axis),
-            expected.compared(effect, axis),
-        )
-        for effect, size in draft.effects
-    )
-    answer = (draft.verdict, concealed, draft.rivals, draft.not_testable)
-    return Truth(
-        name, tier, number, seed, axis.kind, *answer, dict(axis.true), dict(axis.believed), noise, draft.forgotten
-    )
+    concealed = []
+    for effect, size in draft.effects:
+        drawn = effect.id, effect.form, dict(effect.parameters), size
+        right = expected.same_law(effect.id), expected.block(effect.id), expected.place(effect, axis)
+        concealed.append(Concealed(*drawn, *right, expected.compared(effect, axis)))
+    answer = draft.verdict, tuple(concealed), draft.rivals, draft.not_testable
+    parameters = dict(axis.true), dict(axis.believed), noise
+    return Truth(name, tier, number, seed, axis.kind, *answer, *parameters, draft.forgotten)
 
 
 def _turn(names: tuple[str, ...], number: int, seed: int) -> str:

@@ -4,16 +4,14 @@ A good motion has the full travel, several feeds both ways, creep through revers
 accelerations. All are made of sine-squared moves (`hil.motion.profile`), from rest to rest.
 """
 
-from dataclasses import replace
 from typing import Any, Literal, get_args
-
-import numpy as np
 
 from hil.motion.profile import Profile
 from hil.motion.trajectory import Trajectory, plan
 from hil.validation.proof.draw.axes import JERK_M_S3, DrawnAxis
 from hil.validation.proof.draw.axis_kinds import Rng, log_uniform
 
+Runs = tuple[Trajectory, Trajectory, Trajectory]  # two for training, one to hold out
 Poor = Literal["one_way", "local", "slow"]
 POOR: tuple[Poor, ...] = get_args(Poor)
 TRAINING_S, SHORT_S, HOLDOUT_S = 18.0, 12.0, 12.0
@@ -21,22 +19,22 @@ _CREEP_M_S = (0.6e-3, 12e-3)
 _TRIES = 5  # draws that do not fit into the time before a motion counts as full
 
 
-def training(rng: Rng, axis: DrawnAxis) -> tuple[Trajectory, Trajectory]:
-    """Draw two motions, a long and a short one."""
-    return _good(rng, axis, TRAINING_S), _good(rng, axis, SHORT_S)
+def good(rng: Rng, axis: DrawnAxis) -> Runs:
+    """Draw a long and a short motion for training, and one with other feeds, strokes and positions to hold out."""
+    return _good(rng, axis, TRAINING_S), _good(rng, axis, SHORT_S), _good(rng, axis, HOLDOUT_S)
 
 
-def holdout(rng: Rng, axis: DrawnAxis) -> Trajectory:
-    """Draw a motion with other feeds, strokes and positions."""
-    return _good(rng, axis, HOLDOUT_S)
+def poor(rng: Rng, axis: DrawnAxis, kind: Poor) -> Runs:
+    """Draw three motions with little excitation: one stroke in one direction, recorded until shortly before its end;
+    strokes of about 1 mm in one place; or one low feed back and forth with low acceleration."""
+    return _poor(rng, axis, kind), _poor(rng, axis, kind), _poor(rng, axis, kind)
 
 
-def poor(rng: Rng, axis: DrawnAxis, kind: Poor) -> Trajectory:
-    """Draw a motion with little excitation: one stroke in one direction, recorded until shortly before its end; strokes
-    of about 1 mm in one place; or one low feed back and forth with low acceleration."""
+def _poor(rng: Rng, axis: DrawnAxis, kind: Poor) -> Trajectory:
     if kind == "one_way":
         feed = axis.travel_m / rng.uniform(4.0, 8.0)
-        return _cut(_planned(axis, [_rest(0.2), _to(axis.travel_m, feed)]), 0.95)
+        whole = _planned(axis, [_rest(0.2), _to(axis.travel_m, feed)])
+        return whole.first(round(0.95 * len(whole)))
     if kind == "local":
         stroke, feed = rng.uniform(0.5e-3, 2e-3), axis.feed_m_s * rng.uniform(0.02, 0.05)
         laps = [_stroke(stroke, feed), _rest(0.1), _stroke(-stroke, feed), _rest(0.1)]
@@ -116,12 +114,3 @@ def _seconds(axis: DrawnAxis, segments: list[dict[str, Any]]) -> float:
 
 def _planned(axis: DrawnAxis, segments: list[dict[str, Any]], gentle: float = 1.0) -> Trajectory:
     return plan(_profile(axis, segments, gentle), axis.period_s)
-
-
-def _cut(trajectory: Trajectory, share: float) -> Trajectory:
-    """Return the first part of a trajectory."""
-    rows = slice(0, round(share * len(trajectory)))
-    arrays: dict[str, Any] = {
-        name: value[rows] for name, value in vars(trajectory).items() if isinstance(value, np.ndarray)
-    }
-    return replace(trajectory, **arrays)

@@ -47,9 +47,9 @@ EFFECTS = (
 )
 
 
-def xml(axis: DrawnAxis, effect: Effect | None, step_s: float = STEP_S) -> str:
+def xml(axis: DrawnAxis, effect: Effect | None) -> str:
     """Return the model with those effects that MuJoCo has."""
-    stiff = f'"{2.0 * step_s} 1"'  # solref: the least time constant that is stable
+    stiff = f'"{2.0 * STEP_S} 1"'  # solref: the least time constant that is stable
     name = effect.id if effect is not None else None
     true, ratio = axis.true, axis.truth.screw_ratio_m_rad
     motor, table = true["motor_mass_kg"] * ratio**2, true["table_mass_kg"]
@@ -76,7 +76,7 @@ def xml(axis: DrawnAxis, effect: Effect | None, step_s: float = STEP_S) -> str:
         )
     weight = _own(effect, "constant_load", "load_torque_n_m") / ratio / table
     friction = f'solreffriction={stiff} solimpfriction="{_HARD} {_HARD} 1"'
-    return f"""<mujoco><option timestep="{step_s}" gravity="{-weight} 0 0" integrator="implicitfast" solver="Newton"
+    return f"""<mujoco><option timestep="{STEP_S}" gravity="{-weight} 0 0" integrator="implicitfast" solver="Newton"
     iterations="50" tolerance="1e-12"><flag autoreset="disable"/></option><compiler autolimits="false"/><worldbody>
   <body><joint name="motor" type="hinge" axis="1 0 0" damping="{(1.0 - share) * viscous}"
     frictionloss="{(1.0 - share) * coulomb}" {friction}/>{_inertial(1e-3, motor)}</body>

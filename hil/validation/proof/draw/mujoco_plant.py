@@ -56,9 +56,7 @@ def _draft(name: str | None, rng: Rng) -> CaseDraft:
             return draft
 
 
-def record_mujoco(
-    axis: DrawnAxis, effect: Effect | None, run: Trajectory, seed: int, name: str = "run", step_s: float = STEP_S
-) -> Recording:
+def record_mujoco(axis: DrawnAxis, effect: Effect | None, run: Trajectory, seed: int, name: str = "run") -> Recording:
     """Record a two-mass axis with at most one effect over set-points, from rest at the first one.
 
     Raises HilError if MuJoCo is not installed or the axis leaves its path, ValueError for another axis or effect.
@@ -74,9 +72,9 @@ def record_mujoco(
         raise HilError(
             f"{error.name} is not installed, allowed is the simulated plant; install it with: make peers"
         ) from None
-    model = mujoco.MjModel.from_xml_string(xml(axis, effect, step_s))
+    model = mujoco.MjModel.from_xml_string(xml(axis, effect))
     data, act = mujoco.MjData(model), acting(axis, effect)
-    gains, steps, count = axis.bench.gains, round(axis.period_s / step_s), len(run)
+    gains, steps, count = axis.bench.gains, round(axis.period_s / STEP_S), len(run)
     motor_count, table_count = 2.0 * pi / axis.sensors.motor_counts_per_rev, axis.sensors.table_resolution_m
     sag = sag_m(axis, effect)
     data.qpos[:2] = run.position_m[0] / gains.ratio_m_rad, run.position_m[0] - sag

@@ -2,30 +2,27 @@
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 
 import numpy as np
 
 from hil.errors import InputError
 
 # Cases of the full proof. 300 singles are ten and more of each effect; the ladder has a dozen on each rung.
-FULL: Mapping[str, int] = MappingProxyType(
-    {
-        "single": 300,
-        "pair": 200,
-        "null": 150,
-        "parameters_only": 150,
-        "masked": 100,
-        "novel": 60,
-        "ladder": 140,
-        "ambiguous": 60,
-        "insufficient": 60,
-        "less_known": 120,
-    }
-)
+FULL: Mapping[str, int] = {
+    "single": 300,
+    "pair": 200,
+    "null": 150,
+    "parameters_only": 150,
+    "masked": 100,
+    "novel": 60,
+    "ladder": 140,
+    "ambiguous": 60,
+    "insufficient": 60,
+    "less_known": 120,
+}
 # MuJoCo moves two-mass axes: three of each effect that its model has.
-MUJOCO: Mapping[str, int] = MappingProxyType({"single": 45, "parameters_only": 15})
-PLANTS: Mapping[str, Mapping[str, int]] = MappingProxyType({"simulated": FULL, "mujoco": MUJOCO})
+MUJOCO: Mapping[str, int] = {"single": 45, "parameters_only": 15}
+PLANTS: Mapping[str, Mapping[str, int]] = {"simulated": FULL, "mujoco": MUJOCO}
 MOST = 10_000  # case folders have four digits
 _NUMBERS = 1_000_000  # upper limit of the number of the first case of a tier
 

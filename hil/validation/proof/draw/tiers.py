@@ -5,6 +5,7 @@ A recipe returns None if its draws failed on this axis; the next call draws anot
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from math import inf
 
 from hil.validation.proof.draw import motions
@@ -16,7 +17,7 @@ from hil.validation.proof.draw.effect_size import EffectSizes
 from hil.validation.proof.draw.effects import applicable, draw_effect
 from hil.validation.proof.draw.expected import block, inseparable, same_law
 from hil.validation.proof.draw.less_known import possible
-from hil.validation.proof.draw.unknown_effects import NOVEL, EncoderFault, draw_novel, novel
+from hil.validation.proof.draw.unknown_effects import EncoderFault, draw_novel, novel
 
 Recipe = Callable[[Rng, str | None, Kind | None], CaseDraft | None]
 VISIBLE = (1.5, 100.0)  # sizes of an effect that is to be named, in units of noise
@@ -32,7 +33,7 @@ _OTHER_BLOCK = 0.8  # share of the pairs whose effects lie in different blocks
 def single(rng: Rng, effect: str | None, kind: Kind | None) -> CaseDraft | None:
     """Conceal one visible effect."""
     on = stage(rng, kind)
-    name = name_on(on.axis, effect, kind is not None, rng)
+    name = name_on(on.axis, effect, rng)
     return one(rng, on, name, VISIBLE) if name else None
 
 
@@ -40,7 +41,7 @@ def ladder(rng: Rng, effect: str | None, kind: Kind | None) -> CaseDraft | None:
     """Conceal one effect of 0.5 to 30 times the noise."""
     on = stage(rng, kind)
     wanted = float(rng.choice(RUNGS))
-    name = name_on(on.axis, effect, kind is not None, rng)
+    name = name_on(on.axis, effect, rng)
     found = at_size(draw_effect(name, on.scale, rng), wanted, on) if name else None
     return CaseDraft(on.axis, on.runs, "missing_physics", (found,)) if found else None
 
@@ -48,7 +49,7 @@ def ladder(rng: Rng, effect: str | None, kind: Kind | None) -> CaseDraft | None:
 def pair(rng: Rng, effect: str | None, kind: Kind | None) -> CaseDraft | None:
     """Conceal two effects, each visible beside the other, mostly in different blocks."""
     on = stage(rng, kind)
-    first = name_on(on.axis, effect, kind is not None, rng)
+    first = name_on(on.axis, effect, rng)
     if first is None:
         return None
     others = [name for name in applicable(on.axis) if name not in inseparable(first)]
@@ -57,21 +58,11 @@ def pair(rng: Rng, effect: str | None, kind: Kind | None) -> CaseDraft | None:
     return two(rng, on, (first, str(rng.choice(others))), VISIBLE, VISIBLE, (0.0, inf))
 
 
-def null(rng: Rng, effect: str | None, kind: Kind | None) -> CaseDraft | None:
-    """Conceal nothing; the bench file is exact."""
-    return _nothing(rng, effect, kind, "exact", "no_mismatch")
-
-
-def parameters_only(rng: Rng, effect: str | None, kind: Kind | None) -> CaseDraft | None:
-    """Conceal nothing; the parameters of the bench file are wrong."""
-    return _nothing(rng, effect, kind, "wrong", "parameter_error")
-
-
 def masked(rng: Rng, effect: str | None, kind: Kind | None) -> CaseDraft | None:
     """Conceal a small effect behind noise and coarse encoders, or behind a larger effect."""
     hard = bool(rng.random() < 0.5)
     on = stage(rng, kind, hard=hard)
-    name = name_on(on.axis, effect, kind is not None, rng)
+    name = name_on(on.axis, effect, rng)
     if name is None or hard:
         return one(rng, on, name, _MASKED) if name else None
     others = [other for other in applicable(on.axis) if other not in inseparable(name)]
@@ -82,9 +73,6 @@ def novel_physics(rng: Rng, effect: str | None, kind: Kind | None) -> CaseDraft 
     """Conceal physics that the library lacks."""
     on = stage(rng, kind)
     names = novel(on.axis)
-    possible = names if kind is not None else NOVEL
-    if effect is not None and effect not in possible:
-        raise ValueError(f"effect: must be one of {', '.join(possible)}, got {effect!r}")
     name = effect or str(rng.choice(names))
     for _ in range(TRIES if name in names else 0):
         found = draw_novel(name, on.scale, rng)
@@ -100,31 +88,25 @@ def novel_physics(rng: Rng, effect: str | None, kind: Kind | None) -> CaseDraft 
 def insufficient(rng: Rng, effect: str | None, kind: Kind | None) -> CaseDraft | None:
     """Conceal an effect that good motions show, and record motions that do not: it must be reported as not testable."""
     on = stage(rng, kind)
-    poor = {how: tuple(motions.poor(rng, on.axis, how) for _ in range(3)) for how in motions.POOR}
+    poor = {how: motions.poor(rng, on.axis, how) for how in motions.POOR}
     unseen = {how: EffectSizes(on.axis, runs[:2]) for how, runs in poor.items()}
     for _ in range(TRIES):
-        name = name_on(on.axis, effect, kind is not None, rng)
+        name = name_on(on.axis, effect, rng)
         # a recording that ends before the window of a force says nothing about its motion
         if name is None or name == "external_force":
             continue
         found, how = draw_effect(name, on.scale, rng), motions.POOR[int(rng.integers(len(motions.POOR)))]
         if unseen[how].evidence([found]) > _INVISIBLE or not VISIBLE[0] <= on.sizes.size([found]) <= VISIBLE[1]:
             continue
-        first, second, last = poor[how]
-        return CaseDraft(
-            on.axis,
-            (first, second, last),
-            "parameter_error",
-            ((found, unseen[how].size([found])),),
-            not_testable=same_law(name),
-        )
+        concealed = ((found, unseen[how].size([found])),)
+        return CaseDraft(on.axis, poor[how], "parameter_error", concealed, not_testable=same_law(name))
     return None
 
 
 def less_known(rng: Rng, effect: str | None, kind: Kind | None) -> CaseDraft | None:
     """Conceal one clear effect and forget a part of what is known; it is to be named, or said not to be testable."""
     on = stage(rng, kind)
-    name = name_on(on.axis, effect, kind is not None, rng)
+    name = name_on(on.axis, effect, rng)
     draft = one(rng, on, name, _CLEAR) if name else None
     if name is None or draft is None:
         return None
@@ -132,9 +114,8 @@ def less_known(rng: Rng, effect: str | None, kind: Kind | None) -> CaseDraft | N
     return replace(draft, not_testable=same_law(name), forgotten=ways[int(rng.integers(len(ways)))])
 
 
-def _nothing(rng: Rng, effect: str | None, kind: Kind | None, belief: Belief, verdict: str) -> CaseDraft:
-    if effect is not None:
-        raise ValueError(f"effect: must be left out where nothing is concealed, got {effect!r}")
+def _nothing(belief: Belief, verdict: str, rng: Rng, effect: str | None, kind: Kind | None) -> CaseDraft:
+    """Conceal nothing; the parameters of the bench file are exact or wrong."""
     on = stage(rng, kind, belief)
     return CaseDraft(on.axis, on.runs, verdict)
 
@@ -143,8 +124,8 @@ RECIPES: Mapping[str, Recipe] = {
     "single": single,
     "ladder": ladder,
     "pair": pair,
-    "null": null,
-    "parameters_only": parameters_only,
+    "null": partial(_nothing, "exact", "no_mismatch"),
+    "parameters_only": partial(_nothing, "wrong", "parameter_error"),
     "masked": masked,
     "novel": novel_physics,
     "ambiguous": ambiguous,

@@ -6,7 +6,6 @@ a sine of position, which the library has.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -52,7 +51,7 @@ class EncoderFault:
 
 def draw_novel(name: str, scale: DrawScale, rng: Rng) -> Effect | EncoderFault:
     """Draw an effect or a fault with random parameters for this axis."""
-    parameters = {key: float(value) for key, value in _UNKNOWN[name].draw(scale, rng).items()}
+    parameters = {key: float(value) for key, value in _UNKNOWN[name][1](scale, rng).items()}
     return EncoderFault(name, parameters) if name in FAULTS else Effect(name, parameters)
 
 
@@ -92,16 +91,13 @@ def _hammering(s: DrawScale, rng: Rng) -> dict[str, float]:
     }
 
 
-class _Unknown(NamedTuple):
-    block: str
-    draw: Callable[[DrawScale, Rng], dict[str, float]]
-
-
-_UNKNOWN: Mapping[str, _Unknown] = {
-    "novel_friction_bump": _Unknown(
-        "motor_side", lambda s, rng: {"fraction": log_uniform(rng, 0.3, 2.0), **_somewhere(s, rng)}
+# The block of each, and the draw of its parameters.
+_UNKNOWN: Mapping[str, tuple[str, Callable[[DrawScale, Rng], dict[str, float]]]] = {
+    "novel_friction_bump": (
+        "motor_side",
+        lambda s, rng: {"fraction": log_uniform(rng, 0.3, 2.0), **_somewhere(s, rng)},
     ),
-    "novel_friction_wander": _Unknown(
+    "novel_friction_wander": (
         "motor_side",
         lambda s, rng: {
             "fraction": log_uniform(rng, 0.05, 0.25),
@@ -109,21 +105,22 @@ _UNKNOWN: Mapping[str, _Unknown] = {
             "phase_rad": any_phase(rng),
         },
     ),
-    "novel_pitch_bump": _Unknown(
+    "novel_pitch_bump": (
         "transmission",
         lambda s, rng: {"height_m": any_sign(rng) * log_uniform(rng, 3e-6, 30e-6), **_somewhere(s, rng)},
     ),
-    "novel_mass_change": _Unknown("table", _mass_change),
-    "novel_vibration": _Unknown("table", _vibration),
-    "novel_hammering": _Unknown("table", _hammering),
-    "novel_torque_fade": _Unknown(
+    "novel_mass_change": ("table", _mass_change),
+    "novel_vibration": ("table", _vibration),
+    "novel_hammering": ("table", _hammering),
+    "novel_torque_fade": (
         "drive",
         lambda s, rng: {"fraction": rng.uniform(0.05, 0.25), "time_constant_s": log_uniform(rng, 2.0, 10.0)},
     ),
-    _LOST_COUNTS: _Unknown(
-        "sensor", lambda s, rng: {"events": float(rng.integers(3, 9)), "counts": float(rng.integers(4, 40))}
+    _LOST_COUNTS: (
+        "sensor",
+        lambda s, rng: {"events": float(rng.integers(3, 9)), "counts": float(rng.integers(4, 40))},
     ),
-    _NOISE_BURSTS: _Unknown(
+    _NOISE_BURSTS: (
         "sensor",
         lambda s, rng: {
             "events": float(rng.integers(3, 8)),
@@ -134,4 +131,4 @@ _UNKNOWN: Mapping[str, _Unknown] = {
 }
 FAULTS = (_LOST_COUNTS, _NOISE_BURSTS)
 NOVEL: tuple[str, ...] = tuple(_UNKNOWN)
-BLOCKS: Mapping[str, str] = {name: unknown.block for name, unknown in _UNKNOWN.items()}
+BLOCKS: Mapping[str, str] = {name: block for name, (block, _) in _UNKNOWN.items()}

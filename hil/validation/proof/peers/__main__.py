@@ -14,8 +14,8 @@ import typer
 
 from hil.errors import HilError
 from hil.validation.proof.answer.blind import answered
-from hil.validation.proof.answer.worker_pool import cases_in, side_by_side
 from hil.validation.proof.peers import METHODS, SLOW, answer_case
+from hil.validation.proof.worker_pool import cases_in, side_by_side
 
 Name = StrEnum("Name", {name: name for name in METHODS})  # type: ignore[misc]   # choices of the command line
 _QUICK = [Name(name) for name in METHODS if name not in SLOW]
@@ -34,7 +34,7 @@ def answer_cases(
         place for place in cases_in(cases, out)[:first] if not all(answered(out / name / place.name) for name in names)
     ]
     for done in side_by_side(partial(answer_case, out=out, methods=names), todo, jobs):
-        print(done, flush=True)
+        print(done.name, flush=True)
 
 
 if __name__ == "__main__":

@@ -36,11 +36,6 @@ class PeerCase:
     nominal: Fit
     scene: Scene
 
-    @property
-    def fitted(self) -> Bench:
-        """The bench with the refitted nominal parameters."""
-        return self.nominal.bench
-
     def answer(self, effects: Sequence[str]) -> dict[str, Any]:
         """Return the verdict and the named effects, the most important one first, in the form of diagnosis.json.
 

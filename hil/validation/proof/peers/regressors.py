@@ -53,7 +53,7 @@ def equations(
     for block in blocks:
         if block == "transmission" and not runs[0].table_m.size:
             continue
-        drafts = [MAKERS[block](run, case.fitted, case.scene) for run in runs]
+        drafts = [MAKERS[block](run, case.nominal.bench, case.scene) for run in runs]
         if residuals is not None:
             drafts = [
                 replace(draft, target=errors[block], noise=1.0) if block in errors else draft

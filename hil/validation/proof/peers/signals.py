@@ -5,7 +5,6 @@ polynomial damps accelerations more than positions, which would look like a flex
 """
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,13 +12,11 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.signal import bilinear, lfilter
 
 from hil.arrays import FloatArray
-from hil.bench.bench_file import Bench
-from hil.control import cascade
-from hil.identification.measured import Measured
 
 SMOOTH_S = 0.002  # standard deviation of the Gaussian: cut-off at 66 Hz
 _TRUNCATE = 8.0  # standard deviations: derivatives of a constant are zero to rounding
 _REACH = 4.0  # standard deviations with noticeable weight
+SWAY_DAMPING = 0.03  # damping ratio of a mass on a spring
 SLIDING_M_S = 1e-4  # at the table: what is slower counts as rest
 
 
@@ -79,30 +76,8 @@ def lagged(torque: FloatArray, time_constant_s: float, period_s: float) -> Float
     return np.asarray(torque - (torque - begins) * time_constant_s / period_s * (1.0 - pole), dtype=np.float64)
 
 
-def swayed(acceleration: FloatArray, frequency_hz: float, period_s: float, damping: float = 0.03) -> FloatArray:
+def swayed(acceleration: FloatArray, frequency_hz: float, period_s: float) -> FloatArray:
     """Return the acceleration (n,) of a mass on a spring on an accelerated base."""
     omega = 2.0 * math.pi * frequency_hz
-    b, a = bilinear([omega**2], [1.0, 2.0 * damping * omega, omega**2], 1.0 / period_s)
+    b, a = bilinear([omega**2], [1.0, 2.0 * SWAY_DAMPING * omega, omega**2], 1.0 / period_s)
     return np.asarray(lfilter(b, a, acceleration), dtype=np.float64)
-
-
-def law(run: Measured, bench: Bench) -> Callable[[FloatArray, float], FloatArray]:
-    """Return the control law over a run as a function of motor position (n,) and velocity filter time constant [s],
-    with the torque command (n,) as its value."""
-    feedback = run.table_m if run.table_m.size else run.motor
-
-    def command(motor: FloatArray, filter_s: float = 0.0) -> FloatArray:
-        gains = bench.gains
-        if filter_s > 0.0:
-            gains = gains._replace(filter_coefficient=1.0 - math.exp(-gains.period_s / filter_s))
-        state = cascade.init(
-            float(run.motor[0]),
-            run.start.velocity_m_s / gains.ratio_m_rad,
-            run.start.torque,
-            gains.period_s,
-            run.start.tick,
-        )
-        torque, _ = cascade.replay(gains, state, run.position_command_m, run.velocity_command_m_s, motor, feedback)
-        return np.asarray(torque, dtype=np.float64)
-
-    return command

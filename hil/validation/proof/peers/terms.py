@@ -7,7 +7,7 @@ estimated from the residuals of the refitted twin, by the functions of the diagn
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from math import pi
+from math import exp, pi
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
 from hil.identification.measured import Measured
+from hil.twin.axis import Twin
 from hil.twin.scene import Scene
 from hil.validation.proof.peers import signals
 
@@ -68,13 +69,22 @@ class BlockEquation:
 
 
 def _controller(run: Measured, bench: Bench, scene: Scene) -> BlockEquation:
-    law = signals.law(run, bench)
-    nominal = law(run.motor, 0.0)
+    def law(motor: FloatArray, filter_s: float = 0.0) -> FloatArray:
+        """Return the command (n,) of the law with a motor position (n,) and a filter of the velocity."""
+        gains = bench.gains
+        if filter_s > 0.0:
+            gains = gains._replace(filter_coefficient=1.0 - exp(-gains.period_s / filter_s))
+        seen = run.response._replace(motor_position=motor)
+        return Twin(bench.axis.physics(), gains).command(
+            run.position_command_m, run.velocity_command_m_s, seen, run.start
+        )
+
+    nominal = law(run.motor)
     velocity = signals.smooth(run.motor, run.period_s, 1)
     equation = BlockEquation(run.torque_command - nominal, run.noise.torque, [], _judged(run), smooth=False)
     for time_s in _DELAYS_S:
         equation.add(law(run.motor, time_s) - nominal, "filtered velocity")
-        equation.add(law(run.motor + time_s * velocity, 0.0) - nominal, "late motor position")
+        equation.add(law(run.motor + time_s * velocity) - nominal, "late motor position")
     return equation
 
 

@@ -106,7 +106,7 @@ def _add(page: Page, table: ProofTable) -> None:
         page.heading(table.heading)
     if table.text:
         page.text(table.text)
-    page.table(table.headers, table.rows, table.mark)
+    page.table(table.headers, table.rows, table.left, table.mark)
 
 
 def _time(times: Sequence[float]) -> str:

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from hil.arrays import FloatArray
 from hil.diagnosis.wording import title
 from hil.figures import panels as style
-from hil.figures.drawing import style_axis
+from hil.figures.drawing import legend_above, style_axis
 from hil.validation.proof.score.scores import Scores
 from hil.validation.proof.score.statistics import Counts, Rate, confusion, power, rate
 
@@ -23,8 +23,7 @@ def power_figure(scores: Scores) -> Figure | None:
     rungs = power(scores.cases)
     if not rungs:
         return None
-    figure = Figure(figsize=(9.0, 4.6), layout="constrained")
-    axes = figure.subplots()
+    figure, axes = _one_axis(9.0, 4.6)
     size = np.array([rung.size for rung in rungs])
     for label, rates, colour, shift in (
         ("detected", [rung.detected for rung in rungs], style.MEASURED, 0.985),
@@ -38,11 +37,10 @@ def power_figure(scores: Scores) -> Figure | None:
     axes.set_xscale("log")
     axes.set_xticks(size, [f"{value:g}" for value in size])
     axes.minorticks_off()
-    axes.set_xlabel("size of the concealed effect, in units of the noise (rms of the strongest channel)")
-    axes.set_title("Power: how large an effect must be", loc="left")
-    style_axis(axes, "share of the cases")
+    size_label = "size of the concealed effect, in units of the noise (rms of the strongest channel)"
+    style_axis(axes, "share of the cases", size_label, "Power: how large an effect must be")
     axes.set_ylim(-0.03, 1.03)
-    _legend_above(axes)
+    legend_above(axes)
     return figure
 
 
@@ -55,8 +53,7 @@ def confusion_figure(scores: Scores) -> Figure | None:
     shares = np.array(
         [[counts[row].get(column, 0) / sum(counts[row].values()) for column in columns] for row in counts]
     )
-    figure = Figure(figsize=(3.6 + 0.31 * len(columns), 2.6 + 0.29 * len(counts)), layout="constrained")
-    axes = figure.subplots()
+    figure, axes = _one_axis(3.6 + 0.31 * len(columns), 2.6 + 0.29 * len(counts))
     axes.imshow(shares, cmap="Blues", vmin=0.0, vmax=1.0, aspect="auto")
     axes.set_xticks(np.arange(len(columns)) - 0.5, minor=True)
     axes.set_yticks(np.arange(len(counts)) - 0.5, minor=True)
@@ -80,17 +77,14 @@ def calibration_figure(scores: Scores) -> Figure | None:
     """Draw accuracy over confidence; None without findings."""
     if not scores.calibration:
         return None
-    figure = Figure(figsize=(5.6, 5.2), layout="constrained")
-    axes = figure.subplots()
+    figure, axes = _one_axis(5.6, 5.2)
     axes.plot([0.0, 1.0], [0.0, 1.0], color=style.NOISE, linestyle="dashed", label="calibrated")
     confidence = np.array([found.confidence for found in scores.calibration])
     _rates(axes, confidence, [found.right for found in scores.calibration], style.MEASURED, "findings")
     for found in scores.calibration:
         at = found.confidence, found.right.value or 0.0
         axes.annotate(str(found.right.of), at, (6, -9), textcoords="offset points", fontsize=8, color=style.COMMAND)
-    axes.set_xlabel("confidence")
-    axes.set_title("Calibration: findings that are right (number: of so many)", loc="left", fontsize=10)
-    style_axis(axes, "share that is right")
+    style_axis(axes, "share that is right", "confidence", "Right findings (number: of so many)")
     axes.set_xlim(-0.02, 1.08)
     axes.set_ylim(-0.06, 1.04)
     axes.legend(loc="lower right")
@@ -106,21 +100,19 @@ def errors_figure(scores: Scores) -> Figure | None:
     if not errors:
         return None
     names = sorted(errors, key=lambda name: -float(np.median(errors[name])))
-    figure = Figure(figsize=(9.0, 1.4 + 0.27 * len(names)), layout="constrained")
-    axes = figure.subplots()
+    figure, axes = _one_axis(9.0, 1.4 + 0.27 * len(names))
     for y, name in enumerate(names):
         values = np.maximum(errors[name], _LEAST_ERROR)
         axes.plot(values, np.full(values.size, y), "o", color=style.MEASURED, alpha=0.5, markersize=4)
         axes.plot([np.median(values)], [y], "|", color=style.DEVIATION, markersize=14, markeredgewidth=2)
     for goal, text, line in zip(_ERRORS, ("median", "90th percentile"), ("dashed", "dotted"), strict=True):
         axes.axvline(goal, color=style.COMMAND, linestyle=line, label=f"goal, {text}: {100 * goal:g} %")
-    _legend_above(axes)
+    legend_above(axes)
     axes.set_xscale("log")
     axes.set_yticks(range(len(names)), [title(name) for name in names], fontsize=8)
+    error_label = "relative error of a parameter (bar: median of the effect)"
+    style_axis(axes, "", error_label, "Parameters of effects that were rightly named")
     axes.set_ylim(-0.7, len(names) - 0.3)
-    axes.grid(alpha=0.3)
-    axes.set_xlabel("relative error of a parameter (bar: median of the effect)")
-    axes.set_title("Parameters of effects that were rightly named", loc="left")
     return figure
 
 
@@ -129,17 +121,19 @@ def times_figure(scores: Scores) -> Figure | None:
     times = [case.answer.runtime_s for case in scores.cases if case.answer.runtime_s is not None]
     if not times:
         return None
-    figure = Figure(figsize=(9.0, 3.4), layout="constrained")
-    axes = figure.subplots()
+    figure, axes = _one_axis(9.0, 3.4)
     axes.hist(times, bins=min(40, 4 + len(times) // 3), color=style.MEASURED, alpha=0.8)
     for part, text in ((0.5, "median"), (0.9, "90 %")):
         value = float(np.quantile(times, part))
         axes.axvline(value, color=style.SIMULATED, linestyle="dashed")
         axes.text(value, 0.97, f" {text} {value:.0f} s", transform=axes.get_xaxis_transform(), va="top", fontsize=8)
-    axes.set_xlabel("time of a diagnosis [s]")
-    axes.set_title("Time", loc="left")
-    style_axis(axes, "cases")
+    style_axis(axes, "cases", "time of a diagnosis [s]", "Time")
     return figure
+
+
+def _one_axis(width: float, height: float) -> tuple[Figure, Axes]:
+    figure = Figure(figsize=(width, height), layout="constrained")
+    return figure, figure.subplots()
 
 
 def _rates(axes: Axes, at: FloatArray, rates: Sequence[Rate], colour: str, label: str) -> None:
@@ -154,8 +148,3 @@ def _columns(counts: Counts) -> list[str]:
     """Return the answers in the order of the rows, then the others."""
     said = {column for row in counts.values() for column in row}
     return [row for row in counts if row in said] + sorted(said - set(counts))
-
-
-def _legend_above(axes: Axes) -> None:
-    """Place the legend beside the title, where it hides no points."""
-    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, frameon=False, fontsize=8, borderaxespad=0.2)

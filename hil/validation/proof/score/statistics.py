@@ -1,6 +1,7 @@
 """Rates with intervals, calibration, and counts over graded cases by effect, tier, verdict and size."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import log
 
@@ -14,7 +15,7 @@ from hil.validation.proof.draw.unknown_effects import NOVEL
 from hil.validation.proof.score.grading import GradedCase
 
 BINS = 10  # of confidence
-Counts = dict[str, dict[str, int]]
+Counts = Mapping[str, Mapping[str, int]]
 _NOTHING = {"null": "nothing", "parameters_only": "wrong parameters"}
 _OF_THE_MATRIX = ("single", "ladder", "novel", *_NOTHING)
 
@@ -89,27 +90,27 @@ def expected_calibration_error(bins: Sequence[ConfidenceBin]) -> float | None:
 
 def by_effect(cases: Iterable[GradedCase], hit: Callable[[GradedCase], bool]) -> dict[str, Rate]:
     """Return a rate for each effect to be found."""
-    found: dict[str, list[bool]] = {}
+    found = defaultdict[str, list[bool]](list)
     for case in cases:
         if case.concealed:
-            found.setdefault(case.concealed.effect, []).append(hit(case))
+            found[case.concealed.effect].append(hit(case))
     return {effect: rate(found[effect]) for effect in sorted(found)}
 
 
 def verdicts(cases: Iterable[GradedCase]) -> Counts:
     """Count verdicts by tier."""
-    found: Counts = {}
+    found = defaultdict[str, Counter[str]](Counter)
     for case in sorted(cases, key=lambda case: TIERS.index(case.truth.tier)):
-        _count(found, case.truth.tier, case.answer.verdict)
+        found[case.truth.tier][case.answer.verdict] += 1
     return found
 
 
 def power(cases: Iterable[GradedCase]) -> list[Rung]:
     """Return detection and naming over the size of the effect, from the ladder."""
-    rungs: dict[float, list[GradedCase]] = {}
+    rungs = defaultdict[float, list[GradedCase]](list)
     for case in cases:
         if case.truth.tier == "ladder":
-            rungs.setdefault(min(RUNGS, key=lambda size: abs(log(size / case.size))), []).append(case)
+            rungs[min(RUNGS, key=lambda size: abs(log(size / case.size)))].append(case)
     return [
         Rung(size, rate(case.detected for case in rungs[size]), rate(case.top for case in rungs[size]))
         for size in sorted(rungs)
@@ -122,15 +123,10 @@ def confusion(cases: Iterable[GradedCase]) -> Counts:
     Two names of one law count as the concealed one; effects below the noise floor are left out.
     """
     order = [*LIBRARY, *NOVEL, *_NOTHING.values()]
-    found: Counts = {}
+    found = defaultdict[str, Counter[str]](Counter)
     for case in cases:
         if case.truth.tier in _OF_THE_MATRIX and (not case.concealed or case.above_floor):
             row = case.concealed.effect if case.concealed else _NOTHING[case.truth.tier]
             said = case.first.effect if case.first else case.answer.verdict
-            _count(found, row, row if case.top else said)
+            found[row][row if case.top else said] += 1
     return {row: found[row] for row in sorted(found, key=order.index)}
-
-
-def _count(counts: Counts, row: str, column: str) -> None:
-    line = counts.setdefault(row, {})
-    line[column] = line.get(column, 0) + 1

@@ -1,7 +1,7 @@
 """Tables of a proof for the page and for Markdown: goals, other methods, verdicts, effects, power, worst cases."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf, isfinite
 from pathlib import Path
@@ -10,7 +10,6 @@ from typing import Any
 from hil.diagnosis.wording import title
 from hil.errors import InputError
 from hil.quantities import digits
-from hil.report.page import Number
 from hil.validation.proof.score.grading import GradedCase
 from hil.validation.proof.score.scores import Goal, Scores
 from hil.validation.proof.score.statistics import Rate, by_effect, power, verdicts
@@ -23,30 +22,31 @@ _WORST = 5
 
 @dataclass(frozen=True)
 class ProofTable:
-    """A table with its heading and introduction; `mark`: index of a column of yes and no."""
+    """A table with its heading and introduction; columns beside `left` and `mark`, that of yes and no, hold numbers."""
 
     heading: str
     headers: Sequence[str]
     rows: Sequence[Sequence[str]]
     text: str = ""
+    left: Collection[int] = (0,)
     mark: int | None = None
 
 
 def goals_table(goals: Sequence[Goal]) -> ProofTable:
     """Return the table of goals and measured figures."""
-    return ProofTable("Goals", HEADERS, [goal_row(goal) for goal in goals], mark=5)
+    return ProofTable("Goals", HEADERS, [goal_row(goal) for goal in goals], left=(0, 1), mark=5)
 
 
 def goal_row(goal: Goal) -> tuple[str, ...]:
     """Return a row of the table of goals."""
     name = f"{goal.name} ({title(goal.detail)})" if goal.detail else goal.name
-    interval = _interval(goal.measured) if isinstance(goal.measured, Rate) else ""
+    interval, of = (_interval(goal.measured), goal.measured.of) if isinstance(goal.measured, Rate) else ("", goal.of)
     return (
         name,
         _wanted(goal),
-        Number(_text(goal, goal.value)),
-        Number(interval),
-        Number(str(goal.measured.of if isinstance(goal.measured, Rate) else goal.of)),
+        _text(goal, goal.value),
+        interval,
+        str(of),
         {None: "–", True: "yes", False: "no"}[goal.met],
     )
 
@@ -54,12 +54,11 @@ def goal_row(goal: Goal) -> tuple[str, ...]:
 def others_table(scores: Scores, others: Mapping[str, Scores]) -> ProofTable:
     """Return the table of the rates of other methods."""
     rows = [{goal.name: goal for goal in other.goals} for other in others.values()]
-    headers = [f"{name} ({len(found.cases)} cases)" for name, found in {"this diagnosis": scores, **others}.items()]
     return ProofTable(
         "Beside other methods",
-        ("", *headers),
+        ("", *(f"{name} ({len(found.cases)} cases)" for name, found in {"this diagnosis": scores, **others}.items())),
         [
-            (goal.name, Number(_text(goal, goal.value)), *(Number(_text(goal, row[goal.name].value)) for row in rows))
+            (goal.name, *(_text(goal, one.value) for one in (goal, *(row[goal.name] for row in rows))))
             for goal in scores.goals
             if isinstance(goal.measured, Rate) and any(row[goal.name].value is not None for row in rows)
         ],
@@ -73,24 +72,17 @@ def verdicts_table(scores: Scores) -> ProofTable:
     """Return the table of verdicts by tier."""
     found = verdicts(scores.cases)
     columns = sorted({verdict for counts in found.values() for verdict in counts})
-    return ProofTable(
-        "Verdicts",
-        ("tier", *map(title, columns), "wholly right"),
-        [
-            (
-                title(tier),
-                *(Number(str(counts.get(verdict, 0))) for verdict in columns),
-                Number(str(sum(case.right for case in scores.of_tier(tier)))),
-            )
-            for tier, counts in found.items()
-        ],
-    )
+    rows = []
+    for tier, counts in found.items():
+        right = sum(case.right for case in scores.of_tier(tier))
+        rows.append((title(tier), *(str(counts.get(verdict, 0)) for verdict in columns), str(right)))
+    return ProofTable("Verdicts", ("tier", *map(title, columns), "wholly right"), rows)
 
 
 def effects_table(scores: Scores) -> ProofTable:
     """Return the table of singles by effect."""
     singles = scores.of_tier("single")
-    columns = [
+    first, *columns = [
         by_effect(singles, lambda case: case.top),
         by_effect(singles, lambda case: case.in_set),
         by_effect(singles, lambda case: not case.names_too_much),
@@ -100,12 +92,8 @@ def effects_table(scores: Scores) -> ProofTable:
         "Singles, effect by effect",
         ("effect", "cases", "named first", "in the set", "nothing else named", "block right"),
         [
-            (
-                title(effect),
-                Number(str(columns[0][effect].of)),
-                *(Number(f"{100.0 * (column[effect].value or 0.0):.0f} %") for column in columns),
-            )
-            for effect in columns[0]
+            (title(effect), str(named.of), *(_share(one) for one in (named, *(column[effect] for column in columns))))
+            for effect, named in first.items()
         ],
     )
 
@@ -117,16 +105,16 @@ def power_table(scores: Scores) -> ProofTable:
         ("size over noise", "cases", "detected", "95 %", "named first", "95 %"),
         [
             (
-                Number(f"{rung.size:g}"),
-                Number(str(rung.named.of)),
-                *(
-                    Number(text)
-                    for found in (rung.detected, rung.named)
-                    for text in (f"{100.0 * (found.value or 0.0):.0f} %", _interval(found))
-                ),
+                f"{rung.size:g}",
+                str(rung.named.of),
+                _share(rung.detected),
+                _interval(rung.detected),
+                _share(rung.named),
+                _interval(rung.named),
             )
             for rung in power(scores.cases)
         ],
+        left=(),
     )
 
 
@@ -139,7 +127,7 @@ def worst_tables(scores: Scores) -> list[ProofTable]:
     )
     heading = f"The worst of {len(wrong)} cases that are not wholly right"
     return [
-        ProofTable(heading if not at else "", (case.truth.name, case.wrong), _rows(case))
+        ProofTable(heading if not at else "", (case.truth.name, case.wrong), _rows(case), left=(0, 1))
         for at, case in enumerate(wrong[:_WORST])
     ]
 
@@ -164,7 +152,7 @@ def published(name: str) -> str:
         names = ", ".join(sorted(path.stem for path in PUBLISHED.glob("*.json")))
         raise InputError(f"--show: given {name}, allowed {names}")
     data: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-    tables = [ProofTable(table["heading"], table["headers"], table["rows"], table["text"]) for table in data["tables"]]
+    tables = [ProofTable(**table, left=range(len(table["headers"]))) for table in data["tables"]]
     notes = "\n".join(f"- {note}" for note in data["notes"])
     parts = [f"# {data['title']}", data["about"], *map(markdown, tables), notes]
     return "\n\n".join(part for part in parts if part)
@@ -174,8 +162,8 @@ def markdown(table: ProofTable) -> str:
     """Return a table in Markdown with its heading; empty if it has no rows."""
     if not table.rows:
         return ""
-    right = [all(isinstance(row[at], Number) for row in table.rows) for at in range(len(table.headers))]
-    lines = [table.headers, ["---:" if number else "---" for number in right], *table.rows]
+    texts = {*table.left, table.mark}
+    lines = [table.headers, ["---" if at in texts else "---:" for at in range(len(table.headers))], *table.rows]
     parts = [
         f"## {table.heading}" if table.heading else "",
         table.text,
@@ -229,6 +217,10 @@ def _text(goal: Goal, value: float | None) -> str:
     if not isfinite(value):
         return "none given"
     return f"{digits(100.0 * value)} %" if goal.percent else digits(value)
+
+
+def _share(found: Rate) -> str:
+    return f"{100.0 * (found.value or 0.0):.0f} %"
 
 
 def _interval(found: Rate) -> str:

@@ -17,16 +17,16 @@ from processes import DEADLINE_S, wait_for
 from hil.errors import HilError, InputError
 from hil.files.output import write_json
 from hil.validation.proof.answer.blind import DIAGNOSIS, CaseFiles, diagnose_files, read_case
-from hil.validation.proof.answer.worker_pool import cluster
 from hil.validation.proof.draw.plan import Planned
 from hil.validation.proof.run import prove
 from hil.validation.proof.seal import CASES, draw_cases, seal
+from hil.validation.proof.worker_pool import cluster
 
 # Waits for a case that would take longer than anybody waits.
 WAITING = """
 import sys, time
 from hil.errors import HilError
-from hil.validation.proof.answer.worker_pool import cluster, completed
+from hil.validation.proof.worker_pool import cluster, completed
 
 try:
     with cluster(sys.argv[1]) as workers:

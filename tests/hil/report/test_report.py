@@ -26,7 +26,7 @@ from hil.identification.figures import fastest_move
 from hil.identification.measured import bench_of
 from hil.quantities import quantity
 from hil.report.compare_report import verdict, write_bench, write_comparison
-from hil.report.page import Number, Page
+from hil.report.page import Page
 from hil.report.plots import over_time
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
@@ -172,7 +172,7 @@ def test_long_recordings_stay_light(tmp_path: Path) -> None:
 
 def test_text_is_escaped(tmp_path: Path) -> None:
     page = Page("<b>", "a & b", "<script>alert(1)</script>", False)
-    page.table(("<i>",), [(Number("1 < 2"),)])
+    page.table(("<i>",), [("1 < 2",)], left=())
     page.items(["<u>"])
     page.write(tmp_path / "page.html")
     text = (tmp_path / "page.html").read_text()

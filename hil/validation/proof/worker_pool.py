@@ -2,7 +2,7 @@
 
 import os
 import signal
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
@@ -34,14 +34,14 @@ class Workers:
     count: Callable[[], int]
 
 
-def side_by_side(work: Callable[[Path], None], todo: Sequence[Path], jobs: int, hours: float = inf) -> Iterator[str]:
-    """Call `work` for each folder, `jobs` at once, none begun after `hours`; yields each name when it is done.
+def side_by_side(work: Callable[[Argument], None], todo: Iterable[Argument], jobs: int) -> Iterator[Argument]:
+    """Call `work` for each argument in `jobs` processes; yields each argument when it is done.
 
     Raises HilError if a process was ended from outside.
     """
     with local(jobs) as workers:
-        for place, _ in completed(workers, work, todo, hours):
-            yield place.name
+        for argument, _ in completed(workers, work, todo):
+            yield argument
 
 
 @contextmanager

@@ -15,7 +15,7 @@ from hil.commands.warm_up import compile_kernels
 from hil.compiled.kernel_cache import provide_kernel_cache
 
 SAID = "compiling kernels, once after the installation: about a minute ..."
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 PROFILE = ROOT / "profiles" / "identification.yaml"
 
 

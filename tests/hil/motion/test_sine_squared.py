@@ -10,7 +10,7 @@ import pytest
 
 from hil.errors import FieldError
 from hil.motion.excitation import Chirp, Multisine, Spectrum, Wave
-from hil.motion.pieces import MotionLimits, MotionPhase, Ramp
+from hil.motion.pieces import MotionLimits, Ramp
 from hil.motion.sine_squared import bell_duration_s, ramp_duration_s, reversals, sine_squared
 
 LIMITS = MotionLimits(0.3, 2.0, 50.0)
@@ -18,7 +18,7 @@ LIMITS = MotionLimits(0.3, 2.0, 50.0)
 
 def test_a_ramp_is_the_square_of_a_sine() -> None:
     t = np.linspace(0, 0.2, 101)
-    ramp = Ramp(0.2, MotionPhase.ACCELERATION, 0.0, 0.0, 0.3).at(t)
+    ramp = Ramp(0.2, 0.0, 0.0, 0.3).at(t)
     assert ramp.velocity_m_s == pytest.approx(0.3 * np.sin(np.pi * t / 0.4) ** 2, abs=1e-15)
     assert ramp.acceleration_m_s2.max() == pytest.approx(math.pi * 0.3 / (2 * 0.2))
     assert ramp.jerk_m_s3[0] == pytest.approx(math.pi**2 * 0.3 / (2 * 0.2**2))
@@ -81,7 +81,7 @@ def test_limits_must_be_positive(bad: float) -> None:
 def test_derivatives_of_excitations_agree_with_differences(spectrum: Spectrum, sweep: bool) -> None:
     signal = Chirp(1.0, 20.0, 4.0, spectrum) if sweep else Multisine(1.0, 20.0, 2.0, spectrum)
     t = np.linspace(0, 4.0, 400_001)
-    motion = Wave(4.0, MotionPhase.EXCITATION, 0.1, 0.02, 1e-3, 0.5, signal).at(t)
+    motion = Wave(4.0, 0.1, 0.02, 1e-3, 0.5, signal).at(t)
     for value, derivative in pairwise(motion):
         difference = np.gradient(value, t)[2:-2]
         assert np.abs(difference - derivative[2:-2]).max() <= 2e-5 * np.abs(derivative).max()

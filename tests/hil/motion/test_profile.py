@@ -12,7 +12,7 @@ import yaml
 from hil.errors import InputError
 from hil.motion.profile import Profile, json_schema, load_profile
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 SHIPPED = sorted((ROOT / "profiles").iterdir())
 HEAD = """schema_version: 1
 limits: {velocity_m_s: 0.5, acceleration_m_s2: 2.0, jerk_m_s3: 100.0}

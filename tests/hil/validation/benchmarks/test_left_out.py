@@ -7,7 +7,7 @@ import pytest
 
 from hil.arrays import FloatArray
 from hil.loop.clock import VirtualClock, next_due
-from hil.validation.benchmarks.left_out import Stalls, blocks, compare, of_loop, of_peer
+from hil.validation.benchmarks.left_out import Stalls, compare, of_loop, of_peer
 
 PERIOD_S = 0.001
 # what `cyclictest --spike=125` prints after its histogram: latency and end of two stalls
@@ -60,13 +60,11 @@ def test_a_loop_in_the_same_stalls_leaves_out_the_same_ticks(seed: int) -> None:
     assert left_out == of_peer(stalls.lateness_s(100.0 + np.arange(ticks) * PERIOD_S), PERIOD_S)
     found = compare(lateness_s, 100.0, PERIOD_S, stalls)
     assert (found.loop, found.peer) == (len(left_out), len(left_out))
-    assert (found.loop_only, found.peer_only) == ((), 0)
-    assert found.by_chance < 0.5 * found.loop
+    assert (found.loop_only, found.peer_only) == (0, 0)
 
 
 def test_ticks_of_one_side_alone_are_counted_on_that_side() -> None:
     stalls = stalls_of(np.array([100.0495, 100.2998]), np.array([0.003, 0.0018]))
     other = stalls_of(np.array([100.0495, 100.6998]), np.array([0.003, 0.0048]))
     found = compare(loop(stalls, 1000, 100.0), 100.0, PERIOD_S, other)
-    assert found[:4] == (3 + 2, 3 + 5, (300, 301), 5)
-    assert blocks([3, 5, 6, 7, 9]) == [(5, 3), (3, 1), (9, 1)]
+    assert found == (3 + 2, 3 + 5, 2, 5)

@@ -90,7 +90,7 @@ def test_stages_sum_their_steps_in_order() -> None:
 
 
 def test_every_step_of_the_diagnosis_belongs_to_a_stage() -> None:
-    folder = Path(__file__).parents[3] / "hil" / "diagnosis"
+    folder = Path(__file__).parents[4] / "hil" / "diagnosis"
     steps = [
         step
         for path in folder.rglob("*.py")

@@ -16,7 +16,7 @@ from hil.files.output import new_folder
 from hil.report.console import out, table
 
 BENCH = hil.load_bench("reference")
-PROFILE = Path(__file__).parents[2] / "profiles" / "jog.yaml"
+PROFILE = Path(__file__).parents[3] / "profiles" / "jog.yaml"
 COLUMNS = {name: np.zeros(400) for name in ("position_command_m", "velocity_command_m_s", "motor_position_rad")}
 
 

@@ -23,7 +23,7 @@ from processes import DEADLINE_S
 
 from hil.report.compare_report import write_bench
 
-SWEEP = Path(__file__).parents[2] / "profiles" / "friction_sweep.yaml"
+SWEEP = Path(__file__).parents[3] / "profiles" / "friction_sweep.yaml"
 
 
 @pytest.fixture(scope="module")
@@ -69,7 +69,7 @@ def test_help_lists_the_commands_and_imports_nothing_heavy(tmp_path: Path) -> No
 def test_an_installation_that_cannot_be_written(tmp_path: Path, temporary: bool) -> None:
     for package in ("hil", "drivers"):
         shutil.copytree(
-            Path(__file__).parents[2] / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__")
+            Path(__file__).parents[3] / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__")
         )
     for folder in {source.parent for source in tmp_path.rglob("*.py")}:
         (folder / "__pycache__").touch()  # a file in its place stops even root

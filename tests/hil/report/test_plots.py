@@ -18,7 +18,7 @@ from hil.motion.profile import load_profile
 from hil.motion.trajectory import plan
 from hil.report.plots import over_time
 
-PROFILES = Path(__file__).parents[2] / "profiles"
+PROFILES = Path(__file__).parents[3] / "profiles"
 
 
 def labels(figure: object) -> list[str]:

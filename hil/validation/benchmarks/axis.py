@@ -4,7 +4,6 @@ from hil.bench.axis_models import SerialChain, TwoMass
 from hil.bench.bench_file import Bench, load_bench
 from hil.bench.hardware import DriveSection, SimulationSection
 from hil.bench.supervision_section import SupervisionSection
-from hil.motion.profile import Profile
 from hil.motion.trajectory import Trajectory, plan
 from hil.validation.proof.draw.demo import from_rest, there_and_back
 
@@ -16,15 +15,6 @@ _STANDING = SupervisionSection(frozen_torque=1e9, torque_difference=1e9)
 def trajectory(period_s: float) -> Trajectory:
     """Return the set-points of `MOVES`."""
     return plan(MOVES, period_s, 0.0)
-
-
-def repeated(profile: Profile, length_s: float, period_s: float) -> Profile:
-    """Return a profile repeated to a length of about `length_s`."""
-    data = profile.model_dump(mode="json")
-    times = max(round(length_s / plan(profile, period_s).duration_s), 1)
-    return Profile.model_validate(
-        data | {"segments": [{"kind": "repeat", "times": times, "segments": data["segments"]}]}
-    )
 
 
 def two_mass() -> Bench:

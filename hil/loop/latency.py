@@ -30,7 +30,6 @@ from hil.loop.realtime import PRIORITY, Grant, loop_core, real_time
 
 HALF_DECADES = (1e-6, 2e-6, 5e-6, 1e-5, 2e-5, 5e-5, 1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2, 0.1)
 _HISTOGRAM_US = 1_000_000  # longest latency that cyclictest resolves
-_SPIKES = 1_000_000  # the most that are listed
 _LEAD_S = 0.3  # from the start of cyclictest to its first wake-up at a full second
 # A busy process: arithmetic and copies of more memory than a core's cache holds.
 _BUSY = "import os, sys; os.sched_setaffinity(0, {int(sys.argv[1])}); a = bytearray(1 << 24)\nwhile True: bytes(a)"
@@ -135,11 +134,10 @@ def load() -> Iterator[int]:
 
 
 class Cyclictest:
-    """Result of a run of cyclictest, when it has ended. spikes: its list of late wake-ups, if it was asked for."""
+    """Result of a run of cyclictest, when it has ended."""
 
     def __init__(self, process: subprocess.Popen[str] | None, results: Path) -> None:
         self._process, self._results = process, results
-        self.spikes = ""
         self.found: tuple[Latencies | None, str] = (
             None,
             "cyclictest is not installed: sudo apt install rt-tests (Debian, Ubuntu), "
@@ -153,7 +151,7 @@ class Cyclictest:
         """Wait for the end and read the histogram."""
         if self._process is None:
             return
-        self.spikes, errors = self._process.communicate()
+        _, errors = self._process.communicate()
         try:
             thread = json.loads(self._results.read_text())["thread"]["0"]
             counts = {int(us) / 1e6: count for us, count in thread["histogram"].items()}
@@ -167,23 +165,17 @@ class Cyclictest:
 
 
 @contextmanager
-def cyclictest(
-    period_s: float, seconds: float, core: int, priority: int = PRIORITY, spike_s: float | None = None
-) -> Iterator[Cyclictest]:
-    """Run cyclictest beside the block, if it is installed; its result is known after the block.
-
-    spike_s: latency from which its wake-ups are listed with their times.
-    """
+def cyclictest(period_s: float, seconds: float, core: int) -> Iterator[Cyclictest]:
+    """Run cyclictest beside the block, if it is installed; its result is known after the block."""
     program = shutil.which("cyclictest")
     with tempfile.TemporaryDirectory(prefix="hil-latency-") as folder:
         results = Path(folder) / "cyclictest.json"
         process = None
         if program is not None:
             process = subprocess.Popen(
-                [program, "--quiet", "--mlockall", f"--priority={priority}", f"--affinity={core}", "--secaligned",
+                [program, "--quiet", "--mlockall", f"--priority={PRIORITY}", f"--affinity={core}", "--secaligned",
                  f"--interval={round(1e6 * period_s)}", f"--loops={max(1, round(seconds / period_s))}",
-                 f"--histogram={_HISTOGRAM_US}", f"--histfile={os.devnull}", f"--json={results}",
-                 *([] if spike_s is None else [f"--spike={round(1e6 * spike_s)}", f"--spike-nodes={_SPIKES}"])],
+                 f"--histogram={_HISTOGRAM_US}", f"--histfile={os.devnull}", f"--json={results}"],
                 stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)  # fmt: skip
         reference = Cyclictest(process, results)
         try:

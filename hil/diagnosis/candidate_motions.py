@@ -188,7 +188,7 @@ def _slope(values: FloatArray, period_s: float) -> FloatArray:
 
 
 def _down(value: float) -> float:
-    """Round down to four digits."""
+    """SearchRound down to four digits."""
     if value <= 0.0:
         return value
     factor = 10.0 ** (3 - math.floor(math.log10(value)))

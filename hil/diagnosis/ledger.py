@@ -27,7 +27,7 @@ class Rule(Generic[_M]):
     test: Callable[[_M, Any], Answer | None]
 
 
-class Entry(NamedTuple):
+class LedgerEntry(NamedTuple):
     """Answer of one rule on one candidate, in words, and its figures."""
 
     rule: str
@@ -36,7 +36,7 @@ class Entry(NamedTuple):
     figures: Figures
 
 
-Ledger = tuple[Entry, ...]
+Ledger = tuple[LedgerEntry, ...]
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,9 @@ def examine(rules: Sequence[Rule[_M]], measured: _M, criteria: Any) -> Ledger:
         if answer is None:
             continue
         accepts, figures = answer
-        entries.append(Entry(rule.name, accepts, (rule.asks if accepts else rule.refusal).format(**figures), figures))
+        entries.append(
+            LedgerEntry(rule.name, accepts, (rule.asks if accepts else rule.refusal).format(**figures), figures)
+        )
         if not accepts:
             break
     return tuple(entries)

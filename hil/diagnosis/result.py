@@ -204,7 +204,7 @@ class RuleAnswer(_Part):
     figures: dict[str, float | str | None] = Field(description="measured quantities; null where not finite")
 
 
-class Candidate(_Part):
+class CandidateLedger(_Part):
     """A mechanism that was fitted, and its ledger: the rules in the order in which they were asked."""
 
     effect: str
@@ -251,7 +251,7 @@ class Result(_Part):
     torque_left: TorqueLeft | None = Field(None, description="null without held-out motion or recorded torque")
     next_experiment: NextExperiment | None = None
     time_budget: TimeBudget | None = Field(None, description="null if the search was completed")
-    considered: tuple[Candidate, ...] = Field((), description="every mechanism that was fitted, in order")
+    considered: tuple[CandidateLedger, ...] = Field((), description="every mechanism that was fitted, in order")
     notes: tuple[str, ...] = ()
     runtime_s: NotNegative
 

@@ -27,7 +27,7 @@ LITTLE, LITTLE_STEP, ANY = 1e-3, 1e-2, 1e6
 DELAY, MOST_DELAY = "torque_delay_s", 1.5
 
 
-class Motion(NamedTuple):
+class MotionRange(NamedTuple):
     """Extent of the motion that recordings show: of the table, of the motor, and in time."""
 
     travel_m: float
@@ -75,7 +75,7 @@ class Coordinate:
         """True for an instant at which a window begins or ends."""
         return self.role is Role.EDGE
 
-    def step(self, start: float, least: float, edge_step_s: float, motion: Motion) -> float:
+    def step(self, start: float, least: float, edge_step_s: float, motion: MotionRange) -> float:
         """Step of x in a forward difference, for a parameter of a mechanism that begins at `start`."""
         step = least
         if self.role is Role.PERIOD:

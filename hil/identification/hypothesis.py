@@ -18,7 +18,7 @@ from hil.identification.coordinates import (
     CHATTER_STEP,
     DELAY,
     Coordinate,
-    Motion,
+    MotionRange,
     axis_coordinate,
     coordinate_of,
     delay_coordinate,
@@ -173,7 +173,7 @@ class Hypothesis:
         """Steps (p,) of x for forward differences; `travel_m` and `duration_s` of the recordings."""
         step = CHATTER_STEP if self._chatters else 1e-4
         angle_rad = travel_m / self.bench.axis.ratio_m_rad * self.bench.axis.physics().angle_per_unit
-        motion, of_axis = Motion(travel_m, angle_rad, duration_s), self.nominal_count - len(self._known)
+        motion, of_axis = MotionRange(travel_m, angle_rad, duration_s), self.nominal_count - len(self._known)
         steps = [max(step, one.least_step) for one in self.coordinates[:of_axis]]
         starts = [*self.bench_values[of_axis:], *(value for term in self.terms for value in term.values)]
         of_mechanisms = zip(self.coordinates[of_axis:], starts, strict=True)

@@ -2,7 +2,7 @@
 
 import math
 
-from hil.diagnosis.result import Candidate, Result
+from hil.diagnosis.result import CandidateLedger, Result
 from hil.diagnosis.wording import title, titles
 from hil.report.page import Page
 
@@ -29,11 +29,11 @@ def ledger_section(page: Page, result: Result) -> None:
     page.text(f"{len(result.considered)} fits of mechanisms were considered; diagnosis.json has the ledger of each.")
 
 
-def _outcome(one: Candidate) -> str:
+def _outcome(one: CandidateLedger) -> str:
     return "not named, not refuted" if all(answer.accepted for answer in one.rules) else "refuted"
 
 
-def _evidence(one: Candidate) -> float:
+def _evidence(one: CandidateLedger) -> float:
     """Evidence of a candidate against the twin without it (BIC difference)."""
     evidence = (answer.figures.get("evidence") for answer in one.rules)
     return next((float(value) for value in evidence if value is not None), -math.inf)

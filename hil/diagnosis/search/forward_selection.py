@@ -17,7 +17,7 @@ from hil.diagnosis.ledger import Considered, accepted, examine
 from hil.diagnosis.search.addition import removed
 from hil.diagnosis.search.events import beside_loads, revised
 from hil.diagnosis.search.initial_values import axis_facts, claimable
-from hil.diagnosis.search.next_term import Round, next_term
+from hil.diagnosis.search.next_term import SearchRound, next_term
 from hil.diagnosis.search.restart import again
 from hil.diagnosis.search.rivals import ENDED, RivalFit, chosen, ended
 from hil.diagnosis.search.score_test import screen_library
@@ -67,7 +67,7 @@ def search(prepared: Prepared, progress: Progress = lambda text: None, deadline_
         step(f"screening the library beside {len(base.terms)} terms")
         if stopped_at:
             break
-        round_ = Round(base, beside_loads(nominal, base), given)
+        round_ = SearchRound(base, beside_loads(nominal, base), given)
         additions = next_term(round_, screen_library(base), step)
         fitted = {one.fit.terms[-1].effect for one in additions.fits if not base.estimator.expired}
         considered += additions.considered

@@ -15,7 +15,7 @@ from hil.identification.estimator import Fit
 
 
 @dataclass(frozen=True, eq=False)
-class Round:
+class SearchRound:
     """One round of the search: what a further term is added to, and measured against (see `Addition`)."""
 
     base: Fit
@@ -41,7 +41,7 @@ class Additions:
     considered: tuple[Considered, ...] = ()
 
 
-def next_term(search: Round, candidates: Sequence[Candidate], step: Progress) -> Additions:
+def next_term(search: SearchRound, candidates: Sequence[Candidate], step: Progress) -> Additions:
     """Fit the base with one more term.
 
     A torque that is sampled, or the only one recorded, drives the twin with its error: terms that pass less of it leave

@@ -15,7 +15,7 @@ from hil.diagnosis.acceptance import COMPARED, paying
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.ledger import Considered, Ledger, accepted, examine, refusal
 from hil.diagnosis.search.addition import Addition
-from hil.diagnosis.search.next_term import Round, first_standing
+from hil.diagnosis.search.next_term import SearchRound, first_standing
 from hil.identification.coordinates import LAST_EDGE_STEP_S
 from hil.identification.estimator import Fit, FitStatus
 from hil.identification.inference import Filter, bic_gain, bic_margin, refuted, whitening
@@ -69,7 +69,7 @@ class Choice:
     considered: tuple[Considered, ...]
 
 
-def chosen(best: Addition, additions: Sequence[Addition], search: Round) -> Choice:
+def chosen(best: Addition, additions: Sequence[Addition], search: SearchRound) -> Choice:
     """Choose the explanation to name.
 
     `best` is the first of the additions so far: those near it are ended too, and may then come before it.
@@ -105,7 +105,7 @@ def objection(one: Addition, named: Addition) -> str:
     return f"with it the training recordings are reproduced worse in {', '.join(worse)}" if worse else ""
 
 
-def _ended(one: Addition, search: Round) -> Addition:
+def _ended(one: Addition, search: SearchRound) -> Addition:
     fit = ended(one.fit)
     return one if fit is one.fit else search.addition(fit)
 

@@ -3,15 +3,15 @@
 import math
 from dataclasses import replace
 
-from hil.diagnosis.ledger import Considered, Entry, Ledger
-from hil.diagnosis.result import Candidate, RuleAnswer
+from hil.diagnosis.ledger import Considered, Ledger, LedgerEntry
+from hil.diagnosis.result import CandidateLedger, RuleAnswer
 from hil.diagnosis.stages import Judged
 from hil.diagnosis.verdict.findings import key_in_search
 from hil.diagnosis.verdict.judge import explanation
 from hil.twin.library import BY_ID
 
 
-def ledgers(judged: Judged) -> tuple[Candidate, ...]:
+def ledgers(judged: Judged) -> tuple[CandidateLedger, ...]:
     """The candidates in the order in which they were fitted.
 
     One that was found has the answers on held-out recordings too, and that on all terms together. A term that the
@@ -21,7 +21,10 @@ def ledgers(judged: Judged) -> tuple[Candidate, ...]:
     together: Ledger = ()
     if proof.final.terms:
         together = explanation(searched.nominal, proof.final, searched.prepared.held_out)
-    answers, more = {index: _candidate(one, False) for index, one in enumerate(searched.considered)}, list[Candidate]()
+    answers, more = (
+        {index: _candidate(one, False) for index, one in enumerate(searched.considered)},
+        list[CandidateLedger](),
+    )
     for ablation, kept in [*((one, True) for one in proof.ablations), *((one, False) for one in proof.dropped)]:
         term, effect = ablation.term, key_in_search(searched, ablation.term)[0]
         places = [index for index, one in enumerate(searched.considered) if one.effect == effect and one.accepted]
@@ -36,8 +39,8 @@ def ledgers(judged: Judged) -> tuple[Candidate, ...]:
     return (*answers.values(), *more)
 
 
-def _candidate(one: Considered, named: bool) -> Candidate:
-    return Candidate(
+def _candidate(one: Considered, named: bool) -> CandidateLedger:
+    return CandidateLedger(
         effect=one.effect,
         variant=BY_ID[one.effect].forms[one.variant],
         beside=one.beside,
@@ -46,7 +49,7 @@ def _candidate(one: Considered, named: bool) -> Candidate:
     )
 
 
-def _answer(entry: Entry) -> RuleAnswer:
+def _answer(entry: LedgerEntry) -> RuleAnswer:
     figures = {
         name: value if isinstance(value, str) or math.isfinite(value) else None for name, value in entry.figures.items()
     }

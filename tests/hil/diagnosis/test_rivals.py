@@ -15,7 +15,7 @@ from hil.channels import AxisKind
 from hil.diagnosis.diagnose import diagnose
 from hil.diagnosis.search import rivals
 from hil.diagnosis.search.addition import Addition
-from hil.diagnosis.search.next_term import Round, first_standing
+from hil.diagnosis.search.next_term import SearchRound, first_standing
 from hil.diagnosis.search.rivals import RivalFit, chosen
 from hil.diagnosis.verdict.findings import rival_in_words
 from hil.identification.hypothesis import Hypothesis
@@ -92,7 +92,7 @@ def test_what_explains_more_is_named_unless_there_is_an_objection(monkeypatch: p
     data = dataset([take(recorded(OWNER, LOAD), OWNER)], OWNER)
     base = fitted(Hypothesis(OWNER), data, evaluations=4)
     fits = [fitted(Hypothesis(OWNER, (term,)), data, evaluations=8) for term in (LOAD, OTHER)]
-    search = Round(base, base, base)
+    search = SearchRound(base, base, base)
     right, wrong = map(search.addition, fits)
     choice = chosen(wrong, [right, wrong], search)
     assert choice.named.fit.terms[-1].effect == LOAD.effect
@@ -127,7 +127,7 @@ def test_a_little_harm_does_not_set_aside_what_explains_nearly_all(monkeypatch: 
     """An eccentric pulley explained nine tenths of what play left, and a third more remained in the motor."""
     for name, value in {"evidence": 1000.0, "gain": 1e6, "unrepeated": (0.0, 0.0), "inside": None}.items():
         monkeypatch.setattr(Addition, name, value)
-    search = Round(base := explained(5e5, 12.0, 1000.0), base, explained(6e5, 16.0, 1100.0))
+    search = SearchRound(base := explained(5e5, 12.0, 1000.0), base, explained(6e5, 16.0, 1100.0))
     most, play = (search.addition(fit) for fit in (explained(4e4, 16.0, 75.0), explained(3e5, 6.0, 60.0)))
     assert first_standing([most, play]) is most
     below = search.addition(explained(4e4, 25.0, 75.0))  # worse than by the bench file

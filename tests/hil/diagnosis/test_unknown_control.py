@@ -16,7 +16,7 @@ from hil.bench.control_section import UnknownControl
 from hil.diagnosis.diagnose import diagnose
 from hil.diagnosis.preparation.prepare import prepare
 from hil.diagnosis.result import Result
-from hil.diagnosis.search.next_term import Round, next_term
+from hil.diagnosis.search.next_term import SearchRound, next_term
 from hil.diagnosis.search.score_test import Candidate
 from hil.errors import InputError
 from hil.identification.compare import compare
@@ -150,5 +150,5 @@ def test_the_noise_of_a_sampled_torque_is_no_evidence() -> None:
     delay_s = found.hypothesis.values[found.hypothesis.nominal.index("torque_delay_s")]
     assert abs(delay_s) < 0.1 * recording.period_s
     candidates = [Candidate(COGGING, 0.9)]
-    additions = next_term(Round(found, found, found), candidates, print)
+    additions = next_term(SearchRound(found, found, found), candidates, print)
     assert (additions.fits, additions.best) == ([], None)

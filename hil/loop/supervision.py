@@ -50,7 +50,7 @@ class LoopSign(IntFlag):
     STALLED = 4  # a short time ago: the axis did not get the set-points of the ticks left out
 
 
-class StopRule(NamedTuple):
+class Trip(NamedTuple):
     """A line of the table. cycles: from the fault (bound passed, last good frame) to the reaction, at most, as text."""
 
     name: str
@@ -84,92 +84,92 @@ _E, _R, _L, _C = Ending, Reaction, Limit, Condition
 _STALE = "missed_answers + 2"
 _BEAT = "heartbeat time-out + 1"
 
-RULES: tuple[StopRule, ...] = (
+RULES: tuple[Trip, ...] = (
     # first, because a late loop has the drive trip by its own watchdog
-    StopRule("loop late", _E.OVERRUN, "lateness > overrun_s, or > deadline of the RPDO less two periods", _R.STOP, "1",
+    Trip("loop late", _E.OVERRUN, "lateness > overrun_s, or > deadline of the RPDO less two periods", _R.STOP, "1",
          "the loop was {lateness_s:.3f} s late, allowed {late_limit_s:.3f} s (drive.overrun_s, "
          "drive.command_deadline_s): take load off the machine", loop=LoopSign.LATE),
-    StopRule("after a stall", _E.OVERRUN, "ticks were left out less than three time constants of the position loop ago; "
+    Trip("after a stall", _E.OVERRUN, "ticks were left out less than three time constants of the position loop ago; "
          "only bounds are passed that this can break, and it moved the axis by a fifth of them or more", _R.TWICE, "1",
          "the axis did not follow because the loop had been {stall_s:.3f} s late: take load off the machine",
          loop=LoopSign.STALLED),
-    StopRule("drive bus-off", _E.DRIVE_FAULT, "the controller left the bus", _R.QUICK_STOP, "1", "{text}",
+    Trip("drive bus-off", _E.DRIVE_FAULT, "the controller left the bus", _R.QUICK_STOP, "1", "{text}",
          drive=_C.BUS_OFF),
-    StopRule("drive heartbeat lost", _E.DRIVE_FAULT, "no heartbeat of the drive", _R.QUICK_STOP, _BEAT, "{text}",
+    Trip("drive heartbeat lost", _E.DRIVE_FAULT, "no heartbeat of the drive", _R.QUICK_STOP, _BEAT, "{text}",
          drive=_C.HEARTBEAT_LOST),
-    StopRule("drive not operational", _E.DRIVE_FAULT, "the drive left NMT operational", _R.QUICK_STOP, "1", "{text}",
+    Trip("drive not operational", _E.DRIVE_FAULT, "the drive left NMT operational", _R.QUICK_STOP, "1", "{text}",
          drive=_C.NOT_OPERATIONAL),
-    StopRule("drive emergency", _E.DRIVE_FAULT, "EMCY with an error code", _R.QUICK_STOP, "1", "{text}",
+    Trip("drive emergency", _E.DRIVE_FAULT, "EMCY with an error code", _R.QUICK_STOP, "1", "{text}",
          drive=_C.EMERGENCY),
-    StopRule("drive fault", _E.DRIVE_FAULT, "state FAULT or FAULT REACTION ACTIVE", _R.QUICK_STOP, "1", "{text}",
+    Trip("drive fault", _E.DRIVE_FAULT, "state FAULT or FAULT REACTION ACTIVE", _R.QUICK_STOP, "1", "{text}",
          drive=_C.FAULT),
-    StopRule("drive switched off", _E.DRIVE_FAULT, "left OPERATION ENABLED by itself", _R.QUICK_STOP, "1", "{text}",
+    Trip("drive switched off", _E.DRIVE_FAULT, "left OPERATION ENABLED by itself", _R.QUICK_STOP, "1", "{text}",
          drive=_C.DISABLED),
-    StopRule("drive unanswered", _E.DRIVE_FAULT, "does not follow its controlword", _R.QUICK_STOP, "1", "{text}",
+    Trip("drive unanswered", _E.DRIVE_FAULT, "does not follow its controlword", _R.QUICK_STOP, "1", "{text}",
          drive=_C.UNANSWERED),
-    StopRule("drive set-point", _E.DRIVE_FAULT, "the set-point that acts (0x6074, 0x606B, 0x6062) is none of those of the "
+    Trip("drive set-point", _E.DRIVE_FAULT, "the set-point that acts (0x6074, 0x606B, 0x6062) is none of those of the "
          "last missed_answers + 3 cycles", _R.QUICK_STOP, "missed_answers + 4", "{text}", drive=_C.OTHER_SETPOINT),
-    StopRule("drive stale", _E.DRIVE_FAULT, "SYNC or answers lost: more than missed_answers in a row", _R.QUICK_STOP,
+    Trip("drive stale", _E.DRIVE_FAULT, "SYNC or answers lost: more than missed_answers in a row", _R.QUICK_STOP,
          _STALE, "{text}", drive=_C.STALE),
-    StopRule("table encoder bus-off", _E.ENCODER_FAULT, "the controller left the bus", _R.BY_FEEDBACK, "1", "{text}",
+    Trip("table encoder bus-off", _E.ENCODER_FAULT, "the controller left the bus", _R.BY_FEEDBACK, "1", "{text}",
          encoder=_C.BUS_OFF),
-    StopRule("table encoder heartbeat lost", _E.ENCODER_FAULT, "no heartbeat of the encoder", _R.BY_FEEDBACK, _BEAT,
+    Trip("table encoder heartbeat lost", _E.ENCODER_FAULT, "no heartbeat of the encoder", _R.BY_FEEDBACK, _BEAT,
          "{text}", encoder=_C.HEARTBEAT_LOST),
-    StopRule("table encoder not operational", _E.ENCODER_FAULT, "the encoder left NMT operational", _R.BY_FEEDBACK, "1",
+    Trip("table encoder not operational", _E.ENCODER_FAULT, "the encoder left NMT operational", _R.BY_FEEDBACK, "1",
          "{text}", encoder=_C.NOT_OPERATIONAL),
-    StopRule("table encoder alarm", _E.ENCODER_FAULT, "alarm of the encoder", _R.BY_FEEDBACK, "1", "{text}",
+    Trip("table encoder alarm", _E.ENCODER_FAULT, "alarm of the encoder", _R.BY_FEEDBACK, "1", "{text}",
          encoder=_C.ALARM),
-    StopRule("table encoder line lost", _E.ENCODER_FAULT, "serial line gone", _R.BY_FEEDBACK, "1", "{text}",
+    Trip("table encoder line lost", _E.ENCODER_FAULT, "serial line gone", _R.BY_FEEDBACK, "1", "{text}",
          encoder=_C.LINE_LOST),
-    StopRule("table encoder stale", _E.ENCODER_FAULT, "more than missed_answers in a row", _R.BY_FEEDBACK, _STALE, "{text}",
+    Trip("table encoder stale", _E.ENCODER_FAULT, "more than missed_answers in a row", _R.BY_FEEDBACK, _STALE, "{text}",
          encoder=_C.STALE),
-    StopRule("not a number", _E.NOT_FINITE, "NaN or infinity in set-point, sample, command or twin", _R.QUICK_STOP, "1",
+    Trip("not a number", _E.NOT_FINITE, "NaN or infinity in set-point, sample, command or twin", _R.QUICK_STOP, "1",
          "a set-point, sample, command or value of the twin is NaN or infinite", _L.NOT_FINITE),
-    StopRule("motor encoder jump", _E.ENCODER_FAULT, "step > velocity bound x time + frozen_m", _R.QUICK_STOP, "1",
+    Trip("motor encoder jump", _E.ENCODER_FAULT, "step > velocity bound x time + frozen_m", _R.QUICK_STOP, "1",
          "the motor encoder jumped further than the axis can move: check encoder and cable", _L.MOTOR_JUMP),
-    StopRule("table encoder jump", _E.ENCODER_FAULT, "step > velocity bound x time + frozen_m", _R.BY_FEEDBACK, "1",
+    Trip("table encoder jump", _E.ENCODER_FAULT, "step > velocity bound x time + frozen_m", _R.BY_FEEDBACK, "1",
          "the table encoder jumped further than the axis can move: check encoder and cable", _L.TABLE_JUMP),
-    StopRule("motor encoder frozen", _E.ENCODER_FAULT,
+    Trip("motor encoder frozen", _E.ENCODER_FAULT,
          "value repeats; table moved > frozen_m or measured torque changed > frozen_torque (CST)", _R.QUICK_STOP, "1",
          "the motor encoder is frozen, or the axis blocked: its value repeats while table or torque change",
          _L.MOTOR_FROZEN),
-    StopRule("table encoder frozen", _E.ENCODER_FAULT, "value repeats; motor moved > frozen_m", _R.BY_FEEDBACK, "1",
+    Trip("table encoder frozen", _E.ENCODER_FAULT, "value repeats; motor moved > frozen_m", _R.BY_FEEDBACK, "1",
          "the table encoder is frozen: its value repeats while the motor moves", _L.TABLE_FROZEN),
-    StopRule("motor encoder reversed", _E.ENCODER_FAULT, "against the table and the set-points by > "
+    Trip("motor encoder reversed", _E.ENCODER_FAULT, "against the table and the set-points by > "
          "frozen_m, since they agreed", _R.QUICK_STOP, "1",
          "the motor encoder counts against the table encoder and the set-points: correct its "
          "direction", _L.MOTOR_REVERSED),
-    StopRule("table encoder reversed", _E.ENCODER_FAULT, "against the motor by > frozen_m, since they agreed",
+    Trip("table encoder reversed", _E.ENCODER_FAULT, "against the motor by > frozen_m, since they agreed",
          _R.BY_FEEDBACK, "1",
          "the table encoder counts against the motor encoder: correct encoders.table.direction", _L.TABLE_REVERSED),
-    StopRule("encoder difference", _E.ENCODER_FAULT, "motor and table differ by > encoder_difference_m", _R.BY_FEEDBACK,
+    Trip("encoder difference", _E.ENCODER_FAULT, "motor and table differ by > encoder_difference_m", _R.BY_FEEDBACK,
          "1", "motor encoder and table encoder differ by more than the transmission allows "
          "(drive.supervision.encoder_difference_m): one counts wrong or the coupling slips", _L.ENCODER_DIFFERENCE),
-    StopRule("velocity", _E.VELOCITY, "smoothed velocity > velocity_m_s", _R.QUICK_STOP, "16",
+    Trip("velocity", _E.VELOCITY, "smoothed velocity > velocity_m_s", _R.QUICK_STOP, "16",
          "the motor is faster than its bound (drive.supervision.velocity_m_s)", _L.VELOCITY),
-    StopRule("acting set-point", _E.DRIVE_FAULT, "smoothed measured less commanded torque > torque_difference (CST)",
+    Trip("acting set-point", _E.DRIVE_FAULT, "smoothed measured less commanded torque > torque_difference (CST)",
          _R.QUICK_STOP, "16", "the torque differs from its command (drive.supervision.torque_difference): set-points "
          "do not reach the drive, or it limits them", _L.ACTING_TORQUE),
-    StopRule("torque", _E.TORQUE, "measured torque > torque", _R.QUICK_STOP, "3",
+    Trip("torque", _E.TORQUE, "measured torque > torque", _R.QUICK_STOP, "3",
          "the torque exceeds its bound (drive.supervision.torque)", _L.TORQUE),
-    StopRule("following error", _E.FOLLOWING_ERROR,
+    Trip("following error", _E.FOLLOWING_ERROR,
          "set-point less fed-back position > following_error_m + following_error_s x speed", _R.TWICE, "1",
          "the axis is more than {following_error_m} m from its set-point (drive.following_error_m): blocked, "
          "overloaded, or badly tuned", _L.FOLLOWING_ERROR),
-    StopRule("travel", _E.TRAVEL_LIMIT, "fed-back position outside travel_m", _R.STOP, "1",
+    Trip("travel", _E.TRAVEL_LIMIT, "fed-back position outside travel_m", _R.STOP, "1",
          "the axis left {travel_m} m (drive.travel_m): correct the profile or home the axis", _L.TRAVEL),
-    StopRule("stopping distance", _E.TRAVEL_LIMIT, "place of a stop from now outside travel_m by > following_error_m",
+    Trip("stopping distance", _E.TRAVEL_LIMIT, "place of a stop from now outside travel_m by > following_error_m",
          _R.STOP, "16", "the axis is too fast to stop inside {travel_m} m (drive.travel_m)", _L.STOPPING_DISTANCE),
-    StopRule("torque over time", _E.TORQUE, "mean square over thermal_time_s > continuous_torque squared", _R.STOP, "1",
+    Trip("torque over time", _E.TORQUE, "mean square over thermal_time_s > continuous_torque squared", _R.STOP, "1",
          "the torque over time exceeds drive.supervision.continuous_torque: let the motor cool, lower the "
          "accelerations", _L.TORQUE_TIME),
-    StopRule("residual: encoder", _E.RESIDUAL, "one position leaves the twin, torque does not", _R.STOP, "20",
+    Trip("residual: encoder", _E.RESIDUAL, "one position leaves the twin, torque does not", _R.STOP, "20",
          "the axis deviates from its twin; suspect: encoder (one position alone)", _L.RESIDUAL_ENCODER),
-    StopRule("residual: drive", _E.RESIDUAL, "torque leaves the twin and its command", _R.STOP, "20",
+    Trip("residual: drive", _E.RESIDUAL, "torque leaves the twin and its command", _R.STOP, "20",
          "the axis deviates from its twin; suspect: drive (torque differs from its command)", _L.RESIDUAL_DRIVE),
-    StopRule("residual: load", _E.RESIDUAL, "torque or both positions leave the twin", _R.STOP, "20",
+    Trip("residual: load", _E.RESIDUAL, "torque or both positions leave the twin", _R.STOP, "20",
          "the axis deviates from its twin; suspect: load (friction, mass, external force)", _L.RESIDUAL_LOAD),
-    StopRule("stop asked", _E.INTERRUPTED, "ctrl-C or a signal", _R.TWICE, "1", "stopped by the user",
+    Trip("stop asked", _E.INTERRUPTED, "ctrl-C or a signal", _R.TWICE, "1", "stopped by the user",
          loop=LoopSign.ASKED),
 )  # fmt: skip
 # Conditions that stop the axis; a late sample or a damaged frame of an encoder does not.

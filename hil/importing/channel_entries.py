@@ -7,21 +7,13 @@ import numpy as np
 from hil.arrays import FloatArray
 from hil.channels import AXIS_CHANNELS, SPEED_SET_POINT, AxisKind
 from hil.errors import InputError
+from hil.identification.derivatives import Motion, motion, smoothed
 from hil.importing.column_names import Label
 from hil.importing.effort import effort_entry, signs_of
 from hil.importing.encoder_counts import CountSize, assumed, from_length, from_speed
 from hil.importing.header_values import Constant
 from hil.importing.map_draft import DraftedChannel, MapDraft
-from hil.importing.relations import (
-    MotionColumns,
-    derivative_of,
-    driven,
-    explained,
-    lateness_s,
-    motion,
-    proportional,
-    smoothed,
-)
+from hil.importing.relations import derivative_of, driven, explained, lateness_s, proportional
 from hil.importing.roles import SAME_POSITION, Roles
 from hil.importing.unit_choice import (
     MATCH,
@@ -262,7 +254,7 @@ class ChannelEntries:
         alone, both = explained(speed, moved.velocity), explained(speed, moved.velocity, smoothed(error, self.period_s))
         return 1.0 - alone > LEAST_LEFT and 1.0 - both < LOOP_LEAVES * (1.0 - alone)
 
-    def _efforts(self, moved: MotionColumns) -> None:
+    def _efforts(self, moved: Motion) -> None:
         names = AXIS_CHANNELS[self.kind]
         pairs = ((self.roles.effort, names.torque), (self.roles.effort_command, names.torque_command))
         given = [(column, channel) for column, channel in pairs if column is not None]

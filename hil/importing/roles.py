@@ -6,18 +6,10 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.errors import InputError
+from hil.identification.derivatives import Motion, motion, smoothed
 from hil.importing.column_names import Label, Quantity
 from hil.importing.computed_position import computed_one
-from hil.importing.relations import (
-    MotionColumns,
-    derivative_of,
-    driven,
-    motion,
-    noise,
-    proportional,
-    roughness,
-    smoothed,
-)
+from hil.importing.relations import derivative_of, driven, noise, proportional, roughness
 from hil.quantities import UNITS
 
 SAME_POSITION = 0.98  # share from which a column is another reading of a position: following errors are below 5 %
@@ -180,7 +172,7 @@ def _as_position(name: str, live: dict[str, FloatArray], period_s: float) -> flo
     return total - 0.01 * noise(live[name])
 
 
-def _accelerates(values: FloatArray, moved: MotionColumns, period_s: float) -> bool:
+def _accelerates(values: FloatArray, moved: Motion, period_s: float) -> bool:
     return proportional(smoothed(values, period_s), moved.acceleration).share > IS_DERIVATIVE
 
 
@@ -242,7 +234,7 @@ def _velocities(
     live: dict[str, FloatArray],
     labels: dict[str, Label],
     names: list[str],
-    moved: MotionColumns | None,
+    moved: Motion | None,
     period_s: float,
     roles: Roles,
 ) -> None:

@@ -215,7 +215,7 @@ class CandidateLedger(_Part):
 
 
 class NextExperiment(_Part):
-    """Motion that separates mechanisms that the recorded motion cannot."""
+    """MeasuredMotion that separates mechanisms that the recorded motion cannot."""
 
     profile: str = Field(description="profile file")
     separates: tuple[str, ...]

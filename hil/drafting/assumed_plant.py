@@ -1,7 +1,7 @@
 """Inertia and friction of a bench where no torque is recorded: two encoders tell the transmission without them."""
 
-from hil.drafting.estimate import Estimate
 from hil.drafting.plant_values import PlantValues, TransmissionValues, plant_values
+from hil.identification.least_squares import Estimate
 from hil.recording.recording import Recording
 
 # A servo motor of a kilowatt; without a torque a diagnosis uses the ratio of stiffness and mass alone.

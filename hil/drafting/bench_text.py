@@ -1,8 +1,8 @@
 """Write a drafted bench as YAML, each value with its error and how it was found."""
 
 from hil.channels import AxisKind
+from hil.drafting.bench_value import BenchValue
 from hil.drafting.draft_bench import BenchDraft
-from hil.drafting.estimate import BenchValue
 
 
 def bench_text(draft: BenchDraft) -> str:

@@ -6,13 +6,14 @@ from math import hypot, log2, pi, sqrt
 from hil.channels import AxisKind
 from hil.drafting.assumed_plant import plant_or_assumed
 from hil.drafting.bench_notes import bench_notes
-from hil.drafting.estimate import BenchValue, Estimate
+from hil.drafting.bench_value import BenchValue
 from hil.drafting.loop_values import loop_values
 from hil.drafting.plant_values import PlantValues, TransmissionValues, plant_values, transmission_values
 from hil.drafting.ratio_values import gear_of, lead_of
 from hil.drafting.sensor_values import noise_of
 from hil.errors import InputError
 from hil.identification.derived_channels import with_position
+from hil.identification.least_squares import Estimate
 from hil.importing.by_map import STEP
 from hil.importing.usual_values import ROTARY_LEAD_M
 from hil.quantities import digits, unit_of

@@ -14,7 +14,7 @@ import numpy as np
 
 from hil.channels import SPEED_SET_POINT, AxisKind
 from hil.control.cascade import Gains, make_gains
-from hil.drafting.estimate import BenchValue
+from hil.drafting.bench_value import BenchValue
 from hil.identification.law.closed_form import closed_form, find_delays, first_tick
 from hil.identification.law.fit import fit_settings
 from hil.identification.law.replay import LawRows, Settings

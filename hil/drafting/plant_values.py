@@ -1,6 +1,6 @@
 """Inertia, friction, load and transmission of an axis from its recording.
 
-T = J a + D v + Tc sign(v) + T0 (+ r G sin(r q + q0)  or  + k q)        at the motor; r = 1 / gear ratio
+T = J a + D v + Fc sign(v) + T0 (+ r G sin(r q + q0)  or  + k q)        the plain model at the motor; r = 1 / gear ratio
 x = r q + c - r tau v - (m_t / k) a - (F_t / k) sign(v) - (G / k) sin(x + q0)      second encoder over the motor's
 """
 
@@ -11,27 +11,20 @@ from scipy.signal import butter, sosfiltfilt
 from scipy.stats import norm
 from scipy.stats import t as student
 
-from hil.arrays import FloatArray
-from hil.drafting.estimate import BlockFit, Estimate, fit_blocks
 from hil.errors import InputError
+from hil.identification.derivatives import motion, rows_per_sample, smoothed
 from hil.identification.friction import identify_friction
 from hil.identification.inverse_dynamics import CORNER, CUT_AT_START, inverse_dynamics_columns
+from hil.identification.least_squares import Estimate, LinearFit, least_squares
+from hil.identification.plain_model import MOTION, least_structure
 from hil.identification.sensor_noise import white_noise
-from hil.importing.relations import direction, motion, smoothed
 from hil.recording.recording import Recording
 
 CUTOFFS_HZ = (100.0, 50.0, 25.0, 12.0, 6.0, 3.0)  # of the position filter
 NOISE_SHARE = 0.02  # of noise in the acceleration: it makes the inertia too small by this share
 MOST_OF_RATE = 0.2  # of the sampling rate: the filter must end well below half of it
 LEAST_ROWS = 80  # after decimation: eight per block of the error estimate
-# Residual with a torque over the position over that without, up to which it is reported: on LEAST_ROWS white rows two
-# parameters without effect remove 1 %.
-GRAVITY_GAIN = 0.85
-# Least low-passed sign of the velocity of a row that is fitted: below, the filter mixes the friction of both directions
-# and of rest, and its change near a reversal, where the acceleration is largest, looks like an inertia.
-SLIDES = 0.9
 WRONG_SIGN = 3.0  # standard errors by which a negative inertia is none that the motion does not tell
-LEAST_ANGLE_RAD = 0.5  # of the load: over less, a sine is a straight line to 1 %, and gravity is a spring
 
 
 @dataclass(frozen=True)
@@ -91,7 +84,7 @@ def plant_values(recording: Recording, load_ratio: float | None = None) -> Plant
     # the highest that noise allows: a lower one cuts acceleration, so that the inertia comes out too large
     cutoff_hz = next((one for one in allowed if _noise_share(recording, one) < NOISE_SHARE), allowed[-1])
     fit = _fit(recording, cutoff_hz, load_ratio)
-    inertia, viscous, coulomb, offset, *more = fit.estimates
+    inertia, viscous, coulomb, offset = (fit[name] for name in MOTION)
     if inertia.value <= -WRONG_SIGN * inertia.std_error:
         raise InputError(
             f"{recording.name}: the inertia comes out as {inertia.value:.3g} +- {inertia.std_error:.2g}, allowed "
@@ -101,8 +94,9 @@ def plant_values(recording: Recording, load_ratio: float | None = None) -> Plant
         )
     if inertia.value <= inertia.std_error:
         inertia = replace(inertia, value=inertia.std_error, how=f"{inertia.how}; not told by this motion: its error")
-    gravity, angle = _gravity(more[0], more[1], load_ratio) if len(more) == 2 and load_ratio else (None, None)
-    spring = more[0] if len(more) == 1 else None
+    heavy = load_ratio is not None and "sine" in fit.names
+    gravity, angle = _gravity(fit["sine"], fit["cosine"], load_ratio or 1.0) if heavy else (None, None)
+    spring = fit["spring"] if "spring" in fit.names else None
     viscous, coulomb = _at_feeds(recording, viscous, coulomb) or (viscous, coulomb)
     return PlantValues(inertia, viscous, coulomb, offset, fit.left, gravity, angle, spring, cutoff_hz)
 
@@ -152,11 +146,7 @@ def _noise_share(recording: Recording, cutoff_hz: float) -> float:
     return float(noise) / total if total > 0.0 else np.inf
 
 
-def _fit(recording: Recording, cutoff_hz: float, load_ratio: float | None) -> BlockFit:
-    """Fit without a torque over the position, or with it where it leaves clearly less.
-
-    It is a spring, or gravity where the load turns far and that leaves less.
-    """
+def _fit(recording: Recording, cutoff_hz: float, load_ratio: float | None) -> LinearFit:
     # the filter of the decimation, alike for torque and motion, ends where that of the position does, at 40 Hz or below
     rate_hz = 1.0 / recording.period_s
     decimation = max(2, round(0.5 * CORNER * rate_hz / cutoff_hz), round(rate_hz / 100.0))
@@ -166,21 +156,10 @@ def _fit(recording: Recording, cutoff_hz: float, load_ratio: float | None) -> Bl
             f"{recording.name}: given {len(recording)} rows, allowed {CUT_AT_START + LEAST_ROWS * decimation} or more; "
             "give a longer recording"
         )
-    position = recording[recording.axis.motor_position]
-    angle = position * (load_ratio or 0.0)
-    over_position = [position, np.sin(angle), np.cos(angle)]
-    columns, torque = inverse_dynamics_columns(recording, cutoff_hz, decimation, more=over_position)
-    slides = np.abs(columns[:, 2]) > SLIDES
-    if np.count_nonzero(slides) >= LEAST_ROWS:
-        columns, torque = columns[slides], torque[slides]
+    columns, torque = inverse_dynamics_columns(recording, cutoff_hz, decimation, load_ratio=load_ratio)
+    turned_rad = float(np.ptp(columns["spring"])) * (load_ratio or 0.0)
     how = f"least squares of torque over motion, position filtered at {cutoff_hz:g} Hz"
-    motion_only, spring, weight = columns[:, :4].T, columns[:, 4], columns[:, 5:].T
-    plain = fit_blocks(list(motion_only), torque, [how] * 4)
-    more = fit_blocks([*motion_only, spring], torque, [f"{how}, with a spring"] * 5)
-    if np.ptp(spring) * (load_ratio or 0.0) >= LEAST_ANGLE_RAD:
-        heavy = fit_blocks([*motion_only, *weight], torque, [f"{how}, with gravity"] * 6)
-        more = heavy if heavy.left < more.left else more
-    return more if more.left < GRAVITY_GAIN * plain.left and more.estimates[0].value > 0.0 else plain
+    return least_structure(columns, torque, LEAST_ROWS, turned_rad, how=how)
 
 
 def transmission_values(recording: Recording, gravity_angle: float | None = None) -> TransmissionValues | None:
@@ -193,19 +172,25 @@ def transmission_values(recording: Recording, gravity_angle: float | None = None
         return None
     period_s = recording.period_s
     moved = motion(recording[names.motor_position], period_s)
-    edge = slice(CUT_AT_START, -CUT_AT_START)
-    table = smoothed(recording[names.table_position], period_s)[edge]
-    parts = (moved.position, moved.velocity, moved.acceleration, direction(moved.velocity))
-    columns: list[FloatArray] = [*(part[edge] for part in parts), np.ones(table.size)]
+    table = smoothed(recording[names.table_position], period_s)
+    columns = {
+        "ratio": moved.position,
+        "delay": moved.velocity,
+        "compliance": moved.acceleration,
+        "friction": moved.direction,
+        "offset": np.ones_like(table),
+    }
     if gravity_angle is not None:
         weight = -np.sin(table + gravity_angle)
-        columns += [weight, np.sign(weight)]  # deflection, and play whose flank the weight chooses
-    fit = fit_blocks(columns, table, ["second encoder over the motor's"] * len(columns))
-    sag = fit.estimates[5] if gravity_angle is not None else None
-    ratio, velocity, acceleration, friction = fit.estimates[:4]
-    delay = velocity.scaled(-1.0 / ratio.value)
+        columns |= {"sag": weight, "play": np.sign(weight)}  # deflection, and play whose flank the weight chooses
+    edge = slice(CUT_AT_START, -CUT_AT_START)
+    columns, table = {name: column[edge] for name, column in columns.items()}, table[edge]
+    how = "second encoder over the motor's"
+    fit = least_squares(columns, table, rows_per_sample=rows_per_sample(period_s), how=how)
+    ratio, acceleration = fit["ratio"], fit["compliance"]
+    delay = fit["delay"].scaled(-1.0 / ratio.value)
     # a pure delay adds r tau^2 / 2 to the factor of the acceleration
-    straight = Estimate(
-        acceleration.value - 0.5 * ratio.value * delay.value**2, acceleration.std_error, acceleration.how
-    ).scaled(1.0 / ratio.value)
-    return TransmissionValues(ratio, delay, straight, friction, fit.left * float(np.std(table)), sag)
+    straight = replace(acceleration, value=acceleration.value - 0.5 * ratio.value * delay.value**2)
+    compliance, left_m = straight.scaled(1.0 / ratio.value), float(np.std(fit.residual))
+    sag = fit["sag"] if gravity_angle is not None else None
+    return TransmissionValues(ratio, delay, compliance, fit["friction"], left_m, sag)

@@ -3,11 +3,10 @@
 from dataclasses import replace
 from math import pi
 
-import numpy as np
-
-from hil.drafting.estimate import Estimate, fit_blocks
 from hil.drafting.plant_values import TransmissionValues
-from hil.importing.relations import direction, motion
+from hil.identification.derivatives import motion
+from hil.identification.least_squares import Estimate, least_squares
+from hil.identification.plain_model import plain_columns
 from hil.importing.usual_values import ROTARY_LEAD_M, usual_lead
 from hil.recording.recording import Recording
 
@@ -63,9 +62,7 @@ def _of_set_points(recording: Recording) -> Estimate:
     """
     names = recording.axis
     moved = motion(recording[names.motor_position], recording.period_s)
-    columns = (moved.position, moved.velocity, moved.acceleration, direction(moved.velocity))
-    constant = np.ones_like(moved.position)
-    fit = fit_blocks([*columns, constant], recording[names.position_command])
-    ratio = fit.estimates[0]
+    fit = least_squares(plain_columns(moved, spring=True), recording[names.position_command])
+    ratio = fit["spring"]  # the factor of the position
     error = max(ratio.std_error, fit.left * abs(ratio.value))
     return Estimate(ratio.value, error, "set-points over the motor's encoder")

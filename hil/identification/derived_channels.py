@@ -13,16 +13,14 @@ from dataclasses import replace
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
-from scipy.signal import savgol_filter
 
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
 from hil.errors import InputError
+from hil.identification.derivatives import motion, window_rows
 from hil.identification.sensor_noise import white_noise
 from hil.recording.recording import RESAMPLED, Recording
 
-SMOOTH_S = 0.021  # window of the derivatives of the motor position: passes some 20 Hz, averages encoder counts
-_SHORTEST = 5  # rows of a parabola: the fewest that average noise on both sides
 _REST = 5.0  # speed at rest in standard deviations of its noise: one row in a million is above
 _SLOW = 1e-3  # of the top speed: below lies rest, as for set-points (`sensor_noise.moving`)
 DERIVED = "derived"  # key of the metadata: channel -> how it was derived
@@ -45,7 +43,7 @@ def completed(recording: Recording, bench: Bench) -> Recording:
             columns[name], derived[name] = values, how
 
     motor = columns[names.motor_position]
-    velocity = derivatives(motor, recording.period_s)[0]
+    velocity = motion(motor, recording.period_s).velocity
     ratio = bench.axis.ratio_m_rad
     add(names.position_command, ratio * motor, f"measured {names.motor_position}")
     add(names.velocity_command, ratio * without_rest(velocity, motor, bench, recording.period_s), "measured motion")
@@ -54,7 +52,7 @@ def completed(recording: Recording, bench: Bench) -> Recording:
             add(name, columns[other].copy(), f"copy of {other}, the only one recorded")
     if names.torque not in columns:
         physics = bench.axis.physics()
-        acceleration = derivatives(motor, recording.period_s, _SHORTEST)[1]
+        acceleration = motion(motor, recording.period_s, smooth_s=0.0).acceleration  # the shortest parabola
         friction = physics.coulomb_n_m * np.sign(without_rest(velocity, motor, bench, recording.period_s))
         torque = (
             float(physics.chain.inertia_kg_m2.sum()) * acceleration + physics.viscous_n_m_s_rad * velocity + friction
@@ -120,31 +118,11 @@ def position_is_measured(recording: Recording) -> bool:
     return recording.axis.motor_position not in recording.metadata.get(DERIVED, {})
 
 
-def derivatives(position: FloatArray, period_s: float, window: int | None = None) -> tuple[FloatArray, FloatArray]:
-    """Smoothed velocity and acceleration (n,) of a position (n,); of one shorter than the window, plain differences.
-
-    `window` is the number of rows of the parabola, by default of `SMOOTH_S`.
-    """
-    window = window or _window(period_s)
-    if position.size <= window:
-        velocity = np.gradient(position, period_s)
-        return velocity, np.gradient(velocity, period_s)
-    velocity, acceleration = (
-        np.asarray(savgol_filter(position, window, 2, deriv=order, delta=period_s), dtype=np.float64)
-        for order in (1, 2)
-    )
-    return velocity, acceleration
-
-
 def without_rest(velocity: FloatArray, position: FloatArray, bench: Bench, period_s: float) -> FloatArray:
-    """Velocity (n,) of `derivatives` with 0 where it is noise or below 1/1000 of the top speed."""
-    window = _window(period_s)
+    """Velocity (n,) of `motion` with 0 where it is noise or below 1/1000 of the top speed."""
+    window = window_rows(period_s)
     # standard deviation of the slope of a parabola or a line through `window` points with white noise
     slope = np.sqrt(12.0 / (window * (window**2 - 1.0))) / period_s
     noise = max(white_noise(position), bench.motor_count / np.sqrt(12.0)) * slope
     least = max(_REST * noise, _SLOW * float(np.max(np.abs(velocity), initial=0.0)))
     return np.where(np.abs(velocity) > least, velocity, 0.0)
-
-
-def _window(period_s: float) -> int:
-    return max(round(SMOOTH_S / period_s) | 1, _SHORTEST)

@@ -18,7 +18,7 @@ import numpy as np
 from hil.arrays import FloatArray
 from hil.channels import AxisKind
 from hil.errors import InputError
-from hil.identification.inverse_dynamics import solve
+from hil.identification.least_squares import least_squares
 from hil.recording.recording import Recording
 
 if TYPE_CHECKING:
@@ -115,8 +115,9 @@ def identify_friction(
             f"constant feed, allowed 4 or more of different feeds and both directions, each longer than "
             f"{settling_s + ENDING_S + AVERAGED_MIN_S:g} s; record profiles/friction_sweep.yaml"
         )
-    fit = solve(np.column_stack([np.sign(speed), speed, np.ones_like(speed)]), torque)
-    figures = np.concatenate([fit.values, fit.std_errors, [fit.residual_rms]])
+    columns = {"coulomb": np.sign(speed), "viscous": speed, "offset": np.ones_like(speed)}
+    fit = least_squares(columns, torque, blocks=0)  # the means of separate stretches are independent
+    figures = np.concatenate([fit.values, fit.std_errors, [np.sqrt(np.mean(fit.residual**2))]])
     return FrictionResult(recording.kind, points, *figures.tolist())
 
 

@@ -24,7 +24,6 @@ Sensitivity of the published figures to each step, changed alone (computed on th
 Therefore sign(v) is taken at the full rate and low-passed with the other columns, and the start of the record is cut.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,6 +32,9 @@ from scipy.signal import butter, cheby1, sosfiltfilt
 from hil.arrays import FloatArray
 from hil.channels import AxisKind
 from hil.errors import InputError
+from hil.identification.derivatives import MeasuredMotion
+from hil.identification.least_squares import Columns, least_squares
+from hil.identification.plain_model import MOTION, plain_columns
 from hil.recording.recording import Recording
 
 BUTTERWORTH_ORDER = 4
@@ -44,8 +46,8 @@ CUT_AT_START = 49  # samples in which the differences and filters settle
 class InverseDynamics:
     """Result: inertia [kg], viscous [N s/m], coulomb [N], offset [N]; rotary [kg m^2], [N m s/rad], [N m], [N m].
 
-    `relative_error` is |F - fit| / |F|, Euclidean norms of the decimated columns; the others are standard
-    errors of the regression.
+    `relative_error` is |F - fit| / |F|, Euclidean norms of the decimated columns; the standard errors are those of
+    `least_squares`, which count correlated residuals.
     """
 
     kind: AxisKind
@@ -81,35 +83,35 @@ def fit_inverse_dynamics(
             f"{CUT_AT_START + 100 * decimation} or more; give a longer recording"
         )
     columns, force = inverse_dynamics_columns(recording, cutoff_hz, decimation, cut_at_end)
-    fit = solve(columns, force)
+    fit = least_squares({name: columns[name] for name in MOTION}, force)
     figures = np.concatenate([fit.values, fit.std_errors, [fit.relative_error]])
     return InverseDynamics(recording.kind, *figures.tolist())
 
 
 def inverse_dynamics_columns(
-    recording: Recording, cutoff_hz: float, decimation: int, cut_at_end: int = 0, more: Sequence[FloatArray] = ()
-) -> tuple[FloatArray, FloatArray]:
-    """Regressors (n, 4) for inertia, viscous, Coulomb and offset, and torque or force (n,), filtered and decimated.
+    recording: Recording, cutoff_hz: float, decimation: int, cut_at_end: int = 0, load_ratio: float | None = None
+) -> tuple[Columns, FloatArray]:
+    """Columns of the plain model, with a spring, and torque or force (n,), filtered and decimated.
 
-    `more` are further regressors at the rate of the recording (rows,), appended as columns.
+    With `load_ratio` [load rad per motor rad] there are those of gravity too. The Butterworth filter is that of the
+    source instead of `derivatives`: its corner is chosen by the noise of the position.
 
     Raises InputError if the record does not move both ways.
     """
     position, force = recording[recording.axis.motor_position], recording[recording.axis.torque]
     butterworth = butter(BUTTERWORTH_ORDER, 2 * cutoff_hz * recording.period_s, output="sos")
     velocity = np.gradient(_forwards_and_backwards(butterworth, position), recording.period_s)
-    acceleration = np.gradient(velocity, recording.period_s)
     if not (velocity.min() < 0 < velocity.max()):
         raise InputError(
             f"{recording.name}: {recording.axis.motor_position}: given motion in one direction, allowed "
             "both; Coulomb friction and offset are not separable in one direction: record a return move"
         )
-
+    moved = MeasuredMotion(position, velocity, np.gradient(velocity, recording.period_s), np.sign(velocity))
     # every column is filtered, the offset too: the filter's gain at low frequencies is 0.989, not 1
     settled = slice(CUT_AT_START, len(recording) - cut_at_end)
-    columns = (acceleration, velocity, np.sign(velocity), np.ones_like(velocity), *more)
-    regressors = np.column_stack([_decimate(column[settled], decimation) for column in columns])
-    return regressors, _decimate(force[settled], decimation)
+    columns = plain_columns(moved, load_ratio, spring=True)
+    filtered = {name: _decimate(column[settled], decimation) for name, column in columns.items()}
+    return filtered, _decimate(force[settled], decimation)
 
 
 def _forwards_and_backwards(sections: FloatArray, values: FloatArray) -> FloatArray:
@@ -121,36 +123,3 @@ def _decimate(values: FloatArray, decimation: int) -> FloatArray:
     """Low-pass and decimate values (n,), counted from the end so that the last sample is kept."""
     chebyshev = cheby1(CHEBYSHEV_ORDER, RIPPLE_DB, CORNER / decimation, output="sos")
     return _forwards_and_backwards(chebyshev, values)[(values.size - 1) % decimation :: decimation]
-
-
-@dataclass(frozen=True, eq=False)
-class LinearFit:
-    """Solution of min |y - W x|^2; errors by the textbook formula for independent, equal residuals.
-
-    values, std_errors (p,), in the units of x; residual_rms in the unit of y; relative_error |y - W x| / |y|.
-    """
-
-    values: FloatArray
-    std_errors: FloatArray
-    residual_rms: float
-    relative_error: float
-
-
-def solve(regressors: FloatArray, measured: FloatArray) -> LinearFit:
-    """Fit `measured` (n,) by columns of `regressors` (n, p), n > p, of full rank.
-
-    x = (W'W)^-1 W'y,  s^2 = |y - W x|^2 / (n - p),  std errors^2 = s^2 diag (W'W)^-1.
-    """
-    rows, columns = regressors.shape
-    # QR instead of W'W keeps the digits of badly scaled columns
-    q, r = np.linalg.qr(regressors)
-    values = np.linalg.solve(r, q.T @ measured)
-    residual = measured - regressors @ values
-    variance = float(residual @ residual) / (rows - columns)
-    std_errors = np.sqrt(variance * np.sum(np.linalg.inv(r) ** 2, axis=1))
-    return LinearFit(
-        values,
-        std_errors,
-        float(np.sqrt(np.mean(residual**2))),
-        float(np.linalg.norm(residual) / np.linalg.norm(measured)),
-    )

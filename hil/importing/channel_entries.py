@@ -7,21 +7,13 @@ import numpy as np
 from hil.arrays import FloatArray
 from hil.channels import AXIS_CHANNELS, SPEED_SET_POINT, AxisKind
 from hil.errors import InputError
+from hil.identification.derivatives import MeasuredMotion, motion, smoothed
 from hil.importing.column_names import Label
 from hil.importing.effort_entry import effort_entry, signs_of
 from hil.importing.encoder_counts import CountSize, assumed, from_length, from_speed
 from hil.importing.lexicon import Constant, Quantity
 from hil.importing.map_draft import DraftedChannel, MapDraft
-from hil.importing.relations import (
-    MotionColumns,
-    derivative_of,
-    driven,
-    explained,
-    lateness_s,
-    motion,
-    proportional,
-    smoothed,
-)
+from hil.importing.relations import derivative_of, driven, explained, lateness_s, proportional
 from hil.importing.roles import SAME_POSITION, Roles
 from hil.importing.unit_choice import (
     MATCH,
@@ -79,7 +71,7 @@ class ChannelEntries:
                 "second encoder is found; record one, or write its column into a map: hil import FILE --map MAP.yaml"
             )
 
-    def _motion(self, column: str) -> MotionColumns:
+    def _motion(self, column: str) -> MeasuredMotion:
         return motion(self.live[column], self.period_s)
 
     def _choose(self, column: str, choice: UnitChoice) -> str:
@@ -246,7 +238,7 @@ class ChannelEntries:
         alone, both = explained(speed, velocity), explained(speed, velocity, smoothed(error, self.period_s))
         return 1.0 - alone > LEAST_LEFT and 1.0 - both < LOOP_LEAVES * (1.0 - alone)
 
-    def _efforts(self, moved: MotionColumns) -> None:
+    def _efforts(self, moved: MeasuredMotion) -> None:
         names = AXIS_CHANNELS[self.kind]
         pairs = ((self.roles.effort, names.torque), (self.roles.effort_command, names.torque_command))
         given = [(column, channel) for column, channel in pairs if column is not None]

@@ -9,8 +9,9 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.errors import InputError
+from hil.identification.derivatives import motion
 from hil.importing.foreign_columns import FEW_MISSING
-from hil.importing.relations import NO_SPREAD, driven, motion, proportional, roughness
+from hil.importing.relations import NO_SPREAD, driven, proportional, roughness
 from hil.importing.roles import Roles
 from hil.recording.stamps import GAP_STEPS
 

@@ -6,11 +6,13 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.channels import AxisKind
+from hil.identification.derivatives import MeasuredMotion
+from hil.identification.least_squares import LinearFit
 from hil.importing.column_names import Label
 from hil.importing.foreign_table import ForeignTable
 from hil.importing.header_values import HeaderValue
 from hil.importing.lexicon import Constant, lexicon
-from hil.importing.relations import EffortCause, MotionColumns, proportional
+from hil.importing.relations import proportional
 from hil.quantities import UNITS
 
 CAUSED = 0.3  # share of an effort explained by its motion from which its sign can be judged
@@ -20,7 +22,7 @@ PART = 0.1  # of the effort: the inertia's part must exceed it, else the sign of
 
 
 def effort_entry(
-    told: Label, kind: AxisKind, table: ForeignTable, cause: EffortCause, sign: int
+    told: Label, kind: AxisKind, table: ForeignTable, cause: LinearFit, sign: int
 ) -> tuple[dict[str, object], list[str]]:
     """Keys of the map beside the column, and notes on what is unsure.
 
@@ -38,13 +40,13 @@ def effort_entry(
     return entry, notes
 
 
-def signs_of(efforts: list[FloatArray], causes: list[EffortCause], moved: MotionColumns) -> list[int]:
+def signs_of(efforts: list[FloatArray], causes: list[LinearFit], moved: MeasuredMotion) -> list[int]:
     """Signs with which efforts (n,) of one axis accelerate forwards.
 
     A measured torque and its command have one cause: the motion decides on the sign of the one that it explains better,
     and their relation on that of the other. What another axis does to this one may turn the sign of one of them.
     """
-    signs = [_sign(cause.coefficients, moved) if cause.share >= CAUSED else 1 for cause in causes]
+    signs = [_sign(cause.values, moved) if cause.share >= CAUSED else 1 for cause in causes]
     if len(efforts) == 2:
         relation = proportional(*efforts)
         if relation.share > TOGETHER:
@@ -53,7 +55,7 @@ def signs_of(efforts: list[FloatArray], causes: list[EffortCause], moved: Motion
     return signs
 
 
-def _sign(coefficients: FloatArray, moved: MotionColumns) -> int:
+def _sign(coefficients: FloatArray, moved: MeasuredMotion) -> int:
     inertia, viscous, coulomb = coefficients[:3]
     parts = np.array(
         [

@@ -2,28 +2,19 @@
 
 velocity    v = k dp/dt            k tells the units
 position    p = k q + c            another encoder, or the set-point
-effort      u = J a + D v + F sign(v) + w q + c          least squares over the motion of q
+effort      u = J a + D v + F sign(v) + c + w q          the plain model over the motion of q
 """
 
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import savgol_filter
 
 from hil.arrays import FloatArray
+from hil.identification.derivatives import MeasuredMotion, smoothed
+from hil.identification.least_squares import LinearFit, least_squares
+from hil.identification.plain_model import plain_columns
 
-SMOOTH_S = 0.021  # window of the derivatives: passes some 20 Hz, averages encoder counts
-SHORTEST_WINDOW = 5  # rows of a parabola with redundancy
 NO_SPREAD = 0.01  # of the travel: a part of a recording with less motion tells nothing
-
-
-@dataclass(frozen=True, eq=False)
-class MotionColumns:
-    """Smoothed position and its derivatives (n,) in units of the column."""
-
-    position: FloatArray
-    velocity: FloatArray
-    acceleration: FloatArray
 
 
 @dataclass(frozen=True)
@@ -32,18 +23,6 @@ class Relation:
 
     factor: float
     share: float
-
-
-def smoothed(values: FloatArray, period_s: float) -> FloatArray:
-    """Values (n,) through the filter of `motion`."""
-    return np.asarray(savgol_filter(values, _window(values, period_s), 2), dtype=np.float64)
-
-
-def motion(position: FloatArray, period_s: float) -> MotionColumns:
-    """Position with derivatives from parabolas over `SMOOTH_S`."""
-    window = _window(position, period_s)
-    parts = (savgol_filter(position, window, 2, deriv=order, delta=period_s) for order in (0, 1, 2))
-    return MotionColumns(*(np.asarray(part, dtype=np.float64) for part in parts))
 
 
 def proportional(values: FloatArray, other: FloatArray) -> Relation:
@@ -56,54 +35,31 @@ def proportional(values: FloatArray, other: FloatArray) -> Relation:
     return Relation(factor, float(x @ y) ** 2 / (power * total))
 
 
-def derivative_of(values: FloatArray, moved: MotionColumns, period_s: float) -> Relation:
+def derivative_of(values: FloatArray, moved: MeasuredMotion, period_s: float) -> Relation:
     """Fit a column (n,) as a multiple of the velocity of a motion."""
     return proportional(smoothed(values, period_s), moved.velocity)
 
 
 def explained(values: FloatArray, *columns: FloatArray) -> float:
     """Share of the variance of values (n,) that columns (n,) and a constant explain by least squares."""
-    centred = values - values.mean()
-    matrix = np.column_stack([column - column.mean() for column in columns])
-    left = centred - matrix @ np.linalg.lstsq(matrix, centred, rcond=None)[0]
-    return 1.0 - float(left @ left) / max(float(centred @ centred), 1e-300)
+    named = {str(index): column for index, column in enumerate([*columns, np.ones_like(values)])}
+    return least_squares(named, values, blocks=0).share
 
 
-def lateness_s(values: FloatArray, moved: MotionColumns) -> float:
+def lateness_s(values: FloatArray, moved: MeasuredMotion) -> float:
     """Time by which a position (n,) comes after a motion, from least squares: x = k (q - late v) + c."""
-    columns = np.column_stack([moved.position, moved.velocity, np.ones_like(moved.position)])
-    k, velocity, _ = np.linalg.lstsq(columns, values, rcond=None)[0]
+    columns = {"k": moved.position, "late": moved.velocity, "c": np.ones_like(moved.position)}
+    k, velocity, _ = least_squares(columns, values, blocks=0).values
     return -float(velocity / k) if k else 0.0
 
 
-@dataclass(frozen=True, eq=False)
-class EffortCause:
-    """Share of an effort that a motion explains, and the coefficients J, D, F, w, c (5,)."""
-
-    share: float
-    coefficients: FloatArray
-
-
-def driven(values: FloatArray, moved: MotionColumns, period_s: float) -> EffortCause:
-    """Fit an effort (n,) by inertia, friction and load of a motion."""
-    effort = smoothed(values, period_s)
-    columns = (moved.acceleration, moved.velocity, direction(moved.velocity), moved.position, np.ones_like(effort))
-    scales = np.array([float(np.std(column)) or 1.0 for column in columns])
-    matrix = np.column_stack(columns) / scales
-    solution = np.linalg.lstsq(matrix, effort, rcond=None)[0]
-    left = effort - matrix @ solution
-    total = float(np.var(effort))
-    return EffortCause(1.0 - float(np.var(left)) / total if total > 0.0 else 0.0, np.asarray(solution / scales))
-
-
-def direction(velocity: FloatArray) -> FloatArray:
-    """Sign of the velocity (n,), 0 where it is below a hundredth of its maximum: rest and noise."""
-    return np.where(np.abs(velocity) > 0.01 * np.max(np.abs(velocity), initial=0.0), np.sign(velocity), 0.0)
+def driven(values: FloatArray, moved: MeasuredMotion, period_s: float) -> LinearFit:
+    """Fit an effort (n,) by the plain model of a motion, with a load over the position; rows at rest count too."""
+    return least_squares(plain_columns(moved, spring=True), smoothed(values, period_s), blocks=0)
 
 
 def roughness(values: FloatArray) -> float:
-    """Change from row to row over the deviation, of the middle row: 1.4 for rows without order, far less for a "
-    "motion."""
+    """Median change from row to row over the median deviation: 1.4 for rows without order, far less for a motion."""
     spread = float(np.median(np.abs(values - np.median(values))))
     return float(np.median(np.abs(np.diff(values)))) / spread if spread > 0.0 else 0.0
 
@@ -131,7 +87,3 @@ def lead_rows(values: FloatArray, other: FloatArray, most: int) -> int:
         return float(first @ second) / float(first.size)
 
     return max(range(-most, most + 1), key=agreement)
-
-
-def _window(values: FloatArray, period_s: float) -> int:
-    return min(max(round(SMOOTH_S / period_s) | 1, SHORTEST_WINDOW), (values.size - 1) | 1)

@@ -6,19 +6,11 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.errors import InputError
+from hil.identification.derivatives import MeasuredMotion, motion, smoothed
 from hil.importing.column_names import Label
 from hil.importing.computed_position import computed_one
 from hil.importing.lexicon import Quantity
-from hil.importing.relations import (
-    MotionColumns,
-    derivative_of,
-    driven,
-    motion,
-    noise,
-    proportional,
-    roughness,
-    smoothed,
-)
+from hil.importing.relations import derivative_of, driven, noise, proportional, roughness
 from hil.quantities import UNITS
 
 SAME_POSITION = 0.98  # share from which a column is another reading of a position: following errors are below 5 %
@@ -174,7 +166,7 @@ def _as_position(name: str, live: dict[str, FloatArray], period_s: float) -> flo
     return total - 0.01 * noise(live[name])
 
 
-def _accelerates(values: FloatArray, moved: MotionColumns, period_s: float) -> bool:
+def _accelerates(values: FloatArray, moved: MeasuredMotion, period_s: float) -> bool:
     return proportional(smoothed(values, period_s), moved.acceleration).share > IS_DERIVATIVE
 
 
@@ -234,7 +226,7 @@ def _velocities(
     live: dict[str, FloatArray],
     labels: dict[str, Label],
     names: list[str],
-    moved: MotionColumns | None,
+    moved: MeasuredMotion | None,
     period_s: float,
     roles: Roles,
 ) -> None:

@@ -77,7 +77,7 @@ def test_the_torque_left_is_compared_with_a_plain_model() -> None:
     plain = fit_plain(train)
     assert plain is not None
     inertia = 719.0 * owner.axis.ratio_m_rad**2
-    assert plain.coefficients[0] == pytest.approx(inertia, rel=0.05)
+    assert plain["inertia"].value == pytest.approx(inertia, rel=0.05)
     by_plain = left_by_plain(plain, held_out)
     deviation = torque_deviation([held_out], plain.slowest)
     assert left_by_plain(plain, held_out, 2.0 * deviation) == pytest.approx(0.5 * (by_plain or 0.0))

@@ -7,7 +7,7 @@ speed.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +15,7 @@ import numpy as np
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
 from hil.diagnosis.location.residual_energy import Energy
-from hil.diagnosis.search.disturbance import harmonic_share
+from hil.identification.periods import harmonic_share, strongest_periods
 from hil.identification.terms import Term
 from hil.twin.library import BY_ID
 from hil.twin.parameter import Role
@@ -23,6 +23,9 @@ from hil.twin.parameter import Role
 CLAIMED = 0.25  # least share of the energy in one harmonic: a line that dominates the residual
 APART = 1.5  # least ratio of that share to that of the next domain
 LEAST_WAVES = 1.5  # that the motion passes: less is no repetition
+_MOST_WAVES = 60.0  # over the motion: shorter periods along the travel are those of encoders
+_SHIFTS = np.linspace(-0.5, 0.5, 9)  # of the width of a peak
+_CANDIDATES = 12  # peaks of the spectrum: the strongest may be orders of the screw
 SPEEDS = 1.5  # least ratio of feeds: with less, domains differ by less than the width of a line
 LOWEST_HZ = 4.0  # lowest frequency: the motion itself has its lines below
 HIGHEST_ORDER = 48  # slots or pole passings per revolution of usual motors
@@ -56,25 +59,28 @@ def lock(seen: Sequence[Energy], channel: str, bench: Bench, terms: Sequence[Ter
     signal = moving([energy.parts[channel] for energy in seen])
     time = moving([energy.run.time_s for energy in seen])
     period_s = seen[0].run.period_s
+    span = float(np.ptp(x))
+
+    def best_of(values: Sequence[float], phases: Callable[[float], FloatArray]) -> tuple[float, float]:
+        return max(((_share(phases(value), signal), value) for value in values), default=(0.0, 0.0))
+
+    orders = [float(n) for n in range(1, HIGHEST_ORDER + 1) if lead_m and n * span > LEAST_WAVES * lead_m]
+    shortest = span / _MOST_WAVES
+    peaks = strongest_periods(x, signal, 0.1 * shortest, shortest, _CANDIDATES, span / LEAST_WAVES)
+    # rows are not even over the position: the best harmonic may be half a width of its peak away
+    periods = [float(1.0 / (1.0 / p + shift / span)) for p in peaks for shift in _SHIFTS]
     # a period that divides the lead is an order of the screw
-    spans = [
-        float(p)
-        for p in np.geomspace(np.ptp(x) / 60.0, np.ptp(x) / LEAST_WAVES, 200)
-        if not lead_m or lead_m / p < 0.5 or abs(lead_m / p - round(lead_m / p)) > lead_m / np.ptp(x)
+    periods = [
+        p
+        for p in periods
+        if p <= span / LEAST_WAVES
+        and (not lead_m or lead_m / p < 0.5 or abs(lead_m / p - round(lead_m / p)) > lead_m / span)
     ]
-    found: dict[str, tuple[float, float]] = {
-        "order": max(
-            (
-                (_share(2.0 * np.pi * n * x / lead_m, signal), float(n))
-                for n in range(1, HIGHEST_ORDER + 1)
-                if n * np.ptp(x) > LEAST_WAVES * lead_m
-            ),
-            default=(0.0, 0.0),
-        )
-        if lead_m
-        else (0.0, 0.0),
-        "period": max(((_share(2.0 * np.pi * x / p, signal), p) for p in spans), default=(0.0, 0.0)),
-        "frequency": _strongest_frequency(time, signal, period_s),
+    waves_s = strongest_periods(time, signal, period_s, 2.0 * period_s, 1, 1.0 / LOWEST_HZ)
+    found = {
+        "order": best_of(orders, lambda n: 2.0 * np.pi * n * x / lead_m),
+        "period": best_of(periods, lambda p: 2.0 * np.pi * x / p),
+        "frequency": best_of([1.0 / one for one in waves_s], lambda f: 2.0 * np.pi * f * time),
     }
     best = max(found, key=lambda name: found[name][0])
     others = max(found[name][0] for name in found if name != best)
@@ -109,15 +115,3 @@ def _share(phase: FloatArray, signal: FloatArray) -> float:
     """Share of the energy that one harmonic explains."""
     step = max(phase.size // _MOST_ROWS, 1)
     return harmonic_share(phase[::step], signal[::step])
-
-
-def _strongest_frequency(time: FloatArray, signal: FloatArray, period_s: float) -> tuple[float, float]:
-    """Share and frequency of the strongest line over time."""
-    rows = np.round((time - time.min()) / period_s).astype(int)
-    whole = np.bincount(rows, weights=signal - signal.mean())
-    size = 1 << (2 * whole.size - 1).bit_length()
-    spectrum = np.abs(np.fft.rfft(whole, size))
-    frequency = np.fft.rfftfreq(size, period_s)
-    spectrum[frequency < LOWEST_HZ] = 0.0
-    best = float(frequency[int(np.argmax(spectrum))])
-    return _share(2.0 * np.pi * best * time, signal), best

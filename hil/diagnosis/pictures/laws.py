@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from scipy.signal import savgol_filter
 
 from hil.arrays import FloatArray
 from hil.diagnosis.pictures.view import Captioned, Curve, View, around, binned, longest, three_curves, unit_of_channel
 from hil.diagnosis.turning import speed_unit
 from hil.figures.drawing import style_axis
 from hil.figures.panels import COMMAND, DEVIATION, MEASURED, SIMULATED
+from hil.identification.derivatives import motion, smoothed, window_rows
 from hil.identification.estimator import Fit
 from hil.identification.measured import Measured
 from hil.identification.residual_scales import inertia
@@ -84,10 +84,9 @@ def _answer(final: Fit, view: View) -> tuple[FloatArray, FloatArray]:
 
 def _friction_of(final: Fit, run: Measured, motor: FloatArray, torque: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Speed and friction (m,) of the rows in which the axis moves with little acceleration."""
-    window = max(round(0.021 / run.period_s) | 1, 5)
-    velocity = savgol_filter(motor, window, 2, deriv=1, delta=run.period_s)
-    inertial = inertia(final.bench) * savgol_filter(motor, window, 2, deriv=2, delta=run.period_s)
-    friction = savgol_filter(torque, window, 2) - inertial
+    moved, window = motion(motor, run.period_s), window_rows(run.period_s)
+    velocity, inertial = moved.velocity, inertia(final.bench) * moved.acceleration
+    friction = smoothed(torque, run.period_s) - inertial
     coulomb = final.bench.axis.physics().coulomb_n_m
     # the slip of a stick-slip cycle is shorter than the filter window; at higher speed J a is known well
     share = np.where(np.abs(velocity) > 0.05 * np.abs(velocity).max(), 1.0, 0.1)
@@ -109,8 +108,7 @@ def lost_motion(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:
     stretch = stretch - np.mean(stretch)  # the zero of the linear encoder is arbitrary
     factor, unit = reading_unit(unit_of_channel(diagnosis, "table"), float(np.abs(stretch).max()))
     curves = three_curves(diagnosis, run, "table", stretch)
-    window = max(round(0.009 / run.period_s) | 1, 5)
-    acceleration = savgol_filter(run.table_m, window, 2, deriv=2, delta=run.period_s)
+    acceleration = motion(run.table_m, run.period_s, smooth_s=0.009).acceleration
     figure = Figure(figsize=(10.0, 5.2), layout="constrained")
     left, right = figure.subplots(1, 2)
     label = f"table - motor position [{unit}]"

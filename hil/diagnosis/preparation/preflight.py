@@ -1,8 +1,7 @@
 """Check recordings before a diagnosis: excitation, frozen channels, wrong signs and units, saturation.
 
-    torque = J a + D v + Fc sign(v) + T0      by least squares over the measured motion
-
-A negative J without positive friction Fc shows a wrong sign; J and Fc far from those of the bench, a wrong unit.
+The plain model of the torque over the measured motion tells inertia J and Coulomb friction Fc. A negative J without
+positive Fc shows a wrong sign; J and Fc far from those of the bench, a wrong unit.
 """
 
 import math
@@ -11,7 +10,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import savgol_filter
 
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
@@ -19,6 +17,7 @@ from hil.channels import AXIS_CHANNELS
 from hil.errors import InputError
 from hil.identification.derived_channels import DERIVED, completed, torque_is_measured
 from hil.identification.measured import LEAD_IN, Measured, take
+from hil.identification.plain_model import PlainModel, fit_plain_model, motion_data
 from hil.quantities import digits, misread_factors
 from hil.recording.recording import Recording
 
@@ -31,7 +30,6 @@ SLOPE_TOLERANCE = 0.2  # of positions against set-points; following errors are b
 _RELATED = 0.5  # least squared correlation of two channels for a factor between them: half of the variance
 _SWINGS = 6  # of the command between its limits in a move one way: to speed up and to brake make two
 SATURATED = 0.5  # share of the moving rows at the torque limit: above, most rows do not obey the control law
-_SMOOTH_S = 0.021  # window of the derivatives of the motor position: passes some 20 Hz, averages encoder counts
 
 _POSITION_UNITS = misread_factors("mm", "um", "nm", "deg", "rev", "km", "in")
 _VELOCITY_UNITS = misread_factors("m/min", "mm/s", "mm/min", "um/s")
@@ -183,19 +181,19 @@ def _torque_problems(run: Measured, bench: Bench) -> Iterator[str]:
         if _correlation(run.torque_command, run.torque) > 0.5 and not 0.5 / WRONG_BY < slope < 2.0 * WRONG_BY:
             yield f"{names.torque}: {_factor(slope, _TORQUE_UNITS, names.torque_command)}"
             return
-    measured = regress(run)
+    measured = regress(run, bench)
     if measured is None:
         return
-    (j, _, coulomb, *_), errors = measured
-    if _turned(measured) and _turned(regress(run, spring=True)):
+    j, coulomb = measured["inertia"], measured["coulomb"]
+    if j.value < -3.0 * j.std_error and coulomb.value < 3.0 * coulomb.std_error:  # friction has the sign of the torque
         yield (
-            f"{names.torque} has the wrong sign: its regression gives a negative inertia, {j:.3g} ± {errors[0]:.1g}; "
-            "correct the sign of the channel, or of the encoder"
+            f"{names.torque} has the wrong sign: its regression gives a negative inertia, {j.value:.3g} ± "
+            f"{j.std_error:.1g}; correct the sign of the channel, or of the encoder"
         )
         return
-    factors = [j / inertia] if j > 5.0 * errors[0] else []
-    if physics.coulomb_n_m > 0.0 and coulomb > 5.0 * errors[2]:
-        factors.append(coulomb / physics.coulomb_n_m)
+    factors = [j.value / inertia] if j.value > 5.0 * j.std_error else []
+    if physics.coulomb_n_m > 0.0 and coulomb.value > 5.0 * coulomb.std_error:
+        factors.append(coulomb.value / physics.coulomb_n_m)
     # one of them may be wrong in the bench file; a wrong unit changes both
     if factors and (min(factors) > WRONG_BY or max(factors) < 1.0 / WRONG_BY):
         factor = float(np.exp(np.mean(np.log(factors))))
@@ -204,36 +202,13 @@ def _torque_problems(run: Measured, bench: Bench) -> Iterator[str]:
         yield f"{names.torque}: {_factor(factor, units | _TORQUE_UNITS, against)}"
 
 
-def _turned(found: tuple[list[float], list[float]] | None) -> bool:
-    """True for a negative inertia; friction has the sign of the torque too."""
-    values, errors = found or ([0.0, 0.0, 0.0], [0.0, 0.0, 0.0])
-    return values[0] < -3.0 * errors[0] and values[2] < 3.0 * errors[2]
+def regress(run: Measured, bench: Bench) -> PlainModel | None:
+    """Fit the plain model to a recording; None without sliding motion.
 
-
-def regress(run: Measured, spring: bool = False) -> tuple[list[float], list[float]] | None:
-    """Fit J, D, Fc, T0 of the module's equation, with standard errors [motor units]; None without sliding motion.
-
-    `spring` adds a torque over the position. Of motion in one direction Fc holds the load; its error is infinite.
+    It has gravity or a spring where the torque follows the position.
     """
-    window = max(round(_SMOOTH_S / run.period_s) | 1, 5)
-    if run.motor.size < 4 * window:
-        return None
-    velocity = savgol_filter(run.motor, window, 2, deriv=1, delta=run.period_s)
-    acceleration = savgol_filter(run.motor, window, 2, deriv=2, delta=run.period_s)
-    torque = savgol_filter(run.torque, window, 2)
-    rows = np.abs(velocity) > 0.02 * np.max(np.abs(velocity))
-    rows[:window] = rows[-window:] = False
-    if rows.sum() < 4 * window:
-        return None
-    columns = [acceleration, velocity, np.sign(velocity), np.ones_like(velocity), run.motor]
-    basis = np.stack(columns if spring else columns[:4], axis=1)[rows]
-    basis[:, 3] *= not (one_way := bool(np.ptp(basis[:, 2]) == 0.0))
-    solution = np.linalg.lstsq(basis, torque[rows], rcond=None)[0]
-    left = torque[rows] - basis @ solution
-    variance = float(left @ left) / max(rows.sum() / window - 4.0, 1.0)  # one independent sample per window
-    covariance = np.linalg.pinv(basis.T @ basis) * variance
-    errors = np.sqrt(np.diag(covariance)).tolist()
-    return solution.tolist(), [*errors[:2], np.inf if one_way else errors[2], *errors[3:]]
+    load_ratio = bench.axis.ratio_m_rad if bench.axis.turns else None
+    return fit_plain_model([motion_data(run.motor, run.torque, run.period_s)], load_ratio, spring=True)
 
 
 def _saturation(run: Measured, bench: Bench, moving: NDArray[np.bool_]) -> Iterator[str]:

@@ -14,7 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hil.arrays import FloatArray
+from hil.identification.least_squares import least_squares
 from hil.identification.measured import Measured
+from hil.identification.periods import harmonic_share, strongest_periods
 
 _SMOOTH_S = 0.006  # mean of the innovations: passes 60 Hz, reduces encoder counts
 _PASS_HZ = 60.0  # above, the mean attenuates a ripple by more than a fifth
@@ -52,13 +54,10 @@ def _width(period_s: float) -> int:
     return max(round(_SMOOTH_S / period_s), 1)
 
 
-def harmonic_share(phase: FloatArray, signal: FloatArray) -> float:
-    """Share of a signal's energy that one harmonic of `phase` explains."""
-    basis = np.stack([np.sin(phase), np.cos(phase), np.ones_like(phase)], axis=1)
-    coefficients, *_ = np.linalg.lstsq(basis, signal, rcond=None)
-    centred = signal - signal.mean()
-    left = signal - basis @ coefficients
-    return 1.0 - float(left @ left) / max(float(centred @ centred), 1e-300)
+def _over_travel(runs: Sequence[Measured], found: Sequence[Disturbance], ratio: float) -> tuple[FloatArray, FloatArray]:
+    """Position of the table [m] by the motor encoder, and torque, of the sliding rows (n,) of all runs."""
+    x = np.concatenate([ratio * run.motor[d.sliding] for run, d in zip(runs, found, strict=True)])
+    return x, np.concatenate([d.torque[d.sliding] for d in found])
 
 
 def orders(
@@ -93,21 +92,19 @@ def friction_periods(
     runs: Sequence[Measured], found: Sequence[Disturbance], ratio: float, most: int = 4
 ) -> list[float]:
     """Periods along the travel [m], from 1 mm up, with the largest variation of friction, best first."""
-    x = [ratio * run.motor[d.sliding] for run, d in zip(runs, found, strict=True)]
-    friction = [d.torque[d.sliding] * np.sign(d.velocity[d.sliding]) for d in found]
-    return _periods(x, friction, 1e-4, 1e-3, most)
+    x, torque = _over_travel(runs, found, ratio)
+    velocity = np.concatenate([d.velocity[d.sliding] for d in found])
+    return strongest_periods(x, torque * np.sign(velocity), 1e-4, 1e-3, most)
 
 
 def waves(runs: Sequence[Measured], found: Sequence[Disturbance], ratio: float, most: int = 3) -> list[float]:
     """Waves per metre of travel with the largest disturbance, best first, where no revolution is known."""
-    x = [ratio * run.motor[d.sliding] for run, d in zip(runs, found, strict=True)]
-    return [1.0 / period for period in _periods(x, [d.torque[d.sliding] for d in found], 1e-4, 5e-4, most)]
+    return [1.0 / period_m for period_m in strongest_periods(*_over_travel(runs, found, ratio), 1e-4, 5e-4, most)]
 
 
 def rest_position(runs: Sequence[Measured], found: Sequence[Disturbance], ratio: float) -> float:
     """Position [m] at which a straight line through the disturbance over the position is 0; 0 if there is none."""
-    x = np.concatenate([ratio * run.motor[d.sliding] for run, d in zip(runs, found, strict=True)])
-    torque = np.concatenate([d.torque[d.sliding] for d in found])
+    x, torque = _over_travel(runs, found, ratio)
     if x.size < 2 or np.ptp(x) == 0.0:
         return 0.0
     centre = float(np.mean(x))
@@ -117,9 +114,9 @@ def rest_position(runs: Sequence[Measured], found: Sequence[Disturbance], ratio:
 
 def scale_periods(runs: Sequence[Measured], errors: Sequence[FloatArray], most: int = 2) -> list[float]:
     """Periods [m] below 1 mm in which an error (n,) of the linear encoder repeats, best first."""
-    return [
-        period for period in _periods([run.table_m for run in runs], errors, 0.5e-6, 2e-6, most + 2) if period < 1e-3
-    ][:most]
+    x = np.concatenate([run.table_m for run in runs])
+    periods_m = strongest_periods(x, np.concatenate(list(errors)), 0.5e-6, 2e-6, most + 2)
+    return [period_m for period_m in periods_m if period_m < 1e-3][:most]
 
 
 def lines_hz(run: Measured, d: Disturbance, most: int = 4) -> list[float]:
@@ -127,38 +124,11 @@ def lines_hz(run: Measured, d: Disturbance, most: int = 4) -> list[float]:
     first; of what constant, Coulomb and viscous friction leave."""
     if np.count_nonzero(d.sliding) < 100:
         return []
-    basis = np.stack([np.ones_like(d.velocity), np.sign(d.velocity), d.velocity], axis=1)[d.sliding]
-    coefficients, *_ = np.linalg.lstsq(basis, d.torque[d.sliding], rcond=None)
-    left = np.zeros(d.torque.size)
-    left[d.sliding] = d.torque[d.sliding] - basis @ coefficients
+    velocity, left = d.velocity[d.sliding], np.zeros(d.torque.size)
+    friction = {"coulomb": np.sign(velocity), "viscous": velocity, "offset": np.ones_like(velocity)}
+    left[d.sliding] = least_squares(friction, d.torque[d.sliding], blocks=0).residual
     time_s = np.arange(left.size, dtype=np.float64) * run.period_s
-    return [1.0 / wave_s for wave_s in _periods([time_s], [left], run.period_s, 1.0 / _PASS_HZ, most)]
-
-
-def _periods(
-    positions: Sequence[FloatArray], values: Sequence[FloatArray], bin_m: float, shortest_m: float, most: int
-) -> list[float]:
-    """Periods [m] of the spectral peaks of values (n,) over position (n,) [m], or [s] over time, averaged in bins."""
-    x, y = np.concatenate(list(positions)), np.concatenate(list(values))
-    if x.size < 100 or np.ptp(x) < 4.0 * shortest_m:
-        return []
-    count = int(np.ceil(np.ptp(x) / bin_m))
-    index = np.minimum(((x - x.min()) / np.ptp(x) * count).astype(int), count - 1)
-    rows = np.bincount(index, minlength=count)
-    mean = np.bincount(index, weights=y, minlength=count) / np.maximum(rows, 1)
-    size = 4 * (1 << (count - 1).bit_length())  # zero-padded: a resolution of a quarter of a peak width
-    spectrum = np.abs(np.fft.rfft(np.where(rows > 0, mean - mean[rows > 0].mean(), 0.0), size))
-    frequency = np.fft.rfftfreq(size, float(np.ptp(x)) / count)
-    width = size // count + 1
-    spectrum[(frequency > 1.0 / shortest_m) | (frequency < 0.4 / np.ptp(x))] = 0.0
-    found = []
-    for _ in range(most):
-        peak = int(np.argmax(spectrum))
-        if spectrum[peak] == 0.0:
-            break
-        found.append(float(1.0 / frequency[peak]))
-        spectrum[max(peak - 2 * width, 0) : peak + 2 * width] = 0.0
-    return found
+    return [1.0 / wave_s for wave_s in strongest_periods(time_s, left, run.period_s, 1.0 / _PASS_HZ, most)]
 
 
 def force_window(run: Measured, d: Disturbance) -> tuple[float, float, float]:
@@ -180,8 +150,8 @@ def friction_zones(
     Each is start, end [m] and level [motor units]. The torque against the motion is summed in bins of the position by
     the motor encoder, both directions together, so that a constant force and a lag of the observer cancel.
     """
-    x = np.concatenate([ratio * run.motor[d.sliding] for run, d in zip(runs, found, strict=True)])
-    against = np.concatenate([-d.torque[d.sliding] * np.sign(d.velocity[d.sliding]) for d in found])
+    x, torque = _over_travel(runs, found, ratio)
+    against = -torque * np.sign(np.concatenate([d.velocity[d.sliding] for d in found]))
     if x.size < 100 or np.ptp(x) == 0.0:
         return []
     width = float(np.ptp(x)) / _BINS

@@ -15,8 +15,11 @@ from hil.arrays import FloatArray
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.search.change_points import Segment, joined, segments, standing_out
 from hil.diagnosis.search.disturbance import Disturbance, disturbance
+from hil.identification.derivatives import MeasuredMotion
 from hil.identification.estimator import Fit
+from hil.identification.least_squares import least_absolute
 from hil.identification.measured import Measured
+from hil.identification.plain_model import plain_columns
 from hil.identification.residual_scales import inertia
 
 BLOCK_S = 0.005  # an edge to be refined by simulation
@@ -25,7 +28,6 @@ _MOST_BLOCKS = 6000  # the time of a partition grows with their square: half a s
 _REVERSAL_S = 0.05  # about a reversal friction is known least
 _ALIKE = 0.25  # levels of adjacent windows that differ less are one
 _ROUNDS = 3  # windows found in one round do not count as motion or noise in the next; then they stay
-_REWEIGHTED = 40  # iterations of the regression
 _LEAST_USUAL = 0.3  # of the blocks without an event: else which level is none cannot be told
 _SMOOTH_BLOCKS = 8  # the noise of a block is that of means over 40 ms: longer than the observer remembers
 
@@ -96,14 +98,16 @@ def _of_run(run: Measured, seen: Disturbance, reversals: bool) -> list[Event]:
 
     known = usable[:rows].reshape(-1, block).sum(axis=1)
     weights = np.asarray(known >= block / 2, dtype=np.float64)
+    if not weights.any():
+        return []
     values = means(seen.torque)
     speed = means(seen.velocity) / max(float(np.abs(seen.velocity).max()), 1e-300)
     acceleration = means(np.gradient(seen.velocity, run.period_s))
-    columns = np.stack([np.ones(speed.size), np.sign(speed), speed, np.abs(speed), acceleration], axis=1)
-    columns /= np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+    moved = MeasuredMotion(np.zeros(speed.size), speed, acceleration, np.sign(speed))
+    columns = {**plain_columns(moved), "viscous, by direction": np.abs(speed)}
     usual, rest = weights, values
     for _ in range(_ROUNDS):
-        rest = values - _explained(columns, values, usual)
+        rest = values - least_absolute(columns, values, usual)
         found = standing_out(rest, weights, _windows(rest, weights), CRITERIA.stands_out, EDGE)
         usual = weights.copy()
         for one in found:
@@ -129,17 +133,6 @@ def _beyond_reversals(rest: FloatArray, weights: FloatArray, near: NDArray[np.bo
     others = near & (weights > 0.0)
     others[max(one.first - EDGE, 0) : one.last + EDGE] = False
     return abs(one.level) > CRITERIA.stands_out * float(np.sqrt(np.mean(rest[others] ** 2) if others.any() else np.inf))
-
-
-def _explained(columns: FloatArray, values: FloatArray, weights: FloatArray) -> FloatArray:
-    """Part of values (n,) that columns (n, k) explain; least absolute deviations, which windows do not shift."""
-    weight = weights
-    for _ in range(_REWEIGHTED):
-        solved, *_ = np.linalg.lstsq(columns * weight[:, None], values * weight, rcond=1e-9)
-        left = np.abs(values - columns @ solved)
-        least = 1e-3 * float(np.median(left[weights > 0.0])) + 1e-300
-        weight = weights / np.sqrt(np.maximum(left, least))
-    return np.asarray(columns @ solved, dtype=np.float64)
 
 
 def _windows(rest: FloatArray, weights: FloatArray) -> list[Segment]:

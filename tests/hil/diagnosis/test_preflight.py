@@ -50,9 +50,9 @@ def test_physics_is_no_reason_to_refuse(terms: tuple[Term, ...]) -> None:
 
 
 def test_the_regression_finds_inertia_and_friction(run: Recording) -> None:
-    found = regress(preflight([run], OWNER).accepted()[0])
+    found = regress(preflight([run], OWNER).accepted()[0], OWNER)
     assert found is not None
-    (inertia, viscous, coulomb, offset), _ = found
+    inertia, viscous, coulomb, offset = found.fit.values
     axis = OWNER.axis
     assert inertia == pytest.approx(719.0 * axis.ratio_m_rad**2, rel=0.05)
     assert coulomb == pytest.approx(1.1, rel=0.05)
@@ -73,9 +73,9 @@ def test_motion_in_one_direction_tells_no_friction_and_no_unit(run: Recording) -
         "torque_command_n_m": None,
     }
     prepared = preflight([changed(run, **columns)], OWNER).accepted()[0]
-    found = regress(prepared)
+    found = regress(prepared, OWNER)
     assert found is not None
-    assert found[1][2] == math.inf
+    assert found["coulomb"].std_error == math.inf
 
 
 def test_too_short(run: Recording) -> None:

@@ -16,9 +16,9 @@ from hil.commands.identify import identify
 from hil.commands.import_ import import_
 from hil.drafting.bench_text import bench_text
 from hil.drafting.draft_bench import draft_bench
-from hil.drafting.estimate import Estimate
 from hil.drafting.ratio_values import gear_of, lead_of
 from hil.errors import InputError
+from hil.identification.least_squares import Estimate
 from hil.recording.quantum import count_of
 from hil.recording.recording import Recording
 from hil.twin.mechanisms import gravity_torque

@@ -1,0 +1,122 @@
+"""Linear least squares on named columns, with standard errors that count correlated residuals."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from hil.arrays import FloatArray
+
+BLOCKS = 10  # of consecutive rows, each left out once: few enough to be independent, enough for an error to 25 %
+_RANK = 1e-9  # of the largest singular value of the scaled columns: below, a combination of columns is not told
+_REWEIGHTED = 40  # iterations of least absolute deviations
+
+Columns = Mapping[str, FloatArray]  # regressors (n,) by the name of their coefficient
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Value and standard error in the same unit, and how they were found."""
+
+    value: float
+    std_error: float
+    how: str = ""
+
+    @property
+    def significant(self) -> bool:
+        """True above three standard errors."""
+        return abs(self.value) > 3.0 * self.std_error
+
+    def scaled(self, factor: float) -> "Estimate":
+        """The estimate in another unit."""
+        return Estimate(factor * self.value, abs(factor) * self.std_error, self.how)
+
+
+@dataclass(frozen=True, eq=False)
+class LinearFit:
+    """Coefficients (p,) with standard errors, and the residual (n,).
+
+    The error of a coefficient that the columns do not tell is infinite, and its value the smallest one. `left` is the
+    standard deviation of the residual over that of the fitted values, `relative_error` the ratio of their norms.
+    """
+
+    names: tuple[str, ...]
+    values: FloatArray
+    std_errors: FloatArray
+    residual: FloatArray
+    left: float
+    relative_error: float
+    how: str = ""
+
+    def __getitem__(self, name: str) -> Estimate:
+        at = self.names.index(name)
+        return Estimate(float(self.values[at]), float(self.std_errors[at]), self.how)
+
+    @property
+    def share(self) -> float:
+        """Share of the variance that is explained."""
+        return 1.0 - self.left**2
+
+    def predict(self, columns: Columns) -> FloatArray:
+        """Values (n,) of the fit on other columns."""
+        return np.asarray(sum(value * columns[name] for name, value in zip(self.names, self.values, strict=True)))
+
+
+def least_squares(
+    columns: Columns, measured: FloatArray, *, blocks: int = BLOCKS, rows_per_sample: float = 1.0, how: str = ""
+) -> LinearFit:
+    """Fit `measured` (n,) by columns (n,).
+
+    Residuals of a model that lacks something are correlated in time, so that the textbook formula is too small. The
+    error is that of the jackknife over blocks of rows (B. Efron, The Jackknife, the Bootstrap and Other Resampling
+    Plans, 1982, sec. 3), or that of the textbook with one independent sample in `rows_per_sample` rows, whichever is
+    larger. Without `blocks` it is the latter alone.
+    """
+    matrix = np.column_stack(list(columns.values()))
+    scale = np.linalg.norm(matrix, axis=0)
+    scale[scale == 0.0] = 1.0
+    u, size, v = np.linalg.svd(matrix / scale, full_matrices=False)
+    told = size > _RANK * size[0]
+    u, root = u[:, told], v[told].T / size[told] / scale[:, None]  # values = root u' measured
+    values = root @ (u.T @ measured)
+    residual = measured - matrix @ values
+    free = measured.size / rows_per_sample - told.sum()
+    variance = float(residual @ residual) / free if free > 0.0 else np.inf
+    errors = np.sqrt(variance * np.sum(root**2, axis=1))
+    changes = []
+    for first, end in pairwise(np.linspace(0, measured.size, blocks + 1).astype(int)):
+        without = np.eye(u.shape[1]) - u[first:end].T @ u[first:end]
+        if np.linalg.eigvalsh(without)[0] > _RANK:
+            changes.append(root @ np.linalg.solve(without, u[first:end].T @ residual[first:end]))
+    if len(changes) > 1:
+        errors = np.maximum(errors, np.sqrt((len(changes) - 1) * np.var(changes, axis=0)))
+    errors[np.sum(v[told] ** 2, axis=0) < 1.0 - _RANK] = np.inf
+    spread, norm = float(np.std(measured)), float(np.linalg.norm(measured))
+    return LinearFit(
+        tuple(columns),
+        values,
+        errors,
+        residual,
+        float(np.std(residual)) / spread if spread > 0.0 else 1.0,
+        float(np.linalg.norm(residual)) / norm if norm > 0.0 else 1.0,
+        how,
+    )
+
+
+def least_absolute(columns: Columns, measured: FloatArray, weights: FloatArray) -> FloatArray:
+    """Part (n,) of `measured` (n,) that columns (n,) explain with the least sum of weights (n,) times |deviation|.
+
+    Windows of another level do not shift it. Iteratively reweighted least squares (E. J. Schlossmacher, Journal of the
+    American Statistical Association 68, 1973). At least one weight is positive.
+    """
+    matrix = np.column_stack(list(columns.values()))
+    matrix = matrix / np.maximum(np.linalg.norm(matrix, axis=0), 1e-300)
+    weight, found = weights, measured
+    for _ in range(_REWEIGHTED):
+        solved, *_ = np.linalg.lstsq(matrix * weight[:, None], measured * weight, rcond=_RANK)
+        found = matrix @ solved
+        left = np.abs(measured - found)
+        least = 1e-3 * float(np.median(left[weights > 0.0])) + 1e-300
+        weight = weights / np.sqrt(np.maximum(left, least))
+    return np.asarray(found, dtype=np.float64)

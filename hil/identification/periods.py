@@ -1,0 +1,48 @@
+"""One search for periods of a signal over a position, an angle or time that is sampled unevenly.
+
+Candidates are peaks of the spectrum of the signal averaged in bins; the share of the energy that one harmonic explains
+is that of the Lomb-Scargle periodogram with a free mean (M. Zechmeister, M. Kuerster, Astronomy and Astrophysics 496,
+2009): least squares of sine, cosine and a constant over the rows themselves.
+"""
+
+import numpy as np
+
+from hil.arrays import FloatArray
+from hil.identification.least_squares import least_squares
+
+_FEWEST_ROWS = 100
+
+
+def harmonic_share(phase: FloatArray, signal: FloatArray) -> float:
+    """Share of the energy of a signal (n,) that one harmonic of a phase (n,) [rad] explains."""
+    columns = {"sine": np.sin(phase), "cosine": np.cos(phase), "one": np.ones_like(phase)}
+    return least_squares(columns, signal, blocks=0).share
+
+
+def strongest_periods(
+    position: FloatArray, signal: FloatArray, width: float, shortest: float, most: int, longest: float = np.inf
+) -> list[float]:
+    """At most `most` periods of a signal (n,) over a position (n,), strongest first, in the unit of the position.
+
+    The signal is averaged in bins of `width`. Periods lie between `shortest` and `longest`, and 2.5 times the range.
+    """
+    span = float(np.ptp(position)) if position.size else 0.0
+    if position.size < _FEWEST_ROWS or span < 4.0 * shortest:
+        return []
+    count = int(np.ceil(span / width))
+    index = np.minimum(((position - position.min()) / span * count).astype(int), count - 1)
+    rows = np.bincount(index, minlength=count)
+    mean = np.bincount(index, weights=signal, minlength=count) / np.maximum(rows, 1)
+    size = 4 * (1 << (count - 1).bit_length())  # zero-padded: a resolution of a quarter of a peak width
+    spectrum = np.abs(np.fft.rfft(np.where(rows > 0, mean - mean[rows > 0].mean(), 0.0), size))
+    frequency = np.fft.rfftfreq(size, span / count)
+    apart = 2 * (size // count + 1)
+    spectrum[(frequency > 1.0 / shortest) | (frequency < max(0.4 / span, 1.0 / longest))] = 0.0
+    found = []
+    for _ in range(most):
+        peak = int(np.argmax(spectrum))
+        if spectrum[peak] == 0.0:
+            break
+        found.append(float(1.0 / frequency[peak]))
+        spectrum[max(peak - apart, 0) : peak + apart] = 0.0
+    return found

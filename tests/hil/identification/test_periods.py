@@ -1,0 +1,43 @@
+"""One search for periods: the strongest line over uneven positions, and the share that it explains."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.signal import lombscargle
+
+from hil.identification.periods import harmonic_share, strongest_periods
+
+
+@given(st.floats(0.011, 0.2), st.floats(-3.0, 3.0), st.floats(-5.0, 5.0), st.integers(0, 1000))
+@settings(max_examples=30)
+def test_the_period_of_a_wave_is_found_over_uneven_positions(
+    period: float, phase: float, level: float, seed: int
+) -> None:
+    x = np.sort(np.random.default_rng(seed).uniform(0.0, 1.0, 4000))
+    found = strongest_periods(x, np.sin(2.0 * np.pi * x / period + phase) + level, 1e-3, 0.01, 1)
+    assert 1.0 / found[0] == pytest.approx(1.0 / period, abs=0.3)  # of 1 / span
+
+
+def test_lines_come_by_strength_within_the_limits() -> None:
+    x = np.linspace(0.0, 1.0, 5000)
+    signal = np.sin(2.0 * np.pi * x / 0.02) + 3.0 * np.sin(2.0 * np.pi * x / 0.1) + 9.0 * np.sin(2.0 * np.pi * x / 0.5)
+    assert strongest_periods(x, signal, 1e-3, 0.01, 3) == pytest.approx([0.5, 0.1, 0.02], rel=0.03)
+    assert strongest_periods(x, signal, 1e-3, 0.05, 1, 0.3) == pytest.approx([0.1], rel=0.03)
+
+
+@given(st.integers(0, 1000), st.floats(0.5, 30.0))
+@settings(max_examples=30)
+def test_the_share_is_that_of_lomb_and_scargle_with_a_free_mean(seed: int, order: float) -> None:
+    rng = np.random.default_rng(seed)
+    x = np.sort(rng.uniform(0.0, 6.0, 300))
+    signal = rng.normal(size=300) + np.sin(order * x) + 2.0
+    expected = lombscargle(x, signal, [order, 40.0], normalize=True, floating_mean=True)[0]
+    assert harmonic_share(order * x, signal) == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize("x", [np.zeros(0), np.linspace(0.0, 1.0, 50), np.linspace(0.0, 0.03, 5000)])
+def test_a_few_rows_and_a_short_way_have_no_period(x: np.ndarray) -> None:
+    assert strongest_periods(x, np.sin(700.0 * x), 1e-3, 0.01, 3) == []

@@ -45,7 +45,7 @@ class Diagnosis:
 
     @property
     def experiment(self) -> Experiment | None:
-        """MeasuredMotion that separates what is open; None if nothing is."""
+        """Motion that separates what is open; None if nothing is."""
         return self.reported.experiment
 
     @property

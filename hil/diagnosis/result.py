@@ -215,7 +215,7 @@ class CandidateLedger(_Part):
 
 
 class NextExperiment(_Part):
-    """MeasuredMotion that separates mechanisms that the recorded motion cannot."""
+    """Motion that separates mechanisms that the recorded motion cannot."""
 
     profile: str = Field(description="profile file")
     separates: tuple[str, ...]

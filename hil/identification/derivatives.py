@@ -27,7 +27,7 @@ class MeasuredMotion:
 
 
 def motion(position: FloatArray, period_s: float, smooth_s: float = SMOOTH_S) -> MeasuredMotion:
-    """MeasuredMotion of a position (n,) sampled at `period_s`; the direction is 0 at rest, below 1 % of the top speed."""
+    """Motion of a position (n,) sampled at `period_s`; the direction is 0 at rest, below 1 % of the top speed."""
     smooth, velocity, acceleration = (_filtered(position, period_s, order, smooth_s) for order in (0, 1, 2))
     moves = np.abs(velocity) > _AT_REST * np.max(np.abs(velocity), initial=0.0)
     return MeasuredMotion(smooth, velocity, acceleration, np.where(moves, np.sign(velocity), 0.0))

@@ -72,7 +72,7 @@ def least_structure(
 
 @dataclass(frozen=True, eq=False)
 class MotionData:
-    """MeasuredMotion of a recording, its torque (n,) smoothed alike, and the rows (n,) that are evaluated."""
+    """Motion of a recording, its torque (n,) smoothed alike, and the rows (n,) that are evaluated."""
 
     moved: MeasuredMotion
     torque: FloatArray

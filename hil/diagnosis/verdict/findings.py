@@ -101,7 +101,7 @@ def findings(
 def corrections(owner: Bench, fit: Fit) -> dict[str, Correction]:
     """Nominal parameters of the bench file and as fitted; without a torque only the damping of the transmission.
 
-    MeasuredMotion alone gives the ratio of stiffness and mass, and nothing of the motor side. A parameter that ended at the
+    Motion alone gives the ratio of stiffness and mass, and nothing of the motor side. A parameter that ended at the
     bound of the allowed range, or was left as it is, has no correction. Values of the
     bench's mechanisms are among them.
     """

@@ -59,7 +59,7 @@ def report(judged: Judged, progress: Progress, begin_s: float, budget_s: float) 
         time_budget=TimeBudget(budget_s=budget_s, stopped_before=searched.stopped_at, not_tried=searched.not_tried)
         if searched.stopped_at
         else None,
-        considered=ledgers(judged),
+        considered=ledgers(judged, forms),
         notes=tuple(notes_on(judged, table, forms, left, experiment.note if experiment else "", budget_s)),
         runtime_s=time.monotonic() - begin_s,
     )

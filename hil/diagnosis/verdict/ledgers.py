@@ -1,6 +1,7 @@
 """Ledgers of all candidates that were fitted, with the answers of the verdict on those that were found."""
 
 import math
+from collections.abc import Container
 from dataclasses import replace
 
 from hil.diagnosis.ledger import Considered, Ledger, LedgerEntry
@@ -11,11 +12,12 @@ from hil.diagnosis.verdict.judge import explanation
 from hil.twin.library import BY_ID
 
 
-def ledgers(judged: Judged) -> tuple[CandidateLedger, ...]:
+def ledgers(judged: Judged, forms: Container[int]) -> tuple[CandidateLedger, ...]:
     """The candidates in the order in which they were fitted.
 
     One that was found has the answers on held-out recordings too, and that on all terms together. A term that the
-    search did not add itself (another form, an event of a held-out recording) has these alone.
+    search did not add itself (another form, an event of a held-out recording) has these alone. `forms` are the indices
+    of terms that are reported as part of another one: they have no name of their own.
     """
     searched, proof = judged.tested.searched, judged.tested.proof
     together: Ledger = ()
@@ -25,13 +27,17 @@ def ledgers(judged: Judged) -> tuple[CandidateLedger, ...]:
         {index: _candidate(one, False) for index, one in enumerate(searched.considered)},
         list[CandidateLedger](),
     )
-    for ablation, kept in [*((one, True) for one in proof.ablations), *((one, False) for one in proof.dropped)]:
+    for index, ablation in enumerate((*proof.ablations, *proof.dropped)):
+        kept = index < len(proof.ablations)
         term, effect = ablation.term, key_in_search(searched, ablation.term)[0]
         places = [index for index, one in enumerate(searched.considered) if one.effect == effect and one.accepted]
         # the same torque may be named by a more frequent cause of it
         before = replace(searched.considered[places[-1]], effect=term.effect) if places else None
         found = before or Considered(term.effect, term.variant, (), ())
-        answer = _candidate(found.asked(ablation.ledger).asked(together if kept else ()), kept and judged.has_findings)
+        answer = _candidate(
+            found.asked(ablation.ledger).asked(together if kept else ()),
+            kept and index not in forms and judged.has_findings,
+        )
         if places:
             answers[places[-1]] = answer
         else:

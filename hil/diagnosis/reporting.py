@@ -46,7 +46,7 @@ def report(judged: Judged, progress: Progress, begin_s: float, budget_s: float) 
         location=location,
         missing=() if judged.is_part else found,
         partial=found if judged.is_part else (),
-        change=judged.change.told if judged.change else None,
+        change=judged.change.summary if judged.change else None,
         parameter_corrections=law.corrections | ({} if judged.keeps_bench else corrections(bench, final)),
         not_identifiable=() if judged.keeps_bench else at_bound(final),
         fit=table,

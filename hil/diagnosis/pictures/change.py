@@ -56,8 +56,10 @@ def change_figure(diagnosis: Diagnosis) -> Figure:
             label="one set of parameters",
         )
         axis.plot(time_s[chosen], factor * lines[1][chosen], color=SIMULATED, linewidth=0.9, label="those of each part")
-        if change.told.moment_s is not None:
-            axis.axvline(change.told.moment_s, color=DEVIATION, linewidth=1.4, label=f"{change.told.moment_s:.2f} s")
+        if change.summary.moment_s is not None:
+            axis.axvline(
+                change.summary.moment_s, color=DEVIATION, linewidth=1.4, label=f"{change.summary.moment_s:.2f} s"
+            )
         style_axis(axis, f"{label_of_channel(diagnosis, channel)}\n[{unit}]", "time [s]", run.name)
         legend_above(axis)
     return figure

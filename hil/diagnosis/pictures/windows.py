@@ -22,7 +22,7 @@ DRAWN_ROWS = 6000  # several per pixel
 
 
 def force_over_time(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:
-    """Draw the force that the owner's twin lacks and that of the twin without the event, with its windows shaded."""
+    """Draw the force that the twins of the bench file and without the event lack, with the windows of the event."""
     shown = sorted(views, key=lambda view: not view.term.windows_of(view.run.name))[:MOST_RUNS]
     shown.sort(key=lambda view: view.run.start.time_s)
     ratio = diagnosis.given_bench.axis.ratio_m_rad
@@ -30,9 +30,9 @@ def force_over_time(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:
     axes = np.atleast_1d(figure.subplots(len(shown), 1))
     for axis, view in zip(axes, shown, strict=True):
         run, observer_s = view.run, diagnosis.train.observer_s
-        owner = diagnosis.residuals(diagnosis.searched.given, run)["motor"]
-        of_owner = disturbance(run, owner, inertia(diagnosis.given_bench), observer_s).torque / ratio
-        curves = view.torque_modelled.torque / ratio, view.torque.torque / ratio, of_owner
+        given = diagnosis.residuals(diagnosis.searched.given, run)["motor"]
+        of_bench_file = disturbance(run, given, inertia(diagnosis.given_bench), observer_s).torque / ratio
+        curves = view.torque_modelled.torque / ratio, view.torque.torque / ratio, of_bench_file
         rows = slice(run.evaluated.start, None)
         chosen = thin(tuple(values[rows] for values in curves), DRAWN_ROWS)
         looks = (

@@ -245,11 +245,13 @@ def observable(mechanism: Mechanism, variant: Variant, bench: Bench) -> bool:
     return felt and not mechanism.search.needs_table
 
 
-def judged(effect: str, runs: Sequence[Measured]) -> bool:
+def block_observed(effect: str, runs: Sequence[Measured]) -> bool:
     """True if input and output of the block of a mechanism are known in the recordings."""
     return not any(BY_ID[effect].block is _BLOCK_OF[channel] for run in runs for channel in run.observability.hidden)
 
 
 def claimable(term: Term, bench: Bench, runs: Sequence[Measured] = ()) -> bool:
     """True if the values are valid for the mechanism of a term, and the sensors can show it."""
-    return judged(term.effect, runs) and BY_ID[term.effect].is_valid(term.values, term.variant, axis_facts(bench, runs))
+    return block_observed(term.effect, runs) and BY_ID[term.effect].is_valid(
+        term.values, term.variant, axis_facts(bench, runs)
+    )

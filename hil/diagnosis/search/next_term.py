@@ -7,7 +7,7 @@ from hil.diagnosis.acceptance import promises
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.ledger import Considered, accepted
 from hil.diagnosis.search.addition import Addition
-from hil.diagnosis.search.restart import companion, from_owner, may_hide, together, unbent
+from hil.diagnosis.search.restart import companion, from_bench_file, may_hide, together, unbent
 from hil.diagnosis.search.score_test import Candidate
 from hil.diagnosis.search.successive_halving import race
 from hil.diagnosis.stages import Progress
@@ -76,7 +76,7 @@ def next_term(search: SearchRound, candidates: Sequence[Candidate], step: Progre
     if best is None and not base.at_floor and search.unfinished:
         step("searching again beside the parameters of the bench file")
         considered += [one.considered for one in found]
-        found = valid(from_owner(base))
+        found = valid(from_bench_file(base))
         best = first_standing(found)
     if best is not None and not best.fit.at_floor and search.unfinished and (other := companion(base, best.fit)):
         step(f"fitting {best.fit.terms[-1].effect} together with {other.effect}")

@@ -20,7 +20,7 @@ from functools import partial
 
 from hil.diagnosis.search.initial_values import axis_facts, stretches
 from hil.diagnosis.search.score_test import screen_library
-from hil.diagnosis.search.successive_halving import LONG, SEARCH_ACCURACY, owner_points, race
+from hil.diagnosis.search.successive_halving import LONG, SEARCH_ACCURACY, given_points, race
 from hil.identification.coordinates import LAST_EDGE_STEP_S
 from hil.identification.estimator import Fit
 from hil.identification.nominal_fit import SOFT
@@ -33,12 +33,12 @@ _FIRST, _SECOND = 8, 20  # evaluations: a fit starts farther from its minimum th
 _NARROWEST_M = 1e-6  # least first gap, if the deflection between motor and table is negligible
 
 
-def from_owner(base: Fit) -> list[Fit]:
+def from_bench_file(base: Fit) -> list[Fit]:
     """Fit the first candidates at the nominal parameters of the bench file, best first."""
     # not fitted, so without a Jacobian: the score test has no projection
-    owner = base.estimator.evaluate(base.hypothesis.moved(owner_points(base)[-1]))
-    promising = screen_library(owner)
-    return race(owner, promising) if promising else []
+    given = base.estimator.evaluate(base.hypothesis.moved(given_points(base)[-1]))
+    promising = screen_library(given)
+    return race(given, promising) if promising else []
 
 
 def companion(base: Fit, fit: Fit) -> Term | None:
@@ -53,8 +53,8 @@ def companion(base: Fit, fit: Fit) -> Term | None:
 
 def together(base: Fit, fit: Fit, other: Term) -> list[Fit]:
     """Fit mechanisms like the last term of a fit beside another term, from the parameters of the bench; best first."""
-    owner = base.hypothesis.moved(owner_points(base)[0]).with_term(other)
-    beside = base.estimator.fit(owner, evaluations=_SECOND, fixed=range(owner.nominal_count))
+    given = base.hypothesis.moved(given_points(base)[0]).with_term(other)
+    beside = base.estimator.fit(given, evaluations=_SECOND, fixed=range(given.nominal_count))
     alike = [one for one in screen_library(beside) if BY_ID[one.term.effect].search.beside == other.effect]
     likely = [one for one in alike if one.share > 0.0]
     return race(beside, likely) if likely else []
@@ -65,9 +65,9 @@ def again(found: Fit, evaluations: int) -> Fit:
     stuck = set(found.at_bound).intersection(found.hypothesis.nominal)
     if not found.terms or not stuck or found.at_floor or found.estimator.expired:
         return found
-    owner, axis = found.hypothesis.rebased.given, axis_facts(found.data.bench, found.data.runs)
+    given, axis = found.hypothesis.rebased.given, axis_facts(found.data.bench, found.data.runs)
     starts = [
-        owner.replaced(index, replace(term, variant=variant, values=BY_ID[term.effect].typical_values(axis)))
+        given.replaced(index, replace(term, variant=variant, values=BY_ID[term.effect].typical_values(axis)))
         for index, term in enumerate(found.terms)
         if not term.windows
         for variant in range(len(BY_ID[term.effect].variants))
@@ -92,10 +92,10 @@ def _hidden(base: Fit) -> list[Term]:
 
 def unbent(base: Fit) -> Fit:
     """Fit the base with a mechanism that springs may hide, from the springs of the bench file."""
-    owner = base.hypothesis.moved(owner_points(base)[-1])
+    given = base.hypothesis.moved(given_points(base)[-1])
     search = replace(base.estimator, torque_accuracy=SEARCH_ACCURACY, fast=True)
-    starts = [owner.with_term(term) for term in _hidden(base)]
-    held = search.jacobian(owner)
+    starts = [given.with_term(term) for term in _hidden(base)]
+    held = search.jacobian(given)
     first = [partial(search.fit, start, soft=SOFT, evaluations=_FIRST, held=held) for start in starts]
     best = min(in_parallel(first), key=lambda found: found.cost)
     full = replace(search, fast=False)  # small gaps need the steps of the twin

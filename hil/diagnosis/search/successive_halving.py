@@ -52,16 +52,16 @@ def race(base: Fit, candidates: Sequence[Candidate]) -> list[Fit]:
     ).run()
 
 
-def owner_points(base: Fit) -> list[FloatArray]:
+def given_points(base: Fit) -> list[FloatArray]:
     """Points x of a base with nominal parameters of the bench: all of them, and only springs and shares of the masses.
 
     Fitted parameters may compensate for missing physics. A mechanism between motor and table changes the fitted springs
     and shares of the masses; friction and total mass remain right.
     """
-    hypothesis, owner = base.hypothesis, base.hypothesis.given.x
+    hypothesis, given = base.hypothesis, base.hypothesis.given.x
     bench, axis = hypothesis.bench, hypothesis.bench.axis
     if not axis.SPRINGS:
-        return [owner]
+        return [given]
 
     def heavier(factor: float) -> Bench:
         return bench.model_copy(
@@ -75,8 +75,8 @@ def owner_points(base: Fit) -> list[FloatArray]:
         if coordinate.name in axis.MASSES:
             hidden[index] = coordinate.x(factor * getattr(axis, coordinate.name))
         elif coordinate.name in axis.SPRINGS:
-            hidden[index] = owner[index]
-    return [owner, hidden]
+            hidden[index] = given[index]
+    return [given, hidden]
 
 
 class _FirstFit(NamedTuple):
@@ -104,14 +104,14 @@ class _Race:
         return replace(self.base.estimator, torque_accuracy=SEARCH_ACCURACY, fast=True)
 
     @cached_property
-    def owner(self) -> list[FloatArray]:
+    def given(self) -> list[FloatArray]:
         """Points with the parameters of the bench."""
-        return owner_points(self.base)
+        return given_points(self.base)
 
     @cached_property
     def derivatives(self) -> dict[tuple[float, ...], SingleArray]:
         """Jacobian of the base by the point at which it was taken."""
-        points = (self.base.hypothesis.x, *self.owner)
+        points = (self.base.hypothesis.x, *self.given)
         return {tuple(x): self.search.jacobian(self.base.hypothesis.moved(x)).astype(np.float32) for x in points}
 
     def run(self) -> list[Fit]:
@@ -146,7 +146,7 @@ class _Race:
         here = self.base.hypothesis.x
         begun = self._least(candidate, here, _soft, self._cost_beside_base)
         if candidate in self.candidates[:_CONTINUED]:
-            begun.append(self._owner_start(candidate))
+            begun.append(self._given_start(candidate))
             if begun[0].terms[-1].variant != candidate.term.variant:
                 same = tuple(term for term in candidate.others if term.variant == candidate.term.variant)
                 begun.append(self._best_start(replace(candidate, others=same), here))
@@ -177,9 +177,9 @@ class _Race:
         step = damped_step(normal, descent, _SOLVED, np.sqrt(np.diag(normal)), low, high)
         return robust_loss(vector + slopes @ step, SOFT)[0]
 
-    def _owner_start(self, candidate: Candidate) -> Fit:
+    def _given_start(self, candidate: Candidate) -> Fit:
         """Return the best start of a candidate at the parameters of the bench."""
-        return min((self._best_start(candidate, x) for x in self.owner), key=_soft)
+        return min((self._best_start(candidate, x) for x in self.given), key=_soft)
 
     def _followers(self, leader: Fit, before: Fit, others: Sequence[Fit]) -> list[Fit]:
         """Evaluate the second fits, and converge those with a cost near that of the leader.
@@ -189,7 +189,7 @@ class _Race:
         """
         level, *reached = [fit.with_accuracy(TORQUE_ACCURACY) for fit in (before, *others)]
         beaten = max(_BEATEN * leader.cost, _LEVEL * level.cost)
-        again = [] if leader.at_floor else [partial(self._from_owner, before)]
+        again = [] if leader.at_floor else [partial(self._from_bench_file, before)]
         near = [
             partial(_finish, other)
             for other, fit in zip(others, reached, strict=True)
@@ -197,10 +197,10 @@ class _Race:
         ]
         return [*reached, *in_parallel([*again, *near])]
 
-    def _from_owner(self, fit: Fit) -> Fit:
+    def _from_bench_file(self, fit: Fit) -> Fit:
         """Fit the same mechanism from the parameters of the bench with its own derivatives."""
         candidate = next(one for one in self.candidates if one.term.effect == fit.terms[-1].effect)
-        again = self._owner_start(candidate).refit(SECOND, soft=SOFT)
+        again = self._given_start(candidate).refit(SECOND, soft=SOFT)
         return _finish(again) if self._gain(again) > 0.0 else again
 
     def _variants(self, fit: Fit) -> list[Fit]:

@@ -21,13 +21,13 @@ _SHORTEST = 0.1  # of the judged rows: a shorter part tells no parameters
 
 @dataclass(frozen=True, eq=False)
 class Change:
-    """A change of the axis: `told`, and the evidence for it.
+    """A change of the axis: `summary`, and the evidence for it.
 
     `runs` are the recordings, `parts` the fits of the nominal parameters to each of them, or before and after the
     moment; `left` is the share of the energy above the noise that these leave.
     """
 
-    told: AxisChange
+    summary: AxisChange
     runs: tuple[Measured, ...]
     parts: tuple[Fit, ...]
     left: float

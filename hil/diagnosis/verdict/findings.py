@@ -98,7 +98,7 @@ def findings(
     return tuple(finding for _, finding in sorted(result, key=lambda pair: -pair[0]))
 
 
-def corrections(owner: Bench, fit: Fit) -> dict[str, Correction]:
+def corrections(bench_file: Bench, fit: Fit) -> dict[str, Correction]:
     """Nominal parameters of the bench file and as fitted; without a torque only the damping of the transmission.
 
     Motion alone gives the ratio of stiffness and mass, and nothing of the motor side. A parameter that ended at the
@@ -115,7 +115,7 @@ def corrections(owner: Bench, fit: Fit) -> dict[str, Correction]:
             nominal=before,
             value=value,
             std=std,
-            unit=unit_of(one.name) if one.parameter is None else unit_in(owner, one.parameter),
+            unit=unit_of(one.name) if one.parameter is None else unit_in(bench_file, one.parameter),
         )
         for before, one, value, std in entries
         if one.name in told
@@ -125,7 +125,7 @@ def corrections(owner: Bench, fit: Fit) -> dict[str, Correction]:
     }
 
 
-def diagnosed_bench(owner: Bench, fit: Fit) -> Bench:
+def diagnosed_bench(bench_file: Bench, fit: Fit) -> Bench:
     """Bench file with the parameters and permanent terms of a fit; every other command accepts it.
 
     An event is not expected in another recording.
@@ -139,7 +139,9 @@ def diagnosed_bench(owner: Bench, fit: Fit) -> Bench:
         for term in fit.terms
         if not term.windows
     )
-    return fit.bench.model_copy(update={"name": f"{owner.name}_diagnosed", "mechanisms": fit.hypothesis.kept + entries})
+    return fit.bench.model_copy(
+        update={"name": f"{bench_file.name}_diagnosed", "mechanisms": fit.hypothesis.kept + entries}
+    )
 
 
 def _normal(term: Term) -> Term:

@@ -42,7 +42,7 @@ def channel_residuals(hypothesis: Hypothesis, data: Dataset, mode: Mode) -> tupl
 class _ChannelTable:
     """Figures of one channel in one mode for the three hypotheses."""
 
-    owner: Hypothesis
+    given: Hypothesis
     nominal: Hypothesis
     final: Hypothesis
     noise: dict[Measured, dict[str, float]]  # closed-loop response of the axis to the noise of its encoders
@@ -57,12 +57,14 @@ class _ChannelTable:
         ]
         white = float(np.sqrt(np.mean(np.square(lapped or [rms for rms, _ in own]))))
         closed = self.mode is Mode.CLOSED_LOOP
-        by_owner = math.inf if closed and not holds(self.owner, data) else self._rms(self.owner, data)
+        by_bench_file = math.inf if closed and not holds(self.given, data) else self._rms(self.given, data)
         return FitFigures(
             before_rms=self._rms(self.nominal, data),
             after_rms=self._rms(self.final, data),
             noise_floor_rms=white,
-            owner_rms=by_owner if math.isfinite(by_owner) else None,  # the twin diverges with the owner's values
+            owner_rms=by_bench_file
+            if math.isfinite(by_bench_file)
+            else None,  # the twin diverges with the values of the bench file
         )
 
     def _of(self, hypothesis: Hypothesis, data: Dataset) -> list[FloatArray]:
@@ -104,7 +106,7 @@ def closed_loop_held(nominal: Fit, final: Fit, held_out: Dataset) -> bool:
     )
 
 
-def fit_table(owner: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> dict[str, ChannelFit]:
+def fit_table(given: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> dict[str, ChannelFit]:
     """Compute the figures of each recorded channel."""
     train = final.data
     sets = [data for data in (train, held_out) if data.runs]
@@ -122,7 +124,7 @@ def fit_table(owner: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> dict[s
         figures = {
             mode: [table.figures(data, held_out if data is train else train) for data in sets]
             for mode in modes
-            for table in [_ChannelTable(owner.hypothesis, nominal.hypothesis, final.hypothesis, noise, channel, mode)]
+            for table in [_ChannelTable(given.hypothesis, nominal.hypothesis, final.hypothesis, noise, channel, mode)]
         }
         mode = modes[0]
         if held:

@@ -35,7 +35,7 @@ def reported_refit(nominal: Fit) -> Refit:
     return never_worse(nominal, figures, floors)
 
 
-def torque_left(owner: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> TorqueLeft | None:
+def torque_left(given: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> TorqueLeft | None:
     """Shares of the held-out torque that the twins and the plain model leave; None if that cannot be told."""
     if not held_out.runs or not held_out.observability.torque_measured:
         return None
@@ -48,7 +48,7 @@ def torque_left(owner: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> Torq
         return None
     of = {
         name: left_by_twin(fit.hypothesis, held_out, plain.slowest, deviation)
-        for name, fit in (("owner", owner), ("refitted", nominal), ("final", final))
+        for name, fit in (("owner", given), ("refitted", nominal), ("final", final))
     }
     told = {name: None if left is None or not np.isfinite(left) else left for name, left in of.items()}
     return TorqueLeft(plain=by_plain, **told)

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from hil.diagnosis.criteria import CRITERIA
-from hil.diagnosis.search.initial_values import axis_facts, judged, observable
+from hil.diagnosis.search.initial_values import axis_facts, block_observed, observable
 from hil.identification.estimator import Fit
 from hil.identification.parallel import POOL
 from hil.identification.terms import Term
@@ -47,7 +47,7 @@ def not_testable(fit: Fit, asked: Collection[str] = tuple(BY_ID), margin: float 
         (mechanism.id, number)
         for mechanism in wanted
         for number, variant in enumerate(mechanism.variants)
-        if observable(mechanism, variant, bench) and judged(mechanism.id, fit.data.runs)
+        if observable(mechanism, variant, bench) and block_observed(mechanism.id, fit.data.runs)
     ]
     shown = {effect for (effect, _), seen in zip(jobs, POOL.map(lambda job: visible(*job), jobs), strict=True) if seen}
     return tuple(mechanism.id for mechanism in wanted if mechanism.id not in shown)

@@ -11,7 +11,7 @@ from diagnosis_runs import bench, evaluated, prepared, recorded
 from hil.bench.bench_file import Bench, MechanismEntry, load_bench
 from hil.diagnosis.search import next_term
 from hil.diagnosis.search.forward_selection import search
-from hil.diagnosis.search.restart import from_owner, may_hide, unbent
+from hil.diagnosis.search.restart import from_bench_file, may_hide, unbent
 from hil.diagnosis.search.score_test import screen_library
 from hil.identification.dataset import prepare_dataset
 from hil.identification.hypothesis import Hypothesis
@@ -82,7 +82,7 @@ def test_where_a_screen_beside_the_refit_finds_nothing_the_owners_values_are_sea
     pulled = Term("spring_load", 0, (6000.0, 0.02))
     run, plain = (take(recorded(bench(), *terms), owner) for terms in ((pulled,), ()))
     base = fit_nominal_parameters(prepare_dataset([run], owner))
-    first = from_owner(base)[0]
+    first = from_bench_file(base)[0]
     assert first.cost < 1.1 * base.rows < 0.1 * base.cost
     monkeypatch.setattr(next_term, "race", lambda base, candidates: [])
     (spring,) = search(prepared(prepare_dataset([run], owner))).terms

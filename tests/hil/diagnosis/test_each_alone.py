@@ -34,7 +34,7 @@ def differing(*benches: Bench, terms: tuple[Term, ...] = ()) -> dict[str, tuple[
     runs = [take(recorded(one, *terms, seed=k, name=f"run {k}"), OWNER) for k, one in enumerate(benches)]
     nominal = fit_nominal_parameters(dataset(runs, OWNER))
     found = changed(nominal, nominal.data.over([]))
-    return {one.name: tuple(value.value for value in one.values) for one in found.told.parameters} if found else {}
+    return {one.name: tuple(value.value for value in one.values) for one in found.summary.parameters} if found else {}
 
 
 def test_a_parameter_that_differs_between_recordings_is_said() -> None:

@@ -10,7 +10,7 @@ from hil.bench.bench_file import load_bench
 from hil.diagnosis.diagnose import diagnose
 from hil.diagnosis.preparation.preflight import preflight
 from hil.diagnosis.search.score_test import Candidate
-from hil.diagnosis.search.successive_halving import _Race, _soft, owner_points
+from hil.diagnosis.search.successive_halving import _Race, _soft, given_points
 from hil.identification.coordinates import CHATTER_STEP, LAST_EDGE_STEP_S
 from hil.identification.dataset import prepare_dataset
 from hil.identification.estimator import Estimator, Fit
@@ -41,7 +41,7 @@ def test_springs_and_shares_of_the_masses_are_the_owners_and_the_rest_is_refitte
         damping_ratio=5.0,
         coulomb_torque_n_m=1.2,
     )
-    everything, hidden = (base.hypothesis.moved(x) for x in owner_points(base))
+    everything, hidden = (base.hypothesis.moved(x) for x in given_points(base))
     refitted, terms = hidden.resolved
     assert everything.resolved.bench.axis == owner.axis
     assert inertia(refitted) == pytest.approx(inertia(base.bench))
@@ -56,7 +56,7 @@ def test_springs_and_shares_of_the_masses_are_the_owners_and_the_rest_is_refitte
 
 
 def test_without_springs_there_is_one_such_point() -> None:
-    assert len(owner_points(bent(Hypothesis(load_bench("emps_symmetric"), ())))) == 1
+    assert len(given_points(bent(Hypothesis(load_bench("emps_symmetric"), ())))) == 1
 
 
 def test_differences_are_wide_where_a_nut_may_chatter() -> None:

@@ -62,9 +62,8 @@ class _ChannelTable:
             before_rms=self._rms(self.nominal, data),
             after_rms=self._rms(self.final, data),
             noise_floor_rms=white,
-            owner_rms=by_bench_file
-            if math.isfinite(by_bench_file)
-            else None,  # the twin diverges with the values of the bench file
+            # the twin may diverge with the values of the bench file
+            owner_rms=by_bench_file if math.isfinite(by_bench_file) else None,
         )
 
     def _of(self, hypothesis: Hypothesis, data: Dataset) -> list[FloatArray]:

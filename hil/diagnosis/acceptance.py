@@ -54,7 +54,7 @@ def _material(of: Addition | Need, c: Criteria) -> Answer:
 
 def _worth(of: Addition, c: Criteria) -> Answer:
     share = c.worth if of.beside < c.several else c.series
-    return of.gain >= share * of.excess, {"share": of.gain / (of.excess or 1.0), "needed": share}
+    return of.gain >= share * of.excess, {"explained": of.gain / (of.excess or 1.0), "needed": share}
 
 
 def _laps(of: Addition, c: Criteria) -> Answer:
@@ -189,8 +189,8 @@ ADDED: tuple[Rule[Addition], ...] = (
     _MATERIAL,
     Rule(
         "share of the mismatch",
-        "it removes {share:.1%} of the energy above the noise, needed {needed:.0%}",
-        "it removes {share:.1%} of the energy above the noise, needed {needed:.0%}: such terms are a series",
+        "it removes {explained:.1%} of the energy above the noise, needed {needed:.0%}",
+        "it removes {explained:.1%} of the energy above the noise, needed {needed:.0%}: such terms are a series",
         "many small terms are a series expansion of one effect",
         _worth,
     ),

@@ -36,7 +36,7 @@ class Bound(NamedTuple):
 BOUNDS = (
     Bound("evidence", "evidence", CRITERIA.evidence),
     Bound("material energy", "removed", CRITERIA.material),
-    Bound("share of the mismatch", "share", CRITERIA.worth),
+    Bound("share of the mismatch", "explained", CRITERIA.worth),
     Bound("constant force", "left", CRITERIA.form, above=False),
     Bound("beside the named one", "against", CRITERIA.tied, above=False),
     Bound("beside the named one", "more", CRITERIA.alike, above=False),

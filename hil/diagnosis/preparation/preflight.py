@@ -185,10 +185,14 @@ def _torque_problems(run: Measured, bench: Bench) -> Iterator[str]:
     if measured is None:
         return
     j, coulomb = measured["inertia"], measured["coulomb"]
-    if j.value < -3.0 * j.std_error and coulomb.value < 3.0 * coulomb.std_error:  # friction has the sign of the torque
+    both = {"inertia": j, "friction": coulomb}
+    negative = next((name for name, one in both.items() if one.value < -3.0 * one.std_error), None)
+    # neither can be negative, and both have the sign of the torque
+    if negative and not any(one.value > 3.0 * one.std_error for one in both.values()):
         yield (
-            f"{names.torque} has the wrong sign: its regression gives a negative inertia, {j.value:.3g} ± "
-            f"{j.std_error:.1g}; correct the sign of the channel, or of the encoder"
+            f"{names.torque} has the wrong sign: its regression gives a negative {negative}, "
+            f"{both[negative].value:.3g} ± {both[negative].std_error:.1g}; correct the sign of the channel, or of the "
+            "encoder"
         )
         return
     factors = [j.value / inertia] if j.value > 5.0 * j.std_error else []

@@ -52,4 +52,4 @@ def test_all_published_tables_are_listed() -> None:
 def test_documents_stay_short() -> None:
     lines = {path.name: len(path.read_text(encoding="utf-8").splitlines()) for path in DOCUMENTS}
     assert {name: lines[name] for name, most in MOST_LINES.items() if lines[name] >= most} == {}
-    assert sum(lines.values()) < 1400
+    assert sum(lines.values()) < 1500

@@ -1,7 +1,7 @@
 """Check recordings before a diagnosis: excitation, frozen channels, wrong signs and units, saturation.
 
-The plain model of the torque over the measured motion tells inertia J and Coulomb friction Fc. A negative J without
-positive Fc shows a wrong sign; J and Fc far from those of the bench, a wrong unit.
+The plain model of the torque over the measured motion tells inertia J and Coulomb friction Fc. One of them negative,
+and none positive, shows a wrong sign; J and Fc far from those of the bench, a wrong unit.
 """
 
 import math

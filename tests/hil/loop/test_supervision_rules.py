@@ -65,7 +65,7 @@ def test_each_bit_gives_its_own_rule() -> None:
 
 
 def test_document_and_table_agree() -> None:
-    text = (Path(__file__).parents[2] / "ARCHITECTURE.md").read_text(encoding="utf-8")
+    text = (Path(__file__).parents[3] / "ARCHITECTURE.md").read_text(encoding="utf-8")
     assert rules_table() in text
 
 

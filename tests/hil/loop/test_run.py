@@ -22,7 +22,7 @@ from hil.loop.simulated_bench import load_simulated
 from hil.motion.profile import load_profile
 from hil.recording.recording import read_recording
 
-ROOT = Path(__file__).parent.parent.parent
+ROOT = Path(__file__).parents[3]
 
 
 def test_a_recording_says_how_it_was_made(tmp_path: Path) -> None:

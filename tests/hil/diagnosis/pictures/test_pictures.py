@@ -12,7 +12,7 @@ from hil.diagnosis.pictures.findings import finding_figure
 from hil.diagnosis.pictures.view import around
 from hil.diagnosis.result import Result, Unexplained, Verdict
 from hil.diagnosis.search.initial_values import axis_facts
-from hil.diagnosis.stages import Judged, Reported, Tested
+from hil.diagnosis import stages
 from hil.diagnosis.verdict.cross_validation import CrossValidation
 from hil.figures.drawing import save
 from hil.identification.honest_refit import Refit
@@ -39,9 +39,9 @@ def diagnosis_of(effect: str, times: float = 3.0) -> Diagnosis:
     data = dataset(runs, OWNER)
     plain, right = evaluated(Hypothesis(OWNER), data), evaluated(Hypothesis(OWNER, (term,)), data)
     proof = CrossValidation(right, (), ())
-    tested = Tested(searched(plain, plain, right), proof, Refit(plain, ""))
+    tested = stages.Tested(searched(plain, plain, right), proof, Refit(plain, ""))
     verdict = Verdict.MISSING_PHYSICS
-    judged = Judged(tested, verdict, verdict, None, False, plain, plain, right)
+    judged = stages.Judged(tested, verdict, verdict, None, False, plain, plain, right)
     result = Result(
         verdict=verdict,
         statement="",
@@ -53,7 +53,7 @@ def diagnosis_of(effect: str, times: float = 3.0) -> Diagnosis:
         unexplained=Unexplained(share=0.0, description=""),
         runtime_s=0.0,
     )
-    return Diagnosis(Reported(judged, result, OWNER, None))
+    return Diagnosis(stages.Reported(judged, result, OWNER, None))
 
 
 def test_only_evaluated_rows_are_enlarged() -> None:

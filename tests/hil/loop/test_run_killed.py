@@ -17,7 +17,7 @@ from processes import DEADLINE_S, is_over, wait_for
 from hil.recording.recording import Recording, read_recording
 from hil.recording.ring import FOLDER, Counter, Ring
 
-PROFILE = Path(__file__).parents[2] / "profiles" / "friction_sweep.yaml"
+PROFILE = Path(__file__).parents[3] / "profiles" / "friction_sweep.yaml"
 MOVING = 1000  # rows
 
 

@@ -12,7 +12,7 @@ from scipy.signal import lfilter
 
 from hil.bench.bench_file import Bench, load_bench
 from hil.diagnosis.diagnose import diagnose
-from hil.diagnosis.notes import at_bound, ended
+from hil.diagnosis.notes import _on_fit, at_bound
 from hil.diagnosis.search.initial_values import axis_facts, claimable
 from hil.diagnosis.verdict.cross_validation import cross_validate
 from hil.diagnosis.verdict.findings import corrections
@@ -126,7 +126,7 @@ def test_a_parameter_at_its_bound_is_no_correction() -> None:
     found = reported_refit(fitted(Hypothesis(light), data)).fit
     assert at_bound(found) == ("table_mass_kg",)
     assert "table_mass_kg" not in corrections(light, found)
-    assert any("table_mass_kg: not identifiable from this motion" in note for note in ended(found))
+    assert any("table_mass_kg: not identifiable from this motion" in note for note in _on_fit(found))
 
 
 def test_standard_errors_count_what_the_model_leaves_with_its_correlation() -> None:

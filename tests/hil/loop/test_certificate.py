@@ -24,7 +24,7 @@ from hil.loop.realtime import NotPunctual
 from hil.loop.run import run_profile
 from hil.recording.recording import read_recording
 
-PROFILE = Path(__file__).parents[2] / "profiles" / "friction_sweep.yaml"
+PROFILE = Path(__file__).parents[3] / "profiles" / "friction_sweep.yaml"
 
 
 def certificate(recording: Path | None) -> dict[str, Any]:

@@ -145,7 +145,7 @@ def test_lost_set_points_are_no_fault_of_an_encoder(tmp_path: Path, lost_at: str
 
 def test_no_module_of_a_run_reads_the_wall_clock() -> None:
     """CLOCK_REALTIME may step: a run's ticks, time-outs and rows depend on the monotonic clock alone."""
-    root = Path(__file__).parents[2]
+    root = Path(__file__).parents[3]
     folders = (root / "drivers", root / "hil" / "loop", root / "hil" / "recording", root / "hil" / "control")
     sources = [path for folder in folders for path in folder.rglob("*.py")]
     assert len(sources) > 50

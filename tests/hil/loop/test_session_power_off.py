@@ -25,7 +25,7 @@ from hil.motion.profile import Profile
 from hil.motion.trajectory import plan
 
 RPDO = 0x205
-PROFILE = Path(__file__).parents[2] / "profiles" / "friction_sweep.yaml"
+PROFILE = Path(__file__).parents[3] / "profiles" / "friction_sweep.yaml"
 SPEED_M_S, DECELERATION_M_S2 = 0.1, 160 * 0.01  # of the move; 160 rev/s^2, the default of 0x6085, on a lead of 10 mm
 RAMP_M = SPEED_M_S**2 / (2 * DECELERATION_M_S2)
 DEADLINE_S = 0.05  # of the RPDO

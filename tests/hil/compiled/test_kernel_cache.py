@@ -17,7 +17,7 @@ from numba.core.dispatcher import Dispatcher
 from hil.compiled import kernel_cache
 from hil.compiled.kernel_cache import KEPT, SOURCES, provide_kernel_cache, source_digest
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 # Compiles only the control law.
 REPLAY = """
 import numpy as np

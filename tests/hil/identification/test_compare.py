@@ -6,7 +6,6 @@ import json
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -16,15 +15,10 @@ from hil.bench.bench_file import Bench, load_bench
 from hil.bench.control_section import without_law
 from hil.errors import InputError
 from hil.identification.compare import Comparison, compare
-from hil.identification.dataset import prepare_dataset
 from hil.identification.measured import bench_of, take
-from hil.identification.nominal_fit import fit_nominal
 from hil.identification.twin_deviation import low_pass
-from hil.importing.by_map import import_recording
-from hil.recording.recording import Recording, read_recording
+from hil.recording.recording import Recording
 from hil.report.compare_report import parameter_rows, rows_of, verdict, write_comparison
-
-SHARED = Path(__file__).parents[2].parent / "shared" / "recordings"
 
 
 @pytest.fixture(scope="module")
@@ -37,13 +31,6 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Recording]:
 def clean(run: Recording) -> Comparison:
     """Its comparison."""
     return compare(run, bench_of(run))
-
-
-def shared(name: str) -> Path:
-    """A recording beside the repository."""
-    if not (SHARED / name).exists():
-        pytest.skip(f"the recording {name} is not beside the repository")
-    return SHARED / name
 
 
 def block_rms(result: Comparison) -> dict[str, float]:
@@ -207,47 +194,6 @@ def test_fitted_values_are_printed_with_those_at_a_bound_marked(tmp_path: Path) 
     assert rows["table_mass_kg"][3] == "at its bound"
     assert any("table_mass_kg: not identifiable from this motion" in note for note in result.notes)
     assert rows["motor_mass_kg"][3] != "at its bound"
-
-
-def test_emps_with_its_published_parameters() -> None:
-    recording = import_recording(shared("emps/DATA_EMPS.mat"), "emps")
-    result = compare(recording, load_bench("emps"))
-    assert result.channel("motor_position_m").rms <= 1.7e-6
-    assert result.channel("force_n").rms <= 2.5
-    assert result.channel("acceleration_m_s2").relative <= 0.045
-    assert result.inverse_dynamics is not None
-    assert result.inverse_dynamics.relative_error == pytest.approx(0.0408, abs=5e-4)
-    assert "drive" not in block_rms(result)  # the force was not recorded apart from its command
-    assert result.channel("force_n").relative > block_rms(result)["controller"] / 54.0
-
-
-def _rig(name: str) -> tuple[Bench, Recording]:
-    folder = shared("rig")
-    return load_bench(folder / "axis.yaml"), read_recording(folder / name)
-
-
-def test_the_null_rig_is_explained_on_another_motion() -> None:
-    bench, holdout = _rig("null/holdout.csv")
-    trained = [take(_rig(f"null/{name}.csv")[1], bench) for name in ("train_1", "train_2")]
-    result = compare(holdout, fit_nominal(prepare_dataset(trained, bench)).bench)
-    assert result.torque_over_noise <= 1.3
-    assert result.channel("table_position_m").rms <= 1e-6
-    assert result.explained
-
-
-@pytest.mark.parametrize(
-    ("folder", "block"),
-    [("stribeck", "motor and load"), ("lead", "transmission and table"), ("backlash", "transmission and table")],
-)
-def test_the_other_rigs_are_not_explained_by_parameters(folder: str, block: str) -> None:
-    bench, recording = _rig(f"{folder}/holdout.csv")
-    result = compare(recording, bench, fit=True)
-    assert not result.explained
-    over: dict[str, Any] = {
-        part.deviation.name: part.deviation.rms / part.noise for part in result.blocks if part.noise > 0.0
-    }
-    assert over[block] > 3.0
-    assert over["drive"] < 1.1
 
 
 def test_a_fit_that_creeps_gives_its_best_and_says_so(run: Recording, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from math import pi
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,10 +13,8 @@ from numpy.typing import NDArray
 from hil.channels import AxisKind
 from hil.errors import InputError
 from hil.identification.friction import constant_feed_stretches, identify_friction
-from hil.importing.by_map import import_recording
-from hil.recording.recording import Recording, read_recording
+from hil.recording.recording import Recording
 
-SHARED = Path(__file__).parents[2].parent / "shared" / "recordings"
 PERIOD_S = 1e-3
 RADIUS_M = 0.010 / (2 * pi)
 INERTIA_KG_M2 = 1.8e-3
@@ -136,22 +133,3 @@ def test_the_figure_shows_points_line_and_values() -> None:
     assert f"Coulomb {result.coulomb:.5f} ± " in top.texts[0].get_text()
     assert "N m s/rad" in top.texts[0].get_text()
     figure.canvas.draw()
-
-
-@pytest.mark.skipif(not SHARED.is_dir(), reason="needs ../shared/recordings, which is not part of the repository")
-def test_the_rig_with_a_stribeck_fall_gives_its_coulomb_torque_above_it() -> None:
-    recording = read_recording(SHARED / "rig" / "stribeck" / "train_1.csv")
-    # Coulomb 1.007 N m is in the data; below some 6 rad/s the Stribeck fall (3.085 rad/s) lifts the points
-    assert identify_friction(recording, speed_min=6.0).coulomb == pytest.approx(1.007, rel=0.01)
-    assert identify_friction(recording).coulomb > 1.1
-
-
-@pytest.mark.skipif(not SHARED.is_dir(), reason="needs ../shared/recordings, which is not part of the repository")
-def test_emps_at_constant_feed_agrees_with_its_inverse_dynamics() -> None:
-    result = identify_friction(import_recording(SHARED / "emps" / "DATA_EMPS.mat", "emps"))
-    assert result.kind is AxisKind.LINEAR
-    # 20.394 N, 203.5 N s/m, -3.165 N: another method on other parts of the same record, not equal
-    assert abs(result.coulomb - 20.394) < 3 * result.coulomb_std_error
-    assert abs(result.viscous - 203.50) < 3 * result.viscous_std_error
-    assert abs(result.offset + 3.165) < 3 * result.offset_std_error
-    assert result.plot().axes[0].get_ylabel() == "mean force [N]"

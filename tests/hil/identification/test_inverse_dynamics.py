@@ -1,8 +1,6 @@
-"""The inverse-dynamics fit finds known parameters and reproduces the published ones of EMPS."""
+"""The inverse-dynamics fit finds known parameters."""
 
 from __future__ import annotations
-
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,10 +10,7 @@ from numpy.typing import NDArray
 
 from hil.errors import InputError
 from hil.identification.inverse_dynamics import fit_inverse_dynamics, solve
-from hil.importing.by_map import import_recording
 from hil.recording.recording import Recording
-
-EMPS = Path(__file__).parents[2].parent / "shared" / "recordings" / "emps" / "DATA_EMPS.mat"
 
 
 def swinging(rows: int = 20_000, period_s: float = 1e-3, noise_n: float = 0.0, one_way: bool = False) -> Recording:
@@ -62,17 +57,6 @@ def test_standard_errors_cover_the_error_under_noise() -> None:
 def test_an_unfit_recording_is_refused(recording: Recording, message: str) -> None:
     with pytest.raises(InputError, match=f"swinging: .*{message}"):
         fit_inverse_dynamics(recording)
-
-
-@pytest.mark.skipif(not EMPS.is_file(), reason="the EMPS recording is not beside the project")
-def test_the_published_parameters_of_emps_come_out() -> None:
-    fit = fit_inverse_dynamics(import_recording(EMPS, "emps"))
-    # to the digits printed by Janot, Gautier and Brunot
-    assert fit.inertia == pytest.approx(95.109, abs=5e-4)
-    assert fit.viscous == pytest.approx(203.50, abs=5e-3)
-    assert fit.coulomb == pytest.approx(20.394, abs=1e-3)
-    assert fit.offset == pytest.approx(-3.165, abs=5e-4)
-    assert 100 * fit.relative_error == pytest.approx(4.08, abs=5e-3)
 
 
 @given(seed=st.integers(0, 10_000), scale=st.floats(1e-6, 1e6))

@@ -6,9 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis_runs import RIG, bench, dataset, evaluated, moves, recorded
+from diagnosis_runs import bench, dataset, evaluated, moves, recorded
 
-from hil.bench.bench_file import load_bench
 from hil.diagnosis.result import Mode
 from hil.diagnosis.verdict.fit_table import fit_table
 from hil.identification.dataset import prepare_dataset
@@ -17,11 +16,8 @@ from hil.identification.laps import Laps
 from hil.identification.measured import Measured, take
 from hil.identification.noise_floor import floor, noise_response
 from hil.identification.terms import Term
-from hil.importing.by_map import import_recording
 from hil.twin.library import BY_ID
 from hil.validation.proof.draw.generator import draw, rerun
-
-EMPS = RIG.parent / "emps" / "DATA_EMPS.mat"
 
 
 @pytest.fixture(scope="module")
@@ -65,20 +61,6 @@ def test_without_laps_the_floor_is_the_sensor_noise() -> None:
     once = take(recorded(bench()), bench())
     assert once.laps is None
     assert floor(np.ones(once.motor.size), 0.02, None) == 0.02
-
-
-def test_the_emps_record_has_its_published_floor() -> None:
-    """Position about 0.22 um, force 0.3 to 0.37 N, by three laps."""
-    if not EMPS.exists():
-        pytest.skip("the EMPS record is not beside the repository")
-    owner = load_bench("emps_symmetric")
-    run = take(import_recording(EMPS, "emps"), owner)
-    found = run.laps
-    assert found is not None
-    assert lag_s(found, run) == pytest.approx(6.24)
-    (left,) = Hypothesis(owner).residuals(dataset([run], owner), closed=True).channels
-    assert found.noise(left["motor"]) == pytest.approx(0.2e-6, rel=0.15)
-    assert 0.3 <= found.noise(left["torque"]) <= 0.37
 
 
 def test_in_closed_loop_the_axis_moves_with_what_its_encoders_count() -> None:

@@ -1,4 +1,4 @@
-"""Nobody knows the datum of a linear encoder: where its zero lies says nothing about the axis."""
+"""Measured less simulated: the datum of an encoder, which nobody knows, and simulations that run away."""
 
 from __future__ import annotations
 
@@ -6,11 +6,14 @@ import numpy as np
 import pytest
 from diagnosis_runs import bench, changed, dataset, recorded
 
+from hil.bench.bench_file import load_bench
 from hil.diagnosis.preparation.preflight import preflight
 from hil.identification.compare import compare
 from hil.identification.dataset import FASTEST_OBSERVER_S
 from hil.identification.hypothesis import Hypothesis
+from hil.identification.residuals import differences
 from hil.identification.terms import Term
+from hil.twin.axis import Response
 
 OWNER = bench()
 PLAY = Term("backlash", 0, (20e-6,))
@@ -83,3 +86,31 @@ def test_where_the_loop_goes_by_the_table_the_motor_has_the_datum(shift_rad: flo
     known, moved = Hypothesis(owner, (PLAY,)).residuals(data, closed=True).channels
     for channel, noise in (("motor", 1e-6 / owner.axis.ratio_m_rad), ("table", 0.3e-6), ("torque", 0.015)):
         assert np.std(moved[channel] - known[channel]) < noise, channel
+
+
+BENCH = load_bench("reference")
+ALL = slice(None)
+RNG = np.random.default_rng(7)
+MEASURED = Response(*RNG.standard_normal((4, 50)))
+
+
+def test_a_datum_of_the_linear_encoder_counts_for_nothing() -> None:
+    shifted = MEASURED._replace(table_position_m=MEASURED.table_position_m + 0.05)
+    found = differences(shifted, MEASURED, BENCH, ALL)
+    np.testing.assert_allclose(found["table"], 0.0, atol=1e-12)
+    assert set(found) == {"motor", "table", "torque"}
+
+
+def test_what_was_not_judged_does_not_move_the_datum() -> None:
+    jump = MEASURED.table_position_m + np.where(np.arange(50) < 10, 1.0, 0.0)
+    found = differences(MEASURED._replace(table_position_m=jump), MEASURED, BENCH, slice(10, None))
+    np.testing.assert_allclose(found["table"], np.where(np.arange(50) < 10, 1.0, 0.0), atol=1e-12)
+
+
+@pytest.mark.parametrize("away", [np.inf, -np.inf, np.nan])
+def test_a_twin_that_runs_away_gives_no_finite_difference_and_no_warning(away: float) -> None:
+    lost = Response(*(np.where(np.arange(50) < 25, values, away) for values in MEASURED))
+    found = differences(MEASURED, lost, BENCH, ALL)
+    assert not np.isfinite(found["torque"][25:]).any()
+    assert not np.isfinite(found["table"][25:]).any()
+    assert np.isfinite(found["torque"][:25]).all()

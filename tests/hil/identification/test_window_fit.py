@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from diagnosis_runs import bench, evaluated, recorded
 from emps_windows import windows
 
 from hil.diagnosis.search.events import revised
-from hil.diagnosis.verdict.event_windows import train_of
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.measured import take
@@ -68,17 +66,3 @@ def test_windows_alone_leave_the_other_parameters() -> None:
     found = fit_windows(begun, 20, others=False)
     assert found.hypothesis.values[: begun.hypothesis.nominal_count] == begun.hypothesis.values[:6]
     assert windows(found)[1][:2] == pytest.approx((0.95, 1.25), abs=1e-3)
-
-
-def test_an_edge_that_nothing_tells_contradicts_no_period() -> None:
-    starts_s = 1.0 + 0.5 * np.arange(5)
-    edges, errors = np.stack([starts_s, starts_s + 0.2], axis=1), np.full((5, 2), 1e-3)
-    edges[2, 1], errors[2, 1] = edges[2, 1] - 0.1, 0.2
-    found = train_of(edges, errors)
-    assert found is not None
-    train, own, told = found
-    assert (train.start_s, train.period_s, train.width_s) == pytest.approx((1.0, 0.5, 0.2), abs=1e-4)
-    assert own[2, 1] == pytest.approx(2.2, abs=1e-4)
-    assert told[2, 1] < 1e-3
-    errors[2, 1] = 1e-3
-    assert train_of(edges, errors) is None

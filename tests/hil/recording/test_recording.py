@@ -15,7 +15,6 @@ from hil.channels import CHANNELS, AxisKind
 from hil.errors import InputError
 from hil.recording.recording import Recording, arrow_schema, read_recording, write_parquet
 
-RIG = Path(__file__).parents[2].parent / "shared" / "recordings" / "rig"
 HEADER = "time_s,position_command_m,velocity_command_m_s,motor_position_rad,torque_n_m"
 ROWS = ["0.000,0,0,0,0.1", "0.001,0,0,0,0.2", "0.002,0,0,0,0.3", "0.003,0,0,0,0.4", "0.004,0,0,0,0.5"]
 
@@ -203,12 +202,3 @@ def test_a_cut_stream_is_read_to_its_last_complete_batch(tmp_path_factory: pytes
 def test_a_closed_stream_is_not_called_recovered(tmp_path: Path) -> None:
     stream(tmp_path / "run.arrows", small(), 20)
     assert read_recording(tmp_path / "run.arrows").metadata == small().metadata
-
-
-@pytest.mark.skipif(not RIG.is_dir(), reason="needs ../shared/recordings/rig, which is not part of the repository")
-def test_the_rig_recordings_are_read() -> None:
-    recording = read_recording(RIG / "null" / "train_1.csv")
-    assert len(recording) == 20529
-    assert recording.period_s == 0.001
-    assert recording["motor_position_rad"][-1] == 125.66370614
-    assert "unknown_columns" not in recording.metadata

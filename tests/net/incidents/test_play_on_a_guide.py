@@ -1,5 +1,7 @@
 """Play of an axis whose table has friction of its own, simulated by other equations; the split of masses is unknown."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np
@@ -8,6 +10,8 @@ import pytest
 from hil.bench.bench_file import Bench
 from hil.diagnosis.diagnose import diagnose
 from hil.recording.recording import Recording
+
+pytestmark = pytest.mark.net
 
 RATIO_M_RAD = 0.01 / (2.0 * math.pi)
 GAP_M, STIFFNESS_N_M, DAMPING_N_S_M = 14e-6, 9e7, 9e3
@@ -74,7 +78,6 @@ def recorded() -> Recording:
     return Recording(name="guide", period_s=PERIOD_S, columns=columns)
 
 
-@pytest.mark.long
 def test_play_is_told_beside_the_friction_of_the_table() -> None:
     """Each of the two alone fits worse than a wrong mechanism."""
     found = diagnose([recorded()], [], BENCH).result

@@ -3,28 +3,22 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from diagnosis_runs import SEGMENTS, bench, changed, recorded
+from diagnosis_runs import bench, changed, recorded
 from scipy.interpolate import CubicSpline
 
 from hil.bench.bench_file import Bench, load_bench
 from hil.bench.control_section import UnknownControl
 from hil.diagnosis.diagnose import diagnose
-from hil.diagnosis.preparation.prepare import prepare
 from hil.diagnosis.result import Result
-from hil.diagnosis.search.next_term import Round, next_term
-from hil.diagnosis.search.score_test import Candidate
-from hil.errors import InputError
-from hil.identification.compare import compare
-from hil.identification.derived_channels import completed
-from hil.identification.nominal_fit import fit_nominal_parameters
 from hil.identification.terms import Term
 from hil.recording.recording import Recording
 from hil.report.diagnosis_report import write_diagnosis
+
+pytestmark = pytest.mark.net
 
 KNOWN = bench()
 OWNER = KNOWN.model_copy(update={"control": UnknownControl(law="unknown")})
@@ -47,8 +41,8 @@ def laps(*terms: Term) -> Recording:
 
 @pytest.mark.parametrize(
     "left_out",
-    [{}, SET_POINTS, SET_POINTS | {"torque_command_n_m": None}, SET_POINTS | {"torque_n_m": None}],
-    ids=["all channels", "no set-points", "torque alone", "command alone"],
+    [{}, SET_POINTS, SET_POINTS | {"torque_n_m": None}],
+    ids=["all channels", "no set-points", "command alone"],
 )
 def test_a_cause_is_named_as_with_the_controller(left_out: dict[str, None], tmp_path: Path) -> None:
     result = answer(changed(laps(COGGING), **left_out), folder=tmp_path)
@@ -94,61 +88,7 @@ def test_a_velocity_takes_the_place_of_the_position(noise_rad_s: float) -> None:
     assert found.missing[0].parameters["amplitude_n_m"].value == pytest.approx(0.2, rel=0.05)
 
 
-def test_the_measured_motion_tells_rest_from_motion() -> None:
-    recording = laps()
-    found = completed(changed(recording, **SET_POINTS), OWNER)
-    still = recording["velocity_command_m_s"] == 0.0
-    assert np.mean(found["velocity_command_m_s"][still] == 0.0) > 0.8
-    assert np.mean(found["velocity_command_m_s"][~still] != 0.0) > 0.95
-    assert completed(recording, KNOWN) is recording
-    assert SEGMENTS[0]["kind"] == "dwell"
-    assert np.all(found["velocity_command_m_s"][:100] == 0.0)
-
-
-def test_motion_alone_is_refused() -> None:
-    alone = changed(laps(), **SET_POINTS, torque_n_m=None, torque_command_n_m=None, table_position_m=None)
-    with pytest.raises(InputError, match="motion alone has no cause; record one"):
-        answer(alone)
-
-
 def test_a_known_law_is_set_aside_without_set_points() -> None:
     result = answer(changed(laps(COGGING), **SET_POINTS), KNOWN)
     assert [finding.effect for finding in result.missing] == ["cogging_torque"]
     assert any("position_command_m, velocity_command_m_s are not recorded" in note for note in result.notes)
-
-
-@pytest.mark.parametrize(
-    "control", ["", "control: unknown\n", "control: {position_gain_1_s: 36.84, velocity_gain_n_m_s_rad: unknown}\n"]
-)
-def test_a_bench_file_says_what_is_unknown(tmp_path: Path, control: str) -> None:
-    path = tmp_path / "axis.yaml"
-    axis = (
-        "model: rigid\n  mass_kg: 700.0\n  lead_m: 0.01\n  coulomb_torque_n_m: 1.0\n  viscous_torque_n_m_s_rad: 0.006\n"
-    )
-    path.write_text(f"axis:\n  {axis}{control}encoders: {{table: null}}\n")
-    found = load_bench(path)
-    assert not found.law_known
-    assert found.sampled(0.002).gains.period_s == 0.002
-    assert not compare(laps(), found).channels  # block by block only
-
-
-def test_a_mistyped_key_beside_an_unknown_value_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "axis.yaml"
-    path.write_text(
-        "lead_m: 0.01\nmass_kg: 700.0\ncoulomb_torque_n_m: 1.0\nviscous_torque_n_m_s_rad: 0.006\n"
-        "control:\n  position_gain_1_s: unknown\n  torque_limit: 12\n"
-    )
-    with pytest.raises(InputError, match=r"axis\.yaml:7: control\.torque_limit: given an unknown key"):
-        load_bench(path)
-
-
-def test_the_noise_of_a_sampled_torque_is_no_evidence() -> None:
-    """An axis without any effect whose torque was only measured: a delay of half a row would average its noise."""
-    recording = changed(recorded(KNOWN, times=2, torque_noise_n_m=0.05), torque_command_n_m=None)
-    recording = replace(recording, metadata={**recording.metadata, "source": "log.csv"})
-    found = fit_nominal_parameters(prepare([recording], [], OWNER).train)
-    delay_s = found.hypothesis.values[found.hypothesis.nominal.index("torque_delay_s")]
-    assert abs(delay_s) < 0.1 * recording.period_s
-    candidates = [Candidate(COGGING, 0.9)]
-    additions = next_term(Round(found, found, found), candidates, print)
-    assert (additions.fits, additions.best) == ([], None)

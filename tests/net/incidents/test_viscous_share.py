@@ -9,6 +9,8 @@ from diagnosis_runs import bench
 import hil
 from hil.diagnosis.result import Result
 
+pytestmark = pytest.mark.net
+
 OWNER = bench()
 SHARES = {"table_side_friction", "table_side_viscous_friction"}
 SKEW = "channel_time_skew"
@@ -28,7 +30,7 @@ def test_shares_of_coulomb_and_viscous_friction_are_told() -> None:
     assert "table_side_viscous_friction" in (other.effect, *other.equivalents)
 
 
-@pytest.mark.parametrize("delay_s", [3e-6, pytest.param(300e-6, marks=pytest.mark.long)])
+@pytest.mark.parametrize("delay_s", [3e-6, 300e-6])
 def test_a_late_channel_keeps_its_name(delay_s: float) -> None:
     (found,) = diagnosed({SKEW: {"delay_s": delay_s}}).missing
     assert SKEW in (found.effect, *found.equivalents)

@@ -7,12 +7,12 @@ from pathlib import Path
 import pytest
 from diagnosis_runs import bench, dataset, evaluated, recorded, searched
 
+from hil.diagnosis import stages
 from hil.diagnosis.diagnosis import Diagnosis
 from hil.diagnosis.pictures.findings import finding_figure
 from hil.diagnosis.pictures.view import around
 from hil.diagnosis.result import Result, Unexplained, Verdict
 from hil.diagnosis.search.initial_values import axis_facts
-from hil.diagnosis import stages
 from hil.diagnosis.verdict.cross_validation import CrossValidation
 from hil.figures.drawing import save
 from hil.identification.honest_refit import Refit

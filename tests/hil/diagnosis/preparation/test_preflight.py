@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from diagnosis_runs import bench, changed, recorded
+from linear_stage import BENCH as STAGE
+from linear_stage import moved
 
 from hil.bench.bench_file import load_bench
 from hil.diagnosis.preparation.preflight import _factor_between, preflight, regress
@@ -186,3 +189,12 @@ def test_an_axis_that_lags_on_short_strokes_is_not_taken_for_another_unit() -> N
     assert 0.9 < factor <= 1.0
     assert _factor_between(command, 1e3 * command) == pytest.approx(1e3)
     assert _factor_between(command, -command) == pytest.approx(-1.0)
+
+
+def test_friction_that_varies_is_no_wrong_sign() -> None:
+    """On a slow move the force follows the cogging, not the acceleration; of a wrong sign friction is negative."""
+    slow = moved([(0.15, 0.06)])
+    preflight([slow], STAGE).accepted()
+    turned = replace(slow, columns=slow.columns | {"force_n": -slow.columns["force_n"]})
+    with pytest.raises(InputError, match="wrong sign"):
+        preflight([turned], STAGE).accepted()

@@ -1,4 +1,4 @@
-"""Starting points of the search: parameters of the bench file beside the refitted ones, and play on a light nut."""
+"""Starting points of the race: parameters of the bench file beside the refitted ones."""
 
 from __future__ import annotations
 
@@ -7,11 +7,9 @@ import pytest
 from diagnosis_runs import bench, dataset, recorded
 
 from hil.bench.bench_file import load_bench
-from hil.diagnosis.diagnose import diagnose
 from hil.diagnosis.preparation.preflight import preflight
 from hil.diagnosis.search.score_test import Candidate
 from hil.diagnosis.search.successive_halving import _Race, _soft, owner_points
-from hil.identification.coordinates import CHATTER_STEP, LAST_EDGE_STEP_S
 from hil.identification.dataset import prepare_dataset
 from hil.identification.estimator import Estimator, Fit
 from hil.identification.hypothesis import Hypothesis
@@ -57,29 +55,6 @@ def test_springs_and_shares_of_the_masses_are_the_owners_and_the_rest_is_refitte
 
 def test_without_springs_there_is_one_such_point() -> None:
     assert len(owner_points(bent(Hypothesis(load_bench("emps_symmetric"), ())))) == 1
-
-
-def test_differences_are_wide_where_a_nut_may_chatter() -> None:
-    owner = load_bench("reference_7dof")
-    plain = Hypothesis(owner).steps(0.1, 20.0, LAST_EDGE_STEP_S)
-    loose = Hypothesis(owner, (Term("backlash", 0, (4e-6,)),)).steps(0.1, 20.0, LAST_EDGE_STEP_S)
-    assert plain.max() < CHATTER_STEP
-    assert np.all(loose[: plain.size] == CHATTER_STEP)
-
-
-def test_play_on_a_light_nut_beside_wrong_springs() -> None:
-    """The nut of the 7-dof chain chatters in 5 um; the owner's spring is too stiff, the table too light."""
-    owner = load_bench("reference_7dof")
-    axis = owner.axis
-    true = {
-        "nut_support_stiffness_n_m": 0.75 * axis.nut_support_stiffness_n_m,
-        "table_mass_kg": 1.2 * axis.table_mass_kg,
-    }
-    truth = owner.model_copy(update={"axis": axis.model_copy(update=true)})
-    play = Term("backlash", 1, (5e-6,))
-    found = diagnose([recorded(truth, play, times=2)], [recorded(truth, play, seed=2)], owner)
-    assert [one.effect for one in found.result.missing] == ["backlash"]
-    assert found.result.missing[0].parameters["gap_m"].value == pytest.approx(5e-6, rel=0.05)
 
 
 def test_a_start_is_compared_beside_the_parameters_that_the_mismatch_has_bent() -> None:

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 from concealed_run import concealed_run
 from diagnosis_runs import bench
 
 import hil
 from hil.bench.bench_file import Bench
-from hil.diagnosis.search.disturbance import Disturbance, friction_zones
-from hil.diagnosis.search.initial_values import axis_facts
-from hil.identification.measured import take
 from hil.recording.recording import Recording
 from hil.twin.library import BY_ID
+
+pytestmark = pytest.mark.net
 
 MECHANISM = BY_ID["local_friction"]
 ZONE = {"begin_m": 0.22, "end_m": 0.30, "flank_m": 0.004}
@@ -38,7 +36,7 @@ FALSE_PLAY = pytest.mark.xfail(
 @pytest.mark.parametrize(
     ("owner", "fraction"),
     [
-        pytest.param(bench(), 0.5, id="two encoders", marks=(FALSE_PLAY, pytest.mark.long)),
+        pytest.param(bench(), 0.5, id="two encoders", marks=FALSE_PLAY),
         pytest.param(single(), -0.4, id="one encoder"),
     ],
 )
@@ -50,31 +48,3 @@ def test_a_zone_of_other_friction_is_the_only_finding(owner: Bench, fraction: fl
     for name in ("begin_m", "end_m"):
         assert finding.parameters[name].value == pytest.approx(ZONE[name], abs=3e-3)
     assert ("lower" if fraction < 0.0 else "higher") in result.statement
-
-
-@pytest.mark.parametrize("level", [0.5, -0.3])
-def test_the_zone_is_estimated_from_the_torque_against_the_motion(level: float) -> None:
-    run = take(recorded(bench(), 0.0), bench())
-    x = bench().axis.ratio_m_rad * run.motor
-    velocity = np.gradient(run.motor, run.period_s)
-    more = np.where((x > 0.22) & (x < 0.30), level, 0.0)
-    noise = np.random.default_rng(1).normal(0.0, 0.1, x.size)
-    torque = 0.2 - more * np.sign(velocity) + noise  # the constant force is no friction
-    begin_m, end_m, found = friction_zones(
-        [run], [Disturbance(torque, velocity, np.abs(velocity) > 1.0)], bench().axis.ratio_m_rad
-    )[0]
-    assert (begin_m, end_m) == pytest.approx((0.22, 0.30), abs=3e-3)
-    assert abs(found) <= abs(level)
-    assert found * level > 0.0
-
-
-def test_a_zone_is_a_part_of_the_travel() -> None:
-    facts = axis_facts(bench(), [take(recorded(bench(), 0.0), bench())])
-    for zone, told in (
-        ((0.22, 0.30, 0.004), True),
-        ((0.01, 0.39, 0.004), False),  # the whole travel
-        ((0.38, 0.50, 0.004), False),  # most of it is out of reach
-        ((0.30, 0.22, 0.004), False),
-        ((0.22, 0.30, 0.1), False),  # flanks without a zone between
-    ):
-        assert MECHANISM.is_valid((0.5, *zone), 0, facts) is told

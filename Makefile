@@ -1,8 +1,8 @@
 # make          set everything up and run the demo on the simulated bus
 # make test     set everything up and run every check
 # make format   format the code and apply the fixes that ruff makes by itself
-# make net      diagnose the fixed cases of tests/net again and print what changed (up to 40 min);
-#               continues a stopped run of this commit; NET=FOLDER for changes without a commit
+# make net      diagnose the fixed cases of tests/net again and print what changed (up to 40 min), then run
+#               tests/net/incidents; continues a stopped run of this commit; NET=FOLDER for changes without a commit
 # make fuzz, make fault-matrix: 20 000 damaged inputs; 10 000 runs with a fault (10 to 20 min each)
 # make mutation run the tests against mutants of the safety code, SAMPLE of each module (an hour)
 # make vm-test  boot a PREEMPT_RT kernel in a virtual machine and disturb the bench there (as root)
@@ -34,10 +34,10 @@ test: setup
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/pytest -n 2 --dist loadfile -m "not long"
+	$(BIN)/pytest -n 2 --dist loadfile -m "not long and not net"
 
 test-long: setup
-	$(BIN)/pytest -n 2 --dist loadfile
+	$(BIN)/pytest -n 2 --dist loadfile -m "not net"
 
 fuzz: setup
 	$(BIN)/python tests/fuzz/fuzz.py
@@ -58,6 +58,7 @@ format: setup
 
 net: setup
 	$(BIN)/python tests/net/net.py $(NET)
+	$(BIN)/pytest -n 2 --dist loadfile -m net
 
 # what hil bench and hil prove measure the project against; not needed to run it
 peers: setup

@@ -52,12 +52,14 @@ MODULES = {
     "drivers/cia402.py": Suite(_tests("drivers", "cia402")),
     "drivers/homing.py": Suite(_tests("drivers", "stop_answered", "canopen_drive")),
     "drivers/canopen_drive.py": Suite(_DRIVE),
-    "hil/loop/checks.py": Suite(_tests("hil", "checks", "encoder_checks"), compiled=False),
-    "hil/loop/stall.py": Suite(_tests("hil", "stall")),
-    "hil/loop/stopping.py": Suite(_tests("hil", "bounds")),
-    "hil/loop/bounds.py": Suite(_tests("hil", "bounds")),
-    "hil/loop/supervision.py": Suite(_tests("hil", "rules", "stall")),
-    "hil/loop/session.py": Suite(_tests("hil", "session", "session_times", "arming", "power_off", "supervision")),
+    "hil/loop/checks.py": Suite(_tests("hil/loop", "checks", "encoder_checks"), compiled=False),
+    "hil/loop/stall.py": Suite(_tests("hil/loop", "stall")),
+    "hil/loop/stopping.py": Suite(_tests("hil/loop", "bounds")),
+    "hil/loop/bounds.py": Suite(_tests("hil/loop", "bounds")),
+    "hil/loop/supervision.py": Suite(_tests("hil/loop", "supervision_rules", "stall")),
+    "hil/loop/session.py": Suite(
+        _tests("hil/loop", "session", "session_times", "session_arming", "session_power_off", "supervision")
+    ),
 }
 TEST_S = 20  # processor time of a test: the slowest takes 3 s
 BROKEN = 70  # exit code where pytest itself could not be run

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import fields, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 from numpy.typing import NDArray
 
 from hil.bench.bench_file import Bench, load_bench
@@ -23,8 +21,6 @@ from hil.motion.profile import Profile
 from hil.motion.trajectory import plan
 from hil.recording.recording import Recording
 from hil.twin.axis import Start
-
-RIG = Path(__file__).parents[2].parent / "shared" / "recordings" / "rig"
 
 SEGMENTS = [
     {"kind": "dwell", "duration_s": 0.2},
@@ -97,11 +93,12 @@ def changed(recording: Recording, **columns: object) -> Recording:
     return replace(recording, columns=new)
 
 
-def rig(folder: str) -> Path:
-    """A folder of rig recordings beside the repository."""
-    if not (RIG / folder).is_dir():
-        pytest.skip(f"the rig recordings {folder} are not beside the repository")
-    return RIG / folder
+def one_way(owner: Bench, truth: Term, feed_m_s: float, seed: int) -> Recording:
+    """A stroke forwards, recorded until shortly before its end: at rest friction holds, and cogging does not."""
+    rest, stroke = {"kind": "dwell", "duration_s": 0.2}, {"kind": "sine_squared", "to_m": 0.08, "feed_m_s": feed_m_s}
+    whole = recorded(owner, truth, seed=seed, profile=moves([rest, stroke]))
+    rows = slice(0, round(0.95 * len(whole)))
+    return replace(whole, columns={name: values[rows] for name, values in whole.columns.items()})
 
 
 def dataset(runs: Sequence[Measured], owner: Bench, **settings: float) -> Dataset:

@@ -12,18 +12,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import pytest
+from measured_recordings import emps
 from scipy.linalg import expm
 
 from hil.identification.estimator import Fit
-from hil.importing.by_map import import_recording
 from hil.recording.recording import Recording
 
-EMPS = Path(__file__).parents[2].parent / "shared" / "recordings" / "emps" / "DATA_EMPS.mat"
 MASS_KG, VISCOUS_N_S_M = 95.1, 203.5
 POSITION_GAIN_1_S, VELOCITY_GAIN_V_S_M, FORCE_PER_VOLT = 160.18, 243.45, 35.15065
 PERIOD_S, SUBSTEPS = 1e-3, 10
@@ -38,16 +36,9 @@ class Push(NamedTuple):
     force_n: float
 
 
-def emps_recording() -> Recording:
-    """The recording as published."""
-    if not EMPS.is_file():
-        pytest.skip("the EMPS recording is not beside the repository")
-    return import_recording(EMPS, "emps")
-
-
 def pushed(pushes: Sequence[Push]) -> Recording:
     """The recording with forces on the table."""
-    recording = emps_recording()
+    recording = emps()
     position_m, force_n = response(len(recording), pushes)
     columns = dict(recording.columns)
     columns["motor_position_m"] = columns["motor_position_m"] + position_m

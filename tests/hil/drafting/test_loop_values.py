@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import pytest
-from diagnosis_runs import RIG, bench, changed
+from diagnosis_runs import bench, changed
 from servo_loop import one_encoder, servo_run
 
-from hil.bench.bench_file import Bench, load_bench
+from hil.bench.bench_file import Bench
 from hil.drafting.loop_values import ControlValues, loop_values
-from hil.importing.by_map import import_recording
 from hil.recording.recording import Recording
 
 OWNER = one_encoder(bench())
 RATIO_M_RAD = OWNER.axis.ratio_m_rad
-EMPS = RIG.parent / "emps" / "DATA_EMPS.mat"
 
 
 def assert_drafted(
@@ -74,19 +72,6 @@ def test_the_measured_torque_stands_for_its_command() -> None:
     recording: Recording = changed(servo_run(OWNER), torque_command_n_m=None)
     values = {entry.key: entry.value for entry in loop_values(recording, RATIO_M_RAD).values}
     assert values["velocity_gain_n_m_s_rad"] == pytest.approx(OWNER.gains.velocity_gain_n_m_s_rad, rel=0.01)
-
-
-def test_the_law_of_emps_is_drafted() -> None:
-    """The published law: 160.18 1/s, 243.45 V s/m x 35.15065 N/V, no feed-forward, difference of two-sample means."""
-    if not EMPS.exists():
-        pytest.skip("the EMPS recording is not beside the repository")
-    published = load_bench("emps_symmetric").gains
-    values = {entry.key: entry.value for entry in loop_values(import_recording(EMPS, "emps"), 1.0).values}
-    assert values["position_gain_1_s"] == pytest.approx(published.position_gain_1_s, rel=1e-3)
-    assert values["velocity_gain_n_s_m"] == pytest.approx(published.velocity_gain_n_m_s_rad, rel=1e-3)
-    assert values["velocity_feedforward"] == pytest.approx(0.0, abs=1e-3)
-    assert values["velocity_estimate"] == "two_sample_mean"
-    assert "velocity_integral_time_s" not in values
 
 
 @pytest.mark.parametrize("time_s", [0.02, pytest.param(0.2, marks=pytest.mark.long)])

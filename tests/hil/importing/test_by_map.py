@@ -21,8 +21,6 @@ from hil.importing.by_map import import_recording
 from hil.quantities import UNITS, si_factor
 from hil.recording.recording import read_recording, write_parquet
 
-EMPS = Path(__file__).parents[4] / "shared" / "recordings" / "emps" / "DATA_EMPS.mat"
-
 MAP: dict[str, Any] = {
     "about": "a rotary axis recorded by a drive",
     "time": {"column": "t", "unit": "ms"},
@@ -278,21 +276,3 @@ def test_a_gain_by_name_needs_a_mat_file(tmp_path: Path) -> None:
     content = changed(torque_n_m={"column": "i", "unit": "V", "gain": "k"})
     with pytest.raises(InputError, match=r"log\.csv: the map takes k from the file by name"):
         import_recording(write_csv(tmp_path), write_map(tmp_path, content))
-
-
-@pytest.mark.skipif(not EMPS.is_file(), reason="needs ../shared/recordings/emps, not part of the repository")
-def test_the_shipped_map_imports_emps() -> None:
-    recording = import_recording(EMPS, "emps")
-    assert recording.kind is AxisKind.LINEAR
-    assert len(recording) == 24841
-    # the stamps jitter by 24 ns from step to step and do not drift: the period is 1 ms
-    assert recording.period_s == 0.001
-    assert "stamps within 3.2e-08 s" in recording.metadata["clock"]
-    assert recording["force_n"][0] == pytest.approx(35.15065188248547 * 2.53862809, rel=1e-8)
-    assert recording.metadata["derived"]["force_n"] == "copy of force_command_n, the only one recorded"
-    # the record's own control law: force = gtau kv (kp (qg - qm) - d/dt of the two-sample mean of qm)
-    position = recording["motor_position_m"]
-    velocity = (position[2:] - position[:-2]) / (2 * recording.period_s)
-    error = recording["position_command_m"] - position
-    force = 35.15065188248547 * 243.45 * (160.18 * error[2:] - velocity)
-    assert np.abs(force - recording["force_command_n"][2:]).max() < 1.0  # of 170 N

@@ -16,7 +16,6 @@ from hil.importing.map_draft import MapDraft
 from hil.importing.map_text import map_text
 from hil.recording.recording import Recording
 
-SHARED = Path(__file__).parents[4] / "shared" / "recordings"
 AXIS = axis()
 NAMES = {"t": "time_s", "x_set": "position_setpoint_mm", "angle": "motor_angle_rad", "torque": "torque_Nm"}
 COUNTS = np.round(AXIS["angle"] / (2 * np.pi) * 4096)
@@ -235,25 +234,3 @@ def test_two_encoders_in_mm_are_a_screw_with_a_lead_to_correct(tmp_path: Path) -
     assert any("mm per turn are taken: correct scale and lead" in note for note in draft.unsure)
     assert recording["motor_position_rad"] == pytest.approx(AXIS["angle"] * LEAD_M / 0.010, abs=1e-3)
     assert "table_position_m" in recording.columns
-
-
-@pytest.mark.skipif(not SHARED.is_dir(), reason="needs ../shared/recordings, not part of the repository")
-@pytest.mark.parametrize(
-    ("folder", "expected"),
-    [
-        (
-            "kuka/axis1_a.csv",
-            {"motor_position_rad": "c", "table_position_m": "d", "position_command_m": "b", "torque_n_m": "g"},
-        ),
-        (
-            "rig/null/train_1.csv",
-            {"motor_position_rad": "d", "table_position_m": "e", "position_command_m": "b", "torque_n_m": "f"},
-        ),
-    ],
-)
-def test_measured_recordings_are_told_without_names(tmp_path: Path, folder: str, expected: dict[str, str]) -> None:
-    lines = (SHARED / folder).read_text().splitlines()
-    letters = ",".join("abcdefgh"[: len(lines[0].split(","))])
-    path = tmp_path / "log.csv"
-    path.write_text("\n".join([letters, *lines[1:]]) + "\n")
-    assert {channel: entry["column"] for channel, entry in entries(draft_map(path)).items()} == expected

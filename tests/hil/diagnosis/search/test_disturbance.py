@@ -1,0 +1,39 @@
+"""Zones of other friction and lines of fixed frequency, estimated from the torque against the motion."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from concealed_run import concealed_run
+from diagnosis_runs import bench
+
+from hil.diagnosis.search.disturbance import Disturbance, friction_zones, lines_hz
+from hil.identification.measured import take
+
+OWNER = bench()
+
+
+@pytest.mark.parametrize("level", [0.5, -0.3])
+def test_the_zone_is_estimated_from_the_torque_against_the_motion(level: float) -> None:
+    run = take(concealed_run(OWNER, {}), OWNER)
+    x = OWNER.axis.ratio_m_rad * run.motor
+    velocity = np.gradient(run.motor, run.period_s)
+    more = np.where((x > 0.22) & (x < 0.30), level, 0.0)
+    noise = np.random.default_rng(1).normal(0.0, 0.1, x.size)
+    torque = 0.2 - more * np.sign(velocity) + noise  # the constant force is no friction
+    begin_m, end_m, found = friction_zones(
+        [run], [Disturbance(torque, velocity, np.abs(velocity) > 1.0)], OWNER.axis.ratio_m_rad
+    )[0]
+    assert (begin_m, end_m) == pytest.approx((0.22, 0.30), abs=3e-3)
+    assert abs(found) <= abs(level)
+    assert found * level > 0.0
+
+
+def test_lines_are_those_of_the_disturbance_over_time() -> None:
+    run = take(concealed_run(OWNER, {}), OWNER)
+    time_s = np.arange(run.motor.size) * run.period_s
+    velocity = np.gradient(run.motor, run.period_s)
+    torque = 1.1 * np.sign(velocity) + 0.3 * np.sin(2.0 * np.pi * 8.3 * time_s) + 0.1 * np.sin(40.0 * time_s)
+    found = lines_hz(run, Disturbance(torque, velocity, np.abs(velocity) > 1e-3))
+    assert found[0] == pytest.approx(8.3, abs=0.3 / time_s[-1])
+    assert not lines_hz(run, Disturbance(torque, velocity, np.zeros(velocity.size, dtype=bool)))

@@ -1,0 +1,68 @@
+"""Explanations beside the named one: the same chance for each, and what sets one aside."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from diagnosis_runs import bench, dataset, fitted, recorded
+
+from hil.channels import AxisKind
+from hil.diagnosis.search import rivals
+from hil.diagnosis.search.addition import Addition
+from hil.diagnosis.search.next_term import SearchRound, first_standing
+from hil.diagnosis.search.rivals import chosen
+from hil.identification.hypothesis import Hypothesis
+from hil.identification.measured import take
+from hil.identification.terms import Term
+
+OWNER = bench()
+LOAD, OTHER = Term("constant_load", 0, (0.4,)), Term("friction_gradient", 0, (0.3,))
+
+
+def test_what_explains_more_is_named_unless_there_is_an_objection(monkeypatch: pytest.MonkeyPatch) -> None:
+    data = dataset([take(recorded(OWNER, LOAD), OWNER)], OWNER)
+    base = fitted(Hypothesis(OWNER), data, evaluations=4)
+    fits = [fitted(Hypothesis(OWNER, (term,)), data, evaluations=8) for term in (LOAD, OTHER)]
+    search = SearchRound(base, base, base)
+    right, wrong = map(search.addition, fits)
+    choice = chosen(wrong, [right, wrong], search)
+    assert choice.named.fit.terms[-1].effect == LOAD.effect
+    (rival,) = choice.rivals
+    assert rival.terms[-1].effect == OTHER.effect
+    assert rival.evidence > 0.0
+    assert not rival.tied
+    assert [(one.effect, one.accepted) for one in choice.considered] == [(LOAD.effect, True), (OTHER.effect, False)]
+
+    monkeypatch.setattr(rivals, "first_standing", lambda additions: additions[-1])
+    monkeypatch.setattr(
+        rivals, "objection", lambda one, *_: "it is excluded" if one.fit.terms[-1].effect != OTHER.effect else ""
+    )
+    choice = chosen(wrong, [right, wrong], search)
+    assert choice.named.fit.terms[-1].effect == OTHER.effect
+    (rival,) = choice.rivals
+    assert rival.evidence < 0.0
+    assert rival.objection == "it is excluded"
+    assert not rival.tied
+    assert choice.considered[1].ledger[-1].text == "it is excluded"
+
+
+def explained(cost: float, motor: float, table: float) -> Any:
+    """Stand-in for a fit: its cost, and the mean squares of motor and table residuals over their noise."""
+    run = SimpleNamespace(motor=np.zeros(1000), evaluated=slice(None), kind=AxisKind.ROTARY)
+    data = SimpleNamespace(runs=(run,))
+    ratios = ({"motor": motor, "table": table},)
+    return SimpleNamespace(cost=cost, rows=2000, excess=0.0, terms=(), data=data, noise_ratios=ratios, bench=OWNER)
+
+
+def test_a_little_harm_does_not_set_aside_what_explains_nearly_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An eccentric pulley explained nine tenths of what play left, and a third more remained in the motor."""
+    for name, value in {"evidence": 1000.0, "gain": 1e6, "unrepeated": (0.0, 0.0), "inside": None}.items():
+        monkeypatch.setattr(Addition, name, value)
+    search = SearchRound(base := explained(5e5, 12.0, 1000.0), base, explained(6e5, 16.0, 1100.0))
+    most, play = (search.addition(fit) for fit in (explained(4e4, 16.0, 75.0), explained(3e5, 6.0, 60.0)))
+    assert first_standing([most, play]) is most
+    below = search.addition(explained(4e4, 25.0, 75.0))  # worse than by the bench file
+    assert first_standing([below, play]) is play

@@ -1,0 +1,56 @@
+"""A term stands only where the training and the held-out recordings bear it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from diagnosis_runs import bench, dataset, evaluated, fitted, recorded
+
+from hil.bench.bench_file import Bench
+from hil.diagnosis.verdict.cross_validation import cross_validate
+from hil.identification.dataset import Dataset
+from hil.identification.hypothesis import Hypothesis
+from hil.identification.inference import standard_errors
+from hil.identification.measured import take
+from hil.identification.terms import Term
+
+OWNER = bench()
+
+
+def runs(*terms: Term, seed: int = 1, owner: Bench = OWNER) -> Dataset:
+    return dataset([take(recorded(OWNER, *terms, seed=seed), owner)], owner)
+
+
+@pytest.fixture(scope="module")
+def train() -> Dataset:
+    return runs()
+
+
+def test_a_strength_below_its_standard_error_is_dropped(train: Dataset) -> None:
+    small = fitted(Hypothesis(OWNER, (Term("cogging_torque", 0, (1e-4, 7.0, 0.2)),)), train, evaluations=6)
+    plain = fitted(Hypothesis(OWNER), train, evaluations=6)
+    error = standard_errors(small)[small.hypothesis.columns(0)][0]
+    assert small.terms[0].values[0] < error
+    proof = cross_validate(plain, small, runs(seed=2))
+    assert [ablation.refuted for ablation in proof.dropped] == ["its strength is below its standard error"]
+
+
+def test_a_term_that_harms_the_training_recordings_is_dropped(train: Dataset) -> None:
+    load = Term("constant_load", 0, (0.4,))
+    wrong = evaluated(Hypothesis(OWNER, (load,)), train)
+    proof = cross_validate(evaluated(Hypothesis(OWNER), train), wrong, dataset([], OWNER))
+    (dropped,) = proof.dropped
+    assert "motor_position_rad" in dropped.worse
+    assert "reproduced worse in motor_position_rad" in dropped.refuted
+
+
+def test_a_term_beside_a_refit_that_is_worse_than_the_bench_file_is_dropped(train: Dataset) -> None:
+    """Twice the Coulomb friction: with the term the motor is no worse than without it, but than the bench file."""
+    plain = Hypothesis(OWNER)
+    names = [coordinate.name for coordinate in plain.coordinates]
+    x = plain.x.copy()
+    x[names.index("coulomb_torque_n_m")] = np.log(2.0)
+    nominal = evaluated(plain.moved(x), train)
+    final = evaluated(nominal.hypothesis.with_term(Term("cogging_torque", 0, (0.01, 6.0, 0.0))), train)
+    (dropped,) = cross_validate(nominal, final, dataset([], OWNER)).dropped
+    assert "motor_position_rad" in dropped.worse

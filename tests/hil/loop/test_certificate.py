@@ -1,0 +1,149 @@
+"""Every recording carries how punctual its loop was; a request to end by the terminal stops the axis under control."""
+
+from __future__ import annotations
+
+import os
+import pty
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from bench_runs import MOVE, bench_with
+from patient_bench import patient_bench, patient_bench_file
+from processes import DEADLINE_S, wait_for
+
+from drivers.cia402 import DriveState
+from hil.loop.clock import LatenessLog
+from hil.loop.realtime import NotPunctual
+from hil.loop.run import run_profile
+from hil.recording.recording import read_recording
+
+PROFILE = Path(__file__).parents[3] / "profiles" / "friction_sweep.yaml"
+
+
+def certificate(recording: Path | None) -> dict[str, Any]:
+    assert recording is not None
+    return read_recording(recording).metadata["real_time"]
+
+
+def test_a_run_by_the_wall_clock_carries_the_certificate(tmp_path: Path) -> None:
+    ran = run_profile(patient_bench(), MOVE, tmp_path, "run", force=True)
+    found = certificate(ran.recording)
+    lateness_s = pq.read_table(ran.recording).column("lateness_s").to_numpy()  # without rows that a reader interpolates
+    assert found["clock"] == "wall"
+    assert found["period_s"] == 0.001
+    assert found["budget"] == {"jitter_p99_s": 0.0005, "bus_load": 0.7}
+    assert found["bus_load"] == pytest.approx(0.455, abs=0.01)  # SYNC 55, RPDO 95, TPDOs 135 and 75, encoder 95 bits
+    assert {"kernel", "preempt_rt", "governor", "cores"} <= set(found["machine"])
+    assert found["jitter_before_arming"]["ticks"] > 0
+    run = found["run"]
+    assert run["ticks"] >= len(lateness_s)
+    assert run["max_s"] >= lateness_s.max()
+    assert run["missed"] >= (lateness_s >= 0.001).sum()
+    assert run["skipped"] == ran.outcome.skipped
+    assert set(run) >= {"p50_s", "p99_s", "page_faults", "preemptions", "collections", "threads"}
+    assert run["collections"] == 0
+
+
+def test_a_run_in_virtual_time_says_so(tmp_path: Path) -> None:
+    found = certificate(run_profile(bench_with(), MOVE, tmp_path, "run", virtual=True).recording)
+    assert found["clock"] == "virtual"
+    assert (found["run"]["max_s"], found["run"]["missed"], found["run"]["skipped"]) == (0.0, 0, 0)
+    assert "page_faults" not in found["run"]
+
+
+def test_a_run_that_fails_carries_it_as_well(tmp_path: Path) -> None:
+    bench = bench_with(drive={"missed_answers": 0, "interface": "virtual", "channel": "certificate"})
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("hil.loop.session.Session._loop", lambda *_: 1 / 0)
+        with pytest.raises(ZeroDivisionError):
+            run_profile(bench, MOVE, tmp_path, "run", virtual=True)
+    assert list(tmp_path.iterdir()) == []  # without a row no file
+
+
+def test_a_bench_may_allow_to_arm_above_its_budget_and_the_recording_says_so(tmp_path: Path) -> None:
+    with pytest.raises(
+        NotPunctual, match=r"The drive was not armed: raise .* or say drive.watch_setpoint: false, or arm"
+    ):
+        run_profile(bench_with(drive={"bitrate": 250_000}), MOVE, tmp_path, "run", virtual=True)
+    bench = bench_with(drive={"bitrate": 250_000, "over_budget": "arm"})
+    ran = run_profile(bench, MOVE, tmp_path, "run", virtual=True)
+    assert len(ran.doubts) == 1
+    assert ran.doubts[0].endswith("the drive was armed all the same, as --force or drive.over_budget asks")
+    assert "not armed" not in ran.doubts[0]
+    assert read_recording(ran.recording).metadata["overridden"] == list(ran.doubts)
+
+
+def test_lateness_is_kept_in_memory_that_does_not_grow() -> None:
+    log = LatenessLog(5)
+    for late_s in (0.1, 0.2, 0.3):
+        log.add(late_s)
+    assert list(log.values) == [0.1, 0.2, 0.3]
+    log.begin(0.0)
+    assert list(log.values) == [0.3]
+    log.add(0.4)
+    log.begin(0.0, 2)
+    assert list(log.values) == [0.4, 0.0, 0.0]
+    assert log.last_s == 0.0
+    for late_s in (0.5, 0.6, 0.7):
+        log.add(late_s)
+    assert list(log.values) == [0.4, 0.0, 0.0, 0.5, 0.6]
+    assert log.last_s == 0.7
+
+
+# -- the terminal is closed -------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def running(tmp_path: Path) -> Iterator[tuple[subprocess.Popen[bytes], int, Path]]:
+    """`hil run` in a terminal of its own, moving; the process, the terminal's other end, its stream."""
+    ours, theirs = pty.openpty()
+    # SIGHUP as in a terminal, also where the tests run under nohup
+    start = (
+        "import os, signal, sys; signal.signal(signal.SIGHUP, signal.SIG_DFL); os.login_tty(int(sys.argv[1])); "
+        "os.execv(sys.executable, [sys.executable, *sys.argv[2:]])"
+    )
+    bench = str(patient_bench_file(tmp_path))
+    command = ["-m", "hil.cli", "run", str(PROFILE), "--bench", bench, "--force", "--out", str(tmp_path)]
+    process = subprocess.Popen([sys.executable, "-c", start, str(theirs), *command], pass_fds=[theirs])
+    os.close(theirs)
+    try:
+        stream = tmp_path / "friction_sweep.arrows"
+        wait_for(lambda: stream.exists() and stream.stat().st_size > 100_000)
+        yield process, ours, tmp_path / "friction_sweep.parquet"
+    finally:
+        process.kill()
+        process.wait()
+
+
+def assert_stopped_under_control(path: Path) -> None:
+    recording = read_recording(path)
+    assert recording.metadata["ended"] == "interrupted: stopped by the user"
+    assert recording["segment"][-1] == -1
+    assert DriveState.QUICK_STOP_ACTIVE not in recording["drive_state"]
+    # the set-points are at rest; the axis follows some time after a stall of the machine
+    assert np.ptp(recording["position_command_m"][-20:]) < 1e-5
+
+
+def test_sighup_stops_the_axis_under_control(running: tuple[subprocess.Popen[bytes], int, Path]) -> None:
+    process, ours, path = running
+    process.send_signal(signal.SIGHUP)
+    code = process.wait(DEADLINE_S)
+    assert_stopped_under_control(path)
+    assert code == 130
+    os.close(ours)
+
+
+def test_a_terminal_that_is_closed_stops_the_axis_under_control(
+    running: tuple[subprocess.Popen[bytes], int, Path],
+) -> None:
+    process, ours, path = running
+    os.close(ours)  # the kernel sends SIGHUP, and nothing can be printed any more
+    process.wait(DEADLINE_S)
+    assert_stopped_under_control(path)

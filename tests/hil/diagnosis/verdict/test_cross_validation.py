@@ -7,6 +7,7 @@ import pytest
 from diagnosis_runs import bench, dataset, evaluated, fitted, recorded
 
 from hil.bench.bench_file import Bench
+from hil.diagnosis.acceptance import paying
 from hil.diagnosis.verdict.cross_validation import cross_validate
 from hil.identification.dataset import Dataset
 from hil.identification.hypothesis import Hypothesis
@@ -40,7 +41,7 @@ def test_a_term_that_harms_the_training_recordings_is_dropped(train: Dataset) ->
     wrong = evaluated(Hypothesis(OWNER, (load,)), train)
     proof = cross_validate(evaluated(Hypothesis(OWNER), train), wrong, dataset([], OWNER))
     (dropped,) = proof.dropped
-    assert "motor_position_rad" in dropped.worse
+    assert "motor_position_rad" in paying(dropped.harm)
     assert "reproduced worse in motor_position_rad" in dropped.refuted
 
 
@@ -53,4 +54,4 @@ def test_a_term_beside_a_refit_that_is_worse_than_the_bench_file_is_dropped(trai
     nominal = evaluated(plain.moved(x), train)
     final = evaluated(nominal.hypothesis.with_term(Term("cogging_torque", 0, (0.01, 6.0, 0.0))), train)
     (dropped,) = cross_validate(nominal, final, dataset([], OWNER)).dropped
-    assert "motor_position_rad" in dropped.worse
+    assert "motor_position_rad" in paying(dropped.harm)

@@ -38,6 +38,7 @@ def test_a_case_that_fails_is_an_answer_and_not_tried_again(tmp_path: Path) -> N
     assert not (tmp_path / ANSWERS / "two" / ERROR).exists()
 
 
+@pytest.mark.long
 def test_a_small_proof(tmp_path: Path) -> None:
     """Six cases from the draw to the page, with wide margins: one test, since it takes its time."""
     folder = tmp_path / "small"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import shutil
 import signal
 import subprocess
 import time
@@ -44,9 +45,10 @@ def freezable_disk(tmp_path: Path) -> Iterator[Path]:
     image, folder = tmp_path / "image", tmp_path / "frozen"
     image.write_bytes(bytes(16 << 20))
     folder.mkdir()
-    made = subprocess.run(["mkfs.ext4", "-q", str(image)], capture_output=True, check=False)
-    if made.returncode:
+    make = shutil.which("mkfs.ext4", path=os.pathsep.join((os.environ["PATH"], "/usr/sbin", "/sbin")))
+    if make is None:
         pytest.skip("mkfs.ext4 is missing")
+    subprocess.run([make, "-q", str(image)], capture_output=True, check=True)
     yield from mounted(folder, "mount", "-o", "loop", str(image))
 
 

@@ -45,10 +45,9 @@ def freezable_disk(tmp_path: Path) -> Iterator[Path]:
     image, folder = tmp_path / "image", tmp_path / "frozen"
     image.write_bytes(bytes(16 << 20))
     folder.mkdir()
-    make = shutil.which("mkfs.ext4", path=os.pathsep.join((os.environ["PATH"], "/usr/sbin", "/sbin")))
-    if make is None:
-        pytest.skip("mkfs.ext4 is missing")
-    subprocess.run([make, "-q", str(image)], capture_output=True, check=True)
+    if missing := [name for name in ("mkfs.ext4", "fsfreeze") if shutil.which(name) is None]:
+        pytest.skip(f"{', '.join(missing)} not in the path, usually in /usr/sbin")
+    subprocess.run(["mkfs.ext4", "-q", str(image)], capture_output=True, check=True)
     yield from mounted(folder, "mount", "-o", "loop", str(image))
 
 

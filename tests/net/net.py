@@ -11,7 +11,7 @@ may be copied from an old one to save the drawing. `--only` selects cases by a p
 answers of this run as the new reference, after every change has been explained. Cases of recordings outside of the
 repository are skipped if these are not there.
 
-`make net` then runs tests/net/incidents: a pytest file for each incident that was once diagnosed wrong, and what is
+`make net` then runs tests/net/incidents: a pytest file for each incident that was once diagnosed wrongly, and what is
 known of the measured recordings. They are marked `net` and not part of `make test`: pytest -m net.
 """
 

@@ -13,7 +13,7 @@ from drivers.port import Condition
 from hil.loop.checks import Limit
 from hil.loop.devices import Rig
 from hil.loop.stall import Stall
-from hil.loop.supervision import AFTER_STALL, RULES, Ending, LoopSign, Reaction, StopCause, find, rules_table
+from hil.loop.supervision import RULES, Ending, LoopSign, Reaction, StopCause, find, rules_table
 
 FINE = Condition.LATE | Condition.BUS_PASSIVE  # what stops nothing
 
@@ -29,21 +29,6 @@ def found(rig: Rig, passed: Limit = Limit.NONE, lateness_s: float = 0.0, stops_a
     encoder = Rig(bench_with()).encoder if rig.encoder is None else rig.encoder
     sample = encoder.read(0.0)._replace(condition=seen)
     return list(find(rig, sample, passed, lateness_s, stops_asked, stopping=stopping, **stall))
-
-
-def test_bounds_that_a_stall_explains() -> None:
-    """Those that a missing set-point breaks; an encoder that jumps, freezes or counts wrong is none."""
-    assert set(AFTER_STALL) == {
-        Limit.FOLLOWING_ERROR,
-        Limit.VELOCITY,
-        Limit.TORQUE,
-        Limit.TRAVEL,
-        Limit.STOPPING_DISTANCE,
-        Limit.ACTING_TORQUE,
-        Limit.RESIDUAL_ENCODER,
-        Limit.RESIDUAL_DRIVE,
-        Limit.RESIDUAL_LOAD,
-    }
 
 
 def test_every_limit_has_one_rule() -> None:
@@ -160,6 +145,16 @@ def test_a_residual_is_explained_by_a_share_of_its_own_threshold(residual_m: dic
             assert found(rig, limit, **after(rig, 0.19, 1e-4))[0].ending is Ending.RESIDUAL
         assert found(rig, Limit.TRAVEL, **after(rig, 0.21, 1e-4))[0].ending is Ending.TRAVEL_LIMIT
         assert found(rig, Limit.TRAVEL, **after(rig, 0.21, rig.section.following_error_m))[0].ending is Ending.OVERRUN
+
+
+def test_a_stall_explains_bounds_of_the_motion_and_none_of_a_sensor(rig: Rig) -> None:
+    """A missing set-point breaks those of motion and torque; an encoder does not jump, freeze or count wrong by it."""
+    moved = after(rig, 1.0, rig.section.following_error_m)
+    explained = {limit for limit in Limit if limit and found(rig, limit, **moved)[0].rule == "after a stall"}
+    of_sensors = Limit.NOT_FINITE | Limit.ENCODER_DIFFERENCE | Limit.TORQUE_TIME
+    for encoder in ("MOTOR", "TABLE"):
+        of_sensors |= Limit[f"{encoder}_JUMP"] | Limit[f"{encoder}_FROZEN"] | Limit[f"{encoder}_REVERSED"]
+    assert explained == set(Limit) - set(of_sensors) - {Limit.NONE}
 
 
 def test_a_stall_explains_no_fault_of_a_device(rig: Rig) -> None:

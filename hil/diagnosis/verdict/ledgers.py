@@ -27,10 +27,15 @@ def ledgers(judged: Judged, forms: Container[int]) -> tuple[CandidateLedger, ...
         {index: _candidate(one, False) for index, one in enumerate(searched.considered)},
         list[CandidateLedger](),
     )
+    taken = set[int]()
     for index, ablation in enumerate((*proof.ablations, *proof.dropped)):
         kept = index < len(proof.ablations)
         term, effect = ablation.term, key_in_search(searched, ablation.term)[0]
-        places = [index for index, one in enumerate(searched.considered) if one.effect == effect and one.accepted]
+        places = [
+            place
+            for place, one in enumerate(searched.considered)
+            if one.effect == effect and one.accepted and place not in taken
+        ]
         # the same torque may be named by a more frequent cause of it
         before = replace(searched.considered[places[-1]], effect=term.effect) if places else None
         found = before or Considered(term.effect, term.variant, (), ())
@@ -40,6 +45,7 @@ def ledgers(judged: Judged, forms: Container[int]) -> tuple[CandidateLedger, ...
         )
         if places:
             answers[places[-1]] = answer
+            taken.add(places[-1])  # several terms may be of one mechanism
         else:
             more.append(answer)
     return (*answers.values(), *more)

@@ -57,8 +57,10 @@ def _worth(of: Addition, c: Criteria) -> Answer:
     return of.gain >= share * of.excess, {"explained": of.gain / (of.excess or 1.0), "needed": share}
 
 
-def _laps(of: Addition, c: Criteria) -> Answer:
+def _laps(of: Addition, c: Criteria) -> Answer | None:
     left, before = of.unrepeated
+    if not left and not before:  # no motion repeats
+        return None
     return c.repeats * left <= before, {"ratio": left / before if before else 1.0}
 
 

@@ -19,7 +19,7 @@ def ledger_section(page: Page, result: Result) -> None:
     for one in (*named, *others):
         name = title(one.effect).capitalize() + (f" ({one.variant})" if one.variant else "")
         beside = f", added beside {titles(one.beside)}" if one.beside else ""
-        page.text(f"{name}{beside}: {'named' if one.named else _outcome(one)}.")
+        page.text(f"{name}{beside}: {_outcome(one)}.")
         page.table(
             ("rule", "accepted", "what was found"),
             [(answer.rule, "yes" if answer.accepted else "no", answer.text) for answer in one.rules],
@@ -30,7 +30,10 @@ def ledger_section(page: Page, result: Result) -> None:
 
 
 def _outcome(one: CandidateLedger) -> str:
-    return "not named, not refuted" if all(answer.accepted for answer in one.rules) else "refuted"
+    stands = all(answer.accepted for answer in one.rules)
+    if one.named:
+        return "named" if stands else "named as a part of the mismatch"
+    return "not named, not refuted" if stands else "refuted"
 
 
 def _evidence(one: CandidateLedger) -> float:

@@ -78,7 +78,8 @@ def search(prepared: Prepared, progress: Progress = lambda text: None, deadline_
         considered += choice.considered
         rivals[choice.named.fit.terms[-1].key] = choice.rivals
         del additions  # their residuals are not needed any more
-        best, needed = _pruned(choice.named.fit, round_.reference)
+        best, needed, pruned = _pruned(choice.named.fit, round_.reference)
+        considered += pruned
         # to convergence: the residual of an unfinished fit resembles other mechanisms
         base = revised(claimed(best.refit(ENDED, slopes=best.jacobian)))
         if not base.terms and base.cost < nominal.cost - CRITERIA.evidence:
@@ -138,8 +139,12 @@ def _beyond(fit: Fit, index: int) -> Term | None:
     return other if compatible([*others, other]) else None
 
 
-def _pruned(fit: Fit, reference: Fit) -> tuple[Fit, dict[Key, float]]:
-    """Remove terms without evidence, weakest first; return the fit and the evidence for the remaining terms."""
+def _pruned(fit: Fit, reference: Fit) -> tuple[Fit, dict[Key, float], list[Considered]]:
+    """Remove terms without evidence, weakest first.
+
+    Returns the fit, the evidence for the remaining terms, and the ledgers of those that were removed.
+    """
+    pruned = list[Considered]()
 
     def ablated(index: int) -> tuple[float, Fit]:
         other = _without(fit, index)
@@ -150,9 +155,12 @@ def _pruned(fit: Fit, reference: Fit) -> tuple[Fit, dict[Key, float]]:
     while fit.terms:
         filters = whitening(fit)
         pairs = in_parallel([partial(ablated, index) for index in range(len(fit.terms))])
-        evidence, rest = min(pairs, key=lambda pair: pair[0])
-        need = Need(evidence, removed(rest, fit, reference), fit.rows)
-        if accepted(examine(NEEDED, need, CRITERIA)):
-            return fit, {term.key: value for term, (value, _) in zip(fit.terms, pairs, strict=True)}
+        weakest = min(range(len(pairs)), key=lambda index: pairs[index][0])
+        evidence, rest = pairs[weakest]
+        ledger = examine(NEEDED, Need(evidence, removed(rest, fit, reference), fit.rows), CRITERIA)
+        if accepted(ledger):
+            return fit, {term.key: value for term, (value, _) in zip(fit.terms, pairs, strict=True)}, pruned
+        others = (*fit.terms[:weakest], *fit.terms[weakest + 1 :])
+        pruned.append(Considered.of((*others, fit.terms[weakest]), ledger))
         fit = rest
-    return fit, {}
+    return fit, {}, pruned

@@ -1,7 +1,7 @@
 """What a mechanism must show before it is named: all constants of evidence, and the table of rules.
 
 Each rule is a pure function of measured quantities (`hil.diagnosis.ledger`). `promises` decides before a candidate is
-fitted; the rules are asked at six moments:
+fitted; the rules are asked at seven moments:
 
     VALUES     on the fitted values of a candidate
     ADDED      on the fit with one more term, against the fit without it; HARMLESS: and its channels
@@ -9,6 +9,7 @@ fitted; the rules are asked at six moments:
     COMPARED   on another explanation of the same residual, against the named one
     HELD_OUT   on each term of the final fit, by the recordings that nothing was fitted to
     EXPLAINED  on all terms together
+    REPRODUCED on a twin without new terms
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from hil.diagnosis.search.rivals import RivalFit
     from hil.diagnosis.verdict.cross_validation import Ablation
     from hil.diagnosis.verdict.judge import Remainder
+    from hil.diagnosis.verdict.reproduction import Reproduction
 
 
 def _values(of: Addition, c: Criteria) -> Answer:
@@ -54,7 +56,7 @@ def _material(of: Addition | Need, c: Criteria) -> Answer:
 
 def _worth(of: Addition, c: Criteria) -> Answer:
     share = c.worth if of.beside < c.several else c.series
-    return of.gain >= share * of.excess, {"explained": of.gain / (of.excess or 1.0), "needed": share}
+    return of.explained >= share, {"explained": of.explained, "needed": share}
 
 
 def _laps(of: Addition, c: Criteria) -> Answer | None:
@@ -127,6 +129,32 @@ def _strength(of: Ablation, c: Criteria) -> Answer:
 
 def _moves(of: Ablation, c: Criteria) -> Answer:
     return not of.quiet, {}
+
+
+def _torque_held_out(of: Ablation, c: Criteria) -> Answer | None:
+    if of.torque is None:
+        return None
+    left, without = of.torque
+    return left - without <= c.material, {"left": left**0.5, "without": without**0.5}
+
+
+def _within_noise(of: Reproduction, c: Criteria) -> Answer:
+    return of.worst <= c.floor, {"worst": of.worst**0.5}
+
+
+def _within_noise_elsewhere(of: Reproduction, c: Criteria) -> Answer | None:
+    return None if of.held_out is None else (of.held_out <= c.elsewhere, {"worst": of.held_out**0.5})
+
+
+def _without_structure(of: Reproduction, c: Criteria) -> Answer:
+    return not of.structure, {"structure": of.structure}
+
+
+def _no_worse_than_plain(of: Reproduction, c: Criteria) -> Answer | None:
+    if of.torque is None:
+        return None
+    left, plain = of.torque
+    return left - plain <= c.material, {"left": left**0.5, "plain": plain**0.5}
 
 
 def _explains(of: Remainder, c: Criteria) -> Answer:
@@ -254,6 +282,13 @@ HELD_OUT: tuple[Rule[Ablation], ...] = (
         _moves,
     ),
     Rule(
+        "torque, held out",
+        "the torque of held-out motion is predicted no worse with it",
+        "with it the twin leaves {left:.3g} times the noise of the torque on held-out motion, without it {without:.3g}",
+        "a torque on the axis shows in the torque; errors of sensors may not",
+        _torque_held_out,
+    ),
+    Rule(
         "channels, all terms",
         "it makes no channel worse",
         "with it the training recordings are reproduced worse in {channels}",
@@ -270,4 +305,34 @@ EXPLAINED: tuple[Rule[Remainder], ...] = (
         _explains,
     ),
 )
-RULES = (*VALUES, *ADDED, *HARMLESS, *COMPARED, *HELD_OUT, *EXPLAINED)
+REPRODUCED: tuple[Rule[Reproduction], ...] = (
+    Rule(
+        "within the noise",
+        "every channel is within its noise, {worst:.3g} times its rms at most",
+        "a channel is at {worst:.3g} times its noise (rms)",
+        "measurement noise of each channel, see `hil.identification.noise_floor`",
+        _within_noise,
+    ),
+    Rule(
+        "within the noise, held out",
+        "held-out recordings are within their noise, {worst:.3g} times its rms at most",
+        "on held-out recordings a channel is at {worst:.3g} times its noise (rms)",
+        "prediction; errors of fitted parameters leave as much as the noise",
+        _within_noise_elsewhere,
+    ),
+    Rule(
+        "structure",
+        "what is left depends on no position, angle, speed, load or time",
+        "what is left has a structure: {structure}",
+        "noise depends on nothing (`hil.identification.structure`); errors count autocorrelation and the questions",
+        _without_structure,
+    ),
+    Rule(
+        "plain model",
+        "it predicts the torque of held-out motion no worse than plain least squares",
+        "it leaves {left:.3g} times the noise of the torque on held-out motion, plain least squares {plain:.3g}",
+        "a twin that inertia, friction and gravity by least squares beat lacks something, or has a structure too many",
+        _no_worse_than_plain,
+    ),
+)
+RULES = (*VALUES, *ADDED, *HARMLESS, *COMPARED, *HELD_OUT, *EXPLAINED, *REPRODUCED)

@@ -7,12 +7,14 @@ from collections.abc import Sequence
 from hil.bench.bench_file import Bench
 from hil.diagnosis.diagnosis import Diagnosis
 from hil.diagnosis.preparation.prepare import prepare
+from hil.diagnosis.preparation.structure import as_one_inertia
 from hil.diagnosis.reporting import report
 from hil.diagnosis.search.forward_selection import search
-from hil.diagnosis.stages import Progress
+from hil.diagnosis.stages import Judged, Prepared, Progress
 from hil.diagnosis.time_left import with_time_left
 from hil.diagnosis.verdict.held_out import test_on_held_out
 from hil.diagnosis.verdict.judge import judge
+from hil.diagnosis.verdict.reproduction import behind_plain, with_less_torque
 from hil.errors import InputError
 from hil.identification.parallel import one_blas_thread
 from hil.recording.recording import Recording
@@ -40,7 +42,14 @@ def diagnose(
     progress = with_time_left(progress, begin_s, budget_s)
     progress("checking the recordings")
     prepared = prepare(train, validate, bench)
-    searched = search(prepared, progress, begin_s + SEARCH_SHARE * budget_s)
-    progress("testing on held-out recordings")
-    judged = judge(test_on_held_out(searched))
+
+    def answer(prepared: Prepared) -> Judged:
+        searched = search(prepared, progress, begin_s + SEARCH_SHARE * budget_s)
+        progress("testing on held-out recordings")
+        return judge(test_on_held_out(searched))
+
+    judged = answer(prepared)
+    if behind_plain(judged) and (least := as_one_inertia(prepared)):
+        progress("comparing with one inertia")
+        judged = with_less_torque(judged, answer(least))
     return Diagnosis(report(judged, progress, begin_s, budget_s))

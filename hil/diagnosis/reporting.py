@@ -119,9 +119,14 @@ def _unexplained(judged: Judged, location: Location | None) -> Unexplained:
             for name, ratio in ratios.items():
                 worst[names[name]] = max(worst.get(names[name], 0.0), ratio)
     above = {name: float(np.sqrt(ratio)) for name, ratio in worst.items() if ratio > FLOOR}
+    unit = final.bench.axis.drive_unit
+    structure = "; ".join(one.in_words(unit) for one in judged.structure[:2])
     if not above:
-        return Unexplained(share=share, description=AT_FLOOR)
+        more = f" Structure is left: {structure}." if structure else ""
+        return Unexplained(share=share, description=AT_FLOOR + more)
     text = ", ".join(f"{name} at {digits(above[name])} × noise rms" for name in sorted(above, key=lambda n: -above[n]))
     if judged.of_plant is Verdict.UNEXPLAINED and not final.terms and location is not None:
         text += f"; {where_in_short(location, final.bench.axis.turns)}"
+    if structure:
+        text += f". Structure is left: {structure}"
     return Unexplained(share=share, description=f"Residuals above the noise, block by block: {text}.")

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from hil.diagnosis.preparation.usable_law import LawCheck
     from hil.diagnosis.result import Result, Verdict
     from hil.diagnosis.search.rivals import RivalFit
+    from hil.diagnosis.structure_left import Dependence
     from hil.diagnosis.verdict.cross_validation import CrossValidation
     from hil.diagnosis.verdict.each_alone import Change
     from hil.identification.dataset import Dataset
@@ -90,6 +91,7 @@ class Judged:
     nominal: Fit
     before: Fit
     final: Fit
+    structure: tuple[Dependence, ...] = ()  # of what `final` leaves
 
     @property
     def has_findings(self) -> bool:

@@ -88,9 +88,13 @@ def by_energy(better: Fit, worse: Fit) -> float:
     Of a residual that the model's own faults colour, few rows are independent: two forms of one effect are then told
     apart only by a clear difference in energy.
     """
-    rows = effective_samples(better)
     more = better.hypothesis.free - worse.hypothesis.free
-    return float(rows * np.log(worse.cost / better.cost) - more * np.log(rows))
+    evidence = rows = 0.0
+    for a, b in zip(better.residuals.parts.values(), worse.residuals.parts.values(), strict=True):
+        own, blur = a.size / correlation_time(a), _BLUR * a.size
+        evidence += own * np.log((float(b @ b) + blur) / (float(a @ a) + blur))
+        rows += own
+    return float(evidence - more * np.log(rows))
 
 
 def refuted(evidence: float, more: float) -> bool:
@@ -108,22 +112,6 @@ def correlation_time(residual: FloatArray) -> float:
     total = 2.0 * np.cumsum(correlation) - 1.0
     enough = np.flatnonzero(np.arange(total.size) >= _SOKAL * total)
     return float(max(total[enough[0]] if enough.size else total[-1], 1.0))
-
-
-def effective_samples(fit: Fit) -> float:
-    """Independent rows of a fit's residuals: rows of each part over its correlation time, weighted by energy.
-
-    A hidden channel counts as one at its white noise, as it is where control law and torque are known: the
-    least evidence of a search was calibrated with it.
-    """
-    weight = total = 0.0
-    parts = fit.residuals.parts
-    for (run, channel), part in parts.items():
-        hidden = channel in fit.data.runs[run].observability.hidden
-        energy = float(part.size) if hidden else float(part @ part)
-        weight += energy * part.size / correlation_time(part)
-        total += energy
-    return weight / max(total, 1e-300) * len(parts) + 1.0
 
 
 # Factor for the model discrepancy: on development cases (seeds 931 and 941 of the proof's generator, 67 parameters)

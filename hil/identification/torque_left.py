@@ -26,6 +26,7 @@ from hil.identification.derivatives import smoothed
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.measured import Measured
 from hil.identification.plain_model import MotionData, PlainModel, fit_plain_model, motion_data
+from hil.identification.structure import Series
 from hil.identification.twin_deviation import held_on_motor
 
 _ADDED = 0.01  # of the torque's standard deviation: far above rounding, and an axis that slides goes on sliding
@@ -34,12 +35,12 @@ _ADDED = 0.01  # of the torque's standard deviation: far above rounding, and an 
 def fit_plain(data: Dataset) -> PlainModel | None:
     """Fit the plain model to a data set; None without sliding motion."""
     axis = data.bench.axis
-    return fit_plain_model([_motion(run) for run in data.runs], axis.ratio_m_rad if axis.turns else None)
+    return fit_plain_model([measured_motion(run) for run in data.runs], axis.ratio_m_rad if axis.turns else None)
 
 
 def torque_deviation(every: Sequence[Dataset], slowest: float) -> float:
     """Standard deviation of the torque of data sets where the motor is faster than `slowest`; 0 where nothing is."""
-    found = [_motion(run) for data in every for run in data.runs]
+    found = [measured_motion(run) for data in every for run in data.runs]
     torque = np.concatenate([one.torque[one.sliding(slowest)] for one in found])
     return float(np.std(torque)) if torque.size else 0.0
 
@@ -51,7 +52,7 @@ def left_by_plain(model: PlainModel, data: Dataset, deviation: float | None = No
     """
     found = []
     for run in data.runs:
-        missing = run.torque - model.predict(_motion(run).moved)
+        missing = run.torque - model.predict(measured_motion(run).moved)
         a = run.period_s / data.observer_s
         seen = lfilter([0.0, a * a], [1.0, -(2.0 - 2.0 * a - a * a), 1.0 - 2.0 * a], missing)
         found.append(np.asarray(seen, dtype=np.float64))
@@ -63,15 +64,25 @@ def left_by_twin(hypothesis: Hypothesis, data: Dataset, slowest: float, deviatio
 
     Without a deviation it is that of the data set.
     """
+    found = [series.left for series in needed_torque(hypothesis, data, slowest)]
+    return _share(found, data, slowest, deviation)
+
+
+def needed_torque(hypothesis: Hypothesis, data: Dataset, slowest: float) -> list[Series]:
+    """Torque (n,) that the measured motion of each run needs beyond that of a twin; NaN where it does not hold it.
+
+    Rows in which the motor is faster than `slowest` count.
+    """
     found = []
     for run in data.runs:
-        rows = _motion(run).sliding(slowest)
+        rows = measured_motion(run).sliding(slowest)
         added = _ADDED * float(np.std(run.torque))
         innovation = _innovation(hypothesis, run, data.observer_s)
         moved = _innovation(hypothesis, replace(run, torque=run.torque + added), data.observer_s) - innovation
         scale = float(np.median(moved[rows])) if rows.any() else 0.0
-        found.append(innovation * added / scale if scale else np.full(run.motor.size, np.nan))
-    return _share(found, data, slowest, deviation)
+        left = -innovation * added / scale if scale else np.full(run.motor.size, np.nan)
+        found.append(Series(left, rows))
+    return found
 
 
 def _innovation(hypothesis: Hypothesis, run: Measured, observer_s: float) -> FloatArray:
@@ -84,10 +95,12 @@ def _share(missing: Sequence[FloatArray], data: Dataset, slowest: float, deviati
     if not all(np.isfinite(values).all() for values in missing):  # the twin does not hold the motion
         return None
     pairs = zip(missing, data.runs, strict=True)
-    left = np.concatenate([smoothed(values, run.period_s)[_motion(run).sliding(slowest)] for values, run in pairs])
+    left = np.concatenate(
+        [smoothed(values, run.period_s)[measured_motion(run).sliding(slowest)] for values, run in pairs]
+    )
     deviation = torque_deviation([data], slowest) if deviation is None else deviation
     return float(np.sqrt(np.mean(left**2)) / deviation) if left.size and deviation > 0.0 else None
 
 
-def _motion(run: Measured) -> MotionData:
+def measured_motion(run: Measured) -> MotionData:
     return motion_data(run.motor, run.torque, run.period_s, run.evaluated)

@@ -21,7 +21,9 @@ RECORDINGS = Path(__file__).parents[3] / "shared" / "recordings"
 PENDULUM = ("joint1_open_loop", "swingup_a", "swingup_b", "pendubot_friction_compensated")
 FILES = {
     "emps": ("emps/DATA_EMPS.mat", ""),
-    **{f"kuka {name}": (f"kuka/axis1_{name}.csv", "") for name in ("a", "b")},
+    **{f"kuka {name}": (f"kuka/axis{name}.csv", "") for name in ("1_a", "1_b", "1_c", "2_a", "3_c")},
+    **{f"laas {name}": (f"laas/{name}.csv", "") for name in ("speed", "acceleration", "map")},
+    **{f"sinumerik {name}": (f"sinumerik/axis{name}.csv", "") for name in ("1_part2", "2_part1", "2_part2")},
     **{f"bar {name}": (f"flexible-bar/{name}.csv", "") for name in ("prbs", "square", "staircase_up")},
     **{f"pendulum {name} {axis}": (f"double-pendulum/{name}.csv", axis) for axis in ("1", "2") for name in PENDULUM},
     **{f"rig {name}": (f"rig/{name}/train_1.csv", "") for name in ("null", "stribeck", "backlash", "lead")},

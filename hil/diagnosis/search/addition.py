@@ -3,7 +3,7 @@
 Quantities are computed when a rule asks for them: each is a simulation or more.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -57,10 +57,13 @@ class Addition:
         """Number of residuals."""
         return self.base.rows
 
-    @property
-    def excess(self) -> float:
-        """Energy of the base above the noise floor."""
-        return self.base.excess
+    @cached_property
+    def explained(self) -> float:
+        """Largest share that the term removes from the energy above the noise of a channel that has a material one.
+
+        A channel with a large mismatch of its own does not hide what a term explains of another.
+        """
+        return max(_explained(self.base, self.fit), default=0.0)
 
     @property
     def beside(self) -> int:
@@ -125,6 +128,18 @@ def removed(without: Fit, fit: Fit, reference: Fit) -> float:
         max(float(a @ a - b @ b) - CRITERIA.form * max(float(n @ n - a @ a), 0.0), 0.0)
         for a, b, n in zip(*parts, strict=True)
     )
+
+
+def _explained(without: Fit, fit: Fit) -> Iterator[float]:
+    """Share that the last term of a fit removes from the energy above the noise, for each channel."""
+    for channel in without.noise_ratios[0]:
+        above = gained = 0.0
+        for run, ratios, there in zip(without.data.runs, without.noise_ratios, fit.noise_ratios, strict=True):
+            rows = run.motor[run.evaluated].size
+            above += rows * max(ratios[channel] - 1.0, 0.0)
+            gained += rows * (ratios[channel] - there[channel])
+        if above > CRITERIA.nothing * without.data.rows:
+            yield gained / above
 
 
 def harm(fit: Fit, without: Fit, given: Fit) -> dict[str, Harm]:

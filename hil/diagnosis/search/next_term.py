@@ -11,6 +11,7 @@ from hil.diagnosis.search.restart import companion, from_bench_file, may_hide, t
 from hil.diagnosis.search.score_test import Candidate
 from hil.diagnosis.search.successive_halving import race
 from hil.diagnosis.stages import Progress
+from hil.diagnosis.structure_left import structure_left
 from hil.identification.estimator import Fit
 
 
@@ -45,7 +46,7 @@ def next_term(search: SearchRound, candidates: Sequence[Candidate], step: Progre
     """Fit the base with one more term.
 
     A torque that is sampled, or the only one recorded, drives the twin with its error: terms that pass less of it leave
-    less than the noise, so that nothing below the floor is evidence.
+    less than the noise, so that below the floor nothing but structure is evidence.
     """
     base, considered = search.base, list[Considered]()
 
@@ -54,7 +55,7 @@ def next_term(search: SearchRound, candidates: Sequence[Candidate], step: Progre
         considered.extend(Considered.of(one.fit.terms, one.values) for one in additions if not accepted(one.values))
         return [one for one in additions if accepted(one.values)]
 
-    if base.at_floor and not base.data.observability.exact_input:
+    if base.at_floor and not base.data.observability.exact_input and not structure_left(base, base.data.over(())):
         return Additions([], None)
     promising = [one for one in candidates if promises(one.share, base.cost, base.rows)]
     found = list[Addition]()

@@ -21,6 +21,7 @@ from hil.diagnosis.search.addition import Harm, harm
 from hil.diagnosis.search.forward_selection import claimed
 from hil.diagnosis.search.initial_values import axis_facts
 from hil.diagnosis.verdict.noise_free import energy_without_noise
+from hil.diagnosis.verdict.reproduction import torque_missed
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.inference import bic_margin, standard_errors
@@ -28,6 +29,7 @@ from hil.identification.noise_floor import unrepeated
 from hil.identification.parallel import in_parallel
 from hil.identification.terms import Term
 from hil.twin.library import BY_ID
+from hil.twin.mechanism import Block
 from hil.twin.parameter import Role
 
 
@@ -39,7 +41,9 @@ class Ablation:
     that does not repeat from lap to lap. `gain` is the evidence for the term on the held-out recordings. They are None
     without held-out recordings or laps, and for an event, whose `train` is the ratio over all recordings. `acts`: the
     term changes the held-out residuals as it does those in training. `clear`: its strength is above its standard error.
-    `quiet`: it hardly acts on motion without noise. `harm`: each channel with it and without it.
+    `quiet`: it hardly acts on motion without noise. `torque`: mean squares of the torque that held-out motion needs
+    beyond that of the twin, over its squared noise, with the term and without; None for an error of a sensor. `harm`:
+    each channel with it and without it.
     """
 
     term: Term
@@ -51,6 +55,7 @@ class Ablation:
     acts: bool = False
     clear: bool = True
     quiet: bool = False
+    torque: tuple[float, float] | None = None
     harm: Mapping[str, Harm] = field(default_factory=dict)
 
     @property
@@ -134,6 +139,7 @@ def _ablate(given: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> list[Abl
             bool(there and own_held_out and _change(own_held_out, there) > CRITERIA.acts * _change(final, other)),
             clear[index],
             _quiet(final, other),
+            _torque(final, other, term, held_out),
             harm(final, other, given),
         )
 
@@ -166,6 +172,14 @@ def _quiet(fit: Fit, without: Fit) -> bool:
     return removed is not None and removed < min(
         CRITERIA.material * fit.rows, CRITERIA.on_motion * (without.cost - fit.cost)
     )
+
+
+def _torque(fit: Fit, without: Fit, term: Term, held_out: Dataset) -> tuple[float, float] | None:
+    """Mean squares of the torque missed on held-out recordings with a term of the plant and without it."""
+    if BY_ID[term.effect].block in (Block.CONTROLLER, Block.SENSOR) or term.windows:
+        return None
+    left, other = torque_missed(fit, held_out), torque_missed(without, held_out)
+    return None if left is None or other is None else (left, other)
 
 
 def _gain(fit: Fit, without: Fit) -> float:

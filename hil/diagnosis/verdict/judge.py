@@ -9,8 +9,10 @@ from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.ledger import Ledger, accepted, examine
 from hil.diagnosis.result import Verdict
 from hil.diagnosis.stages import Judged, Tested
+from hil.diagnosis.structure_left import structure_left
 from hil.diagnosis.verdict.cross_validation import explained_share
 from hil.diagnosis.verdict.each_alone import Change, changed
+from hil.diagnosis.verdict.reproduction import reproduction
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.inference import bic_gain
@@ -45,22 +47,23 @@ def judge(tested: Tested) -> Judged:
         final = searched.given if of_plant is Verdict.NO_MISMATCH else refit.fit
     # a parameter error is located and measured against the parameters of the bench file
     before = searched.given if of_plant is Verdict.PARAMETER_ERROR else refit.fit
-    return Judged(tested, of_plant, verdict, change, is_part, refit.fit, before, final)
+    left = structure_left(final, held_out)
+    return Judged(tested, of_plant, verdict, change, is_part, refit.fit, before, final, left)
 
 
 def verdict_on_plant(given: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> Verdict:
     """Give the verdict on the plant.
 
-    If the terms are rejected, the first two fits decide. What they reproduce in training must hold on held-out
-    recordings.
+    If the terms are rejected, the first two fits decide, by the rules on a twin without new terms.
     """
     if final.terms and accepted(explanation(nominal, final, held_out)):
         return Verdict.MISSING_PHYSICS
-    wrong = not given.at_floor and refit_matters(given, nominal)
-    plain = nominal if wrong else given
-    if not nominal.at_floor or (held_out.runs and plain.on(held_out).worst_ratio > CRITERIA.elsewhere):
-        return Verdict.UNEXPLAINED
-    return Verdict.PARAMETER_ERROR if wrong else Verdict.NO_MISMATCH
+    matters = refit_matters(given, nominal)
+    if given.at_floor and accepted(reproduction(given, held_out)):
+        return Verdict.NO_MISMATCH
+    if accepted(reproduction(nominal, held_out)):
+        return Verdict.PARAMETER_ERROR if matters else Verdict.NO_MISMATCH
+    return Verdict.UNEXPLAINED
 
 
 def explanation(nominal: Fit, final: Fit, held_out: Dataset) -> Ledger:

@@ -1,0 +1,165 @@
+"""Structure in what a twin leaves: over position, angle, speed, load and time, in torque and in position.
+
+A residual within its noise says that the rows of a channel are explained one by one; thousands of rows together tell
+far less than the noise of one. Each channel is asked over each quantity (`hil.identification.structure`). A dependence
+counts if chance makes it in less than the level of significance over the number of questions, if its energy is material
+against the noise, and if it holds on held-out recordings.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hil.arrays import FloatArray
+from hil.diagnosis.criteria import CRITERIA
+from hil.identification.dataset import Dataset
+from hil.identification.estimator import Fit
+from hil.identification.hypothesis import Hypothesis
+from hil.identification.plain_model import PlainModel
+from hil.identification.structure import BINS, Series, Structure, structure
+from hil.identification.torque_left import fit_plain, measured_motion, needed_torque
+from hil.quantities import digits, quantity, reading_unit
+
+TORQUE, DIFFERENCE = "torque", "difference"  # needed beyond the twin's; of the encoders, beyond the twin's
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """A quantity (n,) of each run that a residual may depend on, in a unit.
+
+    `by_direction`: it is a position from the least one on, and further by `by_direction` where the axis moves up.
+    `kept`: it means the same in other recordings.
+    """
+
+    name: str
+    unit: str
+    values: tuple[FloatArray, ...]
+    bins: int = BINS
+    by_direction: float = 0.0
+    kept: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class Dependence:
+    """A residual that depends on a quantity: on training recordings, its noise, and what it explains held out.
+
+    `explained` is the share of the residual's mean square, `material` the energy over the squared noise, `held_out` the
+    mean square that the dependence removes from held-out recordings, over the squared noise; None where nothing tells.
+    """
+
+    channel: str
+    question: Question
+    found: Structure
+    explained: float
+    material: float
+    held_out: float | None
+
+    def in_words(self, drive_unit: str) -> str:
+        """Say what the twin lacks, and where it lacks most."""
+        found, question = self.found, self.question
+        at = int(np.argmax(np.abs(found.means) / np.maximum(found.errors, 1e-300)))
+        value, low, high = (float(one) for one in (found.means[at], found.edges[at], found.edges[at + 1]))
+        more = "more" if value > 0.0 else "less"
+        if self.channel == TORQUE:
+            what = f"the axis needs {quantity(abs(value), drive_unit)} {more} torque than the twin"
+        else:
+            unit = "rad" if question.unit.startswith("rad") else "m"
+            what = f"the second encoder reads {quantity(abs(value), unit)} {more} than the twin"
+        moving = ""
+        if question.by_direction:
+            moving = " moving up" if low >= question.by_direction else " moving down"
+            low, high = (min(one, question.by_direction * 2.0) % question.by_direction for one in (low, high))
+        factor, unit = reading_unit(question.unit, max(abs(low), abs(high)))
+        return (
+            f"{what} at a {question.name} of {digits(factor * low)} to {digits(factor * high)} {unit}{moving} "
+            f"(by chance {self.found.p:.1g})"
+        )
+
+
+def structure_left(fit: Fit, held_out: Dataset) -> tuple[Dependence, ...]:
+    """Dependences of what a fit leaves in training, the one with most energy first; none is no structure."""
+    plain = fit_plain(fit.data)
+    if plain is None:
+        return ()
+    found = []
+    for channel in _channels(fit.data):
+        parts = _left(fit.hypothesis, fit.data, channel, plain)
+        others = _left(fit.hypothesis, held_out, channel, plain) if held_out.runs else []
+        if not all(np.isfinite(part.left).all() for part in (*parts, *others)):
+            continue  # the twin does not hold the motion
+        found += list(_dependences(fit, held_out, channel, plain, (parts, others)))
+    asked = len(_channels(fit.data)) * len(questions(fit.hypothesis, fit.data, plain))
+    level = CRITERIA.significance / max(asked, 1)
+    counted = [
+        one
+        for one in found
+        if one.found.p < level and one.material > CRITERIA.material and (one.held_out is None or one.held_out > 0.0)
+    ]
+    return tuple(sorted(counted, key=lambda one: -one.explained))
+
+
+def questions(hypothesis: Hypothesis, data: Dataset, plain: PlainModel) -> list[Question]:
+    """Quantities that a residual may depend on."""
+    motions = [measured_motion(run).moved for run in data.runs]
+    physics, ratio = hypothesis.bench.axis.physics(), hypothesis.bench.axis.ratio_m_rad
+    position = tuple(ratio * moved.position for moved in motions)
+    low = min(float(one.min()) for one in position)
+    span = max(float(one.max()) for one in position) - low
+    length = "rad" if hypothesis.bench.axis.turns else "m"
+    up = tuple(one - low + 1.001 * span * (moved.velocity > 0.0) for one, moved in zip(position, motions, strict=True))
+    found = [
+        Question("position", length, position),
+        Question("distance from the first position", length, up, 2 * BINS, by_direction=1.001 * span),
+        Question("speed", f"{length}/s", tuple(ratio * moved.velocity for moved in motions)),
+        Question("load", hypothesis.bench.axis.drive_unit, tuple(plain.predict(moved) for moved in motions)),
+        Question("time", "s", tuple(run.time_s for run in data.runs), kept=False),
+    ]
+    if physics.turn_known:
+        turned = tuple(np.mod(physics.angle_per_unit * moved.position, 2.0 * np.pi) for moved in motions)
+        found.append(Question("motor angle", "rad", turned))
+    return found
+
+
+def _channels(data: Dataset) -> list[str]:
+    torque = data.observability.torque_measured
+    return [*([TORQUE] if torque else []), *([DIFFERENCE] if data.runs[0].table_m.size else [])]
+
+
+def _left(hypothesis: Hypothesis, data: Dataset, channel: str, plain: PlainModel) -> list[Series]:
+    if channel == TORQUE:
+        return needed_torque(hypothesis, data, plain.slowest)
+    return [
+        Series(hypothesis.blocks(run, data.observer_s)["table"], measured_motion(run).sliding(plain.slowest))
+        for run in data.runs
+    ]
+
+
+def _dependences(
+    fit: Fit, held_out: Dataset, channel: str, plain: PlainModel, left: tuple[Sequence[Series], Sequence[Series]]
+) -> Iterator[Dependence]:
+    """Answers to the questions on one channel, (training, held-out) residuals."""
+    parts, others = left
+    noise = float(np.mean([run.noise.torque if channel == TORQUE else run.noise.table_m for run in fit.data.runs]))
+    rows = np.concatenate([part.left[part.rows] for part in parts])
+    total = float(np.mean((rows - rows.mean()) ** 2)) if rows.size else 0.0
+    if not total > 0.0:
+        return
+    elsewhere = questions(fit.hypothesis, held_out, plain) if others else []
+    for number, question in enumerate(questions(fit.hypothesis, fit.data, plain)):
+        found = structure(parts, question.values, question.bins)
+        if found is None:
+            continue
+        gain = None
+        if others and question.kept:
+            gain = _removed(found, others, elsewhere[number].values) / noise**2
+        yield Dependence(channel, question, found, found.energy / total, found.energy / noise**2, gain)
+
+
+def _removed(found: Structure, parts: Sequence[Series], quantity: Sequence[FloatArray]) -> float:
+    """Mean square that a dependence removes from residuals (n,) of other recordings, their means taken off."""
+    left = np.concatenate([part.left[part.rows] for part in parts])
+    if not left.size:
+        return 0.0
+    model = np.concatenate([found.at(one)[part.rows] for one, part in zip(quantity, parts, strict=True)])
+    return float(np.var(left) - np.var(left - model))

@@ -1,0 +1,158 @@
+"""Test for structure: does a residual depend on a quantity more than chance, with errors that count autocorrelation?
+
+    m = A r,    W = m' (A R A')^-1 m,    F = W / (K - 1) * (v - K) / v     against F(K - 1, v - K)
+
+A (K, n) averages the rows of each of K bins of the quantity, R is the autocovariance of what the bin means leave (A. R.
+Gallant, Nonlinear Statistical Models, 1987, sec. 2.1: correction of least squares for autocorrelated errors), tapered
+after Bartlett, and v the number of independent rows. Slow noise moves a whole bin, and is no structure.
+
+Lines over a position are found in the spectrum over it, against the median of its neighbours: white or coloured noise
+makes exponential ordinates (P. Bloomfield, Fourier Analysis of Time Series, 2000, sec. 8.4).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+from scipy.signal import fftconvolve
+from scipy.stats import f as fisher
+
+from hil.arrays import FloatArray
+
+BINS = 10  # of a quantity: a bend, a step and a line show in them; twice as many for one that is asked by direction
+_TAPER = 4  # Bartlett window in correlation times: it shortens the correlation by an eighth
+_DECAYED = 0.05  # of the variance: the correlation time ends there
+_FEWEST_INDEPENDENT = 2.0  # independent rows per bin, below which nothing is told
+_NEIGHBOURS = 101  # ordinates of a spectrum whose median is the noise
+_MOST_ORDINATES = 1 << 17  # of a spectrum over the position
+
+
+class Series(NamedTuple):
+    """A residual (n,) of one recording, and the rows (n,) that count."""
+
+    left: FloatArray
+    rows: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Structure:
+    """Dependence of a residual on a quantity: bin edges (K + 1,), means and their errors (K,), by chance `p`.
+
+    `energy` is the mean square of the means over all rows, less what chance makes of it.
+    """
+
+    edges: FloatArray
+    means: FloatArray
+    errors: FloatArray
+    energy: float
+    p: float
+
+    def at(self, quantity: FloatArray) -> FloatArray:
+        """Mean (n,) of the residual at values of the quantity (n,)."""
+        return np.asarray(self.means[_bin(quantity, self.edges)])
+
+
+@dataclass(frozen=True)
+class Line:
+    """The strongest line over a position: waves per unit of it, amplitude, and the probability of it by chance."""
+
+    waves: float
+    amplitude: float
+    p: float
+
+
+def structure(parts: Sequence[Series], quantity: Sequence[FloatArray], bins: int = BINS) -> Structure | None:
+    """Structure of residuals over a quantity, (n,) for each part; None where there are too few independent rows.
+
+    Bins have equally many rows.
+    """
+    values = np.concatenate([one[part.rows] for one, part in zip(quantity, parts, strict=True)])
+    if values.size < bins or not np.isfinite(values).all():
+        return None
+    edges = np.unique(np.quantile(values, np.linspace(0.0, 1.0, bins + 1)))
+    count = edges.size - 1
+    if count < 2:
+        return None
+    where = [_bin(one, edges) for one in quantity]
+    rows = _sums(parts, where, [part.rows.astype(np.float64) for part in parts], count)
+    mean = _sums(parts, where, [part.left for part in parts], count) / np.maximum(rows, 1.0)
+    share = rows / rows.sum()
+    mean -= share @ mean
+    noise = [part._replace(left=part.left - mean[at]) for part, at in zip(parts, where, strict=True)]
+    correlation = autocovariance(noise)
+    independent = rows.sum() * correlation[0] / max(correlation[0] + 2.0 * correlation[1:].sum(), 1e-300)
+    if not correlation[0] > 0.0 or independent < _FEWEST_INDEPENDENT * count:
+        return None
+    covariance = np.zeros((count, count))
+    for part, at in zip(parts, where, strict=True):
+        covariance += _of_sums(part, at, correlation, count)
+    covariance /= np.outer(np.maximum(rows, 1.0), np.maximum(rows, 1.0))
+    centre = np.eye(count) - share  # the mean of all rows is no structure
+    covariance = centre @ covariance @ centre.T
+    axes, size, _ = np.linalg.svd(covariance)
+    freed = independent - count
+    contrast = (axes.T @ mean)[:-1] ** 2 / size[:-1]
+    ratio = float(contrast.sum()) / (count - 1) * freed / independent
+    errors = np.sqrt(np.diag(covariance))
+    energy = float(share @ (mean**2 - errors**2))
+    return Structure(edges, mean, errors, energy, float(fisher.sf(ratio, count - 1, freed)))
+
+
+def line_over(parts: Sequence[Series], position: Sequence[FloatArray], shortest: float) -> Line | None:
+    """The strongest line of residuals over a position, (n,) for each part; waves of `shortest` or more in its unit."""
+    x = np.concatenate([one[part.rows] for one, part in zip(position, parts, strict=True)])
+    left = np.concatenate([part.left[part.rows] for part in parts])
+    span = float(np.ptp(x)) if x.size else 0.0
+    count = int(min(2.0 * span / shortest, _MOST_ORDINATES)) if shortest > 0.0 else 0
+    if count < 2 * _NEIGHBOURS:
+        return None
+    at = np.minimum(((x - x.min()) / span * count).astype(int), count - 1)
+    spectrum = np.abs(np.fft.rfft(np.bincount(at, weights=left - left.mean(), minlength=count)))[1:] ** 2
+    noise = median_filter(spectrum, _NEIGHBOURS, mode="reflect") / np.log(2.0)
+    ratio = np.divide(spectrum, noise, out=np.zeros_like(spectrum), where=noise > 0.0)
+    peak = int(np.argmax(ratio))
+    amplitude = 2.0 * float(np.sqrt(spectrum[peak])) / left.size
+    p = float(-np.expm1(ratio.size * np.log1p(-np.exp(-min(ratio[peak], 700.0)))))
+    return Line((peak + 1) / span, amplitude, p)
+
+
+def autocovariance(parts: Sequence[Series]) -> FloatArray:
+    """Autocovariance (l,) of residuals over the rows that count, until it has decayed, tapered."""
+    longest = max(part.left.size for part in parts)
+    size = 1 << (2 * longest - 1).bit_length()
+    products, pairs = np.zeros(size // 2 + 1), np.zeros(size // 2 + 1)
+    for part in parts:
+        products += np.abs(np.fft.rfft(np.where(part.rows, part.left, 0.0), size)) ** 2
+        pairs += np.abs(np.fft.rfft(part.rows.astype(np.float64), size)) ** 2
+    half = max(longest // 2, 1)
+    covariance = np.fft.irfft(products, size)[:half] / np.maximum(np.fft.irfft(pairs, size)[:half].round(), 1.0)
+    decayed = np.flatnonzero(covariance <= _DECAYED * covariance[0])
+    length = min(_TAPER * max(int(decayed[0]) if decayed.size else half, 1), half)
+    return np.asarray(covariance[:length] * (1.0 - np.arange(length) / length))
+
+
+def _bin(quantity: FloatArray, edges: FloatArray) -> NDArray[np.intp]:
+    return np.clip(np.searchsorted(edges, quantity, side="right") - 1, 0, edges.size - 2)
+
+
+def _sums(
+    parts: Sequence[Series], where: Sequence[NDArray[np.intp]], values: Sequence[FloatArray], count: int
+) -> FloatArray:
+    """Sums (K,) of values (n,) over the rows of each bin."""
+    found = np.zeros(count)
+    for part, at, one in zip(parts, where, values, strict=True):
+        found += np.bincount(at[part.rows], weights=one[part.rows], minlength=count)
+    return found
+
+
+def _of_sums(part: Series, at: NDArray[np.intp], correlation: FloatArray, count: int) -> FloatArray:
+    """Covariance (K, K) of the sums of the bins of one part."""
+    inside = np.zeros((count, at.size))
+    inside[at[part.rows], np.flatnonzero(part.rows)] = 1.0
+    both = np.concatenate([correlation[:0:-1], correlation])[None, :]
+    first = correlation.size - 1
+    spread = fftconvolve(inside, both, mode="full", axes=1)[:, first : first + at.size]
+    return np.asarray(spread @ inside.T)

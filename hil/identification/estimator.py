@@ -101,17 +101,23 @@ class Fit:
         """True if every channel of every run is at its noise floor."""
         return self.worst_ratio <= FLOOR
 
-    @cached_property
+    @property
     def excess(self) -> float:
         """Energy above the noise floor in units of noise^2."""
+        return sum(self.excess_by_channel.values())
+
+    @cached_property
+    def excess_by_channel(self) -> dict[str, float]:
+        """Energy of each channel above the noise floor in units of noise^2."""
         return self.energy(lambda ratio: max(ratio - 1.0, 0.0))
 
-    def energy(self, of: Callable[[float], float]) -> float:
-        """Sum of a function of the noise ratios over all channels and evaluated rows."""
-        pairs = zip(self.data.runs, self.noise_ratios, strict=True)
-        return float(
-            sum(run.motor[run.evaluated].size * of(ratio) for run, ratios in pairs for ratio in ratios.values())
-        )
+    def energy(self, of: Callable[[float], float]) -> dict[str, float]:
+        """Sum of a function of the noise ratios over all evaluated rows, by channel."""
+        found = dict[str, float]()
+        for run, ratios in zip(self.data.runs, self.noise_ratios, strict=True):
+            for channel, ratio in ratios.items():
+                found[channel] = found.get(channel, 0.0) + run.motor[run.evaluated].size * of(ratio)
+        return found
 
     @cached_property
     def missed_torque(self) -> float:

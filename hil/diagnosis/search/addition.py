@@ -3,7 +3,7 @@
 Quantities are computed when a rule asks for them: each is a simulation or more.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -63,7 +63,9 @@ class Addition:
 
         A channel with a large mismatch of its own does not hide what a term explains of another.
         """
-        return max(_explained(self.base, self.fit), default=0.0)
+        gained = removed_by_channel(self.base, self.fit, self.reference)
+        above, least = self.base.excess_by_channel, CRITERIA.nothing * self.base.data.rows
+        return max((gain / above[name] for name, gain in gained.items() if above[name] > least), default=0.0)
 
     @property
     def beside(self) -> int:
@@ -122,24 +124,18 @@ class Addition:
 
 
 def removed(without: Fit, fit: Fit, reference: Fit) -> float:
-    """Energy that a term removes, by channel, less the share that may be due to the form of the terms before it."""
-    parts = (one.residuals.parts.values() for one in (without, fit, reference))
-    return sum(
-        max(float(a @ a - b @ b) - CRITERIA.form * max(float(n @ n - a @ a), 0.0), 0.0)
-        for a, b, n in zip(*parts, strict=True)
-    )
+    """Energy that a term removes from all channels, see `removed_by_channel`."""
+    return sum(removed_by_channel(without, fit, reference).values())
 
 
-def _explained(without: Fit, fit: Fit) -> Iterator[float]:
-    """Share that the last term of a fit removes from the energy above the noise, for each channel."""
-    for channel in without.noise_ratios[0]:
-        above = gained = 0.0
-        for run, ratios, there in zip(without.data.runs, without.noise_ratios, fit.noise_ratios, strict=True):
-            rows = run.motor[run.evaluated].size
-            above += rows * max(ratios[channel] - 1.0, 0.0)
-            gained += rows * (ratios[channel] - there[channel])
-        if above > CRITERIA.nothing * without.data.rows:
-            yield gained / above
+def removed_by_channel(without: Fit, fit: Fit, reference: Fit) -> dict[str, float]:
+    """Energy that a term removes from each channel, less the share that may be due to the form of those before it."""
+    parts = [one.residuals.parts for one in (without, fit, reference)]
+    found = dict[str, float]()
+    for (_, channel), a, b, n in zip(parts[0], *(one.values() for one in parts), strict=True):
+        gain = float(a @ a - b @ b) - CRITERIA.form * max(float(n @ n - a @ a), 0.0)
+        found[channel] = found.get(channel, 0.0) + max(gain, 0.0)
+    return found
 
 
 def harm(fit: Fit, without: Fit, given: Fit) -> dict[str, Harm]:

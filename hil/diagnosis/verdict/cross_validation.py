@@ -37,7 +37,8 @@ from hil.twin.parameter import Role
 class Ablation:
     """A term and the fit without it.
 
-    `train` and `held_out` are the residual energy without the term over that with it, `laps` the same ratio of the part
+    `channel` is the one in which it explains most: a large mismatch of another says nothing of it. `train` and
+    `held_out` are its residual energy without the term over that with it, `laps` the same ratio of the part
     that does not repeat from lap to lap. `gain` is the evidence for the term on the held-out recordings. They are None
     without held-out recordings or laps, and for an event, whose `train` is the ratio over all recordings. `acts`: the
     term changes the held-out residuals as it does those in training. `clear`: its strength is above its standard error.
@@ -48,6 +49,7 @@ class Ablation:
 
     term: Term
     without: Fit
+    channel: str
     train: float
     held_out: float | None
     gain: float | None
@@ -99,8 +101,8 @@ def cross_validate(nominal: Fit, final: Fit, held_out: Dataset) -> CrossValidati
             final = claimed(final.refit(30))
 
 
-def energy(fit: Fit) -> float:
-    """Energy of the residuals block by block in units of noise^2, at least that of the noise."""
+def by_channel(fit: Fit) -> dict[str, float]:
+    """Energy of the residuals of each channel in units of noise^2, at least that of the noise."""
     return fit.energy(lambda ratio: max(ratio, 1.0))
 
 
@@ -118,20 +120,25 @@ def _ablate(given: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> list[Abl
         return final.estimator.fit(rest, evaluations=12) if rest.terms else nominal
 
     fits = in_parallel([partial(without, index) for index in range(len(final.terms))])
-    own, own_held_out = energy(final), final.on(held_out) if held_out.runs else None
+    own, own_held_out = by_channel(final), final.on(held_out) if held_out.runs else None
     differs = unrepeated(final.hypothesis, final.data)
     clear = _clear(final)
 
     def ablation(index: int, term: Term, other: Fit) -> Ablation:
         there = other.on(held_out) if held_out.runs else None
-        train, more, gain = energy(other) / own, None, None
-        if there and own_held_out and term.windows:  # an event is found in each recording: none is a test of another
-            train = (energy(other) + energy(there)) / (own + energy(own_held_out))
-        elif there and own_held_out:
-            more, gain = energy(there) / energy(own_held_out), _gain(own_held_out, there)
+        factors = {channel: value / own[channel] for channel, value in by_channel(other).items()}
+        channel = max(factors, key=lambda name: factors[name])
+        train, more, gain = factors[channel], None, None
+        if there and own_held_out:
+            beyond, inside = by_channel(there)[channel], by_channel(own_held_out)[channel]
+            if term.windows:  # an event is found in each recording: none is a test of another
+                train = (train * own[channel] + beyond) / (own[channel] + inside)
+            else:
+                more, gain = beyond / inside, _gain(own_held_out, there)
         return Ablation(
             term,
             other,
+            channel,
             train,
             more,
             gain,

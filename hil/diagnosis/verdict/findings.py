@@ -13,7 +13,7 @@ from hil.bench.axis_fields import RATIOS
 from hil.bench.bench_file import Bench, MechanismEntry
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.result import Correction, Finding, Rival, Value
-from hil.diagnosis.search.initial_values import claimable
+from hil.diagnosis.search.initial_values import axis_facts, claimable
 from hil.diagnosis.search.rivals import RivalFit
 from hil.diagnosis.stages import Searched
 from hil.diagnosis.verdict.confidence import confidence
@@ -24,6 +24,7 @@ from hil.identification.coordinates import DELAY
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.inference import standard_errors
+from hil.identification.measured import Measured
 from hil.identification.terms import Key, Term, ambiguous, same_torque
 from hil.quantities import digits, unit_of
 from hil.twin.library import BY_ID
@@ -57,7 +58,7 @@ def findings(
 ) -> tuple[Finding, ...]:
     """Make a finding of each term that is not part of another (`forms`), the one with most energy first."""
     deviations = standard_errors(final)
-    left = math.sqrt(max(final.on(data).worst_ratio for data in (final.data, held_out) if data.runs))
+    fits = [final.on(data) for data in (final.data, held_out) if data.runs]
     bench, terms, runs = final.bench, final.terms, final.data.runs
     result = []
     for index, (term, ablation) in enumerate(zip(terms, ablations, strict=True)):
@@ -79,7 +80,8 @@ def findings(
                 Finding(
                     effect=term.effect,
                     variant=BY_ID[term.effect].forms[term.variant],
-                    confidence=confidence(left, _factor(ablation), margin),
+                    confidence=_sure(term, errors, bench, runs)
+                    * confidence(_left(fits, ablation.channel), _factor(ablation), margin),
                     equivalents=tuple(dict.fromkeys(tied)),
                     rivals=tuple(
                         Rival(effect=rival.terms[-1].effect, evidence=rival_in_words(rival, term)) for rival in rivals
@@ -158,6 +160,18 @@ def _values(term: Term, errors: Sequence[float], bench: Bench) -> dict[str, Valu
         parameter.name: Value(value=value, std=error, unit=unit_in(bench, parameter))
         for parameter, value, error in zip(BY_ID[term.effect].parameters, _normal(term).values, errors, strict=True)
     }
+
+
+def _sure(term: Term, errors: Sequence[float], bench: Bench, runs: Sequence[Measured]) -> float:
+    """Least probability that a strength differs from no effect, whatever the distribution of its error (Chebyshev)."""
+    mechanism = BY_ID[term.effect]
+    size, error = mechanism.size(term.values, axis_facts(bench, runs)), errors[mechanism.strength]
+    return max(1.0 - (error / size) ** 2, 0.0) if size > 0.0 and math.isfinite(error) else float(error == 0.0)
+
+
+def _left(fits: Sequence[Fit], channel: str) -> float:
+    """Largest rms of a channel over its noise."""
+    return math.sqrt(max(ratios[channel] for fit in fits for ratios in fit.noise_ratios))
 
 
 def _factor(ablation: Ablation) -> float:

@@ -162,6 +162,6 @@ def test_a_score_must_promise_evidence_and_energy() -> None:
 
 def test_answers_after_a_refusal_are_left_out() -> None:
     passed, failed = (examine(ADDED, addition(evidence=value), CRITERIA) for value in (500.0, 1.0))
-    one = Considered("any", 0, (), passed)
+    one = Considered(("any", 0, 0), (), passed)
     assert one.asked(failed).ledger == (*passed, *failed)
     assert one.asked(failed).asked(passed).ledger == (*passed, *failed)

@@ -34,7 +34,9 @@ def test_what_explains_more_is_named_unless_there_is_an_objection(monkeypatch: p
     assert rival.terms[-1].effect == OTHER.effect
     assert rival.evidence > 0.0
     assert not rival.tied
-    assert [(one.effect, one.accepted) for one in choice.considered] == [(LOAD.effect, True), (OTHER.effect, False)]
+    rival_entry, entry = choice.considered
+    assert (rival_entry.key, rival_entry.accepted, rival_entry.added) == (OTHER.key, False, False)
+    assert (entry.key, entry.accepted, entry.added) == (LOAD.key, True, True)
 
     monkeypatch.setattr(rivals, "first_standing", lambda additions: additions[-1])
     monkeypatch.setattr(
@@ -46,7 +48,7 @@ def test_what_explains_more_is_named_unless_there_is_an_objection(monkeypatch: p
     assert rival.evidence < 0.0
     assert rival.objection == "it is excluded"
     assert not rival.tied
-    assert choice.considered[1].ledger[-1].text == "it is excluded"
+    assert choice.considered[0].ledger[-1].text == "it is excluded"
 
 
 def explained(cost: float, motor: float, table: float) -> Any:

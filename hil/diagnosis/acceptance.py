@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     from hil.diagnosis.verdict.judge import Remainder
 
 
-def _values(of: Addition, c: Criteria) -> Answer:
-    return of.valid, {}
+def _values(valid: bool, c: Criteria) -> Answer:
+    return valid, {}
 
 
 def promises(share: float, cost: float, rows: int, c: Criteria = CRITERIA) -> bool:
@@ -161,7 +161,7 @@ _MATERIAL: Rule[Addition | Need] = Rule(
     "two correct simulations of one axis differ by less",
     _material,
 )
-VALUES: tuple[Rule[Addition], ...] = (
+VALUES: tuple[Rule[bool], ...] = (
     Rule(
         "values",
         "its values are valid for the mechanism, and its block is observed",

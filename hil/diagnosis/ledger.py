@@ -52,10 +52,10 @@ class Considered:
     added: bool = False
 
     @classmethod
-    def of(cls, terms: Sequence[Term], ledger: Ledger) -> "Considered":
-        """The last of the terms of a fit."""
-        *beside, term = terms
-        return cls(term.key, tuple(one.effect for one in beside), ledger)
+    def of(cls, terms: Sequence[Term], ledger: Ledger, index: int = -1) -> "Considered":
+        """One of the terms of a fit, by default the last."""
+        term = terms[index]
+        return cls(term.key, tuple(one.effect for one in terms if one is not term), ledger)
 
     @property
     def accepted(self) -> bool:

@@ -88,11 +88,6 @@ class Addition:
         return claimable(self.fit.terms[-1], self.fit.bench, self.fit.data.runs)
 
     @cached_property
-    def values(self) -> Ledger:
-        """Answer of the rule on the values of the term."""
-        return examine(VALUES, self, CRITERIA)
-
-    @cached_property
     def conditions(self) -> Ledger:
         """Answers of the rules on evidence, size and form."""
         return examine(ADDED, self, CRITERIA)
@@ -115,7 +110,8 @@ class Addition:
     @property
     def considered(self) -> Considered:
         """The candidate and its ledger; channels are in it where the choice has asked for them."""
-        return Considered.of(self.fit.terms, (*self.conditions, *self.__dict__.get("harmless", ())))
+        more = (*self.conditions, *self.__dict__.get("harmless", ())) if self.valid else ()
+        return Considered.of(self.fit.terms, (*examine(VALUES, self.valid, CRITERIA), *more))
 
 
 def removed(without: Fit, fit: Fit, reference: Fit) -> float:

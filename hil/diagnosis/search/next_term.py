@@ -51,8 +51,8 @@ def next_term(search: SearchRound, candidates: Sequence[Candidate], step: Progre
 
     def valid(fits: Sequence[Fit]) -> list[Addition]:
         additions = [search.addition(fit) for fit in fits]
-        considered.extend(Considered.of(one.fit.terms, one.values) for one in additions if not accepted(one.values))
-        return [one for one in additions if accepted(one.values)]
+        considered.extend(one.considered for one in additions if not one.valid)
+        return [one for one in additions if one.valid]
 
     if base.at_floor and not base.data.observability.exact_input:
         return Additions([], None)
@@ -80,10 +80,10 @@ def next_term(search: SearchRound, candidates: Sequence[Candidate], step: Progre
         best = first_standing(found)
     if best is not None and not best.fit.at_floor and search.unfinished and (other := companion(base, best.fit)):
         step(f"fitting {best.fit.terms[-1].effect} together with {other.effect}")
-        pairs = [
-            pair for pair in valid(together(base, best.fit, other)) if pair.fit.cost < CRITERIA.clear * best.fit.cost
-        ]
-        found = _ordered([*found, *pairs])
+        pairs = valid(together(base, best.fit, other))
+        clear = [pair for pair in pairs if pair.fit.cost < CRITERIA.clear * best.fit.cost]
+        considered += [pair.considered for pair in pairs if pair not in clear]
+        found = _ordered([*found, *clear])
         best = first_standing(found)
     return Additions(found, best, tuple(considered))
 

@@ -88,7 +88,8 @@ def chosen(best: Addition, additions: Sequence[Addition], search: SearchRound) -
     named = _on_fewest_parts(_simplest(best, standing), [best, *standing])
     filters = whitening(named.fit)
     compared = [(one, _compared(one, named, filters)) for one in order if one is not named]
-    considered = [one.considered.asked(rival.ledger) for one, rival in compared]
+    considered = [one.considered for one in others if not one.valid]
+    considered += [one.considered.asked(rival.ledger) for one, rival in compared]
     considered.append(replace(named.considered, added=True))
     return Choice(named, sorted((rival for _, rival in compared), key=lambda rival: rival.evidence), tuple(considered))
 

@@ -29,7 +29,6 @@ ROOT = Path(acceptance.__file__).parent
 def addition(**quantities: Any) -> Any:
     """A term that passes every rule, but for the quantities given."""
     usual = {
-        "valid": True,
         "evidence": 500.0,
         "gain": 900.0,
         "rows": 1000,
@@ -107,7 +106,7 @@ def test_more_evidence_and_energy_never_turn_accepted_into_refuted(evidence: flo
 
 def test_form_and_values_are_asked_alone_too() -> None:
     assert accepted(examine(FORM, addition(evidence=-1.0), CRITERIA))
-    assert not accepted(examine(VALUES, addition(valid=False), CRITERIA))
+    assert not accepted(examine(VALUES, False, CRITERIA))
 
 
 def test_a_channel_that_pays_is_named() -> None:

@@ -70,7 +70,7 @@ def next_term(search: SearchRound, candidates: Sequence[Candidate], step: Progre
         and base.excess > CRITERIA.nothing * base.rows
         and may_hide(base)
     ):
-        step("fitting a lost preload from the springs of the bench file")
+        step("fitting mechanisms that springs may hide from the springs of the bench file")
         found = _ordered([*found, search.addition(unbent(base))])
         best = first_standing(found)
     if best is None and not base.at_floor and search.unfinished:

@@ -61,7 +61,7 @@ def _laps(of: Addition, c: Criteria) -> Answer | None:
     left, before = of.unrepeated
     if not left and not before:  # no motion repeats
         return None
-    return c.repeats * left <= before, {"ratio": left / before if before else 1.0}
+    return c.repeats * left <= before, {"without_over_with": before / left if left else math.inf}
 
 
 def _constant(of: Addition, c: Criteria) -> Answer | None:
@@ -118,7 +118,7 @@ def _predicts(of: Ablation, c: Criteria) -> Answer | None:
 
 
 def _repeats(of: Ablation, c: Criteria) -> Answer | None:
-    return None if of.laps is None else (of.laps >= c.repeats, {"ratio": of.laps})
+    return None if of.laps is None else (of.laps >= c.repeats, {"without_over_with": of.laps})
 
 
 def _strength(of: Ablation, c: Criteria) -> Answer:

@@ -104,6 +104,12 @@ def test_more_evidence_and_energy_never_turn_accepted_into_refuted(evidence: flo
     assert after or not before
 
 
+def test_both_rules_on_laps_give_what_differs_without_the_term_over_that_with_it() -> None:
+    held_out: Any = SimpleNamespace(gain=None, laps=0.5)
+    entries = examine(FORM, addition(unrepeated=(100.0, 50.0)), CRITERIA)[0], examine(HELD_OUT, held_out, CRITERIA)[0]
+    assert [entry.figures for entry in entries] == [{"without_over_with": 0.5}] * 2
+
+
 def test_form_and_values_are_asked_alone_too() -> None:
     assert accepted(examine(FORM, addition(evidence=-1.0), CRITERIA))
     assert not accepted(examine(VALUES, False, CRITERIA))

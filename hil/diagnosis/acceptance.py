@@ -1,7 +1,6 @@
-"""What a mechanism must show before it is named: all constants of evidence, and the table of rules.
+"""Accept or refute a mechanism by rules, each a pure function of measured quantities (`hil.diagnosis.ledger`).
 
-Each rule is a pure function of measured quantities (`hil.diagnosis.ledger`). `promises` decides before a candidate is
-fitted; the rules are asked at six moments:
+The comment on a rule is its reason. `promises` decides before a candidate is fitted; the rules are asked at six moments:
 
     VALUES     on the fitted values of a candidate
     ADDED      on the fit with one more term, against the fit without it; HARMLESS: and its channels
@@ -147,126 +146,126 @@ def names_stand(left: float, above: float, c: Criteria = CRITERIA) -> bool:
     return left <= c.most_left and (left <= c.little or above <= c.floor or left * above**0.5 <= c.far)
 
 
+# Schwarz 1978; Kass and Raftery 1995, with the price of a search over the library
 _EVIDENCE: Rule[Addition | Need] = Rule(
     "evidence",
     "the evidence for it is {evidence:.0f} (BIC difference), needed {needed:.0f}",
     "the evidence for it is {evidence:.0f} (BIC difference), needed {needed:.0f}",
-    "Schwarz 1978; Kass and Raftery 1995, with the price of a search over the library",
     _evidence,
 )
+# two correct simulations of one axis differ by less
 _MATERIAL: Rule[Addition | Need] = Rule(
     "material energy",
     "it removes {removed:.3g} noise² per row, needed {needed:.3g}",
     "it removes {removed:.3g} noise² per row, needed {needed:.3g}",
-    "two correct simulations of one axis differ by less",
     _material,
 )
 VALUES: tuple[Rule[bool], ...] = (
+    # the condition of each mechanism (`Mechanism.is_valid`): else its name does not apply
     Rule(
         "values",
         "its values are valid for the mechanism, and its block is observed",
         "its values are not valid for the mechanism, or its block is not observed",
-        "the condition of each mechanism (`Mechanism.is_valid`): else its name does not apply",
         _values,
     ),
 )
 FORM: tuple[Rule[Addition], ...] = (
+    # what repeats with the motion is no matter of chance
     Rule(
         "repeated laps",
         "repeated laps are reproduced as well as without it",
         "with it the repeated laps are reproduced worse",
-        "what repeats with the motion is no matter of chance",
         _laps,
     ),
+    # an external force; what depends on place or speed leaves its form inside
     Rule(
         "constant force",
         "the force is constant within its windows",
         "the force is not constant within its windows",
-        "an external force; what depends on place or speed leaves its form inside",
         _constant,
     ),
 )
 ADDED: tuple[Rule[Addition], ...] = (
     _EVIDENCE,
     _MATERIAL,
+    # many small terms are a series expansion of one effect
     Rule(
         "share of the mismatch",
         "it removes {explained:.1%} of the energy above the noise, needed {needed:.0%}",
         "it removes {explained:.1%} of the energy above the noise, needed {needed:.0%}: such terms are a series",
-        "many small terms are a series expansion of one effect",
         _worth,
     ),
     *FORM,
 )
 HARMLESS: tuple[Rule[Addition], ...] = (
+    # a real effect pays with no channel for another
     Rule(
         "channels",
         "it makes no channel worse",
         "with it the training recordings are reproduced worse in {channels}",
-        "a real effect pays with no channel for another",
         _channels,
     ),
 )
 NEEDED: tuple[Rule[Addition | Need], ...] = (_EVIDENCE, _MATERIAL)
 COMPARED: tuple[Rule[RivalFit], ...] = (
+    # a rival is refuted by very strong evidence and by more than the model discrepancy
     Rule(
         "beside the named one",
         "the recordings do not separate them: evidence against it {against:.0f}, {more:.3g} noise² per row more",
         "the named one explains more: evidence against it {against:.0f}, {more:.3g} noise² per row more",
-        "a rival is refuted by very strong evidence and by more than the model discrepancy",
         _not_behind,
     ),
+    # the conditions of a term
     Rule(
         "as the cause",
         "nothing speaks against it as the cause",
         "{objection}",
-        "the conditions of a term",
         _no_objection,
     ),
 )
 HELD_OUT: tuple[Rule[Ablation], ...] = (
+    # prediction; motion without its effect does not refute it
     Rule(
         "held-out recordings",
         "held-out recordings are reproduced no worse with it",
         "it improves the fit to the training recordings, but worsens that to held-out recordings",
-        "prediction; motion without its effect does not refute it",
         _predicts,
     ),
+    # what repeats with the motion is no matter of chance
     Rule(
         "repeated laps, held out",
         "repeated laps are reproduced as well as without it",
         "it improves the fit to the training recordings, but worsens that to repeated laps",
-        "what repeats with the motion is no matter of chance",
         _repeats,
     ),
+    # sandwich estimator of `standard_errors`
     Rule(
         "strength",
         "its strength is above its standard error",
         "its strength is below its standard error",
-        "sandwich estimator of `standard_errors`",
         _strength,
     ),
+    # `verdict.noise_free`
     Rule(
         "motion without noise",
         "it acts on the motion, not only on the noise of the sensors",
         "it changes what the noise of the sensors does in the twin, and hardly the motion",
-        "`verdict.noise_free`",
         _moves,
     ),
+    # a real effect pays with no channel for another
     Rule(
         "channels, all terms",
         "it makes no channel worse",
         "with it the training recordings are reproduced worse in {channels}",
-        "a real effect pays with no channel for another",
         _channels,
     ),
 )
 EXPLAINED: tuple[Rule[Remainder], ...] = (
+    # the true mechanism in another form leaves little
     Rule(
         "explains the mismatch",
         "all terms leave {left:.1%} of the energy above the noise",
         "all terms leave {left:.1%} of the energy above the noise, a channel {above:.3g} times its noise (square)",
-        "the true mechanism in another form leaves little",
         _explains,
     ),
 )

@@ -23,7 +23,6 @@ class Rule(Generic[_M]):
     name: str
     asks: str
     refusal: str
-    reason: str
     test: Callable[[_M, Any], Answer | None]
 
 

@@ -1,6 +1,6 @@
 """Accept or refute a mechanism by rules, each a pure function of measured quantities (`hil.diagnosis.ledger`).
 
-The comment on a rule is its reason. `promises` decides before a candidate is fitted; the rules are asked at six moments:
+The comment on a rule is its reason. `promises` decides before a candidate is fitted; rules are asked at six moments:
 
     VALUES     on the fitted values of a candidate
     ADDED      on the fit with one more term, against the fit without it; HARMLESS: and its channels

@@ -1,4 +1,4 @@
-"""A fit with one more term than its base, and what the rules of `acceptance.ADDED` ask of it.
+"""Measure a fit with one more term than its base for the rules of `acceptance.ADDED`.
 
 Quantities are computed when a rule asks for them: each is a simulation or more.
 """
@@ -74,7 +74,7 @@ class Addition:
 
     @cached_property
     def inside(self) -> InsideWindows | None:
-        """What a force leaves within its windows; None for a permanent term."""
+        """Residuals inside and outside the windows of a force; None for a permanent term."""
         return inside_windows(self.fit, self.base)
 
     @cached_property

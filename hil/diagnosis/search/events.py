@@ -215,7 +215,7 @@ class InsideWindows(NamedTuple):
 
 
 def inside_windows(fit: Fit, base: Fit) -> InsideWindows | None:
-    """What the force of a fit leaves within its windows; None without one. `base` is the fit without the force."""
+    """Measure what the force of a fit leaves within its windows; None without one. `base` is the fit without it."""
     index = _index(fit)
     if index is None:
         return None

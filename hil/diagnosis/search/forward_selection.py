@@ -35,7 +35,7 @@ MOST_TERMS = 8  # at once: more than an engineer can act on; limits the duration
 
 @dataclass(frozen=True)
 class Need:
-    """What a term explains beside all others: evidence (BIC difference), energy [noise^2], rows of the residuals."""
+    """Need of a term beside all others: evidence (BIC difference), energy it removes [noise^2], number of residuals."""
 
     evidence: float
     gain: float

@@ -1,4 +1,4 @@
-"""Which of several explanations of one residual is named, and how the others compare with it.
+"""Choose the explanation of a residual to name, and compare the others with it.
 
 The named one is the first that can be the cause. An explanation whose evidence is not worse is tied with it, or there
 is an objection to it: a reason beside its evidence.
@@ -100,7 +100,7 @@ def ended(fit: Fit) -> Fit:
 
 
 def objection(one: Addition, named: Addition) -> str:
-    """Why a term cannot be named instead of another, whatever it explains; empty if it can."""
+    """Reason against a term in place of another, whatever it explains; empty if there is none."""
     if reason := refusal(one.form):
         return reason
     worse = sorted(paying(one.harm) - paying(named.harm))
@@ -155,7 +155,7 @@ def _compared(one: Addition, named: Addition, filters: Sequence[Filter]) -> Riva
 
 
 def _behind(one: Addition, named: Addition) -> str:
-    """Why an explanation with better evidence and no objection is not the named one."""
+    """Reason why an explanation with better evidence and no objection is not the named one."""
     if _parts(one) > _parts(named):
         return "it acts on more parts of the axis"
     if one.fit.hypothesis.free > named.fit.hypothesis.free:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-from hil.diagnosis.acceptance import ADDED, FORM, HARMLESS, VALUES
+from hil.diagnosis.acceptance import ADDED, HARMLESS, VALUES
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.ledger import Considered, Ledger, accepted, examine
 from hil.diagnosis.search.events import InsideWindows, inside_windows
@@ -91,11 +91,6 @@ class Addition:
     def conditions(self) -> Ledger:
         """Answers of the rules on evidence, size and form."""
         return examine(ADDED, self, CRITERIA)
-
-    @cached_property
-    def form(self) -> Ledger:
-        """Answers of the rules on its form alone: whether the term can be the cause, whatever it explains."""
-        return examine(FORM, self, CRITERIA)
 
     @cached_property
     def harmless(self) -> Ledger:

@@ -41,19 +41,14 @@ class Event(NamedTuple):
     level: float
 
 
-def without_events(fit: Fit) -> Fit:
-    """Evaluate a fit without its events."""
-    events = [index for index, term in enumerate(fit.hypothesis.terms) if term.windows]
-    return fit.estimator.evaluate(fit.hypothesis.without(*events)) if events else fit
-
-
 def detect(fit: Fit) -> list[Event]:
     """Find the events of all runs of a fit, beside its permanent terms; none about a reversal.
 
     They are those that hold nearly all energy of the windows: a fit that begins with many faint ones ends nowhere. What
     those leave shows beside the fitted ones (`left_over`).
     """
-    events = _of_fit(without_events(fit), False)
+    known = [index for index, term in enumerate(fit.hypothesis.terms) if term.windows]
+    events = _of_fit(fit.estimator.evaluate(fit.hypothesis.without(*known)) if known else fit, False)
     left_out = faint([(one.start_s, one.end_s, one.level) for one in events])
     return [one for one, leave in zip(events, left_out, strict=True) if not leave]
 

@@ -56,9 +56,8 @@ def next_term(search: SearchRound, candidates: Sequence[Candidate], step: Progre
 
     if base.at_floor and not base.data.observability.exact_input:
         return Additions([], None)
-    promising = [one for one in candidates if promises(one.share, base.cost, base.rows)]
     additions = list[Addition]()
-    if promising:
+    if promising := [one for one in candidates if promises(one.share, base.cost, base.rows)]:
         step("fitting " + ", ".join(one.term.effect for one in promising[:3]))
         additions = valid(race(base, promising))
     best = first_standing(additions)

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hil.diagnosis.acceptance import COMPARED, paying
+from hil.diagnosis.acceptance import COMPARED, FORM, paying
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.ledger import Considered, Ledger, accepted, examine, refusal
 from hil.diagnosis.search.addition import Addition
@@ -101,7 +101,7 @@ def ended(fit: Fit) -> Fit:
 
 def objection(one: Addition, named: Addition) -> str:
     """Reason against a term in place of another, whatever it explains; empty if there is none."""
-    if reason := refusal(one.form):
+    if reason := refusal(examine(FORM, one, CRITERIA)):
         return reason
     worse = sorted(paying(one.harm) - paying(named.harm))
     return f"with it the training recordings are reproduced worse in {', '.join(worse)}" if worse else ""

@@ -1,7 +1,7 @@
-"""What a mechanism must show before it is named: all constants of evidence, and the table of rules.
+"""Accept or refute a mechanism by rules, each a pure function of measured quantities (`hil.diagnosis.ledger`).
 
-Each rule is a pure function of measured quantities (`hil.diagnosis.ledger`). `promises` decides before a candidate is
-fitted; the rules are asked at seven moments:
+The comment on a rule is its reason. `promises` decides before a candidate is fitted; rules are asked at six moments,
+and on a twin without new terms at a seventh (`hil.diagnosis.reproduced`):
 
     VALUES     on the fitted values of a candidate
     ADDED      on the fit with one more term, against the fit without it; HARMLESS: and its channels
@@ -9,7 +9,6 @@ fitted; the rules are asked at seven moments:
     COMPARED   on another explanation of the same residual, against the named one
     HELD_OUT   on each term of the final fit, by the recordings that nothing was fitted to
     EXPLAINED  on all terms together
-    REPRODUCED on a twin without new terms
 """
 
 from __future__ import annotations
@@ -19,6 +18,7 @@ from typing import TYPE_CHECKING
 
 from hil.diagnosis.criteria import CRITERIA, Criteria
 from hil.diagnosis.ledger import Answer, Rule
+from hil.diagnosis.reproduced import REPRODUCED
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -29,11 +29,10 @@ if TYPE_CHECKING:
     from hil.diagnosis.search.rivals import RivalFit
     from hil.diagnosis.verdict.cross_validation import Ablation
     from hil.diagnosis.verdict.judge import Remainder
-    from hil.diagnosis.verdict.reproduction import Reproduction
 
 
-def _values(of: Addition, c: Criteria) -> Answer:
-    return of.valid, {}
+def _values(valid: bool, c: Criteria) -> Answer:
+    return valid, {}
 
 
 def promises(share: float, cost: float, rows: int, c: Criteria = CRITERIA) -> bool:
@@ -63,7 +62,7 @@ def _laps(of: Addition, c: Criteria) -> Answer | None:
     left, before = of.unrepeated
     if not left and not before:  # no motion repeats
         return None
-    return c.repeats * left <= before, {"ratio": left / before if before else 1.0}
+    return c.repeats * left <= before, {"without_over_with": before / left if left else math.inf}
 
 
 def _constant(of: Addition, c: Criteria) -> Answer | None:
@@ -120,7 +119,7 @@ def _predicts(of: Ablation, c: Criteria) -> Answer | None:
 
 
 def _repeats(of: Ablation, c: Criteria) -> Answer | None:
-    return None if of.laps is None else (of.laps >= c.repeats, {"ratio": of.laps})
+    return None if of.laps is None else (of.laps >= c.repeats, {"without_over_with": of.laps})
 
 
 def _strength(of: Ablation, c: Criteria) -> Answer:
@@ -136,25 +135,6 @@ def _torque_held_out(of: Ablation, c: Criteria) -> Answer | None:
         return None
     left, without = of.torque
     return left - without <= c.material, {"left": left**0.5, "without": without**0.5}
-
-
-def _within_noise(of: Reproduction, c: Criteria) -> Answer:
-    return of.worst <= c.floor, {"worst": of.worst**0.5}
-
-
-def _within_noise_elsewhere(of: Reproduction, c: Criteria) -> Answer | None:
-    return None if of.held_out is None else (of.held_out <= c.elsewhere, {"worst": of.held_out**0.5})
-
-
-def _without_structure(of: Reproduction, c: Criteria) -> Answer:
-    return not of.structure, {"structure": of.structure}
-
-
-def _no_worse_than_plain(of: Reproduction, c: Criteria) -> Answer | None:
-    if of.torque is None:
-        return None
-    left, plain = of.torque
-    return left - plain <= c.material, {"left": left**0.5, "plain": plain**0.5}
 
 
 def _explains(of: Remainder, c: Criteria) -> Answer:
@@ -175,164 +155,134 @@ def names_stand(left: float, above: float, c: Criteria = CRITERIA) -> bool:
     return left <= c.most_left and (left <= c.little or above <= c.floor or left * above**0.5 <= c.far)
 
 
+# Schwarz 1978; Kass and Raftery 1995, with the price of a search over the library
 _EVIDENCE: Rule[Addition | Need] = Rule(
     "evidence",
     "the evidence for it is {evidence:.0f} (BIC difference), needed {needed:.0f}",
     "the evidence for it is {evidence:.0f} (BIC difference), needed {needed:.0f}",
-    "Schwarz 1978; Kass and Raftery 1995, with the price of a search over the library",
     _evidence,
 )
+# two correct simulations of one axis differ by less
 _MATERIAL: Rule[Addition | Need] = Rule(
     "material energy",
     "it removes {removed:.3g} noise² per row, needed {needed:.3g}",
     "it removes {removed:.3g} noise² per row, needed {needed:.3g}",
-    "two correct simulations of one axis differ by less",
     _material,
 )
-VALUES: tuple[Rule[Addition], ...] = (
+VALUES: tuple[Rule[bool], ...] = (
+    # the condition of each mechanism (`Mechanism.is_valid`): else its name does not apply
     Rule(
         "values",
         "its values are valid for the mechanism, and its block is observed",
         "its values are not valid for the mechanism, or its block is not observed",
-        "the condition of each mechanism (`Mechanism.is_valid`): else its name does not apply",
         _values,
     ),
 )
 FORM: tuple[Rule[Addition], ...] = (
+    # what repeats with the motion is no matter of chance
     Rule(
         "repeated laps",
         "repeated laps are reproduced as well as without it",
         "with it the repeated laps are reproduced worse",
-        "what repeats with the motion is no matter of chance",
         _laps,
     ),
+    # an external force; what depends on place or speed leaves its form inside
     Rule(
         "constant force",
         "the force is constant within its windows",
         "the force is not constant within its windows",
-        "an external force; what depends on place or speed leaves its form inside",
         _constant,
     ),
 )
 ADDED: tuple[Rule[Addition], ...] = (
     _EVIDENCE,
     _MATERIAL,
+    # many small terms are a series expansion of one effect
     Rule(
         "share of the mismatch",
         "it removes {explained:.1%} of the energy above the noise, needed {needed:.0%}",
         "it removes {explained:.1%} of the energy above the noise, needed {needed:.0%}: such terms are a series",
-        "many small terms are a series expansion of one effect",
         _worth,
     ),
     *FORM,
 )
 HARMLESS: tuple[Rule[Addition], ...] = (
+    # a real effect pays with no channel for another
     Rule(
         "channels",
         "it makes no channel worse",
         "with it the training recordings are reproduced worse in {channels}",
-        "a real effect pays with no channel for another",
         _channels,
     ),
 )
 NEEDED: tuple[Rule[Addition | Need], ...] = (_EVIDENCE, _MATERIAL)
 COMPARED: tuple[Rule[RivalFit], ...] = (
+    # a rival is refuted by very strong evidence and by more than the model discrepancy
     Rule(
         "beside the named one",
         "the recordings do not separate them: evidence against it {against:.0f}, {more:.3g} noise² per row more",
         "the named one explains more: evidence against it {against:.0f}, {more:.3g} noise² per row more",
-        "a rival is refuted by very strong evidence and by more than the model discrepancy",
         _not_behind,
     ),
+    # the conditions of a term
     Rule(
         "as the cause",
         "nothing speaks against it as the cause",
         "{objection}",
-        "the conditions of a term",
         _no_objection,
     ),
 )
 HELD_OUT: tuple[Rule[Ablation], ...] = (
+    # prediction; motion without its effect does not refute it
     Rule(
         "held-out recordings",
         "held-out recordings are reproduced no worse with it",
         "it improves the fit to the training recordings, but worsens that to held-out recordings",
-        "prediction; motion without its effect does not refute it",
         _predicts,
     ),
+    # what repeats with the motion is no matter of chance
     Rule(
         "repeated laps, held out",
         "repeated laps are reproduced as well as without it",
         "it improves the fit to the training recordings, but worsens that to repeated laps",
-        "what repeats with the motion is no matter of chance",
         _repeats,
     ),
+    # sandwich estimator of `standard_errors`
     Rule(
         "strength",
         "its strength is above its standard error",
         "its strength is below its standard error",
-        "sandwich estimator of `standard_errors`",
         _strength,
     ),
+    # `verdict.noise_free`
     Rule(
         "motion without noise",
         "it acts on the motion, not only on the noise of the sensors",
         "it changes what the noise of the sensors does in the twin, and hardly the motion",
-        "`verdict.noise_free`",
         _moves,
     ),
+    # a torque on the axis shows in the torque; errors of sensors may not
     Rule(
         "torque, held out",
         "the torque of held-out motion is predicted no worse with it",
         "with it the twin leaves {left:.3g} times the noise of the torque on held-out motion, without it {without:.3g}",
-        "a torque on the axis shows in the torque; errors of sensors may not",
         _torque_held_out,
     ),
+    # a real effect pays with no channel for another
     Rule(
         "channels, all terms",
         "it makes no channel worse",
         "with it the training recordings are reproduced worse in {channels}",
-        "a real effect pays with no channel for another",
         _channels,
     ),
 )
 EXPLAINED: tuple[Rule[Remainder], ...] = (
+    # the true mechanism in another form leaves little
     Rule(
         "explains the mismatch",
         "all terms leave {left:.1%} of the energy above the noise",
         "all terms leave {left:.1%} of the energy above the noise, a channel {above:.3g} times its noise (square)",
-        "the true mechanism in another form leaves little",
         _explains,
-    ),
-)
-REPRODUCED: tuple[Rule[Reproduction], ...] = (
-    Rule(
-        "within the noise",
-        "every channel is within its noise, {worst:.3g} times its rms at most",
-        "a channel is at {worst:.3g} times its noise (rms)",
-        "measurement noise of each channel, see `hil.identification.noise_floor`",
-        _within_noise,
-    ),
-    Rule(
-        "within the noise, held out",
-        "held-out recordings are within their noise, {worst:.3g} times its rms at most",
-        "on held-out recordings a channel is at {worst:.3g} times its noise (rms)",
-        "prediction; errors of fitted parameters leave as much as the noise",
-        _within_noise_elsewhere,
-    ),
-    Rule(
-        "structure",
-        "what is left depends on no position, angle, speed, load or time",
-        "what is left has a structure: {structure}",
-        "noise depends on nothing (`hil.identification.structure`); errors count autocorrelation and the questions",
-        _without_structure,
-    ),
-    Rule(
-        "plain model",
-        "it predicts the torque of held-out motion no worse than plain least squares",
-        "it leaves {left:.3g} times the noise of the torque on held-out motion, plain least squares {plain:.3g}",
-        "a twin that inertia, friction and gravity by least squares beat lacks something, or has a structure too many",
-        _no_worse_than_plain,
     ),
 )
 RULES = (*VALUES, *ADDED, *HARMLESS, *COMPARED, *HELD_OUT, *EXPLAINED, *REPRODUCED)

@@ -9,10 +9,8 @@ from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
 from hil.diagnosis.experiment import Experiment
 from hil.diagnosis.result import Mode, Result
-from hil.diagnosis.stages import Prepared, Reported, Searched
+from hil.diagnosis.stages import Reported, Searched
 from hil.diagnosis.turning import labelled
-from hil.diagnosis.verdict.cross_validation import CrossValidation
-from hil.diagnosis.verdict.each_alone import Change
 from hil.diagnosis.verdict.fit_table import channel_residuals
 from hil.diagnosis.wording import title, titles
 from hil.errors import InputError
@@ -54,34 +52,19 @@ class Diagnosis:
         return self.reported.judged.tested.searched
 
     @property
-    def prepared(self) -> Prepared:
-        """The recordings as data sets."""
-        return self.searched.prepared
-
-    @property
     def given_bench(self) -> Bench:
         """The bench that the recordings were compared with, with the control law that could be used."""
-        return self.prepared.bench
+        return self.searched.prepared.bench
 
     @property
     def train(self) -> Dataset:
         """Recordings, or parts of them, that were fitted."""
-        return self.prepared.train
+        return self.searched.prepared.train
 
     @property
     def held_out(self) -> Dataset:
         """Recordings that nothing was fitted to; without runs if nothing was held out."""
-        return self.prepared.held_out
-
-    @property
-    def proof(self) -> CrossValidation:
-        """Tests of each term on held-out recordings."""
-        return self.reported.judged.tested.proof
-
-    @property
-    def change(self) -> Change | None:
-        """Change of the axis, between or during the recordings."""
-        return self.reported.judged.change
+        return self.searched.prepared.held_out
 
     @property
     def nominal(self) -> Fit:

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Generic, NamedTuple, TypeVar
 
-from hil.identification.terms import Term
+from hil.identification.terms import Key, Term
 
 Figures = Mapping[str, float | str]
 Answer = tuple[bool, Figures]
@@ -23,7 +23,6 @@ class Rule(Generic[_M]):
     name: str
     asks: str
     refusal: str
-    reason: str
     test: Callable[[_M, Any], Answer | None]
 
 
@@ -41,18 +40,21 @@ Ledger = tuple[LedgerEntry, ...]
 
 @dataclass(frozen=True)
 class Considered:
-    """A candidate that was fitted, beside which other terms, and its ledger."""
+    """A candidate that was fitted, by the key of its term, beside which other terms, and its ledger.
 
-    effect: str
-    variant: int
+    `added`: the search went on with it.
+    """
+
+    key: Key
     beside: tuple[str, ...]
     ledger: Ledger
+    added: bool = False
 
     @classmethod
-    def of(cls, terms: Sequence[Term], ledger: Ledger) -> "Considered":
-        """The last of the terms of a fit."""
-        *beside, term = terms
-        return cls(term.effect, term.variant, tuple(one.effect for one in beside), ledger)
+    def of(cls, terms: Sequence[Term], ledger: Ledger, index: int = -1) -> "Considered":
+        """One of the terms of a fit, by default the last."""
+        term = terms[index]
+        return cls(term.key, tuple(one.effect for one in terms if one is not term), ledger)
 
     @property
     def accepted(self) -> bool:

@@ -27,7 +27,7 @@ def notes_on(
     """All notes, in the order in which they are read."""
     searched, final = judged.tested.searched, judged.final
     notes = [*searched.prepared.notes, *_on_figures(judged, table), *_on_terms(judged, forms)]
-    notes += [*_on_fit(final), *on_torque(left)]
+    notes += [*on_fit(final), *on_torque(left)]
     notes += filter(None, (judged.tested.refit.note, experiment))
     notes += [] if final.data.observability.closed_loop else not_observable(searched.prepared.train)
     return [*notes, _stopped(searched, budget_s)] if searched.stopped_at else notes
@@ -86,7 +86,7 @@ def at_bound(fit: Fit) -> tuple[str, ...]:
     return tuple(name for name in fit.at_bound if name in nominal)
 
 
-def _on_fit(final: Fit) -> list[str]:
+def on_fit(final: Fit) -> list[str]:
     """Notes on a final fit that did not converge, or in which a parameter ended at its bound."""
     notes = []
     if final.status is FitStatus.OUT_OF_STEPS:

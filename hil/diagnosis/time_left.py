@@ -10,7 +10,7 @@ from hil.quantities import digits
 # two-mass and seven-mass axes. A second effect takes longer.
 PASSED = {
     "screening the library beside 0": 0.06,
-    "fitting a lost preload": 0.65,
+    "fitting mechanisms that springs may hide": 0.65,
     "fitting the explanation": 0.9,
     "fitting": 0.2,
     "screening": 0.5,
@@ -22,13 +22,19 @@ PASSED = {
 def with_time_left(progress: Callable[[str], None], begin_s: float, budget_s: float) -> Callable[[str], None]:
     """Return a receiver of steps that adds the estimated time left to each text and passes it on to `progress`.
 
-    The time is at most the rest of the budget. `begin_s` is the begin of the diagnosis on the monotonic clock.
+    Only a step whose share is known has an estimate. The rest of the budget bounds it while there is one: a budget
+    limits the search, and the steps after it may take longer. `begin_s` is the begin of the diagnosis on the monotonic
+    clock.
     """
 
     def tell(step: str) -> None:
         share = next((passed for words, passed in PASSED.items() if step.startswith(words)), None)
+        if share is None:
+            progress(step)
+            return
         elapsed_s = time.monotonic() - begin_s
-        left_s = min(math.inf if share is None else elapsed_s * (1.0 / share - 1.0), budget_s - elapsed_s)
-        progress(step if math.isinf(left_s) else f"{step} (about {digits(max(left_s, 1.0), 1)} s left)")
+        rest_s = budget_s - elapsed_s if elapsed_s < budget_s else math.inf
+        left_s = min(elapsed_s * (1.0 / share - 1.0), rest_s)
+        progress(f"{step} (about {digits(max(left_s, 1.0), 1)} s left)")
 
     return tell

@@ -83,7 +83,6 @@ class LatenessLog:
         self._values = array("d", bytes(8 * capacity))
         self.ticks = 0
         self.last_s = 0.0
-        self.due_s = 0.0  # when the first tick was due, by the monotonic clock
 
     def add(self, late_s: float) -> None:
         """Take the lateness of a tick; ticks beyond the capacity are not kept."""
@@ -92,9 +91,8 @@ class LatenessLog:
             self._values[self.ticks] = late_s
             self.ticks += 1
 
-    def begin(self, since_s: float, punctual: int = 0) -> None:
-        """Forget all ticks but the last one, which was due since_s ago; after it came as many that were in time."""
-        self.due_s = time.perf_counter() - since_s
+    def begin(self, punctual: int = 0) -> None:
+        """Forget all ticks but the last one; after it came as many that were in time."""
         self._values[0] = self.last_s
         self._values[1 : 1 + punctual] = array("d", bytes(8 * punctual))
         self.ticks = 1 + punctual

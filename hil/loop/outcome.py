@@ -8,9 +8,8 @@ from hil.loop.supervision import Ending
 
 @dataclass(frozen=True)
 class Outcome:
-    """Ending of a run, its reason in words, number of rows, lateness of its ticks [s], ticks left out, whether the
-    user asked for a stop, for whatever reason it ended, and when the tick of the first row was due, by the monotonic
-    clock [s]."""
+    """Ending of a run, its reason in words, number of rows, lateness of its ticks [s], ticks left out, and whether the
+    user asked for a stop, for whatever reason it ended."""
 
     ending: Ending
     reason: str
@@ -18,4 +17,3 @@ class Outcome:
     lateness_s: Sequence[float]
     skipped: int = 0
     stop_asked: bool = False
-    first_tick_s: float = 0.0

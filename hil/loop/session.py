@@ -134,8 +134,7 @@ class Session:
             if self._ending is Ending.COMPLETE:
                 self._ending = Ending.DRIVE_FAULT
             self._reason += "; the drive did not follow its controlword: SYNC, heartbeat and set-points were withheld"
-        late = self.late
-        return Outcome(self._ending, self._reason, rows, late.values, self.skipped, self._stops_asked > 0, late.due_s)
+        return Outcome(self._ending, self._reason, rows, self.late.values, self.skipped, self._stops_asked > 0)
 
     # -- one tick -------------------------------------------------------------------------------------------------
 
@@ -195,13 +194,13 @@ class Session:
         cycle, drive, clock, record = self._cycle, self._drive, self._clock, self._recorder.record
         step, row, exchange = cycle.step, cycle.row, self._exchange
         late = self.late
-        late.begin(clock.since(self._clock_tick))
+        late.begin()
         late_limit_s, bench = self._late_limit_s, self._rig.bench
         tick, error_code, cycle_s, skipped = 0, 0, 0.0, 0
         self.skipped = self._left_out = 0
         if self._fast_forward is not None:
             tick, sample, seen = self._fast_forward.run(cycle, sample, seen, lambda: self._stops_asked > 0)
-            late.begin(clock.since(self._clock_tick), tick)
+            late.begin(tick)
         while True:
             motor, torque = sample.motor_position_rad, sample.torque_n_m
             if skipped != self._left_out:

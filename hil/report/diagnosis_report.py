@@ -166,7 +166,8 @@ def _fit(page: Page, diagnosis: Diagnosis, folder: Path) -> None:
     page.plot(plots.over_time(run.time_s, residual_panels(diagnosis, run)))
     if result.torque_left:
         page.text(torque_line(result.torque_left))
-    kept, dropped = diagnosis.proof.ablations, diagnosis.proof.dropped
+    proof = diagnosis.reported.judged.tested.proof
+    kept, dropped = proof.ablations, proof.dropped
     if not dropped and not (result.findings and len(kept) > 1):
         return
     page.text("Growth of the residual energy if one term is left out and everything else is refitted.")

@@ -10,9 +10,10 @@ _OTHERS = 3  # candidates that are shown beside the named ones; diagnosis.json h
 
 
 def ledger_section(page: Page, result: Result) -> None:
-    """Add the ledgers of all named mechanisms and of the three others with the most evidence."""
+    """Add the ledgers of all named mechanisms and of the three others with the most evidence, each by its last fit."""
     named = [one for one in result.considered if one.named]
-    others = sorted((one for one in result.considered if not one.named), key=_evidence, reverse=True)[:_OTHERS]
+    last = {(one.effect, one.variant, one.beside): one for one in (*result.considered, *named)}
+    others = sorted((one for one in last.values() if not one.named), key=_evidence, reverse=True)[:_OTHERS]
     if not named and not others:
         return
     page.heading("Which rules decided")
@@ -30,7 +31,7 @@ def ledger_section(page: Page, result: Result) -> None:
 
 
 def _outcome(one: CandidateLedger) -> str:
-    stands = all(answer.accepted for answer in one.rules)
+    stands = all(answer.accepted for answer in one.rules[-1:])  # an added one goes on where `channels` refutes
     if one.named:
         return "named" if stands else "named as a part of the mismatch"
     return "not named, not refuted" if stands else "refuted"

@@ -29,7 +29,7 @@ CAPTION = (
 
 def change_figure(diagnosis: Diagnosis) -> Figure:
     """Draw the residual of each recording over time. Raises InputError if the axis did not change."""
-    change = diagnosis.change
+    change = diagnosis.reported.judged.change
     if change is None:
         raise InputError("change: the axis did not change between or during these recordings")
     figure = Figure(figsize=(10.0, 1.0 + 2.4 * len(change.runs)), layout="constrained")

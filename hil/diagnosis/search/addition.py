@@ -1,4 +1,4 @@
-"""A fit with one more term than its base, and what the rules of `acceptance.ADDED` ask of it.
+"""Measure a fit with one more term than its base for the rules of `acceptance.ADDED`.
 
 Quantities are computed when a rule asks for them: each is a simulation or more.
 """
@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-from hil.diagnosis.acceptance import ADDED, FORM, HARMLESS, VALUES
+from hil.diagnosis.acceptance import ADDED, HARMLESS, VALUES
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.ledger import Considered, Ledger, accepted, examine
 from hil.diagnosis.search.events import InsideWindows, inside_windows
@@ -79,7 +79,7 @@ class Addition:
 
     @cached_property
     def inside(self) -> InsideWindows | None:
-        """What a force leaves within its windows; None for a permanent term."""
+        """Residuals inside and outside the windows of a force; None for a permanent term."""
         return inside_windows(self.fit, self.base)
 
     @cached_property
@@ -93,19 +93,9 @@ class Addition:
         return claimable(self.fit.terms[-1], self.fit.bench, self.fit.data.runs)
 
     @cached_property
-    def values(self) -> Ledger:
-        """Answer of the rule on the values of the term."""
-        return examine(VALUES, self, CRITERIA)
-
-    @cached_property
     def conditions(self) -> Ledger:
         """Answers of the rules on evidence, size and form."""
         return examine(ADDED, self, CRITERIA)
-
-    @cached_property
-    def form(self) -> Ledger:
-        """Answers of the rules on its form alone: whether the term can be the cause, whatever it explains."""
-        return examine(FORM, self, CRITERIA)
 
     @cached_property
     def harmless(self) -> Ledger:
@@ -120,7 +110,8 @@ class Addition:
     @property
     def considered(self) -> Considered:
         """The candidate and its ledger; channels are in it where the choice has asked for them."""
-        return Considered.of(self.fit.terms, (*self.conditions, *self.__dict__.get("harmless", ())))
+        more = (*self.conditions, *self.__dict__.get("harmless", ())) if self.valid else ()
+        return Considered.of(self.fit.terms, (*examine(VALUES, self.valid, CRITERIA), *more))
 
 
 def removed(without: Fit, fit: Fit, reference: Fit) -> float:

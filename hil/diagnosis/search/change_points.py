@@ -35,20 +35,20 @@ def segments(values: FloatArray, weights: FloatArray, variance: float, penalty: 
         best[end] = max(gains[begin], best[end - 1])
         if gains[begin] > best[end - 1]:
             begins[end] = begin
-    found, end = list[Segment](), count.size - 1
+    windows, end = list[Segment](), count.size - 1
     while end > 0:
         begin = int(begins[end])
         if begin >= 0:
             level = (total[end] - total[begin]) / max(count[end] - count[begin], 1.0)
-            found.append(Segment(begin, end, float(level)))
+            windows.append(Segment(begin, end, float(level)))
         end = begin if begin >= 0 else end - 1
-    return found[::-1]
+    return windows[::-1]
 
 
-def joined(found: list[Segment], weights: FloatArray, short: int, alike: float) -> list[Segment]:
+def joined(windows: list[Segment], weights: FloatArray, short: int, alike: float) -> list[Segment]:
     """Join windows of one sign with no known block between: `short` ones to their neighbour, and levels `alike`."""
     result = list[Segment]()
-    for one in found:
+    for one in windows:
         before = result[-1] if result else None
         if before is None or weights[before.last : one.first].any() or before.level * one.level < 0.0:
             result.append(one)
@@ -67,13 +67,13 @@ def joined(found: list[Segment], weights: FloatArray, short: int, alike: float) 
 
 
 def standing_out(
-    values: FloatArray, weights: FloatArray, found: list[Segment], least: float, margin: int
+    values: FloatArray, weights: FloatArray, windows: list[Segment], least: float, margin: int
 ) -> list[Segment]:
     """Keep the windows whose level is `least` times the rms of the blocks beside all stronger windows.
 
     Where the model is wrong everywhere no window stands out. `margin` blocks about a window do not count: its edges.
     """
-    ordered = sorted(found, key=lambda one: -abs(one.level))
+    ordered = sorted(windows, key=lambda one: -abs(one.level))
     beside, kept = weights > 0.0, 0
     for number, one in enumerate(ordered, 1):
         beside[max(one.first - margin, 0) : one.last + margin] = False

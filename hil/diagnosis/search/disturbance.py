@@ -54,15 +54,17 @@ def _width(period_s: float) -> int:
     return max(round(_SMOOTH_S / period_s), 1)
 
 
-def _over_travel(runs: Sequence[Measured], found: Sequence[Disturbance], ratio: float) -> tuple[FloatArray, FloatArray]:
+def _over_travel(
+    runs: Sequence[Measured], disturbances: Sequence[Disturbance], ratio: float
+) -> tuple[FloatArray, FloatArray]:
     """Position of the table [m] by the motor encoder, and torque, of the sliding rows (n,) of all runs."""
-    x = np.concatenate([ratio * run.motor[d.sliding] for run, d in zip(runs, found, strict=True)])
-    return x, np.concatenate([d.torque[d.sliding] for d in found])
+    x = np.concatenate([ratio * run.motor[d.sliding] for run, d in zip(runs, disturbances, strict=True)])
+    return x, np.concatenate([d.torque[d.sliding] for d in disturbances])
 
 
 def orders(
     runs: Sequence[Measured],
-    found: Sequence[Disturbance],
+    disturbances: Sequence[Disturbance],
     angle_per_unit: float,
     most: int = 3,
     weight: Sequence[FloatArray] | None = None,
@@ -75,7 +77,7 @@ def orders(
     shares = []
     for order in _ORDERS:
         phases, signals = [], []
-        for index, (run, d) in enumerate(zip(runs, found, strict=True)):
+        for index, (run, d) in enumerate(zip(runs, disturbances, strict=True)):
             rate = np.abs(d.velocity) * angle_per_unit * order / (2.0 * np.pi)
             rows = d.sliding & (rate < _PASS_HZ) & (rate > 0.5)
             phases.append(order * angle_per_unit * run.motor[rows])
@@ -89,22 +91,24 @@ def orders(
 
 
 def friction_periods(
-    runs: Sequence[Measured], found: Sequence[Disturbance], ratio: float, most: int = 4
+    runs: Sequence[Measured], disturbances: Sequence[Disturbance], ratio: float, most: int = 4
 ) -> list[float]:
     """Periods along the travel [m], from 1 mm up, with the largest variation of friction, best first."""
-    x, torque = _over_travel(runs, found, ratio)
-    velocity = np.concatenate([d.velocity[d.sliding] for d in found])
+    x, torque = _over_travel(runs, disturbances, ratio)
+    velocity = np.concatenate([d.velocity[d.sliding] for d in disturbances])
     return strongest_periods(x, torque * np.sign(velocity), 1e-4, 1e-3, most)
 
 
-def waves(runs: Sequence[Measured], found: Sequence[Disturbance], ratio: float, most: int = 3) -> list[float]:
+def waves(runs: Sequence[Measured], disturbances: Sequence[Disturbance], ratio: float, most: int = 3) -> list[float]:
     """Waves per metre of travel with the largest disturbance, best first, where no revolution is known."""
-    return [1.0 / period_m for period_m in strongest_periods(*_over_travel(runs, found, ratio), 1e-4, 5e-4, most)]
+    return [
+        1.0 / period_m for period_m in strongest_periods(*_over_travel(runs, disturbances, ratio), 1e-4, 5e-4, most)
+    ]
 
 
-def rest_position(runs: Sequence[Measured], found: Sequence[Disturbance], ratio: float) -> float:
+def rest_position(runs: Sequence[Measured], disturbances: Sequence[Disturbance], ratio: float) -> float:
     """Position [m] at which a straight line through the disturbance over the position is 0; 0 if there is none."""
-    x, torque = _over_travel(runs, found, ratio)
+    x, torque = _over_travel(runs, disturbances, ratio)
     if x.size < 2 or np.ptp(x) == 0.0:
         return 0.0
     centre = float(np.mean(x))
@@ -137,21 +141,21 @@ def force_window(run: Measured, d: Disturbance) -> tuple[float, float, float]:
     n = run.motor.size // block
     mask = d.sliding[: n * block].reshape(n, block)
     values = np.where(mask, d.torque[: n * block].reshape(n, block), 0.0).sum(axis=1)
-    first, last, level = max(_levels(values, mask.sum(axis=1, dtype=np.float64)), key=lambda found: found.score)[:3]
+    first, last, level = max(_levels(values, mask.sum(axis=1, dtype=np.float64)), key=lambda one: one.score)[:3]
     scale = block * run.period_s
     return first * scale, last * scale, level
 
 
 def friction_zones(
-    runs: Sequence[Measured], found: Sequence[Disturbance], ratio: float
+    runs: Sequence[Measured], disturbances: Sequence[Disturbance], ratio: float
 ) -> list[tuple[float, float, float]]:
     """Zones of the travel with the most significant constant friction above and below the mean, best first.
 
     Each is start, end [m] and level [motor units]. The torque against the motion is summed in bins of the position by
     the motor encoder, both directions together, so that a constant force and a lag of the observer cancel.
     """
-    x, torque = _over_travel(runs, found, ratio)
-    against = -torque * np.sign(np.concatenate([d.velocity[d.sliding] for d in found]))
+    x, torque = _over_travel(runs, disturbances, ratio)
+    against = -torque * np.sign(np.concatenate([d.velocity[d.sliding] for d in disturbances]))
     if x.size < 100 or np.ptp(x) == 0.0:
         return []
     width = float(np.ptp(x)) / _BINS
@@ -183,11 +187,11 @@ def _levels(sums: FloatArray, counts: FloatArray) -> list[_Level]:
     sizes = np.subtract.outer(count, count).T
     rest = np.maximum(count[-1] - sizes, 1.0)
     score = np.where(sizes > 5, inside**2 * (1.0 / np.maximum(sizes, 1.0) + 1.0 / rest), 0.0)
-    found = []
+    levels = []
     for signed in (np.where(inside > 0.0, score, 0.0), np.where(inside < 0.0, score, 0.0)):
         first, last = np.unravel_index(int(np.argmax(np.triu(signed))), signed.shape)
         level = float(inside[first, last] / max(sizes[first, last], 1.0))
-        found.append(
+        levels.append(
             _Level(int(first) * stride, max(int(last), int(first) + 1) * stride, level, float(signed[first, last]))
         )
-    return found
+    return levels

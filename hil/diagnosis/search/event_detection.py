@@ -28,7 +28,7 @@ _MOST_BLOCKS = 6000  # the time of a partition grows with their square: half a s
 _REVERSAL_S = 0.05  # about a reversal friction is known least
 _ALIKE = 0.25  # levels of adjacent windows that differ less are one
 _ROUNDS = 3  # windows found in one round do not count as motion or noise in the next; then they stay
-_LEAST_USUAL = 0.3  # of the blocks without an event: else which level is none cannot be told
+_LEAST_USUAL = 0.3  # of the blocks without an event: else the level without one is unknown
 _SMOOTH_BLOCKS = 8  # the noise of a block is that of means over 40 ms: longer than the observer remembers
 
 
@@ -41,19 +41,14 @@ class Event(NamedTuple):
     level: float
 
 
-def without_events(found: Fit) -> Fit:
-    """Evaluate a fit without its events."""
-    events = [index for index, term in enumerate(found.hypothesis.terms) if term.windows]
-    return found.estimator.evaluate(found.hypothesis.without(*events)) if events else found
-
-
-def detect(found: Fit) -> list[Event]:
+def detect(fit: Fit) -> list[Event]:
     """Find the events of all runs of a fit, beside its permanent terms; none about a reversal.
 
     They are those that hold nearly all energy of the windows: a fit that begins with many faint ones ends nowhere. What
     those leave shows beside the fitted ones (`left_over`).
     """
-    events = _of_fit(without_events(found), False)
+    known = [index for index, term in enumerate(fit.hypothesis.terms) if term.windows]
+    events = _of_fit(fit.estimator.evaluate(fit.hypothesis.without(*known)) if known else fit, False)
     left_out = faint([(one.start_s, one.end_s, one.level) for one in events])
     return [one for one, leave in zip(events, left_out, strict=True) if not leave]
 
@@ -61,19 +56,19 @@ def detect(found: Fit) -> list[Event]:
 def faint(windows: Sequence[tuple[float, float, float]]) -> list[bool]:
     """True for windows (start, end, level) that hold next to nothing of the energy of all, weakest first."""
     energies = np.array([level**2 * (end_s - start_s) for start_s, end_s, level in windows])
-    found, order = np.zeros(len(windows), dtype=bool), np.argsort(energies)
-    found[order] = np.cumsum(energies[order]) < CRITERIA.faint * energies.sum()
-    return [bool(one) for one in found]
+    weak, order = np.zeros(len(windows), dtype=bool), np.argsort(energies)
+    weak[order] = np.cumsum(energies[order]) < CRITERIA.faint * energies.sum()
+    return [bool(one) for one in weak]
 
 
-def left_over(found: Fit) -> list[Event]:
+def left_over(fit: Fit) -> list[Event]:
     """Find the events that a fit with events leaves, also those about a reversal that stand out against the others."""
-    return _of_fit(found, True)
+    return _of_fit(fit, True)
 
 
-def _of_fit(found: Fit, reversals: bool) -> list[Event]:
-    pairs = zip(found.data.runs, found.residuals.channels, strict=True)
-    axis, observer_s = inertia(found.bench), found.data.observer_s
+def _of_fit(fit: Fit, reversals: bool) -> list[Event]:
+    pairs = zip(fit.data.runs, fit.residuals.channels, strict=True)
+    axis, observer_s = inertia(fit.bench), fit.data.observer_s
     return [
         event
         for run, channels in pairs
@@ -108,20 +103,20 @@ def _of_run(run: Measured, seen: Disturbance, reversals: bool) -> list[Event]:
     usual, rest = weights, values
     for _ in range(_ROUNDS):
         rest = values - least_absolute(columns, values, usual)
-        found = standing_out(rest, weights, _windows(rest, weights), CRITERIA.stands_out, EDGE)
+        windows = standing_out(rest, weights, _windows(rest, weights), CRITERIA.stands_out, EDGE)
         usual = weights.copy()
-        for one in found:
+        for one in windows:
             usual[one.first : one.last] = 0.0
         if usual.sum() < _LEAST_USUAL * weights.sum():
             return []
     near = np.any(turning[:rows].reshape(-1, block), axis=1, keepdims=True)[:, 0]
-    found = [one for one in found if _beyond_reversals(rest, weights, near, one)]
+    windows = [one for one in windows if _beyond_reversals(rest, weights, near, one)]
     at_s, length_s = run.time_s[first], block * run.period_s
     # edges are where the torque is seen: at rest before and after it a window may begin anywhere
-    shown = [one.first + np.flatnonzero(weights[one.first : one.last])[[0, -1]] + [0, 1] for one in found]
+    shown = [one.first + np.flatnonzero(weights[one.first : one.last])[[0, -1]] + [0, 1] for one in windows]
     return [
         Event(run.name, at_s + float(begin) * length_s, at_s + float(end) * length_s, one.level)
-        for one, (begin, end) in zip(found, shown, strict=True)
+        for one, (begin, end) in zip(windows, shown, strict=True)
     ]
 
 
@@ -137,7 +132,7 @@ def _beyond_reversals(rest: FloatArray, weights: FloatArray, near: NDArray[np.bo
 
 def _windows(rest: FloatArray, weights: FloatArray) -> list[Segment]:
     """Windows of constant level in a signal (n,), and its noise beside them, estimated in turn."""
-    found, beside = list[Segment](), weights
+    windows, beside = list[Segment](), weights
     for _ in range(_ROUNDS):
         noise = _noise(rest, beside)
         if noise <= 0.0:
@@ -145,17 +140,17 @@ def _windows(rest: FloatArray, weights: FloatArray) -> list[Segment]:
         cut = joined(
             segments(rest, weights, noise**2, 3.0 * np.log(rest.size) + CRITERIA.evidence), weights, EDGE, _ALIKE
         )
-        before, found = found, [one for one in cut if weights[one.first : one.last].sum() >= SHORTEST]
+        before, windows = windows, [one for one in cut if weights[one.first : one.last].sum() >= SHORTEST]
         beside = weights.copy()
-        for one in found:
+        for one in windows:
             beside[one.first : one.last + EDGE] = 0.0
-        if found == before or beside.sum() < _LEAST_USUAL * weights.sum():
+        if windows == before or beside.sum() < _LEAST_USUAL * weights.sum():
             break
-    return found
+    return windows
 
 
 def _noise(rest: FloatArray, weights: FloatArray) -> float:
-    """Standard deviation of a block of a signal (n,), from the differences of neighbouring means; 0 if not told."""
+    """Standard deviation of a block of a signal (n,), from the differences of neighbouring means; 0 if unknown."""
     if rest.size < 2 * _SMOOTH_BLOCKS:
         return 0.0
     known, total = (np.convolve(values, np.ones(_SMOOTH_BLOCKS), "valid") for values in (weights, rest * weights))

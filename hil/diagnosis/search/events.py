@@ -24,15 +24,15 @@ from hil.twin.parameter import Role
 EVENTS = tuple(mechanism.id for mechanism in LIBRARY if mechanism.transient)
 
 
-def event_term(effect: str, found: Sequence[Event], ratio: float) -> Term:
+def event_term(effect: str, events: Sequence[Event], ratio: float) -> Term:
     """Make one term of events, all with one effect; the strongest gives its values."""
     mechanism = BY_ID[effect]
-    first = max(found, key=lambda one: abs(one.level))
+    first = max(events, key=lambda one: abs(one.level))
     start, end = mechanism.indices(Role.EDGE)
     values = [0.0] * len(mechanism.parameters)
     values[mechanism.strength], values[start], values[end] = first.level / ratio, first.start_s, first.end_s
     windows = tuple(
-        Window(one.run, one.start_s - first.start_s, one.end_s - first.end_s, one.level / first.level) for one in found
+        Window(one.run, one.start_s - first.start_s, one.end_s - first.end_s, one.level / first.level) for one in events
     )
     return Term(effect, 0, tuple(values), windows=windows)
 
@@ -83,8 +83,8 @@ def with_events_of(held_out: Dataset, final: Fit) -> Fit:
     plain = there.evaluate(at.without(*range(len(at.terms))))
     # terms may depend on the motion, which strong events disturb: some show only beside the nominal twin
     for beside in (before, plain) if at.terms else (before,):
-        if found := detect(beside):
-            choices += [event_term(effect, found, final.bench.axis.ratio_m_rad) for effect in EVENTS]
+        if events := detect(beside):
+            choices += [event_term(effect, events, final.bench.axis.ratio_m_rad) for effect in EVENTS]
     if index is not None:
         windows = dict.fromkeys(one._replace(run=run.name) for run in held_out.runs for one in at.terms[index].windows)
         choices.append(replace(at.resolved.terms[index], windows=tuple(windows)))
@@ -215,7 +215,7 @@ class InsideWindows(NamedTuple):
 
 
 def inside_windows(fit: Fit, base: Fit) -> InsideWindows | None:
-    """What the force of a fit leaves within its windows; None without one. `base` is the fit without the force."""
+    """Measure what the force of a fit leaves within its windows; None without one. `base` is the fit without it."""
     index = _index(fit)
     if index is None:
         return None

@@ -11,7 +11,7 @@ from functools import partial
 
 import numpy as np
 
-from hil.diagnosis.acceptance import NEEDED
+from hil.diagnosis.acceptance import NEEDED, VALUES
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.ledger import Considered, accepted, examine
 from hil.diagnosis.search.addition import removed
@@ -35,7 +35,7 @@ MOST_TERMS = 8  # at once: more than an engineer can act on; limits the duration
 
 @dataclass(frozen=True)
 class Need:
-    """What a term explains beside all others: evidence (BIC difference), energy [noise^2], rows of the residuals."""
+    """Need of a term beside all others: evidence (BIC difference), energy it removes [noise^2], number of residuals."""
 
     evidence: float
     gain: float
@@ -81,7 +81,9 @@ def search(prepared: Prepared, progress: Progress = lambda text: None, deadline_
         best, needed, pruned = _pruned(choice.named.fit, round_.reference)
         considered += pruned
         # to convergence: the residual of an unfinished fit resembles other mechanisms
-        base = revised(claimed(best.refit(ENDED, slopes=best.jacobian)))
+        best = best.refit(ENDED, slopes=best.jacobian)
+        considered += [Considered.of(best.terms, examine(VALUES, False, CRITERIA), index) for index in _invalid(best)]
+        base = revised(claimed(best))
         if not base.terms and base.cost < nominal.cost - CRITERIA.evidence:
             nominal = base  # the term has only led the nominal parameters out of a local minimum
             continue
@@ -112,16 +114,20 @@ def claimed(fit: Fit) -> Fit:
     A spring that rests out of reach is a weight.
     """
     while True:
-        terms, bench, runs = fit.terms, fit.bench, fit.data.runs
-        lost = next((index for index, term in enumerate(terms) if not claimable(term, bench, runs)), None)
-        if lost is None:
+        lost = _invalid(fit)
+        if not lost:
             return fit
-        other = _beyond(fit, lost)
+        other = _beyond(fit, lost[0])
         if other is None:
-            rest = _without(fit, lost)
+            rest = _without(fit, lost[0])
             fit = rest.refit(ENDED, slopes=rest.jacobian)
         else:
-            fit = fit.estimator.fit(fit.hypothesis.replaced(lost, other), evaluations=ENDED)
+            fit = fit.estimator.fit(fit.hypothesis.replaced(lost[0], other), evaluations=ENDED)
+
+
+def _invalid(fit: Fit) -> list[int]:
+    """Indices of the terms whose values are not valid for their mechanism."""
+    return [index for index, term in enumerate(fit.terms) if not claimable(term, fit.bench, fit.data.runs)]
 
 
 def _beyond(fit: Fit, index: int) -> Term | None:
@@ -160,7 +166,6 @@ def _pruned(fit: Fit, reference: Fit) -> tuple[Fit, dict[Key, float], list[Consi
         ledger = examine(NEEDED, Need(evidence, removed(rest, fit, reference), fit.rows), CRITERIA)
         if accepted(ledger):
             return fit, {term.key: value for term, (value, _) in zip(fit.terms, pairs, strict=True)}, pruned
-        others = (*fit.terms[:weakest], *fit.terms[weakest + 1 :])
-        pruned.append(Considered.of((*others, fit.terms[weakest]), ledger))
+        pruned.append(Considered.of(fit.terms, ledger, weakest))
         fit = rest
     return fit, {}, pruned

@@ -98,33 +98,33 @@ def scene(runs: Sequence[Measured], bench: Bench, blocks: Sequence[dict[str, Flo
     """
     physics = bench.axis.physics()
     ratio = bench.axis.ratio_m_rad
-    found = [
+    disturbances = [
         estimate.disturbance(run, block["motor"], inertia(bench), observer_s)
         for run, block in zip(runs, blocks, strict=True)
     ]
     stretch, most_stretch = stretches(runs, ratio) if runs[0].table_m.size else (0.0, 0.0)
     longest = max(range(len(runs)), key=lambda i: runs[i].motor.size)
-    first_s, last_s, level = estimate.force_window(runs[longest], found[longest])
+    first_s, last_s, level = estimate.force_window(runs[longest], disturbances[longest])
     travel = max(float(np.ptp(run.position_command_m)) for run in runs)
     lead = 2.0 * np.pi * ratio / physics.angle_per_unit
     # a screw-locked effect is periodic in the angle and along the travel: orders and periods start each other
-    periods = estimate.friction_periods(runs, found, ratio)
+    periods = estimate.friction_periods(runs, disturbances, ratio)
     if physics.turn_known:
-        orders = estimate.orders(runs, found, physics.angle_per_unit)
+        orders = estimate.orders(runs, disturbances, physics.angle_per_unit)
     else:
-        orders = estimate.waves(runs, found, ratio)
+        orders = estimate.waves(runs, disturbances, ratio)
     turns = [lead / order for order in dict.fromkeys((1.0, 2.0, *orders)) if _SHORTEST_M < lead / order < travel]
     per_lead = [lead / period for period in periods if period < lead]
     whole = [float(round(order)) for order in per_lead if abs(order - round(order)) < _WHOLE and physics.turn_known]
     orders = list(dict.fromkeys((*orders, *whole)))
     ripple = [
         d.torque / np.where(np.abs(run.torque) > 0.2 * physics.coulomb_n_m, run.torque, np.inf)
-        for run, d in zip(runs, found, strict=True)
+        for run, d in zip(runs, disturbances, strict=True)
     ]
     return Scene(
         coulomb=max(physics.coulomb_n_m, 1e-6),
         peak_torque=max(float(np.max(np.abs(run.torque))) for run in runs),
-        peak_speed=max(float(np.max(np.abs(d.velocity))) for d in found),
+        peak_speed=max(float(np.max(np.abs(d.velocity))) for d in disturbances),
         viscous_speed=max(physics.viscous_speed, 1e-6),
         travel_m=travel,
         positions_m=axis_facts(bench, runs).positions_m,
@@ -133,15 +133,17 @@ def scene(runs: Sequence[Measured], bench: Bench, blocks: Sequence[dict[str, Flo
         ratio=ratio,
         lead_m=lead,
         orders=orders,
-        ripple_orders=estimate.orders(runs, found, physics.angle_per_unit, 2, ripple) if physics.turn_known else [],
+        ripple_orders=estimate.orders(runs, disturbances, physics.angle_per_unit, 2, ripple)
+        if physics.turn_known
+        else [],
         friction_periods=[*periods, *turns],
-        friction_zones=estimate.friction_zones(runs, found, ratio),
+        friction_zones=estimate.friction_zones(runs, disturbances, ratio),
         scale_periods=(
             estimate.scale_periods(runs, [block["table"] for block in blocks]) if runs[0].table_m.size else []
         ),
-        lines_hz=estimate.lines_hz(runs[longest], found[longest]),
+        lines_hz=estimate.lines_hz(runs[longest], disturbances[longest]),
         window=(runs[longest].start.time_s + first_s, runs[longest].start.time_s + last_s, level),
-        rest_m=estimate.rest_position(runs, found, ratio),
+        rest_m=estimate.rest_position(runs, disturbances, ratio),
         stretch=max(stretch, 0.5e-6),
         most_stretch=max(most_stretch, 1e-6),
     )
@@ -149,9 +151,9 @@ def scene(runs: Sequence[Measured], bench: Bench, blocks: Sequence[dict[str, Flo
 
 def stretches(runs: Sequence[Measured], ratio_m_rad: float) -> tuple[float, float]:
     """Table less motor position [m], typical and largest, of runs with a linear encoder."""
-    found = [run.table_m - ratio_m_rad * run.motor for run in runs]
+    apart = [run.table_m - ratio_m_rad * run.motor for run in runs]
     typical, most = np.max(
-        [np.percentile(np.abs(stretch - np.median(stretch)), (60.0, 99.9)) for stretch in found], axis=0
+        [np.percentile(np.abs(stretch - np.median(stretch)), (60.0, 99.9)) for stretch in apart], axis=0
     )
     return float(typical), float(most)
 
@@ -164,7 +166,7 @@ def starts(scene: Scene, bench: Bench, runs: Sequence[Measured] = ()) -> list[St
     """Starting points of all variants of the library for a scene; an event is in the longest of the runs, or in all."""
     longest = max(runs, key=lambda run: run.motor.size, default=None)
     somewhere = [tuple(Window(run.name) for run in chosen) for chosen in ([longest] if longest else [], runs)]
-    found = []
+    points = []
     for mechanism in LIBRARY:
         if mechanism.turning and not bench.axis.turns:
             continue
@@ -175,12 +177,12 @@ def starts(scene: Scene, bench: Bench, runs: Sequence[Measured] = ()) -> list[St
             strength, phase = mechanism.strength, next(iter(phases), -1)
             if not (mechanism.search.proportional and variant.proportional):
                 strength = phase = -1
-            found += [
+            points += [
                 StartPoint(mechanism.id, number, point, strength, phase, max(len(phases), 1), windows=windows)
                 for point in mechanism.start_points(number, scene)
                 for windows in (dict.fromkeys(somewhere) if mechanism.transient else [()])
             ]
-    return found
+    return points
 
 
 # The angle is unknown, since the zero of the table is not that of the motor: eight phases are within 23 deg of any.
@@ -200,7 +202,7 @@ def likenesses(terms: Sequence[Term], bench: Bench) -> list[list[Term]]:
     size, place = _size_and_place(BY_ID[last.effect])
     share = last.values[size] / _unit(BY_ID[last.effect], physics.coulomb_n_m)
     order = _other(BY_ID[last.effect], last.values[place], lead_m)
-    found = []
+    alike = []
     for mechanism in sorted(LIBRARY, key=lambda one: one.parameters[0].dimension is not Dimension.TORQUE):
         if not mechanism.search.screw_locked or mechanism.id == last.effect:
             continue
@@ -213,8 +215,8 @@ def likenesses(terms: Sequence[Term], bench: Bench) -> list[list[Term]]:
         values[place] = repeats
         (turned,) = mechanism.indices(Role.PHASE)
         slot = free_slot(mechanism.id, rest)
-        found.append([Term(mechanism.id, 0, tuple((values | {turned: phase}).values()), slot) for phase in _PHASES])
-    return found
+        alike.append([Term(mechanism.id, 0, tuple((values | {turned: phase}).values()), slot) for phase in _PHASES])
+    return alike
 
 
 def _size_and_place(mechanism: Mechanism) -> tuple[int, int]:

@@ -51,18 +51,17 @@ def next_term(search: SearchRound, candidates: Sequence[Candidate], step: Progre
     base, considered = search.base, list[Considered]()
 
     def valid(fits: Sequence[Fit]) -> list[Addition]:
-        additions = [search.addition(fit) for fit in fits]
-        considered.extend(Considered.of(one.fit.terms, one.values) for one in additions if not accepted(one.values))
-        return [one for one in additions if accepted(one.values)]
+        begun = [search.addition(fit) for fit in fits]
+        considered.extend(one.considered for one in begun if not one.valid)
+        return [one for one in begun if one.valid]
 
     if base.at_floor and not base.data.observability.exact_input and not structure_left(base, base.data.over(())):
         return Additions([], None)
-    promising = [one for one in candidates if promises(one.share, base.cost, base.rows)]
-    found = list[Addition]()
-    if promising:
+    additions = list[Addition]()
+    if promising := [one for one in candidates if promises(one.share, base.cost, base.rows)]:
         step("fitting " + ", ".join(one.term.effect for one in promising[:3]))
-        found = valid(race(base, promising))
-    best = first_standing(found)
+        additions = valid(race(base, promising))
+    best = first_standing(additions)
     unclear = best is None or best.fit.cost > CRITERIA.clear * base.cost
     if (
         unclear
@@ -71,22 +70,22 @@ def next_term(search: SearchRound, candidates: Sequence[Candidate], step: Progre
         and base.excess > CRITERIA.nothing * base.rows
         and may_hide(base)
     ):
-        step("fitting a lost preload from the springs of the bench file")
-        found = _ordered([*found, search.addition(unbent(base))])
-        best = first_standing(found)
+        step("fitting mechanisms that springs may hide from the springs of the bench file")
+        additions = _ordered([*additions, search.addition(unbent(base))])
+        best = first_standing(additions)
     if best is None and not base.at_floor and search.unfinished:
         step("searching again beside the parameters of the bench file")
-        considered += [one.considered for one in found]
-        found = valid(from_bench_file(base))
-        best = first_standing(found)
+        considered += [one.considered for one in additions]
+        additions = valid(from_bench_file(base))
+        best = first_standing(additions)
     if best is not None and not best.fit.at_floor and search.unfinished and (other := companion(base, best.fit)):
         step(f"fitting {best.fit.terms[-1].effect} together with {other.effect}")
-        pairs = [
-            pair for pair in valid(together(base, best.fit, other)) if pair.fit.cost < CRITERIA.clear * best.fit.cost
-        ]
-        found = _ordered([*found, *pairs])
-        best = first_standing(found)
-    return Additions(found, best, tuple(considered))
+        pairs = valid(together(base, best.fit, other))
+        clear = [pair for pair in pairs if pair.fit.cost < CRITERIA.clear * best.fit.cost]
+        considered += [pair.considered for pair in pairs if pair not in clear]
+        additions = _ordered([*additions, *clear])
+        best = first_standing(additions)
+    return Additions(additions, best, tuple(considered))
 
 
 def first_standing(additions: Sequence[Addition]) -> Addition | None:

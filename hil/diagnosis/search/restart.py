@@ -60,20 +60,20 @@ def together(base: Fit, fit: Fit, other: Term) -> list[Fit]:
     return race(beside, likely) if likely else []
 
 
-def again(found: Fit, evaluations: int) -> Fit:
+def again(fit: Fit, evaluations: int) -> Fit:
     """The fit, or a better one of the same mechanisms from the bench file, if a nominal parameter is at its bound."""
-    stuck = set(found.at_bound).intersection(found.hypothesis.nominal)
-    if not found.terms or not stuck or found.at_floor or found.estimator.expired:
-        return found
-    given, axis = found.hypothesis.rebased.given, axis_facts(found.data.bench, found.data.runs)
+    stuck = set(fit.at_bound).intersection(fit.hypothesis.nominal)
+    if not fit.terms or not stuck or fit.at_floor or fit.estimator.expired:
+        return fit
+    given, axis = fit.hypothesis.rebased.given, axis_facts(fit.data.bench, fit.data.runs)
     starts = [
         given.replaced(index, replace(term, variant=variant, values=BY_ID[term.effect].typical_values(axis)))
-        for index, term in enumerate(found.terms)
+        for index, term in enumerate(fit.terms)
         if not term.windows
         for variant in range(len(BY_ID[term.effect].variants))
     ]
-    fits = in_parallel([partial(found.estimator.fit, start, evaluations=evaluations) for start in starts])
-    return min((found, *fits), key=lambda fit: fit.cost)
+    fits = in_parallel([partial(fit.estimator.fit, start, evaluations=evaluations) for start in starts])
+    return min((fit, *fits), key=lambda one: one.cost)
 
 
 def may_hide(base: Fit) -> bool:
@@ -97,7 +97,7 @@ def unbent(base: Fit) -> Fit:
     starts = [given.with_term(term) for term in _hidden(base)]
     held = search.jacobian(given)
     first = [partial(search.fit, start, soft=SOFT, evaluations=_FIRST, held=held) for start in starts]
-    best = min(in_parallel(first), key=lambda found: found.cost)
+    best = min(in_parallel(first), key=lambda fit: fit.cost)
     full = replace(search, fast=False)  # small gaps need the steps of the twin
     best = full.fit(best.hypothesis, soft=SOFT, evaluations=_SECOND)
     if best.cost > full.evaluate(base.hypothesis).cost:  # worse than without the term

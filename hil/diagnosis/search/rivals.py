@@ -1,4 +1,4 @@
-"""Which of several explanations of one residual is named, and how the others compare with it.
+"""Choose the explanation of a residual to name, and compare the others with it.
 
 The named one is the first that can be the cause. An explanation whose evidence is not worse is tied with it, or there
 is an objection to it: a reason beside its evidence.
@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hil.diagnosis.acceptance import COMPARED, paying
+from hil.diagnosis.acceptance import COMPARED, FORM, paying
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.ledger import Considered, Ledger, accepted, examine, refusal
 from hil.diagnosis.search.addition import Addition
@@ -88,8 +88,10 @@ def chosen(best: Addition, additions: Sequence[Addition], search: SearchRound) -
     named = _on_fewest_parts(_simplest(best, standing), [best, *standing])
     filters = whitening(named.fit)
     compared = [(one, _compared(one, named, filters)) for one in order if one is not named]
-    considered = (named.considered, *(one.considered.asked(rival.ledger) for one, rival in compared))
-    return Choice(named, sorted((rival for _, rival in compared), key=lambda rival: rival.evidence), considered)
+    considered = [one.considered for one in others if not one.valid]
+    considered += [one.considered.asked(rival.ledger) for one, rival in compared]
+    considered.append(replace(named.considered, added=True))
+    return Choice(named, sorted((rival for _, rival in compared), key=lambda rival: rival.evidence), tuple(considered))
 
 
 def ended(fit: Fit) -> Fit:
@@ -98,8 +100,8 @@ def ended(fit: Fit) -> Fit:
 
 
 def objection(one: Addition, named: Addition) -> str:
-    """Why a term cannot be named instead of another, whatever it explains; empty if it can."""
-    if reason := refusal(one.form):
+    """Reason against a term in place of another, whatever it explains; empty if there is none."""
+    if reason := refusal(examine(FORM, one, CRITERIA)):
         return reason
     worse = sorted(paying(one.harm) - paying(named.harm))
     return f"with it the training recordings are reproduced worse in {', '.join(worse)}" if worse else ""
@@ -153,7 +155,7 @@ def _compared(one: Addition, named: Addition, filters: Sequence[Filter]) -> Riva
 
 
 def _behind(one: Addition, named: Addition) -> str:
-    """Why an explanation with better evidence and no objection is not the named one."""
+    """Reason why an explanation with better evidence and no objection is not the named one."""
     if _parts(one) > _parts(named):
         return "it acts on more parts of the axis"
     if one.fit.hypothesis.free > named.fit.hypothesis.free:

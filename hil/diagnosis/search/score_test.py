@@ -119,7 +119,7 @@ def screen_library(base: Fit) -> list[Candidate]:
         return Candidate(begun[0], same[0].share, tuple(begun[1:]))
 
     candidates = [gathered(effect, same) for effect, same in best.items()]
-    return sorted((one for one in candidates if one is not None), key=lambda found: -found.share)
+    return sorted((one for one in candidates if one is not None), key=lambda one: -one.share)
 
 
 def _events(base: Fit) -> list[StartPoint]:
@@ -129,10 +129,10 @@ def _events(base: Fit) -> list[StartPoint]:
     # events may have led the fitted parameters astray, those of the bench file may be wrong
     points = (base, base.estimator.evaluate(base.hypothesis.given))
     shown = [(one, events) for one in points if (events := detect(one))]
-    found = [
+    pairs = [
         (one, event_term(effect, events, base.bench.axis.ratio_m_rad)) for one, events in shown for effect in EVENTS
     ]
-    terms = [term for _, term in sorted(found, key=lambda pair: _criterion(*pair))[:1]]
+    terms = [term for _, term in sorted(pairs, key=lambda pair: _criterion(*pair))[:1]]
     return [
         StartPoint(term.effect, 0, term.values, BY_ID[term.effect].strength, windows=term.windows)
         for term in terms
@@ -187,7 +187,7 @@ def _tuned(base: Fit, best: Candidate, views: Sequence[_View]) -> Candidate:
                 values = list(best.term.values)
                 values[index] = min(max(factor * values[index], parameter.low), parameter.high)
                 points.append(StartPoint(mechanism.id, variant, tuple(values), strength=-1))
-        best = max(best, screen(base, points, views)[0], key=lambda found: found.share)
+        best = max(best, screen(base, points, views)[0], key=lambda one: one.share)
     return best
 
 
@@ -208,7 +208,7 @@ def screen(base: Fit, points: Sequence[StartPoint], views: Sequence[_View] = ())
     def candidate(start: StartPoint) -> Candidate:
         directions = [direction(start, values) for values in _directions(start)]
         gone = direction(start, _scaled(start, np.zeros(2 * start.harmonics))) if start.instead else np.zeros(base.rows)
-        return max((scored(start, directions, gone, view) for view in views), key=lambda found: found.share)
+        return max((scored(start, directions, gone, view) for view in views), key=lambda one: one.share)
 
     def scored(start: StartPoint, directions: list[FloatArray], gone: FloatArray, view: _View) -> Candidate:
         energy = float(view.residual @ view.residual)
@@ -229,7 +229,7 @@ def screen(base: Fit, points: Sequence[StartPoint], views: Sequence[_View] = ())
             share,
         )
 
-    return sorted(POOL.map(candidate, points), key=lambda found: -found.share)
+    return sorted(POOL.map(candidate, points), key=lambda one: -one.share)
 
 
 def _pairs(start: StartPoint) -> list[tuple[int, int]]:
@@ -241,15 +241,15 @@ def _directions(start: StartPoint) -> list[tuple[float, ...]]:
     """Parameter values that span the effect of a start: its strength, or sine and cosine of each harmonic."""
     if start.phase < 0:
         return [start.values]
-    found = []
+    points = []
     for strength, phase in _pairs(start):
         for angle in (0.0, np.pi / 2.0):
             values = list(start.values)
             for other, _ in _pairs(start):
                 values[other] = 0.0
             values[strength], values[phase] = start.values[start.strength], angle
-            found.append(tuple(values))
-    return found
+            points.append(tuple(values))
+    return points
 
 
 def _scaled(start: StartPoint, coefficients: FloatArray) -> tuple[float, ...]:

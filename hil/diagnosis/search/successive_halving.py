@@ -130,12 +130,12 @@ class _Race:
         best = min(results, key=lambda fit: fit.cost)
         if not self.search.expired:
             results += [*self._variants(best), *self._equivalents(best)]
-        found: dict[str, Fit] = {}
+        fits: dict[str, Fit] = {}
         for fit in results:
             effect = fit.terms[-1].effect
-            if compatible(fit.terms) and (effect not in found or _rather(fit, found[effect])):
-                found[effect] = fit
-        return sorted(found.values(), key=lambda fit: fit.cost)
+            if compatible(fit.terms) and (effect not in fits or _rather(fit, fits[effect])):
+                fits[effect] = fit
+        return sorted(fits.values(), key=lambda fit: fit.cost)
 
     def _first_fit(self, candidate: Candidate) -> _FirstFit:
         """Fit a candidate briefly with the derivatives of the base, at the base or at the bench's parameters.
@@ -232,16 +232,16 @@ class _Race:
 
 def _second_fit(first: _FirstFit) -> Fit:
     fit, slopes = first.fit, np.hstack([first.held, first.own])
-    found = fit.estimator.fit(fit.hypothesis, evaluations=SECOND, soft=SOFT, slopes=slopes)
-    if found.terms[-1].windows:  # a new Jacobian costs a simulation for each edge
-        return found
-    return replace(found, jacobian=found.jacobian[:, :0].copy())  # few fits are continued, and memory is dear
+    second = fit.estimator.fit(fit.hypothesis, evaluations=SECOND, soft=SOFT, slopes=slopes)
+    if second.terms[-1].windows:  # a new Jacobian costs a simulation for each edge
+        return second
+    return replace(second, jacobian=second.jacobian[:, :0].copy())  # few fits are continued, and memory is dear
 
 
 def _fit_fast_first(last: Estimator, hypothesis: Hypothesis) -> Fit:
     """Converge with the steps of a search, then with those of the twin."""
-    found = replace(last, fast=True).fit(hypothesis)
-    return last.fit(found.hypothesis, evaluations=SECOND, slopes=found.jacobian)
+    fast = replace(last, fast=True).fit(hypothesis)
+    return last.fit(fast.hypothesis, evaluations=SECOND, slopes=fast.jacobian)
 
 
 def _finish(fit: Fit) -> Fit:

@@ -1,4 +1,4 @@
-"""Confidence of a finding: whether this effect is there, not whether everything is explained.
+"""Confidence of a finding: the probability that this effect is there, whatever else is missing.
 
     p = 1 / (1 + exp(-s)),   s = a - b ln(1 + e / (factor - 1)) - c ln+(1 / (factor - 1)) - d ln+(1000 / (1 + margin))
 

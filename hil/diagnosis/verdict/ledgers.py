@@ -1,8 +1,7 @@
-"""Ledgers of all candidates that were fitted, with the answers of the verdict on those that were found."""
+"""Ledgers of all candidates that were fitted, with the answers of the verdict on those that were added."""
 
 import math
 from collections.abc import Container
-from dataclasses import replace
 
 from hil.diagnosis.ledger import Considered, Ledger, LedgerEntry
 from hil.diagnosis.result import CandidateLedger, RuleAnswer
@@ -15,7 +14,7 @@ from hil.twin.library import BY_ID
 def ledgers(judged: Judged, forms: Container[int]) -> tuple[CandidateLedger, ...]:
     """The candidates in the order in which they were fitted.
 
-    One that was found has the answers on held-out recordings too, and that on all terms together. A term that the
+    One that was added has the answers on held-out recordings too, and that on all terms together. A term that the
     search did not add itself (another form, an event of a held-out recording) has these alone. `forms` are the indices
     of terms that are reported as part of another one: they have no name of their own.
     """
@@ -23,38 +22,24 @@ def ledgers(judged: Judged, forms: Container[int]) -> tuple[CandidateLedger, ...
     together: Ledger = ()
     if proof.final.terms:
         together = explanation(searched.nominal, proof.final, searched.prepared.held_out)
-    answers, more = (
-        {index: _candidate(one, False) for index, one in enumerate(searched.considered)},
-        list[CandidateLedger](),
-    )
-    taken = set[int]()
+    answers = {index: _candidate(one) for index, one in enumerate(searched.considered)}
+    places = {one.key: index for index, one in enumerate(searched.considered) if one.added}
     for index, ablation in enumerate((*proof.ablations, *proof.dropped)):
-        kept = index < len(proof.ablations)
-        term, effect = ablation.term, key_in_search(searched, ablation.term)[0]
-        places = [
-            place
-            for place, one in enumerate(searched.considered)
-            if one.effect == effect and one.accepted and place not in taken
-        ]
+        kept, term = index < len(proof.ablations), ablation.term
+        place = places.pop(key_in_search(searched, term), len(answers))
+        before = searched.considered[place] if place in answers else Considered(term.key, (), ())
+        ledger = (*before.ledger, *ablation.ledger, *(together if kept else ()))
         # the same torque may be named by a more frequent cause of it
-        before = replace(searched.considered[places[-1]], effect=term.effect) if places else None
-        found = before or Considered(term.effect, term.variant, (), ())
-        answer = _candidate(
-            found.asked(ablation.ledger).asked(together if kept else ()),
-            kept and index not in forms and judged.has_findings,
-        )
-        if places:
-            answers[places[-1]] = answer
-            taken.add(places[-1])  # several terms may be of one mechanism
-        else:
-            more.append(answer)
-    return (*answers.values(), *more)
+        of_term = Considered(term.key, before.beside, ledger)
+        answers[place] = _candidate(of_term, kept and index not in forms and judged.has_findings)
+    return tuple(answers.values())
 
 
-def _candidate(one: Considered, named: bool) -> CandidateLedger:
+def _candidate(one: Considered, named: bool = False) -> CandidateLedger:
+    effect, variant, _ = one.key
     return CandidateLedger(
-        effect=one.effect,
-        variant=BY_ID[one.effect].forms[one.variant],
+        effect=effect,
+        variant=BY_ID[effect].forms[variant],
         beside=one.beside,
         named=named,
         rules=tuple(map(_answer, one.ledger)),

@@ -4,9 +4,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hil.diagnosis.acceptance import REPRODUCED
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.ledger import Ledger, examine
+from hil.diagnosis.reproduced import REPRODUCED
 from hil.diagnosis.stages import Judged
 from hil.diagnosis.structure_left import structure_left
 from hil.identification.dataset import Dataset

@@ -29,7 +29,6 @@ ROOT = Path(acceptance.__file__).parent
 def addition(**quantities: Any) -> Any:
     """A term that passes every rule, but for the quantities given."""
     usual = {
-        "valid": True,
         "evidence": 500.0,
         "gain": 900.0,
         "rows": 1000,
@@ -47,11 +46,11 @@ def test_the_number_of_constants_and_rules_does_not_grow() -> None:
     assert len(RULES) <= RULE_COUNT
 
 
-def test_criteria_are_frozen_and_each_rule_has_its_own_name_and_a_reason() -> None:
+def test_criteria_are_frozen_and_each_rule_has_its_own_name() -> None:
     with pytest.raises(FrozenInstanceError):
         CRITERIA.evidence = 1.0  # type: ignore[misc]
     assert len({rule.name for rule in RULES}) == len(RULES)
-    assert all(rule.reason and rule.asks and rule.refusal for rule in RULES)
+    assert all(rule.asks and rule.refusal for rule in RULES)
 
 
 def test_every_constant_of_evidence_is_used() -> None:
@@ -105,9 +104,15 @@ def test_more_evidence_and_energy_never_turn_accepted_into_refuted(evidence: flo
     assert after or not before
 
 
+def test_both_rules_on_laps_give_what_differs_without_the_term_over_that_with_it() -> None:
+    held_out: Any = SimpleNamespace(gain=None, laps=0.5)
+    entries = examine(FORM, addition(unrepeated=(100.0, 50.0)), CRITERIA)[0], examine(HELD_OUT, held_out, CRITERIA)[0]
+    assert [entry.figures for entry in entries] == [{"without_over_with": 0.5}] * 2
+
+
 def test_form_and_values_are_asked_alone_too() -> None:
     assert accepted(examine(FORM, addition(evidence=-1.0), CRITERIA))
-    assert not accepted(examine(VALUES, addition(valid=False), CRITERIA))
+    assert not accepted(examine(VALUES, False, CRITERIA))
 
 
 def test_a_channel_that_pays_is_named() -> None:
@@ -162,6 +167,6 @@ def test_a_score_must_promise_evidence_and_energy() -> None:
 
 def test_answers_after_a_refusal_are_left_out() -> None:
     passed, failed = (examine(ADDED, addition(evidence=value), CRITERIA) for value in (500.0, 1.0))
-    one = Considered("any", 0, (), passed)
+    one = Considered(("any", 0, 0), (), passed)
     assert one.asked(failed).ledger == (*passed, *failed)
     assert one.asked(failed).asked(passed).ledger == (*passed, *failed)

@@ -3,11 +3,13 @@
 import json
 import math
 from pathlib import Path
+from types import SimpleNamespace
 
 import jsonschema
 import pytest
 from diagnosis_runs import bench, recorded
 
+from hil.diagnosis import time_left
 from hil.diagnosis.diagnose import diagnose
 from hil.diagnosis.result import Verdict, schema
 from hil.diagnosis.time_left import with_time_left
@@ -40,12 +42,20 @@ def test_a_budget_that_is_no_time_is_refused(budget_s: float) -> None:
         diagnose([recorded(bench(), times=3)], [], bench(), budget_s=budget_s)
 
 
-def test_the_time_left_is_at_most_that_of_the_budget() -> None:
-    told: list[str] = []
-    tell = with_time_left(told.append, begin_s=-1e6, budget_s=math.inf)
-    tell("locating")
-    tell("testing on held-out recordings")
-    with_time_left(told.append, begin_s=-1e6, budget_s=1.0)("screening the library beside 0 terms")
-    assert told[0] == "locating"
-    assert told[1].startswith("testing on held-out recordings (about ")
-    assert told[2] == "screening the library beside 0 terms (about 1 s left)"
+@pytest.mark.parametrize(
+    ("step", "budget_s", "said"),
+    [
+        ("screening the library beside 0 terms", math.inf, " (about 1567 s left)"),
+        ("screening the library beside 0 terms", 130.0, " (about 30 s left)"),
+        ("testing on held-out recordings", 130.0, " (about 5 s left)"),
+        ("testing on held-out recordings", 90.0, " (about 5 s left)"),
+        ("locating", 130.0, ""),
+    ],
+)
+def test_the_time_left_of_a_search_is_at_most_that_of_the_budget(
+    step: str, budget_s: float, said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(time_left, "time", SimpleNamespace(monotonic=lambda: 100.0))
+    steps = list[str]()
+    with_time_left(steps.append, begin_s=0.0, budget_s=budget_s)(step)
+    assert steps == [step + said]

@@ -85,10 +85,10 @@ def test_lateness_is_kept_in_memory_that_does_not_grow() -> None:
     for late_s in (0.1, 0.2, 0.3):
         log.add(late_s)
     assert list(log.values) == [0.1, 0.2, 0.3]
-    log.begin(0.0)
+    log.begin()
     assert list(log.values) == [0.3]
     log.add(0.4)
-    log.begin(0.0, 2)
+    log.begin(2)
     assert list(log.values) == [0.4, 0.0, 0.0]
     assert log.last_s == 0.0
     for late_s in (0.5, 0.6, 0.7):

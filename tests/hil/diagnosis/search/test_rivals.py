@@ -10,7 +10,7 @@ import pytest
 from diagnosis_runs import bench, dataset, fitted, recorded
 
 from hil.channels import AxisKind
-from hil.diagnosis.search import rivals
+from hil.diagnosis.search import addition, rivals
 from hil.diagnosis.search.addition import Addition
 from hil.diagnosis.search.next_term import SearchRound, first_standing
 from hil.diagnosis.search.rivals import chosen
@@ -34,7 +34,10 @@ def test_what_explains_more_is_named_unless_there_is_an_objection(monkeypatch: p
     assert rival.terms[-1].effect == OTHER.effect
     assert rival.evidence > 0.0
     assert not rival.tied
-    assert [(one.effect, one.accepted) for one in choice.considered] == [(LOAD.effect, True), (OTHER.effect, False)]
+    rival_entry, entry = choice.considered
+    assert (rival_entry.key, rival_entry.accepted, rival_entry.added) == (OTHER.key, False, False)
+    assert (entry.key, entry.accepted, entry.added) == (LOAD.key, True, True)
+    assert [answer.rule for answer in entry.ledger][:2] == ["values", "evidence"]
 
     monkeypatch.setattr(rivals, "first_standing", lambda additions: additions[-1])
     monkeypatch.setattr(
@@ -46,7 +49,12 @@ def test_what_explains_more_is_named_unless_there_is_an_objection(monkeypatch: p
     assert rival.evidence < 0.0
     assert rival.objection == "it is excluded"
     assert not rival.tied
-    assert choice.considered[1].ledger[-1].text == "it is excluded"
+    assert choice.considered[0].ledger[-1].text == "it is excluded"
+
+    monkeypatch.setattr(addition, "claimable", lambda term, *_: term.effect != LOAD.effect)
+    choice = chosen(wrong, [search.addition(fits[0]), wrong], search)
+    assert choice.rivals == []
+    assert [(one.rule, one.accepted) for one in choice.considered[0].ledger] == [("values", False)]
 
 
 def explained(cost: float, motor: float, table: float) -> Any:

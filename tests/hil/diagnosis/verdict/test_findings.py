@@ -11,7 +11,7 @@ from diagnosis_runs import bench, dataset, recorded, searched
 
 from hil.bench.bench_file import Bench, MechanismEntry
 from hil.diagnosis.criteria import CRITERIA
-from hil.diagnosis.notes import _on_fit, at_bound
+from hil.diagnosis.notes import at_bound, on_fit
 from hil.diagnosis.result import Finding
 from hil.diagnosis.search.rivals import RivalFit
 from hil.diagnosis.search.score_test import screen_library
@@ -207,4 +207,4 @@ def test_a_parameter_at_its_bound_is_no_correction() -> None:
     found = reported_refit(diagnosis_runs.fitted(Hypothesis(light), data)).fit
     assert at_bound(found) == ("table_mass_kg",)
     assert "table_mass_kg" not in corrections(light, found)
-    assert any("table_mass_kg: not identifiable from this motion" in note for note in _on_fit(found))
+    assert any("table_mass_kg: not identifiable from this motion" in note for note in on_fit(found))

@@ -1,0 +1,62 @@
+"""Rules on a twin without new terms: whether it reproduces the recordings, so that nothing is missing."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from hil.diagnosis.criteria import Criteria
+from hil.diagnosis.ledger import Answer, Rule
+
+if TYPE_CHECKING:
+    from hil.diagnosis.verdict.reproduction import Reproduction
+
+
+def _within_noise(of: Reproduction, c: Criteria) -> Answer:
+    return of.worst <= c.floor, {"worst": of.worst**0.5}
+
+
+def _within_noise_elsewhere(of: Reproduction, c: Criteria) -> Answer | None:
+    return None if of.held_out is None else (of.held_out <= c.elsewhere, {"worst": of.held_out**0.5})
+
+
+def _without_structure(of: Reproduction, c: Criteria) -> Answer:
+    return not of.structure, {"structure": of.structure}
+
+
+def _no_worse_than_plain(of: Reproduction, c: Criteria) -> Answer | None:
+    if of.torque is None:
+        return None
+    left, plain = of.torque
+    return left - plain <= c.material, {"left": left**0.5, "plain": plain**0.5}
+
+
+REPRODUCED: tuple[Rule[Reproduction], ...] = (
+    # measurement noise of each channel: `hil.identification.noise_floor`
+    Rule(
+        "within the noise",
+        "every channel is within its noise, {worst:.3g} times its rms at most",
+        "a channel is at {worst:.3g} times its noise (rms)",
+        _within_noise,
+    ),
+    # prediction; errors of fitted parameters leave as much as the noise
+    Rule(
+        "within the noise, held out",
+        "held-out recordings are within their noise, {worst:.3g} times its rms at most",
+        "on held-out recordings a channel is at {worst:.3g} times its noise (rms)",
+        _within_noise_elsewhere,
+    ),
+    # noise depends on nothing: `hil.identification.structure`, with errors that count autocorrelation and the questions
+    Rule(
+        "structure",
+        "what is left depends on no position, angle, speed, load or time",
+        "what is left has a structure: {structure}",
+        _without_structure,
+    ),
+    # a twin that inertia, friction and gravity by least squares beat lacks something, or has a structure too many
+    Rule(
+        "plain model",
+        "it predicts the torque of held-out motion no worse than plain least squares",
+        "it leaves {left:.3g} times the noise of the torque on held-out motion, plain least squares {plain:.3g}",
+        _no_worse_than_plain,
+    ),
+)

@@ -35,14 +35,14 @@ def _values(valid: bool, c: Criteria) -> Answer:
     return valid, {}
 
 
-def promises(share: float, cost: float, rows: int, c: Criteria = CRITERIA) -> bool:
+def promises(share: float, cost: float, rows: int, noise_energy: float, c: Criteria = CRITERIA) -> bool:
     """True if a score, a share of the residual energy `cost` over so many rows, promises the evidence of a term.
 
     Rao's score test: what a linear step explains bounds what a small effect can explain. Without it a mechanism is not
     fitted.
     """
     enough = 1.0 - math.exp(-c.evidence / rows)  # share of white residuals whose removal gives the evidence of a term
-    return share > enough and share * cost > c.material * rows
+    return share > enough and share * cost > c.material * noise_energy
 
 
 def _evidence(of: Addition | Need, c: Criteria) -> Answer:
@@ -50,10 +50,13 @@ def _evidence(of: Addition | Need, c: Criteria) -> Answer:
 
 
 def _material(of: Addition | Need, c: Criteria) -> Answer:
-    return of.gain >= c.material * of.rows, {"removed": of.gain / of.rows, "needed": c.material}
+    removed = of.gain / of.noise_energy if of.noise_energy else 0.0
+    return removed >= c.material, {"removed": removed, "needed": c.material}
 
 
-def _worth(of: Addition, c: Criteria) -> Answer:
+def _worth(of: Addition, c: Criteria) -> Answer | None:
+    if of.explained is None:  # nothing is above the noise
+        return None
     share = c.worth if of.beside < c.several else c.series
     return of.explained >= share, {"explained": of.explained, "needed": share}
 
@@ -63,6 +66,11 @@ def _laps(of: Addition, c: Criteria) -> Answer | None:
     if not left and not before:  # no motion repeats
         return None
     return c.repeats * left <= before, {"without_over_with": before / left if left else math.inf}
+
+
+def _structure(of: Addition, c: Criteria) -> Answer | None:
+    left = of.structure_left
+    return None if left is None else (left <= c.most_left, {"left": left})
 
 
 def _constant(of: Addition, c: Criteria) -> Answer | None:
@@ -185,6 +193,13 @@ FORM: tuple[Rule[Addition], ...] = (
         "repeated laps are reproduced as well as without it",
         "with it the repeated laps are reproduced worse",
         _laps,
+    ),
+    # a torque with noise drives the twin: a term that passes less of it leaves less, and explains nothing
+    Rule(
+        "structure",
+        "it leaves {left:.0%} of the structure below the noise",
+        "it leaves {left:.0%} of the structure below the noise: it only passes less noise",
+        _structure,
     ),
     # an external force; what depends on place or speed leaves its form inside
     Rule(

@@ -2,8 +2,9 @@
 
 A residual within its noise says that the rows of a channel are explained one by one; thousands of rows together tell
 far less than the noise of one. Each channel is asked over each quantity (`hil.identification.structure`). A dependence
-counts if chance makes it in less than the level of significance over the number of questions, if its energy is material
-against the noise, and if it holds on held-out recordings.
+counts if chance makes it in less than the level of significance over the number of questions, if it holds on held-out
+recordings, and if it is material: a torque above the share by which correct simulations of one axis differ, a
+difference of the encoders against their noise.
 """
 
 from collections.abc import Iterator, Sequence
@@ -17,8 +18,9 @@ from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.plain_model import PlainModel
+from hil.identification.residual_scales import DISCREPANCY
 from hil.identification.structure import BINS, Series, Structure, structure
-from hil.identification.torque_left import fit_plain, measured_motion, needed_torque
+from hil.identification.torque_left import fit_plain, measured_motion, needed_torque, torque_deviation
 from hil.quantities import digits, quantity, reading_unit
 
 TORQUE, DIFFERENCE = "torque", "difference"  # needed beyond the twin's; of the encoders, beyond the twin's
@@ -44,8 +46,8 @@ class Question:
 class Dependence:
     """A residual that depends on a quantity: on training recordings, its noise, and what it explains held out.
 
-    `explained` is the share of the residual's mean square, `material` the energy over the squared noise, `held_out` the
-    mean square that the dependence removes from held-out recordings, over the squared noise; None where nothing tells.
+    `explained` is the share of the residual's mean square, `material` the energy over the least one that counts,
+    `held_out` the mean square that the dependence removes from held-out recordings; None where nothing tells.
     """
 
     channel: str
@@ -54,6 +56,15 @@ class Dependence:
     explained: float
     material: float
     held_out: float | None
+
+    def left_by(self, fit: Fit) -> float:
+        """Share of the energy of the dependence that another fit leaves, at least 0."""
+        plain = fit_plain(fit.data)
+        parts = [] if plain is None else _left(fit.hypothesis, fit.data, self.channel, plain)
+        if not all(np.isfinite(part.left).all() for part in parts):
+            return np.inf
+        found = structure(parts, self.question.values, self.question.bins)
+        return max(found.energy, 0.0) / self.found.energy if found else 0.0
 
     def in_words(self, drive_unit: str) -> str:
         """Say what the twin lacks, and where it lacks most."""
@@ -94,7 +105,7 @@ def structure_left(fit: Fit, held_out: Dataset) -> tuple[Dependence, ...]:
     counted = [
         one
         for one in found
-        if one.found.p < level and one.material > CRITERIA.material and (one.held_out is None or one.held_out > 0.0)
+        if one.found.p < level and one.material > 1.0 and (one.held_out is None or one.held_out > 0.0)
     ]
     return tuple(sorted(counted, key=lambda one: -one.explained))
 
@@ -140,7 +151,7 @@ def _dependences(
 ) -> Iterator[Dependence]:
     """Answers to the questions on one channel, (training, held-out) residuals."""
     parts, others = left
-    noise = float(np.mean([run.noise.torque if channel == TORQUE else run.noise.table_m for run in fit.data.runs]))
+    least = _least_energy(fit.data, channel, plain)
     rows = np.concatenate([part.left[part.rows] for part in parts])
     total = float(np.mean((rows - rows.mean()) ** 2)) if rows.size else 0.0
     if not total > 0.0:
@@ -152,8 +163,15 @@ def _dependences(
             continue
         gain = None
         if others and question.kept:
-            gain = _removed(found, others, elsewhere[number].values) / noise**2
-        yield Dependence(channel, question, found, found.energy / total, found.energy / noise**2, gain)
+            gain = _removed(found, others, elsewhere[number].values)
+        yield Dependence(channel, question, found, found.energy / total, found.energy / least, gain)
+
+
+def _least_energy(data: Dataset, channel: str, plain: PlainModel) -> float:
+    """Mean square of a residual from which a dependence is material."""
+    if channel == TORQUE:
+        return (DISCREPANCY * torque_deviation([data], plain.slowest)) ** 2
+    return CRITERIA.material * float(np.mean([run.noise.table_m**2 for run in data.runs]))
 
 
 def _removed(found: Structure, parts: Sequence[Series], quantity: Sequence[FloatArray]) -> float:

@@ -12,6 +12,7 @@ from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.ledger import Considered, Ledger, accepted, examine
 from hil.diagnosis.search.events import InsideWindows, inside_windows
 from hil.diagnosis.search.initial_values import claimable
+from hil.diagnosis.structure_left import Dependence
 from hil.diagnosis.wording import channel_names
 from hil.identification.estimator import Fit
 from hil.identification.inference import bic_gain
@@ -34,13 +35,14 @@ class Addition:
     """A fit with one more term than its `base`.
 
     `reference` is the nominal fit beside the loads of the base: what the terms before it are measured against. `given`
-    is the fit at the values of the bench file.
+    is the fit at the values of the bench file, `structure` what the base leaves where it is within its noise.
     """
 
     fit: Fit
     base: Fit
     reference: Fit
     given: Fit
+    structure: Dependence | None = None
 
     @cached_property
     def evidence(self) -> float:
@@ -53,19 +55,20 @@ class Addition:
         return removed(self.base, self.fit, self.reference)
 
     @property
-    def rows(self) -> int:
-        """Number of residuals."""
-        return self.base.rows
+    def noise_energy(self) -> float:
+        """Energy of the noise of the base."""
+        return self.base.noise_energy
 
     @cached_property
-    def explained(self) -> float:
+    def explained(self) -> float | None:
         """Largest share that the term removes from the energy above the noise of a channel that has a material one.
 
-        A channel with a large mismatch of its own does not hide what a term explains of another.
+        A channel with a large mismatch of its own does not hide what a term explains of another. None where no channel
+        has one.
         """
         gained = removed_by_channel(self.base, self.fit, self.reference)
         above, least = self.base.excess_by_channel, CRITERIA.nothing * self.base.data.rows
-        return max((gain / above[name] for name, gain in gained.items() if above[name] > least), default=0.0)
+        return max((gain / above[name] for name, gain in gained.items() if above[name] > least), default=None)
 
     @property
     def beside(self) -> int:
@@ -76,6 +79,11 @@ class Addition:
     def unrepeated(self) -> tuple[float, float]:
         """Energy of the differences between laps with the term and without it."""
         return unrepeated(self.fit.hypothesis, self.fit.data), unrepeated(self.base.hypothesis, self.base.data)
+
+    @cached_property
+    def structure_left(self) -> float | None:
+        """Share of the structure of a base within its noise that is left; None above the noise."""
+        return None if self.structure is None else self.structure.left_by(self.fit)
 
     @cached_property
     def inside(self) -> InsideWindows | None:

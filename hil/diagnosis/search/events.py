@@ -98,7 +98,7 @@ def with_events_of(held_out: Dataset, final: Fit) -> Fit:
         gain = bic_gain(fitted, before)
         if (
             gain > evidence
-            and before.cost - fitted.cost > CRITERIA.material * before.rows
+            and before.cost - fitted.cost > CRITERIA.material * before.noise_energy
             and is_constant(inside_windows(fitted, before))
         ):
             own = final.estimator.residuals(fitted.hypothesis)

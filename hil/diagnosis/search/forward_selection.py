@@ -35,11 +35,11 @@ MOST_TERMS = 8  # at once: more than an engineer can act on; limits the duration
 
 @dataclass(frozen=True)
 class Need:
-    """Need of a term beside all others: evidence (BIC difference), energy it removes [noise^2], number of residuals."""
+    """Need of a term beside all others: evidence (BIC difference), energy it removes and that of the noise."""
 
     evidence: float
     gain: float
-    rows: int
+    noise_energy: float
 
 
 def search(prepared: Prepared, progress: Progress = lambda text: None, deadline_s: float = math.inf) -> Searched:
@@ -163,7 +163,7 @@ def _pruned(fit: Fit, reference: Fit) -> tuple[Fit, dict[Key, float], list[Consi
         pairs = in_parallel([partial(ablated, index) for index in range(len(fit.terms))])
         weakest = min(range(len(pairs)), key=lambda index: pairs[index][0])
         evidence, rest = pairs[weakest]
-        ledger = examine(NEEDED, Need(evidence, removed(rest, fit, reference), fit.rows), CRITERIA)
+        ledger = examine(NEEDED, Need(evidence, removed(rest, fit, reference), fit.noise_energy), CRITERIA)
         if accepted(ledger):
             return fit, {term.key: value for term, (value, _) in zip(fit.terms, pairs, strict=True)}, pruned
         pruned.append(Considered.of(fit.terms, ledger, weakest))

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 from hil.diagnosis.acceptance import promises
 from hil.diagnosis.criteria import CRITERIA
@@ -11,7 +12,7 @@ from hil.diagnosis.search.restart import companion, from_bench_file, may_hide, t
 from hil.diagnosis.search.score_test import Candidate
 from hil.diagnosis.search.successive_halving import race
 from hil.diagnosis.stages import Progress
-from hil.diagnosis.structure_left import structure_left
+from hil.diagnosis.structure_left import Dependence, structure_left
 from hil.identification.estimator import Fit
 
 
@@ -25,7 +26,18 @@ class SearchRound:
 
     def addition(self, fit: Fit) -> Addition:
         """A fit with one more term than the base."""
-        return Addition(fit, self.base, self.reference, self.given)
+        return Addition(fit, self.base, self.reference, self.given, self.structure)
+
+    @cached_property
+    def within_noise(self) -> bool:
+        """True if the base is at its floor, and a torque with noise drives the twin."""
+        return self.base.at_floor and not self.base.data.observability.exact_input
+
+    @cached_property
+    def structure(self) -> Dependence | None:
+        """What the base leaves below its floor; None above it, or where nothing is left."""
+        left = structure_left(self.base, self.base.data.over(())) if self.within_noise else ()
+        return left[0] if left else None
 
     @property
     def unfinished(self) -> bool:
@@ -55,10 +67,10 @@ def next_term(search: SearchRound, candidates: Sequence[Candidate], step: Progre
         considered.extend(one.considered for one in begun if not one.valid)
         return [one for one in begun if one.valid]
 
-    if base.at_floor and not base.data.observability.exact_input and not structure_left(base, base.data.over(())):
+    if search.within_noise and search.structure is None:
         return Additions([], None)
     additions = list[Addition]()
-    if promising := [one for one in candidates if promises(one.share, base.cost, base.rows)]:
+    if promising := [one for one in candidates if promises(one.share, base.cost, base.rows, base.noise_energy)]:
         step("fitting " + ", ".join(one.term.effect for one in promising[:3]))
         additions = valid(race(base, promising))
     best = first_standing(additions)

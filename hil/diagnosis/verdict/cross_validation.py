@@ -177,7 +177,7 @@ def _quiet(fit: Fit, without: Fit) -> bool:
     """True if a term removes too little on motion without noise: less than a term must, and not most of its gain."""
     removed = energy_without_noise(fit, without)
     return removed is not None and removed < min(
-        CRITERIA.material * fit.rows, CRITERIA.on_motion * (without.cost - fit.cost)
+        CRITERIA.material * fit.noise_energy, CRITERIA.on_motion * (without.cost - fit.cost)
     )
 
 

@@ -93,7 +93,7 @@ def refit_matters(given: Fit, nominal: Fit) -> bool:
     """True if evidence and a material share of energy support the refitted nominal parameters."""
     paid = nominal.hypothesis.x.size * float(np.log(nominal.rows))
     enough = bic_gain(nominal, given) - paid > CRITERIA.evidence
-    return enough and given.cost - nominal.cost > CRITERIA.material * nominal.rows
+    return enough and given.cost - nominal.cost > CRITERIA.material * nominal.noise_energy
 
 
 def _better(change: Change | None, nominal: Fit, final: Fit, held_out: Dataset) -> Change | None:

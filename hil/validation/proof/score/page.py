@@ -72,14 +72,14 @@ def write_proof(scores: Scores, others: Mapping[str, Scores], folder: Path) -> N
 
     page = Page(heading, about, verdict, decided > 0 and not missed)
     for table in before:
-        _add(page, table)
+        add_table(page, table)
     for name, draw, caption in _PICTURES:
         figure = draw(scores)
         if figure is not None:
             page.heading(name.capitalize())
             page.picture(save(figure, folder / f"{name}.png"), caption)
     for table in after:
-        _add(page, table)
+        add_table(page, table)
     page.heading("How to check it")
     page.items(checking(seal))
     page.write(folder / REPORT)
@@ -99,7 +99,8 @@ def _of(scored: int, sealed: int) -> str:
     return f"{scored}" if scored == sealed else f"The first {scored} of {sealed}"
 
 
-def _add(page: Page, table: ProofTable) -> None:
+def add_table(page: Page, table: ProofTable) -> None:
+    """Add a table with its heading to a page; nothing if it has no rows."""
     if not table.rows:
         return
     if table.heading:
@@ -122,7 +123,7 @@ def _scores_json(
     return {
         "schema_version": 1,
         "seal": seal,
-        "goals": [_goal_json(goal) for goal in goals],
+        "goals": [goal_json(goal) for goal in goals],
         "verdicts": verdicts(scores.cases),
         "confusion": confusion(scores.cases),
         "effects": {effect: _rate_json(found) for effect, found in effects.items()},
@@ -135,11 +136,12 @@ def _scores_json(
         ],
         "runtime_s": {"median": quantile(times, 0.5), "p90": quantile(times, 0.9), "longest": max(times, default=None)},
         "cases": [_case_json(case) for case in scores.cases],
-        "others": {name: [_goal_json(goal) for goal in other.goals] for name, other in others.items()},
+        "others": {name: [goal_json(goal) for goal in other.goals] for name, other in others.items()},
     }
 
 
-def _goal_json(goal: Goal) -> dict[str, Any]:
+def goal_json(goal: Goal) -> dict[str, Any]:
+    """Return plain data of a goal with its figure."""
     finite = goal.value is not None and isfinite(goal.value)
     number = {"value": goal.value if finite else None, "of": goal.of}
     found = _rate_json(goal.measured) if isinstance(goal.measured, Rate) else number

@@ -129,10 +129,10 @@ def conceal(half: Half, kind: str, rng: Rng) -> RealCase | None:
             continue
         error = edit.error or half.told(edit.channel, edit.shape, edit.instead).std_error
         strength = float(np.exp(rng.uniform(*np.log(SIZES)))) * error
+        if not 0.0 < strength <= edit.largest:
+            continue
         if edit.whole and rng.random() < 0.5 and strength > 0.75 * edit.whole:
             strength = edit.whole * round(strength / edit.whole)
-        if strength > edit.largest:
-            continue
         if edit.signed and rng.random() < 0.5:
             strength = -strength
         return RealCase(edited(half, edit, strength), half.bench, _truth(half, kind, edit, strength, error))

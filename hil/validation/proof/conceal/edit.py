@@ -10,7 +10,7 @@ from hil.arrays import FloatArray
 from hil.twin.library import LIBRARY
 from hil.twin.mechanism import Mechanism
 from hil.twin.parameter import Role
-from hil.validation.proof.conceal.half import Channel
+from hil.validation.proof.conceal.half import EditedChannel
 
 _TAPS = 32  # rows on either side that the interpolation reads
 _BETA = 8.0  # of the Kaiser window: passes up to 0.9 of the Nyquist frequency within 1e-3
@@ -29,7 +29,7 @@ class Edit:
     tell the shape, since parameters of the bench explain it: no name is right.
     """
 
-    channel: Channel
+    channel: EditedChannel
     change: Callable[[float], FloatArray]
     largest: float
     mechanism: Mechanism | None = None

@@ -27,7 +27,7 @@ _FEW = 0.1  # of the rows
 _SLIDING = 0.02  # of the top speed: below, an axis may stick, and its torque is not that of its friction
 
 
-class Channel(StrEnum):
+class EditedChannel(StrEnum):
     """Channel that an edit changes, and the raw channels in which least squares tell it."""
 
     TORQUE = "torque"  # in the torque that the motion needs
@@ -137,16 +137,16 @@ class Half:
         columns = {name: column[self.sliding] for name, column in self._torque_columns.items()}
         return least_squares(columns, self.torque[self.sliding])
 
-    def told(self, channel: Channel, shape: FloatArray, instead: str = "") -> Estimate:
+    def told(self, channel: EditedChannel, shape: FloatArray, instead: str = "") -> Estimate:
         """Coefficient of a shape (n,), the change of a channel for a strength of 1, in the raw channels.
 
         It is fitted beside the plain model of the torque, or ratio, datum, delay and stretch of the encoders; `instead`
         is the name of the regressor that it takes the place of.
         """
-        rows = self.sliding if channel is Channel.TORQUE else np.ones(shape.size, dtype=bool)
-        if channel is Channel.TORQUE:
+        rows = self.sliding if channel is EditedChannel.TORQUE else np.ones(shape.size, dtype=bool)
+        if channel is EditedChannel.TORQUE:
             columns, target = dict(self._torque_columns), self.torque
-        elif channel is Channel.CURRENT:
+        elif channel is EditedChannel.CURRENT:
             assert self.command is not None
             columns, target = {"offset": np.ones(shape.size)}, self.torque - self.command
         else:
@@ -154,7 +154,7 @@ class Half:
             moved = self.moved
             columns = {"ratio": self.motor, "late": moved.velocity, "stretch": moved.acceleration}
             columns["offset"], target = np.ones(shape.size), self.table - self.position_m
-            shape = shape if channel is Channel.TABLE else -self.ratio * shape
+            shape = shape if channel is EditedChannel.TABLE else -self.ratio * shape
         columns.pop(instead, None)
         columns, target = {name: column[rows] for name, column in columns.items()}, target[rows]
         fit = least_squares({**columns, "shape": shape[rows]}, target)

@@ -17,7 +17,7 @@ from hil.twin.mechanisms import (
     thermal_growth,
 )
 from hil.validation.proof.conceal.edit import Edit, later
-from hil.validation.proof.conceal.half import Channel, Half, rows_of
+from hil.validation.proof.conceal.half import EditedChannel, Half, rows_of
 from hil.validation.proof.conceal.torque_edits import Drawn, Rng
 
 _LATEST_S = 8e-3  # of a channel
@@ -33,7 +33,7 @@ def _table_late(half: Half, rng: Rng) -> Edit | None:
     if table is None:
         return None
     return Edit(
-        Channel.TABLE, lambda late_s: later(table, late_s / period_s), _LATEST_S, channel_time_skew.MECHANISM,
+        EditedChannel.TABLE, lambda late_s: later(table, late_s / period_s), _LATEST_S, channel_time_skew.MECHANISM,
         told=(0,), instead="late", adds=True, whole=period_s,
     )  # fmt: skip
 
@@ -43,7 +43,7 @@ def _motor_late(half: Half, rng: Rng) -> Edit | None:
     if half.table is None or half.law_known:
         return None
     return Edit(
-        Channel.MOTOR, lambda late_s: later(motor, late_s / period_s), _LATEST_S, channel_time_skew.MECHANISM,
+        EditedChannel.MOTOR, lambda late_s: later(motor, late_s / period_s), _LATEST_S, channel_time_skew.MECHANISM,
         variant=2, instead="late", adds=True, whole=period_s,
     )  # fmt: skip
 
@@ -60,7 +60,7 @@ def _torque_late(half: Half, rng: Rng) -> Edit | None:
         return np.asarray((1.0 - part) * longer[1 : 1 + torque.size] + part * longer[: torque.size])
 
     mechanism = channel_time_skew.MECHANISM
-    return Edit(Channel.CURRENT, delayed, _LATEST_S, mechanism, variant=1, told=(0,), adds=True, whole=period_s)
+    return Edit(EditedChannel.CURRENT, delayed, _LATEST_S, mechanism, variant=1, told=(0,), adds=True, whole=period_s)
 
 
 def _scaled(half: Half, rng: Rng) -> Edit | None:
@@ -69,7 +69,7 @@ def _scaled(half: Half, rng: Rng) -> Edit | None:
         return None
     mechanism = cumulative_lead_error.MECHANISM
     return Edit(
-        Channel.TABLE,
+        EditedChannel.TABLE,
         lambda s: (1.0 + s) * table,
         _SCALE,
         mechanism,
@@ -87,7 +87,7 @@ def _growing(half: Half, rng: Rng) -> Edit | None:
     time_s = max(whole_s * rng.uniform(0.2, 1.0), _FASTEST_S)
     grown = -np.expm1(-half.time_s / time_s)
     mechanism = thermal_growth.MECHANISM
-    return Edit(Channel.TABLE, lambda g: (1.0 + g * grown) * table, _SCALE, mechanism, lambda g: (g, time_s))
+    return Edit(EditedChannel.TABLE, lambda g: (1.0 + g * grown) * table, _SCALE, mechanism, lambda g: (g, time_s))
 
 
 def _interpolated(half: Half, rng: Rng) -> Edit | None:
@@ -101,7 +101,12 @@ def _interpolated(half: Half, rng: Rng) -> Edit | None:
     wave = np.sin(2.0 * pi * table / period + phase)
     mechanism = scale_interpolation_error.MECHANISM
     return Edit(
-        Channel.TABLE, lambda a: table + a * wave, 0.2 * period, mechanism, lambda a: (a, period, phase), told=(0,)
+        EditedChannel.TABLE,
+        lambda a: table + a * wave,
+        0.2 * period,
+        mechanism,
+        lambda a: (a, period, phase),
+        told=(0,),
     )
 
 
@@ -112,20 +117,20 @@ def _load_eccentric(half: Half, rng: Rng) -> Edit | None:
     phase = float(rng.uniform(-pi, pi))
     wave = np.sin(table + phase)
     mechanism, rivals = load_encoder_eccentricity.MECHANISM, (encoder_eccentricity.MECHANISM,)
-    return Edit(Channel.TABLE, lambda a: table + a * wave, 1e-2, mechanism, lambda a: (a, phase), rivals=rivals)
+    return Edit(EditedChannel.TABLE, lambda a: table + a * wave, 1e-2, mechanism, lambda a: (a, phase), rivals=rivals)
 
 
-def _once_per_turn(channel: Channel) -> Drawn:
+def _once_per_turn(channel: EditedChannel) -> Drawn:
     def draw(half: Half, rng: Rng) -> Edit | None:
         table, motor, physics = half.table, half.motor, half.bench.axis.physics()
         if table is None or not physics.turn_known or np.ptp(half.angle_rad) < 2.0 * pi * _TURNS:
             return None
-        if channel is Channel.MOTOR and half.law_known:
+        if channel is EditedChannel.MOTOR and half.law_known:
             return None
         phase = float(rng.uniform(-pi, pi))
         wave = np.sin(half.angle_rad + phase)
         eccentric, lead = encoder_eccentricity.MECHANISM, periodic_lead_error.MECHANISM
-        if channel is Channel.MOTOR:
+        if channel is EditedChannel.MOTOR:
             largest = 3e-3 * half.lead / abs(half.ratio)
             return Edit(
                 channel, lambda a: motor + a * wave, largest, eccentric, lambda a: (a, phase), told=(0,), rivals=(lead,)
@@ -168,8 +173,8 @@ SENSOR_EDITS: Mapping[str, Drawn] = {
     "scale over time": _growing,
     "second encoder within a short period": _interpolated,
     "second encoder once per turn of the load": _load_eccentric,
-    "second encoder once per turn": _once_per_turn(Channel.TABLE),
-    "motor encoder once per turn": _once_per_turn(Channel.MOTOR),
+    "second encoder once per turn": _once_per_turn(EditedChannel.TABLE),
+    "motor encoder once per turn": _once_per_turn(EditedChannel.MOTOR),
 }
 # Less is recorded; nothing is missing in the model.
 LOSSES: Mapping[str, Callable[[Half, Rng], Recording]] = {"rows lost": rows_lost, "coarser counts": coarser_counts}

@@ -24,7 +24,7 @@ from hil.twin.mechanisms import (
     torque_ripple,
 )
 from hil.validation.proof.conceal.edit import Edit, current_for
-from hil.validation.proof.conceal.half import Channel, Half, rigid
+from hil.validation.proof.conceal.half import EditedChannel, Half, rigid
 
 Rng = np.random.Generator
 Drawn = Callable[[Half, Rng], Edit | None]  # None: this half cannot show it
@@ -44,7 +44,7 @@ def _added(half: Half, shape: FloatArray, mechanism: Mechanism | None, most: flo
     """An edit that adds strength times a shape (n,) to the torque, of a strength up to `most`."""
     largest = min(_MOST * _peak(half) / max(float(np.max(np.abs(shape))), 1e-300), most)
     torque = half.torque
-    return Edit(Channel.TORQUE, lambda a: torque + a * shape, largest, mechanism, **more)  # type: ignore[arg-type]
+    return Edit(EditedChannel.TORQUE, lambda a: torque + a * shape, largest, mechanism, **more)  # type: ignore[arg-type]
 
 
 def _offset(half: Half, rng: Rng) -> Edit:
@@ -147,21 +147,26 @@ def _rippling(half: Half, rng: Rng) -> Edit | None:
     order, phase, wave = found
     torque, mechanism = half.torque, torque_ripple.MECHANISM
     return Edit(
-        Channel.TORQUE, lambda a: torque / (1.0 + a * wave), 0.3, mechanism, lambda a: (a, order, phase), told=(0, 2)
+        EditedChannel.TORQUE,
+        lambda a: torque / (1.0 + a * wave),
+        0.3,
+        mechanism,
+        lambda a: (a, order, phase),
+        told=(0, 2),
     )
 
 
 def _saturating(half: Half, rng: Rng) -> Edit:
     torque, largest = half.torque, _SATURATED / _peak(half) ** 2 / 2.0
     return Edit(
-        Channel.TORQUE, lambda c: current_for(torque, c), largest, torque_constant_saturation.MECHANISM, told=(0,)
+        EditedChannel.TORQUE, lambda c: current_for(torque, c), largest, torque_constant_saturation.MECHANISM, told=(0,)
     )
 
 
 def _compressed(half: Half, rng: Rng) -> Edit:
     torque, level = half.torque, _COMPRESSED * _peak(half)
     above = np.sign(torque) * np.maximum(np.abs(torque) - level, 0.0)
-    return Edit(Channel.TORQUE, lambda a: torque - a * above, 0.9, None)
+    return Edit(EditedChannel.TORQUE, lambda a: torque - a * above, 0.9, None)
 
 
 def _by_load(half: Half, rng: Rng) -> Edit:
@@ -177,7 +182,7 @@ def _other_constant(half: Half, rng: Rng) -> Edit | None:
     if not inertia.significant:
         return None
     error = inertia.std_error / abs(inertia.value)
-    return Edit(Channel.TORQUE, lambda a: (1.0 + a) * torque, 0.5, signed=True, error=error)
+    return Edit(EditedChannel.TORQUE, lambda a: (1.0 + a) * torque, 0.5, signed=True, error=error)
 
 
 TORQUE_EDITS: Mapping[str, Drawn] = {

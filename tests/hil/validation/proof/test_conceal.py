@@ -18,7 +18,7 @@ from hil.twin.mechanism import WIDTH, Moment, Stage
 from hil.twin.parameter import Role
 from hil.validation.proof.conceal.cases import EDITS, SIZES, conceal, edited, ways
 from hil.validation.proof.conceal.edit import Edit, current_for, ends, later
-from hil.validation.proof.conceal.half import Channel, Half, halves
+from hil.validation.proof.conceal.half import EditedChannel, Half, halves
 from hil.validation.proof.conceal.sensor_edits import LOSSES, SENSOR_EDITS
 
 RECORDING = Path(__file__).parents[3] / "recordings" / "clean.parquet"
@@ -72,7 +72,7 @@ def test_the_law_of_the_library_gives_the_recording_back(uses: dict[str, Half], 
     period_s = half.recording.period_s
     if stage in (Stage.CHANNEL, Stage.ANSWER):
         cut = slice(3 * ends(strength / period_s), -3 * ends(strength / period_s))
-        place = {Channel.MOTOR: 0, Channel.TABLE: 1, Channel.CURRENT: 3}[edit.channel]
+        place = {EditedChannel.MOTOR: 0, EditedChannel.TABLE: 1, EditedChannel.CURRENT: 3}[edit.channel]
         channels = (untouched,) * 4
         expected = law(channels, values, period_s)[place]
         # another interpolation: they differ in the noise beyond 0.9 of the Nyquist frequency
@@ -132,7 +132,7 @@ def test_least_squares_find_the_strength_that_was_concealed(uses: dict[str, Half
     after = replace(half, recording=changed)
     for kept in ("motor", "moved", "_torque_columns", "sliding"):
         after.__dict__[kept] = getattr(half, kept)  # the regressors of the untouched half
-    if edit.channel is Channel.MOTOR:
+    if edit.channel is EditedChannel.MOTOR:
         after.__dict__["motor"] = edit.change(small)
     found = after.told(edit.channel, shape, edit.instead).value - before.value
     assert found == pytest.approx(small, rel=0.05)

@@ -58,7 +58,10 @@ def prove_recordings(
     sealed = unsealed(folder)
     first = list(takewhile(lambda name: answered(folder / ANSWERS / name), order))
     if len(first) < len(order):
-        say(f"the first {len(first)} of {len(order)} cases have an answer and are scored; the same command continues")
+        say(
+            f"the first {len(first)} of {len(order)} cases have an answer; scored are those whose untouched halves have "
+            "one too; the same command continues"
+        )
     progress("scoring", None)
     truths = {name: RealTruth.from_json(sealed[name]) for name in first}
     return score_real(truths, read_answers(folder / ANSWERS, truths))

@@ -11,7 +11,6 @@ from hil.twin.mechanisms import (
     channel_time_skew,
     cumulative_lead_error,
     encoder_eccentricity,
-    load_encoder_eccentricity,
     periodic_lead_error,
     scale_interpolation_error,
     thermal_growth,
@@ -110,16 +109,6 @@ def _interpolated(half: Half, rng: Rng) -> Edit | None:
     )
 
 
-def _load_eccentric(half: Half, rng: Rng) -> Edit | None:
-    table, turns = half.table, getattr(half.bench.axis, "turns", False)
-    if table is None or not turns or np.ptp(table) < 2.0 * pi * _TURNS:
-        return None
-    phase = float(rng.uniform(-pi, pi))
-    wave = np.sin(table + phase)
-    mechanism, rivals = load_encoder_eccentricity.MECHANISM, (encoder_eccentricity.MECHANISM,)
-    return Edit(EditedChannel.TABLE, lambda a: table + a * wave, 1e-2, mechanism, lambda a: (a, phase), rivals=rivals)
-
-
 def _once_per_turn(channel: EditedChannel) -> Drawn:
     def draw(half: Half, rng: Rng) -> Edit | None:
         table, motor, physics = half.table, half.motor, half.bench.axis.physics()
@@ -172,7 +161,6 @@ SENSOR_EDITS: Mapping[str, Drawn] = {
     "scale of the second encoder": _scaled,
     "scale over time": _growing,
     "second encoder within a short period": _interpolated,
-    "second encoder once per turn of the load": _load_eccentric,
     "second encoder once per turn": _once_per_turn(EditedChannel.TABLE),
     "motor encoder once per turn": _once_per_turn(EditedChannel.MOTOR),
 }

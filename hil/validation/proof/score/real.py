@@ -10,10 +10,10 @@ from functools import cached_property
 from math import hypot
 
 from hil.twin.library import LIBRARY
-from hil.validation.proof.answer.answers import ABSENT, FAILED, Answer, Named
+from hil.validation.proof.answer.answers import FAILED, Answer, Named
 from hil.validation.proof.conceal.cases import RealTruth
 from hil.validation.proof.score.grading import NORMAL_90, difference
-from hil.validation.proof.score.scores import NO_ANSWER, Goal
+from hil.validation.proof.score.scores import Goal
 from hil.validation.proof.score.statistics import Rate, confidence_bins, expected_calibration_error, rate
 
 TOLD = 5.0  # standard errors of least squares from which the diagnosis should name an effect
@@ -31,8 +31,8 @@ class RealCaseScore:
 
     @property
     def unanswered(self) -> bool:
-        """True if the diagnosis failed or is missing."""
-        return self.answer.verdict in (FAILED, ABSENT)
+        """True if the diagnosis failed."""
+        return self.answer.verdict == FAILED
 
     @property
     def null(self) -> bool:
@@ -129,18 +129,15 @@ def same_laws(effect: str) -> frozenset[str]:
 
 
 def score_real(truths: Mapping[str, RealTruth], answers: Mapping[str, Answer]) -> RealScores:
-    """Score answers by case; a missing one counts as wrong."""
-    nulls = {truth.half: answers.get(name, NO_ANSWER) for name, truth in truths.items() if not truth.kind}
-    cases = tuple(
-        RealCaseScore(
-            truth,
-            answers.get(name, NO_ANSWER),
-            nulls.get(truth.half, NO_ANSWER),
-            nulls.get((truth.source, 1 - truth.part, truth.law_known), NO_ANSWER),
-        )
-        for name, truth in truths.items()
-    )
-    return RealScores(cases, tuple(_goals(cases)))
+    """Score the answers to cases of which both untouched halves have one too."""
+    nulls = {truth.half: answers[name] for name, truth in truths.items() if not truth.kind and name in answers}
+    cases = []
+    for name, truth in truths.items():
+        source, part, law_known = truth.half
+        untouched, other_half = nulls.get(truth.half), nulls.get((source, 1 - part, law_known))
+        if name in answers and untouched is not None and other_half is not None:
+            cases.append(RealCaseScore(truth, answers[name], untouched, other_half))
+    return RealScores(tuple(cases), tuple(_goals(cases)))
 
 
 def _goals(cases: Sequence[RealCaseScore]) -> list[Goal]:

@@ -59,8 +59,8 @@ def prove_recordings(
     first = list(takewhile(lambda name: answered(folder / ANSWERS / name), order))
     if len(first) < len(order):
         say(
-            f"the first {len(first)} of {len(order)} cases have an answer; scored are those whose untouched halves have "
-            "one too; the same command continues"
+            f"the first {len(first)} of {len(order)} cases have an answer; scored are those whose untouched halves "
+            "have one too; the same command continues"
         )
     progress("scoring", None)
     truths = {name: RealTruth.from_json(sealed[name]) for name in first}

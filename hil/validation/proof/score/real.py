@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from math import hypot
 
-from hil.twin.library import LIBRARY
+from hil.twin.library import LIBRARY, names_of
+from hil.twin.parameter import Role
 from hil.validation.proof.answer.answers import FAILED, Answer, Named
 from hil.validation.proof.conceal.cases import RealTruth
 from hil.validation.proof.score.grading import NORMAL_90, difference
@@ -18,6 +19,7 @@ from hil.validation.proof.score.statistics import Rate, confidence_bins, expecte
 
 TOLD = 5.0  # standard errors of least squares from which the diagnosis should name an effect
 SURE, LIKELY = 0.9, 0.5  # confidence of a name
+_NEAR = 0.1  # relative difference of two periods, orders or frequencies that are one
 
 
 @dataclass(frozen=True)
@@ -42,24 +44,23 @@ class RealCaseScore:
     @property
     def there_already(self) -> bool:
         """True if the untouched half has the name of the concealed effect: a name proves nothing."""
-        return bool(set(self.truth.right) & {named.effect for named in self.untouched.named})
+        return any(self._names(one, frozenset({one.effect})) for one in self.untouched.named)
 
     @cached_property
     def new(self) -> tuple[Named, ...]:
         """Names that are not there already; on an untouched half those that the other half does not confirm."""
         before = self.other_half if self.null else self.untouched
-        known = frozenset[str]().union(*(same_laws(named.effect) for named in before.named))
-        return tuple(named for named in self.answer.named if named.effect not in known)
+        return tuple(named for named in self.answer.named if not any(alike(named, one) for one in before.named))
 
     @property
     def first_right(self) -> bool:
         """True if the first new name is that of the concealed effect."""
-        return bool(self.new) and self.new[0].effect in self.truth.right
+        return bool(self.new) and self._names(self.new[0], frozenset({self.new[0].effect}))
 
     @property
     def in_set(self) -> bool:
         """True if the first new name or one of its equivalents is that of the concealed effect."""
-        return bool(self.new) and bool(self.new[0].reported & set(self.truth.right))
+        return bool(self.new) and self.right(self.new[0])
 
     @property
     def detected(self) -> bool:
@@ -69,7 +70,11 @@ class RealCaseScore:
 
     def right(self, named: Named) -> bool:
         """Return whether a new name is right, by itself or by an equivalent that the diagnosis gives beside it."""
-        return bool(named.reported & set(self.truth.right))
+        return self._names(named, named.reported)
+
+    def _names(self, named: Named, reported: frozenset[str]) -> bool:
+        """Return whether ids that a finding reports are right, and its place is that of the concealed effect."""
+        return bool(reported & set(self.truth.right)) and same_place(_values(named), self.truth.parameters)
 
     @property
     def wrong(self) -> tuple[Named, ...]:
@@ -85,10 +90,11 @@ class RealCaseScore:
 
         Of an effect that was there already it is the change that is compared, with the errors of both answers.
         """
-        found = next((named for named in self.answer.named if named.effect in self.truth.right), None)
+        names = (one for one in self.answer.named if self._names(one, frozenset({one.effect})))
+        found = next(names, None)
         if found is None or (self.there_already and not self.truth.adds):
             return {}
-        before = next((named for named in self.untouched.named if named.effect == found.effect), None)
+        before = next((one for one in self.untouched.named if one.effect == found.effect and alike(one, found)), None)
         held = {}
         for name, true in self.truth.compared.items():
             if name in found.parameters:
@@ -126,6 +132,25 @@ def same_laws(effect: str) -> frozenset[str]:
     same = {one.id for one in LIBRARY if one.same_torque(0) == effect}
     own = {one.same_torque(0) for one in LIBRARY if one.id == effect} - {""}
     return frozenset({effect, *same, *own})
+
+
+def alike(one: Named, other: Named) -> bool:
+    """Return whether two findings are one effect: the same law at the same place."""
+    return one.effect in same_laws(other.effect) and same_place(_values(one), _values(other))
+
+
+def same_place(one: Mapping[str, float], other: Mapping[str, float]) -> bool:
+    """Return whether orders, periods and frequencies that both have agree, and their windows of time overlap."""
+    shared = [
+        name for name in names_of(Role.ORDER, Role.PERIOD, Role.LINE, Role.FREQUENCY) if name in one and name in other
+    ]
+    windows = [[values[name] for name in names_of(Role.EDGE) if name in values] for values in (one, other)]
+    apart = all(windows) and max(window[0] for window in windows) >= min(window[-1] for window in windows)
+    return not apart and all(abs(one[name] - other[name]) <= _NEAR * abs(other[name]) for name in shared)
+
+
+def _values(named: Named) -> dict[str, float]:
+    return {name: value for name, (value, _) in named.parameters.items()}
 
 
 def score_real(truths: Mapping[str, RealTruth], answers: Mapping[str, Answer]) -> RealScores:

@@ -111,6 +111,32 @@ def test_what_is_there_already_is_neither_right_nor_wrong() -> None:
     assert figures["told by 5 errors: named first"].of == 0  # type: ignore[union-attr]
 
 
+def test_the_same_name_at_another_place_is_another_effect() -> None:
+    cogging = "cogging_torque"
+
+    def teeth(order: float) -> Named:
+        return named(cogging, cycles_per_rev=(order, 0.1))
+
+    given = {"right": (cogging,), "size": 9.0, "parameters": {"cycles_per_rev": 6.0}}
+    before = missing(teeth(72.0))
+    found = scored(missing(teeth(72.1), teeth(6.0)), before, before, **given).cases[2]
+    assert (found.there_already, found.first_right, found.wrong) == (False, True, ())
+    other = scored(missing(teeth(72.1), teeth(12.0)), before, before, **given).cases[2]
+    assert (other.first_right, len(other.wrong)) == (False, 1)
+    assert scored(missing(), missing(teeth(6.1)), before, **given).cases[2].there_already
+
+
+def test_a_force_at_another_time_is_another_one() -> None:
+    force = "external_force"
+
+    def push(start: float, end: float) -> Named:
+        return named(force, start_s=(start, 0.1), end_s=(end, 0.1))
+
+    given = {"right": (force,), "size": 9.0, "parameters": {"start_s": 2.0, "end_s": 3.0}}
+    assert scored(missing(push(2.1, 3.1)), missing(), missing(), **given).cases[2].first_right
+    assert not scored(missing(push(4.0, 5.0)), missing(), missing(), **given).cases[2].first_right
+
+
 def test_a_name_in_one_untouched_half_only_is_a_false_alarm() -> None:
     both = scored(missing(), missing(named("asymmetric_friction")), missing(named(LOAD)))
     assert [len(case.new) for case in both.cases[:2]] == [0, 0]

@@ -123,7 +123,9 @@ def conceal(half: Half, kind: str, rng: Rng) -> RealCase | None:
     """Conceal an edit or a loss of a kind in a half; None if the half cannot show it at any size of `SIZES`."""
     if kind in LOSSES:
         return RealCase(LOSSES[kind](half, rng), half.bench, _truth(half, kind))
-    for _ in range(_TRIES if half.law_known is False or kind in SENSOR_EDITS else 0):
+    if half.law_known and kind in TORQUE_EDITS:  # it would contradict the law
+        return None
+    for _ in range(_TRIES):
         edit = EDITS[kind](half, rng)
         if edit is None:
             continue
@@ -151,7 +153,8 @@ def edited(half: Half, edit: Edit, strength: float) -> Recording:
 
 
 def bench_yaml(bench: Bench) -> str:
-    """The bench as text of a file, without comments."""
+    """The bench as text of a file, without comments, its name, and a simulation that may tell effects."""
+    bench = bench.model_copy(update={"name": "", "description": "", "simulation": None})
     return yaml.safe_dump(bench.model_dump(mode="json", exclude_defaults=True), sort_keys=False)
 
 

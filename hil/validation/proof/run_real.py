@@ -12,7 +12,8 @@ from hil.recording.recording import Recording, write_parquet
 from hil.report.console import Progress
 from hil.validation.proof.answer.answers import read_answers
 from hil.validation.proof.answer.blind import answered
-from hil.validation.proof.conceal.cases import RealTruth, bench_yaml, draw_cases, ways
+from hil.validation.proof.conceal.cases import RealTruth, bench_yaml, check, draw_cases, ways
+from hil.validation.proof.conceal.half import Half
 from hil.validation.proof.draw.plan import Planned
 from hil.validation.proof.run import ANSWERS, diagnose_blind, make_folder
 from hil.validation.proof.score.real import RealScores, score_real
@@ -76,10 +77,12 @@ def _conceal(
     say: Callable[[str], None],
 ) -> list[Planned]:
     """Draw and write all cases; those of an interrupted drawing are written anew."""
-    found = []
+    found: list[tuple[Half, Half]] = []
     for recording in recordings:
         try:
-            found += list(ways(recording, bench))
+            for pair in ways(recording, bench):
+                check(pair)
+                found.append(pair)
         except InputError as error:
             say(f"left out: {error}")
     if not found:

@@ -13,6 +13,7 @@ import yaml
 from pydantic import TypeAdapter
 
 from hil.bench.bench_file import Bench
+from hil.diagnosis.preparation.prepare import prepare
 from hil.drafting.bench_text import bench_text
 from hil.drafting.draft_bench import draft_bench
 from hil.errors import InputError
@@ -89,9 +90,15 @@ def ways(recording: Recording, bench: Bench | None) -> Iterator[tuple[Half, Half
         for part, (half, own) in enumerate(zip((one, other), benches, strict=True))
     )
     lawful = all(half.law_known and (half.table is not None or half.command is not None) for half in pair)
-    for found in [pair] if lawful else []:
-        yield found[0], found[1]
+    if lawful:
+        yield pair[0], pair[1]
     yield as_plant(pair[0]), as_plant(pair[1])
+
+
+def check(pair: Sequence[Half]) -> None:
+    """Raise InputError if the diagnosis refuses an untouched half."""
+    for half in pair:
+        prepare([half.recording], [], half.bench)
 
 
 def draw_cases(found: Sequence[tuple[Half, Half]], cases: int, seed: int) -> list[RealCase]:

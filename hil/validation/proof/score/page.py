@@ -86,7 +86,7 @@ def write_proof(scores: Scores, others: Mapping[str, Scores], folder: Path) -> N
     times = [case.answer.runtime_s for case in scores.cases if case.answer.runtime_s is not None]
     parts = [
         f"# {heading}",
-        f"{about}. {_time(times)}{verdict}",
+        f"{about}. {time_text(times)}{verdict}",
         *(markdown(table) for table in (*before, power_table(scores), *after)),
         "## How to check it",
         "\n".join(f"- {text}" for text in checking(seal)),
@@ -110,7 +110,8 @@ def add_table(page: Page, table: ProofTable) -> None:
     page.table(table.headers, table.rows, table.left, table.mark)
 
 
-def _time(times: Sequence[float]) -> str:
+def time_text(times: Sequence[float]) -> str:
+    """Return a sentence on the times [s] of diagnoses; empty without any."""
     if not times:
         return ""
     return f"A diagnosis took {digits(quantile(times, 0.5) or 0.0)} s in the median, {digits(max(times))} s at most. "

@@ -7,7 +7,7 @@ from hil.diagnosis.wording import title
 from hil.files.output import write_json, write_text
 from hil.quantities import digits
 from hil.report.page import Page
-from hil.validation.proof.score.page import MARKDOWN, REPORT, SCORES, add_table, goal_json
+from hil.validation.proof.score.page import MARKDOWN, REPORT, SCORES, add_table, goal_json, time_text
 from hil.validation.proof.score.real import TOLD, RealCaseScore, RealScores
 from hil.validation.proof.score.statistics import quantile, rate
 from hil.validation.proof.score.tables import ProofTable, checking, goals_table, markdown
@@ -38,10 +38,9 @@ def write_real_proof(scores: RealScores, folder: Path) -> None:
     page.heading("How to check it")
     page.items(checking(seal))
     page.write(folder / REPORT)
-    took = f"A diagnosis took {digits(quantile(times, 0.5) or 0.0)} s in the median, {digits(max(times))} s at most. "
     parts = [
         f"# {_HEADING}",
-        f"{about}. {took if times else ''}{verdict}",
+        f"{about}. {time_text(times)}{verdict}",
         *map(markdown, tables),
         "## How to check it",
         "\n".join(f"- {text}" for text in checking(seal)),

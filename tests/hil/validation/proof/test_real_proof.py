@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from proof_folders import answer, data, quiet
@@ -13,7 +14,7 @@ from typer.testing import CliRunner
 from hil.bench.bench_file import load_bench
 from hil.cli import app
 from hil.errors import HilError, InputError
-from hil.recording.recording import Recording, read_recording
+from hil.recording.recording import Recording, read_recording, write_parquet
 from hil.twin.library import BY_ID
 from hil.validation.proof.answer.answers import Answer, Named
 from hil.validation.proof.answer.blind import DIAGNOSIS
@@ -25,11 +26,19 @@ from hil.validation.proof.score.real_page import write_real_proof
 from hil.validation.proof.seal import CASES, SEAL, SEALED, sha256, unsealed
 
 RECORDINGS = Path(__file__).parents[3] / "recordings"
-FILES = [RECORDINGS / name for name in ("clean.parquet", "cogging_prove.parquet")]
+NAMES = ("first_run", "second_run")
 
 
 def recordings() -> list[Recording]:
-    return [read_recording(path) for path in FILES]
+    """Runs that are long enough to be cut: one recording after another one of the same axis, from rest to rest."""
+    one, other = (read_recording(RECORDINGS / f"cogging_{name}.parquet") for name in ("learn", "prove"))
+    return [joined(NAMES[0], one, other), joined(NAMES[1], other, one)]
+
+
+def joined(name: str, *parts: Recording) -> Recording:
+    columns = {channel: np.concatenate([part[channel] for part in parts]) for channel in parts[0].columns}
+    columns["time_s"] = np.arange(columns["time_s"].size) * parts[0].period_s
+    return Recording(name, columns, parts[0].period_s)
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +53,7 @@ def sealed(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_the_seal_covers_the_truth_and_every_file(sealed: Path) -> None:
     about = data(sealed / SEAL)
     assert about["truths_sha256"] == sha256(sealed / SEALED / "truths.json")
-    assert "--recording clean --recording cogging_prove" in about["command"]
+    assert "--recording first_run --recording second_run" in about["command"]
     truths = [RealTruth.from_json(truth) for truth in unsealed(sealed).values()]
     assert len(truths) == 10
     nulls = [truth for truth in truths if not truth.kind]
@@ -61,7 +70,7 @@ def test_the_seal_covers_the_truth_and_every_file(sealed: Path) -> None:
 
 
 def test_a_case_says_nothing_of_the_truth(sealed: Path) -> None:
-    words = (*BY_ID, *EDITS, "kind", "truth", "clean", "cogging_prove")
+    words = (*BY_ID, *EDITS, "kind", "truth", *NAMES)
     for place in (sealed / CASES).iterdir():
         assert {path.name for path in place.iterdir()} == {"train_1.parquet", "bench.yaml"}
         schema = pq.read_schema(place / "train_1.parquet")
@@ -177,9 +186,17 @@ def test_a_page_is_written_of_what_is_answered(sealed: Path, tmp_path: Path) -> 
     assert "| case_0009 |" in (folder / "proof.md").read_text()
 
 
+def test_a_recording_that_is_too_short_to_be_cut_is_left_out(tmp_path: Path) -> None:
+    told: list[str] = []
+    short = [read_recording(RECORDINGS / "clean.parquet")]
+    with pytest.raises(InputError, match=r"--recording: given recordings of which no half"):
+        prove_recordings(tmp_path, short, load_bench("reference"), 5, 1, 1, told.append, quiet)
+    assert "too short" in told[0]
+
+
 @pytest.mark.parametrize("wrong", [["--full"], ["--only", "single"], ["--plant", "mujoco"]])
 def test_options_of_simulated_axes_are_refused(wrong: list[str], tmp_path: Path) -> None:
-    ran = CliRunner().invoke(app, ["prove", "--recording", str(FILES[0]), *wrong, "--out", str(tmp_path / "new")])
+    ran = CliRunner().invoke(app, ["prove", "--recording", "run.parquet", *wrong, "--out", str(tmp_path / "new")])
     assert isinstance(ran.exception, InputError)
     assert str(ran.exception).startswith("--recording: given")
 
@@ -187,9 +204,11 @@ def test_options_of_simulated_axes_are_refused(wrong: list[str], tmp_path: Path)
 @pytest.mark.long
 def test_a_whole_proof_on_a_recording(tmp_path: Path) -> None:
     """From the command to the page, with the answers of the blind process."""
-    folder = tmp_path / "proof"
+    folder, files = tmp_path / "proof", [tmp_path / f"{name}.parquet" for name in NAMES]
+    for recording, path in zip(recordings(), files, strict=True):
+        write_parquet(recording, path)
     given = ["--bench", "reference", "--cases", "5", "--seed", "2", "--workers", "1", "--out", str(folder)]
-    ran = CliRunner().invoke(app, ["prove", "--recording", *map(str, FILES), *given])
+    ran = CliRunner().invoke(app, ["prove", "--recording", *map(str, files), *given])
     assert ran.exit_code == 0, ran.output
     assert data(folder / SEAL)["truths_sha256"] in ran.output
     answers = list((folder / ANSWERS).rglob(DIAGNOSIS))

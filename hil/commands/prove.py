@@ -17,6 +17,23 @@ class PlantChoice(StrEnum):
 
 
 def prove(
+    more: Annotated[
+        list[Path] | None,
+        typer.Argument(metavar="[FILE]...", show_default=False, help="Further recordings after --recording"),
+    ] = None,
+    recording: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--recording",
+            help="Conceal effects in real recordings instead, .parquet, .arrows or .csv; may be repeated",
+        ),
+    ] = None,
+    bench: Annotated[
+        Path | None,
+        typer.Option(
+            "--bench", help="Bench file of the axis of all recordings; default: drafted from the other half of each"
+        ),
+    ] = None,
     folder: Annotated[
         Path | None,
         typer.Option("--out", help="Folder for cases, answers and scores; continues an interrupted proof"),
@@ -55,7 +72,7 @@ def prove(
         str | None, typer.Option("--show", help="Print the published tables of a run, as 20261206, and exit")
     ] = None,
 ) -> None:
-    """Conceal effects in simulated axes, seal the truth, diagnose the recordings blind, unseal and score."""
+    """Conceal effects in simulated axes, or in real recordings, seal the truth, diagnose blind, unseal and score."""
     import os
     import signal
     from math import inf
@@ -73,6 +90,17 @@ def prove(
         return
     if folder is None:
         raise InputError("--out: not given, allowed a folder for cases, answers and scores; or --show NAME")
+    jobs, limit = workers or len(os.sched_getaffinity(0)), inf if hours is None else hours
+    if recording or more:
+        if not recording or full or only or plant is not PlantChoice.SIMULATED:
+            raise InputError(
+                "--recording: given with --full, --only or --plant, or files without it; allowed --recording FILE FILE "
+                "with --bench, --cases and --seed"
+            )
+        _on_recordings(
+            [*recording, *(more or [])], bench, folder, 40 if cases is None else cases, seed, jobs, limit, scheduler
+        )
+        return
     if full and cases is not None:
         raise InputError(f"--full: given with --cases {cases}, allowed one of them")
     whole = sum(share for tier, share in PLANTS[plant].items() if not only or tier in only)
@@ -84,11 +112,46 @@ def prove(
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         with progress() as tell:
-            limit = inf if hours is None else hours
-            jobs = workers or len(os.sched_getaffinity(0))
             scores = run(folder, planned, seed, jobs, out.print, tell, plant, tiers, limit, scheduler)
             tell("writing the report", None)
             write_proof(scores, score_others(folder, scores), folder)
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    table(HEADERS, [goal_row(goal) for goal in scores.goals])
+    out.print(f"\nReport: {folder / 'report.html'}")
+
+
+def _on_recordings(
+    paths: list[Path],
+    bench: Path | None,
+    folder: Path,
+    cases: int,
+    seed: int,
+    jobs: int,
+    hours: float,
+    scheduler: str | None,
+) -> None:
+    """Run the proof on real recordings."""
+    import signal
+
+    from hil.bench.bench_file import load_bench
+    from hil.commands.runs import read_run
+    from hil.commands.warm_up import compile_kernels
+    from hil.validation.proof.run_real import prove_recordings
+    from hil.validation.proof.score.real_page import write_real_proof
+    from hil.validation.proof.score.tables import HEADERS, goal_row
+
+    recordings = [read_run(path) for path in paths]
+    believed = load_bench(bench) if bench is not None else None
+    compile_kernels()
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        with progress() as tell:
+            scores = prove_recordings(
+                folder, recordings, believed, cases, seed, jobs, out.print, tell, hours, scheduler
+            )
+            tell("writing the report", None)
+            write_real_proof(scores, folder)
     finally:
         signal.signal(signal.SIGTERM, before)
     table(HEADERS, [goal_row(goal) for goal in scores.goals])

@@ -50,7 +50,7 @@ def prove(
     command = f"hil prove {which}{cases} --seed {seed} --out DIR"
     about = read_seal(folder)
     if about is None:
-        _make_folder(folder)
+        make_folder(folder)
         progress("drawing cases", 0.0)
         draw_cases(folder, planned, seed, jobs, progress, plant)
         about = seal(folder, planned, command, seed)
@@ -122,7 +122,7 @@ def diagnose_blind(
         )
 
 
-def _make_folder(folder: Path) -> None:
+def make_folder(folder: Path) -> None:
     """Make the folder of a new proof, or accept one whose drawing was interrupted."""
     if folder.is_file():
         raise InputError(f"{folder}: is a file, allowed a folder; give another --out")

@@ -90,6 +90,11 @@ def read_seal(folder: Path) -> dict[str, Any] | None:
 
 def unseal(folder: Path) -> dict[str, Truth]:
     """Read the truths by case. Raises HilError if they, a recording or a bench have changed since the seal."""
+    return {name: Truth.from_json(truth) for name, truth in unsealed(folder).items()}
+
+
+def unsealed(folder: Path) -> dict[str, dict[str, Any]]:
+    """Read the truths by case as plain data. Raises HilError as `unseal`."""
     about, path = read_seal(folder), folder / _TRUTHS
     if about is None:
         raise HilError(f"{folder}: nothing is sealed here; give the --out of hil prove")
@@ -105,8 +110,15 @@ def unseal(folder: Path) -> dict[str, Truth]:
             raise HilError(
                 f"{place}: recordings or bench are not what was sealed; nothing can be scored: give another --out"
             )
-        truths[name] = Truth.from_json(entry["truth"])
+        truths[name] = entry["truth"]
     return truths
+
+
+def write_part(folder: Path, name: str, truth: dict[str, Any]) -> None:
+    """Write the truth of a drawn case, whose files stand, until all are sealed."""
+    part = _part(folder, name)
+    part.parent.mkdir(parents=True, exist_ok=True)
+    write_json(part, {"truth": truth, "sha256": _digests(folder / CASES / name)})
 
 
 def sha256(path: Path) -> str:
@@ -120,10 +132,8 @@ def _draw(folder: Path, seed: int, plant: str, case: Planned) -> None:
     # the number within the tier would reveal the tier
     drawn = replace(drawn, name=case.name, truth=replace(drawn.truth, name=case.name))
     shutil.rmtree(folder / CASES / case.name, ignore_errors=True)
-    place = write(drawn, folder / CASES)
-    part = _part(folder, case.name)
-    part.parent.mkdir(parents=True, exist_ok=True)
-    write_json(part, {"truth": drawn.truth.as_json(), "sha256": _digests(place)})
+    write(drawn, folder / CASES)
+    write_part(folder, case.name, drawn.truth.as_json())
 
 
 def _digests(place: Path) -> dict[str, str]:

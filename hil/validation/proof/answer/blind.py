@@ -3,8 +3,9 @@
     python -m hil.validation.proof.answer.blind CASES ANSWERS [--jobs N | --scheduler ADDRESS] [--hours H]
 
 reads CASES/NAME/{train_*.parquet, holdout.parquet, bench.yaml} and writes ANSWERS/NAME/diagnosis.json, with the next
-experiment as a profile if one is proposed, or error.json if the diagnosis failed. Cases with an answer are skipped, so
-an interrupted run continues. An import contract keeps everything that draws or knows the truth out of this process.
+experiment as a profile if one is proposed, or error.json if the diagnosis failed. Without holdout.parquet a third of
+each recording is held out. Cases with an answer are skipped, so an interrupted run continues. An import contract keeps
+everything that draws or knows the truth out of this process.
 
 A worker gets the content of a case's files and returns the content of the answer's. It needs no folder in common with
 this process, only the same code and libraries.
@@ -108,11 +109,9 @@ def diagnose_case(case: Path, answers: Path) -> None:
     answer = answers / case.name
     answer.mkdir(parents=True, exist_ok=True)
     try:
-        found = diagnose(
-            [read_recording(path) for path in sorted(case.glob("train_*.parquet"))],
-            [read_recording(case / "holdout.parquet")],
-            load_bench(case / "bench.yaml"),
-        )
+        train = [read_recording(path) for path in sorted(case.glob("train_*.parquet"))]
+        held_out = [case / "holdout.parquet"] if not train or (case / "holdout.parquet").exists() else []
+        found = diagnose(train, [read_recording(path) for path in held_out], load_bench(case / "bench.yaml"))
     except Exception as error:  # any failure counts as a wrong answer
         message = str(error).replace(f"{case.parent}{os.sep}", "")  # a folder of the worker's
         write_json(answer / ERROR, {"kind": type(error).__name__, "error": message})

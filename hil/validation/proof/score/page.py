@@ -72,21 +72,21 @@ def write_proof(scores: Scores, others: Mapping[str, Scores], folder: Path) -> N
 
     page = Page(heading, about, verdict, decided > 0 and not missed)
     for table in before:
-        _add(page, table)
+        add_table(page, table)
     for name, draw, caption in _PICTURES:
         figure = draw(scores)
         if figure is not None:
             page.heading(name.capitalize())
             page.picture(save(figure, folder / f"{name}.png"), caption)
     for table in after:
-        _add(page, table)
+        add_table(page, table)
     page.heading("How to check it")
     page.items(checking(seal))
     page.write(folder / REPORT)
     times = [case.answer.runtime_s for case in scores.cases if case.answer.runtime_s is not None]
     parts = [
         f"# {heading}",
-        f"{about}. {_time(times)}{verdict}",
+        f"{about}. {time_text(times)}{verdict}",
         *(markdown(table) for table in (*before, power_table(scores), *after)),
         "## How to check it",
         "\n".join(f"- {text}" for text in checking(seal)),
@@ -99,7 +99,8 @@ def _of(scored: int, sealed: int) -> str:
     return f"{scored}" if scored == sealed else f"The first {scored} of {sealed}"
 
 
-def _add(page: Page, table: ProofTable) -> None:
+def add_table(page: Page, table: ProofTable) -> None:
+    """Add a table with its heading to a page; nothing if it has no rows."""
     if not table.rows:
         return
     if table.heading:
@@ -109,7 +110,8 @@ def _add(page: Page, table: ProofTable) -> None:
     page.table(table.headers, table.rows, table.left, table.mark)
 
 
-def _time(times: Sequence[float]) -> str:
+def time_text(times: Sequence[float]) -> str:
+    """Return a sentence on the times [s] of diagnoses; empty without any."""
     if not times:
         return ""
     return f"A diagnosis took {digits(quantile(times, 0.5) or 0.0)} s in the median, {digits(max(times))} s at most. "
@@ -122,7 +124,7 @@ def _scores_json(
     return {
         "schema_version": 1,
         "seal": seal,
-        "goals": [_goal_json(goal) for goal in goals],
+        "goals": [goal_json(goal) for goal in goals],
         "verdicts": verdicts(scores.cases),
         "confusion": confusion(scores.cases),
         "effects": {effect: _rate_json(found) for effect, found in effects.items()},
@@ -135,11 +137,12 @@ def _scores_json(
         ],
         "runtime_s": {"median": quantile(times, 0.5), "p90": quantile(times, 0.9), "longest": max(times, default=None)},
         "cases": [_case_json(case) for case in scores.cases],
-        "others": {name: [_goal_json(goal) for goal in other.goals] for name, other in others.items()},
+        "others": {name: [goal_json(goal) for goal in other.goals] for name, other in others.items()},
     }
 
 
-def _goal_json(goal: Goal) -> dict[str, Any]:
+def goal_json(goal: Goal) -> dict[str, Any]:
+    """Return plain data of a goal with its figure."""
     finite = goal.value is not None and isfinite(goal.value)
     number = {"value": goal.value if finite else None, "of": goal.of}
     found = _rate_json(goal.measured) if isinstance(goal.measured, Rate) else number

@@ -6,21 +6,35 @@ import numpy as np
 
 from hil.bench.bench_file import Bench
 from hil.diagnosis.experiment import NEXT_EXPERIMENT, Experiment, separating, showing
+from hil.diagnosis.ledger import refusal
 from hil.diagnosis.location.locate import locate, shown_in
 from hil.diagnosis.notes import at_bound, notes_on
-from hil.diagnosis.result import AT_FLOOR, Location, NextExperiment, Result, TimeBudget, Unexplained, Verdict
+from hil.diagnosis.result import (
+    AT_FLOOR,
+    Location,
+    NextExperiment,
+    Result,
+    StructureLeft,
+    TimeBudget,
+    Unexplained,
+    Unnamed,
+    Verdict,
+)
 from hil.diagnosis.stages import Judged, Progress, Reported
 from hil.diagnosis.statement import statement
+from hil.diagnosis.structure_left import Dependence
 from hil.diagnosis.verdict.findings import corrections, diagnosed_bench, findings, form_of
 from hil.diagnosis.verdict.fit_table import closed_loop_held, fit_table
 from hil.diagnosis.verdict.judge import unexplained_share
 from hil.diagnosis.verdict.ledgers import ledgers
 from hil.diagnosis.verdict.refit import torque_left
 from hil.diagnosis.verdict.testability import not_testable
-from hil.diagnosis.wording import channel_names, where_in_short
+from hil.diagnosis.verdict.unnamed import UnnamedTerm, with_maps
+from hil.diagnosis.wording import channel_names, title, where_in_short
 from hil.identification.estimator import Fit
 from hil.identification.noise_floor import FLOOR
 from hil.quantities import digits
+from hil.twin.library import BY_ID
 
 
 def report(judged: Judged, progress: Progress, begin_s: float, budget_s: float) -> Reported:
@@ -53,6 +67,8 @@ def report(judged: Judged, progress: Progress, begin_s: float, budget_s: float) 
         not_testable=hidden,
         unexplained=_unexplained(judged, location),
         torque_left=left,
+        structure=tuple(_structure(one, bench.axis.drive_unit) for one in judged.structure),
+        unnamed=tuple(_unnamed(one, judged) for one in judged.unnamed),
         next_experiment=NextExperiment(profile=NEXT_EXPERIMENT, separates=experiment.separates)
         if experiment and experiment.profile
         else None,
@@ -98,10 +114,36 @@ def _experiment(judged: Judged, hidden: tuple[str, ...]) -> Experiment | None:
 def _bench(judged: Judged) -> Bench:
     """The bench with what was found; a control law that was set aside, and encoders, stay as they were in the file."""
     prepared = judged.tested.searched.prepared
-    bench = prepared.bench if judged.keeps_bench else diagnosed_bench(prepared.bench, judged.final)
+    bench = prepared.bench
+    if not judged.keeps_bench or judged.unnamed:
+        bench = diagnosed_bench(bench, with_maps(judged.final, judged.unnamed))
     if not prepared.bench.law_known:
         bench = bench.model_copy(update={"control": prepared.bench_file.control})
     return bench.model_copy(update={"encoders": prepared.bench_file.encoders})
+
+
+def _structure(one: Dependence, drive_unit: str) -> StructureLeft:
+    return StructureLeft(
+        channel=one.channel,
+        over=one.question.name,
+        share=min(max(one.explained, 0.0), 1.0),
+        by_chance=one.found.p,
+        text=one.in_words(drive_unit),
+    )
+
+
+def _unnamed(one: UnnamedTerm, judged: Judged) -> Unnamed:
+    """A map, and the nearest mechanism of the library with the rule that refutes it."""
+    mapped, tried = BY_ID[one.term.effect], judged.tested.searched.considered
+    near = next((other for other in reversed(tried) if not other.accepted), None)
+    return Unnamed(
+        effect=mapped.id,
+        block=mapped.block.value,
+        parameters={name: value for name, value in zip(mapped.names, one.term.values, strict=True)},
+        held_out_before=one.before,
+        held_out_after=one.after,
+        nearest=f"{title(near.key[0])}: {refusal(near.ledger)}" if near else "",
+    )
 
 
 def _unexplained(judged: Judged, location: Location | None) -> Unexplained:

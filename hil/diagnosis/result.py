@@ -214,6 +214,27 @@ class CandidateLedger(_Part):
     rules: tuple[RuleAnswer, ...]
 
 
+class StructureLeft(_Part):
+    """A dependence of what is left on a quantity, which noise does not have."""
+
+    channel: str = Field(description="torque that the axis needs beyond the twin's, or difference of the encoders")
+    over: str = Field(description="quantity")
+    share: Share = Field(description="of the mean square of what is left")
+    by_chance: Share = Field(description="probability of it without structure; errors count autocorrelation")
+    text: str
+
+
+class Unnamed(_Part):
+    """A map of what has no name, as bench.diagnosed.yaml has it; motor units."""
+
+    effect: str = Field(description="id of the map")
+    block: str
+    parameters: dict[str, float]
+    held_out_before: NotNegative = Field(description="rms on held-out recordings without it [N m, N, m or rad]")
+    held_out_after: NotNegative
+    nearest: str = Field("", description="mechanism of the library that was refuted last, and by what")
+
+
 class NextExperiment(_Part):
     """Motion that separates mechanisms that the recorded motion cannot."""
 
@@ -249,6 +270,8 @@ class Result(_Part):
     not_testable: tuple[str, ...] = Field(description="mechanisms this motion cannot show")
     unexplained: Unexplained
     torque_left: TorqueLeft | None = Field(None, description="null without held-out motion or recorded torque")
+    structure: tuple[StructureLeft, ...] = Field((), description="what is left, the strongest dependence first")
+    unnamed: tuple[Unnamed, ...] = Field((), description="maps of it that improve the fit to held-out recordings")
     next_experiment: NextExperiment | None = None
     time_budget: TimeBudget | None = Field(None, description="null if the search was completed")
     considered: tuple[CandidateLedger, ...] = Field((), description="every mechanism that was fitted, in order")

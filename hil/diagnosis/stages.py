@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from hil.diagnosis.structure_left import Dependence
     from hil.diagnosis.verdict.cross_validation import CrossValidation
     from hil.diagnosis.verdict.each_alone import Change
+    from hil.diagnosis.verdict.unnamed import UnnamedTerm
     from hil.identification.dataset import Dataset
     from hil.identification.estimator import Fit
     from hil.identification.honest_refit import Refit
@@ -92,6 +93,7 @@ class Judged:
     before: Fit
     final: Fit
     structure: tuple[Dependence, ...] = ()  # of what `final` leaves
+    unnamed: tuple[UnnamedTerm, ...] = ()  # maps of it that hold on held-out recordings
 
     @property
     def has_findings(self) -> bool:

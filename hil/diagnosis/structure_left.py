@@ -23,6 +23,7 @@ from hil.identification.structure import BINS, Series, Structure, structure
 from hil.identification.torque_left import fit_plain, measured_motion, needed_torque, torque_deviation
 from hil.quantities import digits, quantity, reading_unit
 
+POSITION, SPEED = "position", "speed"
 TORQUE, DIFFERENCE = "torque", "difference"  # needed beyond the twin's; of the encoders, beyond the twin's
 
 
@@ -30,12 +31,13 @@ TORQUE, DIFFERENCE = "torque", "difference"  # needed beyond the twin's; of the 
 class Question:
     """A quantity (n,) of each run that a residual may depend on, in a unit.
 
-    `by_direction`: it is a position from the least one on, and further by `by_direction` where the axis moves up.
+    `length` is the unit of positions, m or rad. `by_direction`: it is a position from the least one on, and further by `by_direction` where the axis moves up.
     `kept`: it means the same in other recordings.
     """
 
     name: str
     unit: str
+    length: str
     values: tuple[FloatArray, ...]
     bins: int = BINS
     by_direction: float = 0.0
@@ -66,6 +68,14 @@ class Dependence:
         found = structure(parts, self.question.values, self.question.bins)
         return max(found.energy, 0.0) / self.found.energy if found else 0.0
 
+    def rms_left(self, fit: Fit, data: Dataset) -> float:
+        """Rms of the residual of a fit on other recordings, its mean taken off; infinite where it is not held."""
+        plain = fit_plain(fit.data)
+        if plain is None:
+            return np.inf
+        left = np.concatenate([one.left[one.rows] for one in _left(fit.hypothesis, data, self.channel, plain)])
+        return float(np.std(left)) if left.size and np.isfinite(left).all() else np.inf
+
     def in_words(self, drive_unit: str) -> str:
         """Say what the twin lacks, and where it lacks most."""
         found, question = self.found, self.question
@@ -75,8 +85,7 @@ class Dependence:
         if self.channel == TORQUE:
             what = f"the axis needs {quantity(abs(value), drive_unit)} {more} torque than the twin"
         else:
-            unit = "rad" if question.unit.startswith("rad") else "m"
-            what = f"the second encoder reads {quantity(abs(value), unit)} {more} than the twin"
+            what = f"the second encoder reads {quantity(abs(value), question.length)} {more} than the twin"
         moving = ""
         if question.by_direction:
             moving = " moving up" if low >= question.by_direction else " moving down"
@@ -120,15 +129,15 @@ def questions(hypothesis: Hypothesis, data: Dataset, plain: PlainModel) -> list[
     length = "rad" if hypothesis.bench.axis.turns else "m"
     up = tuple(one - low + 1.001 * span * (moved.velocity > 0.0) for one, moved in zip(position, motions, strict=True))
     found = [
-        Question("position", length, position),
-        Question("distance from the first position", length, up, 2 * BINS, by_direction=1.001 * span),
-        Question("speed", f"{length}/s", tuple(ratio * moved.velocity for moved in motions)),
-        Question("load", hypothesis.bench.axis.drive_unit, tuple(plain.predict(moved) for moved in motions)),
-        Question("time", "s", tuple(run.time_s for run in data.runs), kept=False),
+        Question(POSITION, length, length, position),
+        Question("distance from the first position", length, length, up, 2 * BINS, by_direction=1.001 * span),
+        Question(SPEED, f"{length}/s", length, tuple(ratio * moved.velocity for moved in motions)),
+        Question("load", hypothesis.bench.axis.drive_unit, length, tuple(plain.predict(moved) for moved in motions)),
+        Question("time", "s", length, tuple(run.time_s for run in data.runs), kept=False),
     ]
     if physics.turn_known:
         turned = tuple(np.mod(physics.angle_per_unit * moved.position, 2.0 * np.pi) for moved in motions)
-        found.append(Question("motor angle", "rad", turned))
+        found.append(Question("motor angle", "rad", length, turned))
     return found
 
 

@@ -7,6 +7,8 @@ from hil.diagnosis.experiment import NEXT_EXPERIMENT
 from hil.diagnosis.pictures.change import CAPTION
 from hil.diagnosis.pictures.findings import finding_figure, term_of
 from hil.diagnosis.pictures.location import residual_panels
+from hil.diagnosis.pictures.structure import CAPTION as CAPTION_OF_STRUCTURE
+from hil.diagnosis.pictures.structure import structure_figure
 from hil.diagnosis.result import Finding, FitFigures, Result, TorqueLeft, Value, Verdict
 from hil.diagnosis.turning import of_load
 from hil.diagnosis.wording import label, title, titles, where
@@ -60,6 +62,7 @@ def write_diagnosis(diagnosis: Diagnosis, folder: Path) -> None:
     page.text(result.unexplained.description)
     if result.unexplained.share > 0.0:
         page.text(f"Unexplained: {percent(result.unexplained.share)} of the energy above the noise.")
+    _structure(page, diagnosis, folder)
     page.heading("What this motion cannot show")
     page.text(
         titles(result.not_testable)
@@ -79,6 +82,20 @@ def write_diagnosis(diagnosis: Diagnosis, folder: Path) -> None:
     write_json(folder / "diagnosis.json", result.as_json())
     write_bench(diagnosis.bench, folder / "bench.diagnosed.yaml")
     page.write(folder / "report.html")
+
+
+def _structure(page: Page, diagnosis: Diagnosis, folder: Path) -> None:
+    """What is left depends on something: where, and the map of it that has no name."""
+    result = diagnosis.result
+    if not result.structure:
+        return
+    page.picture(save(structure_figure(diagnosis), folder / "structure.png"), CAPTION_OF_STRUCTURE)
+    for one in result.unnamed:
+        page.text(
+            f"{one.effect.replace('_', ' ').capitalize()}: bench.diagnosed.yaml has it. What is left on held-out "
+            f"recordings falls from {digits(one.held_out_before)} to {digits(one.held_out_after)} rms. "
+            f"Nearest mechanism of the library: {one.nearest or 'none was fitted'}."
+        )
 
 
 def _lead(diagnosis: Diagnosis) -> str:

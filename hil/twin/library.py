@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 from hil.compiled.kernel_cache import provide_kernel_cache
+from hil.twin.maps import MAPS
 from hil.twin.mechanism import Mechanism
 from hil.twin.mechanisms import (
     asymmetric_friction,
@@ -86,10 +87,11 @@ LIBRARY: tuple[Mechanism, ...] = (
     channel_time_skew.MECHANISM,
 )
 
-BY_ID: dict[str, Mechanism] = {mechanism.id: mechanism for mechanism in LIBRARY}
+# What a bench file may name: the library, and maps for what has no name.
+BY_ID: dict[str, Mechanism] = {mechanism.id: mechanism for mechanism in (*LIBRARY, *MAPS)}
 
 # Places in the twin: a mechanism that may act twice at once has two.
-SLOTS: tuple[Mechanism, ...] = tuple(mechanism for mechanism in LIBRARY for _ in range(mechanism.most))
+SLOTS: tuple[Mechanism, ...] = tuple(mechanism for mechanism in (*LIBRARY, *MAPS) for _ in range(mechanism.most))
 
 
 def register(mechanism: Mechanism) -> None:

@@ -27,7 +27,7 @@ from hil.identification.inference import bic_gain, whitening
 from hil.identification.nominal_fit import fit_nominal_parameters, require_finite
 from hil.identification.parallel import in_parallel
 from hil.identification.terms import Key, Term, compatible, effects, free_slot
-from hil.twin.library import BY_ID
+from hil.twin.library import BY_ID, LIBRARY
 from hil.twin.physics import Active
 
 MOST_TERMS = 8  # at once: more than an engineer can act on; limits the duration of a search
@@ -96,7 +96,7 @@ def search(prepared: Prepared, progress: Progress = lambda text: None, deadline_
     final = ended(again(revised(base).refit(ENDED), ENDED))
     kept = {term.key for term in final.terms}
     present = {*fitted, *(term.effect for term in final.terms)}
-    not_tried = tuple(effect for effect in BY_ID if effect not in present) if stopped_at else ()
+    not_tried = tuple(one.id for one in LIBRARY if one.id not in present) if stopped_at else ()
     rivals = {key: value for key, value in rivals.items() if key in kept}
     given, nominal, final = (fit.without_deadline() for fit in (given, nominal, final))
     return Searched(prepared, given, nominal, final, rivals, needed, tuple(considered), stopped_at, not_tried)

@@ -13,6 +13,7 @@ from hil.diagnosis.structure_left import structure_left
 from hil.diagnosis.verdict.cross_validation import explained_share
 from hil.diagnosis.verdict.each_alone import Change, changed
 from hil.diagnosis.verdict.reproduction import reproduction
+from hil.diagnosis.verdict.unnamed import unnamed_terms
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.inference import bic_gain
@@ -48,7 +49,8 @@ def judge(tested: Tested) -> Judged:
     # a parameter error is located and measured against the parameters of the bench file
     before = searched.given if of_plant is Verdict.PARAMETER_ERROR else refit.fit
     left = structure_left(final, held_out)
-    return Judged(tested, of_plant, verdict, change, is_part, refit.fit, before, final, left)
+    maps = () if change else unnamed_terms(final, left, held_out)
+    return Judged(tested, of_plant, verdict, change, is_part, refit.fit, before, final, left, maps)
 
 
 def verdict_on_plant(given: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> Verdict:

@@ -18,8 +18,10 @@ from hil.identification.parallel import POOL
 from hil.identification.terms import Term
 from hil.twin.library import BY_ID, LIBRARY
 
+_ALL = tuple(mechanism.id for mechanism in LIBRARY)
 
-def not_testable(fit: Fit, asked: Collection[str] = tuple(BY_ID), margin: float = 1.0) -> tuple[str, ...]:
+
+def not_testable(fit: Fit, asked: Collection[str] = _ALL, margin: float = 1.0) -> tuple[str, ...]:
     """Ids of the mechanisms in `asked` that the data of a fit cannot show, in the library's order.
 
     `margin` multiplies the visibility that is needed: more than one for simulated recordings.

@@ -1,0 +1,74 @@
+"""Figure of the structure that a twin leaves: means over a quantity with standard errors, and the map of it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from hil.diagnosis.structure_left import TORQUE, Dependence
+from hil.figures.drawing import style_axis
+from hil.figures.panels import COMMAND, MEASURED, SIMULATED
+from hil.quantities import reading_unit
+
+if TYPE_CHECKING:
+    from hil.diagnosis.diagnosis import Diagnosis
+
+MOST = 3  # panels: more dependences are those of the first ones, seen over another quantity
+CAPTION = (
+    "Mean of what the twin leaves in bins of equally many rows, with standard errors that count the autocorrelation; "
+    "noise lies about 0 within two of them. Orange: the map that bench.diagnosed.yaml has for it."
+)
+
+
+def structure_figure(diagnosis: Diagnosis) -> Figure:
+    """Draw the strongest dependences of what is left, one panel each."""
+    judged = diagnosis.reported.judged
+    shown = judged.structure[:MOST]
+    figure = Figure(figsize=(10.0, 0.6 + 2.6 * len(shown)), layout="constrained")
+    axes = figure.subplots(len(shown), 1, squeeze=False)[:, 0]
+    mapped = {id(one.dependence): one.term.values for one in judged.unnamed}
+    for axis, one in zip(axes, shown, strict=True):
+        _means(axis, one, diagnosis.given_bench.axis.drive_unit)
+        if id(one) in mapped:
+            _knots(axis, one, mapped[id(one)], diagnosis.given_bench.axis.drive_unit)
+    return figure
+
+
+def _units(one: Dependence, drive_unit: str) -> tuple[float, str, float, str]:
+    """Factor and unit of the quantity, factor and unit of the residual."""
+    along, along_unit = reading_unit(one.question.unit, float(np.max(np.abs(one.found.edges))))
+    unit = drive_unit if one.channel == TORQUE else one.question.length
+    factor, name = reading_unit(unit, float(np.max(np.abs(one.found.means))))
+    return along, along_unit, factor, name
+
+
+def _means(axis: Axes, one: Dependence, drive_unit: str) -> None:
+    along, along_unit, factor, unit = _units(one, drive_unit)
+    found, turn = one.found, one.question.by_direction
+    middle = 0.5 * (found.edges[:-1] + found.edges[1:])
+    parts = [("", np.ones(middle.size, dtype=bool), MEASURED)]
+    if turn:
+        parts = [("moving down", middle < turn, COMMAND), ("moving up", middle >= turn, MEASURED)]
+    for label, rows, colour in parts:
+        x = middle[rows] - (turn if label == "moving up" else 0.0)
+        style = {"fmt": "o-", "markersize": 4, "capsize": 3, "linewidth": 0.8}
+        axis.errorbar(
+            along * x, factor * found.means[rows], factor * found.errors[rows], color=colour, label=label, **style
+        )
+    axis.axhline(0.0, color=COMMAND, linewidth=0.8)
+    what = "needed beyond the twin" if one.channel == TORQUE else "second encoder - twin"
+    chance = f"by chance {one.found.p:.1g}" if one.found.p > 1e-12 else "by chance less than 1e-12"
+    title = f"{100.0 * one.explained:.0f} % of what is left depends on the {one.question.name}; {chance}"
+    style_axis(axis, f"{what}\n[{unit}]", f"{one.question.name} [{along_unit}]", title)
+    if turn:
+        axis.legend(frameon=False)
+
+
+def _knots(axis: Axes, one: Dependence, values: tuple[float, ...], drive_unit: str) -> None:
+    along, _, factor, _ = _units(one, drive_unit)
+    middle = 0.5 * (one.found.edges[:-1] + one.found.edges[1:])
+    x = np.linspace(middle[0], middle[-1], len(values) - 2)
+    axis.plot(along * x, factor * np.array(values[2:]), color=SIMULATED, linewidth=2.0)

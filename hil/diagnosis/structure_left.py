@@ -31,8 +31,8 @@ TORQUE, DIFFERENCE = "torque", "difference"  # needed beyond the twin's; of the 
 class Question:
     """A quantity (n,) of each run that a residual may depend on, in a unit.
 
-    `length` is the unit of positions, m or rad. `by_direction`: it is a position from the least one on, and further by `by_direction` where the axis moves up.
-    `kept`: it means the same in other recordings.
+    `length` is the unit of positions, m or rad. `by_direction`: it is a position from the least one on, and further by
+    `by_direction` where the axis moves up. `kept`: it means the same in other recordings.
     """
 
     name: str
@@ -135,7 +135,7 @@ def questions(hypothesis: Hypothesis, data: Dataset, plain: PlainModel) -> list[
         Question("load", hypothesis.bench.axis.drive_unit, length, tuple(plain.predict(moved) for moved in motions)),
         Question("time", "s", length, tuple(run.time_s for run in data.runs), kept=False),
     ]
-    if physics.turn_known:
+    if physics.turn_known and span * physics.angle_per_unit > 2.0 * np.pi * ratio:
         turned = tuple(np.mod(physics.angle_per_unit * moved.position, 2.0 * np.pi) for moved in motions)
         found.append(Question("motor angle", "rad", length, turned))
     return found

@@ -54,10 +54,8 @@ def _means(axis: Axes, one: Dependence, drive_unit: str) -> None:
         parts = [("moving down", middle < turn, COMMAND), ("moving up", middle >= turn, MEASURED)]
     for label, rows, colour in parts:
         x = middle[rows] - (turn if label == "moving up" else 0.0)
-        style = {"fmt": "o-", "markersize": 4, "capsize": 3, "linewidth": 0.8}
-        axis.errorbar(
-            along * x, factor * found.means[rows], factor * found.errors[rows], color=colour, label=label, **style
-        )
+        y, error = factor * found.means[rows], factor * found.errors[rows]
+        axis.errorbar(along * x, y, error, color=colour, label=label, fmt="o-", markersize=4, capsize=3, linewidth=0.8)
     axis.axhline(0.0, color=COMMAND, linewidth=0.8)
     what = "needed beyond the twin" if one.channel == TORQUE else "second encoder - twin"
     chance = f"by chance {one.found.p:.1g}" if one.found.p > 1e-12 else "by chance less than 1e-12"

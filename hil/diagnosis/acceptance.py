@@ -196,7 +196,7 @@ FORM: tuple[Rule[Addition], ...] = (
     ),
     # a torque with noise drives the twin: a term that passes less of it leaves less, and explains nothing
     Rule(
-        "structure",
+        "structure below the noise",
         "it leaves {left:.0%} of the structure below the noise",
         "it leaves {left:.0%} of the structure below the noise: it only passes less noise",
         _structure,

@@ -5,9 +5,6 @@
 A (K, n) averages the rows of each of K bins of the quantity, R is the autocovariance of what the bin means leave (A. R.
 Gallant, Nonlinear Statistical Models, 1987, sec. 2.1: correction of least squares for autocorrelated errors), tapered
 after Bartlett, and v the number of independent rows. Slow noise moves a whole bin, and is no structure.
-
-Lines over a position are found in the spectrum over it, against the median of its neighbours: white or coloured noise
-makes exponential ordinates (P. Bloomfield, Fourier Analysis of Time Series, 2000, sec. 8.4).
 """
 
 from collections.abc import Sequence
@@ -16,7 +13,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import median_filter
 from scipy.signal import fftconvolve
 from scipy.stats import f as fisher
 
@@ -26,8 +22,6 @@ BINS = 10  # of a quantity: a bend, a step and a line show in them; twice as man
 _TAPER = 4  # Bartlett window in correlation times: it shortens the correlation by an eighth
 _DECAYED = 0.05  # of the variance: the correlation time ends there
 _FEWEST_INDEPENDENT = 2.0  # independent rows per bin, below which nothing is told
-_NEIGHBOURS = 101  # ordinates of a spectrum whose median is the noise
-_MOST_ORDINATES = 1 << 17  # of a spectrum over the position
 
 
 class Series(NamedTuple):
@@ -53,15 +47,6 @@ class Structure:
     def at(self, quantity: FloatArray) -> FloatArray:
         """Mean (n,) of the residual at values of the quantity (n,)."""
         return np.asarray(self.means[_bin(quantity, self.edges)])
-
-
-@dataclass(frozen=True)
-class Line:
-    """The strongest line over a position: waves per unit of it, amplitude, and the probability of it by chance."""
-
-    waves: float
-    amplitude: float
-    p: float
 
 
 def structure(parts: Sequence[Series], quantity: Sequence[FloatArray], bins: int = BINS) -> Structure | None:
@@ -99,24 +84,6 @@ def structure(parts: Sequence[Series], quantity: Sequence[FloatArray], bins: int
     errors = np.sqrt(np.diag(covariance))
     energy = float(share @ (mean**2 - errors**2))
     return Structure(edges, mean, errors, energy, float(fisher.sf(ratio, count - 1, freed)))
-
-
-def line_over(parts: Sequence[Series], position: Sequence[FloatArray], shortest: float) -> Line | None:
-    """The strongest line of residuals over a position, (n,) for each part; waves of `shortest` or more in its unit."""
-    x = np.concatenate([one[part.rows] for one, part in zip(position, parts, strict=True)])
-    left = np.concatenate([part.left[part.rows] for part in parts])
-    span = float(np.ptp(x)) if x.size else 0.0
-    count = int(min(2.0 * span / shortest, _MOST_ORDINATES)) if shortest > 0.0 else 0
-    if count < 2 * _NEIGHBOURS:
-        return None
-    at = np.minimum(((x - x.min()) / span * count).astype(int), count - 1)
-    spectrum = np.abs(np.fft.rfft(np.bincount(at, weights=left - left.mean(), minlength=count)))[1:] ** 2
-    noise = median_filter(spectrum, _NEIGHBOURS, mode="reflect") / np.log(2.0)
-    ratio = np.divide(spectrum, noise, out=np.zeros_like(spectrum), where=noise > 0.0)
-    peak = int(np.argmax(ratio))
-    amplitude = 2.0 * float(np.sqrt(spectrum[peak])) / left.size
-    p = float(-np.expm1(ratio.size * np.log1p(-np.exp(-min(ratio[peak], 700.0)))))
-    return Line((peak + 1) / span, amplitude, p)
 
 
 def autocovariance(parts: Sequence[Series]) -> FloatArray:

@@ -27,7 +27,7 @@ class AxisFacts:
     duration_s: float  # of the longest recording
     travel_m: float = math.inf  # of the longest motion
     positions_m: tuple[float, float] = (-math.inf, math.inf)  # first and last position of the table
-    lost_m: float = math.inf  # largest range of the table against the motor
+    lost_m: float = math.inf  # largest lost motion that the encoders can hide, beside their lateness
     turn_known: bool = True  # False on a linear axis without a lead
     held_s: Callable[[float], float] = _always  # longest time for which |torque command| is at a level or above
     # share of the rows in which the axis moves whose |torque command| is above a level

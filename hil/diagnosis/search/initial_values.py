@@ -11,12 +11,16 @@ started at strengths with the same torque at creep, where all torque is Coulomb 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
+from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.search import disturbance as estimate
+from hil.identification.derivatives import motion, rows_per_sample
+from hil.identification.least_squares import least_squares
 from hil.identification.measured import Measured
 from hil.identification.residual_scales import inertia
 from hil.identification.terms import Term, Window, free_slot
@@ -55,7 +59,7 @@ def axis_facts(bench: Bench, runs: Sequence[Measured] = ()) -> AxisFacts:
     physics, table, limit = bench.axis.physics(), bench.encoders.table, bench.gains.torque_limit_n_m
     peak = max((float(np.max(np.abs(run.torque))) for run in runs), default=0.0)
     ratio = bench.axis.ratio_m_rad
-    apart = [float(np.ptp(run.table_m - ratio * run.motor)) for run in runs if run.table_m.size]
+    apart = [lost_motion_m(run) for run in runs if run.table_m.size]
     return AxisFacts(
         coulomb=physics.coulomb_n_m,
         ratio=ratio,
@@ -73,6 +77,25 @@ def axis_facts(bench: Bench, runs: Sequence[Measured] = ()) -> AxisFacts:
         held_s=lambda level: max((_held_s(run, level) for run in runs), default=math.inf),
         driven=lambda level: _driven(runs, level),
     )
+
+
+@lru_cache(maxsize=64)
+def lost_motion_m(run: Measured) -> float:
+    """Largest lost motion [m] that the encoders of a run can hide, by least squares without a twin.
+
+    Twice the part of their difference that changes with the direction, beside ratio and lateness, and three standard
+    errors of it, and the range of what is left. Infinite where direction and lateness are not told apart.
+    """
+    moved = motion(run.motor, run.period_s)
+    columns = {
+        "one": np.ones_like(run.motor),
+        "ratio": moved.position,
+        "late": moved.velocity,
+        "direction": moved.direction,
+    }
+    fit = least_squares(columns, run.table_m, rows_per_sample=rows_per_sample(run.period_s))
+    step = fit["direction"]
+    return 2.0 * (abs(step.value) + CRITERIA.sigmas * step.std_error) + float(np.ptp(fit.residual))
 
 
 def _driven(runs: Sequence[Measured], level: float) -> float:

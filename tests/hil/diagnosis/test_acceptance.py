@@ -16,12 +16,14 @@ from hil.diagnosis import acceptance
 from hil.diagnosis.acceptance import ADDED, COMPARED, EXPLAINED, FORM, HARMLESS, HELD_OUT, RULES, VALUES, promises
 from hil.diagnosis.criteria import CRITERIA, Criteria
 from hil.diagnosis.ledger import Considered, accepted, examine, refusal
+from hil.diagnosis.reproduced import REPRODUCED
 from hil.diagnosis.search.addition import Harm
 from hil.diagnosis.search.events import InsideWindows
+from hil.diagnosis.verdict.reproduction import Reproduction
 
 # A new constant needs a sealed draw that improves beyond its interval, or it takes the place of another (CONTRIBUTING).
 CONSTANTS = 47
-RULE_COUNT = 15
+RULE_COUNT = 21
 
 ROOT = Path(acceptance.__file__).parent
 
@@ -31,8 +33,9 @@ def addition(**quantities: Any) -> Any:
     usual = {
         "evidence": 500.0,
         "gain": 900.0,
-        "rows": 1000,
-        "excess": 1000.0,
+        "noise_energy": 1000.0,
+        "explained": 0.9,
+        "structure_left": None,
         "beside": 0,
         "unrepeated": (100.0, 100.0),
         "inside": None,
@@ -65,8 +68,9 @@ def test_every_constant_of_evidence_is_used() -> None:
         ({"evidence": 19.9}, "evidence"),
         ({"evidence": math.nan}, "evidence"),
         ({"gain": 19.0}, "material energy"),
-        ({"gain": 21.0, "excess": 1100.0}, "share of the mismatch"),
-        ({"gain": 90.0, "beside": 2}, "share of the mismatch"),
+        ({"explained": 0.019}, "share of the mismatch"),
+        ({"explained": 0.09, "beside": 2}, "share of the mismatch"),
+        ({"structure_left": 0.9}, "structure below the noise"),
         ({"unrepeated": (106.0, 100.0)}, "repeated laps"),
         ({"inside": InsideWindows(0.01, 1.0, 5.0, 1.0, False)}, "constant force"),
     ],
@@ -85,7 +89,9 @@ def test_a_term_is_refuted_by_the_first_rule_that_it_fails(quantities: dict[str,
         {},
         {"evidence": 20.0},
         {"gain": 20.0},
-        {"gain": 100.0, "beside": 2},
+        {"explained": 0.1, "beside": 2},
+        {"explained": None},  # nothing is above the noise
+        {"structure_left": 0.5},
         {"unrepeated": (105.0, 100.0)},
         {"inside": InsideWindows(0.2, 1.0, 50.0, 1.0, True)},  # one push may have any form
         {"inside": InsideWindows(0.01, 1.0, 3.9, 1.0, False)},  # as well as outside
@@ -139,10 +145,19 @@ def test_a_rival_is_tied_or_refuted(evidence: float, more: float, objection: str
         ({"laps": 0.94}, "repeated laps, held out"),
         ({"clear": False}, "strength"),
         ({"quiet": True}, "motion without noise"),
+        ({"torque": (1.03, 1.0)}, "torque, held out"),
     ],
 )
 def test_held_out_recordings_refute(quantities: dict[str, Any], rule: str) -> None:
-    usual = {"gain": None, "acts": False, "laps": None, "clear": True, "quiet": False, "harm": {}}
+    usual = {
+        "gain": None,
+        "acts": False,
+        "laps": None,
+        "clear": True,
+        "quiet": False,
+        "torque": (1.01, 1.0),
+        "harm": {},
+    }
     passing: Any = SimpleNamespace(**usual)
     assert accepted(examine(HELD_OUT, passing, CRITERIA))
     refuted: Any = SimpleNamespace(**(usual | quantities))
@@ -160,9 +175,25 @@ def test_open_inputs_leave_something_beside_a_right_name() -> None:
 def test_a_score_must_promise_evidence_and_energy() -> None:
     rows = 1000
     share = 1.0 - math.exp(-CRITERIA.evidence / rows)
-    assert promises(1.01 * share, 1e6, rows)
-    assert not promises(0.99 * share, 1e6, rows)
-    assert not promises(1.01 * share, CRITERIA.material * rows, rows)
+    assert promises(1.01 * share, 1e6, rows, rows)
+    assert not promises(0.99 * share, 1e6, rows, rows)
+    assert not promises(1.01 * share, CRITERIA.material * rows, rows, rows)
+    assert promises(1.01 * share, CRITERIA.material * rows, rows, 0.01 * rows)  # the noise is an upper bound
+
+
+@pytest.mark.parametrize(
+    ("quantities", "rule"),
+    [
+        ({"worst": 1.6}, "within the noise"),
+        ({"held_out": 4.1}, "within the noise, held out"),
+        ({"structure": "over the speed"}, "structure"),
+        ({"torque": (1.03, 1.0)}, "plain model"),
+    ],
+)
+def test_a_twin_that_leaves_something_reproduces_nothing(quantities: dict[str, Any], rule: str) -> None:
+    usual = {"worst": 1.5, "held_out": 3.9, "structure": "", "torque": (1.01, 1.0)}
+    assert accepted(examine(REPRODUCED, Reproduction(**usual), CRITERIA))
+    assert examine(REPRODUCED, Reproduction(**(usual | quantities)), CRITERIA)[-1].rule == rule
 
 
 def test_answers_after_a_refusal_are_left_out() -> None:

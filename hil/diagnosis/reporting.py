@@ -62,6 +62,7 @@ def report(judged: Judged, progress: Progress, begin_s: float, budget_s: float) 
         partial=found if judged.is_part else (),
         change=judged.change.summary if judged.change else None,
         parameter_corrections=law.corrections | ({} if judged.keeps_bench else corrections(bench, final)),
+        added_command=law.windows,
         not_identifiable=() if judged.keeps_bench else at_bound(final),
         fit=table,
         not_testable=hidden,
@@ -88,9 +89,10 @@ def report(judged: Judged, progress: Progress, begin_s: float, budget_s: float) 
 
 def _location(judged: Judged) -> Location | None:
     """Where the mismatch is: that of the plant, or the control law if only this differs from the bench."""
-    held_out = judged.tested.searched.prepared.held_out
+    held_out, law = judged.tested.searched.prepared.held_out, judged.tested.searched.prepared.law
     if judged.verdict is not judged.of_plant:
-        return Location(block="controller", element="settings of the control law", channels=())
+        element = "command behind the control law" if law.windows else "settings of the control law"
+        return Location(block="controller", element=element, channels=())
     if judged.verdict is Verdict.NO_MISMATCH:
         return None
     seen, goal = shown_in(judged.before, held_out), judged.nominal if judged.is_part else judged.final
@@ -106,7 +108,7 @@ def _experiment(judged: Judged, hidden: tuple[str, ...]) -> Experiment | None:
     held_out = searched.prepared.held_out
     if not closed_loop_held(judged.nominal, judged.final, held_out) or searched.stopped_at or judged.change:
         return None
-    if judged.verdict is Verdict.MISSING_PHYSICS:
+    if judged.of_plant is Verdict.MISSING_PHYSICS:
         return separating(searched, judged.tested.proof.final, held_out)
     return showing(judged.nominal, hidden, held_out)
 

@@ -263,6 +263,9 @@ class Result(_Part):
     )
     change: AxisChange | None = Field(None, description="for `axis_changed`; for `unexplained` one that explains most")
     parameter_corrections: dict[str, Correction]
+    added_command: tuple[EventWindow, ...] = Field(
+        (), description="windows of a command that is added behind the control law, by time"
+    )
     not_identifiable: tuple[str, ...] = Field(
         (), description="nominal parameters whose fit ended at the bound of the allowed range: no correction"
     )

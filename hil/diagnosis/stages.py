@@ -98,7 +98,7 @@ class Judged:
     @property
     def has_findings(self) -> bool:
         """True if the terms of the final hypothesis are reported."""
-        return self.is_part or self.verdict == "missing_physics"
+        return self.is_part or self.of_plant == "missing_physics"
 
     @property
     def keeps_bench(self) -> bool:

@@ -2,7 +2,8 @@
 
 The fit is that of `hil.identification.law.fit`, from a closed form, at every period of the position loop, with both
 velocity estimates, with and without an integrator and delays; the best of these is refined, also with a feed-forward of
-the last difference of the position set-points.
+the last difference of the position set-points. Each encoder is tried as feedback of the position loop; the velocity
+loop has that of the motor.
 """
 
 from dataclasses import replace
@@ -18,7 +19,7 @@ from hil.drafting.bench_value import BenchValue
 from hil.identification.law.closed_form import closed_form, find_delays, first_tick
 from hil.identification.law.fit import fit_settings
 from hil.identification.law.replay import LawRows, Settings
-from hil.identification.law.result import REPLAYED, LawFit, preferred, sure
+from hil.identification.law.result import REPLAYED, LawFit, preferred, sure, told_apart
 from hil.identification.parallel import one_blas_thread
 from hil.identification.terms import Term
 from hil.recording.recording import Recording
@@ -46,11 +47,19 @@ class ControlValues(NamedTuple):
     why: str = ""
 
 
+class LoopFit(NamedTuple):
+    """The control law of a recording, and the best one with the other encoder as feedback of the position loop."""
+
+    law: LawFit
+    other: LawFit | None = None
+
+
 def loop_values(recording: Recording, ratio_m_rad: float) -> ControlValues:
     """Draft the control section of a bench from a recording; `ratio_m_rad`: travel over motor angle."""
-    names, loop, period_s = recording.axis, fit_loops(recording, ratio_m_rad), recording.period_s
-    if loop is None:
+    names, found, period_s = recording.axis, fit_loops(recording, ratio_m_rad), recording.period_s
+    if found is None:
         return ControlValues([], "no set-points are recorded, or no gains reproduce the torque command")
+    loop = found.law
     if loop.left > REPLAYED:
         torque, command = (recording.columns.get(name) for name in (names.torque, names.torque_command))
         measured = command is None or (torque is not None and np.array_equal(command, torque))
@@ -64,7 +73,26 @@ def loop_values(recording: Recording, ratio_m_rad: float) -> ControlValues:
             f"+-{1e3 * period_s * error_rows:.1g}; a delay of the loop is not simulated; if the drive filters its "
             "velocity instead, give its gains and velocity_filter_time_constant_s",
         )
-    return ControlValues(_bench_values(loop, recording.kind, period_s))
+    feedback = [_feedback(found)] if _has_two(recording) else []
+    return ControlValues([*feedback, *_bench_values(loop, recording.kind, period_s)])
+
+
+def _has_two(recording: Recording) -> bool:
+    """True if a second encoder is recorded that a bench file takes."""
+    return recording.kind is AxisKind.ROTARY and recording.axis.table_position in recording.columns
+
+
+def _feedback(found: LoopFit) -> BenchValue:
+    """Encoder of the position loop, and what the law leaves with the other one."""
+    from_table = found.law.gains.position_from_table
+    encoder, other = ("table", "the motor's encoder") if from_table else ("motor", "the second encoder")
+    if found.other is None:
+        told, how = "told", f"with {other} no gains are found"
+    elif told_apart(found.law, found.other):
+        told, how = "told", f"with {other} the law leaves {_left(found.other)}"
+    else:
+        told, how = "not told, assumed", f"with {other} the law leaves as little, {_left(found.other)}"
+    return BenchValue("position_feedback", encoder, told, how)
 
 
 def _bench_values(loop: LawFit, kind: AxisKind, period_s: float) -> list[BenchValue]:
@@ -107,10 +135,11 @@ def _left(loop: LawFit) -> str:
 
 
 @one_blas_thread
-def fit_loops(recording: Recording, ratio_m_rad: float) -> LawFit | None:
+def fit_loops(recording: Recording, ratio_m_rad: float) -> LoopFit | None:
     """Fit the control law; None without set-points or torque, or where no gains are found.
 
-    Where the speed set-point is recorded, each loop is fitted to its own output; if these do not reproduce it, or if it
+    Of two encoders that of the motor closes the position loop unless the second one leaves clearly less. Where the
+    speed set-point is recorded, each loop is fitted to its own output; if these do not reproduce it, or if it
     is not recorded, the chain of both loops is.
     """
     names = recording.axis
@@ -126,25 +155,45 @@ def fit_loops(recording: Recording, ratio_m_rad: float) -> LawFit | None:
         return None
     rows = slice(max(int(moving[0]) - 50, 0), max(int(moving[0]) - 50, 0) + _ROWS)
     motor, command = recording[names.motor_position][rows], recording[torque][rows]
+    table = recording[names.table_position][rows] if _has_two(recording) else np.empty(0)
     law = LawRows(
         position[rows],
         velocity[rows],
-        Response(motor, np.empty(0), command, command),
+        Response(motor, table, command, command),
         np.empty(0),
         Start(float(ratio_m_rad * motor[0]), float(ratio_m_rad * (motor[1] - motor[0])) / recording.period_s),
         _SETTLED,
         _NOISE * max(float(np.std(command)), 1e-300),
     )
     if np.any(speed):
-        found = _best(replace(law, speed_set_point=speed[rows]), ratio_m_rad, recording.period_s)
-        if found is not None and found.left <= REPLAYED:
+        found = _of_encoders(replace(law, speed_set_point=speed[rows]), ratio_m_rad, recording.period_s)
+        if found is not None and found.law.left <= REPLAYED:
             return found
-    return _best(law, ratio_m_rad, recording.period_s)
+    return _of_encoders(law, ratio_m_rad, recording.period_s)
 
 
-def _best(rows: LawRows, ratio_m_rad: float, period_s: float) -> LawFit | None:
-    """The variant of the law with the best criterion, with and without delays."""
-    twin = Twin(Physics(one_mass(1.0), 0.0, 0.0), _gains(ratio_m_rad, period_s, 1, True, False))
+def _of_encoders(rows: LawRows, ratio_m_rad: float, period_s: float) -> LoopFit | None:
+    """The law with the encoder of the position loop that leaves clearly less, else with that of the motor."""
+    gains = make_gains(
+        position_gain_1_s=1.0,
+        velocity_gain_n_m_s_rad=1.0,
+        ratio_m_rad=ratio_m_rad,
+        velocity_period_s=period_s,
+        position_period_s=period_s,
+    )
+    of_motor = _best(rows, gains)
+    of_table = _best(rows, gains._replace(position_from_table=True)) if rows.measured.table_position_m.size else None
+    if of_motor is None or of_table is None:
+        law = of_motor or of_table
+        return LoopFit(law) if law else None
+    if preferred([of_motor, of_table]) is of_table and told_apart(of_table, of_motor):
+        return LoopFit(of_table, of_motor)
+    return LoopFit(of_motor, of_table)
+
+
+def _best(rows: LawRows, given: Gains) -> LawFit | None:
+    """The variant of the law with the best criterion, with and without delays, for the encoder of `given`."""
+    twin, period_s = Twin(Physics(one_mass(1.0), 0.0, 0.0), given), given.period_s
     tried = list[tuple[Settings, int, LawFit]]()
 
     def attempt(start: Settings, free: int) -> None:
@@ -156,9 +205,10 @@ def _best(rows: LawRows, ratio_m_rad: float, period_s: float) -> LawFit | None:
     for ticks, mean in product(_TICKS, (True, False)):
         if ticks * period_s > _LONGEST_S:
             continue
-        delays = find_delays(rows, Settings(_gains(ratio_m_rad, period_s, ticks, True, mean)))
-        for integral in (True, False):
-            start = Settings(_gains(ratio_m_rad, period_s, ticks, integral, mean))
+        gains = given._replace(position_ticks=ticks, two_sample_mean=mean)
+        delays = find_delays(rows, Settings(gains._replace(integral_gain_n_m_rad=1.0)))
+        for integral in (1.0, 0.0):
+            start = Settings(gains._replace(integral_gain_n_m_rad=integral))
             attempt(start, 0)
             attempt(start._replace(setpoint_rows=delays[0], feedback_rows=delays[1]), 2)
     # a coarse search finds no delays of a part of a row: the fit resolves them, from none
@@ -195,15 +245,3 @@ def _refined(rows: LawRows, at: Settings, delays: int, twin: Twin) -> LawFit:
         ]
     least_s = _LEAST_FILTER * at.gains.period_s
     return preferred([one for one in fits if not one.terms or one.terms[0].values[0] > least_s] or fits[:1])
-
-
-def _gains(ratio_m_rad: float, period_s: float, ticks: int, integral: bool, mean: bool) -> Gains:
-    return make_gains(
-        position_gain_1_s=1.0,
-        velocity_gain_n_m_s_rad=1.0,
-        ratio_m_rad=ratio_m_rad,
-        velocity_integral_time_s=1.0 if integral else None,
-        velocity_period_s=period_s,
-        position_period_s=ticks * period_s,
-        two_sample_mean=mean,
-    )

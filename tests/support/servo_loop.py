@@ -26,12 +26,13 @@ def servo_run(
     scale: float = 1.0,
     times: int = 1,
     differenced: bool = False,
+    added: np.ndarray | None = None,
 ) -> Recording:
     """Record the law of `bench` on one inertia; the loop sees positions of `old_rows` ago.
 
     It moves `times` times through the segments, uses the recorded set-points `late_rows` later, and records its speed
     set-point in units of `scale` m/s. Its feed-forward is the velocity of the profile, or the last difference of the
-    position set-points (`differenced`).
+    position set-points (`differenced`). `added` [N m] at each row is added to its command.
     """
     gains = bench.gains
     period_s, ratio = gains.period_s, gains.ratio_m_rad
@@ -53,6 +54,7 @@ def servo_run(
         inputs = cascade.Inputs(trajectory.position_m[used[k]], float(ahead[used[k]]), seen, ratio * seen)
         state, outputs = cascade.step(gains, state, inputs)
         torque[k], reference[k] = outputs
+        torque[k] += 0.0 if added is None else added[k]
         for _ in range(STEPS):
             friction = physics.coulomb_n_m * np.tanh(speed / SMOOTH_RAD_S) + physics.viscous_n_m_s_rad * speed
             speed += step_s * (torque[k] - friction) / inertia

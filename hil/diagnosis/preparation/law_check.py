@@ -4,6 +4,7 @@ Each block is judged on measured inputs, so a wrong law says nothing about the m
 
     kept       where it replays the commands to their noise, or with a mechanism of the library that acts on its inputs
     learnt     where other gains or delays do
+    beside     windows of a command that is added behind it, where it is kept or learnt without these
     set aside  where it cannot be replayed (no set-points, another sampling period), or no gains reproduce the commands
 
 A loop cannot use positions of the future: commands that fit later positions tell that a channel is recorded late, a
@@ -20,6 +21,7 @@ from typing import NamedTuple
 
 from hil.bench.bench_file import Bench
 from hil.diagnosis.criteria import CRITERIA
+from hil.diagnosis.preparation.added_command import added_windows, axis_felt, without_added
 from hil.diagnosis.preparation.usable_law import LawCheck, set_aside
 from hil.diagnosis.result import Correction
 from hil.diagnosis.search.initial_values import axis_facts
@@ -43,6 +45,30 @@ def check_law(runs: Sequence[Measured], bench: Bench) -> LawCheck:
     if not bench.law_known:
         return LawCheck(bench)
     given = fit_law(runs, bench, free=False)
+    if given.ratio <= CRITERIA.floor:
+        return LawCheck(bench)
+    beside = None if _is_coarse(runs, given) else _beside_windows(runs, bench, given)
+    return beside or _without_windows(runs, bench, given)
+
+
+def _beside_windows(runs: Sequence[Measured], bench: Bench, given: LawFit) -> LawCheck | None:
+    """The law beside windows of an added command that it leaves; None without any, or if it is not that law."""
+    windows = added_windows(runs, bench, given.settings)
+    if not windows:
+        return None
+    bare = [without_added(run, windows) for run in runs]
+    law = _without_windows(bare, bench, fit_law(bare, bench, free=False))
+    if law.mismatch:
+        return None
+    owner = law.bench if law.bench.law_known and _SETPOINT_DELAY not in law.corrections else bench
+    if axis_felt(runs, windows):
+        alone = set_aside(bench, "a command is added behind it, which the twin does not simulate")
+        law = replace(law, bench=alone.bench, notes=(*alone.notes, *law.notes), coarse=False)
+    return replace(law, added_to=owner)
+
+
+def _without_windows(runs: Sequence[Measured], bench: Bench, given: LawFit) -> LawCheck:
+    """Check the law on commands without windows; `given`: as it stands in the bench."""
     if given.ratio <= CRITERIA.floor:
         return LawCheck(bench)
     if _is_coarse(runs, given):

@@ -42,6 +42,7 @@ def prepare(train: Sequence[Recording], validate: Sequence[Recording], bench: Be
     if usable.law_known:
         law = at_set_points(measured, usable)
         law = check_law(measured[: len(train)], usable) if law.bench is usable else law
+        law = law.beside(measured)
         if law.bench is not usable:
             usable = reduced(law.bench, runs)
             measured = preflight(runs, usable).accepted()

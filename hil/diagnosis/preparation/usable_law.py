@@ -11,7 +11,10 @@ import numpy as np
 
 from hil.bench.bench_file import Bench
 from hil.bench.control_section import without_law
-from hil.diagnosis.result import Correction, Verdict
+from hil.diagnosis.preparation.added_command import added_in_words, added_windows, windows_told, without_added
+from hil.diagnosis.result import Correction, EventWindow, Verdict
+from hil.diagnosis.search.event_detection import Event
+from hil.identification.law.replay import Settings
 from hil.identification.measured import Measured
 from hil.recording.recording import RESAMPLED, Recording
 
@@ -25,7 +28,7 @@ class LawCheck:
 
     `coarse`: the law is right to the noise that the recorded positions make in a replay, and cannot be tested further.
     `advice` is what the owner should check, empty if nothing; `mismatch`: the law was set aside because no gains
-    reproduce the commands.
+    reproduce the commands. `added_to`: the bench behind whose law a command is added in windows.
     """
 
     bench: Bench
@@ -35,6 +38,9 @@ class LawCheck:
     advice: str = ""
     mismatch: bool = False
     resampled: bool = False  # the rows are not the ticks of the velocity loop
+    added_to: Bench | None = None
+    added: tuple[Event, ...] = ()  # in all recordings
+    windows: tuple[EventWindow, ...] = ()  # the same as they are told
 
     def marked(self, recording: Recording) -> Recording:
         """The recording, marked if its rows are not the ticks of the velocity loop."""
@@ -46,12 +52,28 @@ class LawCheck:
         """Verdict on plant and control law, from that on the plant."""
         if self.mismatch and of_plant in (Verdict.NO_MISMATCH, Verdict.PARAMETER_ERROR):
             return Verdict.UNEXPLAINED
+        if self.windows and of_plant in (Verdict.NO_MISMATCH, Verdict.PARAMETER_ERROR):
+            return Verdict.MISSING_PHYSICS
         if self.corrections and of_plant is Verdict.NO_MISMATCH:
             return Verdict.PARAMETER_ERROR
         return of_plant
 
+    def beside(self, runs: Sequence[Measured]) -> "LawCheck":
+        """The law with the windows of an added command in all `runs`, in training and held-out ones, and in words."""
+        if self.added_to is None:
+            return self
+        added = added_windows(runs, self.added_to, Settings(self.added_to.gains))
+        windows = windows_told(added, runs, self.added_to.axis.drive_unit)
+        told = added_in_words(windows)
+        felt = "The axis does not move by it: it was taken off the recorded command and torque."
+        if not self.bench.law_known:
+            felt = "The axis moves by it."
+        advice = " ".join(filter(None, (told, felt, self.advice)))
+        return replace(self, added=added, windows=windows, advice=advice, notes=(f"{told} {felt}", *self.notes))
+
     def without_command(self, runs: Sequence[Measured]) -> list[Measured]:
-        """The runs, without the command of the controller if they are too coarse to test it."""
+        """The runs less an added command, and without that of the controller if they are too coarse to test it."""
+        runs = [without_added(run, self.added) for run in runs] if self.bench.law_known else runs
         if not self.coarse:
             return list(runs)
         return [replace(run, observability=replace(run.observability, law_testable=False)) for run in runs]

@@ -26,6 +26,7 @@ from hil.twin.axis import Twin
 from hil.twin.library import BY_ID
 from hil.twin.mechanism import Stage
 from hil.twin.physics import Active
+from hil.twin.stepping.loops import INTEGRATOR_S
 
 _FARTHEST = 20.0  # factor of a gain over that of the bench: beyond, another unit is meant
 _MOST_FEEDFORWARD = 3.0  # of the set velocity; 1 is exact
@@ -131,18 +132,7 @@ def fit_law(
 
     `by_loop`: each loop on its own, from the recorded speed set-point. Without anything to fit the law is evaluated.
     """
-    rows = [
-        LawRows(
-            run.position_command_m,
-            run.velocity_command_m_s,
-            run.response,
-            run.speed_set_point if by_loop else np.empty(0),
-            run.start,
-            run.evaluated.start,
-            run.noise.torque,
-        )
-        for run in runs
-    ]
+    rows = [_law_rows(run, by_loop) for run in runs]
     peak = max(float(np.max(np.abs(run.torque_command))) for run in runs)
     gains = bench.gains
     if free and peak < gains.torque_limit_n_m:  # it never acted; gains that are far off would make it act
@@ -151,6 +141,28 @@ def fit_law(
     fit = fit_settings(rows, base, bench.twin(), terms, free=free, delays=delays)
     kept = fit.gains._replace(torque_limit_n_m=bench.gains.torque_limit_n_m)
     return replace(fit, settings=fit.settings._replace(gains=kept))
+
+
+def _law_rows(run: Measured, by_loop: bool) -> LawRows:
+    return LawRows(
+        run.position_command_m,
+        run.velocity_command_m_s,
+        run.response,
+        run.speed_set_point if by_loop else np.empty(0),
+        run.start,
+        run.evaluated.start,
+        run.noise.torque,
+    )
+
+
+def command_left(run: Measured, bench: Bench, settings: Settings) -> FloatArray:
+    """Recorded command less that of a law (n,) [command unit], 0 at first if it has an integrator.
+
+    The integrator of a replay follows the recording, so that a step of the command is forgotten; here it stays one.
+    """
+    rows = replace(_law_rows(run, False), first_evaluated=0)
+    left = residuals(rows, settings, bench.twin(), 0, 1.0).command * rows.noise
+    return np.asarray(left + settings.gains.period_s / INTEGRATOR_S * (np.cumsum(left) - left), dtype=np.float64)
 
 
 def fit_settings(

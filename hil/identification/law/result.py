@@ -8,7 +8,7 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.control.cascade import Gains
-from hil.identification.inference import correlation_time
+from hil.identification.inference import ALIKE, TIED, correlation_time
 from hil.identification.law.replay import Parts, Settings
 from hil.identification.terms import Term
 
@@ -87,3 +87,9 @@ def preferred(fits: Sequence[LawFit]) -> LawFit:
     """The fit of the best Bayesian information criterion."""
     rows = min(one.independent_rows for one in fits)
     return min(fits, key=lambda one: one.bic(rows))
+
+
+def told_apart(better: LawFit, worse: LawFit) -> bool:
+    """True if the criterion refutes `worse` beside `better`, and it leaves more than that, taken as the noise."""
+    rows = min(better.independent_rows, worse.independent_rows)
+    return worse.bic(rows) - better.bic(rows) >= TIED and worse.cost >= (1.0 + ALIKE) * better.cost

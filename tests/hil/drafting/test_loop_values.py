@@ -2,9 +2,20 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 from diagnosis_runs import bench, changed
 from servo_loop import one_encoder, servo_run
+from table_loop import (
+    INTEGRAL_TIME_S,
+    LEAD_M,
+    PERIOD_S,
+    POSITION_GAIN_1_S,
+    TICKS,
+    VELOCITY_GAIN_N_M_S_RAD,
+    table_run,
+)
 
 from hil.bench.bench_file import Bench
 from hil.drafting.loop_values import ControlValues, loop_values
@@ -94,3 +105,34 @@ def test_loops_of_one_period_are_told_apart(time_s: float, feedforward: float) -
     assert values["velocity_integral_time_s"] == pytest.approx(time_s, rel=0.05)
     assert values["velocity_feedforward"] == pytest.approx(feedforward, abs=0.02)
     assert values["position_period_s"] == OWNER.period_s
+
+
+OF_TABLE = {
+    "position_gain_1_s": POSITION_GAIN_1_S,
+    "velocity_feedforward": 1.0,
+    "velocity_gain_n_m_s_rad": VELOCITY_GAIN_N_M_S_RAD,
+    "velocity_integral_time_s": INTEGRAL_TIME_S,
+    "position_period_s": TICKS * PERIOD_S,
+}
+
+
+@pytest.mark.parametrize(
+    ("on_motor", "torque_only"),
+    [(False, False), (True, False), pytest.param(False, True, marks=pytest.mark.long)],
+)
+def test_the_encoder_of_the_position_loop_is_told(on_motor: bool, torque_only: bool) -> None:
+    recording = table_run(on_motor=on_motor)
+    recording = changed(recording, torque_command_n_m=None) if torque_only else recording
+    feedback, *values = loop_values(recording, LEAD_M / (2.0 * math.pi)).values
+    assert (feedback.key, feedback.value) == ("position_feedback", "motor" if on_motor else "table")
+    assert feedback.error == "told"
+    drafted = {entry.key: entry.value for entry in values}
+    assert {key: drafted[key] for key in OF_TABLE} == pytest.approx(OF_TABLE, rel=5e-3)
+
+
+def test_on_a_rigid_axis_the_encoder_of_the_position_loop_is_not_told() -> None:
+    """The motor stands for it, and the draft says so."""
+    rigid = changed(table_run(guideway_n=0.0, stiffness_n_m=2.5e10, noise_n_m=0.02), torque_command_n_m=None)
+    values = loop_values(rigid, LEAD_M / (2.0 * math.pi)).values
+    assert (values[0].value, values[0].error) == ("motor", "not told, assumed")
+    assert values[1].value == pytest.approx(POSITION_GAIN_1_S, rel=0.01)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 from diagnosis_runs import dataset
-from emps_windows import PERIOD_S
+from emps_windows import EDGE_S, PERIOD_S, Push, pushed
 from measured_recordings import emps
 
 from hil.bench.bench_file import Bench, load_bench
@@ -43,6 +44,24 @@ def test_wrong_gains_are_learnt_without_another_part_of_the_law() -> None:
     assert set(learnt.corrections) == set(given)
     assert learnt.corrections["position_gain_1_s"].value == pytest.approx(law.position_gain_1_s, rel=1e-3)
     assert learnt.corrections["velocity_gain_n_s_m"].value == pytest.approx(8557.43, rel=1e-3)
+
+
+@pytest.mark.parametrize("answered", [False, True])
+def test_pulses_added_to_the_command_are_found_behind_its_law(answered: bool) -> None:
+    """25 pulses of 178.2 N for 500 ms, in the recorded command alone, or felt by the axis, to which the law answers."""
+    height_n, recording, owner = 178.2, emps(), load_bench("emps_symmetric")
+    pushes = [Push(0.3 + 0.97 * k, 0.8 + 0.97 * k, height_n) for k in range(25)]
+    recording = pushed(pushes) if answered else recording
+    time_s = np.arange(len(recording)) * PERIOD_S
+    inside = [(time_s > push.start_s - 5e-4) & (time_s < push.end_s - 5e-4) for push in pushes]
+    columns = {name: recording[name] + height_n * np.any(inside, axis=0) for name in ("force_command_n", "force_n")}
+    measured = [take(replace(recording, columns={**recording.columns, **columns}), owner)]
+    law = check_law(measured, owner).beside(measured)
+    assert law.bench.law_known is not answered
+    for found, push in zip(law.windows, pushes, strict=True):
+        assert found.start.value == pytest.approx(push.start_s, abs=EDGE_S)
+        assert found.end.value == pytest.approx(push.end_s, abs=EDGE_S)
+        assert found.strength.value == pytest.approx(height_n, rel=0.01)
 
 
 def test_what_the_real_axis_does_is_found() -> None:

@@ -3,7 +3,8 @@
 step                 modules                                                     result
 file to table        csv_dialect, mat_file, foreign_table (all columns)          `ForeignTable`
                      foreign_columns (those that a map names)                    `Foreign`
-words                lexicon(.yaml), units, column_names, header_values          `Label`, `HeaderValue`
+words                lexicon(.yaml), units, column_names, unit_lines,            `Label`, `HeaderValue`
+                     header_values
 clock                clock; hil.recording.stamps and row_clock                   `StampClock`, `RegularRows`
 rows                 wraps, held_samples, spikes, rows                           `KeptRows`
 roles                relations, computed_position, roles                         `Roles`

@@ -27,6 +27,7 @@ from hil.importing.unit_choice import (
     unit_by_convention,
     velocity_unit,
 )
+from hil.importing.units import unit_named
 from hil.importing.usual_values import LEADS_M, ROTARY_LEAD_M, mixed_up, screw_units, usual_lead
 from hil.quantities import UNITS
 
@@ -109,6 +110,7 @@ class ChannelEntries:
                     si, factor = UNITS[str(speed.unit)]
                     hints.append((relation.factor / factor, si.removesuffix("/s")))
             told = labels[column].unit or (by_convention.unit if by_convention else None)
+            told = told or ("rev" if unit_named(column) == "rev" else None)  # U
             self._choose(column, position_unit(column, live[column], told, hints, prefers))
 
     def _speeds(self) -> list[Label]:

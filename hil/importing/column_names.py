@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from hil.importing.lexicon import Quantity, lexicon
-from hil.importing.units import QUANTITY_OF_UNIT, split_unit, unit_named
+from hil.importing.units import QUANTITY_OF_UNIT, split_unit, unit_named, whole_unit
 
 LEAST_WITHIN = 4  # letters of a word that is also found within a longer one: shorter ones occur in others by chance
 
@@ -32,20 +32,23 @@ class Label:
         return self.quantity is not Quantity.UNKNOWN
 
 
-def label(column: str, unit_text: str = "") -> Label:
-    """Read the name of a column, and the unit that stands beside it in the file (empty without one)."""
+def label(column: str, unit_text: str = "", words_beside: str = "") -> Label:
+    """Read the name of a column, and the unit and the words that the file gives for it (empty without)."""
     name, unit, odd = split_unit(column.strip())
     if unit is None and not odd:
         name, unit = _unit_after_blank(name)
+        unit = unit or whole_unit(name)
     if unit_text and unit is None:
         unit, odd = unit_named(unit_text), unit_named(unit_text) is None
     tokens = _tokens(name)
-    words = _words(tokens)
+    words = _words(tokens) + _words(_tokens(words_beside))
     number = next((match[1] for token in reversed(tokens) if (match := re.search(r"(\d+)$", token))), "")
     quantity = _quantity(words)
     of_unit = QUANTITY_OF_UNIT.get(unit or "")
     if unit == "N m" and quantity is Quantity.POSITION and not _any(words, ("moment",)):
         unit = "nm"
+    elif unit == "rev" and quantity not in (Quantity.POSITION, Quantity.UNKNOWN):
+        unit = None  # speed_rev is a reversal
     elif of_unit and quantity is not Quantity.OTHER and not (unit == "min" and quantity is not Quantity.TIME):
         quantity = of_unit
     elif unit and unit not in QUANTITY_OF_UNIT:
@@ -62,7 +65,7 @@ def label(column: str, unit_text: str = "") -> Label:
         unit,
         odd,
         _electric(words) if quantity is Quantity.EFFORT else None,
-        len(name.strip()) == 1 and quantity is not Quantity.TIME,
+        len(name.strip()) == 1 and quantity is not Quantity.TIME and not words_beside,
     )
 
 

@@ -48,7 +48,7 @@ def find_dialect(path: Path) -> CsvDialect:
     unit_row: tuple[str, ...] = ()
     header = None
     for index in reversed(above[-4:]):
-        fields = _fields(_COMMENT.sub("", lines[index]), delimiter)
+        fields = _fields(_without_word(lines[index]), delimiter)
         if len(fields) not in (width, width - 1) or not any(fields):
             continue
         named = [field for field in fields if field]
@@ -72,6 +72,12 @@ def find_dialect(path: Path) -> CsvDialect:
     if repeated:
         raise InputError(f"{path}: {repeated[0]!r} names two columns of the header, allowed one; rename or remove one")
     return CsvDialect(CsvOptions.model_validate(given), names, unit_row or ("",) * width, tuple(lines[:first]))
+
+
+def _without_word(line: str) -> str:
+    """A line without the mark of a comment and the word for units: "# units: s, mm" -> "s, mm"."""
+    word, colon, rest = _COMMENT.sub("", line).partition(":")
+    return rest if colon and word.strip().lower() in lexicon().unit_line else _COMMENT.sub("", line)
 
 
 def _starts_with_number(line: str, delimiter: str, point: str) -> bool:

@@ -26,7 +26,7 @@ def draft_map(path: Path, rate_hz: float | None = None, axis: str | None = None)
     table = read_table(path)
     distinct = without_duplicates(table.columns)
     table = replace(table, columns=distinct.columns)
-    labels = {name: label(name, table.units.get(name, "")) for name in table.columns}
+    labels = {name: label(name, table.units.get(name, ""), table.words.get(name, "")) for name in table.columns}
     clock = find_clock(table, labels, rate_hz)
     columns = {name: values for name, values in table.columns.items() if name != clock.column}
     may_wrap = [name for name in columns if labels[name].quantity in (Quantity.POSITION, Quantity.UNKNOWN)]

@@ -23,6 +23,7 @@ from hil.importing.header_values import HeaderValue, header_values
 from hil.importing.lexicon import Constant
 from hil.importing.map_file import CsvOptions
 from hil.importing.mat_file import load_mat
+from hil.importing.unit_lines import described, told_units
 from hil.recording.arrow_files import numbers, read_parquet, stored_unit
 
 MOST_ROWS = 200_000  # read of a text file for the draft: minutes of a recording
@@ -34,7 +35,8 @@ class ForeignTable:
     """Columns of equal length, NaN where a field is no number; units and scalars as the file gives them.
 
     `constants` are what lines above the numbers, or scalars, give by a name that is known. `dates` are columns of dates
-    or times of day, in seconds; `texts` is the first text among the numbers of a column.
+    or times of day, in seconds; `texts` is the first text among the numbers of a column, `words` what a line above says
+    of it.
     """
 
     path: Path
@@ -46,6 +48,7 @@ class ForeignTable:
     remarks: tuple[str, ...] = ()
     dates: frozenset[str] = frozenset()
     texts: dict[str, str] = field(default_factory=dict)
+    words: dict[str, str] = field(default_factory=dict)
 
 
 def read_table(path: Path) -> ForeignTable:
@@ -97,9 +100,11 @@ def _text(path: Path) -> ForeignTable:
             dates.add(name)
         elif name.strip():
             remarks.append(f"{name.strip()}: text such as {next((f for f in fields if f.strip()), '')!r}, no numbers")
-    units = {name: unit.strip("[]() ") for name, unit in zip(dialect.names, dialect.units, strict=True) if unit}
-    constants = header_values(dialect.above, {})
-    return ForeignTable(path, columns, units, {}, options, constants, tuple(remarks), frozenset(dates), texts)
+    told = described(dialect.above, dialect.names)
+    units = {name: unit for name, (_, unit) in told.items()} | told_units(dialect.above, dialect.names)
+    units |= {name: unit.strip("[]() ") for name, unit in zip(dialect.names, dialect.units, strict=True) if unit}
+    constants, words = header_values(dialect.above, {}), {name: text for name, (text, _) in told.items()}
+    return ForeignTable(path, columns, units, {}, options, constants, tuple(remarks), frozenset(dates), texts, words)
 
 
 def _mat(path: Path) -> ForeignTable:

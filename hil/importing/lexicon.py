@@ -103,6 +103,7 @@ class Lexicon(_Entry):
     angle: Words
     length: Words
     units: dict[str, Words]
+    after_unit: Words
     constants: dict[Constant, ConstantWords]
     joints: Words
     scalars: ScalarNames

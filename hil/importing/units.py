@@ -21,6 +21,7 @@ QUANTITY_OF_UNIT = (
 )
 # one letter at the end of a name is a unit only after a word: x_m may be in metres, q_m of the motor
 _BRACKETS = re.compile(r"[\[(<{]\s*([^\])>}]*)\s*[\])>}]\s*$")
+LEAST_ALONE = 3  # letters of a unit that is a name by itself, or of revolutions: motor_u is a voltage
 _BITS = re.compile(r"(?<=[a-z])\d+(bit)?$")  # counts16bit
 _SLASH = re.compile(r"^\s*[^/\s]+\s*/\s*(\S+)\s*$")  # DIN 461: x/mm
 _WORD_IN = re.compile(r"\bin\s+(\S+)\s*$")  # Weg in mm
@@ -45,9 +46,17 @@ def split_unit(name: str) -> tuple[str, str | None, bool]:
             if unit or pattern is _BRACKETS:
                 return rest, unit, unit is None and match[1].strip() not in ("", "-", "1")
     tokens = name.split("_")
+    while len(tokens) > 2 and tokens[-1].lower() in lexicon().after_unit:
+        tokens.pop()
     for take in (3, 2, 1):
         if len(tokens) > take:
             unit = unit_named("_".join(tokens[-take:]).replace("°", "deg"))
-            if unit and unit not in ("rev", "min"):
+            if unit and unit != "min" and not (unit == "rev" and len(tokens[-1]) < LEAST_ALONE):
                 return "_".join(tokens[:-take]), unit, False
     return name, None, False
+
+
+def whole_unit(name: str) -> str | None:
+    """Unit of an angle or its speed that is the whole name of a column: turns, rpm."""
+    unit = unit_named(name) if len(name.strip()) >= LEAST_ALONE else None
+    return unit if UNITS.get(unit or "", ("",))[0] in ("rad", "rad/s") else None

@@ -1,0 +1,72 @@
+"""What lines above the numbers say of the columns: a list of units, or the name of a column with words and its unit."""
+
+import re
+from collections.abc import Sequence
+
+from hil.importing.column_names import label
+from hil.importing.lexicon import Quantity, lexicon
+from hil.importing.units import QUANTITY_OF_UNIT, unit_named
+
+_COMMENT = re.compile(r"^[\s\"#%/;!]+")
+_SEPARATORS = (r"[;,|\t]", r"\s/\s", r"\s+")
+_BRACKET = re.compile(r"[\[({](.*?)[\])}]")
+
+
+def told_units(lines: Sequence[str], names: Sequence[str]) -> dict[str, str]:
+    """Units by column `names` of the first of the `lines` that is a list of units.
+
+    A list as long as the columns, or as those without the time, is in their order. Of another one a unit is that of the
+    columns of its quantity, if the list has one of this quantity.
+    """
+    for line in lines:
+        units = _list_of_units(line)
+        if not units or set(units) <= set(names):  # s, v, a may be names
+            continue
+        timeless = [name for name in names if label(name).quantity is not Quantity.TIME]
+        if len(units) == len(names):
+            return dict(zip(names, units, strict=True))
+        if len(units) == len(timeless):
+            return dict(zip(timeless, units, strict=True))
+        of = {QUANTITY_OF_UNIT.get(unit_named(unit) or ""): unit for unit in units}
+        read = {name: label(name) for name in names}
+        told = {name: of[one.quantity] for name, one in read.items() if one.unit is None and one.quantity in of}
+        return {name: unit for name, unit in told.items() if read[name].electric in (None, unit_named(unit))}
+    return {}
+
+
+def _list_of_units(line: str) -> list[str]:
+    """Units of a line that holds nothing else: "# units: s, mm, %"; at least two of them, each of a quantity once."""
+    text = _COMMENT.sub("", line).strip(' "\r\n')
+    word, colon, rest = text.partition(":")
+    text = rest if colon and word.strip().lower() in lexicon().unit_line else text
+    for separator in _SEPARATORS:
+        units = [field.strip(' []()"') for field in re.split(separator, text.strip())]
+        if len(units) > 1 and all(unit_named(unit) or unit in ("", "-") for unit in units) and any(units):
+            return units
+    return []
+
+
+def described(lines: Sequence[str], names: Sequence[str]) -> dict[str, tuple[str, str]]:
+    """Words and unit of columns that a line names in turn: "ch2 set [um] | ch3 motor [inc]", "xs set-point mm, M Nm"."""
+    for line in lines:
+        found = {name: re.search(rf"(?<!\w){re.escape(name)}(?!\w)", line) for name in names if name}
+        places = sorted((match.start(), match.end(), name) for name, match in found.items() if match)
+        ends = [*(start for start, _, _ in places), len(line)][1:]
+        told = {name: _words_and_unit(line[begin:end]) for (_, begin, name), end in zip(places, ends, strict=False)}
+        if len(told) > 1 and sum(bool(unit) for _, unit in told.values()) > len(told) / 2:
+            return told
+    return {}
+
+
+def _words_and_unit(text: str) -> tuple[str, str]:
+    bracket = _BRACKET.search(text)
+    if bracket and (unit := next((one for one in _starts(bracket[1]) if unit_named(one)), "")):
+        return text[: bracket.start()].strip(), unit
+    words = re.split(r"[,;|(]", text)[0].split()
+    last = words[-1] if words and unit_named(words[-1]) and not re.search(r"[\d=]", text) else ""
+    return " ".join(words[: len(words) - bool(last)]), last
+
+
+def _starts(text: str) -> list[str]:
+    """A text, the part before a comma, and its first word: inc 65536/rev."""
+    return [text, text.split(",")[0], *text.split()[:1]]

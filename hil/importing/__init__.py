@@ -5,6 +5,7 @@ file to table        csv_dialect, mat_file, foreign_table (all columns)         
                      foreign_columns (those that a map names)                    `Foreign`
 words                lexicon(.yaml), units, column_names, unit_lines,            `Label`, `HeaderValue`
                      header_values
+values that hold     on_change                                               columns without empty cells
 clock                clock; hil.recording.stamps and row_clock                   `StampClock`, `RegularRows`
 rows                 wraps, held_samples, spikes, rows                           `KeptRows`
 roles                relations, computed_position, roles                         `Roles`

@@ -41,7 +41,8 @@ def import_recording(source: str | Path, map_path: str | Path) -> Recording:
     gains = {entry.gain for entry in the_map.channels.values() if isinstance(entry.gain, str)}
     dates = the_map.time.column if the_map.time is not None and the_map.time.unit == "date" else None
     few = FEW_MISSING if the_map.missing == "leave_out" else 0.0
-    foreign = read_foreign(source, wanted, sorted(gains), the_map.csv.format(), dates, few)
+    on_change = sorted({entry.column for entry in the_map.channels.values() if entry.empty == "hold"})
+    foreign = read_foreign(source, wanted, sorted(gains), the_map.csv.format(), dates, few, on_change)
 
     raw = {"time_s": _time_s(the_map, foreign.columns)}
     origins: dict[str, dict[str, str | float]] = {}

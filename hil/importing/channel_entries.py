@@ -10,12 +10,15 @@ from hil.errors import InputError
 from hil.identification.derivatives import MeasuredMotion, motion, smoothed
 from hil.importing.column_names import Label
 from hil.importing.effort_entry import effort_entry, signs_of
-from hil.importing.encoder_counts import CountSize, assumed, from_length, from_speed
+from hil.importing.encoder_counts import CountSize, angle_unit, assumed, from_length, from_speed, scale_count
 from hil.importing.lexicon import Constant, Quantity
 from hil.importing.map_draft import DraftedChannel, MapDraft
-from hil.importing.relations import derivative_of, driven, explained, lateness_s, proportional
+from hil.importing.map_file import ChannelSource
+from hil.importing.relations import Relation, derivative_of, driven, explained, lateness_s, proportional
 from hil.importing.roles import SAME_POSITION, Roles
 from hil.importing.unit_choice import (
+    ANGULAR_SPEEDS,
+    LINEAR_SPEEDS,
     MATCH,
     UnitChoice,
     are_counts,
@@ -25,14 +28,15 @@ from hil.importing.unit_choice import (
     position_unit,
     prefers_length,
     unit_by_convention,
-    velocity_unit,
 )
 from hil.importing.units import unit_named
-from hil.importing.usual_values import LEADS_M, ROTARY_LEAD_M, mixed_up, screw_units, usual_lead
-from hil.quantities import UNITS
+from hil.importing.usual_values import LEADS_M, ROTARY_LEAD_M, improbable, mixed_up, screw_units, usual_lead
+from hil.quantities import UNITS, si_factor
 
 SAME_COUNTS = 1e-3  # deviation of the factor between motor and set-point, both in counts: following errors are below
 _LEAD_NOT_TOLD = "not told; masses at the table scale with it"
+FOLLOWS = 0.9  # share from which a speed is the derivative of the set-point
+SAME_SPEED = 0.1  # deviation of a speed from that derivative: a following error is below, other units are far
 LATE_ROWS = 0.5  # by which a set-point may seem late: its rounding and the sampling of the encoder
 # Shares of a speed set-point: what the velocity of the position set-point must leave, and the most of this that the
 # following error may leave, if it is the output of the position loop.
@@ -60,8 +64,10 @@ class ChannelEntries:
             self._velocity_only()
             return
         self._units_of_positions()
-        table = roles.table and is_length(self.units[roles.table])  # the transmission to a second encoder is judged
-        linear = is_length(self.units[roles.motor]) and (gives_force(self.effort) or not table)
+        # the transmission to a second encoder is judged, and a lead turns a length into an angle
+        table = roles.table and is_length(self.units[roles.table])
+        screw = table or Constant.LEAD in self.draft.table.constants
+        linear = is_length(self.units[roles.motor]) and (gives_force(self.effort) or not screw)
         self.kind = AxisKind.LINEAR if linear else AxisKind.ROTARY
         self._positions(roles.motor)
         self._velocity_command()
@@ -91,7 +97,8 @@ class ChannelEntries:
         self.draft.unsure += [by_convention.note] if by_convention else []
         far, motor = roles.table or roles.command, roles.motor
         in_counts = "counts" in [labels[name].unit for name in (far, motor) if name]
-        if far and motor and not by_convention and not in_counts and not are_counts(live[motor]):
+        geared = far is not None and labels[far].unit is None and prefers_length([far], None) is False
+        if far and motor and not geared and not by_convention and not in_counts and not are_counts(live[motor]):
             relation = proportional(live[far], live[motor])
             pair = screw_units(relation.factor, labels[far].unit, labels[motor].unit)
             if pair and relation.share > SAME_POSITION and None in (labels[far].unit, labels[motor].unit):
@@ -99,6 +106,13 @@ class ChannelEntries:
                 self._choose(far, UnitChoice(pair[0], note))
                 self._choose(motor, UnitChoice(pair[1]))
         speeds = [one for one in self._speeds() if one.column in live]
+        untold = (
+            prefers is False and not by_convention and not speeds and all(labels[n].unit is None for n in positions)
+        )
+        for column in [name for name in (motor, roles.table) if name and untold and name not in self.units]:
+            if choice := angle_unit(column, live[column], self._unnamed_speeds(column)):
+                self._choose(column, choice)
+                break
         # columns with a unit first: they are the hints for the others
         open_ones = [name for name in positions if name not in self.units]
         for column in sorted(open_ones, key=lambda name: labels[name].unit is None):
@@ -112,6 +126,15 @@ class ChannelEntries:
             told = labels[column].unit or (by_convention.unit if by_convention else None)
             told = told or ("rev" if unit_named(column) == "rev" else None)  # U
             self._choose(column, position_unit(column, live[column], told, hints, prefers))
+        for column, unit in self.units.items():
+            self.draft.unsure += improbable(column, live[column], unit, self.period_s)
+
+    def _unnamed_speeds(self, column: str) -> list[tuple[str, float]]:
+        """Measured velocities without a unit that are the derivative of `column`, with the derivative over them."""
+        speed = self._motion(column).velocity
+        names = [one.column for one in self.labels.values() if one.quantity is Quantity.VELOCITY and not one.command]
+        found = [(name, proportional(speed, self.live[name])) for name in names if name in self.live]
+        return [(name, relation.factor) for name, relation in found if relation.share > SAME_POSITION]
 
     def _speeds(self) -> list[Label]:
         """Measured velocities with a unit."""
@@ -192,7 +215,14 @@ class ChannelEntries:
         if unit == "counts":  # of the motor's encoder, as in the set-points of a drive
             same = abs(abs(factor) - 1.0) < SAME_COUNTS
             per_count = self.per_count / (1.0 if same else abs(factor))
-            if motor == "m":
+            lever = (self.draft.lead_m or 0.0) / (2.0 * pi) if motor == "rad" else 1.0
+            per_m = scale_count(1.0 / (per_count * lever)) if lever and channel == "table_position_m" else None
+            if per_m is not None and not same:
+                keys |= {"counts_per_m": per_m}
+                unsure.append(
+                    f"{name}: counts of {1e6 / per_m:g} um are taken: measured {1e6 * per_count * lever:.6g} um"
+                )
+            elif motor == "m":
                 keys |= {"counts_per_m": float(f"{1.0 / per_count:.8g}")}
             else:
                 keys |= {"unit": motor, "scale": float(f"{per_count:.8g}")}
@@ -224,13 +254,32 @@ class ChannelEntries:
         channel, how = "velocity_command_m_s", f"the derivative of {command}"
         if self._holds_following_error(name, command):
             channel, how = SPEED_SET_POINT, "output of the position loop: it holds the following error"
-        elif relation.share < 0.9:
+        elif relation.share < FOLLOWS:
             self.draft.left_out[name] = f"no derivative of {command} (share {relation.share:.2f})"
             return
-        unit = self._choose(name, velocity_unit(name, self.labels[name].unit, relation.factor, self.units[command]))
+        unit = self._speed_unit(name, relation)
+        if unit is None:
+            told = f"in {self.labels[name].unit} " if self.labels[name].unit else ""
+            why = f"{abs(relation.factor):.4g} x the derivative of {command} in {self.units[command]}"
+            self.draft.left_out[name] = f"{told}no velocity: {why}"
+            self.draft.unsure.append(f"{name}: is {told}{why}, which no unit of a speed explains; it is not used")
+            return
         turned = any("sign" in one.entry for one in self.draft.channels if one.channel == "position_command_m")
         sign = {"sign": -1} if (relation.factor < 0.0) != turned else {}
         self.draft.channels.append(DraftedChannel(channel, {"column": name, "unit": unit, **sign}, how))
+
+    def _speed_unit(self, name: str, relation: Relation) -> str | None:
+        """Unit of a speed by its factor to the derivative of the set-point; None if none, or not the told one, fits."""
+        entry = next(one.entry for one in self.draft.channels if one.channel == "position_command_m")
+        source, told, lead_m = ChannelSource.model_validate(entry), self.labels[name].unit, self.draft.lead_m
+        si, size = next((si, size) for si in ("m", "rad") if (size := source.factor_to(si, None)) is not None)
+        own, others = (LINEAR_SPEEDS, ANGULAR_SPEEDS) if si == "m" else (ANGULAR_SPEEDS, LINEAR_SPEEDS)
+        for unit in [told] if told else [*own, *others]:
+            factor = si_factor(unit, f"{si}/s", lead_m) if unit else None
+            fits = factor is not None and abs(abs(factor * relation.factor / size) - 1.0) < SAME_SPEED
+            if fits or (factor is not None and told and relation.share < FOLLOWS):
+                return unit
+        return None
 
     def _holds_following_error(self, name: str, command: str) -> bool:
         """True if the following error explains most of what the velocity of the set-point leaves of a speed."""
@@ -255,7 +304,8 @@ class ChannelEntries:
         """A recording with velocity in place of position."""
         name = self.roles.motor_velocity
         assert name
-        unit = self._choose(name, velocity_unit(name, self.labels[name].unit, 1.0, "rad"))
+        unit = self.labels[name].unit or "rad/s"
+        self.draft.unsure += [] if self.labels[name].unit else [f"{name}: no unit is given; rad/s is taken"]
         self.kind = AxisKind.LINEAR if is_length(unit) else AxisKind.ROTARY
         self._add(AXIS_CHANNELS[self.kind].motor_velocity, name, "no position is recorded", {"unit": unit})
         self._efforts(motion(np.cumsum(self.live[name]) * self.period_s, self.period_s))

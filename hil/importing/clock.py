@@ -14,6 +14,8 @@ from hil.recording.stamps import REPEATS
 
 SLOWEST_HZ, FASTEST_HZ = 5.0, 2e5  # of recordings of an axis: outside lies a wrong unit of the stamps
 
+SLOWEST_TOLD_HZ = 2.0  # with a unit in the name
+
 
 @dataclass(frozen=True, eq=False)
 class StampClock:
@@ -113,7 +115,8 @@ def _unit(told: Label, step: float) -> tuple[str, str]:
     plausible = [
         unit for unit in ("s", "ms", "us", "ns", "d") if SLOWEST_HZ <= 1.0 / (step * SECONDS[unit]) <= FASTEST_HZ
     ]
-    if told.unit in plausible or (told.unit is not None and not plausible):
+    slow = told.unit is not None and SLOWEST_TOLD_HZ <= 1.0 / (step * SECONDS[told.unit]) < SLOWEST_HZ
+    if slow or told.unit in plausible or (told.unit is not None and not plausible):
         return str(told.unit), ""
     # of seconds, milliseconds, ... the one with the rate nearest to 1 kHz, the usual one of a servo drive
     best = min(plausible or ["s"], key=lambda unit: abs(np.log(step * SECONDS[unit] / 1e-3)))

@@ -13,6 +13,7 @@ from hil.importing.foreign_table import read_table
 from hil.importing.held_samples import rows_per_slowest_sample
 from hil.importing.lexicon import Quantity
 from hil.importing.map_draft import MapDraft
+from hil.importing.on_change import held, written_on_change
 from hil.importing.roles import find_roles
 from hil.importing.rows import at_regular_times, complete_rows, filled_in, without_duplicates
 from hil.importing.wraps import unwrapped, wrap_range
@@ -24,7 +25,9 @@ def draft_map(path: Path, rate_hz: float | None = None, axis: str | None = None)
     Raises InputError: a damaged file, no clock, no motion, no column that goes with it, contradicting columns.
     """
     table = read_table(path)
-    distinct = without_duplicates(table.columns)
+    on_change = [name for name, values in table.columns.items() if written_on_change(values)]
+    filled_up = {name: held(table.columns[name]) for name in on_change}
+    distinct = without_duplicates(table.columns | filled_up)
     table = replace(table, columns=distinct.columns)
     labels = {name: label(name, table.units.get(name, ""), table.words.get(name, "")) for name in table.columns}
     clock = find_clock(table, labels, rate_hz)
@@ -58,11 +61,17 @@ def draft_map(path: Path, rate_hz: float | None = None, axis: str | None = None)
             *(note for name in positions for note in jump_notes(name, kept[name], kept_s)),
             *(note for name in measured for note in limit_notes(name, kept[name])),
             *(f"{name}: wraps at {wraps[name]:g}; it is unwrapped" for name in used if name in wraps),
+            *(
+                f"{name}: is written only where it changes; an empty cell holds its last value"
+                for name in used
+                if name in on_change
+            ),
             *roles.unsure,
             *(f"{name}: its unit is not known" for name, one in labels.items() if one.odd_unit and name in used),
         ],
     )
     ChannelEntries(draft, labels, roles, live, regular.period_s).fill()
-    for entry in (one.entry for one in draft.channels if one.entry["column"] in wraps):
-        entry["wraps_at"] = wraps[str(entry["column"])]
+    for entry in (one.entry for one in draft.channels):
+        entry |= {"wraps_at": wraps[str(entry["column"])]} if entry["column"] in wraps else {}
+        entry |= {"empty": "hold"} if entry["column"] in on_change else {}
     return draft

@@ -1,13 +1,26 @@
-"""Size of an encoder's count, from another column with a length or a speed, else a count of a micrometre."""
+"""Size of an encoder's count, from another column with a length or a speed, else a count of a micrometre.
+
+And the unit of an angle, in which its steps are counts of an encoder.
+"""
 
 from dataclasses import dataclass
 from math import pi
 
+import numpy as np
+
+from hil.arrays import FloatArray
+from hil.importing.lexicon import lexicon
+from hil.importing.unit_choice import ANGULAR_SPEEDS, MATCH, UnitChoice
 from hil.importing.usual_values import COUNTS, LEADS_M
 from hil.quantities import UNITS
+from hil.recording.quantum import count_of, is_decimal
 
 _ASSUMED_PER_M = 1e6  # without any other column: travels of 1e4 to 1e7 counts are then 10 mm to 10 m
 _USUAL = 0.003  # relative deviation from usual counts, or from a usual pair of counts and lead: smoothing, errors
+
+_SCALE = 0.01  # deviation of the count of a linear scale: the errors of a lead are below
+_WHOLE = 1e-3  # deviation from usual counts per turn: that of steps of few digits
+_DECIMAL = 1e-3  # deviation of a step from a power of ten: of printed digits it tells nothing
 
 
 @dataclass(frozen=True)
@@ -52,6 +65,34 @@ def from_length(column: str, per_unit: float, unit: str, length: str, force: boo
         f"{1e3 * lead:g} mm are taken, another pair with the same ratio fits as well"
     )
     return CountSize({"counts_per_rev": counts}, note)
+
+
+def scale_count(per_m: float) -> float | None:
+    """Counts per m of a linear scale, 1, 2 or 5 times a power of ten, within 1 % of the measured ones; else None."""
+    power = 10.0 ** np.floor(np.log10(per_m))
+    usual = (factor * float(power) for factor in (1.0, 2.0, 5.0, 10.0))
+    return next((one for one in usual if abs(per_m / one - 1.0) < _SCALE), None)
+
+
+def angle_unit(column: str, values: FloatArray, speeds: list[tuple[str, float]]) -> UnitChoice | None:
+    """Unit of an angle (n,) that has none, by its speeds or by whole counts per turn; None if neither tells it.
+
+    `speeds` are the names of speeds without a unit, and the derivative of the angle over them.
+    """
+    for name, ratio in speeds:
+        size = {(one, per): UNITS[per][1] / UNITS[one][1] for one in ("rad", "deg", "rev") for per in ANGULAR_SPEEDS}
+        pairs = [pair for pair, factor in size.items() if abs(abs(ratio) / factor - 1.0) < MATCH]
+        if len(pairs) == 1:
+            return UnitChoice(pairs[0][0], f"{column} in {pairs[0][0]}, {name} in {pairs[0][1]}: by their ratio")
+        if pairs and any(name.lower().startswith(word) for word in lexicon().angular_speed):
+            return UnitChoice("rad", f"{column}: rad, because its derivative is {name}, which is usual in rad/s")
+    step = count_of(values)
+    if step is not None and not is_decimal(step, _DECIMAL):
+        for unit in ("rad", "deg", "rev"):
+            per_rev = 2.0 * pi / UNITS[unit][1] / step
+            if any(abs(per_rev / counts - 1.0) < _WHOLE for counts in COUNTS):
+                return UnitChoice(unit, f"{column}: {unit}, because its steps are then {per_rev:.6g} counts per turn")
+    return None
 
 
 def assumed(column: str) -> CountSize:

@@ -13,6 +13,7 @@ from hil.files import csv_columns, json_columns
 from hil.files.date_stamps import seconds_of
 from hil.files.input_file import check_file
 from hil.importing.mat_file import load_mat, mat_column, mat_scalar
+from hil.importing.on_change import held
 from hil.recording.arrow_files import MOST_BYTES, numbers, read_parquet
 
 TEXT_ENDINGS = (".csv", ".txt", ".tsv", ".dat", ".asc")
@@ -52,8 +53,11 @@ def read_foreign(
     form: csv_columns.CsvFormat,
     dates: str | None = None,
     missing: float = 0.0,
+    on_change: Collection[str] = (),
 ) -> Foreign:
     """The columns `wanted` and, from a .mat file, the scalars; `dates` is a column of dates, returned in seconds.
+
+    Those of `on_change` hold their last value where they have none.
 
     Raises InputError with file, row and column: no such file or format, a missing column, text, infinity, values
     missing in a larger share of the rows than `missing`, columns of different length.
@@ -68,7 +72,8 @@ def read_foreign(
     columns, scalars, stamps = dict[str, FloatArray](), dict[str, float](), dict[str, FloatArray]()
     match format_of(path):
         case ".csv":
-            columns = csv_columns.read_columns(path, wanted, form, missing)
+            columns = csv_columns.read_columns(path, [one for one in wanted if one not in on_change], form, missing)
+            columns |= csv_columns.read_columns(path, on_change, form, 1.0) if on_change else {}
             if dates is not None:
                 stamps[dates] = seconds_of(csv_columns.read_texts(path, dates, form))
         case ".mat":
@@ -85,6 +90,8 @@ def read_foreign(
             columns = {name: content.numbers(path, name) for name in wanted}
             if dates is not None:
                 stamps[dates] = seconds_of([str(text) for text in content.lists.get(dates, [])])
+
+    columns |= {name: held(columns[name]) for name in on_change}
 
     def place(row: int) -> str:
         text = format_of(path) == ".csv"

@@ -28,7 +28,8 @@ _TEXT_OF_NAME = re.compile(r"[^a-z0-9/:]+")
 
 def header_values(lines: Iterable[str], scalars: Mapping[str, float]) -> dict[Constant, HeaderValue]:
     """Constants of header `lines` and `scalars`. One that is given twice with different values is left out."""
-    given = [(*_readings(match), line) for line in lines if (match := _split(line))]
+    texts = [text for line in lines for text in dict.fromkeys([line, *re.split(r"[;,|]\s", line)])]
+    given = [(*_readings(match), text) for text in texts if (match := _split(text))]
     for name, scalar in scalars.items():
         words, unit = _unit_of_name(name)
         given.append((words, scalar, [unit], f"{name} = {scalar:g}"))

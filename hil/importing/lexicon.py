@@ -101,6 +101,7 @@ class Lexicon(_Entry):
     attached_before: Words
     electric: dict[Literal["A", "V"], Words]
     angle: Words
+    angular_speed: Words
     length: Words
     units: dict[str, Words]
     after_unit: Words

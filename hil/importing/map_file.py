@@ -64,6 +64,9 @@ class ChannelSource(_Strict):
     wraps_at: PositiveFloat | None = Field(
         default=None, description="range of a counter or angle that starts again, in the unit of the column"
     )
+    empty: Literal["missing", "hold"] = Field(
+        default="missing", description="an empty cell: no value, or hold the last one, of a column written on change"
+    )
     sign: Literal[1, -1] = Field(default=1, description="-1 if the column is positive the other way")
     counts_per_rev: PositiveFloat | None = Field(default=None, description="unit counts, rotary encoder")
     counts_per_m: PositiveFloat | None = Field(default=None, description="unit counts, linear encoder")

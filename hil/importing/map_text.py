@@ -14,6 +14,7 @@ _KEYS = """\
 #   unit    m mm um in | rad deg rev counts | m/s mm/s m/min rad/s deg/s rpm | N kN | N m mN m | A V % permille
 #   sign    -1 if the column is positive the other way
 #   scale   factor beside the unit (1);  offset: added afterwards, in SI (0)
+#   empty   hold: an empty cell stands for the value before, of a column that is written on change
 #   wraps_at                                  range of a counter or angle that starts again, in the unit of the column
 #   counts_per_rev, counts_per_m              for the unit counts
 #   torque_constant_n_m_a, force_constant_n_a for the unit A

@@ -84,6 +84,10 @@ def position_unit(
             own_si, own = UNITS[candidate]
             if own_si == si and abs(abs(factor) * own / known - 1.0) < MATCH:
                 return UnitChoice(candidate, f"{column}: {candidate}, by its factor to a column in {unit}")
+    for factor, unit in hints:
+        gear = max(abs(factor), 1.0 / abs(factor)) if factor and unit in ANGLES and not prefers_length else 0.0
+        if round(gear) > 1 and abs(gear - round(gear)) < MATCH:
+            return UnitChoice(unit, f"{column}: {unit}, by a gear of {round(gear)} to a column in {unit}")
     travel = float(np.ptp(values))
     if are_counts(values):
         return UnitChoice("counts", f"{column}: whole numbers, taken for counts")
@@ -97,19 +101,8 @@ def _by_size(column: str, travel: float, length: bool, why: str) -> UnitChoice:
     quarters = travel / (0.5 * pi)
     whole = not length and abs(quarters - round(quarters)) < _WHOLE * quarters  # of a set-point in radians
     unit = small if travel < most or whole else large
-    return UnitChoice(unit, f"{column}: {why}; {unit} is taken for a travel of {travel:.4g}")
-
-
-def velocity_unit(column: str, named: str | None, factor: float, position: str) -> UnitChoice:
-    """Unit of a velocity = factor x derivative of a position in the unit `position`."""
-    if named is not None:
-        return UnitChoice(named)
-    si, per = UNITS.get(position, ("rad", 1.0))
-    candidates = LINEAR_SPEEDS if si == "m" else ANGULAR_SPEEDS
-    for candidate in candidates:
-        if abs(abs(factor) * UNITS[candidate][1] / per - 1.0) < MATCH:
-            return UnitChoice(candidate)
-    return UnitChoice(candidates[0], f"{column}: no unit is given; {candidates[0]} is taken")
+    asked = "" if length else f"; is it {large if unit == small else small}? Speed, inertia and friction scale with it"
+    return UnitChoice(unit, f"{column}: {why}; {unit} is taken for a travel of {travel:.4g}{asked}")
 
 
 def misfit(factor: float, unit: str, other: str) -> float:

@@ -47,7 +47,7 @@ def _list_of_units(line: str) -> list[str]:
 
 
 def described(lines: Sequence[str], names: Sequence[str]) -> dict[str, tuple[str, str]]:
-    """Words and unit of columns that a line names in turn: "ch2 set [um] | ch3 motor [inc]", "xs set-point mm, M Nm"."""
+    """Words and unit of columns that a line names in turn: "ch2 set [um] | ch3 motor [inc]", "xs set mm, M Nm"."""
     for line in lines:
         found = {name: re.search(rf"(?<!\w){re.escape(name)}(?!\w)", line) for name in names if name}
         places = sorted((match.start(), match.end(), name) for name, match in found.items() if match)

@@ -2,6 +2,9 @@
 
 from math import pi
 
+import numpy as np
+
+from hil.arrays import FloatArray
 from hil.importing.unit_choice import ANGLES, LENGTHS, MATCH
 from hil.quantities import UNITS
 
@@ -11,6 +14,8 @@ COUNTS = tuple(
 ) + tuple(2.0**power for power in range(12, 25))
 USUAL = 2e-3  # relative deviation of a measured lead: following errors and lead errors are below
 LEADS_M = (0.010, 0.005, 0.020, 0.004, 0.016, 0.0025, 0.002, 0.025, 0.040, 0.008, 0.012, 0.032, 0.001)
+
+LEAST_M, MOST_M, MOST_RAD_S = 1e-6, 100.0, 1e5  # travel of a linear axis and speed of a rotary one: beyond is asked
 
 
 def usual_lead(value_m: float) -> float:
@@ -35,6 +40,17 @@ def screw_units(factor: float, far: str | None, motor: str | None) -> tuple[str,
                 if abs(travel_m / lead - 1.0) < USUAL:
                     return length, angle
     return None
+
+
+def improbable(column: str, values: FloatArray, unit: str, period_s: float) -> list[str]:
+    """Question about a position (n,) whose travel or speed no machine has in this unit; empty for a usual one."""
+    si, factor = UNITS.get(unit, ("", 1.0))
+    travel, speed = factor * float(np.ptp(values)), factor * float(np.abs(np.diff(values)).max()) / period_s
+    if si == "m" and not LEAST_M <= travel <= MOST_M:
+        return [f"{column}: a travel of {travel:.4g} m: is its unit {unit}? Correct it in the map"]
+    if si == "rad" and speed > MOST_RAD_S:
+        return [f"{column}: a speed of {speed:.4g} rad/s: is its unit {unit}? Correct it in the map"]
+    return []
 
 
 def mixed_up(ratio: float) -> str:

@@ -7,11 +7,11 @@ words                lexicon(.yaml), units, column_names, unit_lines,           
                      header_values
 values that hold     on_change                                               columns without empty cells
 clock                clock; hil.recording.stamps and row_clock                   `StampClock`, `RegularRows`
-rows                 wraps, held_samples, spikes, rows                           `KeptRows`
+rows                 wraps, held_samples, spikes, slow_gaps, rows                `KeptRows`
 roles                relations, computed_position, roles                         `Roles`
 refusal              damage                                                      InputError, notes
 units and signs      unit_choice, usual_values, encoder_counts,                  entries of the map
-                     effort_entry, channel_entries
+                     effort_entry, speed_unit, channel_entries
 map                  map_file (its keys), map_draft, draft_map, map_text         `MapDraft`, the YAML file
 recording            by_map                                                      `Recording`
 

@@ -14,11 +14,10 @@ from hil.importing.encoder_counts import CountSize, angle_unit, assumed, from_le
 from hil.importing.lexicon import Constant, Quantity
 from hil.importing.map_draft import DraftedChannel, MapDraft
 from hil.importing.map_file import ChannelSource
-from hil.importing.relations import Relation, derivative_of, driven, explained, lateness_s, proportional
+from hil.importing.relations import derivative_of, driven, explained, lateness_s, proportional
 from hil.importing.roles import SAME_POSITION, Roles
+from hil.importing.speed_unit import FOLLOWS, speed_unit
 from hil.importing.unit_choice import (
-    ANGULAR_SPEEDS,
-    LINEAR_SPEEDS,
     MATCH,
     UnitChoice,
     are_counts,
@@ -31,12 +30,10 @@ from hil.importing.unit_choice import (
 )
 from hil.importing.units import unit_named
 from hil.importing.usual_values import LEADS_M, ROTARY_LEAD_M, improbable, mixed_up, screw_units, usual_lead
-from hil.quantities import UNITS, si_factor
+from hil.quantities import UNITS
 
 SAME_COUNTS = 1e-3  # deviation of the factor between motor and set-point, both in counts: following errors are below
 _LEAD_NOT_TOLD = "not told; masses at the table scale with it"
-FOLLOWS = 0.9  # share from which a speed is the derivative of the set-point
-SAME_SPEED = 0.1  # deviation of a speed from that derivative: a following error is below, other units are far
 LATE_ROWS = 0.5  # by which a set-point may seem late: its rounding and the sampling of the encoder
 # Shares of a speed set-point: what the velocity of the position set-point must leave, and the most of this that the
 # following error may leave, if it is the output of the position loop.
@@ -257,7 +254,8 @@ class ChannelEntries:
         elif relation.share < FOLLOWS:
             self.draft.left_out[name] = f"no derivative of {command} (share {relation.share:.2f})"
             return
-        unit = self._speed_unit(name, relation)
+        entry = next(one.entry for one in self.draft.channels if one.channel == "position_command_m")
+        unit = speed_unit(self.labels[name].unit, relation, ChannelSource.model_validate(entry), self.draft.lead_m)
         if unit is None:
             told = f"in {self.labels[name].unit} " if self.labels[name].unit else ""
             why = f"{abs(relation.factor):.4g} x the derivative of {command} in {self.units[command]}"
@@ -267,19 +265,6 @@ class ChannelEntries:
         turned = any("sign" in one.entry for one in self.draft.channels if one.channel == "position_command_m")
         sign = {"sign": -1} if (relation.factor < 0.0) != turned else {}
         self.draft.channels.append(DraftedChannel(channel, {"column": name, "unit": unit, **sign}, how))
-
-    def _speed_unit(self, name: str, relation: Relation) -> str | None:
-        """Unit of a speed by its factor to the derivative of the set-point; None if none, or not the told one, fits."""
-        entry = next(one.entry for one in self.draft.channels if one.channel == "position_command_m")
-        source, told, lead_m = ChannelSource.model_validate(entry), self.labels[name].unit, self.draft.lead_m
-        si, size = next((si, size) for si in ("m", "rad") if (size := source.factor_to(si, None)) is not None)
-        own, others = (LINEAR_SPEEDS, ANGULAR_SPEEDS) if si == "m" else (ANGULAR_SPEEDS, LINEAR_SPEEDS)
-        for unit in [told] if told else [*own, *others]:
-            factor = si_factor(unit, f"{si}/s", lead_m) if unit else None
-            fits = factor is not None and abs(abs(factor * relation.factor / size) - 1.0) < SAME_SPEED
-            if fits or (factor is not None and told and relation.share < FOLLOWS):
-                return unit
-        return None
 
     def _holds_following_error(self, name: str, command: str) -> bool:
         """True if the following error explains most of what the velocity of the set-point leaves of a speed."""

@@ -80,6 +80,9 @@ def refuse_damage(
 def jump_notes(name: str, values: FloatArray, time_s: FloatArray) -> list[str]:
     """Note on jumps of a position (n,) that the axis cannot make; empty without jumps."""
     change = _changes(values, time_s)
+    steps = np.diff(time_s)
+    if change.size and (usual_s := np.median(steps)) > 0.0:  # over a longer step the axis moves farther
+        change = change / np.maximum(steps / usual_s, 1.0)
     size, way = np.abs(change), np.sign(change)
     moving = size[size > 0.0]
     if moving.size < FEW_VALUES:

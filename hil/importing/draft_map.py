@@ -16,6 +16,7 @@ from hil.importing.map_draft import MapDraft
 from hil.importing.on_change import held, written_on_change
 from hil.importing.roles import find_roles
 from hil.importing.rows import at_regular_times, complete_rows, filled_in, without_duplicates
+from hil.importing.slow_gaps import moving_little, with_gaps_filled
 from hil.importing.wraps import unwrapped, wrap_range
 
 
@@ -36,7 +37,10 @@ def draft_map(path: Path, rate_hz: float | None = None, axis: str | None = None)
     wraps = {name: size for name in may_wrap if (size := wrap_range(columns[name])) is not None}
     columns |= {name: unwrapped(columns[name], size) for name, size in wraps.items()}
     filled = {n: filled_in(values, clock.time_s) for n, values in columns.items() if np.isfinite(values).any()}
-    regular = at_regular_times(path, filled, clock.time_s)
+    named = [name for name in filled if labels[name].quantity is Quantity.POSITION]
+    dense = filled | {"time_s": clock.time_s}
+    dense = with_gaps_filled(dense)[0] if moving_little(dense, named) else dense
+    regular = at_regular_times(path, {name: dense[name] for name in filled}, dense["time_s"])
     roles = find_roles(str(path), regular.longest_part(), labels, regular.period_s, axis)
     used = {name: columns[name] for name in roles.used}
     refuse_missing(path, used, table.texts)
@@ -44,7 +48,9 @@ def draft_map(path: Path, rate_hz: float | None = None, axis: str | None = None)
     positions = [name for name in (roles.motor, roles.table) if name]
     ratio = rows_per_slowest_sample({name: filled[name] for name in used}, positions)
     complete = complete_rows(used | {"time_s": clock.time_s}, ratio if ratio > 1.0 else None, positions)
-    kept, kept_s = {name: values[complete.rows] for name, values in filled.items()}, complete.columns["time_s"]
+    kept_s = complete.columns["time_s"]
+    kept = {name: complete.columns.get(name, values[complete.rows]) for name, values in filled.items()}
+    measured_rows = np.unique(complete.rows, return_index=True)[1]
     regular = at_regular_times(path, kept, kept_s, judged_by=[n for n in used if n != roles.unfollowed])
     live = regular.longest_part()
     refuse_damage(path, {name: filled[name] for name in used}, clock.time_s, live, roles, regular.period_s)
@@ -58,7 +64,11 @@ def draft_map(path: Path, rate_hz: float | None = None, axis: str | None = None)
         left_out=roles.left_out | dict(remark.split(": ", 1) for remark in table.remarks),
         unsure=[
             *(*distinct.notes, *clock.unsure, *complete.notes, *regular.notes),
-            *(note for name in positions for note in jump_notes(name, kept[name], kept_s)),
+            *(
+                note
+                for name in positions
+                for note in jump_notes(name, kept[name][measured_rows], kept_s[measured_rows])
+            ),
             *(note for name in measured for note in limit_notes(name, kept[name])),
             *(f"{name}: wraps at {wraps[name]:g}; it is unwrapped" for name in used if name in wraps),
             *(

@@ -80,7 +80,7 @@ def _unit(told: Label, kind: AxisKind, table: ForeignTable) -> tuple[dict[str, o
         lever = "a length, and no lead is told; 1 N per N m is" if linear else "an angle; 1 N m per N is"
         factor = "multiply scale by the radius"
         if linear:
-            factor = "what reports give in N is in N m of the motor, kg in N m s2/m; multiply scale by 2 pi / lead"
+            factor = "reports then say N where N m of the motor is meant; multiply scale by 2 pi / lead to get N"
         return entry, [f"{column}: is in {unit}, the position in {lever} taken: {factor}"]
     if unit in UNITS:
         return entry, []

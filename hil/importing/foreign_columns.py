@@ -72,8 +72,9 @@ def read_foreign(
     columns, scalars, stamps = dict[str, FloatArray](), dict[str, float](), dict[str, FloatArray]()
     match format_of(path):
         case ".csv":
-            columns = csv_columns.read_columns(path, [one for one in wanted if one not in on_change], form, missing)
-            columns |= csv_columns.read_columns(path, on_change, form, 1.0) if on_change else {}
+            rest = [name for name in wanted if name not in on_change]
+            for names, share in ((rest, missing), (on_change, 1.0)):
+                columns |= csv_columns.read_columns(path, names, form, share) if names else {}
             if dates is not None:
                 stamps[dates] = seconds_of(csv_columns.read_texts(path, dates, form))
         case ".mat":

@@ -9,7 +9,7 @@ _DIFFER = 0.99  # share of the written values that differ from the one before
 # Share of the change over the empty cells that lost rows of a motion would bring: all of it, and a value that holds one
 # row of all.
 _LOST = 0.75
-_FEW = 10  # empty places in front of two written values, which tell it
+_FEW = 3  # empty places before two written values, and written values: fewer tell nothing
 
 
 def written_on_change(values: FloatArray) -> bool:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from hil.arrays import FloatArray
 from hil.importing.held_samples import kept_rows, lost_samples, slower
+from hil.importing.slow_gaps import late_stamps, moving_little, with_gaps_filled
 from hil.importing.spikes import lone_values
 from hil.recording.stamps import LARGEST, REPEATS, RegularRows, regular_rows
 
@@ -82,7 +83,20 @@ def complete_rows(
                 f"{int(rows[off][0]) + 1} of the numbers; these rows are left out and interpolated"
             )
             rows = rows[~off]
-    return KeptRows({name: values[rows] for name, values in columns.items()}, rows, tuple(notes))
+    complete = {name: values[rows] for name, values in columns.items()}
+    for name in positions:
+        late = late_stamps(complete[name], complete["time_s"])
+        if late.size:
+            notes.append(
+                f"late stamps: {late.size} rows have a stamp of more than a period after the moment that {name} tells, "
+                f"first row {int(rows[late[0]]) + 1} of the numbers; they are taken one period after the row before"
+            )
+            period_s = np.median(np.diff(complete["time_s"]))
+            complete["time_s"][late] = complete["time_s"][late - 1] + period_s
+    if "time_s" in complete and rows.size > 2 and moving_little(complete, positions):
+        complete, before, note = with_gaps_filled(complete)
+        rows, notes = rows[before], [*notes, note]
+    return KeptRows(complete, rows, tuple(notes))
 
 
 def filled_in(values: FloatArray, time_s: FloatArray) -> FloatArray:

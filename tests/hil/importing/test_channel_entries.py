@@ -39,3 +39,69 @@ def test_a_speed_set_point_without_it_is_the_velocity_of_the_set_point(tmp_path:
     speed = np.gradient(AXIS["x_set"], AXIS["t"])
     columns = renamed(AXIS | {"v_set": speed}, **NAMES, v_set="velocity_setpoint_mm_s")
     assert channels(draft_map(write(tmp_path / "log.csv", columns)))["velocity_command_m_s"]
+
+
+@pytest.mark.parametrize(("factor", "unit"), [(1.0, "mm/s"), (0.06, "m/min"), (1.175, None), (900.0, None)])
+@pytest.mark.parametrize("name", ["v_set", "speed_command_raw"])
+def test_a_speed_whose_scale_is_no_unit_is_left_out(tmp_path: Path, factor: float, unit: str | None, name: str) -> None:
+    columns = renamed(AXIS | {"v": factor * np.gradient(AXIS["x_set"], AXIS["t"])}, **NAMES, v=name)
+    draft = draft_map(write(tmp_path / "log.csv", columns))
+    assert channels(draft).get("velocity_command_m_s", {}).get("unit") == unit
+    assert (name in draft.left_out) == (unit is None)
+    assert any("which no unit of a speed explains" in note for note in draft.unsure) == (unit is None)
+
+
+def test_a_speed_that_contradicts_its_own_unit_is_left_out(tmp_path: Path) -> None:
+    columns = renamed(AXIS | {"v": 3.0 * np.gradient(AXIS["x_set"], AXIS["t"])}, **NAMES, v="v_set_mm_s")
+    draft = draft_map(write(tmp_path / "log.csv", columns))
+    assert draft.left_out["v_set_mm_s"].startswith("in mm/s no velocity: 3")
+
+
+DEG, RPM = 180.0 / np.pi, 30.0 / np.pi
+
+
+@pytest.mark.parametrize(
+    ("scale", "speed", "name", "unit"),
+    [
+        (1.0, 1.0, "OMEGA", "rad"),
+        (1.0, RPM, "n_ist", "rad"),
+        (DEG, 1.0, "OMEGA", "deg"),
+        (DEG, RPM, "n_ist", "deg"),
+        (1.0, 1.0, "speed", "rad"),  # its steps are whole counts per turn
+        (DEG, DEG, "speed", "deg"),
+    ],
+)
+def test_the_unit_of_an_angle_follows_from_its_speed_or_its_counts(
+    tmp_path: Path, scale: float, speed: float, name: str, unit: str
+) -> None:
+    count = 2.0 * np.pi / 20000
+    angle = np.round(AXIS["angle"] / count) * count
+    changed = {"angle": scale * angle, "x_set": scale * AXIS["x_set"] * 0.2 * np.pi, "speed": speed * AXIS["speed"]}
+    columns = renamed(AXIS | changed, t="t_s", x_set="PHI_REF", angle="PHI", speed=name, torque="I_Q")
+    found = channels(draft_map(write(tmp_path / "log.csv", columns)))
+    assert (found["motor_position_rad"]["unit"], found["position_command_m"]["unit"]) == (unit, unit)
+
+
+def test_where_nothing_tells_the_unit_of_an_angle_it_is_asked(tmp_path: Path) -> None:
+    columns = renamed(AXIS | {"angle": np.round(AXIS["angle"], 3)}, t="time_s", angle="phi", torque="i_A")
+    assert any("is it rad?" in note for note in draft_map(write(tmp_path / "log.csv", columns)).unsure)
+
+
+def test_a_gear_of_whole_numbers_is_no_lead(tmp_path: Path) -> None:
+    columns = renamed(AXIS | {"x_act": 0.01 * AXIS["angle"]}, t="time_s", x_act="q_link", angle="q_mot", torque="tau")
+    draft = draft_map(write(tmp_path / "log.csv", columns))
+    assert {one.entry["unit"] for one in draft.channels[:2]} == {"rad"}
+    assert any("moves 0.01 times as far" in note for note in draft.unsure)
+
+
+def test_counts_of_a_second_encoder_have_the_size_of_a_linear_scale(tmp_path: Path) -> None:
+    scale = {"x_act": np.round(1.004e3 * AXIS["x_act"]), "angle": np.round(AXIS["angle"] * 8192 / (2.0 * np.pi))}
+    names = {"x_act": "lin_enc[cnt]", "angle": "mot_enc[cnt]", "torque": "torque[Nm]"}
+    draft = draft_map(write(tmp_path / "log.csv", renamed(AXIS | scale, t="t[s]", x_set="set[mm]", **names)))
+    assert channels(draft)["table_position_m"]["counts_per_m"] == 1e6
+
+
+@pytest.mark.parametrize(("name", "factor"), [("pos_m", 20.0), ("pos_nm", 1e-3), ("angle_rev", 400.0)])
+def test_a_travel_that_no_machine_has_is_asked(tmp_path: Path, name: str, factor: float) -> None:
+    columns = renamed(AXIS | {"x_act": factor * AXIS["x_act"]}, t="time_s", x_act=name, torque="torque_A")
+    assert any("is its unit" in note for note in draft_map(write(tmp_path / "log.csv", columns)).unsure)

@@ -46,3 +46,20 @@ def test_names_in_italian_and_spanish() -> None:
 @pytest.mark.parametrize("name", ["pos_motor_grados", "angolo [gradi]", "Ángulo (grados)"])
 def test_degrees_in_spanish_and_italian(name: str) -> None:
     assert split_unit(name)[1] == "deg"
+
+
+@pytest.mark.parametrize(
+    "name", ["set_rev", "pos_rev", "pos [rev]", "Lage_Umdr", "Umdr", "turns", "Position U", "q_turns"]
+)
+def test_revolutions_are_a_unit_of_a_position(name: str) -> None:
+    assert (label(name).unit, label(name).quantity) == ("rev", Quantity.POSITION)
+
+
+@pytest.mark.parametrize(("name", "unit"), [("motor_u", None), ("speed_rev", None), ("pos_min", None), ("U", None)])
+def test_what_is_no_revolution(name: str, unit: str | None) -> None:
+    assert label(name).unit == unit
+
+
+@pytest.mark.parametrize(("name", "unit"), [("rpm", "rpm"), ("trq_pct_avg", "%"), ("vel_rpm_mean", "rpm")])
+def test_a_unit_that_is_the_name_or_stands_before_its_last_word(name: str, unit: str) -> None:
+    assert label(name).unit == unit

@@ -1,0 +1,99 @@
+"""Units and words of columns in lines above the numbers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from foreign_axis import LEAD_M, axis, csv_text, renamed
+
+from hil.importing.draft_map import draft_map
+from hil.importing.unit_lines import described, told_units
+
+AXIS = axis()
+NAMES = ("t", "set", "act", "n", "M")
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "# units: s, mm, mm, rpm, Nm",
+        "Units: s / mm / mm / rpm / Nm",
+        "Einheit: s;mm;mm;rpm;Nm",
+        "# mm, mm, rpm, Nm",
+        "#s mm mm rpm Nm",
+        "[s] | [mm] | [mm] | [rpm] | [Nm]",
+    ],
+)
+def test_a_list_of_units_is_that_of_the_columns_or_of_those_without_the_time(line: str) -> None:
+    units = told_units(["a log of Monday", line], NAMES)
+    assert {name: units[name] for name in NAMES[1:]} == {"set": "mm", "act": "mm", "n": "rpm", "M": "Nm"}
+
+
+def test_a_shorter_list_has_the_unit_of_each_quantity() -> None:
+    units = told_units(["#rad, rad/s, A"], ["TIME", "PHI_REF", "PHI", "OMEGA", "I_Q", "U_Q", "torque_Nm"])
+    assert units == {"PHI_REF": "rad", "PHI": "rad", "OMEGA": "rad/s", "I_Q": "A"}
+
+
+@pytest.mark.parametrize("line", ["s,v,a", "# recorded on Monday", "# axis 2, 5 mm", "machine=T5", "s"])
+def test_another_line_is_no_list_of_units(line: str) -> None:
+    assert told_units([line], ["s", "v", "a"]) == {}
+
+
+@pytest.mark.parametrize(
+    ("line", "wanted"),
+    [
+        ("c1 time [ms] | c2 motor [inc 65536/rev] | c3 torque command [Nm]", ["ms", "inc", "Nm"]),
+        ("% c1 time s, c2 motor encoder mm, c3 Nm", ["s", "mm", "Nm"]),
+        ("## c1 [s]  c2 motor shaft [cnt, 4000/rev]  c3 [A]", ["s", "cnt", "A"]),
+    ],
+)
+def test_columns_are_described_in_turn(line: str, wanted: list[str]) -> None:
+    told = described(["log 7", line], ["c1", "c2", "c3"])
+    assert [unit for _, unit in told.values()] == wanted
+    assert told["c2"][0].startswith("motor")
+
+
+@pytest.mark.parametrize("line", ["c1,c2,c3", "c1 was 5 mm, c2 = 3 s", "about c1 and c2"])
+def test_prose_describes_no_column(line: str) -> None:
+    assert described([line], ["c1", "c2", "c3"]) == {}
+
+
+def test_a_described_file_is_read_as_described(tmp_path: Path) -> None:
+    columns = renamed(AXIS | {"t": 1e3 * AXIS["t"]}, t="ch1", x_set="ch2", angle="ch3", torque="ch4")
+    path = tmp_path / "log.csv"
+    path.write_text(csv_text(columns, above="ch1 time [ms] | ch2 set [mm] | ch3 motor [rad] | ch4 torque [Nm]\n"))
+    found = {one.channel: one.entry for one in draft_map(path).channels}
+    assert (found["position_command_m"]["column"], found["position_command_m"]["unit"]) == ("ch2", "mm")
+    assert (found["motor_position_rad"]["unit"], found["torque_n_m"]["unit"]) == ("rad", "N m")
+
+
+@pytest.mark.parametrize("above", ["# units: s, mm, rad, Nm\n", ""])
+def test_a_line_of_units_with_its_word_is_no_header(tmp_path: Path, above: str) -> None:
+    columns = renamed(AXIS, t="time", x_set="set_pos", angle="act_pos", torque="torque")
+    path = tmp_path / "log.csv"
+    path.write_text(csv_text(columns, above=above, below="" if above else "# units: s, mm, rad, Nm\n"))
+    draft = draft_map(path)
+    found = {one.channel: one.entry for one in draft.channels}
+    assert (found["motor_position_rad"]["column"], found["motor_position_rad"]["unit"]) == ("act_pos", "rad")
+    assert draft.lead_m == pytest.approx(LEAD_M, rel=1e-3)
+
+
+@pytest.mark.parametrize("lead", ["# axis 2, lead 10 mm\n", "; ball screw lead 10 mm; motor direct\n"])
+def test_a_lead_within_a_comment_turns_a_length_into_the_motor_s_angle(tmp_path: Path, lead: str) -> None:
+    columns = renamed(AXIS, t="time_s", x_set="pos_set_mm", x_act="pos_mm", torque="torque_Nm")
+    path = tmp_path / "log.csv"
+    path.write_text(csv_text(columns, above=lead))
+    draft = draft_map(path)
+    found = {one.channel: one.entry for one in draft.channels}
+    assert draft.lead_m == LEAD_M
+    assert found["motor_position_rad"]["scale"] == pytest.approx(2e-3 * np.pi / LEAD_M)
+    assert found["torque_n_m"]["unit"] == "N m"
+
+
+def test_without_a_lead_the_unit_of_the_reports_is_said(tmp_path: Path) -> None:
+    columns = renamed(AXIS, t="time_s", x_set="pos_set_mm", x_act="pos_mm", torque="torque_Nm")
+    path = tmp_path / "log.csv"
+    path.write_text(csv_text(columns))
+    assert any("say N where N m of the motor is meant" in note for note in draft_map(path).unsure)

@@ -1,6 +1,6 @@
 """Linear least squares on named columns, with standard errors that count correlated residuals."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -9,7 +9,9 @@ import numpy as np
 from hil.arrays import FloatArray
 
 BLOCKS = 10  # of consecutive rows, each left out once: few enough to be independent, enough for an error to 25 %
+SIGMAS = 3.0  # standard errors from which a value differs from 0
 _RANK = 1e-9  # of the largest singular value of the scaled columns: below, a combination of columns is not told
+_NOISY = 10.0  # power of a combination of columns over that of noise in it, below which it is not told
 _REWEIGHTED = 40  # iterations of least absolute deviations
 
 Columns = Mapping[str, FloatArray]  # regressors (n,) by the name of their coefficient
@@ -26,7 +28,7 @@ class Estimate:
     @property
     def significant(self) -> bool:
         """True above three standard errors."""
-        return abs(self.value) > 3.0 * self.std_error
+        return abs(self.value) > SIGMAS * self.std_error
 
     def scaled(self, factor: float) -> "Estimate":
         """The estimate in another unit."""
@@ -44,14 +46,23 @@ class LinearFit:
     names: tuple[str, ...]
     values: FloatArray
     std_errors: FloatArray
+    covariance: FloatArray  # (p, p) of the coefficients
     residual: FloatArray
     left: float
     relative_error: float
+    held_out: float = 0.0  # sum of squares of the blocks, each predicted by the fit without it
     how: str = ""
 
     def __getitem__(self, name: str) -> Estimate:
         at = self.names.index(name)
         return Estimate(float(self.values[at]), float(self.std_errors[at]), self.how)
+
+    def differs(self, names: Sequence[str]) -> bool:
+        """True where coefficients together differ from 0 by three standard errors each (Wald)."""
+        at = [self.names.index(name) for name in names]
+        part = self.covariance[np.ix_(at, at)]
+        wald = self.values[at] @ np.linalg.pinv(part) @ self.values[at] if np.isfinite(part).all() else 0.0
+        return bool(wald > len(at) * SIGMAS**2)
 
     @property
     def share(self) -> float:
@@ -64,42 +75,65 @@ class LinearFit:
 
 
 def least_squares(
-    columns: Columns, measured: FloatArray, *, blocks: int = BLOCKS, rows_per_sample: float = 1.0, how: str = ""
+    columns: Columns,
+    measured: FloatArray,
+    *,
+    blocks: int = BLOCKS,
+    rows_per_sample: float = 1.0,
+    noise: Mapping[str, float] | None = None,
+    how: str = "",
 ) -> LinearFit:
-    """Fit `measured` (n,) by columns (n,).
+    """Fit `measured` (n,) by columns (n,), of which `noise` is the standard deviation of white noise in each.
 
     Residuals of a model that lacks something are correlated in time, so that the textbook formula is too small. The
     error is that of the jackknife over blocks of rows (B. Efron, The Jackknife, the Bootstrap and Other Resampling
     Plans, 1982, sec. 3), or that of the textbook with one independent sample in `rows_per_sample` rows, whichever is
-    larger. Without `blocks` it is the latter alone.
+    larger. Without `blocks` it is the latter alone. A combination of columns that is noise to a tenth of its power is
+    not told: its value would be too small by a tenth and more. The error is then that of all of `measured` in it.
     """
     matrix = np.column_stack(list(columns.values()))
     scale = np.linalg.norm(matrix, axis=0)
     scale[scale == 0.0] = 1.0
     u, size, v = np.linalg.svd(matrix / scale, full_matrices=False)
-    told = size > _RANK * size[0]
+    exists = size > _RANK * size[0]
+    spoilt = np.array([(noise or {}).get(name, 0.0) for name in columns]) / scale
+    told = exists & (size**2 > _NOISY * measured.size * (v**2 @ spoilt**2))
+    lost = v[exists & ~told] * (float(np.linalg.norm(measured)) / scale)
     u, root = u[:, told], v[told].T / size[told] / scale[:, None]  # values = root u' measured
     values = root @ (u.T @ measured)
     residual = measured - matrix @ values
     free = measured.size / rows_per_sample - told.sum()
     variance = float(residual @ residual) / free if free > 0.0 else np.inf
     errors = np.sqrt(variance * np.sum(root**2, axis=1))
-    changes = []
-    for first, end in pairwise(np.linspace(0, measured.size, blocks + 1).astype(int)):
+    changes, held_out = [], 0.0
+    for first, end in pairwise(np.linspace(0, measured.size, min(blocks, measured.size) + 1).astype(int)):
         without = np.eye(u.shape[1]) - u[first:end].T @ u[first:end]
-        if np.linalg.eigvalsh(without)[0] > _RANK:
-            changes.append(root @ np.linalg.solve(without, u[first:end].T @ residual[first:end]))
+        if not told.any() or np.linalg.eigvalsh(without)[0] > _RANK:
+            change = np.linalg.solve(without, u[first:end].T @ residual[first:end])
+            changes.append(root @ change)
+            held_out += float(np.sum((residual[first:end] + u[first:end] @ change) ** 2))
+        else:  # no other block tells all that this one does
+            held_out = np.inf
+    together = root @ root.T
     if len(changes) > 1:
         errors = np.maximum(errors, np.sqrt((len(changes) - 1) * np.var(changes, axis=0)))
-    errors[np.sum(v[told] ** 2, axis=0) < 1.0 - _RANK] = np.inf
+        together = np.cov(changes, rowvar=False, bias=True).reshape(together.shape)
+    single = np.sqrt(np.diag(together))
+    correlation = together / np.outer(*2 * (np.where(single > 0.0, single, 1.0),))
+    errors = np.hypot(errors, np.linalg.norm(lost, axis=0))
+    errors[np.sum(v[exists] ** 2, axis=0) < 1.0 - _RANK] = np.inf
     spread, norm = float(np.std(measured)), float(np.linalg.norm(measured))
+    with np.errstate(all="ignore"):
+        covariance = np.nan_to_num(correlation * np.outer(errors, errors), nan=np.inf, posinf=np.inf, neginf=-np.inf)
     return LinearFit(
         tuple(columns),
         values,
         errors,
+        covariance,
         residual,
         float(np.std(residual)) / spread if spread > 0.0 else 1.0,
         float(np.linalg.norm(residual)) / norm if norm > 0.0 else 1.0,
+        held_out,
         how,
     )
 

@@ -29,13 +29,13 @@ SCREW = renamed(AXIS, t="time_s", x_act="table_position_mm", angle="motor_angle_
 
 def drafted(tmp_path: Path, columns: dict[str, np.ndarray]) -> Path:
     import_(write(tmp_path / "log.csv", columns), None, tmp_path / "log.parquet", None, None)
-    identify(tmp_path / "log.parquet", tmp_path / "axis.yaml")
+    identify([tmp_path / "log.parquet"], tmp_path / "axis.yaml")
     return tmp_path / "axis.yaml"
 
 
 def test_the_axis_of_a_simulated_recording_is_found_with_its_law(tmp_path: Path) -> None:
     known, target = hil.load_bench("reference"), tmp_path / "axis.yaml"
-    identify(CLEAN, target)
+    identify([CLEAN], target)
     bench = load_bench(target)
     assert bench.axis.model == "two_mass"
     assert bench.axis.lead_m == pytest.approx(0.010, rel=1e-4)
@@ -181,7 +181,7 @@ def test_a_bench_file_is_not_overwritten(tmp_path: Path) -> None:
     target = tmp_path / "axis.yaml"
     target.write_text("mine")
     with pytest.raises(InputError, match="not overwritten"):
-        identify(CLEAN, target)
+        identify([CLEAN], target)
     assert target.read_text() == "mine"
 
 

@@ -39,14 +39,14 @@ def moved(period_s: float, speeds_rad_s: tuple[float, ...]) -> Recording:
 def test_friction_near_a_reversal_is_neither_inertia_nor_gravity() -> None:
     """The torque of the inertia is a hundredth of the friction; at 20 Hz each reversal lies between two rows."""
     speeds = (0.12, 0.3, 0.17, 0.26, 0.22, 0.22, 0.27, 0.3, 0.32, 0.26)
-    found = plant_values(moved(0.05, speeds), 1.0)
+    found = plant_values([moved(0.05, speeds)], 1.0)
     assert found.gravity is None
     assert found.inertia.value < INERTIA_KG_M2 + 2.0 * found.inertia.std_error
     assert found.coulomb.value == pytest.approx(3.0, rel=0.15)
 
 
 def test_inertia_of_a_faster_table() -> None:
-    found = plant_values(moved(0.002, (0.6, 1.2, 2.4)), 1.0)
+    found = plant_values([moved(0.002, (0.6, 1.2, 2.4))], 1.0)
     assert found.gravity is None
     assert found.inertia.value == pytest.approx(INERTIA_KG_M2, rel=0.02)
     assert found.left < 0.15  # 0.43 with the rows around reversals
@@ -68,7 +68,7 @@ def test_viscous_friction_that_a_stribeck_peak_hides_is_taken_from_constant_feed
         "position_command_m": position,
         "velocity_command_m_s": velocity,
     }
-    without, found = (plant_values(Recording("table", one, STEP_S)) for one in (columns, columns | told))
+    without, found = (plant_values([Recording("table", one, STEP_S)]) for one in (columns, columns | told))
     assert not without.viscous.significant
     assert found.viscous.value == pytest.approx(0.09, rel=0.05)
     assert found.coulomb.value == pytest.approx(1.3, rel=0.05)

@@ -86,6 +86,11 @@ def _of_torque(
             "(a flexible load, gravity, a late channel), and their values may be off by more than their errors"
         )
     notes.append(f"{explained} leave {100 * plant.left:.2g} % of the {effort} (share of its standard deviation)")
+    if plant.one_way is not None:
+        unsure.append(
+            f"motion one way tells Coulomb friction and load together, {plant.one_way.value:.3g} {noise_unit} "
+            f"+-{plant.one_way.std_error:.2g}: record the way back"
+        )
     sure = "" if plant.offset.significant else ", not distinguishable from 0"
     notes.append(
         f"constant {effort} {plant.offset.value:.3g} {noise_unit} +-{plant.offset.std_error:.2g}{sure}: a load, or "

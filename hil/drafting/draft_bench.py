@@ -25,6 +25,7 @@ from hil.recording.recording import Recording
 from hil.twin.mechanisms import gravity_torque
 
 _FINEST_M, _COARSEST_M = 1e-12, 1e-3  # resolution of a second encoder that a bench file takes
+_MOST_COUNTS = 2**31  # per revolution: noise below a count of this encoder is that of numbers
 LONGEST_LEAD_M = 1.0  # that a bench file takes; a load that turns as far as its motor, 1 m for 1 rad, has 6.3
 # Least deflection over acceleration that is written: a mode at 5 kHz, beyond any control loop.
 _STIFFEST_S2 = (2.0 * pi * 5e3) ** -2
@@ -253,7 +254,7 @@ def _encoders(draft: BenchDraft, recording: Recording) -> None:
     if linear:
         draft.motor_encoder = BenchValue("resolution_m", float(f"{step:.4g}"), "m", how)
     else:
-        counts = max(round(2.0 * pi / step), 1)
+        counts = min(max(round(2.0 * pi / step), 1), _MOST_COUNTS)
         power = round(2 ** round(log2(counts)))
         draft.motor_encoder = BenchValue(
             "counts_per_rev", power if abs(counts / power - 1.0) < 0.002 else counts, "", how

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.stats import norm
 from scipy.stats import t as student
 
+from hil.arrays import FloatArray
 from hil.errors import InputError
 from hil.identification.derivatives import motion, rows_per_sample, smoothed
 from hil.identification.friction import identify_friction
@@ -27,7 +28,8 @@ class PlantValues:
     """Estimates at the motor: kg m^2, N m s/rad, N m (linear axis kg, N s/m, N); `left` is a share of the torque.
 
     `gravity` is the torque G over the load's angle [N m], `gravity_angle` its q0 [rad], both at the load. `spring` is
-    the torque over the motor's position k [N m/rad, N/m].
+    the torque over the motor's position k [N m/rad, N/m]. `one_way` is Coulomb friction and load together, in the
+    direction of a motion that does not tell them apart; then half of it stands for each.
     """
 
     inertia: Estimate
@@ -38,6 +40,7 @@ class PlantValues:
     gravity: Estimate | None
     gravity_angle: Estimate | None
     spring: Estimate | None
+    one_way: Estimate | None = None
 
 
 @dataclass(frozen=True)
@@ -82,17 +85,41 @@ def plant_values(recordings: Sequence[Recording], load_ratio: float | None = Non
             "the torque has the wrong sign, or the motion does not separate inertia from a spring, gravity or another "
             "moving arm: record moves of different accelerations"
         )
-    if not np.isfinite(inertia.std_error):  # no acceleration at all
-        most = max(float(np.max(np.abs(one.torque))) for one in data)
-        guess = most / max(float(np.max(np.abs(one.moved.velocity))) for one in data)
-        inertia = Estimate(guess, guess, "assumed, without acceleration: the largest torque takes 1 s to the top speed")
-    elif inertia.value <= inertia.std_error:
+    moving = np.concatenate([one.moved.velocity[one.sliding(model.slowest)] for one in data])
+    top, most = float(np.max(np.abs(moving))), max(float(np.max(np.abs(one.torque))) for one in data)
+    if inertia.value <= inertia.std_error and inertia.std_error < most / top:
         inertia = replace(inertia, value=inertia.std_error, how=f"{inertia.how}; not told by this motion: its error")
+    elif inertia.value <= inertia.std_error:
+        inertia = Estimate(most / top, most / top, "assumed: this motion has no acceleration; 1 s to its top speed")
     heavy = "sine" in fit.names
     gravity, angle = _gravity(fit, load_ratio or 1.0) if heavy else (None, None)
     spring = fit["spring"] if "spring" in fit.names else None
+    one_way = None
+    if not np.isfinite(coulomb.std_error):
+        one_way, mean, way = _one_way(fit, moving), float(np.mean(moving)), np.sign(moving[0])
+        half, size = max(0.5 * one_way.value, 0.0), abs(one_way.value)
+        how = (
+            f"half of friction and load, {one_way.value:.3g} +-{one_way.std_error:.2g}: motion one way tells their sum"
+        )
+        coulomb, offset = Estimate(half, size, how), Estimate(float(way) * (one_way.value - half), size, how)
+        if not viscous.significant:
+            viscous = Estimate(0.0, size / abs(mean), "not told from Coulomb friction at one speed")
+    elif viscous.value < 0.0:
+        # friction that falls with speed, or a loop whose torque answers what the model lacks: neither is the plain law
+        viscous, coulomb = (
+            replace(one, std_error=float(np.hypot(one.std_error, size)))
+            for one, size in ((viscous, viscous.value), (coulomb, viscous.value * top))
+        )
     viscous, coulomb = _at_feeds(recordings, viscous, coulomb) or (viscous, coulomb)
-    return PlantValues(inertia, viscous, coulomb, offset, fit.left, gravity, angle, spring)
+    return PlantValues(inertia, viscous, coulomb, offset, fit.left, gravity, angle, spring, one_way)
+
+
+def _one_way(fit: LinearFit, moving: FloatArray) -> Estimate:
+    """Friction and load together in the direction of speeds (n,); at one speed with what is viscous of it."""
+    viscous = 0.0 if fit["viscous"].significant else abs(float(np.mean(moving)))
+    parts = {"coulomb": 1.0, "offset": np.sign(moving[0]), "viscous": viscous}
+    weights = np.array([parts.get(name, 0.0) for name in fit.names])
+    return Estimate(float(weights @ fit.values), float(np.sqrt(weights @ fit.covariance @ weights)), fit.how)
 
 
 def _how(model: PlainModel, window_s: float) -> str:

@@ -1,7 +1,7 @@
 """Linear least squares on named columns, with standard errors that count correlated residuals."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -46,7 +46,7 @@ class LinearFit:
     names: tuple[str, ...]
     values: FloatArray
     std_errors: FloatArray
-    covariance: FloatArray  # (p, p) of the coefficients
+    covariance: FloatArray  # (p, p) of the combinations that are told
     residual: FloatArray
     left: float
     relative_error: float
@@ -60,9 +60,8 @@ class LinearFit:
     def differs(self, names: Sequence[str]) -> bool:
         """True where coefficients together differ from 0 by three standard errors each (Wald)."""
         at = [self.names.index(name) for name in names]
-        part = self.covariance[np.ix_(at, at)]
-        wald = self.values[at] @ np.linalg.pinv(part) @ self.values[at] if np.isfinite(part).all() else 0.0
-        return bool(wald > len(at) * SIGMAS**2)
+        wald = self.values[at] @ np.linalg.pinv(self.covariance[np.ix_(at, at)]) @ self.values[at]
+        return bool(np.isfinite(self.std_errors[at]).all() and wald > len(at) * SIGMAS**2)
 
     @property
     def share(self) -> float:
@@ -88,17 +87,17 @@ def least_squares(
     Residuals of a model that lacks something are correlated in time, so that the textbook formula is too small. The
     error is that of the jackknife over blocks of rows (B. Efron, The Jackknife, the Bootstrap and Other Resampling
     Plans, 1982, sec. 3), or that of the textbook with one independent sample in `rows_per_sample` rows, whichever is
-    larger. Without `blocks` it is the latter alone. A combination of columns that is noise to a tenth of its power is
-    not told: its value would be too small by a tenth and more. The error is then that of all of `measured` in it.
+    larger. Without `blocks` it is the latter alone. A column with `noise` that differs from a combination of the others
+    by noise, to a tenth of its power, so that its value would be too small by a tenth, is not told: see `_without`.
     """
+    for name in noise or {}:
+        if (fit := _without(name, columns, measured, blocks, rows_per_sample, noise or {}, how)) is not None:
+            return fit
     matrix = np.column_stack(list(columns.values()))
     scale = np.linalg.norm(matrix, axis=0)
     scale[scale == 0.0] = 1.0
     u, size, v = np.linalg.svd(matrix / scale, full_matrices=False)
-    exists = size > _RANK * size[0]
-    spoilt = np.array([(noise or {}).get(name, 0.0) for name in columns]) / scale
-    told = exists & (size**2 > _NOISY * measured.size * (v**2 @ spoilt**2))
-    lost = v[exists & ~told] * (float(np.linalg.norm(measured)) / scale)
+    told = size > _RANK * size[0]
     u, root = u[:, told], v[told].T / size[told] / scale[:, None]  # values = root u' measured
     values = root @ (u.T @ measured)
     residual = measured - matrix @ values
@@ -120,11 +119,9 @@ def least_squares(
         together = np.cov(changes, rowvar=False, bias=True).reshape(together.shape)
     single = np.sqrt(np.diag(together))
     correlation = together / np.outer(*2 * (np.where(single > 0.0, single, 1.0),))
-    errors = np.hypot(errors, np.linalg.norm(lost, axis=0))
-    errors[np.sum(v[exists] ** 2, axis=0) < 1.0 - _RANK] = np.inf
+    covariance = correlation * np.outer(errors, errors)
+    errors[np.sum(v[told] ** 2, axis=0) < 1.0 - _RANK] = np.inf
     spread, norm = float(np.std(measured)), float(np.linalg.norm(measured))
-    with np.errstate(all="ignore"):
-        covariance = np.nan_to_num(correlation * np.outer(errors, errors), nan=np.inf, posinf=np.inf, neginf=-np.inf)
     return LinearFit(
         tuple(columns),
         values,
@@ -136,6 +133,41 @@ def least_squares(
         held_out,
         how,
     )
+
+
+def _without(
+    name: str,
+    columns: Columns,
+    measured: FloatArray,
+    blocks: int,
+    rows_per_sample: float,
+    noise: Mapping[str, float],
+    how: str,
+) -> LinearFit | None:
+    """Fit without a column that is not told beside the others, its coefficient 0; None where it is told.
+
+    Its error is that of all of `measured` in it, and that of the others counts what they would take over.
+    """
+    column, others = columns[name], {key: one for key, one in columns.items() if key != name}
+    matrix, size = np.column_stack(list(others.values())), float(np.linalg.norm(column))
+    alike = np.linalg.lstsq(matrix, column, rcond=_RANK)[0]
+    own = column - matrix @ alike
+    power = float(own @ own)
+    full = np.column_stack([matrix, own])
+    left = measured - full @ np.linalg.lstsq(full, measured, rcond=_RANK)[0]
+    most, free = float(np.linalg.norm(measured)) / size if size else np.inf, measured.size / rows_per_sample
+    vague = float(left @ left) > free * power * most**2
+    if size and power > _NOISY * measured.size * noise[name] ** 2 and not vague:
+        return None
+    told = {key: one for key, one in noise.items() if key != name}
+    fit = least_squares(others, measured, blocks=blocks, rows_per_sample=rows_per_sample, noise=told, how=how)
+    at, kept = list(columns).index(name), np.array([key != name for key in columns])
+    values, errors, covariance = np.zeros(kept.size), np.full(kept.size, most), np.zeros((kept.size, kept.size))
+    norm, sizes = float(np.linalg.norm(measured)), np.maximum(np.linalg.norm(matrix, axis=0), 1e-300)
+    taken = np.minimum(np.abs(alike) * most, norm / sizes) if size else 0.0
+    values[kept], errors[kept] = fit.values, np.hypot(fit.std_errors, taken)
+    covariance[np.ix_(kept, kept)], errors[at] = fit.covariance, most
+    return replace(fit, names=tuple(columns), values=values, std_errors=errors, covariance=covariance)
 
 
 def least_absolute(columns: Columns, measured: FloatArray, weights: FloatArray) -> FloatArray:

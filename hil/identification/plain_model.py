@@ -10,8 +10,8 @@ slides one way throughout the window of their derivatives, so that the sign of t
 A term is kept where the rows earn it. Beside a coefficient b +- s the Bayesian information criterion
 n log(R0 / R1) - log n is about (b / s)^2 - log n for n independent samples and residual sums R. Three standard errors
 are evidence below n = 8000, 9 = log n; s is that of the jackknife, which counts correlation, so that n is that of its
-blocks. The blocks that are left out in turn must be predicted better too. Beside a term in question friction may bend at
-low and at high speed: what a bend explains as well is no spring, and no delay. Where a bend is earned itself, errors
+blocks. The blocks that are left out in turn must be predicted better too. Beside a term in question friction may bend
+at low and at high speed: what a bend explains as well is no spring, and no delay. Where a bend is earned itself, errors
 count what it changes: values of a law that bends depend on the speeds.
 """
 
@@ -32,7 +32,7 @@ from hil.identification.derivatives import (
     noise_gains,
 )
 from hil.identification.least_squares import SIGMAS, Columns, Estimate, LinearFit, least_squares
-from hil.recording.quantum import count_of
+from hil.identification.parallel import one_blas_thread
 
 MOTION = ("inertia", "viscous", "coulomb", "offset")  # names of the coefficients without a torque over the position
 LEAST_ANGLE_RAD = 0.5  # of the load: over less, a sine is a straight line to 1 %, and gravity is a spring
@@ -86,8 +86,8 @@ class MotionData:
 
 def motion_data(position: FloatArray, torque: FloatArray, period_s: float, judged: slice = slice(None)) -> MotionData:
     """Data of motor position and torque (n,), of the rows `judged` without half a window at both ends."""
-    noise = _noise(position)
-    window = _window(position, noise, period_s)
+    noise, rms = _noise(position)
+    window = _window(position, rms, period_s)
     rows, half = np.zeros(position.size, dtype=bool), window // 2 + 1
     rows[judged] = True
     rows[:half] = rows[-half:] = False
@@ -101,7 +101,8 @@ def _window(position: FloatArray, noise: float, period_s: float) -> int:
     window = best = max(round(SMOOTH_S / period_s) | 1, 3)
     least = np.inf
     while least == np.inf or (window <= position.size // 4 and window * period_s <= _LONGEST_S):
-        acceleration = matched_motion(position, period_s, window).acceleration
+        inner = slice(window, -window) if position.size > 3 * window else slice(None)
+        acceleration = matched_motion(position, period_s, window).acceleration[inner]
         share = (noise * noise_gains(period_s, window)[2]) ** 2 / max(float(np.var(acceleration)), 1e-300)
         if share < least:
             best, least = window, share
@@ -111,20 +112,20 @@ def _window(position: FloatArray, noise: float, period_s: float) -> int:
     return best
 
 
-def _noise(position: FloatArray) -> float:
-    """White noise of a position (n,), at least that of its counts.
+def _noise(position: FloatArray) -> tuple[float, float]:
+    """White noise of a position (n,): of even motion, the lower quarter, and rms of all.
 
-    From the quarter of the differences that is smallest, those of even motion, of the order that leaves less of it: a
-    difference of order m has the variance of (2 m)! / m!^2.
+    From differences of the order that leaves less motion; one of order m has the variance (2 m)! / m!^2. Stamps that
+    are uneven make the noise of fast motion larger than that of even motion.
     """
-    counted = (count_of(position) or 0.0) / np.sqrt(12.0)
-    gains = {4: 70.0, 8: 12870.0}
-    quarters = [
-        np.quantile(np.abs(np.diff(position, order)), 0.5) / (ndtri(0.75) * np.sqrt(gain))
-        for order, gain in gains.items()
+    differences = [
+        np.diff(position, order) / np.sqrt(gain)
+        for order, gain in ((4, 70.0), (8, 12870.0))
         if position.size > 2 * order
     ]
-    return float(max(counted, min(quarters, default=0.0)))
+    even = min((float(np.quantile(np.abs(one), 0.25) / ndtri(0.625)) for one in differences), default=0.0)
+    rms = min((float(np.sqrt(np.mean(one**2))) for one in differences), default=0.0)
+    return even, rms
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,6 +148,7 @@ class PlainModel:
         return self.fit.predict(plain_columns(_later(moved, self.late_rows), self.load_ratio, spring=True))
 
 
+@one_blas_thread
 def fit_plain_model(
     data: Sequence[MotionData], load_ratio: float | None = None, spring: bool = False
 ) -> PlainModel | None:
@@ -158,22 +160,20 @@ def fit_plain_model(
     top = max((float(np.max(np.abs(one.moved.velocity[one.rows]), initial=0.0)) for one in data), default=0.0)
     slowest = _SLIDING * top
     sliding = [one.sliding(slowest) for one in data]
-    used = [(one, rows) for one, rows in zip(data, sliding, strict=True) if rows.any()]
-    count = sum(int(rows.sum()) for _, rows in used)
-    gains = [noise_gains(one.period_s, one.window) for one, _ in used]
-    samples = sum(gain[0] ** 2 * rows.sum() for gain, (_, rows) in zip(gains, used, strict=True))
+    gains = [noise_gains(one.period_s, one.window) for one in data]
+    samples = sum(gain[0] ** 2 * rows.sum() for gain, rows in zip(gains, sliding, strict=True))
     if samples < _FEWEST:
         return None
+    # neighbours in a long window say the same
+    used = [(one, np.flatnonzero(rows)[:: max(one.window // 4, 1)]) for one, rows in zip(data, sliding, strict=True)]
     torque = np.concatenate([one.torque[rows] for one, rows in used])
-    turned_rad = abs(load_ratio or 0.0) * max(float(np.ptp(one.moved.position)) for one, _ in used)
+    count = torque.size
+    turned_rad = abs(load_ratio or 0.0) * max(float(np.ptp(one.moved.position)) for one in data)
     more: list[tuple[str, ...]] = [("spring",)] if spring else []
     more += [("sine", "cosine")] if load_ratio is not None and turned_rad >= LEAST_ANGLE_RAD else []
+    weighed = list(zip(used, gains, strict=True))
     noise = {
-        name: float(
-            np.sqrt(
-                sum((one.noise * gain[at]) ** 2 * r.sum() for gain, (one, r) in zip(gains, used, strict=True)) / count
-            )
-        )
+        name: float(np.sqrt(sum((one.noise * gain[at]) ** 2 * rows.size for (one, rows), gain in weighed) / count))
         for name, at in (("inertia", 2), ("viscous", 1))
     }
 
@@ -184,7 +184,7 @@ def fit_plain_model(
             speed = every["viscous"] / top
             every |= {"slow": every["coulomb"] * np.exp(-np.abs(speed) / _BEND), "fast": speed * np.abs(speed)}
             if slope is not None:  # change of the torque per row
-                every[_LOGGED] = np.gradient(slope.predict({**every, "coulomb": np.zeros(rows.size)}))
+                every[_LOGGED] = np.gradient(slope.predict({**every, "coulomb": np.zeros(one.torque.size)}))
             found.append({name: every[name][rows] for name in (*names, *([_LOGGED] if slope else []))})
         return {name: np.concatenate([every[name] for every in found]) for name in found[0]}
 
@@ -220,10 +220,9 @@ def fit_plain_model(
             errors = np.maximum(errors, fitted(stacked(names, late_rows, fit)).std_errors[:-1])
         if bent.differs(_LAW) and bent.held_out < fit.held_out:
             errors = np.hypot(errors, bent.values[: len(names)] - fit.values)
-        with np.errstate(invalid="ignore"):
-            scale = errors / np.where(fit.std_errors > 0.0, fit.std_errors, 1.0)
-            covariance = np.nan_to_num(fit.covariance * np.outer(scale, scale), nan=np.inf)
-        fit = replace(fit, std_errors=errors, covariance=covariance)
+        scale = np.ones(len(names))
+        np.divide(errors, fit.std_errors, out=scale, where=(fit.std_errors > 0.0) & np.isfinite(errors))
+        fit = replace(fit, std_errors=errors, covariance=fit.covariance * np.outer(scale, scale))
         return fit if len(names) == len(MOTION) or fit.differs(names[len(MOTION) :]) else final(MOTION)
 
     fit = final([name for name in again.names if name not in _LAW])

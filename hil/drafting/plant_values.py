@@ -11,7 +11,6 @@ import numpy as np
 from scipy.stats import norm
 from scipy.stats import t as student
 
-from hil.arrays import FloatArray
 from hil.errors import InputError
 from hil.identification.derivatives import motion, rows_per_sample, smoothed
 from hil.identification.friction import identify_friction
@@ -96,14 +95,16 @@ def plant_values(recordings: Sequence[Recording], load_ratio: float | None = Non
     spring = fit["spring"] if "spring" in fit.names else None
     one_way = None
     if not np.isfinite(coulomb.std_error):
-        one_way, mean, way = _one_way(fit, moving), float(np.mean(moving)), np.sign(moving[0])
+        way, mean = float(np.sign(moving[0])), float(np.mean(np.abs(moving)))
+        slope = viscous.std_error * mean < abs(coulomb.value + way * offset.value)  # else one speed: all of it together
+        one_way = _together(fit, {"coulomb": 1.0, "offset": way, "viscous": 0.0 if slope else mean})
         half, size = max(0.5 * one_way.value, 0.0), abs(one_way.value)
         how = (
             f"half of friction and load, {one_way.value:.3g} +-{one_way.std_error:.2g}: motion one way tells their sum"
         )
-        coulomb, offset = Estimate(half, size, how), Estimate(float(way) * (one_way.value - half), size, how)
-        if not viscous.significant:
-            viscous = Estimate(0.0, size / abs(mean), "not told from Coulomb friction at one speed")
+        coulomb, offset = Estimate(half, size, how), Estimate(way * (one_way.value - half), size, how)
+        if not slope:
+            viscous = Estimate(0.0, size / mean, "not told from Coulomb friction at one speed")
     elif viscous.value < 0.0:
         # friction that falls with speed, or a loop whose torque answers what the model lacks: neither is the plain law
         viscous, coulomb = (
@@ -114,10 +115,8 @@ def plant_values(recordings: Sequence[Recording], load_ratio: float | None = Non
     return PlantValues(inertia, viscous, coulomb, offset, fit.left, gravity, angle, spring, one_way)
 
 
-def _one_way(fit: LinearFit, moving: FloatArray) -> Estimate:
-    """Friction and load together in the direction of speeds (n,); at one speed with what is viscous of it."""
-    viscous = 0.0 if fit["viscous"].significant else abs(float(np.mean(moving)))
-    parts = {"coulomb": 1.0, "offset": np.sign(moving[0]), "viscous": viscous}
+def _together(fit: LinearFit, parts: dict[str, float]) -> Estimate:
+    """Sum of coefficients with factors."""
     weights = np.array([parts.get(name, 0.0) for name in fit.names])
     return Estimate(float(weights @ fit.values), float(np.sqrt(weights @ fit.covariance @ weights)), fit.how)
 

@@ -1,6 +1,7 @@
 """hil identify."""
 
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Annotated
 
 import typer
@@ -10,30 +11,32 @@ from hil.report.console import err, out, table
 
 
 def identify(
-    run: Annotated[Path, typer.Argument(help="Recording of the axis: .parquet, .arrows or .csv.", show_default=False)],
+    runs: Annotated[
+        list[Path], typer.Argument(help="Recordings of one axis: .parquet, .arrows or .csv.", show_default=False)
+    ],
     target: Annotated[
         Path | None,
-        typer.Option("--out", help="Bench file to write. Default: the name of the recording, in this folder."),
+        typer.Option("--out", help="Bench file to write. Default: the name of the first recording, in this folder."),
     ] = None,
 ) -> None:
-    """Write a bench file of the axis from a recording alone: masses, friction, lead, gains, encoders, with errors."""
-    from hil.bench.bench_file import load_bench
+    """Write a bench file of an axis from its recordings alone: masses, friction, lead, gains, encoders, with errors."""
     from hil.commands.warm_up import compile_kernels
     from hil.drafting.bench_text import bench_text
     from hil.drafting.draft_bench import draft_bench
     from hil.errors import InputError
     from hil.files.output import write_text
 
-    target = target or Path(f"{run.stem}.yaml")
+    target = target or Path(f"{runs[0].stem}.yaml")
     if target.exists():
         raise InputError(f"{target}: the file exists and is not overwritten; give another name with --out or remove it")
     if target.suffix not in (".yaml", ".yml"):
         raise InputError(f"{target}: given the ending {target.suffix!r}, allowed .yaml; correct --out")
-    recording = read_run(run)
+    recordings = [read_run(run) for run in runs]
     compile_kernels()
-    draft = draft_bench(recording)
-    write_text(target, bench_text(draft))
-    load_bench(target)
+    draft = draft_bench(*recordings)
+    text = bench_text(draft)
+    _validate(text, target)
+    write_text(target, text)
     values = [*draft.axis, *draft.control]
     rows = [
         (one.key, f"{one.value:.6g}" if isinstance(one.value, float) else str(one.value), one.error) for one in values
@@ -45,3 +48,18 @@ def identify(
     for note in draft.unsure:
         err.print(f"Please check: {note}", markup=False)
     out.print(f"Bench: {target} ({draft.model})")
+
+
+def _validate(text: str, target: Path) -> None:
+    """Check a bench file before it is written, as `hil validate` does. Raises InputError."""
+    from hil.errors import InputError
+    from hil.loop.simulated_bench import load_simulated
+
+    with TemporaryDirectory() as folder:
+        written = Path(folder) / target.name
+        written.write_text(text, encoding="utf-8")
+        try:
+            load_simulated(written)
+        except InputError as error:
+            told = str(error).replace(f"{folder}/", "")
+            raise InputError(f"the draft is no valid bench, and is not written: {told}") from None

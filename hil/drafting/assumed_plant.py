@@ -1,5 +1,7 @@
 """Inertia and friction of a bench where no torque is recorded: two encoders tell the transmission without them."""
 
+from collections.abc import Sequence
+
 from hil.drafting.plant_values import PlantValues, TransmissionValues, plant_values
 from hil.identification.least_squares import Estimate
 from hil.recording.recording import Recording
@@ -10,12 +12,12 @@ ASSUMED = "assumed: no torque is recorded, which would tell it"
 
 
 def plant_or_assumed(
-    recording: Recording, transmission: TransmissionValues | None, load_ratio: float | None
+    recordings: Sequence[Recording], transmission: TransmissionValues | None, load_ratio: float | None
 ) -> PlantValues:
     """Values by `plant_values`; those of a usual motor, with errors as large, where two encoders are recorded alone."""
-    if recording.axis.torque in recording.columns or transmission is None:
-        return plant_values(recording, load_ratio)
+    if any(one.axis.torque in one.columns for one in recordings) or transmission is None:
+        return plant_values(recordings, load_ratio)
     inertia, viscous, coulomb = (
         Estimate(value, value, ASSUMED) for value in (_INERTIA_KG_M2, _VISCOUS_N_M_S_RAD, _COULOMB_N_M)
     )
-    return PlantValues(inertia, viscous, coulomb, Estimate(0.0, 0.0, ASSUMED), 0.0, None, None, None, 0.0)
+    return PlantValues(inertia, viscous, coulomb, Estimate(0.0, 0.0, ASSUMED), 0.0, None, None, None)

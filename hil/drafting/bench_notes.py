@@ -1,5 +1,7 @@
 """Comments of a drafted bench on values that its keys cannot hold: load, noise, delays, friction at constant feeds."""
 
+from collections.abc import Sequence
+
 from hil.channels import AxisKind
 from hil.drafting.plant_values import PlantValues, TransmissionValues
 from hil.drafting.sensor_values import noise_of, torque_delay_s
@@ -12,17 +14,17 @@ MUCH_LEFT = 0.3  # share of the torque unexplained, from which it is as large as
 
 
 def bench_notes(
-    recording: Recording,
+    recordings: Sequence[Recording],
     plant: PlantValues,
     transmission: TransmissionValues | None,
     unit: str | None = None,
     turns: bool = False,
 ) -> tuple[list[str], list[str]]:
-    """Notes on what the recording tells, and those that the user should check.
+    """Notes on what the recordings tell, the first one of its sensors, and those that the user should check.
 
     `unit` is that of the torque if it is not the SI unit. `turns`: the load turns, its position is an angle.
     """
-    notes, unsure = list[str](), list[str]()
+    notes, unsure, recording = list[str](), list[str](), recordings[0]
     names, linear = recording.axis, recording.kind is AxisKind.LINEAR
     effort, noise_unit = ("force", "N") if linear else ("voltage", unit) if unit else ("torque", "N m")
     if names.torque in recording.columns:
@@ -40,7 +42,7 @@ def bench_notes(
     if transmission is not None:
         _of_transmission(transmission, recording.period_s, "urad" if turns else "um", notes, unsure)
     try:
-        feeds = identify_friction(recording)
+        feeds = identify_friction(*recordings)
     except InputError:
         return notes, unsure
     notes.append(
@@ -84,6 +86,11 @@ def _of_torque(
             "(a flexible load, gravity, a late channel), and their values may be off by more than their errors"
         )
     notes.append(f"{explained} leave {100 * plant.left:.2g} % of the {effort} (share of its standard deviation)")
+    if plant.one_way is not None:
+        unsure.append(
+            f"motion one way tells Coulomb friction and load together, {plant.one_way.value:.3g} {noise_unit} "
+            f"+-{plant.one_way.std_error:.2g}: record the way back"
+        )
     sure = "" if plant.offset.significant else ", not distinguishable from 0"
     notes.append(
         f"constant {effort} {plant.offset.value:.3g} {noise_unit} +-{plant.offset.std_error:.2g}{sure}: a load, or "

@@ -1,7 +1,10 @@
 """Draft a bench file from a recording: kind of axis, masses, friction, lead, gains, encoders, each with its error."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from math import hypot, log2, pi, sqrt
+
+import numpy as np
 
 from hil.channels import AxisKind
 from hil.drafting.assumed_plant import plant_or_assumed
@@ -22,9 +25,11 @@ from hil.recording.recording import Recording
 from hil.twin.mechanisms import gravity_torque
 
 _FINEST_M, _COARSEST_M = 1e-12, 1e-3  # resolution of a second encoder that a bench file takes
+_MOST_COUNTS = 2**31  # per revolution: noise below a count of this encoder is that of numbers
 LONGEST_LEAD_M = 1.0  # that a bench file takes; a load that turns as far as its motor, 1 m for 1 rad, has 6.3
 # Least deflection over acceleration that is written: a mode at 5 kHz, beyond any control loop.
 _STIFFEST_S2 = (2.0 * pi * 5e3) ** -2
+_MOVES = 0.1  # of the travel of the part that moves farthest, from which a part tells ratio and control law
 _STEPS_PER_NOISE = sqrt(12.0)  # a count of q has noise of q / sqrt(12)
 
 
@@ -45,37 +50,46 @@ class BenchDraft:
     unsure: list[str] = field(default_factory=list)
 
 
-def draft_bench(recording: Recording) -> BenchDraft:
-    """Draft the bench of the axis of a recording; with gaps in time, from its longest part that tells enough.
+def draft_bench(*recordings: Recording) -> BenchDraft:
+    """Draft the bench of one axis from its recordings, cut at gaps in time.
 
-    Raises InputError if masses and friction cannot be told: neither torque nor a second encoder, one direction, too
-    short, a wrong sign.
+    Masses and friction are those of all parts together, of which one tells what another does not; ratio, control law
+    and encoders are those of the longest part that moves.
+    Raises InputError if masses and friction cannot be told: neither torque nor a second encoder, no part that slides, a
+    wrong sign; and for recordings of different kinds or channels.
     """
-    recording = with_position(recording)
-    parts = sorted(recording.parts(), key=len, reverse=True)
-    if len(parts) == 1:
-        return _draft_part(recording)
+    parts = [part for recording in recordings for part in with_position(recording).parts()]
+    first = parts[0]
     for part in parts:
-        try:
-            draft = _draft_part(part)
-        except InputError:
-            if part is parts[-1]:
-                raise
-            continue
-        break
-    draft.name = recording.name
-    seconds = len(part) * part.period_s
-    draft.notes.insert(0, f"found in {part.name}, {seconds:.4g} s long, of {len(parts)} parts between gaps in time")
+        missing = {first.axis.motor_position, first.axis.torque, first.axis.table_position} & set(first.columns)
+        if missing := missing - set(part.columns):
+            raise InputError(
+                f"{part.name}: {', '.join(sorted(missing))} is not recorded as in {first.name}, allowed are recordings "
+                "of one axis with the same channels; leave one out"
+            )
+    travels = [float(np.ptp(part[part.axis.motor_position])) for part in parts]
+    moving = [part for part, travel in zip(parts, travels, strict=True) if travel >= _MOVES * max(travels)]
+    longest = max(moving, key=len)
+    draft = _draft_parts([longest, *(part for part in parts if part is not longest)])
+    draft.name = recordings[0].name
+    if len(parts) > 1:
+        seconds = len(longest) * longest.period_s
+        draft.notes.insert(
+            0,
+            f"masses and friction of {len(parts)} parts together; ratio, control and encoders from {longest.name}, "
+            f"{seconds:.4g} s long",
+        )
     return draft
 
 
-def _draft_part(recording: Recording) -> BenchDraft:
-    """Draft the bench from a recording without gaps."""
+def _draft_parts(recordings: Sequence[Recording]) -> BenchDraft:
+    """Draft the bench from recordings without gaps, the first of which tells all but masses and friction."""
+    recording = recordings[0]
     transmission, ratio = transmission_values(recording), 1.0
     volts = turns = False
     draft = BenchDraft(recording.name, recording.kind, "one_mass")
     if recording.kind is AxisKind.LINEAR:
-        plant = plant_values(recording)
+        plant = plant_values(recordings)
         draft.axis.append(_value("mass_kg", plant.inertia, "kg"))
         draft.axis += [_friction("coulomb_force_n", plant.coulomb), _friction("viscous_force_n_s_m", plant.viscous)]
     else:
@@ -83,7 +97,7 @@ def _draft_part(recording: Recording) -> BenchDraft:
         ratio = lead.value / (2.0 * pi)
         deflection = None if transmission is None else _deflection_s2(transmission)
         turns = recording.metadata.get("lead_m") == ROTARY_LEAD_M or lead.value > LONGEST_LEAD_M
-        plant = plant_or_assumed(recording, transmission, ratio if turns else None)
+        plant = plant_or_assumed(recordings, transmission, ratio if turns else None)
         if plant.gravity_angle is not None and transmission is not None:  # it bends what the ratio is measured over
             transmission = transmission_values(recording, plant.gravity_angle.value)
             lead = lead_of(recording, transmission)
@@ -101,7 +115,7 @@ def _draft_part(recording: Recording) -> BenchDraft:
     draft.control, draft.control_why = loop_values(recording, ratio)
     _encoders(draft, recording)
     _weight(draft, plant)
-    notes, unsure = bench_notes(recording, plant, transmission, "V" if volts else None, turns)
+    notes, unsure = bench_notes(recordings, plant, transmission, "V" if volts else None, turns)
     draft.notes += notes
     draft.unsure += unsure
     return draft
@@ -240,7 +254,7 @@ def _encoders(draft: BenchDraft, recording: Recording) -> None:
     if linear:
         draft.motor_encoder = BenchValue("resolution_m", float(f"{step:.4g}"), "m", how)
     else:
-        counts = max(round(2.0 * pi / step), 1)
+        counts = min(max(round(2.0 * pi / step), 1), _MOST_COUNTS)
         power = round(2 ** round(log2(counts)))
         draft.motor_encoder = BenchValue(
             "counts_per_rev", power if abs(counts / power - 1.0) < 0.002 else counts, "", how

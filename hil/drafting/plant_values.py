@@ -1,29 +1,24 @@
-"""Inertia, friction, load and transmission of an axis from its recording.
+"""Inertia, friction, load and transmission of an axis from its recordings.
 
 T = J a + D v + Fc sign(v) + T0 (+ r G sin(r q + q0)  or  + k q)        the plain model at the motor; r = 1 / gear ratio
 x = r q + c - r tau v - (m_t / k) a - (F_t / k) sign(v) - (G / k) sin(x + q0)      second encoder over the motor's
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.signal import butter, sosfiltfilt
 from scipy.stats import norm
 from scipy.stats import t as student
 
 from hil.errors import InputError
 from hil.identification.derivatives import motion, rows_per_sample, smoothed
 from hil.identification.friction import identify_friction
-from hil.identification.inverse_dynamics import CORNER, CUT_AT_START, inverse_dynamics_columns
 from hil.identification.least_squares import Estimate, LinearFit, least_squares
-from hil.identification.plain_model import MOTION, least_structure
-from hil.identification.sensor_noise import white_noise
+from hil.identification.plain_model import MOTION, PlainModel, fit_plain_model, motion_data
 from hil.recording.recording import Recording
 
-CUTOFFS_HZ = (100.0, 50.0, 25.0, 12.0, 6.0, 3.0)  # of the position filter
-NOISE_SHARE = 0.02  # of noise in the acceleration: it makes the inertia too small by this share
-MOST_OF_RATE = 0.2  # of the sampling rate: the filter must end well below half of it
-LEAST_ROWS = 80  # after decimation: eight per block of the error estimate
+EDGE_ROWS = 49  # at both ends of a second encoder, where filters settle
 WRONG_SIGN = 3.0  # standard errors by which a negative inertia is none that the motion does not tell
 
 
@@ -32,7 +27,8 @@ class PlantValues:
     """Estimates at the motor: kg m^2, N m s/rad, N m (linear axis kg, N s/m, N); `left` is a share of the torque.
 
     `gravity` is the torque G over the load's angle [N m], `gravity_angle` its q0 [rad], both at the load. `spring` is
-    the torque over the motor's position k [N m/rad, N/m].
+    the torque over the motor's position k [N m/rad, N/m]. `one_way` is Coulomb friction and load together, in the
+    direction of a motion that does not tell them apart; then half of it stands for each.
     """
 
     inertia: Estimate
@@ -43,7 +39,7 @@ class PlantValues:
     gravity: Estimate | None
     gravity_angle: Estimate | None
     spring: Estimate | None
-    cutoff_hz: float
+    one_way: Estimate | None = None
 
 
 @dataclass(frozen=True)
@@ -61,54 +57,87 @@ class TransmissionValues:
     sag_m: Estimate | None = None
 
 
-def plant_values(recording: Recording, load_ratio: float | None = None) -> PlantValues:
-    """Fit torque over motion; with `load_ratio` [load rad per motor rad] also gravity on a load that turns.
+def plant_values(recordings: Sequence[Recording], load_ratio: float | None = None) -> PlantValues:
+    """Fit torque over motion of recordings of one axis; with `load_ratio` [load rad per motor rad] also gravity.
 
-    Raises InputError: too short, motion in one direction, no torque, no positive inertia.
+    What one recording does not tell another may. Values that none tells have errors as large, or stand for all.
+    Raises InputError: no torque, no rows that slide, no positive inertia.
     """
-    names = recording.axis
-    if names.torque not in recording.columns:
+    name, names = recordings[0].name, recordings[0].axis
+    if any(names.torque not in recording.columns for recording in recordings):
         raise InputError(
-            f"{recording.name}: {names.torque} is not recorded, and without torque no mass and no friction can be "
-            "told; "
+            f"{name}: {names.torque} is not recorded, and without torque no mass and no friction can be told; "
             "record torque, current or voltage"
         )
-    rate_hz = 1.0 / recording.period_s
-    allowed = [cutoff_hz for cutoff_hz in CUTOFFS_HZ if cutoff_hz <= MOST_OF_RATE * rate_hz]
-    if not allowed:
+    data = [motion_data(one[names.motor_position], one[names.torque], one.period_s) for one in recordings]
+    model = fit_plain_model(data, load_ratio, spring=True)
+    if model is None:
         raise InputError(
-            f"{recording.name}: given {rate_hz:.3g} rows per second, allowed {CUTOFFS_HZ[-1] / MOST_OF_RATE:g} or "
-            "more; "
-            "record at a higher rate"
+            f"{name}: no rows about which the axis keeps sliding one way for the {data[0].window + 2} rows that a "
+            "velocity takes; record longer moves, or more rows per second"
         )
-    # the highest that noise allows: a lower one cuts acceleration, so that the inertia comes out too large
-    cutoff_hz = next((one for one in allowed if _noise_share(recording, one) < NOISE_SHARE), allowed[-1])
-    fit = _fit(recording, cutoff_hz, load_ratio)
+    fit = replace(model.fit, how=_how(model, data[0].window * data[0].period_s))
     inertia, viscous, coulomb, offset = (fit[name] for name in MOTION)
     if inertia.value <= -WRONG_SIGN * inertia.std_error:
         raise InputError(
-            f"{recording.name}: the inertia comes out as {inertia.value:.3g} +- {inertia.std_error:.2g}, allowed "
-            "above 0; "
+            f"{name}: the inertia comes out as {inertia.value:.3g} +- {inertia.std_error:.2g}, allowed above 0; "
             "the torque has the wrong sign, or the motion does not separate inertia from a spring, gravity or another "
             "moving arm: record moves of different accelerations"
         )
-    if inertia.value <= inertia.std_error:
+    moving = np.concatenate([one.moved.velocity[one.sliding(model.slowest)] for one in data])
+    top, most = float(np.max(np.abs(moving))), max(float(np.max(np.abs(one.torque))) for one in data)
+    if inertia.value <= inertia.std_error and inertia.std_error < most / top:
         inertia = replace(inertia, value=inertia.std_error, how=f"{inertia.how}; not told by this motion: its error")
-    heavy = load_ratio is not None and "sine" in fit.names
-    gravity, angle = _gravity(fit["sine"], fit["cosine"], load_ratio or 1.0) if heavy else (None, None)
+    elif inertia.value <= inertia.std_error:
+        inertia = Estimate(most / top, most / top, "assumed: this motion has no acceleration; 1 s to its top speed")
+    heavy = "sine" in fit.names
+    gravity, angle = _gravity(fit, load_ratio or 1.0) if heavy else (None, None)
     spring = fit["spring"] if "spring" in fit.names else None
-    viscous, coulomb = _at_feeds(recording, viscous, coulomb) or (viscous, coulomb)
-    return PlantValues(inertia, viscous, coulomb, offset, fit.left, gravity, angle, spring, cutoff_hz)
+    one_way = None
+    if not np.isfinite(coulomb.std_error):
+        way, mean = float(np.sign(moving[0])), float(np.mean(np.abs(moving)))
+        slope = viscous.std_error * mean < abs(coulomb.value + way * offset.value)  # else one speed: all of it together
+        one_way = _together(fit, {"coulomb": 1.0, "offset": way, "viscous": 0.0 if slope else mean})
+        half, size = max(0.5 * one_way.value, 0.0), abs(one_way.value)
+        how = (
+            f"half of friction and load, {one_way.value:.3g} +-{one_way.std_error:.2g}: motion one way tells their sum"
+        )
+        coulomb, offset = Estimate(half, size, how), Estimate(way * (one_way.value - half), size, how)
+        if not slope:
+            viscous = Estimate(0.0, size / mean, "not told from Coulomb friction at one speed")
+    elif viscous.value < 0.0:
+        # friction that falls with speed, or a loop whose torque answers what the model lacks: neither is the plain law
+        viscous, coulomb = (
+            replace(one, std_error=float(np.hypot(one.std_error, size)))
+            for one, size in ((viscous, viscous.value), (coulomb, viscous.value * top))
+        )
+    viscous, coulomb = _at_feeds(recordings, viscous, coulomb) or (viscous, coulomb)
+    return PlantValues(inertia, viscous, coulomb, offset, fit.left, gravity, angle, spring, one_way)
 
 
-def _at_feeds(recording: Recording, viscous: Estimate, coulomb: Estimate) -> tuple[Estimate, Estimate] | None:
+def _together(fit: LinearFit, parts: dict[str, float]) -> Estimate:
+    """Sum of coefficients with factors."""
+    weights = np.array([parts.get(name, 0.0) for name in fit.names])
+    return Estimate(float(weights @ fit.values), float(np.sqrt(weights @ fit.covariance @ weights)), fit.how)
+
+
+def _how(model: PlainModel, window_s: float) -> str:
+    how = f"least squares of torque over motion where it slides, windows of {1e3 * window_s:.3g} ms"
+    if model.late_rows:
+        how += f", torque {model.late_rows:+.2f} rows after the position"
+    return how + {5: ", with a spring", 6: ", with gravity"}.get(len(model.fit.names), "")
+
+
+def _at_feeds(
+    recordings: Sequence[Recording], viscous: Estimate, coulomb: Estimate
+) -> tuple[Estimate, Estimate] | None:
     """Viscous and Coulomb friction from constant feeds, where these tell both better than all rows do; else None.
 
     Friction that falls from rest makes the viscous friction of all rows too small, and negative; rows at reversals,
     where the sign of the velocity is least known, make Coulomb friction too small.
     """
     try:
-        found = identify_friction(recording)
+        found = identify_friction(*recordings)
     except InputError:
         return None
     how = f"{len(found.points)} constant feeds; all rows tell it less well"
@@ -125,41 +154,15 @@ def _at_feeds(recording: Recording, viscous: Estimate, coulomb: Estimate) -> tup
     return at_feeds if better or not (viscous.significant and viscous.value > 0.0) else None
 
 
-def _gravity(sine: Estimate, cosine: Estimate, load_ratio: float) -> tuple[Estimate, Estimate]:
+def _gravity(fit: LinearFit, load_ratio: float) -> tuple[Estimate, Estimate]:
     """Size and angle at the load from the coefficients of sine and cosine at the motor."""
-    size = float(np.hypot(sine.value, cosine.value))
-    error = float(np.hypot(sine.value * sine.std_error, cosine.value * cosine.std_error)) / size
-    across = float(np.hypot(cosine.value * sine.std_error, sine.value * cosine.std_error)) / size
-    angle = Estimate(float(np.arctan2(cosine.value, sine.value)), across / size, sine.how)
-    return Estimate(size, error, sine.how).scaled(1.0 / load_ratio), angle
-
-
-def _noise_share(recording: Recording, cutoff_hz: float) -> float:
-    """Share of white position noise in the variance of the acceleration below `cutoff_hz`.
-
-    var = 2 T sigma^2 (2 pi)^4 fc^5 / 5 for white noise sigma at the period T.
-    """
-    position, period_s = recording[recording.axis.motor_position], recording.period_s
-    noise = 2.0 * period_s * white_noise(position) ** 2 * (2.0 * np.pi) ** 4 * cutoff_hz**5 / 5.0
-    filtered = sosfiltfilt(butter(4, 2.0 * cutoff_hz * period_s, output="sos"), position)
-    total = float(np.var(np.diff(filtered, 2))) / period_s**4
-    return float(noise) / total if total > 0.0 else np.inf
-
-
-def _fit(recording: Recording, cutoff_hz: float, load_ratio: float | None) -> LinearFit:
-    # the filter of the decimation, alike for torque and motion, ends where that of the position does, at 40 Hz or below
-    rate_hz = 1.0 / recording.period_s
-    decimation = max(2, round(0.5 * CORNER * rate_hz / cutoff_hz), round(rate_hz / 100.0))
-    rows = (len(recording) - CUT_AT_START) // decimation
-    if rows < LEAST_ROWS:
-        raise InputError(
-            f"{recording.name}: given {len(recording)} rows, allowed {CUT_AT_START + LEAST_ROWS * decimation} or more; "
-            "give a longer recording"
-        )
-    columns, torque = inverse_dynamics_columns(recording, cutoff_hz, decimation, load_ratio=load_ratio)
-    turned_rad = float(np.ptp(columns["spring"])) * (load_ratio or 0.0)
-    how = f"least squares of torque over motion, position filtered at {cutoff_hz:g} Hz"
-    return least_structure(columns, torque, LEAST_ROWS, turned_rad, how=how)
+    at = [fit.names.index(name) for name in ("sine", "cosine")]
+    sine, cosine = fit.values[at]
+    size = float(np.hypot(sine, cosine))
+    along, across = np.array([sine, cosine]) / size, np.array([-cosine, sine]) / size
+    error, turned = (float(np.sqrt(one @ fit.covariance[np.ix_(at, at)] @ one)) for one in (along, across))
+    angle = Estimate(float(np.arctan2(cosine, sine)), turned / size, fit.how)
+    return Estimate(size, error, fit.how).scaled(1.0 / load_ratio), angle
 
 
 def transmission_values(recording: Recording, gravity_angle: float | None = None) -> TransmissionValues | None:
@@ -183,7 +186,7 @@ def transmission_values(recording: Recording, gravity_angle: float | None = None
     if gravity_angle is not None:
         weight = -np.sin(table + gravity_angle)
         columns |= {"sag": weight, "play": np.sign(weight)}  # deflection, and play whose flank the weight chooses
-    edge = slice(CUT_AT_START, -CUT_AT_START)
+    edge = slice(EDGE_ROWS, -EDGE_ROWS)
     columns, table = {name: column[edge] for name, column in columns.items()}, table[edge]
     how = "second encoder over the motor's"
     fit = least_squares(columns, table, rows_per_sample=rows_per_sample(period_s), how=how)

@@ -2,18 +2,28 @@
 
 A. Savitzky, M. J. E. Golay, Smoothing and Differentiation of Data by Simplified Least Squares Procedures, Analytical
 Chemistry 36, 1964.
+
+For an equation of torque and motion at any rate (`matched`): the curvature of the parabola over w rows is the second
+difference through a kernel K of w - 2 rows. A second difference is the mean of the true acceleration under a hat of two
+rows, whose variance, a sixth of a row squared, (1, 10, 1) / 12 has too (Numerov). So all terms pass the same mean
+
+    a = K * second difference      v = K * central difference      T, q = K * (1, 10, 1) / 12 * samples
+
+and T = J a + D v + k q holds for them as for the samples, however long the window is beside the motion.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import savgol_filter
+from scipy.ndimage import convolve1d
+from scipy.signal import savgol_coeffs, savgol_filter
 
 from hil.arrays import FloatArray
 
 SMOOTH_S = 0.021  # window of the parabolas: passes some 20 Hz, averages encoder counts
 _AT_REST = 0.01  # of the top speed: below lie rest and noise
 _SHORTEST = 5  # rows of a parabola that averages noise on both sides
+_HAT = np.array([1.0, 10.0, 1.0]) / 12.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +60,38 @@ def rows_per_sample(period_s: float) -> float:
     """
     w = window_rows(period_s)
     return 4.0 * w * (w**2 - 4.0) / (9.0 * w**2 - 21.0)
+
+
+def matched_motion(position: FloatArray, period_s: float, rows: int) -> MeasuredMotion:
+    """Motion of a position (n,), each derivative the same mean of the true one over an odd number of `rows`.
+
+    The direction is the sign of the velocity, at rest too. Within `rows` of both ends values are not exact.
+    """
+    if position.size < 3:
+        nothing = np.zeros(position.size)
+        return MeasuredMotion(position, nothing, nothing, nothing)
+    kernel, bend = _kernel(rows), np.diff(position, 2) / period_s**2
+    velocity = convolve1d(np.gradient(position, period_s), kernel, mode="nearest")
+    acceleration = convolve1d(np.concatenate([bend[:1], bend, bend[-1:]]), kernel, mode="nearest")
+    return MeasuredMotion(matched(position, rows), velocity, acceleration, np.sign(velocity))
+
+
+def matched(values: FloatArray, rows: int) -> FloatArray:
+    """Values (n,) through the mean of `matched_motion`."""
+    return np.asarray(convolve1d(values, np.convolve(_kernel(rows), _HAT), mode="nearest"), dtype=np.float64)
+
+
+def noise_gains(period_s: float, rows: int) -> tuple[float, float, float]:
+    """Noise of matched values, velocity [1/s] and acceleration [1/s^2] for one unit of white noise."""
+    differences = (_HAT, [0.5 / period_s, 0.0, -0.5 / period_s], np.array([1.0, -2.0, 1.0]) / period_s**2)
+    values, velocity, acceleration = (float(np.linalg.norm(np.convolve(_kernel(rows), one))) for one in differences)
+    return values, velocity, acceleration
+
+
+def _kernel(rows: int) -> FloatArray:
+    """K, (rows - 2,): the second sum of the weights of the parabola's curvature."""
+    weights = np.cumsum(np.cumsum(savgol_coeffs(rows, 2, deriv=2)))[:-2]
+    return np.asarray(weights / weights.sum(), dtype=np.float64)
 
 
 def _filtered(values: FloatArray, period_s: float, order: int, smooth_s: float) -> FloatArray:

@@ -91,9 +91,9 @@ class FrictionResult:
 
 
 def identify_friction(
-    recording: Recording, *, settling_s: float = SETTLING_S, speed_min: float = 0.0
+    recording: Recording, *more: Recording, settling_s: float = SETTLING_S, speed_min: float = 0.0
 ) -> FrictionResult:
-    """Fit Coulomb friction, viscous friction and offset to a recording with several feeds in both directions.
+    """Fit Coulomb friction, viscous friction and offset to recordings with several feeds in both directions.
 
     `settling_s` is cut after each feed is reached; points below `speed_min` [rad/s] or [m/s] are omitted (Stribeck
     friction deviates from the line). The speed is that of the motor encoder.
@@ -101,7 +101,8 @@ def identify_friction(
     """
     points = tuple(
         point
-        for part in recording.parts()
+        for one in (recording, *more)
+        for part in one.parts()
         for point in _points(part, settling_s)
         if abs(point.speed) >= speed_min and point.speed != 0.0
     )
@@ -143,7 +144,7 @@ def _points(recording: Recording, settling_s: float) -> list[FrictionPoint]:
     points = []
     for first, end in constant_feed_stretches(feed):
         first, end = first + cut, end - ending
-        if (end - first) * period_s < AVERAGED_MIN_S:
+        if end - first < 2 or (end - first) * period_s < AVERAGED_MIN_S:
             continue
         duration_s = (end - first - 1) * period_s
         speed = (position[end - 1] - position[first]) / duration_s

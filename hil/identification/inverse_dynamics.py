@@ -34,7 +34,7 @@ from hil.channels import AxisKind
 from hil.errors import InputError
 from hil.identification.derivatives import MeasuredMotion
 from hil.identification.least_squares import Columns, least_squares
-from hil.identification.plain_model import MOTION, plain_columns
+from hil.identification.plain_model import plain_columns
 from hil.recording.recording import Recording
 
 BUTTERWORTH_ORDER = 4
@@ -83,18 +83,15 @@ def fit_inverse_dynamics(
             f"{CUT_AT_START + 100 * decimation} or more; give a longer recording"
         )
     columns, force = inverse_dynamics_columns(recording, cutoff_hz, decimation, cut_at_end)
-    fit = least_squares({name: columns[name] for name in MOTION}, force)
+    fit = least_squares(columns, force)
     figures = np.concatenate([fit.values, fit.std_errors, [fit.relative_error]])
     return InverseDynamics(recording.kind, *figures.tolist())
 
 
 def inverse_dynamics_columns(
-    recording: Recording, cutoff_hz: float, decimation: int, cut_at_end: int = 0, load_ratio: float | None = None
+    recording: Recording, cutoff_hz: float, decimation: int, cut_at_end: int = 0
 ) -> tuple[Columns, FloatArray]:
-    """Columns of the plain model, with a spring, and torque or force (n,), filtered and decimated.
-
-    With `load_ratio` [load rad per motor rad] there are those of gravity too. The Butterworth filter is that of the
-    source instead of `derivatives`: its corner is chosen by the noise of the position.
+    """Columns of the plain model and torque or force (n,), filtered and decimated as in the source.
 
     Raises InputError if the record does not move both ways.
     """
@@ -109,8 +106,7 @@ def inverse_dynamics_columns(
     moved = MeasuredMotion(position, velocity, np.gradient(velocity, recording.period_s), np.sign(velocity))
     # every column is filtered, the offset too: the filter's gain at low frequencies is 0.989, not 1
     settled = slice(CUT_AT_START, len(recording) - cut_at_end)
-    columns = plain_columns(moved, load_ratio, spring=True)
-    filtered = {name: _decimate(column[settled], decimation) for name, column in columns.items()}
+    filtered = {name: _decimate(column[settled], decimation) for name, column in plain_columns(moved).items()}
     return filtered, _decimate(force[settled], decimation)
 
 

@@ -4,7 +4,15 @@
 
 J inertia, D viscous friction, Fc Coulomb friction, T0 offset, k spring, S and C gravity over the angle r q of a load
 that turns; motor units (kg m^2, N m s/rad, N m, N m, N m/rad, N m, or kg, N s/m, N, N, N/m). Without a twin, a control
-law or a bench it tells values with standard errors.
+law or a bench it tells values with standard errors, at any rate of rows: fitted are the rows about which the axis
+slides one way throughout the window of their derivatives, so that the sign of the velocity is known in each.
+
+A term is kept where the rows earn it. Beside a coefficient b +- s the Bayesian information criterion
+n log(R0 / R1) - log n is about (b / s)^2 - log n for n independent samples and residual sums R. Three standard errors
+are evidence below n = 8000, 9 = log n; s is that of the jackknife, which counts correlation, so that n is that of its
+blocks. The blocks that are left out in turn must be predicted better too. Beside a term in question friction may bend
+at low and at high speed: what a bend explains as well is no spring, and no delay. Where a bend is earned itself, errors
+count what it changes: values of a law that bends depend on the speeds.
 """
 
 from collections.abc import Sequence
@@ -12,21 +20,29 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import convolve1d, maximum_filter1d, minimum_filter1d
+from scipy.special import ndtri, stdtrit
 
 from hil.arrays import FloatArray
-from hil.identification.derivatives import MeasuredMotion, motion, rows_per_sample, smoothed, window_rows
-from hil.identification.least_squares import Columns, Estimate, LinearFit, least_squares
+from hil.identification.derivatives import (
+    SMOOTH_S,
+    MeasuredMotion,
+    matched,
+    matched_motion,
+    noise_gains,
+)
+from hil.identification.least_squares import SIGMAS, Columns, Estimate, LinearFit, least_squares
+from hil.identification.parallel import one_blas_thread
 
 MOTION = ("inertia", "viscous", "coulomb", "offset")  # names of the coefficients without a torque over the position
-_SLIDING = 0.02  # of the top speed: below, an axis may stick, and its motion does not tell its friction
-_FEWEST_WINDOWS = 4  # of sliding motion: one for each coefficient of the motion
-# Residual with a torque over the position over that without, up to which it is kept: on 80 white rows two parameters
-# without effect remove 1 %.
-OVER_POSITION_GAIN = 0.85
-# Least low-passed sign of the velocity of a row that is fitted: below, the filter mixes the friction of both directions
-# and of rest, and its change near a reversal, where the acceleration is largest, looks like an inertia.
-_SLIDES = 0.9
 LEAST_ANGLE_RAD = 0.5  # of the load: over less, a sine is a straight line to 1 %, and gravity is a spring
+_SLIDING = 0.02  # of the top speed: below, an axis may stick, and its motion does not tell its friction
+_FEWEST = len(MOTION) + 2  # independent samples: two more than coefficients
+_NOISE_SHARE = 0.02  # of noise in the variance of the acceleration: it makes the inertia too small by this share
+_LONGEST_S = 0.35  # window of the derivatives: passes 2 Hz
+_LAW = ("slow", "fast")  # coefficients of a friction that bends at low and at high speed
+_BEND = 0.1  # of the top speed: range of speed in which a friction that falls from rest is felt
+_LOGGED = "logged"  # coefficient of the time of the torque's rows against those of the position
 
 
 def plain_columns(moved: MeasuredMotion, load_ratio: float | None = None, spring: bool = False) -> Columns:
@@ -45,93 +61,186 @@ def plain_columns(moved: MeasuredMotion, load_ratio: float | None = None, spring
     return columns
 
 
-def least_structure(
-    columns: Columns, torque: FloatArray, fewest: int, turned_rad: float, *, samples: float = 1.0, how: str = ""
-) -> LinearFit:
-    """Fit a torque (n,) by motion alone, or with a torque over the position where that leaves clearly less.
-
-    It is a spring, or gravity where the load turned far, by `turned_rad`, and that leaves less; of those whose columns
-    are given. Rows about a reversal are left out where at least `fewest` others are left. `samples` is the number of
-    rows for an independent one.
-    """
-    slides = np.abs(columns["coulomb"]) > _SLIDES
-    if np.count_nonzero(slides) >= fewest:
-        columns, torque = {name: column[slides] for name, column in columns.items()}, torque[slides]
-
-    def fit(text: str, *more: str) -> LinearFit:
-        used = {name: columns[name] for name in (*MOTION, *more)}
-        return least_squares(used, torque, rows_per_sample=samples, how=how + text)
-
-    plain = fit("")
-    tried = [fit(", with a spring", "spring")] if "spring" in columns else []
-    if "sine" in columns and turned_rad >= LEAST_ANGLE_RAD:
-        tried.append(fit(", with gravity", "sine", "cosine"))
-    best = min(tried, key=lambda one: one.left, default=plain)
-    return best if best.left < OVER_POSITION_GAIN * plain.left and best["inertia"].value > 0.0 else plain
-
-
 @dataclass(frozen=True, eq=False)
 class MotionData:
-    """Motion of a recording, its torque (n,) smoothed alike, and the rows (n,) that are evaluated."""
+    """Motion of a recording, its torque (n,) smoothed alike, the rows (n,) that are evaluated, and the window in rows.
+
+    `noise` is that of the position.
+    """
 
     moved: MeasuredMotion
     torque: FloatArray
     rows: NDArray[np.bool_]
     period_s: float
+    window: int
+    noise: float = 0.0
 
     def sliding(self, slowest: float) -> NDArray[np.bool_]:
-        """Evaluated rows (n,) in which the axis is faster than `slowest`."""
-        return np.asarray(self.rows & (np.abs(self.moved.velocity) > slowest))
+        """Evaluated rows (n,) about which the axis moves one way, faster than `slowest`, throughout the window.
+
+        A row more on both sides is what a logger's row may hold: a mean until the next one, or the value before.
+        """
+        low, high = (extreme(self.moved.velocity, self.window + 2) for extreme in (minimum_filter1d, maximum_filter1d))
+        return np.asarray(self.rows & ((low > slowest) | (high < -slowest)))
 
 
 def motion_data(position: FloatArray, torque: FloatArray, period_s: float, judged: slice = slice(None)) -> MotionData:
-    """Data of motor position and torque (n,), of the rows `judged` without a window at both ends.
+    """Data of motor position and torque (n,), of the rows `judged` without half a window at both ends."""
+    noise, rms = _noise(position)
+    window = _window(position, rms, period_s)
+    rows, half = np.zeros(position.size, dtype=bool), window // 2 + 1
+    rows[judged] = True
+    rows[:half] = rows[-half:] = False
+    return MotionData(
+        matched_motion(position, period_s, window), matched(torque, window), rows, period_s, window, noise
+    )
 
-    Of a recording shorter than four windows no row is evaluated.
+
+def _window(position: FloatArray, noise: float, period_s: float) -> int:
+    """Rows of the shortest window that passes little noise: longer ones leave less motion between reversals."""
+    window = best = max(round(SMOOTH_S / period_s) | 1, 3)
+    least = np.inf
+    while least == np.inf or (window <= position.size // 4 and window * period_s <= _LONGEST_S):
+        inner = slice(window, -window) if position.size > 3 * window else slice(None)
+        acceleration = matched_motion(position, period_s, window).acceleration[inner]
+        share = (noise * noise_gains(period_s, window)[2]) ** 2 / max(float(np.var(acceleration)), 1e-300)
+        if share < least:
+            best, least = window, share
+        if share < _NOISE_SHARE:
+            break
+        window = 2 * window - 1
+    return best
+
+
+def _noise(position: FloatArray) -> tuple[float, float]:
+    """White noise of a position (n,): of even motion, the lower quarter, and rms of all.
+
+    From differences of the order that leaves less motion; one of order m has the variance (2 m)! / m!^2. Stamps that
+    are uneven make the noise of fast motion larger than that of even motion.
     """
-    window, rows = window_rows(period_s), np.zeros(position.size, dtype=bool)
-    if position.size >= _FEWEST_WINDOWS * window:
-        rows[judged] = True
-        rows[:window] = rows[-window:] = False
-    moved = motion(position, period_s)
-    moved = replace(moved, direction=np.sign(moved.velocity))  # an axis that creeps has friction too
-    return MotionData(moved, smoothed(torque, period_s), rows, period_s)
+    differences = [
+        np.diff(position, order) / np.sqrt(gain)
+        for order, gain in ((4, 70.0), (8, 12870.0))
+        if position.size > 2 * order
+    ]
+    even = min((float(np.quantile(np.abs(one), 0.25) / ndtri(0.625)) for one in differences), default=0.0)
+    rms = min((float(np.sqrt(np.mean(one**2))) for one in differences), default=0.0)
+    return even, rms
 
 
 @dataclass(frozen=True, eq=False)
 class PlainModel:
-    """Fit of the plain model, the least speed of the rows that were fitted, and the ratio of a load that turns."""
+    """Fit of the plain model, the least speed of the rows that were fitted, and the ratio of a load that turns.
+
+    `late_rows`: rows by which the torque of a row is later than its position; a mean until the next row has 0.5.
+    """
 
     fit: LinearFit
     slowest: float
     load_ratio: float | None = None
+    late_rows: float = 0.0
 
     def __getitem__(self, name: str) -> Estimate:
         return self.fit[name]
 
     def predict(self, moved: MeasuredMotion) -> FloatArray:
         """Torque (n,) of the model on a motion."""
-        return self.fit.predict(plain_columns(moved, self.load_ratio, spring=True))
+        return self.fit.predict(plain_columns(_later(moved, self.late_rows), self.load_ratio, spring=True))
 
 
+@one_blas_thread
 def fit_plain_model(
     data: Sequence[MotionData], load_ratio: float | None = None, spring: bool = False
 ) -> PlainModel | None:
-    """Fit the plain model to the sliding rows of recordings; None without sliding motion.
+    """Fit the plain model to the sliding rows of recordings of one axis; None without sliding motion.
 
-    A `spring`, and gravity on a load that turns (`load_ratio`), are fitted where they leave clearly less.
+    A `spring`, or gravity on a load that turns (`load_ratio`), and the time of the torque against the position within a
+    row, are fitted where the rows earn them.
     """
-    period_s, fewest = data[0].period_s, _FEWEST_WINDOWS * window_rows(data[0].period_s)
-    slowest = _SLIDING * max(float(np.max(np.abs(one.moved.velocity))) for one in data)
+    top = max((float(np.max(np.abs(one.moved.velocity[one.rows]), initial=0.0)) for one in data), default=0.0)
+    slowest = _SLIDING * top
     sliding = [one.sliding(slowest) for one in data]
-    if sum(rows.sum() for rows in sliding) < fewest:
+    gains = [noise_gains(one.period_s, one.window) for one in data]
+    samples = sum(gain[0] ** 2 * rows.sum() for gain, rows in zip(gains, sliding, strict=True))
+    if samples < _FEWEST:
         return None
-    alike = [replace(one.moved, direction=smoothed(one.moved.direction, period_s)) for one in data]
-    found = [plain_columns(moved, load_ratio, spring) for moved in alike]
-    columns = {
-        name: np.concatenate([one[name][rows] for one, rows in zip(found, sliding, strict=True)]) for name in found[0]
-    }
-    torque = np.concatenate([one.torque[rows] for one, rows in zip(data, sliding, strict=True)])
+    # neighbours in a long window say the same
+    used = [(one, np.flatnonzero(rows)[:: max(one.window // 4, 1)]) for one, rows in zip(data, sliding, strict=True)]
+    torque = np.concatenate([one.torque[rows] for one, rows in used])
+    count = torque.size
     turned_rad = abs(load_ratio or 0.0) * max(float(np.ptp(one.moved.position)) for one in data)
-    fit = least_structure(columns, torque, fewest, turned_rad, samples=rows_per_sample(period_s))
-    return PlainModel(fit, slowest, load_ratio)
+    more: list[tuple[str, ...]] = [("spring",)] if spring else []
+    more += [("sine", "cosine")] if load_ratio is not None and turned_rad >= LEAST_ANGLE_RAD else []
+    weighed = list(zip(used, gains, strict=True))
+    noise = {
+        name: float(np.sqrt(sum((one.noise * gain[at]) ** 2 * rows.size for (one, rows), gain in weighed) / count))
+        for name, at in (("inertia", 2), ("viscous", 1))
+    }
+
+    def stacked(names: Sequence[str], late_rows: float, slope: LinearFit | None = None) -> dict[str, FloatArray]:
+        found = []
+        for one, rows in used:
+            every = {**plain_columns(_later(one.moved, late_rows), load_ratio, spring=True)}
+            speed = every["viscous"] / top
+            every |= {"slow": every["coulomb"] * np.exp(-np.abs(speed) / _BEND), "fast": speed * np.abs(speed)}
+            if slope is not None:  # change of the torque per row
+                every[_LOGGED] = np.gradient(slope.predict({**every, "coulomb": np.zeros(one.torque.size)}))
+            found.append({name: every[name][rows] for name in (*names, *([_LOGGED] if slope else []))})
+        return {name: np.concatenate([every[name] for every in found]) for name in found[0]}
+
+    def fitted(columns: Columns) -> LinearFit:
+        fit = least_squares(columns, torque, rows_per_sample=count / samples, noise=noise)
+        free = max(samples - len(columns), 1.0)
+        wider = float(stdtrit(free, 0.975) / ndtri(0.975))
+        return replace(fit, std_errors=wider * fit.std_errors, covariance=wider**2 * fit.covariance)
+
+    def structure(late_rows: float) -> LinearFit:
+        plain = fitted(stacked((*MOTION, *_LAW), late_rows))
+        tried = [fitted(stacked((*MOTION, *_LAW, *names), late_rows)) for names in more]
+        earned = [
+            one
+            for one, names in zip(tried, more, strict=True)
+            if one.differs(names) and one.held_out < plain.held_out and one["inertia"].value > 0.0
+        ]
+        return min(earned, key=lambda one: one.held_out, default=plain)
+
+    best, late_rows = structure(0.0), 0.0
+    for _ in range(4):
+        timed = fitted(stacked(best.names, late_rows, best))
+        late_rows = float(np.clip(late_rows + timed[_LOGGED].value, -1.0, 1.0))
+    again = structure(late_rows)
+    if not (abs(late_rows) > SIGMAS * timed[_LOGGED].std_error and again.held_out < best.held_out):
+        again, late_rows = best, 0.0
+
+    def final(names: Sequence[str]) -> LinearFit:
+        """The fit with errors that count the delay and the bend; without a term that they do not leave."""
+        fit, bent = (fitted(stacked((*names, *law), late_rows)) for law in ((), _LAW))
+        errors = fit.std_errors
+        if late_rows:
+            errors = np.maximum(errors, fitted(stacked(names, late_rows, fit)).std_errors[:-1])
+        if bent.differs(_LAW) and bent.held_out < fit.held_out:
+            errors = np.hypot(errors, bent.values[: len(names)] - fit.values)
+        scale = np.ones(len(names))
+        np.divide(errors, fit.std_errors, out=scale, where=(fit.std_errors > 0.0) & np.isfinite(errors))
+        fit = replace(fit, std_errors=errors, covariance=fit.covariance * np.outer(scale, scale))
+        return fit if len(names) == len(MOTION) or fit.differs(names[len(MOTION) :]) else final(MOTION)
+
+    fit = final([name for name in again.names if name not in _LAW])
+    return PlainModel(fit, slowest, load_ratio, late_rows)
+
+
+def _later(moved: MeasuredMotion, rows: float) -> MeasuredMotion:
+    """Motion `rows` (-1 to 1) after each row; half a row after it as a mean until the next one.
+
+    Of weights (3,) over neighbours the first moment is the time, the second its square and the variance |t| (1 - |t|) /
+    3 of the mean, 1/12 for half a row.
+    """
+    if rows == 0.0:
+        return moved
+    second = rows**2 + abs(rows) * (1.0 - abs(rows)) / 3.0
+    weights = np.array([0.5 * (second + rows), 1.0 - second, 0.5 * (second - rows)])  # of the row after, at, before
+
+    def at(values: FloatArray) -> FloatArray:
+        return np.asarray(convolve1d(values, weights, mode="nearest"), dtype=np.float64)
+
+    return MeasuredMotion(at(moved.position), at(moved.velocity), at(moved.acceleration), moved.direction)

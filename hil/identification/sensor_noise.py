@@ -84,9 +84,12 @@ def moving(velocity: FloatArray) -> NDArray[np.bool_]:
 def white_noise(signal: FloatArray) -> float:
     """White noise of a smooth signal (n,) from its fourth differences, which have the variance 70 sigma^2.
 
-    The median over blocks excludes events such as reversals.
+    The median over blocks excludes events such as reversals; of less than a block it is that of all rows.
     """
-    return float(np.sqrt(np.median(_white_blocks(signal))))
+    blocks = _white_blocks(signal)
+    return (
+        float(np.sqrt(np.median(blocks if blocks.size else np.diff(signal, 4) ** 2 / 70.0))) if signal.size > 4 else 0.0
+    )
 
 
 def _white_blocks(signal: FloatArray) -> FloatArray:

@@ -1,6 +1,6 @@
 """Torque that a model of the axis leaves, predicted from the measured motion, as a share of the torque's deviation.
 
-    left = rms(T - T_model) / std(T)      over the rows in which the axis slides, up to some 20 Hz
+    left = rms(T - T_model) / std(T)      over the rows about which the axis slides one way, up to some 20 Hz
 
 The residual is that of held-out motion, the deviation that of all recordings: a held-out part that is one slow end
 needs hardly any torque of its own.
@@ -8,21 +8,23 @@ needs hardly any torque of its own.
 The twin is held on the measured motion by its observer and fed the measured torque. Its innovation e tells the torque
 that its mechanics lack. The scale is that of the twin itself: its innovation is computed a second time, with a constant
 torque added. Nothing is simulated in closed loop, where a controller hides what a model lacks. The plain model is that
-of `hil.identification.plain_model`, fitted to the training recordings. Its residual passes the same filter as the
-innovation, so that both are compared in one band:
+of `hil.identification.plain_model`, fitted to the training recordings: [a, v, sign(v), 1] on the rows that slide. Its
+residual passes the same filter as the innovation, so that both are compared in one band; between stretches that slide,
+where the sign of the velocity is not known, it goes on from one to the next:
 
     e(z) = a^2 z^-1 / (1 - (2 - 2 a - a^2) z^-1 + (1 - 2 a) z^-2),   a = T / tau      of a rigid axis
 """
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 from scipy.signal import lfilter
 
 from hil.arrays import FloatArray
 from hil.identification.dataset import Dataset
-from hil.identification.derivatives import smoothed
+from hil.identification.derivatives import matched
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.measured import Measured
 from hil.identification.plain_model import MotionData, PlainModel, fit_plain_model, motion_data
@@ -52,10 +54,14 @@ def left_by_plain(model: PlainModel, data: Dataset, deviation: float | None = No
     """
     found = []
     for run in data.runs:
-        missing = run.torque - model.predict(measured_motion(run).moved)
+        motion = measured_motion(run)
+        rows = np.flatnonzero(motion.sliding(model.slowest))
+        missing = (motion.torque - model.predict(motion.moved))[rows]
         a = run.period_s / data.observer_s
-        seen = lfilter([0.0, a * a], [1.0, -(2.0 - 2.0 * a - a * a), 1.0 - 2.0 * a], missing)
-        found.append(np.asarray(seen, dtype=np.float64))
+        if rows.size:
+            bridged = np.interp(np.arange(run.motor.size), rows, missing)
+            seen = lfilter([0.0, a * a], [1.0, -(2.0 - 2.0 * a - a * a), 1.0 - 2.0 * a], bridged)
+            found.append(np.asarray(seen, dtype=np.float64)[rows])
     return _share(found, data, model.slowest, deviation)
 
 
@@ -64,8 +70,9 @@ def left_by_twin(hypothesis: Hypothesis, data: Dataset, slowest: float, deviatio
 
     Without a deviation it is that of the data set.
     """
-    found = [series.left for series in needed_torque(hypothesis, data, slowest)]
-    return _share(found, data, slowest, deviation)
+    found = zip(needed_torque(hypothesis, data, slowest), data.runs, strict=True)
+    left = [matched(series.left, measured_motion(run).window)[series.rows] for series, run in found]
+    return _share(left, data, slowest, deviation)
 
 
 def needed_torque(hypothesis: Hypothesis, data: Dataset, slowest: float) -> list[Series]:
@@ -92,15 +99,14 @@ def _innovation(hypothesis: Hypothesis, run: Measured, observer_s: float) -> Flo
 
 
 def _share(missing: Sequence[FloatArray], data: Dataset, slowest: float, deviation: float | None) -> float | None:
-    if not all(np.isfinite(values).all() for values in missing):  # the twin does not hold the motion
+    left = np.concatenate([*missing, np.zeros(0)])
+    if not np.isfinite(left).all():  # the twin does not hold the motion
         return None
-    pairs = zip(missing, data.runs, strict=True)
-    left = np.concatenate(
-        [smoothed(values, run.period_s)[measured_motion(run).sliding(slowest)] for values, run in pairs]
-    )
     deviation = torque_deviation([data], slowest) if deviation is None else deviation
     return float(np.sqrt(np.mean(left**2)) / deviation) if left.size and deviation > 0.0 else None
 
 
+@lru_cache(maxsize=8)
 def measured_motion(run: Measured) -> MotionData:
+    """Motion and torque of a run for the plain model."""
     return motion_data(run.motor, run.torque, run.period_s, run.evaluated)

@@ -21,7 +21,7 @@ def assert_change_is_told(folder: Path, at: int) -> None:
     columns = axis(12000, inertia_kg_m2=np.where(np.arange(12000) < at, 1.0, 1.6) * INERTIA_KG_M2)
     path = write(folder / "log.csv", renamed(columns, t="time_s", angle="motor_angle_rad", torque="torque_Nm"))
     import_(path, None, folder / "log.parquet", None, None)
-    identify(folder / "log.parquet", folder / "axis.yaml")
+    identify([folder / "log.parquet"], folder / "axis.yaml")
     found = diagnose([read_recording(folder / "log.parquet")], [], load_bench(folder / "axis.yaml"))
     result = found.result
     assert result.verdict == "axis_changed"

@@ -20,7 +20,7 @@ from hil.drafting.ratio_values import gear_of, lead_of
 from hil.errors import InputError
 from hil.identification.least_squares import Estimate
 from hil.recording.quantum import count_of
-from hil.recording.recording import Recording
+from hil.recording.recording import Recording, write_parquet
 from hil.twin.mechanisms import gravity_torque
 
 AXIS = axis(rows=8000)
@@ -29,13 +29,13 @@ SCREW = renamed(AXIS, t="time_s", x_act="table_position_mm", angle="motor_angle_
 
 def drafted(tmp_path: Path, columns: dict[str, np.ndarray]) -> Path:
     import_(write(tmp_path / "log.csv", columns), None, tmp_path / "log.parquet", None, None)
-    identify(tmp_path / "log.parquet", tmp_path / "axis.yaml")
+    identify([tmp_path / "log.parquet"], tmp_path / "axis.yaml")
     return tmp_path / "axis.yaml"
 
 
 def test_the_axis_of_a_simulated_recording_is_found_with_its_law(tmp_path: Path) -> None:
     known, target = hil.load_bench("reference"), tmp_path / "axis.yaml"
-    identify(CLEAN, target)
+    identify([CLEAN], target)
     bench = load_bench(target)
     assert bench.axis.model == "two_mass"
     assert bench.axis.lead_m == pytest.approx(0.010, rel=1e-4)
@@ -168,7 +168,7 @@ def test_the_step_of_a_quantised_channel_is_found_and_none_in_a_smooth_one() -> 
     ("change", "says"),
     [
         ({"torque": -AXIS["torque"]}, "wrong sign"),
-        ({"angle": np.abs(AXIS["t"]) * 10.0}, "one direction"),
+        ({"angle": np.cos(np.pi * AXIS["t"] / 1e-3)}, "keeps sliding one way"),
         ({"torque": None, "x_act": None}, "not recorded"),
     ],
 )
@@ -181,7 +181,7 @@ def test_a_bench_file_is_not_overwritten(tmp_path: Path) -> None:
     target = tmp_path / "axis.yaml"
     target.write_text("mine")
     with pytest.raises(InputError, match="not overwritten"):
-        identify(CLEAN, target)
+        identify([CLEAN], target)
     assert target.read_text() == "mine"
 
 
@@ -276,3 +276,30 @@ def test_a_recording_at_20_khz_tells_its_inertia(tmp_path: Path) -> None:
 def test_a_gear_is_rounded_only_to_a_whole_number_that_is_near(measured: float, error: float, gear: float) -> None:
     lead = 2.0 * np.pi / measured
     assert gear_of(Estimate(lead, lead / measured * error)).value == pytest.approx(gear, rel=1e-9)
+
+
+def test_several_recordings_are_one_axis_and_short_ones_are_no_obstacle(tmp_path: Path) -> None:
+    """Each way alone in its file, and a file of ten rows."""
+    files = []
+    for number, (way, rows) in enumerate(((1.0, 4000), (-1.0, 4000), (1.0, 10))):
+        time = np.arange(rows) * 1e-3
+        velocity, acceleration = way * (6.0 + 3.0 * np.sin(5.0 * time)), way * 15.0 * np.cos(5.0 * time)
+        torque = 0.02 * acceleration + 0.05 * velocity + way * 0.8 + 0.1
+        columns = {"time_s": time, "motor_position_rad": np.cumsum(velocity) * 1e-3, "torque_n_m": torque}
+        files.append(tmp_path / f"part{number}.parquet")
+        write_parquet(Recording(f"part{number}", columns, 1e-3), files[-1])
+    identify(files, tmp_path / "axis.yaml")
+    bench = load_bench(tmp_path / "axis.yaml")
+    assert bench.axis.inertia_kg_m2 == pytest.approx(0.02, rel=0.02)
+    assert bench.axis.coulomb_torque_n_m == pytest.approx(0.8, rel=0.02)
+    assert "3 parts together" in (tmp_path / "axis.yaml").read_text()
+
+
+def test_a_draft_that_is_no_valid_bench_is_not_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(
+        "hil.drafting.bench_text.bench_text", lambda draft: "schema_version: 1\naxis:\n  model: rotary\n"
+    )
+    write_parquet(_recording(AXIS), tmp_path / "log.parquet")
+    with pytest.raises(InputError, match="no valid bench"):
+        identify([tmp_path / "log.parquet"], tmp_path / "axis.yaml")
+    assert not (tmp_path / "axis.yaml").exists()

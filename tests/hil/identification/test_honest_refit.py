@@ -96,6 +96,26 @@ def test_the_torque_left_is_compared_with_a_plain_model() -> None:
     assert by_owner > by_plain
 
 
+def test_the_plain_model_leaves_what_plain_least_squares_leave() -> None:
+    """By own derivatives, means over 21 ms, on the rows whose means reach no reversal and no rest."""
+    owner = bench()
+    run = take(recorded(bench(), Term("cogging_torque", 0, (0.1, 1.0, 0.2))), owner)
+    data = dataset([run], owner)
+    plain = fit_plain(data)
+    assert plain is not None
+    kernel = np.ones(21) / 21.0
+    velocity = np.gradient(run.motor, run.period_s)
+    means = [np.convolve(one, kernel, "same") for one in (np.gradient(velocity, run.period_s), velocity, run.torque)]
+    rows = np.zeros(run.motor.size, dtype=bool)
+    for at in range(run.evaluated.start + 40, run.motor.size - 40):
+        near = velocity[at - 20 : at + 21] / np.abs(velocity).max()
+        rows[at] = near.min() > 0.02 or near.max() < -0.02
+    a, v, torque = (one[rows] for one in means)
+    matrix = np.column_stack([a, v, np.sign(v), np.ones(a.size)])
+    left = torque - matrix @ np.linalg.lstsq(matrix, torque, rcond=None)[0]
+    assert left_by_plain(plain, data) == pytest.approx(np.std(left) / np.std(torque), rel=0.15)
+
+
 def test_a_twin_that_the_torque_does_not_move_has_no_torque_left(data: Dataset) -> None:
     plain = fit_plain(data)
     assert plain is not None

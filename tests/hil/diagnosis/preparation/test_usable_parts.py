@@ -80,9 +80,9 @@ def test_compare_identify_and_friction_work_on_the_parts(tmp_path: Path) -> None
     write_parquet(recording, tmp_path / "cut.parquet")
     compare_command(tmp_path / "cut.parquet", "reference", False, tmp_path / "compared")
     assert sorted(path.name for path in (tmp_path / "compared").iterdir()) == ["part-1", "part-2"]
-    identify(tmp_path / "cut.parquet", tmp_path / "axis.yaml")
+    identify([tmp_path / "cut.parquet"], tmp_path / "axis.yaml")
     text = (tmp_path / "axis.yaml").read_text()
-    assert "of 2 parts between gaps in time" in text
+    assert "friction of 2 parts together" in text
     assert load_bench(tmp_path / "axis.yaml").axis.lead_m == pytest.approx(0.010, rel=1e-3)
     found, whole = (hil.identify_friction(run, settling_s=0.02) for run in (recording, WHOLE))
     assert 4 <= len(found.points) <= len(whole.points) + 1

@@ -8,29 +8,29 @@ from hil.diagnosis.criteria import Criteria
 from hil.diagnosis.ledger import Answer, Rule
 
 if TYPE_CHECKING:
-    from hil.diagnosis.verdict.reproduction import Reproduction
+    from hil.diagnosis.verdict.reproduction import Reproduced
 
 
-def _within_noise(of: Reproduction, c: Criteria) -> Answer:
+def _within_noise(of: Reproduced, c: Criteria) -> Answer:
     return of.worst <= c.floor, {"worst": of.worst**0.5}
 
 
-def _within_noise_elsewhere(of: Reproduction, c: Criteria) -> Answer | None:
+def _within_noise_elsewhere(of: Reproduced, c: Criteria) -> Answer | None:
     return None if of.held_out is None else (of.held_out <= c.elsewhere, {"worst": of.held_out**0.5})
 
 
-def _without_structure(of: Reproduction, c: Criteria) -> Answer:
+def _without_structure(of: Reproduced, c: Criteria) -> Answer:
     return not of.structure, {"structure": of.structure}
 
 
-def _no_worse_than_plain(of: Reproduction, c: Criteria) -> Answer | None:
+def _no_worse_than_plain(of: Reproduced, c: Criteria) -> Answer | None:
     if of.torque is None:
         return None
     left, plain = of.torque
     return left - plain <= c.material, {"left": left**0.5, "plain": plain**0.5}
 
 
-REPRODUCED: tuple[Rule[Reproduction], ...] = (
+REPRODUCED: tuple[Rule[Reproduced], ...] = (
     # measurement noise of each channel: `hil.identification.noise_floor`
     Rule(
         "within the noise",

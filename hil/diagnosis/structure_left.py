@@ -19,7 +19,7 @@ from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.plain_model import PlainModel
 from hil.identification.residual_scales import DISCREPANCY
-from hil.identification.structure import BINS, Series, Structure, structure
+from hil.identification.structure import BINS, ResidualSeries, Structure, structure
 from hil.identification.torque_left import fit_plain, measured_motion, needed_torque, torque_deviation
 from hil.quantities import digits, quantity, reading_unit
 
@@ -146,17 +146,21 @@ def _channels(data: Dataset) -> list[str]:
     return [*([TORQUE] if torque else []), *([DIFFERENCE] if data.runs[0].table_m.size else [])]
 
 
-def _left(hypothesis: Hypothesis, data: Dataset, channel: str, plain: PlainModel) -> list[Series]:
+def _left(hypothesis: Hypothesis, data: Dataset, channel: str, plain: PlainModel) -> list[ResidualSeries]:
     if channel == TORQUE:
         return needed_torque(hypothesis, data, plain.slowest)
     return [
-        Series(hypothesis.blocks(run, data.observer_s)["table"], measured_motion(run).sliding(plain.slowest))
+        ResidualSeries(hypothesis.blocks(run, data.observer_s)["table"], measured_motion(run).sliding(plain.slowest))
         for run in data.runs
     ]
 
 
 def _dependences(
-    fit: Fit, held_out: Dataset, channel: str, plain: PlainModel, left: tuple[Sequence[Series], Sequence[Series]]
+    fit: Fit,
+    held_out: Dataset,
+    channel: str,
+    plain: PlainModel,
+    left: tuple[Sequence[ResidualSeries], Sequence[ResidualSeries]],
 ) -> Iterator[Dependence]:
     """Answers to the questions on one channel, (training, held-out) residuals."""
     parts, others = left
@@ -183,7 +187,7 @@ def _least_energy(data: Dataset, channel: str, plain: PlainModel) -> float:
     return CRITERIA.material * float(np.mean([run.noise.table_m**2 for run in data.runs]))
 
 
-def _removed(found: Structure, parts: Sequence[Series], quantity: Sequence[FloatArray]) -> float:
+def _removed(found: Structure, parts: Sequence[ResidualSeries], quantity: Sequence[FloatArray]) -> float:
     """Mean square that a dependence removes from residuals (n,) of other recordings, their means taken off."""
     left = np.concatenate([part.left[part.rows] for part in parts])
     if not left.size:

@@ -24,7 +24,7 @@ _DECAYED = 0.05  # of the variance: the correlation time ends there
 _FEWEST_INDEPENDENT = 2.0  # independent rows per bin, below which nothing is told
 
 
-class Series(NamedTuple):
+class ResidualSeries(NamedTuple):
     """A residual (n,) of one recording, and the rows (n,) that count."""
 
     left: FloatArray
@@ -49,7 +49,7 @@ class Structure:
         return np.asarray(self.means[_bin(quantity, self.edges)])
 
 
-def structure(parts: Sequence[Series], quantity: Sequence[FloatArray], bins: int = BINS) -> Structure | None:
+def structure(parts: Sequence[ResidualSeries], quantity: Sequence[FloatArray], bins: int = BINS) -> Structure | None:
     """Structure of residuals over a quantity, (n,) for each part; None where there are too few independent rows.
 
     Bins have equally many rows.
@@ -86,7 +86,7 @@ def structure(parts: Sequence[Series], quantity: Sequence[FloatArray], bins: int
     return Structure(edges, mean, errors, energy, float(fisher.sf(ratio, count - 1, freed)))
 
 
-def autocovariance(parts: Sequence[Series]) -> FloatArray:
+def autocovariance(parts: Sequence[ResidualSeries]) -> FloatArray:
     """Autocovariance (l,) of residuals over the rows that count, until it has decayed, tapered."""
     longest = max(part.left.size for part in parts)
     size = 1 << (2 * longest - 1).bit_length()
@@ -106,7 +106,7 @@ def _bin(quantity: FloatArray, edges: FloatArray) -> NDArray[np.intp]:
 
 
 def _sums(
-    parts: Sequence[Series], where: Sequence[NDArray[np.intp]], values: Sequence[FloatArray], count: int
+    parts: Sequence[ResidualSeries], where: Sequence[NDArray[np.intp]], values: Sequence[FloatArray], count: int
 ) -> FloatArray:
     """Sums (K,) of values (n,) over the rows of each bin."""
     found = np.zeros(count)
@@ -115,7 +115,7 @@ def _sums(
     return found
 
 
-def _of_sums(part: Series, at: NDArray[np.intp], correlation: FloatArray, count: int) -> FloatArray:
+def _of_sums(part: ResidualSeries, at: NDArray[np.intp], correlation: FloatArray, count: int) -> FloatArray:
     """Covariance (K, K) of the sums of the bins of one part."""
     inside = np.zeros((count, at.size))
     inside[at[part.rows], np.flatnonzero(part.rows)] = 1.0

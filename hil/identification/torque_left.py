@@ -28,7 +28,7 @@ from hil.identification.derivatives import matched
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.measured import Measured
 from hil.identification.plain_model import MotionData, PlainModel, fit_plain_model, motion_data
-from hil.identification.structure import Series
+from hil.identification.structure import ResidualSeries
 from hil.identification.twin_deviation import held_on_motor
 
 _ADDED = 0.01  # of the torque's standard deviation: far above rounding, and an axis that slides goes on sliding
@@ -75,7 +75,7 @@ def left_by_twin(hypothesis: Hypothesis, data: Dataset, slowest: float, deviatio
     return _share(left, data, slowest, deviation)
 
 
-def needed_torque(hypothesis: Hypothesis, data: Dataset, slowest: float) -> list[Series]:
+def needed_torque(hypothesis: Hypothesis, data: Dataset, slowest: float) -> list[ResidualSeries]:
     """Torque (n,) that the measured motion of each run needs beyond that of a twin; NaN where it does not hold it.
 
     Rows in which the motor is faster than `slowest` count.
@@ -88,7 +88,7 @@ def needed_torque(hypothesis: Hypothesis, data: Dataset, slowest: float) -> list
         moved = _innovation(hypothesis, replace(run, torque=run.torque + added), data.observer_s) - innovation
         scale = float(np.median(moved[rows])) if rows.any() else 0.0
         left = -innovation * added / scale if scale else np.full(run.motor.size, np.nan)
-        found.append(Series(left, rows))
+        found.append(ResidualSeries(left, rows))
     return found
 
 

@@ -23,7 +23,7 @@ from hil.diagnosis.search.rivals import ENDED, RivalFit, chosen, ended
 from hil.diagnosis.search.score_test import screen_library
 from hil.diagnosis.stages import Prepared, Progress, Searched
 from hil.identification.estimator import Fit
-from hil.identification.inference import bic_gain, whitening
+from hil.identification.inference import bic_gain, standard_errors, whitening
 from hil.identification.nominal_fit import fit_nominal_parameters, require_finite
 from hil.identification.parallel import in_parallel
 from hil.identification.terms import Key, Term, compatible, effects, free_slot
@@ -111,7 +111,7 @@ def _without(fit: Fit, index: int) -> Fit:
 def claimed(fit: Fit) -> Fit:
     """Remove the terms whose values are not valid for their mechanism; where these are another's, that takes its place.
 
-    A spring that rests out of reach is a weight.
+    A spring that rests out of reach is a weight, and so is one whose stiffness does not differ from none.
     """
     while True:
         lost = _invalid(fit)
@@ -126,8 +126,21 @@ def claimed(fit: Fit) -> Fit:
 
 
 def _invalid(fit: Fit) -> list[int]:
-    """Indices of the terms whose values are not valid for their mechanism."""
-    return [index for index, term in enumerate(fit.terms) if not claimable(term, fit.bench, fit.data.runs)]
+    """Indices of the terms whose values are not valid for their mechanism, or not told apart from its limit."""
+    return [
+        index
+        for index, term in enumerate(fit.terms)
+        if not claimable(term, fit.bench, fit.data.runs) or _at_limit(fit, index)
+    ]
+
+
+def _at_limit(fit: Fit, index: int) -> bool:
+    """True for a term with a limit that is another mechanism, whose strength is within its standard errors of none."""
+    term, mechanism = fit.terms[index], BY_ID[fit.terms[index].effect]
+    if mechanism.beyond is None or not fit.jacobian.size:
+        return False
+    error = standard_errors(fit)[fit.hypothesis.columns(index)][mechanism.strength]
+    return mechanism.size(term.values, axis_facts(fit.bench, fit.data.runs)) < CRITERIA.sigmas * error
 
 
 def _beyond(fit: Fit, index: int) -> Term | None:

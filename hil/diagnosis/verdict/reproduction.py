@@ -16,7 +16,7 @@ from hil.quantities import digits
 
 
 @dataclass(frozen=True)
-class Reproduction:
+class Reproduced:
     """What a twin leaves: the largest mean square of a channel over its noise in training and on held-out recordings,
     the strongest structure in words, and the mean squares of the torque missed on held-out motion, over its squared
     noise, by the twin and by the plain model. None where there is nothing held out, or no torque."""
@@ -34,7 +34,7 @@ def reproduction(fit: Fit, held_out: Dataset) -> Ledger:
     words = structure[0].in_words(fit.bench.axis.drive_unit) if structure else ""
     left, plain = torque_missed(fit, held_out), _missed_by_plain(fit, held_out)
     torque = None if left is None or plain is None else (left, plain)
-    return examine(REPRODUCED, Reproduction(fit.worst_ratio, elsewhere, words, torque), CRITERIA)
+    return examine(REPRODUCED, Reproduced(fit.worst_ratio, elsewhere, words, torque), CRITERIA)
 
 
 def behind_plain(judged: Judged) -> bool:

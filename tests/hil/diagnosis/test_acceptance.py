@@ -19,7 +19,7 @@ from hil.diagnosis.ledger import Considered, accepted, examine, refusal
 from hil.diagnosis.reproduced import REPRODUCED
 from hil.diagnosis.search.addition import Harm
 from hil.diagnosis.search.events import InsideWindows
-from hil.diagnosis.verdict.reproduction import Reproduction
+from hil.diagnosis.verdict.reproduction import Reproduced
 
 # A new constant needs a sealed draw that improves beyond its interval, or it takes the place of another (CONTRIBUTING).
 CONSTANTS = 47
@@ -192,8 +192,8 @@ def test_a_score_must_promise_evidence_and_energy() -> None:
 )
 def test_a_twin_that_leaves_something_reproduces_nothing(quantities: dict[str, Any], rule: str) -> None:
     usual = {"worst": 1.5, "held_out": 3.9, "structure": "", "torque": (1.01, 1.0)}
-    assert accepted(examine(REPRODUCED, Reproduction(**usual), CRITERIA))
-    assert examine(REPRODUCED, Reproduction(**(usual | quantities)), CRITERIA)[-1].rule == rule
+    assert accepted(examine(REPRODUCED, Reproduced(**usual), CRITERIA))
+    assert examine(REPRODUCED, Reproduced(**(usual | quantities)), CRITERIA)[-1].rule == rule
 
 
 def test_answers_after_a_refusal_are_left_out() -> None:

@@ -9,13 +9,13 @@ from hypothesis import strategies as st
 from scipy.signal import lfilter
 
 from hil.arrays import FloatArray
-from hil.identification.structure import Series, autocovariance, structure
+from hil.identification.structure import ResidualSeries, autocovariance, structure
 
 ROWS = 6000
 
 
-def series(left: FloatArray) -> list[Series]:
-    return [Series(left, np.ones(left.size, dtype=bool))]
+def series(left: FloatArray) -> list[ResidualSeries]:
+    return [ResidualSeries(left, np.ones(left.size, dtype=bool))]
 
 
 def slow_noise(seed: int, pole: float) -> FloatArray:
@@ -60,7 +60,7 @@ def test_rows_that_do_not_count_and_several_parts_are_no_matter() -> None:
     x, left = swing(), slow_noise(3, 0.5)
     rows = np.arange(ROWS) % 3 > 0
     spoilt = np.where(rows, left, 1e9)
-    found = structure([Series(spoilt, rows), Series(left, rows)], [x, x])
+    found = structure([ResidualSeries(spoilt, rows), ResidualSeries(left, rows)], [x, x])
     assert found is not None
     assert np.abs(found.means).max() < 1.0
 

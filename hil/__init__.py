@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from hil.twin.library import LIBRARY
     from hil.twin.mechanism import Mechanism
 
-__version__ = "0.3.0"
+__version__ = "0.4.0"
 
 with _suppress(_HilError):  # raised again when a kernel is needed
     _provide_kernel_cache()  # before any module imports numba

@@ -55,10 +55,8 @@ def _material(of: Addition | Need, c: Criteria) -> Answer:
 
 
 def _worth(of: Addition, c: Criteria) -> Answer | None:
-    if of.explained is None:  # nothing is above the noise
-        return None
     share = c.worth if of.beside < c.several else c.series
-    return of.explained >= share, {"explained": of.explained, "needed": share}
+    return None if of.explained is None else (of.explained >= share, {"explained": of.explained, "needed": share})
 
 
 def _laps(of: Addition, c: Criteria) -> Answer | None:
@@ -75,9 +73,7 @@ def _structure(of: Addition, c: Criteria) -> Answer | None:
 
 def _constant(of: Addition, c: Criteria) -> Answer | None:
     seen = of.inside
-    if seen is None:
-        return None
-    return is_constant(seen, c), {"left": seen.left / (seen.before or 1.0)}
+    return None if seen is None else (is_constant(seen, c), {"left": seen.left / (seen.before or 1.0)})
 
 
 def is_constant(seen: InsideWindows | None, c: Criteria = CRITERIA) -> bool:
@@ -139,7 +135,7 @@ def _moves(of: Ablation, c: Criteria) -> Answer:
 
 
 def _torque_held_out(of: Ablation, c: Criteria) -> Answer | None:
-    if of.torque is None:
+    if of.torque is None:  # an error of a sensor, or not told
         return None
     left, without = of.torque
     return left - without <= c.material, {"left": left**0.5, "without": without**0.5}

@@ -140,7 +140,6 @@ def _unnamed(one: UnnamedTerm, judged: Judged) -> Unnamed:
     near = next((other for other in reversed(tried) if not other.accepted), None)
     return Unnamed(
         effect=mapped.id,
-        block=mapped.block.value,
         parameters={name: value for name, value in zip(mapped.names, one.term.values, strict=True)},
         held_out_before=one.before,
         held_out_after=one.after,

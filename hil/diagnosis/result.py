@@ -218,7 +218,7 @@ class StructureLeft(_Part):
     """A dependence of what is left on a quantity, which noise does not have."""
 
     channel: str = Field(description="torque that the axis needs beyond the twin's, or difference of the encoders")
-    over: str = Field(description="quantity")
+    over: str
     share: Share = Field(description="of the mean square of what is left")
     by_chance: Share = Field(description="probability of it without structure; errors count autocorrelation")
     text: str
@@ -228,7 +228,6 @@ class Unnamed(_Part):
     """A map of what has no name, as bench.diagnosed.yaml has it; motor units."""
 
     effect: str = Field(description="id of the map")
-    block: str
     parameters: dict[str, float]
     held_out_before: NotNegative = Field(description="rms on held-out recordings without it [N m, N, m or rad]")
     held_out_after: NotNegative
@@ -263,12 +262,8 @@ class Result(_Part):
     )
     change: AxisChange | None = Field(None, description="for `axis_changed`; for `unexplained` one that explains most")
     parameter_corrections: dict[str, Correction]
-    added_command: tuple[EventWindow, ...] = Field(
-        (), description="windows of a command that is added behind the control law, by time"
-    )
-    not_identifiable: tuple[str, ...] = Field(
-        (), description="nominal parameters whose fit ended at the bound of the allowed range: no correction"
-    )
+    added_command: tuple[EventWindow, ...] = Field((), description="a command added behind the control law, by time")
+    not_identifiable: tuple[str, ...] = Field((), description="parameters at the bound of their range: no correction")
     fit: dict[str, ChannelFit]
     not_testable: tuple[str, ...] = Field(description="mechanisms this motion cannot show")
     unexplained: Unexplained

@@ -35,6 +35,7 @@ def with_time_left(progress: Callable[[str], None], begin_s: float, budget_s: fl
         elapsed_s = time.monotonic() - begin_s
         rest_s = budget_s - elapsed_s if elapsed_s < budget_s else math.inf
         left_s = min(elapsed_s * (1.0 / share - 1.0), rest_s)
-        progress(f"{step} (about {digits(max(left_s, 1.0), 1)} s left)")
+        text = f"{step} (about {digits(max(left_s, 1.0), 1)} s left)"
+        progress(text)
 
     return tell

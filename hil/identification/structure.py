@@ -21,6 +21,7 @@ from hil.arrays import FloatArray
 BINS = 10  # of a quantity: a bend, a step and a line show in them; twice as many for one that is asked by direction
 _TAPER = 4  # Bartlett window in correlation times: it shortens the correlation by an eighth
 _DECAYED = 0.05  # of the variance: the correlation time ends there
+_NARROWEST = 0.2  # bin, over one of equal width
 _FEWEST_INDEPENDENT = 2.0  # independent rows per bin, below which nothing is told
 
 
@@ -52,12 +53,13 @@ class Structure:
 def structure(parts: Sequence[ResidualSeries], quantity: Sequence[FloatArray], bins: int = BINS) -> Structure | None:
     """Structure of residuals over a quantity, (n,) for each part; None where there are too few independent rows.
 
-    Bins have equally many rows.
+    Bins have equally many rows, but are not narrower than a fifth of equal ones: what a plateau of the quantity has
+    within it is the pattern of its counts.
     """
     values = np.concatenate([one[part.rows] for one, part in zip(quantity, parts, strict=True)])
     if values.size < bins or not np.isfinite(values).all():
         return None
-    edges = np.unique(np.quantile(values, np.linspace(0.0, 1.0, bins + 1)))
+    edges = _edges(values, bins)
     count = edges.size - 1
     if count < 2:
         return None
@@ -99,6 +101,17 @@ def autocovariance(parts: Sequence[ResidualSeries]) -> FloatArray:
     decayed = np.flatnonzero(covariance <= _DECAYED * covariance[0])
     length = min(_TAPER * max(int(decayed[0]) if decayed.size else half, 1), half)
     return np.asarray(covariance[:length] * (1.0 - np.arange(length) / length))
+
+
+def _edges(values: FloatArray, bins: int) -> FloatArray:
+    """Edges (K + 1,) of at most so many bins."""
+    wanted = np.quantile(values, np.linspace(0.0, 1.0, bins + 1))
+    least = _NARROWEST * (wanted[-1] - wanted[0]) / bins
+    kept = [wanted[0]]
+    for edge in wanted[1:-1]:
+        if edge - kept[-1] > least and wanted[-1] - edge > least:
+            kept.append(edge)
+    return np.array([*kept, wanted[-1]])
 
 
 def _bin(quantity: FloatArray, edges: FloatArray) -> NDArray[np.intp]:

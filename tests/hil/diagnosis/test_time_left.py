@@ -16,7 +16,7 @@ from hil.diagnosis.time_left import with_time_left
 from hil.errors import InputError
 from hil.identification.terms import Term
 from hil.report.diagnosis_report import write_diagnosis
-from hil.twin.library import BY_ID
+from hil.twin.library import LIBRARY
 
 
 def test_a_search_without_time_names_nothing_and_lists_what_was_not_tried(tmp_path: Path) -> None:
@@ -24,7 +24,7 @@ def test_a_search_without_time_names_nothing_and_lists_what_was_not_tried(tmp_pa
     diagnosis = diagnose([run], [], bench(), budget_s=1e-6)
     result, ended = diagnosis.result, diagnosis.result.time_budget
     assert ended is not None
-    assert ended.not_tried == tuple(BY_ID)
+    assert ended.not_tried == tuple(mechanism.id for mechanism in LIBRARY)
     assert result.verdict is Verdict.UNEXPLAINED
     assert result.statement.startswith("The time budget ended before a mechanism was found: ")
     assert result.next_experiment is None

@@ -20,7 +20,7 @@ from hil.identification.honest_refit import Refit
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.measured import take
 from hil.identification.terms import Term
-from hil.twin.library import BY_ID
+from hil.twin.library import BY_ID, LIBRARY
 
 OWNER = bench()
 WITHIN_THE_RECORDING = {  # of 2.4 s over 60 mm, and 5 N m at most
@@ -99,7 +99,7 @@ def deviation(axis: Axes) -> float | None:
     return None
 
 
-@pytest.mark.parametrize("effect", BY_ID)
+@pytest.mark.parametrize("effect", [mechanism.id for mechanism in LIBRARY])
 def test_the_picture_of_a_mechanism_shows_measurement_and_twin_agree(effect: str) -> None:
     diagnosis = diagnosis_of(effect)
     shown = finding_figure(diagnosis, diagnosis.final.terms[0])

@@ -62,12 +62,28 @@ def explained(cost: float, motor: float, table: float) -> Any:
     run = SimpleNamespace(motor=np.zeros(1000), evaluated=slice(None), kind=AxisKind.ROTARY)
     data = SimpleNamespace(runs=(run,))
     ratios = ({"motor": motor, "table": table},)
-    return SimpleNamespace(cost=cost, rows=2000, excess=0.0, terms=(), data=data, noise_ratios=ratios, bench=OWNER)
+    return SimpleNamespace(
+        cost=cost,
+        rows=2000,
+        noise_energy=2000.0,
+        excess=0.0,
+        at_floor=False,
+        terms=(),
+        data=data,
+        noise_ratios=ratios,
+        bench=OWNER,
+    )
 
 
 def test_a_little_harm_does_not_set_aside_what_explains_nearly_all(monkeypatch: pytest.MonkeyPatch) -> None:
     """An eccentric pulley explained nine tenths of what play left, and a third more remained in the motor."""
-    for name, value in {"evidence": 1000.0, "gain": 1e6, "unrepeated": (0.0, 0.0), "inside": None}.items():
+    for name, value in {
+        "evidence": 1e3,
+        "gain": 1e6,
+        "explained": 0.9,
+        "unrepeated": (0.0, 0.0),
+        "inside": None,
+    }.items():
         monkeypatch.setattr(Addition, name, value)
     search = SearchRound(base := explained(5e5, 12.0, 1000.0), base, explained(6e5, 16.0, 1100.0))
     most, play = (search.addition(fit) for fit in (explained(4e4, 16.0, 75.0), explained(3e5, 6.0, 60.0)))

@@ -261,8 +261,8 @@ HELD_OUT: tuple[Rule[Ablation], ...] = (
     # sandwich estimator of `standard_errors`
     Rule(
         "strength",
-        "its strength is above its standard error",
-        "its strength is below its standard error",
+        "its strength is above three standard errors",
+        "its strength is below three standard errors",
         _strength,
     ),
     # `verdict.noise_free`

@@ -169,14 +169,14 @@ def _dependences(
     total = float(np.mean((rows - rows.mean()) ** 2)) if rows.size else 0.0
     if not total > 0.0:
         return
-    elsewhere = questions(fit.hypothesis, held_out, plain) if others else []
-    for number, question in enumerate(questions(fit.hypothesis, fit.data, plain)):
+    elsewhere = {one.name: one.values for one in questions(fit.hypothesis, held_out, plain)} if others else {}
+    for question in questions(fit.hypothesis, fit.data, plain):
         found = structure(parts, question.values, question.bins)
         if found is None:
             continue
         gain = None
-        if others and question.kept:
-            gain = _removed(found, others, elsewhere[number].values)
+        if question.kept and question.name in elsewhere:
+            gain = _removed(found, others, elsewhere[question.name])
         yield Dependence(channel, question, found, found.energy / total, found.energy / least, gain)
 
 

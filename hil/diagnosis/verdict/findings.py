@@ -165,8 +165,12 @@ def _values(term: Term, errors: Sequence[float], bench: Bench) -> dict[str, Valu
 def _sure(term: Term, errors: Sequence[float], bench: Bench, runs: Sequence[Measured]) -> float:
     """Least probability that a strength differs from no effect, whatever the distribution of its error (Chebyshev)."""
     mechanism = BY_ID[term.effect]
-    size, error = mechanism.size(term.values, axis_facts(bench, runs)), errors[mechanism.strength]
-    return max(1.0 - (error / size) ** 2, 0.0) if size > 0.0 and math.isfinite(error) else float(error == 0.0)
+    sizes = {place: abs(term.values[place]) for place in mechanism.indices(Role.STRENGTH)}
+    sizes[mechanism.strength] = mechanism.size(term.values, axis_facts(bench, runs))
+    return max(
+        max(1.0 - (errors[place] / size) ** 2, 0.0) if size > 0.0 and math.isfinite(errors[place]) else 0.0
+        for place, size in sizes.items()
+    )
 
 
 def _left(fits: Sequence[Fit], channel: str) -> float:

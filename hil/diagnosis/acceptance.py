@@ -138,7 +138,7 @@ def _torque_held_out(of: Ablation, c: Criteria) -> Answer | None:
     if of.torque is None:  # an error of a sensor, or not told
         return None
     left, without = of.torque
-    return left - without <= c.material, {"left": left**0.5, "without": without**0.5}
+    return left - without <= c.discrepancy, {"left": left, "without": without}
 
 
 def _explains(of: Remainder, c: Criteria) -> Answer:
@@ -276,7 +276,7 @@ HELD_OUT: tuple[Rule[Ablation], ...] = (
     Rule(
         "torque, held out",
         "the torque of held-out motion is predicted no worse with it",
-        "with it the twin leaves {left:.3g} times the noise of the torque on held-out motion, without it {without:.3g}",
+        "with it the twin leaves {left:.2%} of the torque on held-out motion, without it {without:.2%}",
         _torque_held_out,
     ),
     # a real effect pays with no channel for another

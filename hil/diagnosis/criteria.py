@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from hil.identification.inference import ALIKE, TIED
 from hil.identification.law.result import REPLAYED
 from hil.identification.noise_floor import FLOOR, REPEATS
+from hil.identification.residual_scales import DISCREPANCY
 
 
 @dataclass(frozen=True)
@@ -42,6 +43,9 @@ class Criteria:
     # missing, one that only trades between channels loses as it gains.
     worse: float = 1.1**2
     paid: float = 0.1
+
+    # Share of the torque's deviation (rms) by which correct simulations of one axis differ: less is no worse.
+    discrepancy: float = DISCREPANCY
 
     # Windows of a force: energy per row inside over that outside (twice the rms, for edges between two rows), share of
     # the energy inside that the best constant leaves of one push (0.19 of half a sine, 0.25 of a triangle), level over

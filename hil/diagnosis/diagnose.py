@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from hil.bench.bench_file import Bench
 from hil.diagnosis.diagnosis import Diagnosis
 from hil.diagnosis.preparation.prepare import prepare
-from hil.diagnosis.preparation.structure import as_one_inertia
+from hil.diagnosis.preparation.structure import as_one_inertia, as_plant_alone
 from hil.diagnosis.reporting import report
 from hil.diagnosis.search.forward_selection import search
 from hil.diagnosis.stages import Judged, Prepared, Progress
@@ -49,7 +49,8 @@ def diagnose(
         return judge(test_on_held_out(searched))
 
     judged = answer(prepared)
-    if behind_plain(judged) and (least := as_one_inertia(prepared)):
-        progress("comparing with one inertia")
-        judged = with_less_torque(judged, answer(least))
+    for simpler in (as_one_inertia, as_plant_alone):
+        if behind_plain(judged) and (other := simpler(judged.tested.searched.prepared)):
+            progress("comparing with a simpler twin")
+            judged = with_less_torque(judged, answer(other))
     return Diagnosis(report(judged, progress, begin_s, budget_s))

@@ -27,7 +27,7 @@ def _no_worse_than_plain(of: Reproduced, c: Criteria) -> Answer | None:
     if of.torque is None:
         return None
     left, plain = of.torque
-    return left - plain <= c.material, {"left": left**0.5, "plain": plain**0.5}
+    return left - plain <= c.discrepancy, {"left": left, "plain": plain}
 
 
 REPRODUCED: tuple[Rule[Reproduced], ...] = (
@@ -56,7 +56,7 @@ REPRODUCED: tuple[Rule[Reproduced], ...] = (
     Rule(
         "plain model",
         "it predicts the torque of held-out motion no worse than plain least squares",
-        "it leaves {left:.3g} times the noise of the torque on held-out motion, plain least squares {plain:.3g}",
+        "it leaves {left:.2%} of the torque on held-out motion, plain least squares {plain:.2%}",
         _no_worse_than_plain,
     ),
 )

@@ -18,12 +18,11 @@ from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.plain_model import PlainModel
-from hil.identification.residual_scales import DISCREPANCY
-from hil.identification.structure import BINS, ResidualSeries, Structure, structure
+from hil.identification.structure import BINS, ResidualSeries, Structure, offset, structure
 from hil.identification.torque_left import fit_plain, measured_motion, needed_torque, torque_deviation
 from hil.quantities import digits, quantity, reading_unit
 
-POSITION, SPEED = "position", "speed"
+POSITION, SPEED, OFFSET = "position", "speed", "offset"
 TORQUE, DIFFERENCE = "torque", "difference"  # needed beyond the twin's; of the encoders, beyond the twin's
 
 
@@ -65,7 +64,8 @@ class Dependence:
         parts = [] if plain is None else _left(fit.hypothesis, fit.data, self.channel, plain)
         if not all(np.isfinite(part.left).all() for part in parts):
             return np.inf
-        found = structure(parts, self.question.values, self.question.bins)
+        question = self.question
+        found = offset(parts) if question.name == OFFSET else structure(parts, question.values, question.bins)
         return max(found.energy, 0.0) / self.found.energy if found else 0.0
 
     def rms_left(self, fit: Fit, data: Dataset) -> float:
@@ -86,6 +86,8 @@ class Dependence:
             what = f"the axis needs {quantity(abs(value), drive_unit)} {more} torque than the twin"
         else:
             what = f"the second encoder reads {quantity(abs(value), question.length)} {more} than the twin"
+        if question.name == OFFSET:
+            return f"{what} throughout (by chance {found.p:.1g})"
         moving = ""
         if question.by_direction:
             moving = " moving up" if low >= question.by_direction else " moving down"
@@ -169,6 +171,12 @@ def _dependences(
     total = float(np.mean((rows - rows.mean()) ** 2)) if rows.size else 0.0
     if not total > 0.0:
         return
+    if channel == TORQUE and (constant := offset(parts)):  # positions have a datum of their own
+        square = float(np.mean(rows**2))
+        there = np.concatenate([part.left[part.rows] for part in others]) if others else np.empty(0)
+        gain = float(np.mean(there**2) - np.mean((there - constant.means[0]) ** 2)) if there.size else None
+        question = Question(OFFSET, "", "", ())
+        yield Dependence(channel, question, constant, constant.energy / square, constant.energy / least, gain)
     elsewhere = {one.name: one.values for one in questions(fit.hypothesis, held_out, plain)} if others else {}
     for question in questions(fit.hypothesis, fit.data, plain):
         found = structure(parts, question.values, question.bins)
@@ -183,7 +191,7 @@ def _dependences(
 def _least_energy(data: Dataset, channel: str, plain: PlainModel) -> float:
     """Mean square of a residual from which a dependence is material."""
     if channel == TORQUE:
-        return (DISCREPANCY * torque_deviation([data], plain.slowest)) ** 2
+        return (CRITERIA.discrepancy * torque_deviation([data], plain.slowest)) ** 2
     return CRITERIA.material * float(np.mean([run.noise.table_m**2 for run in data.runs]))
 
 

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
+from hil.identification.plain_model import fit_plain_model, motion_data
 from hil.recording.quantum import count_of
 
 _COARSER = 1.5  # factor of a recorded step over the count of the bench: one count, seen with noise, is below
@@ -57,7 +58,7 @@ def estimate_noise(
     if not np.array_equal(command, torque):
         of_torque = _of_drive(command, torque)
     else:  # the steps of a held command are no noise
-        of_torque = 0.0 if is_held(torque, motor) else white_noise(torque)
+        of_torque = 0.0 if is_held(torque, motor) else _of_samples(torque, motor, period_s)
     of_torque = max(of_torque, _rounding(torque), _DIGITS * float(np.max(np.abs(torque), initial=0.0)))
     jitter_s = _jitter_s(motor, velocity, motor_noise, period_s)
     return Noise(motor_noise, table_noise, of_torque, jitter_s, coarse=count > bench.motor_count)
@@ -115,6 +116,19 @@ def _jitter_s(motor: FloatArray, velocity: FloatArray, noise: float, period_s: f
         return 0.0
     more = (variance[fast] - noise**2) / speed[fast] ** 2
     return float(np.sqrt(np.median(more))) if np.median(variance[fast]) > 3.0 * noise**2 else 0.0
+
+
+def _of_samples(torque: FloatArray, motor: FloatArray, period_s: float) -> float:
+    """Noise of a torque (n,) that was sampled: its white noise, or what the plain model leaves of it if that is less.
+
+    Between slow rows the torque itself changes, which is no noise.
+    """
+    data = motion_data(motor, torque, period_s)
+    plain = fit_plain_model([data])
+    if plain is None:
+        return white_noise(torque)
+    left = torque - plain.predict(data.moved)
+    return min(white_noise(torque), float(np.std(left[data.sliding(plain.slowest)])))
 
 
 def _of_drive(command: FloatArray, torque: FloatArray) -> float:

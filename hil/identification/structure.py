@@ -88,6 +88,23 @@ def structure(parts: Sequence[ResidualSeries], quantity: Sequence[FloatArray], b
     return Structure(edges, mean, errors, energy, float(fisher.sf(ratio, count - 1, freed)))
 
 
+def offset(parts: Sequence[ResidualSeries]) -> Structure | None:
+    """Mean of residuals over all rows, as a structure of one bin; None where there are too few independent rows."""
+    left = np.concatenate([part.left[part.rows] for part in parts])
+    if not left.size:
+        return None
+    mean = float(left.mean())
+    correlation = autocovariance([part._replace(left=part.left - mean) for part in parts])
+    spread = max(correlation[0] + 2.0 * float(correlation[1:].sum()), correlation[0])
+    independent = left.size * correlation[0] / spread if spread > 0.0 else 0.0
+    if independent < _FEWEST_INDEPENDENT:
+        return None
+    variance = spread / left.size
+    p = float(fisher.sf(mean**2 / variance, 1, independent))
+    edges = np.array([-np.inf, np.inf])
+    return Structure(edges, np.array([mean]), np.array([variance**0.5]), mean**2 - variance, p)
+
+
 def autocovariance(parts: Sequence[ResidualSeries]) -> FloatArray:
     """Autocovariance (l,) of residuals over the rows that count, until it has decayed, tapered."""
     longest = max(part.left.size for part in parts)

@@ -87,9 +87,8 @@ def write_diagnosis(diagnosis: Diagnosis, folder: Path) -> None:
 def _structure(page: Page, diagnosis: Diagnosis, folder: Path) -> None:
     """What is left depends on something: where, and the map of it that has no name."""
     result = diagnosis.result
-    if not result.structure:
-        return
-    page.picture(save(structure_figure(diagnosis), folder / "structure.png"), CAPTION_OF_STRUCTURE)
+    if result.structure and (figure := structure_figure(diagnosis)):
+        page.picture(save(figure, folder / "structure.png"), CAPTION_OF_STRUCTURE)
     for one in result.unnamed:
         page.text(
             f"{one.effect.replace('_', ' ').capitalize()}: bench.diagnosed.yaml has it. What is left on held-out "

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from hil.diagnosis.structure_left import TORQUE, Dependence
+from hil.diagnosis.structure_left import OFFSET, TORQUE, Dependence
 from hil.figures.drawing import style_axis
 from hil.figures.panels import COMMAND, MEASURED, SIMULATED
 from hil.quantities import reading_unit
@@ -23,10 +23,12 @@ CAPTION = (
 )
 
 
-def structure_figure(diagnosis: Diagnosis) -> Figure:
-    """Draw the strongest dependences of what is left, one panel each."""
+def structure_figure(diagnosis: Diagnosis) -> Figure | None:
+    """Draw the strongest dependences of what is left, one panel each; None of an offset alone."""
     judged = diagnosis.reported.judged
-    shown = judged.structure[:MOST]
+    shown = [one for one in judged.structure if one.question.name != OFFSET][:MOST]
+    if not shown:
+        return None
     figure = Figure(figsize=(10.0, 0.6 + 2.6 * len(shown)), layout="constrained")
     axes = figure.subplots(len(shown), 1, squeeze=False)[:, 0]
     mapped = {id(one.dependence): one.term.values for one in judged.unnamed}

@@ -1,7 +1,8 @@
-"""Other structures of an axis for the same recordings: as one inertia, without the springs of its bench.
+"""Simpler twins for the same recordings: without the springs of the bench, and without its control law.
 
 Motor and table with a spring between them have a resonance. Where the recordings do not tell how the mass is split,
-nothing holds that resonance where it is, and the twin may miss the torque that one inertia predicts.
+nothing holds that resonance where it is, and the twin may miss the torque that one inertia predicts. A law that is
+nearly right says at which instants a torque acts; where it runs faster than the rows, they tell that better.
 """
 
 from dataclasses import replace
@@ -10,9 +11,15 @@ from math import pi
 from hil.bench.axis_models import Rigid
 from hil.bench.bench_file import Bench
 from hil.bench.turning_axes import Rotary
+from hil.diagnosis.preparation.usable_law import set_aside
 from hil.diagnosis.stages import Prepared
 from hil.identification.dataset import prepare_dataset
 from hil.identification.residual_scales import inertia
+
+_ONE = (
+    "The recordings do not tell the springs and the split of the masses of the bench: with them the twin predicts the "
+    "torque of held-out motion worse than as one inertia. The axis was judged as one inertia."
+)
 
 
 def as_one_inertia(prepared: Prepared) -> Prepared | None:
@@ -22,7 +29,24 @@ def as_one_inertia(prepared: Prepared) -> Prepared | None:
         return None
     one = rigid(bench)
     data = prepare_dataset(prepared.train.runs, one)
-    return replace(prepared, bench=one, train=data, held_out=data.over(prepared.held_out.runs))
+    notes = (*prepared.notes, _ONE)
+    return replace(prepared, bench=one, train=data, held_out=data.over(prepared.held_out.runs), notes=notes)
+
+
+def as_plant_alone(prepared: Prepared) -> Prepared | None:
+    """The recordings beside the twin without its control law, whose rows may be samples; None without a law."""
+    if not prepared.bench.law_known or not prepared.train.observability.torque_measured:
+        return None
+    law = set_aside(prepared.bench, "with it the twin predicts the torque of held-out motion worse than without")
+    runs = [
+        replace(run, observability=replace(run.observability, closed_loop=False))
+        for run in (*prepared.train.runs, *prepared.held_out.runs)
+    ]
+    bench = law.bench.sampled(runs[0].period_s)
+    data = prepare_dataset(runs[: len(prepared.train.runs)], bench)
+    held_out = data.over(runs[len(prepared.train.runs) :])
+    notes = (*prepared.notes, *law.notes)
+    return replace(prepared, bench=bench, train=data, held_out=held_out, law=law, notes=notes)
 
 
 def rigid(bench: Bench) -> Bench:

@@ -42,8 +42,8 @@ class Ablation:
     that does not repeat from lap to lap. `gain` is the evidence for the term on the held-out recordings. They are None
     without held-out recordings or laps, and for an event, whose `train` is the ratio over all recordings. `acts`: the
     term changes the held-out residuals as it does those in training. `clear`: its strength differs from none.
-    `quiet`: it hardly acts on motion without noise. `torque`: mean squares of the torque that held-out motion needs
-    beyond that of the twin, over its squared noise, with the term and without; None for an error of a sensor. `harm`:
+    `quiet`: it hardly acts on motion without noise. `torque`: that which held-out motion needs beyond that
+    of the twin, over its deviation (rms), with the term and without; None for an error of a sensor. `harm`:
     each channel with it and without it.
     """
 
@@ -182,7 +182,7 @@ def _quiet(fit: Fit, without: Fit) -> bool:
 
 
 def _torque(fit: Fit, without: Fit, term: Term, held_out: Dataset) -> tuple[float, float] | None:
-    """Mean squares of the torque missed on held-out recordings with a term of the plant and without it."""
+    """Torque missed on held-out recordings with a term of the plant and without it."""
     if BY_ID[term.effect].block in (Block.CONTROLLER, Block.SENSOR) or term.windows:
         return None
     left, other = torque_missed(fit, held_out), torque_missed(without, held_out)

@@ -1,6 +1,6 @@
 """How well a twin without new terms reproduces recordings: noise, structure, and torque beside the plain model."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,15 +11,15 @@ from hil.diagnosis.stages import Judged
 from hil.diagnosis.structure_left import structure_left
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
-from hil.identification.torque_left import fit_plain, left_by_plain, left_by_twin
-from hil.quantities import digits
+from hil.identification.plain_model import PlainModel
+from hil.identification.torque_left import fit_plain, left_by_plain, left_by_twin, torque_deviation
 
 
 @dataclass(frozen=True)
 class Reproduced:
     """What a twin leaves: the largest mean square of a channel over its noise in training and on held-out recordings,
-    the strongest structure in words, and the mean squares of the torque missed on held-out motion, over its squared
-    noise, by the twin and by the plain model. None where there is nothing held out, or no torque."""
+    the strongest structure in words, and the torque missed on held-out motion by the twin and by the plain model, over
+    its deviation (rms). None where there is nothing held out, or no torque."""
 
     worst: float
     held_out: float | None
@@ -41,44 +41,32 @@ def behind_plain(judged: Judged) -> bool:
     """True if plain least squares predict the torque of held-out motion better than the twin of a verdict."""
     final, held_out = judged.final, judged.tested.searched.prepared.held_out
     left, plain = torque_missed(final, held_out), _missed_by_plain(final, held_out)
-    return left is not None and plain is not None and left - plain > CRITERIA.material
+    return left is not None and plain is not None and left - plain > CRITERIA.discrepancy
 
 
 def with_less_torque(given: Judged, other: Judged) -> Judged:
-    """The verdict whose twin misses less torque of the held-out motion; the other says in a note that it is one."""
+    """The verdict whose twin misses less torque of the held-out motion; the first where both miss as much."""
     left, less = (torque_missed(one.final, one.tested.searched.prepared.held_out) for one in (given, other))
-    if left is None or less is None or left - less <= CRITERIA.material:
-        return given
-    prepared = other.tested.searched.prepared
-    note = (
-        "The recordings do not tell the springs and the split of the masses of the bench: with them the twin leaves "
-        f"{digits(left**0.5)} times the noise of the torque on held-out motion, as one inertia "
-        f"{digits(less**0.5)} times. The axis was judged as one inertia."
-    )
-    searched = replace(other.tested.searched, prepared=replace(prepared, notes=(*prepared.notes, note)))
-    return replace(other, tested=replace(other.tested, searched=searched))
+    return other if left is not None and less is not None and less < left else given
 
 
 def torque_missed(fit: Fit, held_out: Dataset) -> float | None:
-    """Mean square of the torque that held-out motion needs beyond that of a twin, over its squared noise; None: not
-    told. Infinite where the twin does not hold the motion."""
-    plain = fit_plain(fit.data) if _told(held_out) else None
+    """Torque that held-out motion needs beyond that of a twin, over its deviation (rms); None: not told.
+
+    Infinite where the twin does not hold the motion.
+    """
+    plain = _plain(fit, held_out)
     if plain is None:
         return None
-    left = left_by_twin(fit.hypothesis, held_out, plain.slowest, _noise(held_out))
-    return np.inf if left is None else left**2
+    left = left_by_twin(fit.hypothesis, held_out, plain.slowest, torque_deviation([held_out], plain.slowest))
+    return np.inf if left is None else left
 
 
 def _missed_by_plain(fit: Fit, held_out: Dataset) -> float | None:
-    plain = fit_plain(fit.data) if _told(held_out) else None
-    left = None if plain is None else left_by_plain(plain, held_out, _noise(held_out))
-    return None if left is None else left**2
+    plain = _plain(fit, held_out)
+    return None if plain is None else left_by_plain(plain, held_out, torque_deviation([held_out], plain.slowest))
 
 
-def _told(data: Dataset) -> bool:
-    return bool(data.runs) and data.observability.torque_measured
-
-
-def _noise(data: Dataset) -> float:
-    """Noise of the torque over all runs (rms)."""
-    return float(np.sqrt(np.mean([run.noise.torque**2 for run in data.runs])))
+def _plain(fit: Fit, held_out: Dataset) -> PlainModel | None:
+    told = held_out.runs and held_out.observability.torque_measured
+    return fit_plain(fit.data) if told else None

@@ -258,19 +258,19 @@ HELD_OUT: tuple[Rule[Ablation], ...] = (
         "it improves the fit to the training recordings, but worsens that to repeated laps",
         _repeats,
     ),
-    # sandwich estimator of `standard_errors`
-    Rule(
-        "strength",
-        "its strength is above three standard errors",
-        "its strength is below three standard errors",
-        _strength,
-    ),
     # `verdict.noise_free`
     Rule(
         "motion without noise",
         "it acts on the motion, not only on the noise of the sensors",
         "it changes what the noise of the sensors does in the twin, and hardly the motion",
         _moves,
+    ),
+    # sandwich estimator of `standard_errors`
+    Rule(
+        "strength",
+        "its strength is above three standard errors",
+        "its strength is below three standard errors",
+        _strength,
     ),
     # a torque on the axis shows in the torque; errors of sensors may not
     Rule(

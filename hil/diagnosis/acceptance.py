@@ -268,8 +268,8 @@ HELD_OUT: tuple[Rule[Ablation], ...] = (
     # sandwich estimator of `standard_errors`
     Rule(
         "strength",
-        "its strength is above three standard errors",
-        "its strength is below three standard errors",
+        "its strength is above its standard error",
+        "its strength is below its standard error",
         _strength,
     ),
     # a torque on the axis shows in the torque; errors of sensors may not

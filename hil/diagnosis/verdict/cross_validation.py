@@ -4,7 +4,7 @@
 
 Both hypotheses are fitted to the training recordings, so that the gain has no penalty for parameters. Repeated motion
 is a second test: a term whose effect differs from lap to lap must reduce the measured differences between laps. A term
-also falls if its strength is within three standard errors, if it worsens a channel of a training recording (`harm`), or
+also falls if its strength is within its standard error, if it worsens a channel of a training recording (`harm`), or
 if it changes only what the noise of the sensors does, see `noise_free`.
 """
 
@@ -41,7 +41,7 @@ class Ablation:
     `held_out` are its residual energy without the term over that with it, `laps` the same ratio of the part
     that does not repeat from lap to lap. `gain` is the evidence for the term on the held-out recordings. They are None
     without held-out recordings or laps, and for an event, whose `train` is the ratio over all recordings. `acts`: the
-    term changes the held-out residuals as it does those in training. `clear`: its strength differs from none.
+    term changes the held-out residuals as it does those in training. `clear`: its strength is above its standard error.
     `quiet`: it hardly acts on motion without noise. `torque`: that which held-out motion needs beyond that
     of the twin, over its deviation (rms), with the term and without; None for an error of a sensor. `harm`:
     each channel with it and without it.
@@ -160,7 +160,7 @@ def _change(fit: Fit, without: Fit) -> float:
 
 
 def _clear(fit: Fit) -> list[bool]:
-    """For each term, whether one of its strengths differs from no effect by its standard errors."""
+    """For each term, whether one of its strengths differs from no effect by more than its standard error."""
     if not fit.jacobian.size:  # evaluated, not fitted
         return [True] * len(fit.terms)
     errors, axis = standard_errors(fit), axis_facts(fit.bench, fit.data.runs)
@@ -169,7 +169,7 @@ def _clear(fit: Fit) -> list[bool]:
         mechanism, own = BY_ID[term.effect], errors[fit.hypothesis.columns(index)]
         sizes = {place: abs(term.values[place]) for place in mechanism.indices(Role.STRENGTH)}
         sizes[mechanism.strength] = mechanism.size(term.values, axis)
-        result.append(any(size > CRITERIA.sigmas * own[place] for place, size in sizes.items()))
+        result.append(any(size > own[place] for place, size in sizes.items()))
     return result
 
 

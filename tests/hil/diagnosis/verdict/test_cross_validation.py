@@ -33,7 +33,7 @@ def test_a_strength_below_its_standard_error_is_dropped(train: Dataset) -> None:
     error = standard_errors(small)[small.hypothesis.columns(0)][0]
     assert small.terms[0].values[0] < error
     proof = cross_validate(plain, small, train.over(()))
-    assert [ablation.refuted for ablation in proof.dropped] == ["its strength is below three standard errors"]
+    assert [ablation.refuted for ablation in proof.dropped] == ["its strength is below its standard error"]
 
 
 def test_a_term_that_harms_the_training_recordings_is_dropped(train: Dataset) -> None:

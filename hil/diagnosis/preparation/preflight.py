@@ -195,11 +195,10 @@ def _torque_problems(run: Measured, bench: Bench) -> Iterator[str]:
             "encoder"
         )
         return
-    factors = [j.value / inertia] if j.value > 5.0 * j.std_error else []
-    if physics.coulomb_n_m > 0.0 and coulomb.value > 5.0 * coulomb.std_error:
-        factors.append(coulomb.value / physics.coulomb_n_m)
-    # one of them may be wrong in the bench file; a wrong unit changes both
-    if factors and (min(factors) > WRONG_BY or max(factors) < 1.0 / WRONG_BY):
+    told = [(j, inertia), (coulomb, physics.coulomb_n_m)] if physics.coulomb_n_m > 0.0 else [(j, inertia)]
+    factors = [one.value / given for one, given in told if one.value > 5.0 * one.std_error]
+    # one of them may be wrong in the bench file, or not be told; a wrong unit changes both
+    if len(factors) == len(told) and (min(factors) > WRONG_BY or max(factors) < 1.0 / WRONG_BY):
         factor = float(np.exp(np.mean(np.log(factors))))
         units = {} if bench.axis.linear else {1.0 / bench.axis.ratio_m_rad: "N at the table"}
         against = f"the inertia and friction of the bench ({unit})"

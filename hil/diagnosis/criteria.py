@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from hil.identification.inference import ALIKE, TIED
 from hil.identification.law.result import REPLAYED
+from hil.identification.least_squares import SIGMAS
 from hil.identification.noise_floor import FLOOR, REPEATS
 from hil.identification.residual_scales import DISCREPANCY
 
@@ -55,7 +56,7 @@ class Criteria:
     stands_out: float = 5.0
     faint: float = 1e-3
 
-    sigmas: float = 3.0  # standard errors from which a value differs: 0.3 % of Gaussian ones are above without cause
+    sigmas: float = SIGMAS  # standard errors from which a value differs: 0.3 % of Gaussian ones are above without cause
     on_motion: float = 0.5  # least share of a term's gain on motion without noise: about 1 where it acts on the motion
     acts: float = 0.1  # least change of held-out residuals per row, over that in training, from which a term acts there
 

@@ -48,8 +48,8 @@ REPRODUCED: tuple[Rule[Reproduced], ...] = (
     # noise depends on nothing: `hil.identification.structure`, with errors that count autocorrelation and the questions
     Rule(
         "structure",
-        "what is left depends on no position, angle, speed, load or time",
-        "what is left has a structure: {structure}",
+        "the residuals do not depend on position, angle, speed, load or time",
+        "the residuals have a structure: {structure}",
         _without_structure,
     ),
     # a twin that inertia, friction and gravity by least squares beat lacks something, or has a structure too many

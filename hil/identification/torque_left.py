@@ -34,6 +34,7 @@ from hil.identification.twin_deviation import held_on_motor
 _ADDED = 0.01  # of the torque's standard deviation: far above rounding, and an axis that slides goes on sliding
 
 
+@lru_cache(maxsize=8)
 def fit_plain(data: Dataset) -> PlainModel | None:
     """Fit the plain model to a data set; None without sliding motion."""
     axis = data.bench.axis

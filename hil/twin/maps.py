@@ -3,6 +3,8 @@
 They are no mechanisms of the library: a search never fits them, so that a map hides no named cause.
 """
 
+from collections.abc import Callable
+
 from numba import njit
 
 from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, Stage, Text, Variant
@@ -51,7 +53,9 @@ def _parameters(over: str, quantity: Dimension, of: str, what: Dimension) -> tup
     )
 
 
-def _map(name: str, block: Block, stage: Stage, law: object, text: str, parameters: tuple[Parameter, ...]) -> Mechanism:
+def _map(
+    name: str, block: Block, stage: Stage, law: Callable[..., float], text: str, parameters: tuple[Parameter, ...]
+) -> Mechanism:
     return Mechanism(
         id=name,
         block=block,
@@ -59,7 +63,7 @@ def _map(name: str, block: Block, stage: Stage, law: object, text: str, paramete
         equation="straight lines between six knots",
         source="measured residual; no law",
         parameters=parameters,
-        variants=(Variant(stage, law),),  # type: ignore[arg-type]
+        variants=(Variant(stage, law),),
         text=Text(text, Picture.TIME),
     )
 

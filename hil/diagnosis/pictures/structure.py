@@ -24,7 +24,7 @@ CAPTION = (
 
 
 def structure_figure(diagnosis: Diagnosis) -> Figure | None:
-    """Draw the strongest dependences of what is left, one panel each; None of an offset alone."""
+    """Draw the strongest dependences of the residuals, one panel each; None where only an offset is left."""
     judged = diagnosis.reported.judged
     shown = [one for one in judged.structure if one.question.name != OFFSET][:MOST]
     if not shown:
@@ -61,7 +61,7 @@ def _means(axis: Axes, one: Dependence, drive_unit: str) -> None:
     axis.axhline(0.0, color=COMMAND, linewidth=0.8)
     what = "needed beyond the twin" if one.channel == TORQUE else "second encoder - twin"
     chance = f"by chance {one.found.p:.1g}" if one.found.p > 1e-12 else "by chance less than 1e-12"
-    title = f"{100.0 * one.explained:.0f} % of what is left depends on the {one.question.name}; {chance}"
+    title = f"{100.0 * one.explained:.0f} % of the residual depends on the {one.question.name}; {chance}"
     style_axis(axis, f"{what}\n[{unit}]", f"{one.question.name} [{along_unit}]", title)
     if turn:
         axis.legend(frameon=False)

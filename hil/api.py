@@ -5,7 +5,6 @@ Everything heavy is imported inside the functions, so that `hil.simulate` does n
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
 from itertools import count
@@ -15,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hil.arrays import FloatArray
+from hil.diagnosis.time_left import BUDGET_S
 from hil.errors import FieldError, HilError, InputError
 
 if TYPE_CHECKING:
@@ -145,14 +145,14 @@ def diagnose(
     *,
     held_out: Recording | Sequence[Recording] = (),
     progress: Callable[[str], None] = lambda text: None,
-    budget_s: float = math.inf,
+    budget_s: float = BUDGET_S,
 ) -> Diagnosis:
     """Find the physics that the twin of a bench lacks: where it acts, its parameters, and a proof.
 
     recordings: to learn from, of one axis. bench: as its owner describes it; wrong parameters are estimated. held_out:
     recordings of another motion that nothing is fitted to; without any, a third of each recording. progress:
-    called with a text at each step. budget_s: time after which the search ends with the best explanation so far,
-    marked in `result.time_budget`; without it from some seconds to some minutes.
+    called with a text at each step. budget_s: processor time of the search and the
+    tests [s]; a search that needs more ends with the best explanation so far, marked in `result.time_budget`.
 
     Returns the diagnosis; `result` has verdict, findings with standard errors, location and held-out figures, `bench`
     the corrected bench. Raises InputError for recordings that cannot be diagnosed, with all reasons.

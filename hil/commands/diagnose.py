@@ -1,6 +1,5 @@
 """hil diagnose."""
 
-import math
 from pathlib import Path
 from typing import Annotated
 
@@ -8,6 +7,7 @@ import typer
 
 from hil.commands.options import Out, RecordedBench
 from hil.commands.runs import read_run
+from hil.diagnosis.time_left import BUDGET_S
 from hil.report.console import out, progress, table
 
 
@@ -27,14 +27,13 @@ def diagnose(
     bench: RecordedBench = None,
     folder: Out = None,
     budget_s: Annotated[
-        float | None,
+        float,
         typer.Option(
             "--budget",
             metavar="SECONDS",
-            show_default="no limit",
-            help="Time after which the search ends with the best answer so far; the result says what was not tried.",
+            help="Processor time after which the search ends with the best answer so far, which says what was not tried.",
         ),
-    ] = None,
+    ] = BUDGET_S,
 ) -> None:
     """Find physics that the twin lacks: where it acts, which mechanism it is, and whether modelling it helps."""
     from hil.bench.bench_file import load_bench
@@ -52,7 +51,7 @@ def diagnose(
     folder = folder or default_folder(f"diagnose-{train[0].name}")
     compile_kernels()
     with new_folder(folder) as part, progress() as tell:
-        diagnosis = diagnose_recordings(train, held_out, believed, tell, math.inf if budget_s is None else budget_s)
+        diagnosis = diagnose_recordings(train, held_out, believed, tell, budget_s)
         tell("writing the report")
         write_diagnosis(diagnosis, part)
     result = diagnosis.result

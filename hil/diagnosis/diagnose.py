@@ -1,6 +1,5 @@
 """Diagnose recordings: detect, locate and classify a mismatch, name the missing physics, and validate it."""
 
-import math
 import time
 from collections.abc import Sequence
 
@@ -11,7 +10,7 @@ from hil.diagnosis.preparation.structure import as_one_inertia, as_plant_alone
 from hil.diagnosis.reporting import report
 from hil.diagnosis.search.forward_selection import search
 from hil.diagnosis.stages import Judged, Prepared, Progress
-from hil.diagnosis.time_left import with_time_left
+from hil.diagnosis.time_left import BUDGET_S, with_time_left
 from hil.diagnosis.verdict.held_out import test_on_held_out
 from hil.diagnosis.verdict.judge import judge
 from hil.diagnosis.verdict.reproduction import behind_plain, with_less_torque
@@ -19,7 +18,7 @@ from hil.errors import InputError
 from hil.identification.parallel import one_blas_thread
 from hil.recording.recording import Recording
 
-SEARCH_SHARE = 0.7  # of a time budget for the search; the rest for held-out recordings, location and report
+SEARCH_SHARE = 0.7  # of a budget for the search; the rest for held-out recordings, location and report
 
 
 @one_blas_thread
@@ -28,29 +27,31 @@ def diagnose(
     validate: Sequence[Recording],
     bench: Bench,
     progress: Progress = lambda text: None,
-    budget_s: float = math.inf,
+    budget_s: float = BUDGET_S,
 ) -> Diagnosis:
     """Diagnose recordings of one axis against its bench, and validate the result on recordings of another motion.
 
     Without `validate` a third of each recording is held out. `progress` gets the name of each step and the time
-    left. After `budget_s` the search ends with the best explanation so far; the rest takes some seconds more. Raises
-    InputError with all reasons if the recordings cannot be diagnosed.
+    left. After most of `budget_s` of processor time the search ends with the best explanation so far: the answer does
+    not depend on how busy the machine is, but may on how fast. Raises InputError with all reasons if the recordings
+    cannot be diagnosed.
     """
     if not budget_s > 0.0:
         raise InputError(f"budget: given {budget_s:g} s, allowed above 0 s")
-    begin_s = time.monotonic()
+    begin_s, end_s = time.monotonic(), time.process_time() + SEARCH_SHARE * budget_s
     progress = with_time_left(progress, begin_s, budget_s)
     progress("checking the recordings")
     prepared = prepare(train, validate, bench)
 
     def answer(prepared: Prepared) -> Judged:
-        searched = search(prepared, progress, begin_s + SEARCH_SHARE * budget_s)
+        searched = search(prepared, progress, end_s)
         progress("testing on held-out recordings")
         return judge(test_on_held_out(searched))
 
     judged = answer(prepared)
     for simpler in (as_one_inertia, as_plant_alone):
-        if behind_plain(judged) and (other := simpler(judged.tested.searched.prepared)):
+        in_time = time.process_time() < end_s
+        if in_time and behind_plain(judged) and (other := simpler(judged.tested.searched.prepared)):
             progress("comparing with a simpler twin")
             judged = with_less_torque(judged, answer(other))
     return Diagnosis(report(judged, progress, begin_s, budget_s))

@@ -184,8 +184,8 @@ class Estimator:
 
     `edge_step_s` is the forward-difference step for the edge of a window, `torque_accuracy` the torque resolved by the
     motor channel over the noise of the torque channel. `closed` selects residuals in closed loop,
-    `fast` those with the internal steps of a search. After `deadline_s` of the
-    monotonic clock fits take no more steps.
+    `fast` those with the internal steps of a search. After `deadline_s` of
+    processor time (`time.process_time`) fits take no more steps.
     """
 
     data: Dataset
@@ -198,7 +198,7 @@ class Estimator:
     @property
     def expired(self) -> bool:
         """True after the deadline."""
-        return time.monotonic() > self.deadline_s
+        return time.process_time() > self.deadline_s
 
     def residuals(self, hypothesis: Hypothesis) -> Residuals:
         """Residuals of a hypothesis, weighted by these settings."""

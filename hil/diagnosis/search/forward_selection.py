@@ -45,14 +45,14 @@ class Need:
 def search(prepared: Prepared, progress: Progress = lambda text: None, deadline_s: float = math.inf) -> Searched:
     """Search for the mechanisms that the twin of a bench lacks on the training recordings.
 
-    After `deadline_s` of the monotonic clock the search ends with the best explanation so far. Raises HilError if the
-    twin of the axis is unstable.
+    After `deadline_s` of processor time the search ends with the best explanation so far. Raises HilError if the twin
+    of the axis is unstable.
     """
     stopped_at = ""
 
     def step(text: str) -> None:
         nonlocal stopped_at
-        if time.monotonic() > deadline_s:
+        if time.process_time() > deadline_s:
             stopped_at = stopped_at or text
         else:
             progress(text)

@@ -8,7 +8,12 @@ from hil.diagnosis.verdict.refit import reported_refit
 
 
 def test_on_held_out(searched: Searched) -> Tested:
-    """Test the terms of a search, with the events of the held-out recordings, and refit the nominal parameters."""
-    nominal, held_out = searched.nominal, searched.prepared.held_out
-    proof = cross_validate(nominal, with_events_of(held_out, renamed(searched.final)), held_out)
+    """Test the terms of a search, with the events of the held-out recordings, and refit the nominal parameters.
+
+    A search that ended with its budget leaves no time for events that it has not found in training.
+    """
+    nominal, held_out, final = searched.nominal, searched.prepared.held_out, renamed(searched.final)
+    if not searched.stopped_at or any(term.windows for term in final.terms):
+        final = with_events_of(held_out, final)
+    proof = cross_validate(nominal, final, held_out)
     return Tested(searched, proof, reported_refit(nominal))

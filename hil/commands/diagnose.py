@@ -31,7 +31,7 @@ def diagnose(
         typer.Option(
             "--budget",
             metavar="SECONDS",
-            help="Processor time after which the search ends with the best answer so far, which says what was not tried.",
+            help="Processor time after which the search ends with the best answer so far; it says what was not tried.",
         ),
     ] = BUDGET_S,
 ) -> None:

@@ -5,7 +5,7 @@ and on a twin without new terms at a seventh (`hil.diagnosis.reproduced`):
 
     VALUES     on the fitted values of a candidate
     ADDED      on the fit with one more term, against the fit without it; HARMLESS: and its channels
-    NEEDED     on each term, once a later one stands beside it
+    NEEDED     on each term beside the others
     COMPARED   on another explanation of the same residual, against the named one
     HELD_OUT   on each term of the final fit, by the recordings that nothing was fitted to
     EXPLAINED  on all terms together
@@ -45,11 +45,15 @@ def promises(share: float, cost: float, rows: int, noise_energy: float, c: Crite
     return share > enough and share * cost > c.material * noise_energy
 
 
-def _evidence(of: Addition | Need, c: Criteria) -> Answer:
+def _evidence(of: Addition | Need, c: Criteria) -> Answer | None:
+    if of.structure_left is not None:  # below the noise nothing but structure is evidence
+        return None
     return of.evidence >= c.evidence, {"evidence": of.evidence, "needed": c.evidence}
 
 
-def _material(of: Addition | Need, c: Criteria) -> Answer:
+def _material(of: Addition | Need, c: Criteria) -> Answer | None:
+    if of.structure_left is not None:
+        return None
     removed = of.gain / of.noise_energy if of.noise_energy else 0.0
     return removed >= c.material, {"removed": removed, "needed": c.material}
 
@@ -66,7 +70,7 @@ def _laps(of: Addition, c: Criteria) -> Answer | None:
     return c.repeats * left <= before, {"without_over_with": before / left if left else math.inf}
 
 
-def _structure(of: Addition, c: Criteria) -> Answer | None:
+def _structure(of: Addition | Need, c: Criteria) -> Answer | None:
     left = of.structure_left
     return None if left is None else (left <= c.most_left, {"left": left})
 
@@ -173,6 +177,13 @@ _MATERIAL: Rule[Addition | Need] = Rule(
     "it removes {removed:.3g} noise² per row, needed {needed:.3g}",
     _material,
 )
+# a torque with noise drives the twin: a term that passes less of it leaves less, and explains nothing
+_STRUCTURE: Rule[Addition | Need] = Rule(
+    "structure below the noise",
+    "it leaves {left:.0%} of the structure below the noise",
+    "it leaves {left:.0%} of the structure below the noise: it only passes less noise",
+    _structure,
+)
 VALUES: tuple[Rule[bool], ...] = (
     # the condition of each mechanism (`Mechanism.is_valid`): else its name does not apply
     Rule(
@@ -190,13 +201,7 @@ FORM: tuple[Rule[Addition], ...] = (
         "with it the repeated laps are reproduced worse",
         _laps,
     ),
-    # a torque with noise drives the twin: a term that passes less of it leaves less, and explains nothing
-    Rule(
-        "structure below the noise",
-        "it leaves {left:.0%} of the structure below the noise",
-        "it leaves {left:.0%} of the structure below the noise: it only passes less noise",
-        _structure,
-    ),
+    _STRUCTURE,
     # an external force; what depends on place or speed leaves its form inside
     Rule(
         "constant force",
@@ -226,7 +231,7 @@ HARMLESS: tuple[Rule[Addition], ...] = (
         _channels,
     ),
 )
-NEEDED: tuple[Rule[Addition | Need], ...] = (_EVIDENCE, _MATERIAL)
+NEEDED: tuple[Rule[Addition | Need], ...] = (_EVIDENCE, _MATERIAL, _STRUCTURE)
 COMPARED: tuple[Rule[RivalFit], ...] = (
     # a rival is refuted by very strong evidence and by more than the model discrepancy
     Rule(

@@ -8,7 +8,7 @@ difference of the encoders against their noise.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,11 +17,15 @@ from hil.diagnosis.criteria import CRITERIA
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
+from hil.identification.periods import strongest_periods
 from hil.identification.plain_model import PlainModel
 from hil.identification.structure import BINS, ResidualSeries, Structure, offset, structure
 from hil.identification.torque_left import fit_plain, measured_motion, needed_torque, torque_deviation
 from hil.quantities import digits, quantity, reading_unit
 
+_ROWS = 4.0  # per period of a line: less is an alias
+_MOST_PERIODS = 4000  # of a line over the travel
+_SEEN = 4.0  # bins of the position per period, from which they show it
 POSITION, SPEED, OFFSET = "position", "speed", "offset"
 TORQUE, DIFFERENCE = "torque", "difference"  # needed beyond the twin's; of the encoders, beyond the twin's
 
@@ -30,8 +34,9 @@ TORQUE, DIFFERENCE = "torque", "difference"  # needed beyond the twin's; of the 
 class Question:
     """A quantity (n,) of each run that a residual may depend on, in a unit.
 
-    `length` is the unit of positions, m or rad. `by_direction`: it is a position from the least one on, and further by
-    `by_direction` where the axis moves up. `kept`: it means the same in other recordings.
+    `length` is the unit of positions, m or rad. `by_direction`: it is counted from its least value on, and further by
+    `by_direction` where the axis moves up. `kept`: it means the same in other recordings. `choices`: number of
+    quantities of which the residual itself chose this one.
     """
 
     name: str
@@ -41,6 +46,7 @@ class Question:
     bins: int = BINS
     by_direction: float = 0.0
     kept: bool = True
+    choices: int = 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,12 +64,8 @@ class Dependence:
     material: float
     held_out: float | None
 
-    def left_by(self, fit: Fit) -> float:
-        """Share of the energy of the dependence that another fit leaves, at least 0."""
-        plain = fit_plain(fit.data)
-        parts = [] if plain is None else _left(fit.hypothesis, fit.data, self.channel, plain)
-        if not all(np.isfinite(part.left).all() for part in parts):
-            return np.inf
+    def left_in(self, parts: Sequence[ResidualSeries]) -> float:
+        """Share of the energy of the dependence that other residuals of its channel have, at least 0."""
         question = self.question
         found = offset(parts) if question.name == OFFSET else structure(parts, question.values, question.bins)
         return max(found.energy, 0.0) / self.found.energy if found else 0.0
@@ -111,36 +113,92 @@ def structure_left(fit: Fit, held_out: Dataset) -> tuple[Dependence, ...]:
         if not all(np.isfinite(part.left).all() for part in (*parts, *others)):
             continue  # the twin does not hold the motion
         found += list(_dependences(fit, held_out, channel, plain, (parts, others)))
-    asked = len(_channels(fit.data)) * len(questions(fit.hypothesis, fit.data, plain))
+    asked = len(_channels(fit.data)) * (len(questions(fit.hypothesis, fit.data, plain)) + 1)  # a line is one more
     level = CRITERIA.significance / max(asked, 1)
     counted = [
         one
         for one in found
-        if one.found.p < level and one.material > 1.0 and (one.held_out is None or one.held_out > 0.0)
+        if one.found.p * one.question.choices < level
+        and one.material > 1.0
+        and (one.held_out is None or one.held_out > 0.0)
     ]
     return tuple(sorted(counted, key=lambda one: -one.explained))
+
+
+def within_noise(fit: Fit) -> bool:
+    """True if a fit is at its floor, and a torque with noise drives the twin: nothing but structure is evidence."""
+    return fit.at_floor and not fit.data.observability.exact_input
+
+
+def below_noise(fit: Fit) -> tuple[Dependence, ...]:
+    """The structure that a fit leaves below its floor; none above it."""
+    return structure_left(fit, fit.data.over(())) if within_noise(fit) else ()
+
+
+def share_left(structure: Sequence[Dependence], fit: Fit) -> float:
+    """Share of a structure, weighted by what each dependence explains, that another fit leaves."""
+    plain, left = fit_plain(fit.data), 0.0
+    if plain is None:
+        return 1.0
+    for channel in sorted({one.channel for one in structure}):
+        parts = _left(fit.hypothesis, fit.data, channel, plain)
+        if not all(np.isfinite(part.left).all() for part in parts):
+            return np.inf
+        left += sum(one.explained * one.left_in(parts) for one in structure if one.channel == channel)
+    return left / sum(one.explained for one in structure)
 
 
 def questions(hypothesis: Hypothesis, data: Dataset, plain: PlainModel) -> list[Question]:
     """Quantities that a residual may depend on."""
     motions = [measured_motion(run).moved for run in data.runs]
-    physics, ratio = hypothesis.bench.axis.physics(), hypothesis.bench.axis.ratio_m_rad
+    ratio = hypothesis.bench.axis.ratio_m_rad
     position = tuple(ratio * moved.position for moved in motions)
     low = min(float(one.min()) for one in position)
     span = max(float(one.max()) for one in position) - low
     length = "rad" if hypothesis.bench.axis.turns else "m"
-    up = tuple(one - low + 1.001 * span * (moved.velocity > 0.0) for one, moved in zip(position, motions, strict=True))
-    found = [
+    begin = min(float(run.time_s[0]) for run in data.runs)
+    duration = max(float(run.time_s[-1]) for run in data.runs) - begin
+    up = [moved.velocity > 0.0 for moved in motions]
+    by_direction = tuple(one - low + 1.001 * span * moves for one, moves in zip(position, up, strict=True))
+    later = tuple(run.time_s - begin + 1.001 * duration * moves for run, moves in zip(data.runs, up, strict=True))
+    return [
         Question(POSITION, length, length, position),
-        Question("distance from the first position", length, length, up, 2 * BINS, by_direction=1.001 * span),
+        Question("distance from the first position", length, length, by_direction, 2 * BINS, 1.001 * span),
         Question(SPEED, f"{length}/s", length, tuple(ratio * moved.velocity for moved in motions)),
         Question("load", hypothesis.bench.axis.drive_unit, length, tuple(plain.predict(moved) for moved in motions)),
-        Question("time", "s", length, tuple(run.time_s for run in data.runs), kept=False),
+        Question("time", "s", length, later, 2 * BINS, 1.001 * duration, kept=False),
     ]
-    if physics.turn_known and span * physics.angle_per_unit > 2.0 * np.pi * ratio:
-        turned = tuple(np.mod(physics.angle_per_unit * moved.position, 2.0 * np.pi) for moved in motions)
-        found.append(Question("motor angle", "rad", length, turned))
-    return found
+
+
+def _line(data: Dataset, parts: Sequence[ResidualSeries], asked: Sequence[Question]) -> tuple[float, int] | None:
+    """Period of the strongest line of a residual over the position, and of how many; None without one.
+
+    Periods are shorter than the bins of the position show.
+    """
+    position, speed = (
+        np.concatenate([one[part.rows] for one, part in zip(question.values, parts, strict=True)])
+        for question in (_named(asked, POSITION), _named(asked, SPEED))
+    )
+    if not position.size:
+        return None
+    span = float(np.ptp(position))
+    shortest = max(_ROWS * data.runs[0].period_s * float(np.median(np.abs(speed))), span / _MOST_PERIODS)
+    left = np.concatenate([part.left[part.rows] for part in parts])
+    found = strongest_periods(position, left, shortest / _ROWS, shortest, 1, longest=_SEEN * span / BINS)
+    return (found[0], int(2.0 * span / shortest)) if found else None
+
+
+def _folded(question: Question, line: tuple[float, int], turn: float) -> Question:
+    """The position within a period; `turn` is that of the motor, 0 if it is not known."""
+    period, choices = line
+    often = f" ({digits(turn / period)} per motor turn)" if turn else ""
+    name = f"place within its period of {quantity(period, question.length)}{often}"
+    folded = tuple(np.mod(one, period) for one in question.values)
+    return replace(question, name=name, values=folded, choices=choices)
+
+
+def _named(asked: Sequence[Question], name: str) -> Question:
+    return next(one for one in asked if one.name == name)
 
 
 def _channels(data: Dataset) -> list[str]:
@@ -177,8 +235,15 @@ def _dependences(
         gain = float(np.mean(there**2) - np.mean((there - constant.means[0]) ** 2)) if there.size else None
         question = Question(OFFSET, "", "", ())
         yield Dependence(channel, question, constant, constant.energy / square, constant.energy / least, gain)
-    elsewhere = {one.name: one.values for one in questions(fit.hypothesis, held_out, plain)} if others else {}
-    for question in questions(fit.hypothesis, fit.data, plain):
+    asked = questions(fit.hypothesis, fit.data, plain)
+    there_too = questions(fit.hypothesis, held_out, plain) if others else []
+    if line := _line(fit.data, parts, asked):
+        physics, ratio = fit.bench.axis.physics(), fit.bench.axis.ratio_m_rad
+        turn = 2.0 * np.pi * ratio / physics.angle_per_unit if physics.turn_known else 0.0
+        asked.append(_folded(_named(asked, POSITION), line, turn))
+        there_too += [_folded(_named(there_too, POSITION), line, turn)] if there_too else []
+    elsewhere = {one.name: one.values for one in there_too}
+    for question in asked:
         found = structure(parts, question.values, question.bins)
         if found is None:
             continue

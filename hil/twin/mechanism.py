@@ -197,6 +197,12 @@ class Mechanism:
         return all(variant.stage in (Stage.TRANSMISSION, Stage.SCREW) for variant in self.variants)
 
     @property
+    def shifts_phase(self) -> bool:
+        """True for a delay, a lag or a resonance: no function of position, speed, load or time."""
+        late = self.parameters[self.strength].dimension is Dimension.TIME
+        return late or any(variant.stage is Stage.CHAIN for variant in self.variants)
+
+    @property
     def names(self) -> tuple[str, ...]:
         """Names of its parameters, in order."""
         return tuple(parameter.name for parameter in self.parameters)

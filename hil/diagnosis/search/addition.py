@@ -12,11 +12,12 @@ from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.ledger import Considered, Ledger, accepted, examine
 from hil.diagnosis.search.events import InsideWindows, inside_windows
 from hil.diagnosis.search.initial_values import claimable
-from hil.diagnosis.structure_left import Dependence
+from hil.diagnosis.structure_left import Dependence, share_left
 from hil.diagnosis.wording import channel_names
 from hil.identification.estimator import Fit
 from hil.identification.inference import bic_gain
 from hil.identification.noise_floor import unrepeated
+from hil.twin.library import BY_ID
 
 
 @dataclass(frozen=True)
@@ -42,7 +43,7 @@ class Addition:
     base: Fit
     reference: Fit
     given: Fit
-    structure: Dependence | None = None
+    structure: tuple[Dependence, ...] = ()
 
     @cached_property
     def evidence(self) -> float:
@@ -82,8 +83,18 @@ class Addition:
 
     @cached_property
     def structure_left(self) -> float | None:
-        """Share of the structure of a base within its noise that is left; None above the noise."""
-        return None if self.structure is None else self.structure.left_by(self.fit)
+        """Share of the structure of a base within its noise that is left; None above the noise.
+
+        A structure is a dependence on a quantity, of which a delay or a resonance is no cause.
+        """
+        if not self.structure:
+            return None
+        return 1.0 if BY_ID[self.fit.terms[-1].effect].shifts_phase else share_left(self.structure, self.fit)
+
+    @property
+    def leaves(self) -> float:
+        """What orders fits of one round: cost, or below the noise the share of the structure that is left."""
+        return self.fit.cost if self.structure_left is None else self.structure_left
 
     @cached_property
     def inside(self) -> InsideWindows | None:

@@ -25,7 +25,7 @@ from hil.identification.residual_scales import inertia
 BLOCK_S = 0.005  # an edge to be refined by simulation
 SHORTEST, EDGE = 3, 6  # blocks of the shortest window; blocks in which the observer follows an edge
 _MOST_BLOCKS = 6000  # the time of a partition grows with their square: half a second
-_REVERSAL_S = 0.05  # about a reversal friction is known least
+_REVERSAL_S = 0.05  # about a reversal, a start or a stop friction is known least
 _ALIKE = 0.25  # levels of adjacent windows that differ less are one
 _ROUNDS = 3  # windows found in one round do not count as motion or noise in the next; then they stay
 _LEAST_USUAL = 0.3  # of the blocks without an event: else the level without one is unknown
@@ -42,7 +42,7 @@ class Event(NamedTuple):
 
 
 def detect(fit: Fit) -> list[Event]:
-    """Find the events of all runs of a fit, beside its permanent terms; none about a reversal.
+    """Find the events of all runs of a fit, beside its permanent terms; none about a reversal or a start.
 
     They are those that hold nearly all energy of the windows: a fit that begins with many faint ones ends nowhere. What
     those leave shows beside the fitted ones (`left_over`).
@@ -82,7 +82,9 @@ def _of_run(run: Measured, seen: Disturbance, reversals: bool) -> list[Event]:
     seen = Disturbance(seen.torque[first:], seen.velocity[first:], seen.sliding[first:])
     block = max(round(BLOCK_S / run.period_s), -(-seen.sliding.size // _MOST_BLOCKS), 1)
     rows = seen.sliding.size // block * block
-    turns = np.diff(np.signbit(seen.velocity), append=np.signbit(seen.velocity[-1])).astype(float)
+    reversals_at = np.diff(np.signbit(seen.velocity), append=np.signbit(seen.velocity[-1]))
+    starts_at = np.diff(seen.sliding, append=seen.sliding[-1])
+    turns = (reversals_at | starts_at).astype(float)
     turning = np.convolve(turns, np.ones(2 * round(_REVERSAL_S / run.period_s) + 1), "same") > 0.5
     usable = seen.sliding if reversals else seen.sliding & ~turning
     usable = usable & (np.arange(usable.size) >= run.evaluated.start - first)

@@ -12,7 +12,7 @@ from hil.diagnosis.search.restart import companion, from_bench_file, may_hide, t
 from hil.diagnosis.search.score_test import Candidate
 from hil.diagnosis.search.successive_halving import race
 from hil.diagnosis.stages import Progress
-from hil.diagnosis.structure_left import Dependence, structure_left
+from hil.diagnosis.structure_left import Dependence, below_noise, within_noise
 from hil.identification.estimator import Fit
 
 
@@ -29,15 +29,9 @@ class SearchRound:
         return Addition(fit, self.base, self.reference, self.given, self.structure)
 
     @cached_property
-    def within_noise(self) -> bool:
-        """True if the base is at its floor, and a torque with noise drives the twin."""
-        return self.base.at_floor and not self.base.data.observability.exact_input
-
-    @cached_property
-    def structure(self) -> Dependence | None:
-        """What the base leaves below its floor; None above it, or where nothing is left."""
-        left = structure_left(self.base, self.base.data.over(())) if self.within_noise else ()
-        return left[0] if left else None
+    def structure(self) -> tuple[Dependence, ...]:
+        """What the base leaves below its floor; none above it."""
+        return below_noise(self.base)
 
     @property
     def unfinished(self) -> bool:
@@ -65,9 +59,9 @@ def next_term(search: SearchRound, candidates: Sequence[Candidate], step: Progre
     def valid(fits: Sequence[Fit]) -> list[Addition]:
         begun = [search.addition(fit) for fit in fits]
         considered.extend(one.considered for one in begun if not one.valid)
-        return [one for one in begun if one.valid]
+        return _ordered([one for one in begun if one.valid])
 
-    if search.within_noise and search.structure is None:
+    if within_noise(base) and not search.structure:
         return Additions([], None)
     additions = list[Addition]()
     if promising := [one for one in candidates if promises(one.share, base.cost, base.rows, base.noise_energy)]:
@@ -107,4 +101,4 @@ def first_standing(additions: Sequence[Addition]) -> Addition | None:
 
 
 def _ordered(additions: Sequence[Addition]) -> list[Addition]:
-    return sorted(additions, key=lambda one: one.fit.cost)
+    return sorted(additions, key=lambda one: one.leaves)

@@ -241,12 +241,7 @@ COMPARED: tuple[Rule[RivalFit], ...] = (
         _not_behind,
     ),
     # the conditions of a term
-    Rule(
-        "as the cause",
-        "nothing speaks against it as the cause",
-        "{objection}",
-        _no_objection,
-    ),
+    Rule("as the cause", "nothing speaks against it as the cause", "{objection}", _no_objection),
 )
 HELD_OUT: tuple[Rule[Ablation], ...] = (
     # prediction; motion without its effect does not refute it

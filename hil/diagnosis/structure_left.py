@@ -173,7 +173,7 @@ def questions(hypothesis: Hypothesis, data: Dataset, plain: PlainModel) -> list[
 def _line(data: Dataset, parts: Sequence[ResidualSeries], asked: Sequence[Question]) -> tuple[float, int] | None:
     """Period of the strongest line of a residual over the position, and of how many; None without one.
 
-    Periods are shorter than the bins of the position show.
+    Periods are shorter than the bins of the position show, and longer than counts and rows make.
     """
     position, speed = (
         np.concatenate([one[part.rows] for one, part in zip(question.values, parts, strict=True)])
@@ -182,7 +182,9 @@ def _line(data: Dataset, parts: Sequence[ResidualSeries], asked: Sequence[Questi
     if not position.size:
         return None
     span = float(np.ptp(position))
-    shortest = max(_ROWS * data.runs[0].period_s * float(np.median(np.abs(speed))), span / _MOST_PERIODS)
+    run, ratio = data.runs[0], data.bench.axis.ratio_m_rad
+    counts = np.sqrt(12.0) * max(ratio * run.noise.motor, run.noise.table_m)
+    shortest = max(_ROWS * run.period_s * float(np.median(np.abs(speed))), _ROWS * float(counts), span / _MOST_PERIODS)
     left = np.concatenate([part.left[part.rows] for part in parts])
     found = strongest_periods(position, left, shortest / _ROWS, shortest, 1, longest=_SEEN * span / BINS)
     return (found[0], int(2.0 * span / shortest)) if found else None
@@ -224,7 +226,6 @@ def _dependences(
 ) -> Iterator[Dependence]:
     """Answers to the questions on one channel, (training, held-out) residuals."""
     parts, others = left
-    least = _least_energy(fit.data, channel, plain)
     rows = np.concatenate([part.left[part.rows] for part in parts])
     total = float(np.mean((rows - rows.mean()) ** 2)) if rows.size else 0.0
     if not total > 0.0:
@@ -234,7 +235,14 @@ def _dependences(
         there = np.concatenate([part.left[part.rows] for part in others]) if others else np.empty(0)
         gain = float(np.mean(there**2) - np.mean((there - constant.means[0]) ** 2)) if there.size else None
         question = Question(OFFSET, "", "", ())
-        yield Dependence(channel, question, constant, constant.energy / square, constant.energy / least, gain)
+        yield Dependence(
+            channel,
+            question,
+            constant,
+            constant.energy / square,
+            constant.energy / _least_energy(fit.data, channel, plain),
+            gain,
+        )
     asked = questions(fit.hypothesis, fit.data, plain)
     there_too = questions(fit.hypothesis, held_out, plain) if others else []
     if line := _line(fit.data, parts, asked):
@@ -250,14 +258,19 @@ def _dependences(
         gain = None
         if question.kept and question.name in elsewhere:
             gain = _removed(found, others, elsewhere[question.name])
-        yield Dependence(channel, question, found, found.energy / total, found.energy / least, gain)
+        needed = _least_energy(fit.data, channel, plain, question.choices > 1)
+        yield Dependence(channel, question, found, found.energy / total, found.energy / needed, gain)
 
 
-def _least_energy(data: Dataset, channel: str, plain: PlainModel) -> float:
-    """Mean square of a residual from which a dependence is material."""
+def _least_energy(data: Dataset, channel: str, plain: PlainModel, line: bool = False) -> float:
+    """Mean square of a residual from which a dependence is material.
+
+    The counts of two encoders beat: a line that may hold all their noise.
+    """
     if channel == TORQUE:
         return (CRITERIA.discrepancy * torque_deviation([data], plain.slowest)) ** 2
-    return CRITERIA.material * float(np.mean([run.noise.table_m**2 for run in data.runs]))
+    share = 1.0 if line else CRITERIA.material
+    return share * float(np.mean([run.noise.table_m**2 for run in data.runs]))
 
 
 def _removed(found: Structure, parts: Sequence[ResidualSeries], quantity: Sequence[FloatArray]) -> float:

@@ -199,8 +199,7 @@ class Mechanism:
     @property
     def shifts_phase(self) -> bool:
         """True for a delay, a lag or a resonance: no function of position, speed, load or time."""
-        late = self.parameters[self.strength].dimension is Dimension.TIME
-        return late or any(variant.stage is Stage.CHAIN for variant in self.variants)
+        return self.parameters[self.strength].dimension is Dimension.TIME or self.variants[0].stage is Stage.CHAIN
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -258,18 +258,20 @@ def _dependences(
         gain = None
         if question.kept and question.name in elsewhere:
             gain = _removed(found, others, elsewhere[question.name])
-        needed = _least_energy(fit.data, channel, plain, question.choices > 1)
+        local = question.choices > 1 or not question.kept
+        needed = _least_energy(fit.data, channel, plain, local)
         yield Dependence(channel, question, found, found.energy / total, found.energy / needed, gain)
 
 
-def _least_energy(data: Dataset, channel: str, plain: PlainModel, line: bool = False) -> float:
+def _least_energy(data: Dataset, channel: str, plain: PlainModel, local: bool = False) -> float:
     """Mean square of a residual from which a dependence is material.
 
-    The counts of two encoders beat: a line that may hold all their noise.
+    A creeping encoder stays within a count, and the counts of two of them beat: over time, and as a line, the noise of
+    counting has a structure of its own (`local`).
     """
     if channel == TORQUE:
         return (CRITERIA.discrepancy * torque_deviation([data], plain.slowest)) ** 2
-    share = 1.0 if line else CRITERIA.material
+    share = 1.0 if local else CRITERIA.material
     return share * float(np.mean([run.noise.table_m**2 for run in data.runs]))
 
 

@@ -11,6 +11,7 @@ from hil.arrays import FloatArray
 from hil.identification.least_squares import least_squares
 
 _FEWEST_ROWS = 100
+_MOST_BINS = 1 << 20  # a spindle turns millions of its shortest periods: memory and time stay bounded
 
 
 def harmonic_share(phase: FloatArray, signal: FloatArray) -> float:
@@ -24,9 +25,11 @@ def strongest_periods(
 ) -> list[float]:
     """At most `most` periods of a signal (n,) over a position (n,), strongest first, in the unit of the position.
 
-    The signal is averaged in bins of `width`. Periods lie between `shortest` and `longest`, and 2.5 times the range.
+    The signal is averaged in bins of `width`, or wider ones over a long range. Periods lie between `shortest`, at least
+    four bins, and `longest`, and 2.5 times the range.
     """
     span = float(np.ptp(position)) if position.size else 0.0
+    width, shortest = max(width, span / _MOST_BINS), max(shortest, 4.0 * span / _MOST_BINS)
     if position.size < _FEWEST_ROWS or span < 4.0 * shortest:
         return []
     count = int(np.ceil(span / width))

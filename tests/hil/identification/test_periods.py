@@ -41,3 +41,8 @@ def test_the_share_is_that_of_lomb_and_scargle_with_a_free_mean(seed: int, order
 @pytest.mark.parametrize("x", [np.zeros(0), np.linspace(0.0, 1.0, 50), np.linspace(0.0, 0.03, 5000)])
 def test_a_few_rows_and_a_short_way_have_no_period(x: np.ndarray) -> None:
     assert strongest_periods(x, np.sin(700.0 * x), 1e-3, 0.01, 3) == []
+
+
+def test_a_spindle_that_turns_a_million_times_its_shortest_period_needs_little_memory() -> None:
+    x = np.linspace(0.0, 60_000.0, 20_000)
+    assert strongest_periods(x, np.sin(2.0 * np.pi * x / 50.0), 1e-4, 1e-3, 1) == pytest.approx([50.0], rel=0.01)

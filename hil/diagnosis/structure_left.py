@@ -226,6 +226,7 @@ def _dependences(
 ) -> Iterator[Dependence]:
     """Answers to the questions on one channel, (training, held-out) residuals."""
     parts, others = left
+    least = _least_energy(fit.data, channel, plain)
     rows = np.concatenate([part.left[part.rows] for part in parts])
     total = float(np.mean((rows - rows.mean()) ** 2)) if rows.size else 0.0
     if not total > 0.0:
@@ -258,21 +259,17 @@ def _dependences(
         gain = None
         if question.kept and question.name in elsewhere:
             gain = _removed(found, others, elsewhere[question.name])
-        local = question.choices > 1 or not question.kept
-        needed = _least_energy(fit.data, channel, plain, local)
-        yield Dependence(channel, question, found, found.energy / total, found.energy / needed, gain)
+        yield Dependence(channel, question, found, found.energy / total, found.energy / least, gain)
 
 
-def _least_energy(data: Dataset, channel: str, plain: PlainModel, local: bool = False) -> float:
+def _least_energy(data: Dataset, channel: str, plain: PlainModel) -> float:
     """Mean square of a residual from which a dependence is material.
 
-    A creeping encoder stays within a count, and the counts of two of them beat: over time, and as a line, the noise of
-    counting has a structure of its own (`local`).
+    A creeping encoder stays within a count, and the counts of two of them beat: that of two encoders is their noise.
     """
     if channel == TORQUE:
         return (CRITERIA.discrepancy * torque_deviation([data], plain.slowest)) ** 2
-    share = 1.0 if local else CRITERIA.material
-    return share * float(np.mean([run.noise.table_m**2 for run in data.runs]))
+    return float(np.mean([run.noise.table_m**2 for run in data.runs]))
 
 
 def _removed(found: Structure, parts: Sequence[ResidualSeries], quantity: Sequence[FloatArray]) -> float:

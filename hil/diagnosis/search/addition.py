@@ -62,14 +62,15 @@ class Addition:
 
     @cached_property
     def explained(self) -> float | None:
-        """Largest share that the term removes from the energy above the noise of a channel that has a material one.
+        """Share that the term removes from the energy above the noise of the channel in which it removes most.
 
-        A channel with a large mismatch of its own does not hide what a term explains of another. None where no channel
-        has one.
+        A channel with a large mismatch of its own does not hide what a term explains of another. None where the energy
+        of that channel above the noise is not material.
         """
         gained = removed_by_channel(self.base, self.fit, self.reference)
-        above, least = self.base.excess_by_channel, CRITERIA.nothing * self.base.data.rows
-        return max((gain / above[name] for name, gain in gained.items() if above[name] > least), default=None)
+        channel = max(gained, key=lambda name: gained[name])
+        above = self.base.excess_by_channel[channel]
+        return gained[channel] / above if above > CRITERIA.nothing * self.base.data.rows else None
 
     @property
     def beside(self) -> int:
@@ -90,11 +91,6 @@ class Addition:
         if not self.structure:
             return None
         return 1.0 if BY_ID[self.fit.terms[-1].effect].shifts_phase else share_left(self.structure, self.fit)
-
-    @property
-    def leaves(self) -> float:
-        """What orders fits of one round: cost, or below the noise the share of the structure that is left."""
-        return self.fit.cost if self.structure_left is None else self.structure_left
 
     @cached_property
     def inside(self) -> InsideWindows | None:

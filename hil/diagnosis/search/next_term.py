@@ -59,7 +59,7 @@ def next_term(search: SearchRound, candidates: Sequence[Candidate], step: Progre
     def valid(fits: Sequence[Fit]) -> list[Addition]:
         begun = [search.addition(fit) for fit in fits]
         considered.extend(one.considered for one in begun if not one.valid)
-        return _ordered([one for one in begun if one.valid])
+        return [one for one in begun if one.valid]
 
     if within_noise(base) and not search.structure:
         return Additions([], None)
@@ -101,4 +101,4 @@ def first_standing(additions: Sequence[Addition]) -> Addition | None:
 
 
 def _ordered(additions: Sequence[Addition]) -> list[Addition]:
-    return sorted(additions, key=lambda one: one.leaves)
+    return sorted(additions, key=lambda one: one.fit.cost)

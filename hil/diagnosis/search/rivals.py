@@ -82,11 +82,10 @@ def chosen(best: Addition, additions: Sequence[Addition], search: SearchRound) -
     converged = _ended(started, search)
     best = converged if converged.valid else started
     others = [_ended(one, search) if one.fit.cost < _NEAR * best.fit.cost else one for one in begun]
-    order = sorted([best, *(one for one in others if one.valid)], key=lambda one: one.leaves)
+    order = sorted([best, *(one for one in others if one.valid)], key=lambda one: one.fit.cost)
     best = first_standing([one for one in order if one.fit.jacobian.size]) or best
     standing = [one for one in order if one is not best and not objection(one, best)]
-    separated = best.structure_left is not None  # by what each leaves of the structure, where evidence says nothing
-    named = best if separated else _on_fewest_parts(_simplest(best, standing), [best, *standing])
+    named = _on_fewest_parts(_simplest(best, standing), [best, *standing])
     filters = whitening(named.fit)
     compared = [(one, _compared(one, named, filters)) for one in order if one is not named]
     considered = [one.considered for one in others if not one.valid]

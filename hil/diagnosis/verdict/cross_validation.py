@@ -186,7 +186,9 @@ def _torque(fit: Fit, without: Fit, term: Term, held_out: Dataset) -> tuple[floa
     if BY_ID[term.effect].block in (Block.CONTROLLER, Block.SENSOR) or term.windows:
         return None
     left, other = torque_missed(fit, held_out), torque_missed(without, held_out)
-    return None if left is None or other is None else (left, other)
+    if left is None or other is None or not np.isfinite(other):  # the twin without it does not hold the motion
+        return None
+    return left, other
 
 
 def _gain(fit: Fit, without: Fit) -> float:

@@ -51,14 +51,15 @@ def with_less_torque(given: Judged, other: Judged) -> Judged:
 
 
 def torque_missed(fit: Fit, held_out: Dataset) -> float | None:
-    """Torque that held-out motion needs beyond that of a twin, over its deviation (rms); None: not told.
+    """Torque that held-out motion needs beyond that of a twin, over its deviation (rms); None: nothing slides there.
 
     Infinite where the twin does not hold the motion.
     """
     plain = _plain(fit, held_out)
-    if plain is None:
+    deviation = torque_deviation([held_out], plain.slowest) if plain else 0.0
+    if plain is None or not deviation:
         return None
-    left = left_by_twin(fit.hypothesis, held_out, plain.slowest, torque_deviation([held_out], plain.slowest))
+    left = left_by_twin(fit.hypothesis, held_out, plain.slowest, deviation)
     return np.inf if left is None else left
 
 

@@ -46,13 +46,13 @@ def promises(share: float, cost: float, rows: int, noise_energy: float, c: Crite
 
 
 def _evidence(of: Addition | Need, c: Criteria) -> Answer | None:
-    if of.structure_left is not None:  # below the noise nothing but structure is evidence
+    if of.below is not None:  # the noise of a row says nothing of thousands of rows
         return None
     return of.evidence >= c.evidence, {"evidence": of.evidence, "needed": c.evidence}
 
 
 def _material(of: Addition | Need, c: Criteria) -> Answer | None:
-    if of.structure_left is not None:
+    if of.below is not None:
         return None
     removed = of.gain / of.noise_energy if of.noise_energy else 0.0
     return removed >= c.material, {"removed": removed, "needed": c.material}
@@ -70,9 +70,11 @@ def _laps(of: Addition, c: Criteria) -> Answer | None:
     return c.repeats * left <= before, {"without_over_with": before / left if left else math.inf}
 
 
-def _structure(of: Addition | Need, c: Criteria) -> Answer | None:
-    left = of.structure_left
-    return None if left is None else (left <= c.most_left, {"left": left})
+def _below_noise(of: Addition | Need, c: Criteria) -> Answer | None:
+    if of.below is None:
+        return None
+    left, chance = of.below
+    return left <= c.most_left and chance < c.significance, {"left": left, "chance": chance}
 
 
 def _constant(of: Addition, c: Criteria) -> Answer | None:
@@ -178,11 +180,11 @@ _MATERIAL: Rule[Addition | Need] = Rule(
     _material,
 )
 # a torque with noise drives the twin: a term that passes less of it leaves less, and explains nothing
-_STRUCTURE: Rule[Addition | Need] = Rule(
-    "structure below the noise",
-    "it leaves {left:.0%} of the structure below the noise",
-    "it leaves {left:.0%} of the structure below the noise: it only passes less noise",
-    _structure,
+_BELOW_NOISE: Rule[Addition | Need] = Rule(
+    "below the noise",
+    "it leaves {left:.0%} of the structure below the noise (its shape by chance: {chance:.1g})",
+    "it leaves {left:.0%} of the structure below the noise (its shape by chance: {chance:.1g}): it passes less noise",
+    _below_noise,
 )
 VALUES: tuple[Rule[bool], ...] = (
     # the condition of each mechanism (`Mechanism.is_valid`): else its name does not apply
@@ -195,13 +197,8 @@ VALUES: tuple[Rule[bool], ...] = (
 )
 FORM: tuple[Rule[Addition], ...] = (
     # what repeats with the motion is no matter of chance
-    Rule(
-        "repeated laps",
-        "repeated laps are reproduced as well as without it",
-        "with it the repeated laps are reproduced worse",
-        _laps,
-    ),
-    _STRUCTURE,
+    Rule("repeated laps", "repeated laps are reproduced as well", "with it repeated laps are reproduced worse", _laps),
+    _BELOW_NOISE,
     # an external force; what depends on place or speed leaves its form inside
     Rule(
         "constant force",
@@ -231,7 +228,7 @@ HARMLESS: tuple[Rule[Addition], ...] = (
         _channels,
     ),
 )
-NEEDED: tuple[Rule[Addition | Need], ...] = (_EVIDENCE, _MATERIAL, _STRUCTURE)
+NEEDED: tuple[Rule[Addition | Need], ...] = (_EVIDENCE, _MATERIAL, _BELOW_NOISE)
 COMPARED: tuple[Rule[RivalFit], ...] = (
     # a rival is refuted by very strong evidence and by more than the model discrepancy
     Rule(

@@ -75,7 +75,9 @@ class Dependence:
         plain = fit_plain(fit.data)
         if plain is None:
             return np.inf
-        left = np.concatenate([one.left[one.rows] for one in _left(fit.hypothesis, data, self.channel, plain)])
+        left = np.concatenate(
+            [one.left[one.rows] for one in left_in_channel(fit.hypothesis, data, self.channel, plain)]
+        )
         return float(np.std(left)) if left.size and np.isfinite(left).all() else np.inf
 
     def in_words(self, drive_unit: str) -> str:
@@ -107,13 +109,13 @@ def structure_left(fit: Fit, held_out: Dataset) -> tuple[Dependence, ...]:
     if plain is None:
         return ()
     found = []
-    for channel in _channels(fit.data):
-        parts = _left(fit.hypothesis, fit.data, channel, plain)
-        others = _left(fit.hypothesis, held_out, channel, plain) if held_out.runs else []
+    for channel in channels(fit.data):
+        parts = left_in_channel(fit.hypothesis, fit.data, channel, plain)
+        others = left_in_channel(fit.hypothesis, held_out, channel, plain) if held_out.runs else []
         if not all(np.isfinite(part.left).all() for part in (*parts, *others)):
             continue  # the twin does not hold the motion
         found += list(_dependences(fit, held_out, channel, plain, (parts, others)))
-    asked = len(_channels(fit.data)) * (len(questions(fit.hypothesis, fit.data, plain)) + 1)  # a line is one more
+    asked = len(channels(fit.data)) * (len(questions(fit.hypothesis, fit.data, plain)) + 1)  # a line is one more
     level = CRITERIA.significance / max(asked, 1)
     counted = [
         one
@@ -130,7 +132,7 @@ def within_noise(fit: Fit) -> bool:
     return fit.at_floor and not fit.data.observability.exact_input
 
 
-def below_noise(fit: Fit) -> tuple[Dependence, ...]:
+def structure_below_noise(fit: Fit) -> tuple[Dependence, ...]:
     """The structure that a fit leaves below its floor; none above it."""
     return structure_left(fit, fit.data.over(())) if within_noise(fit) else ()
 
@@ -141,7 +143,7 @@ def share_left(structure: Sequence[Dependence], fit: Fit) -> float:
     if plain is None:
         return 1.0
     for channel in sorted({one.channel for one in structure}):
-        parts = _left(fit.hypothesis, fit.data, channel, plain)
+        parts = left_in_channel(fit.hypothesis, fit.data, channel, plain)
         if not all(np.isfinite(part.left).all() for part in parts):
             return np.inf
         left += sum(one.explained * one.left_in(parts) for one in structure if one.channel == channel)
@@ -203,12 +205,14 @@ def _named(asked: Sequence[Question], name: str) -> Question:
     return next(one for one in asked if one.name == name)
 
 
-def _channels(data: Dataset) -> list[str]:
+def channels(data: Dataset) -> list[str]:
+    """Channels that are asked: the torque, and the difference of the encoders, as far as they are recorded."""
     torque = data.observability.torque_measured
     return [*([TORQUE] if torque else []), *([DIFFERENCE] if data.runs[0].table_m.size else [])]
 
 
-def _left(hypothesis: Hypothesis, data: Dataset, channel: str, plain: PlainModel) -> list[ResidualSeries]:
+def left_in_channel(hypothesis: Hypothesis, data: Dataset, channel: str, plain: PlainModel) -> list[ResidualSeries]:
+    """Residuals of a channel and the rows in which the axis slides, for each run."""
     if channel == TORQUE:
         return needed_torque(hypothesis, data, plain.slowest)
     return [

@@ -22,7 +22,7 @@ from hil.importing.usual_values import ROTARY_LEAD_M
 from hil.quantities import digits, unit_of
 from hil.recording.quantum import count_of, is_decimal
 from hil.recording.recording import Recording
-from hil.twin.mechanisms import gravity_torque
+from hil.twin.mechanisms import constant_load, gravity_torque
 
 _FINEST_M, _COARSEST_M = 1e-12, 1e-3  # resolution of a second encoder that a bench file takes
 _MOST_COUNTS = 2**31  # per revolution: noise below a count of this encoder is that of numbers
@@ -114,7 +114,7 @@ def _draft_parts(recordings: Sequence[Recording]) -> BenchDraft:
             _screw(draft, plant, deflection, lead)
     draft.control, draft.control_why = loop_values(recording, ratio)
     _encoders(draft, recording)
-    _weight(draft, plant)
+    _loads(draft, plant)
     notes, unsure = bench_notes(recordings, plant, transmission, "V" if volts else None, turns)
     draft.notes += notes
     draft.unsure += unsure
@@ -177,8 +177,16 @@ def _dc_motor(draft: BenchDraft, plant: PlantValues, lead: Estimate) -> None:
     draft.notes.append("the voltage stands in the torque channels, 1 N m for 1 V: torques of a diagnosis are volts")
 
 
-def _weight(draft: BenchDraft, plant: PlantValues) -> None:
-    """Gravity over the angle, as a mechanism of the bench."""
+def _loads(draft: BenchDraft, plant: PlantValues) -> None:
+    """Constant torque that friction holds, and gravity over the angle, as mechanisms of the bench.
+
+    Such an offset has many causes: a load, friction that differs by direction, a zero of the drive. One above friction
+    moves the axis: it is left to a diagnosis.
+    """
+    if plant.offset.significant and plant.one_way is None and abs(plant.offset.value) < plant.coulomb.value:
+        (name,) = (parameter.name for parameter in constant_load.MECHANISM.parameters)
+        held = "below friction: a load, friction that differs by direction, or a zero of the drive"
+        draft.mechanisms[constant_load.MECHANISM.id] = [_value(name, plant.offset, "at the motor", held)]
     if plant.gravity is not None and plant.gravity_angle is not None and plant.gravity.significant:
         torque, angle = (parameter.name for parameter in gravity_torque.MECHANISM.parameters)
         draft.mechanisms[gravity_torque.MECHANISM.id] = [

@@ -51,11 +51,20 @@ class Structure:
 
 
 def structure(parts: Sequence[ResidualSeries], quantity: Sequence[FloatArray], bins: int = BINS) -> Structure | None:
-    """Structure of residuals over a quantity, (n,) for each part; None where there are too few independent rows.
+    """Structure of residuals over a quantity, (n,) for each part, in as many bins as there are independent rows for.
 
-    Bins have equally many rows, but are not narrower than a fifth of equal ones: what a plateau of the quantity has
-    within it is the pattern of its counts.
+    None where these are too few. Bins have equally many rows, but are not narrower than a fifth of equal ones: what a
+    plateau of the quantity has within it is the pattern of its counts.
     """
+    while bins > 1:
+        found = _structure(parts, quantity, bins)
+        if found:
+            return found
+        bins = 4 * bins // 5
+    return None
+
+
+def _structure(parts: Sequence[ResidualSeries], quantity: Sequence[FloatArray], bins: int) -> Structure | None:
     values = np.concatenate([one[part.rows] for one, part in zip(quantity, parts, strict=True)])
     if values.size < bins or not np.isfinite(values).all():
         return None

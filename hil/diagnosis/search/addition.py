@@ -12,12 +12,12 @@ from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.ledger import Considered, Ledger, accepted, examine
 from hil.diagnosis.search.events import InsideWindows, inside_windows
 from hil.diagnosis.search.initial_values import claimable
-from hil.diagnosis.structure_left import Dependence, share_left
+from hil.diagnosis.search.shape import below_noise
+from hil.diagnosis.structure_left import Dependence, within_noise
 from hil.diagnosis.wording import channel_names
 from hil.identification.estimator import Fit
 from hil.identification.inference import bic_gain
 from hil.identification.noise_floor import unrepeated
-from hil.twin.library import BY_ID
 
 
 @dataclass(frozen=True)
@@ -83,14 +83,9 @@ class Addition:
         return unrepeated(self.fit.hypothesis, self.fit.data), unrepeated(self.base.hypothesis, self.base.data)
 
     @cached_property
-    def structure_left(self) -> float | None:
-        """Share of the structure of a base within its noise that is left; None above the noise.
-
-        A structure is a dependence on a quantity, of which a delay or a resonance is no cause.
-        """
-        if not self.structure:
-            return None
-        return 1.0 if BY_ID[self.fit.terms[-1].effect].shifts_phase else share_left(self.structure, self.fit)
+    def below(self) -> tuple[float, float] | None:
+        """Evidence below the noise, see `below_noise`; None above it."""
+        return below_noise(self.fit, self.base, self.structure) if within_noise(self.base) else None
 
     @cached_property
     def inside(self) -> InsideWindows | None:

@@ -10,9 +10,10 @@ from hil.diagnosis.ledger import Considered, accepted
 from hil.diagnosis.search.addition import Addition
 from hil.diagnosis.search.restart import companion, from_bench_file, may_hide, together, unbent
 from hil.diagnosis.search.score_test import Candidate
+from hil.diagnosis.search.shape import shown
 from hil.diagnosis.search.successive_halving import race
 from hil.diagnosis.stages import Progress
-from hil.diagnosis.structure_left import Dependence, below_noise, within_noise
+from hil.diagnosis.structure_left import Dependence, structure_below_noise, within_noise
 from hil.identification.estimator import Fit
 
 
@@ -31,7 +32,7 @@ class SearchRound:
     @cached_property
     def structure(self) -> tuple[Dependence, ...]:
         """What the base leaves below its floor; none above it."""
-        return below_noise(self.base)
+        return structure_below_noise(self.base)
 
     @property
     def unfinished(self) -> bool:
@@ -52,7 +53,7 @@ def next_term(search: SearchRound, candidates: Sequence[Candidate], step: Progre
     """Fit the base with one more term.
 
     A torque that is sampled, or the only one recorded, drives the twin with its error: terms that pass less of it leave
-    less than the noise, so that below the floor nothing but structure is evidence.
+    less than the noise, so that below the floor nothing but structure, and the shape of a term, is evidence.
     """
     base, considered = search.base, list[Considered]()
 
@@ -61,10 +62,13 @@ def next_term(search: SearchRound, candidates: Sequence[Candidate], step: Progre
         considered.extend(one.considered for one in begun if not one.valid)
         return [one for one in begun if one.valid]
 
-    if within_noise(base) and not search.structure:
+    hidden = within_noise(base)
+    promising = shown(base, candidates) if hidden else []
+    if hidden and not promising and not search.structure:
         return Additions([], None)
+    promising = promising or [one for one in candidates if promises(one.share, base.cost, base.rows, base.noise_energy)]
     additions = list[Addition]()
-    if promising := [one for one in candidates if promises(one.share, base.cost, base.rows, base.noise_energy)]:
+    if promising:
         step("fitting " + ", ".join(one.term.effect for one in promising[:3]))
         additions = valid(race(base, promising))
     best = first_standing(additions)

@@ -2,23 +2,28 @@
 
     r = c s + inertia, friction and offset,      s = r of the fit without the term - r of the fit with it
 
-Least squares on the rows that slide: `c / error` is Student's t with one degree of freedom less than the blocks of the
-jackknife (`hil.identification.least_squares`). Thousands of rows together tell what hides in the noise of each one.
+Least squares on the rows that slide: `c / error` is Student's t, with an error that counts the autocovariance, and as
+many degrees of freedom as independent rows. Thousands of rows together tell what hides in the noise of each one.
 """
 
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import t as student
 
+from hil.arrays import FloatArray
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.search.score_test import Candidate
 from hil.diagnosis.structure_left import TORQUE, Dependence, channels, left_in_channel, share_left
 from hil.identification.estimator import Fit
-from hil.identification.least_squares import BLOCKS, least_squares
-from hil.identification.plain_model import plain_columns
+from hil.identification.plain_model import MOTION, plain_columns
+from hil.identification.structure import ResidualSeries, autocovariance
 from hil.identification.torque_left import fit_plain, measured_motion
 from hil.twin.library import BY_ID, LIBRARY
+
+_FEWEST_ROWS = 100
+_RANK = 1e-9  # share of a column, beside the others, below which it is not told
 
 
 def below_noise(fit: Fit, without: Fit, structure: Sequence[Dependence], index: int = -1) -> tuple[float, float]:
@@ -47,21 +52,55 @@ def chance_of_shape(fit: Fit, without: Fit, fitted: bool = True) -> float:
         left, other = (
             np.concatenate([one.left[at] for one, at in zip(each, rows, strict=True)]) for each in (before, after)
         )
-        if left.size < 10 * BLOCKS or not (np.isfinite(left).all() and np.isfinite(other).all()):
+        if left.size < _FEWEST_ROWS or not (np.isfinite(left).all() and np.isfinite(other).all()):
             continue
-        columns = {"shape": left - other, "offset": np.ones_like(left)}
+        columns = [left - other, np.ones_like(left)]
         if channel == TORQUE:
             plains = [plain_columns(moved) for moved in motions]
-            columns |= {
-                name: np.concatenate([one[name][at] for one, at in zip(plains, rows, strict=True)])
-                for name in plains[0]
-            }
-        found = least_squares(columns, left)["shape"]
-        if np.isfinite(found.std_error) and found.std_error > 0.0:
-            ratio = found.value / found.std_error
-            chance = student.sf(ratio, BLOCKS - 1) if fitted else 2.0 * student.sf(abs(ratio), BLOCKS - 1)
+            columns += [
+                np.concatenate([one[name][at] for one, at in zip(plains, rows, strict=True)]) for name in MOTION
+            ]
+        ratio, free = _first_coefficient(np.column_stack(columns), left, rows)
+        if free > 0.0:
+            chance = student.sf(ratio if fitted else abs(ratio), free) * (1.0 if fitted else 2.0)
             best = min(best, len(LIBRARY) * float(chance))
     return best
+
+
+def _first_coefficient(
+    matrix: FloatArray, signal: FloatArray, rows: Sequence[NDArray[np.bool_]]
+) -> tuple[float, float]:
+    """Coefficient of the first column (n, p) over its error, and the degrees of freedom; (0, 0) where it is not told.
+
+    The error counts the autocovariance of what the columns leave (Newey and West 1987); rows (m,) of each run count.
+    """
+    scale = np.linalg.norm(matrix, axis=0)
+    scaled = matrix / np.where(scale > 0.0, scale, 1.0)
+    weights = np.linalg.pinv(scaled, rcond=_RANK)
+    solved = weights @ signal
+    own = scaled[:, 0] - scaled[:, 1:] @ np.linalg.lstsq(scaled[:, 1:], scaled[:, 0], rcond=_RANK)[0]
+    if float(own @ own) < _RANK:  # the others make it
+        return 0.0, 0.0
+    splits = np.cumsum([int(at.sum()) for at in rows])[:-1]
+    residual = np.split(signal - scaled @ solved, splits)
+    parts = [ResidualSeries(_spread(left, at), at) for left, at in zip(residual, rows, strict=True)]
+    covariance = autocovariance(parts)
+    variance = 0.0
+    for weight, at in zip(np.split(weights[0], splits), rows, strict=True):
+        size = 1 << (2 * at.size - 1).bit_length()
+        products = np.fft.irfft(np.abs(np.fft.rfft(_spread(weight, at), size)) ** 2, size)[: covariance.size]
+        lags = covariance[: products.size]
+        variance += float(lags[0] * products[0] + 2.0 * lags[1:] @ products[1 : lags.size])
+    total = max(float(covariance[0] + 2.0 * covariance[1:].sum()), float(covariance[0]))
+    free = signal.size * float(covariance[0]) / total - matrix.shape[1] if total > 0.0 else 0.0
+    return (float(solved[0]) / variance**0.5, free) if variance > 0.0 and free > 0.0 else (0.0, 0.0)
+
+
+def _spread(values: FloatArray, at: NDArray[np.bool_]) -> FloatArray:
+    """Values of the rows that count as a series (n,), 0 in the others."""
+    series = np.zeros(at.size)
+    series[at] = values
+    return series
 
 
 def shown(base: Fit, candidates: Sequence[Candidate]) -> list[Candidate]:

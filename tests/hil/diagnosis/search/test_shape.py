@@ -1,0 +1,55 @@
+"""Evidence below the noise: the shape of a term in the torque that a twin leaves."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+from diagnosis_runs import bench, changed, recorded
+
+from hil.bench.control_section import UnknownControl
+from hil.diagnosis.preparation.prepare import prepare
+from hil.diagnosis.search.score_test import Candidate
+from hil.diagnosis.search.shape import below_noise, chance_of_shape, shown
+from hil.diagnosis.structure_left import structure_below_noise, within_noise
+from hil.identification.estimator import Fit
+from hil.identification.nominal_fit import fit_nominal_parameters
+from hil.identification.terms import Term
+
+KNOWN = bench()
+OWNER = KNOWN.model_copy(update={"control": UnknownControl(law="unknown")})
+COGGING = Term("cogging_torque", 0, (0.05, 6.0, 0.4))
+DELAY = Term("transport_delay", 1, (0.5 * KNOWN.gains.period_s,))
+
+
+def base(*terms: Term) -> Fit:
+    """A twin without new terms on an axis whose torque was measured with much noise."""
+    recording = changed(recorded(KNOWN, *terms, times=2, torque_noise_n_m=0.3), torque_command_n_m=None)
+    recording = replace(recording, metadata={**recording.metadata, "source": "log.csv"})
+    fit = fit_nominal_parameters(prepare([recording], [], OWNER).train)
+    assert within_noise(fit)
+    return fit
+
+
+@pytest.mark.parametrize(("terms", "told"), [((COGGING,), True), ((), False)])
+def test_a_shape_below_the_noise_is_told_where_it_is(terms: tuple[Term, ...], told: bool) -> None:
+    without = base(*terms)
+    begun = without.estimator.evaluate(without.hypothesis.with_term(COGGING))
+    assert (chance_of_shape(begun, without) < 1e-6) == told
+    assert [one.term for one in shown(without, [Candidate(COGGING, 0.0)])] == [COGGING] * told
+
+
+def test_a_shape_of_the_opposite_sign_is_told_only_before_it_is_fitted() -> None:
+    without = base(COGGING)
+    opposite = replace(COGGING, values=(0.05, 6.0, 0.4 + math.pi))
+    begun = without.estimator.evaluate(without.hypothesis.with_term(opposite))
+    assert chance_of_shape(begun, without) > 0.5
+    assert chance_of_shape(begun, without, fitted=False) < 1e-6
+
+
+def test_a_delay_is_no_dependence_on_a_quantity() -> None:
+    without = base(COGGING)
+    late = without.estimator.evaluate(without.hypothesis.with_term(DELAY))
+    assert below_noise(late, without, structure_below_noise(without)) == (1.0, 1.0)
+    assert shown(without, [Candidate(DELAY, 0.9)]) == []

@@ -46,13 +46,13 @@ def promises(share: float, cost: float, rows: int, noise_energy: float, c: Crite
 
 
 def _evidence(of: Addition | Need, c: Criteria) -> Answer | None:
-    if of.below is not None:  # the noise of a row says nothing of thousands of rows
+    if of.chance is not None:  # the noise of a row says nothing of thousands of rows
         return None
     return of.evidence >= c.evidence, {"evidence": of.evidence, "needed": c.evidence}
 
 
 def _material(of: Addition | Need, c: Criteria) -> Answer | None:
-    if of.below is not None:
+    if of.chance is not None:
         return None
     removed = of.gain / of.noise_energy if of.noise_energy else 0.0
     return removed >= c.material, {"removed": removed, "needed": c.material}
@@ -70,11 +70,10 @@ def _laps(of: Addition, c: Criteria) -> Answer | None:
     return c.repeats * left <= before, {"without_over_with": before / left if left else math.inf}
 
 
-def _below_noise(of: Addition | Need, c: Criteria) -> Answer | None:
-    if of.below is None:
+def _shape(of: Addition | Need, c: Criteria) -> Answer | None:
+    if of.chance is None:
         return None
-    left, chance = of.below
-    return left <= c.most_left and chance < c.significance, {"left": left, "chance": chance}
+    return of.chance < math.exp(-0.5 * c.evidence), {"chance": of.chance}
 
 
 def _constant(of: Addition, c: Criteria) -> Answer | None:
@@ -180,11 +179,11 @@ _MATERIAL: Rule[Addition | Need] = Rule(
     _material,
 )
 # a torque with noise drives the twin: a term that passes less of it leaves less, and explains nothing
-_BELOW_NOISE: Rule[Addition | Need] = Rule(
-    "below the noise",
-    "it leaves {left:.0%} of the structure below the noise (its shape by chance: {chance:.1g})",
-    "it leaves {left:.0%} of the structure below the noise (its shape by chance: {chance:.1g}): it passes less noise",
-    _below_noise,
+_SHAPE: Rule[Addition | Need] = Rule(
+    "shape below the noise",
+    "its shape is in what the twin leaves below the noise (by chance {chance:.1g})",
+    "its shape is not in what the twin leaves below the noise (by chance {chance:.1g}): it only passes less noise",
+    _shape,
 )
 VALUES: tuple[Rule[bool], ...] = (
     # the condition of each mechanism (`Mechanism.is_valid`): else its name does not apply
@@ -198,7 +197,7 @@ VALUES: tuple[Rule[bool], ...] = (
 FORM: tuple[Rule[Addition], ...] = (
     # what repeats with the motion is no matter of chance
     Rule("repeated laps", "repeated laps are reproduced as well", "with it repeated laps are reproduced worse", _laps),
-    _BELOW_NOISE,
+    _SHAPE,
     # an external force; what depends on place or speed leaves its form inside
     Rule(
         "constant force",
@@ -228,7 +227,7 @@ HARMLESS: tuple[Rule[Addition], ...] = (
         _channels,
     ),
 )
-NEEDED: tuple[Rule[Addition | Need], ...] = (_EVIDENCE, _MATERIAL, _BELOW_NOISE)
+NEEDED: tuple[Rule[Addition | Need], ...] = (_EVIDENCE, _MATERIAL, _SHAPE)
 COMPARED: tuple[Rule[RivalFit], ...] = (
     # a rival is refuted by very strong evidence and by more than the model discrepancy
     Rule(

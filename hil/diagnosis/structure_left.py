@@ -64,12 +64,6 @@ class Dependence:
     material: float
     held_out: float | None
 
-    def left_in(self, parts: Sequence[ResidualSeries]) -> float:
-        """Share of the energy of the dependence that other residuals of its channel have, at least 0."""
-        question = self.question
-        found = offset(parts) if question.name == OFFSET else structure(parts, question.values, question.bins)
-        return max(found.energy, 0.0) / self.found.energy if found else 0.0
-
     def rms_left(self, fit: Fit, data: Dataset) -> float:
         """Rms of the residual of a fit on other recordings, its mean taken off; infinite where it is not held."""
         plain = fit_plain(fit.data)
@@ -125,29 +119,6 @@ def structure_left(fit: Fit, held_out: Dataset) -> tuple[Dependence, ...]:
         and (one.held_out is None or one.held_out > 0.0)
     ]
     return tuple(sorted(counted, key=lambda one: -one.explained))
-
-
-def within_noise(fit: Fit) -> bool:
-    """True if a fit is at its floor, and a torque with noise drives the twin: nothing but structure is evidence."""
-    return fit.at_floor and not fit.data.observability.exact_input
-
-
-def structure_below_noise(fit: Fit) -> tuple[Dependence, ...]:
-    """The structure that a fit leaves below its floor; none above it."""
-    return structure_left(fit, fit.data.over(())) if within_noise(fit) else ()
-
-
-def share_left(structure: Sequence[Dependence], fit: Fit) -> float:
-    """Share of a structure, weighted by what each dependence explains, that another fit leaves."""
-    plain, left = fit_plain(fit.data), 0.0
-    if plain is None:
-        return 1.0
-    for channel in sorted({one.channel for one in structure}):
-        parts = left_in_channel(fit.hypothesis, fit.data, channel, plain)
-        if not all(np.isfinite(part.left).all() for part in parts):
-            return np.inf
-        left += sum(one.explained * one.left_in(parts) for one in structure if one.channel == channel)
-    return left / sum(one.explained for one in structure)
 
 
 def questions(hypothesis: Hypothesis, data: Dataset, plain: PlainModel) -> list[Question]:

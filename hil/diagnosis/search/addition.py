@@ -12,8 +12,7 @@ from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.ledger import Considered, Ledger, accepted, examine
 from hil.diagnosis.search.events import InsideWindows, inside_windows
 from hil.diagnosis.search.initial_values import claimable
-from hil.diagnosis.search.shape import below_noise
-from hil.diagnosis.structure_left import Dependence, within_noise
+from hil.diagnosis.search.shape import chance_below_noise
 from hil.diagnosis.wording import channel_names
 from hil.identification.estimator import Fit
 from hil.identification.inference import bic_gain
@@ -36,14 +35,13 @@ class Addition:
     """A fit with one more term than its `base`.
 
     `reference` is the nominal fit beside the loads of the base: what the terms before it are measured against. `given`
-    is the fit at the values of the bench file, `structure` what the base leaves where it is within its noise.
+    is the fit at the values of the bench file.
     """
 
     fit: Fit
     base: Fit
     reference: Fit
     given: Fit
-    structure: tuple[Dependence, ...] = ()
 
     @cached_property
     def evidence(self) -> float:
@@ -83,9 +81,9 @@ class Addition:
         return unrepeated(self.fit.hypothesis, self.fit.data), unrepeated(self.base.hypothesis, self.base.data)
 
     @cached_property
-    def below(self) -> tuple[float, float] | None:
-        """Evidence below the noise, see `below_noise`; None above it."""
-        return below_noise(self.fit, self.base, self.structure) if within_noise(self.base) else None
+    def chance(self) -> float | None:
+        """Chance of the shape of the term below the noise; None above it."""
+        return chance_below_noise(self.fit, self.base)
 
     @cached_property
     def inside(self) -> InsideWindows | None:

@@ -21,9 +21,8 @@ from hil.diagnosis.search.next_term import SearchRound, next_term
 from hil.diagnosis.search.restart import again
 from hil.diagnosis.search.rivals import ENDED, RivalFit, chosen, ended
 from hil.diagnosis.search.score_test import screen_library
-from hil.diagnosis.search.shape import below_noise
+from hil.diagnosis.search.shape import chance_below_noise
 from hil.diagnosis.stages import Prepared, Progress, Searched
-from hil.diagnosis.structure_left import structure_below_noise, within_noise
 from hil.identification.estimator import Fit
 from hil.identification.inference import bic_gain, standard_errors, whitening
 from hil.identification.nominal_fit import fit_nominal_parameters, require_finite
@@ -39,13 +38,13 @@ MOST_TERMS = 8  # at once: more than an engineer can act on; limits the duration
 class Need:
     """Need of a term beside all others: evidence (BIC difference), energy it removes and that of the noise.
 
-    `below`: evidence below the noise (`search.shape`); None above it.
+    `chance`: of its shape below the noise (`search.shape`); None above it.
     """
 
     evidence: float
     gain: float
     noise_energy: float
-    below: tuple[float, float] | None
+    chance: float | None
 
 
 def search(prepared: Prepared, progress: Progress = lambda text: None, deadline_s: float = math.inf) -> Searched:
@@ -182,8 +181,8 @@ def _pruned(fit: Fit, reference: Fit) -> tuple[Fit, dict[Key, float], list[Consi
         pairs = in_parallel([partial(ablated, index) for index in range(len(fit.terms))])
         weakest = min(range(len(pairs)), key=lambda index: pairs[index][0])
         evidence, rest = pairs[weakest]
-        below = below_noise(fit, rest, structure_below_noise(rest), weakest) if within_noise(rest) else None
-        ledger = examine(NEEDED, Need(evidence, removed(rest, fit, reference), fit.noise_energy, below), CRITERIA)
+        need = Need(evidence, removed(rest, fit, reference), fit.noise_energy, chance_below_noise(fit, rest, weakest))
+        ledger = examine(NEEDED, need, CRITERIA)
         if accepted(ledger):
             return fit, {term.key: value for term, (value, _) in zip(fit.terms, pairs, strict=True)}, pruned
         pruned.append(Considered.of(fit.terms, ledger, weakest))

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 from hil.diagnosis.acceptance import promises
 from hil.diagnosis.criteria import CRITERIA
@@ -10,10 +9,9 @@ from hil.diagnosis.ledger import Considered, accepted
 from hil.diagnosis.search.addition import Addition
 from hil.diagnosis.search.restart import companion, from_bench_file, may_hide, together, unbent
 from hil.diagnosis.search.score_test import Candidate
-from hil.diagnosis.search.shape import shown
+from hil.diagnosis.search.shape import shown, within_noise
 from hil.diagnosis.search.successive_halving import race
 from hil.diagnosis.stages import Progress
-from hil.diagnosis.structure_left import Dependence, structure_below_noise, within_noise
 from hil.identification.estimator import Fit
 
 
@@ -27,12 +25,7 @@ class SearchRound:
 
     def addition(self, fit: Fit) -> Addition:
         """A fit with one more term than the base."""
-        return Addition(fit, self.base, self.reference, self.given, self.structure)
-
-    @cached_property
-    def structure(self) -> tuple[Dependence, ...]:
-        """What the base leaves below its floor; none above it."""
-        return structure_below_noise(self.base)
+        return Addition(fit, self.base, self.reference, self.given)
 
     @property
     def unfinished(self) -> bool:
@@ -53,7 +46,7 @@ def next_term(search: SearchRound, candidates: Sequence[Candidate], step: Progre
     """Fit the base with one more term.
 
     A torque that is sampled, or the only one recorded, drives the twin with its error: terms that pass less of it leave
-    less than the noise, so that below the floor nothing but structure, and the shape of a term, is evidence.
+    less than the noise, so that below the floor nothing but the shape of a term is evidence.
     """
     base, considered = search.base, list[Considered]()
 
@@ -62,11 +55,12 @@ def next_term(search: SearchRound, candidates: Sequence[Candidate], step: Progre
         considered.extend(one.considered for one in begun if not one.valid)
         return [one for one in begun if one.valid]
 
-    hidden = within_noise(base)
-    promising = shown(base, candidates) if hidden else []
-    if hidden and not promising and not search.structure:
-        return Additions([], None)
-    promising = promising or [one for one in candidates if promises(one.share, base.cost, base.rows, base.noise_energy)]
+    if within_noise(base):
+        promising = shown(base, candidates)
+        if not promising:
+            return Additions([], None)
+    else:
+        promising = [one for one in candidates if promises(one.share, base.cost, base.rows, base.noise_energy)]
     additions = list[Addition]()
     if promising:
         step("fitting " + ", ".join(one.term.effect for one in promising[:3]))

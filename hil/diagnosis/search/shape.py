@@ -15,7 +15,7 @@ from scipy.stats import t as student
 from hil.arrays import FloatArray
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.search.score_test import Candidate
-from hil.diagnosis.structure_left import TORQUE, Dependence, channels, left_in_channel, share_left
+from hil.diagnosis.structure_left import TORQUE, channels, left_in_channel
 from hil.identification.estimator import Fit
 from hil.identification.plain_model import MOTION, plain_columns
 from hil.identification.structure import ResidualSeries, autocovariance
@@ -26,15 +26,19 @@ _FEWEST_ROWS = 100
 _RANK = 1e-9  # share of a column, beside the others, below which it is not told
 
 
-def below_noise(fit: Fit, without: Fit, structure: Sequence[Dependence], index: int = -1) -> tuple[float, float]:
-    """Share of a structure that a fit with a term leaves; where there is none, the chance of the term's shape.
+def within_noise(fit: Fit) -> bool:
+    """True if a fit is at its floor, and a torque with noise drives the twin: there only shapes are evidence."""
+    return fit.at_floor and not fit.data.observability.exact_input
 
-    The other of the two is 0. A delay or a resonance is no dependence on a quantity, and passes less of the noise
-    itself: (1, 1).
+
+def chance_below_noise(fit: Fit, without: Fit, index: int = -1) -> float | None:
+    """Chance of the shape of a term, by default the last one, where the fit without it is within its noise; else None.
+
+    A delay or a resonance is no dependence on a quantity, and passes less of the noise itself: 1.
     """
-    if BY_ID[fit.terms[index].effect].shifts_phase:
-        return 1.0, 1.0
-    return (share_left(structure, fit), 0.0) if structure else (0.0, chance_of_shape(fit, without))
+    if not within_noise(without):
+        return None
+    return 1.0 if BY_ID[fit.terms[index].effect].shifts_phase else chance_of_shape(fit, without)
 
 
 def chance_of_shape(fit: Fit, without: Fit, fitted: bool = True) -> float:

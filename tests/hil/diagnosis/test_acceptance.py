@@ -35,7 +35,7 @@ def addition(**quantities: Any) -> Any:
         "gain": 900.0,
         "noise_energy": 1000.0,
         "explained": 0.9,
-        "below": None,
+        "chance": None,
         "beside": 0,
         "unrepeated": (100.0, 100.0),
         "inside": None,
@@ -70,8 +70,7 @@ def test_every_constant_of_evidence_is_used() -> None:
         ({"gain": 19.0}, "material energy"),
         ({"explained": 0.019}, "share of the mismatch"),
         ({"explained": 0.09, "beside": 2}, "share of the mismatch"),
-        ({"below": (0.9, 0.0)}, "below the noise"),
-        ({"below": (0.0, 0.02), "evidence": 1e6}, "below the noise"),
+        ({"chance": 1e-4, "evidence": 1e6}, "shape below the noise"),
         ({"unrepeated": (106.0, 100.0)}, "repeated laps"),
         ({"inside": InsideWindows(0.01, 1.0, 5.0, 1.0, False)}, "constant force"),
     ],
@@ -92,8 +91,7 @@ def test_a_term_is_refuted_by_the_first_rule_that_it_fails(quantities: dict[str,
         {"gain": 20.0},
         {"explained": 0.1, "beside": 2},
         {"explained": None},  # nothing is above the noise
-        {"below": (0.5, 0.0), "evidence": 0.0, "gain": 0.0},  # the noise of a row says nothing of thousands
-        {"below": (0.0, 0.009)},
+        {"chance": 4e-5, "evidence": 0.0, "gain": 0.0},  # the noise of a row says nothing of thousands
         {"unrepeated": (105.0, 100.0)},
         {"inside": InsideWindows(0.2, 1.0, 50.0, 1.0, True)},  # one push may have any form
         {"inside": InsideWindows(0.01, 1.0, 3.9, 1.0, False)},  # as well as outside

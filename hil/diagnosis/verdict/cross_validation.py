@@ -20,6 +20,7 @@ from hil.diagnosis.ledger import Ledger, examine, refusal
 from hil.diagnosis.search.addition import Harm, harm
 from hil.diagnosis.search.forward_selection import claimed
 from hil.diagnosis.search.initial_values import axis_facts
+from hil.diagnosis.search.shape import within_noise
 from hil.diagnosis.verdict.noise_free import energy_without_noise
 from hil.diagnosis.verdict.reproduction import torque_missed
 from hil.identification.dataset import Dataset
@@ -31,6 +32,8 @@ from hil.identification.terms import Term
 from hil.twin.library import BY_ID
 from hil.twin.mechanism import Block
 from hil.twin.parameter import Role
+
+_LEAST = 1e-12  # of the energy of the noise: a channel that the twin was given is left without a residual
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,9 +104,9 @@ def cross_validate(nominal: Fit, final: Fit, held_out: Dataset) -> CrossValidati
             final = claimed(final.refit(30))
 
 
-def by_channel(fit: Fit) -> dict[str, float]:
-    """Energy of the residuals of each channel in units of noise^2, at least that of the noise."""
-    return fit.energy(lambda ratio: max(ratio, 1.0))
+def by_channel(fit: Fit, least: float = 1.0) -> dict[str, float]:
+    """Energy of the residuals of each channel in units of noise^2, by default at least that of the noise."""
+    return fit.energy(lambda ratio: max(ratio, least))
 
 
 def explained_share(before: Fit, after: Fit) -> float:
@@ -120,17 +123,19 @@ def _ablate(given: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> list[Abl
         return final.estimator.fit(rest, evaluations=12) if rest.terms else nominal
 
     fits = in_parallel([partial(without, index) for index in range(len(final.terms))])
-    own, own_held_out = by_channel(final), final.on(held_out) if held_out.runs else None
+    own_held_out = final.on(held_out) if held_out.runs else None
     differs = unrepeated(final.hypothesis, final.data)
     clear = _clear(final)
 
     def ablation(index: int, term: Term, other: Fit) -> Ablation:
         there = other.on(held_out) if held_out.runs else None
-        factors = {channel: value / own[channel] for channel, value in by_channel(other).items()}
+        least = _LEAST if within_noise(other) else 1.0  # there the shape has shown that it is no noise
+        own = by_channel(final, least)
+        factors = {channel: value / own[channel] for channel, value in by_channel(other, least).items()}
         channel = max(factors, key=lambda name: factors[name])
         train, more, gain = factors[channel], None, None
         if there and own_held_out:
-            beyond, inside = by_channel(there)[channel], by_channel(own_held_out)[channel]
+            beyond, inside = by_channel(there, least)[channel], by_channel(own_held_out, least)[channel]
             if term.windows:  # an event is found in each recording: none is a test of another
                 train = (train * own[channel] + beyond) / (own[channel] + inside)
             else:

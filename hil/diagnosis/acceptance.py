@@ -78,13 +78,18 @@ def _shape(of: Addition | Need, c: Criteria) -> Answer | None:
 
 def _constant(of: Addition, c: Criteria) -> Answer | None:
     seen = of.inside
-    return None if seen is None else (is_constant(seen, c), {"left": seen.left / (seen.before or 1.0)})
+    return None if seen is None else (is_event(seen, c), {"left": seen.left / (seen.before or 1.0)})
 
 
-def is_constant(seen: InsideWindows | None, c: Criteria = CRITERIA) -> bool:
-    """True if a constant force explains its windows nearly whole, or as well as the rest of their recordings."""
+def is_event(seen: InsideWindows | None, c: Criteria = CRITERIA) -> bool:
+    """True if a constant force explains its windows nearly whole, or as well as the rest of their recordings.
+
+    What comes with each acceleration is no event.
+    """
     if seen is None:
         return True
+    if seen.chance < c.significance:
+        return False
     share = c.push if seen.one_push else c.form
     return seen.left <= share * seen.before or seen.mean <= c.inside * max(seen.mean_outside, 1.0)
 
@@ -201,8 +206,8 @@ FORM: tuple[Rule[Addition], ...] = (
     # an external force; what depends on place or speed leaves its form inside
     Rule(
         "constant force",
-        "the force is constant within its windows",
-        "the force is not constant within its windows",
+        "the force is constant within its windows, and these do not follow the motion",
+        "the force is not constant within its windows, or these follow the motion",
         _constant,
     ),
 )

@@ -7,9 +7,11 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import binom
 
 from hil.arrays import FloatArray
-from hil.diagnosis.acceptance import is_constant
+from hil.diagnosis.acceptance import is_event
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.search.event_detection import BLOCK_S, EDGE, Event, detect, faint, left_over
 from hil.identification.dataset import Dataset
@@ -21,6 +23,7 @@ from hil.identification.window_fit import fit_windows, window_errors
 from hil.twin.library import BY_ID, LIBRARY
 from hil.twin.parameter import Role
 
+_ACCELERATES = 0.25  # of the largest acceleration
 EVENTS = tuple(mechanism.id for mechanism in LIBRARY if mechanism.transient)
 
 
@@ -101,7 +104,7 @@ def with_events_of(held_out: Dataset, final: Fit) -> Fit:
         if (
             gain > evidence
             and before.cost - fitted.cost > CRITERIA.material * before.noise_energy
-            and is_constant(inside_windows(fitted, before))
+            and is_event(inside_windows(fitted, before))
         ):
             own = final.estimator.residuals(fitted.hypothesis)
             more = np.zeros((final.rows, fitted.hypothesis.x.size - at.x.size))
@@ -203,7 +206,8 @@ def _trimmed(fit: Fit, others: bool = True) -> Fit:
 
 class InsideWindows(NamedTuple):
     """Motor residuals of a fit with a force: energy inside its windows, `left` and `before` it, and mean squares inside
-    and outside [noise^2]; `one_push`: the windows follow each other in one recording.
+    and outside [noise^2]; `one_push`: the windows follow each other in one recording; `chance`: that windows which know
+    nothing of the motion lie so often where the axis accelerates.
 
     A force of another form, such as friction at one place, leaves more inside. What happens once is no law of place or
     speed: a blow or a push by hand has any form, of which windows that follow each other explain most.
@@ -214,6 +218,7 @@ class InsideWindows(NamedTuple):
     mean: float
     mean_outside: float
     one_push: bool
+    chance: float = 1.0
 
 
 def inside_windows(fit: Fit, base: Fit) -> InsideWindows | None:
@@ -236,7 +241,24 @@ def inside_windows(fit: Fit, base: Fit) -> InsideWindows | None:
         before += float(np.sum(base.residuals.parts[number, channel][within] ** 2))
     left, rest = np.concatenate(inside), np.concatenate(outside)
     mean, mean_outside = (float(np.mean(part)) if part.size else math.nan for part in (left, rest))
-    return InsideWindows(float(np.sum(left)), before, mean, mean_outside, _one_push(term))
+    return InsideWindows(float(np.sum(left)), before, mean, mean_outside, _one_push(term), _chance(fit, term))
+
+
+def _chance(fit: Fit, term: Term) -> float:
+    """Probability that so many windows of an event lie mostly where the axis accelerates, as often as its rows do."""
+    start, end = BY_ID[term.effect].indices(Role.EDGE)
+    inside, every = list[bool](), list[NDArray[np.bool_]]()
+    for run in fit.data.runs:
+        # of the set-points, where there are any: a push accelerates the axis too
+        acceleration = np.abs(np.gradient(run.velocity_command_m_s))
+        accelerates = acceleration > _ACCELERATES * np.max(acceleration, initial=0.0)
+        every.append(accelerates[run.evaluated])
+        for one in term.windows:
+            rows = (run.time_s >= term.at(one)[start]) & (run.time_s < term.at(one)[end])
+            if one.run == run.name and rows.any():
+                inside.append(bool(2 * np.count_nonzero(accelerates & rows) > np.count_nonzero(rows)))
+    share = float(np.mean(np.concatenate(every)))
+    return float(binom.sf(sum(inside) - 1, len(inside), share)) if inside else 1.0
 
 
 def _one_push(term: Term) -> bool:

@@ -73,6 +73,7 @@ def test_every_constant_of_evidence_is_used() -> None:
         ({"chance": 1e-4, "evidence": 1e6}, "shape below the noise"),
         ({"unrepeated": (106.0, 100.0)}, "repeated laps"),
         ({"inside": InsideWindows(0.01, 1.0, 5.0, 1.0, False)}, "constant force"),
+        ({"inside": InsideWindows(0.001, 1.0, 1.0, 1.0, False, 0.009)}, "constant force"),  # at each acceleration
     ],
 )
 def test_a_term_is_refuted_by_the_first_rule_that_it_fails(quantities: dict[str, Any], rule: str) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from diagnosis_runs import bench, evaluated, recorded
 
-from hil.diagnosis.acceptance import is_constant
+from hil.diagnosis.acceptance import is_event
 from hil.diagnosis.search.events import inside_windows
 from hil.diagnosis.verdict.findings import diagnosed_bench
 from hil.identification.hypothesis import Hypothesis
@@ -68,7 +68,7 @@ def test_a_single_blow_of_any_form_is_a_force_and_repeated_ones_are_not() -> Non
         windows = tuple(Window("run", start_s - starts_s[0], start_s - starts_s[0]) for start_s in starts_s)
         constant = Term("external_force", 0, (1000.0, starts_s[0] + 0.01, starts_s[0] + 0.05), windows=windows)
         found = fit_windows(evaluated(Hypothesis(OWNER, (constant,)), [run]))
-        assert is_constant(inside_windows(found, base)) == (len(starts_s) == 1)
+        assert is_event(inside_windows(found, base)) == (len(starts_s) == 1)
 
 
 def test_the_diagnosed_bench_expects_no_event() -> None:

@@ -31,5 +31,5 @@ MECHANISM = Mechanism(
         lambda a: (0.02 * a.rated_torque, 12.0, 0.0),
         screw_locked=True,
     ),
-    most=2,
+    most=4,
 )

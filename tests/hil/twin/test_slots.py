@@ -47,5 +47,5 @@ def test_two_alike_are_one_of_twice_the_strength() -> None:
 
 
 def test_no_more_often_than_there_is_room() -> None:
-    with pytest.raises(ValueError, match="cogging_torque must act at most 2 times"):
-        motion(*[Active("cogging_torque", (0.1, order, 0.0)) for order in (6.0, 12.0, 18.0)])
+    with pytest.raises(ValueError, match="cogging_torque must act at most 4 times"):
+        motion(*[Active("cogging_torque", (0.1, order, 0.0)) for order in (6.0, 12.0, 18.0, 24.0, 36.0)])

@@ -24,7 +24,7 @@ def motion(*active):
 
 def test_what_has_a_period_or_an_order_may_act_twice_and_a_stop_at_each_end() -> None:
     assert {mechanism.id for mechanism in LIBRARY if mechanism.most > 1} == {*TWICE, "end_stop"}
-    assert [mechanism.id for mechanism in SLOTS if mechanism.id in TWICE].count("cogging_torque") == 2
+    assert [mechanism.id for mechanism in SLOTS if mechanism.id in TWICE].count("cogging_torque") == 4
 
 
 @pytest.mark.parametrize("effect", TWICE)

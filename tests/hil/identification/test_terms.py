@@ -15,7 +15,11 @@ def test_the_same_period_is_the_same_cause() -> None:
     assert not repeats(SIX, FIFTEEN)
     assert not repeats(SIX, Term("torque_ripple", 0, (0.02, 6.0, 0.0)))
     assert compatible([SIX, FIFTEEN])
-    assert not compatible([SIX, FIFTEEN, Term("cogging_torque", 0, (0.1, 30.0, 0.0))])
+    more = [
+        Term("cogging_torque", 0, (0.1, order, 0.0), slot=2 + index) for index, order in enumerate((30.0, 45.0, 60.0))
+    ]
+    assert compatible([SIX, FIFTEEN, *more[:2]])
+    assert not compatible([SIX, FIFTEEN, *more])
 
 
 def test_the_same_torque_is_not_named_twice() -> None:

@@ -70,20 +70,21 @@ def test_beside_another_of_its_effect_a_likeness_takes_the_next_slot() -> None:
 
 
 def test_what_there_is_no_room_for_is_not_tried() -> None:
-    """A third cogging, or one in the place of a cogging that the bench knows."""
-    two = [Term("cogging_torque", 0, (0.1, 6.0, 0.0)), Term("cogging_torque", 0, (0.1, 12.0, 0.0), 1)]
+    """A fifth cogging, or one in the place of a cogging that the bench knows."""
+    orders = (6.0, 12.0, 18.0, 24.0)
+    full = [Term("cogging_torque", 0, (0.1, order, 0.0), slot) for slot, order in enumerate(orders)]
     known = OWNER.model_copy(
         update={
             "mechanisms": tuple(
                 MechanismEntry(
                     effect=term.effect, parameters=dict(zip(BY_ID[term.effect].names, term.values, strict=True))
                 )
-                for term in two
+                for term in full
             )
         }
     )
     cogging, ripple = (alike[0] for alike in likenesses([TERMS[1]], OWNER))
-    for model, terms in ((Hypothesis(OWNER, tuple(two)), two), (Hypothesis(known), [])):
+    for model, terms in ((Hypothesis(OWNER, tuple(full)), full), (Hypothesis(known), [])):
         assert not offered(cogging, model, terms)
         assert offered(ripple, model, terms)
 

@@ -63,7 +63,6 @@ def test_a_mechanism_is_offered_again_at_another_order() -> None:
     offered = {one.term.effect: one.term for one in screen_library(fitted(train, SIX))}
     assert offered["cogging_torque"].slot == 1
     assert offered["cogging_torque"].values[1] == 15.0
-    assert "cogging_torque" not in {one.term.effect for one in screen_library(fitted(train, SIX, FIFTEEN))}
 
 
 def test_two_of_a_name_are_two_findings_with_two_entries() -> None:

@@ -151,8 +151,8 @@ def diagnose(
 
     recordings: to learn from, of one axis. bench: as its owner describes it; wrong parameters are estimated. held_out:
     recordings of another motion that nothing is fitted to; without any, a third of each recording. progress:
-    called with a text at each step. budget_s: processor time of the search and the
-    tests [s]; a search that needs more ends with the best explanation so far, marked in `result.time_budget`.
+    called with a text at each step. budget_s: processor time [s]; a search that needs more ends with the best
+    explanation so far, marked in `result.time_budget`.
 
     Returns the diagnosis; `result` has verdict, findings with standard errors, location and held-out figures, `bench`
     the corrected bench. Raises InputError for recordings that cannot be diagnosed, with all reasons.

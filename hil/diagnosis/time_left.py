@@ -1,4 +1,4 @@
-"""Time of a diagnosis: its budget, and an estimate of what is left."""
+"""Processor time that a diagnosis may take, and an estimate of the time that it still takes."""
 
 import math
 import time

@@ -105,6 +105,11 @@ class Fit:
         return max(ratio for ratios in self.noise_ratios for ratio in ratios.values())
 
     @property
+    def within_noise(self) -> bool:
+        """True at the floor where a torque with noise drives the twin: there only the shapes of terms are evidence."""
+        return self.at_floor and not self.data.observability.exact_input
+
+    @property
     def at_floor(self) -> bool:
         """True if every channel of every run is at its noise floor."""
         return self.worst_ratio <= FLOOR
@@ -157,11 +162,9 @@ class Fit:
 
     def on(self, data: Dataset) -> "Fit":
         """Evaluate the hypothesis on a data set; on its own data set this is the fit itself."""
-        if data is self.data:
-            return self
-        if data not in self._elsewhere:
+        if data is not self.data and data not in self._elsewhere:
             self._elsewhere[data] = replace(self.estimator, data=data).evaluate(self.hypothesis)
-        return self._elsewhere[data]
+        return self if data is self.data else self._elsewhere[data]
 
     def without_deadline(self) -> "Fit":
         """The same fit, whose refits are not limited in time."""
@@ -183,9 +186,8 @@ class Estimator:
     """Fits hypotheses to a data set.
 
     `edge_step_s` is the forward-difference step for the edge of a window, `torque_accuracy` the torque resolved by the
-    motor channel over the noise of the torque channel. `closed` selects residuals in closed loop,
-    `fast` those with the internal steps of a search. After `deadline_s` of
-    processor time (`time.process_time`) fits take no more steps.
+    motor channel over the noise of the torque channel. `closed` selects residuals in closed loop, `fast` those with the
+    internal steps of a search. After `deadline_s` of processor time (`time.process_time`) fits take no more steps.
     """
 
     data: Dataset

@@ -82,8 +82,8 @@ def with_events_of(held_out: Dataset, final: Fit) -> Fit:
     index, at = _index(final), final.hypothesis
     there = replace(final.estimator, data=held_out)
     before = there.evaluate(at)
-    if index is None and before.at_floor and not held_out.observability.exact_input:
-        return final  # below the noise of the torque nothing but structure is evidence
+    if index is None and before.within_noise:
+        return final
     choices = list[Term]()
     plain = there.evaluate(at.without(*range(len(at.terms))))
     # terms may depend on the motion, which strong events disturb: some show only beside the nominal twin
@@ -206,8 +206,8 @@ def _trimmed(fit: Fit, others: bool = True) -> Fit:
 
 class InsideWindows(NamedTuple):
     """Motor residuals of a fit with a force: energy inside its windows, `left` and `before` it, and mean squares inside
-    and outside [noise^2]; `one_push`: the windows follow each other in one recording; `chance`: that windows which know
-    nothing of the motion lie so often where the axis accelerates.
+    and outside [noise^2]; `one_push`: the windows follow each other in one recording; `chance` by which windows that do
+    not depend on the motion lie so often where the axis accelerates.
 
     A force of another form, such as friction at one place, leaves more inside. What happens once is no law of place or
     speed: a blow or a push by hand has any form, of which windows that follow each other explain most.

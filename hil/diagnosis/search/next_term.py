@@ -9,7 +9,7 @@ from hil.diagnosis.ledger import Considered, accepted
 from hil.diagnosis.search.addition import Addition
 from hil.diagnosis.search.restart import companion, from_bench_file, may_hide, together, unbent
 from hil.diagnosis.search.score_test import Candidate
-from hil.diagnosis.search.shape import shown, within_noise
+from hil.diagnosis.search.shape import shown
 from hil.diagnosis.search.successive_halving import race
 from hil.diagnosis.stages import Progress
 from hil.identification.estimator import Fit
@@ -55,7 +55,7 @@ def next_term(search: SearchRound, candidates: Sequence[Candidate], step: Progre
         considered.extend(one.considered for one in begun if not one.valid)
         return [one for one in begun if one.valid]
 
-    if within_noise(base):
+    if base.within_noise:
         promising = shown(base, candidates)
         if not promising:
             return Additions([], None)

@@ -26,17 +26,12 @@ _FEWEST_ROWS = 100
 _RANK = 1e-9  # share of a column, beside the others, below which it is not told
 
 
-def within_noise(fit: Fit) -> bool:
-    """True if a fit is at its floor, and a torque with noise drives the twin: there only shapes are evidence."""
-    return fit.at_floor and not fit.data.observability.exact_input
-
-
 def chance_below_noise(fit: Fit, without: Fit, index: int = -1) -> float | None:
     """Chance of the shape of a term, by default the last one, where the fit without it is within its noise; else None.
 
     A delay or a resonance is no dependence on a quantity, and passes less of the noise itself: 1.
     """
-    if not within_noise(without):
+    if not without.within_noise:
         return None
     return 1.0 if BY_ID[fit.terms[index].effect].shifts_phase else chance_of_shape(fit, without)
 

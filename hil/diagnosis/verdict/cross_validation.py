@@ -20,7 +20,6 @@ from hil.diagnosis.ledger import Ledger, examine, refusal
 from hil.diagnosis.search.addition import Harm, harm
 from hil.diagnosis.search.forward_selection import claimed
 from hil.diagnosis.search.initial_values import axis_facts
-from hil.diagnosis.search.shape import within_noise
 from hil.diagnosis.verdict.noise_free import energy_without_noise
 from hil.diagnosis.verdict.reproduction import torque_missed
 from hil.identification.dataset import Dataset
@@ -129,7 +128,7 @@ def _ablate(given: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> list[Abl
 
     def ablation(index: int, term: Term, other: Fit) -> Ablation:
         there = other.on(held_out) if held_out.runs else None
-        least = _LEAST if within_noise(other) else 1.0  # there the shape has shown that it is no noise
+        least = _LEAST if other.within_noise else 1.0  # there the shape has shown that it is no noise
         own = by_channel(final, least)
         factors = {channel: value / own[channel] for channel, value in by_channel(other, least).items()}
         channel = max(factors, key=lambda name: factors[name])

@@ -77,18 +77,6 @@ def test_one_encoder_and_torque_make_a_rotary_axis(tmp_path: Path) -> None:
     assert bench.encoders.motor.counts_per_rev == 2**17
 
 
-@pytest.mark.parametrize(("share", "drafted_load"), [(0.2, True), (0.0, False), (1.5, False)])
-def test_a_constant_torque_that_friction_holds_is_in_the_draft(
-    tmp_path: Path, share: float, drafted_load: bool
-) -> None:
-    offset = share * COULOMB_N_M
-    shifted = AXIS | {"torque": AXIS["torque"] + offset}
-    bench = load_bench(drafted(tmp_path, renamed(shifted, t="time_s", angle="motor_angle_rad", torque="torque_Nm")))
-    assert [entry.effect for entry in bench.mechanisms] == ["constant_load"] * drafted_load
-    if drafted_load:
-        assert bench.mechanisms[0].parameters["load_torque_n_m"] == pytest.approx(offset, rel=0.1)
-
-
 def test_a_voltage_makes_a_dc_motor_in_volts(tmp_path: Path) -> None:
     bench = load_bench(
         drafted(tmp_path, renamed(AXIS, t="time_s", angle="motor_angle_rad", torque="voltage_command_V"))

@@ -71,6 +71,28 @@ def test_a_single_blow_of_any_form_is_a_force_and_repeated_ones_are_not() -> Non
         assert is_event(inside_windows(found, base)) == (len(starts_s) == 1)
 
 
+def test_windows_at_each_acceleration_are_told_from_windows_anywhere() -> None:
+    """On a drive of constant feeds, where the axis accelerates in a small part of the time."""
+    run = take(recorded(OWNER), OWNER)
+    steps = np.repeat(np.tile([0.1, -0.1], run.time_s.size), 200)[: run.time_s.size]
+    run = replace(run, velocity_command_m_s=np.convolve(steps, np.ones(10) / 10.0, "same"))
+    base = evaluated(Hypothesis(OWNER), [run])
+    turns_s = run.time_s[200:-200:200]
+
+    def chance(shift_s: float) -> float:
+        windows = tuple(
+            Window("run", at_s + shift_s - run.time_s[0], at_s + shift_s - run.time_s[0]) for at_s in turns_s
+        )
+        start_s = float(run.time_s[0])
+        term = Term("external_force", 0, (100.0, start_s - 0.002, start_s + 0.003), windows=windows)
+        seen = inside_windows(evaluated(Hypothesis(OWNER, (term,)), [run]), base)
+        assert seen is not None
+        return seen.chance
+
+    assert chance(0.0) < 1e-6
+    assert chance(100 * run.period_s) == 1.0
+
+
 def test_the_diagnosed_bench_expects_no_event() -> None:
     run = take(recorded(OWNER), OWNER)
     found = evaluated(Hypothesis(OWNER, (TWICE, Term("cogging_torque", 0, (0.1, 6.0, 0.2)))), [run])

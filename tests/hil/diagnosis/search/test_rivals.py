@@ -67,7 +67,7 @@ def explained(cost: float, motor: float, table: float) -> Any:
         rows=2000,
         noise_energy=2000.0,
         excess=0.0,
-        at_floor=False,
+        within_noise=False,
         terms=(),
         data=data,
         noise_ratios=ratios,

@@ -11,7 +11,7 @@ from diagnosis_runs import bench, changed, recorded
 from hil.bench.control_section import UnknownControl
 from hil.diagnosis.preparation.prepare import prepare
 from hil.diagnosis.search.score_test import Candidate
-from hil.diagnosis.search.shape import chance_below_noise, chance_of_shape, shown, within_noise
+from hil.diagnosis.search.shape import chance_below_noise, chance_of_shape, shown
 from hil.identification.estimator import Fit
 from hil.identification.nominal_fit import fit_nominal_parameters
 from hil.identification.terms import Term
@@ -27,7 +27,7 @@ def base(*terms: Term) -> Fit:
     recording = changed(recorded(KNOWN, *terms, times=2, torque_noise_n_m=0.3), torque_command_n_m=None)
     recording = replace(recording, metadata={**recording.metadata, "source": "log.csv"})
     fit = fit_nominal_parameters(prepare([recording], [], OWNER).train)
-    assert within_noise(fit)
+    assert fit.within_noise
     return fit
 
 

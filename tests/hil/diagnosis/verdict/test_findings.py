@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import diagnosis_runs
@@ -63,6 +64,12 @@ def test_a_mechanism_is_offered_again_at_another_order() -> None:
     offered = {one.term.effect: one.term for one in screen_library(fitted(train, SIX))}
     assert offered["cogging_torque"].slot == 1
     assert offered["cogging_torque"].values[1] == 15.0
+    full = [
+        SIX,
+        FIFTEEN,
+        *(replace(SIX, values=(0.01, order, 0.0), slot=slot) for order, slot in ((24.0, 2), (36.0, 3))),
+    ]
+    assert "cogging_torque" not in {one.term.effect for one in screen_library(fitted(train, *full))}
 
 
 def test_two_of_a_name_are_two_findings_with_two_entries() -> None:

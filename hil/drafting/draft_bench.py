@@ -27,7 +27,7 @@ from hil.twin.mechanisms import constant_load, gravity_torque
 _FINEST_M, _COARSEST_M = 1e-12, 1e-3  # resolution of a second encoder that a bench file takes
 _MOST_COUNTS = 2**31  # per revolution: noise below a count of this encoder is that of numbers
 LONGEST_LEAD_M = 1.0  # that a bench file takes; a load that turns as far as its motor, 1 m for 1 rad, has 6.3
-# Least deflection over acceleration that is written: a mode at 5 kHz, beyond any control loop.
+# Least deflection over acceleration that is a spring: a mode at 5 kHz, beyond any control loop.
 _STIFFEST_S2 = (2.0 * pi * 5e3) ** -2
 _MOVES = 0.1  # of the travel of the part that moves farthest, from which a part tells ratio and control law
 _STEPS_PER_NOISE = sqrt(12.0)  # a count of q has noise of q / sqrt(12)
@@ -101,8 +101,7 @@ def _draft_parts(recordings: Sequence[Recording]) -> BenchDraft:
         if plant.gravity_angle is not None and transmission is not None:  # it bends what the ratio is measured over
             transmission = transmission_values(recording, plant.gravity_angle.value)
             lead = lead_of(recording, transmission)
-        stiff = deflection is None or not deflection.significant
-        volts = turns and stiff and _in_volts(recording) and plant.viscous.significant
+        volts = turns and deflection is None and _in_volts(recording) and plant.viscous.significant
         if volts:
             draft.model = "dc_motor"
             _dc_motor(draft, plant, lead)
@@ -122,19 +121,14 @@ def _draft_parts(recordings: Sequence[Recording]) -> BenchDraft:
 
 
 def _deflection_s2(transmission: TransmissionValues) -> Estimate | None:
-    """Deflection of the transmission over the load's acceleration [s^2], else the standard error of it.
+    """Deflection of the transmission over the load's acceleration [s^2]; None where it is not told: a rigid axis.
 
-    Two encoders show lead error, play and twist of a transmission, which a rigid axis does not have; a diagnosis
-    searches within a factor of `TRUST` of the deflection. None: the second encoder is late, and no deflection is told
-    beside its delay.
+    A rigid axis has lead errors and play too. A spring has to be told, beside the delay of an encoder.
     """
     stretch = transmission.compliance_s2.scaled(-1.0)
-    if stretch.significant and stretch.value > 0.0:
+    if stretch.significant and stretch.value > _STIFFEST_S2:
         return replace(stretch, how="deflection over acceleration")
-    if transmission.delay_s.significant:
-        return None
-    how = "not told by this motion: the standard error of the deflection over acceleration"
-    return Estimate(max(stretch.value, stretch.std_error, _STIFFEST_S2), stretch.std_error, how)
+    return None
 
 
 def _screw(draft: BenchDraft, plant: PlantValues, deflection: Estimate | None, lead: Estimate) -> None:

@@ -1,7 +1,7 @@
 """Recordings of one axis prepared for a fit: observer, noise and model discrepancy of each residual."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -26,13 +26,15 @@ class Dataset:
     """Recordings of one axis prepared for a fit, with everything that does not depend on the hypothesis.
 
     `observer_s` is the time constant of the motor's observer in the block residuals, `travel_m` the largest range of
-    the position set-points.
+    the position set-points. What nothing explains of a channel counts as noise if the channel is in `set_aside`, with
+    the factor on its noise.
     """
 
     runs: tuple[Measured, ...]
     bench: Bench
     observer_s: float = FASTEST_OBSERVER_S
     travel_m: float = 0.1
+    set_aside: Mapping[str, float] = field(default_factory=dict)
     _scales: dict[tuple[float, float], tuple[dict[str, FloatArray], ...]] = field(
         default_factory=dict, init=False, repr=False
     )
@@ -43,8 +45,12 @@ class Dataset:
         return common(run.observability for run in self.runs)
 
     def over(self, runs: Sequence[Measured]) -> "Dataset":
-        """Other recordings of the same axis with the same observer and travel."""
-        return Dataset(tuple(runs), self.bench, self.observer_s, self.travel_m)
+        """Other recordings of the same axis with the same observer, travel, and channels that are set aside."""
+        return replace(self, runs=tuple(runs))
+
+    def louder(self, factors: Mapping[str, float]) -> "Dataset":
+        """The same recordings with channels set aside, each with the factor on its noise."""
+        return replace(self, set_aside=factors)
 
     @property
     def duration_s(self) -> float:
@@ -57,8 +63,9 @@ class Dataset:
         """Size of one unit of weighted residual at each row, (n,) per channel, for each run."""
         key = torque_accuracy, discrepancy
         if key not in self._scales:
+            sizes = [scales(run, self.bench, self.observer_s, torque_accuracy, discrepancy) for run in self.runs]
             self._scales[key] = tuple(
-                scales(run, self.bench, self.observer_s, torque_accuracy, discrepancy) for run in self.runs
+                {name: self.set_aside.get(name, 1.0) * size for name, size in one.items()} for one in sizes
             )
         return self._scales[key]
 

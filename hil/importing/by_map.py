@@ -48,7 +48,7 @@ def import_recording(source: str | Path, map_path: str | Path) -> Recording:
     origins: dict[str, dict[str, str | float]] = {}
     for name, entry in the_map.channels.items():
         gain = foreign.scalars[entry.gain] if isinstance(entry.gain, str) else 1.0
-        factor = entry.factor_to(CHANNELS[name].unit, the_map.lead_m, gain)
+        factor = entry.factor_to(CHANNELS[name].unit, the_map.travel_per_turn_m, gain)
         assert factor is not None  # the map was validated
         values = foreign.columns[entry.column]
         if entry.wraps_at is not None:
@@ -73,7 +73,7 @@ def import_recording(source: str | Path, map_path: str | Path) -> Recording:
         "source_sha256": _sha256(source),
         "map": map_path.name,
         "about": the_map.about,
-        "lead_m": the_map.lead_m,
+        "lead_m": the_map.travel_per_turn_m,
         "channels": origins,
         "derived": derived,
         "clock": _describe_clock(rows),

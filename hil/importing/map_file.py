@@ -5,7 +5,7 @@
 A map is a YAML file, such as the shipped `hil/maps/emps.yaml`.
 """
 
-from math import pi
+from math import isclose, pi
 from typing import Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, model_validator
@@ -14,7 +14,8 @@ from hil.channels import AXIS_CHANNELS, CHANNELS, AxisChannels, AxisKind
 from hil.errors import FieldError
 from hil.files.csv_columns import CsvFormat
 from hil.files.date_stamps import DAY_S
-from hil.quantities import si_factor, units_of
+from hil.importing.usual_values import ROTARY_LEAD_M
+from hil.quantities import UNITS, si_factor, units_of
 
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "d": DAY_S, "date": 1.0}  # of a unit of time
 # units that need a constant, and the fields that may give it
@@ -90,6 +91,11 @@ class ChannelSource(_Strict):
             raise FieldError(("unit",), f"{self.unit!r} needs exactly one of {', '.join(wanted)}; add it")
         return self
 
+    @property
+    def turns(self) -> bool:
+        """True if the column is an angle."""
+        return self.counts_per_rev is not None or UNITS.get(self.unit, ("",))[0] == "rad"
+
     def factor_to(self, si: str, lead_m: float | None, gain: float = 1.0) -> float | None:
         """Factor from the column to the SI unit `si`, with sign and scale; None if the unit does not convert.
 
@@ -133,6 +139,12 @@ class RecordingMap(_Strict):
     channels: dict[str, ChannelSource] = Field(description="channel name -> where it comes from")
 
     @property
+    def travel_per_turn_m(self) -> float | None:
+        """Lead [m]; of a load whose encoder tells an angle 2 pi, one metre for one radian. None: not told."""
+        table = self.channels.get(self.axis.table_position)
+        return ROTARY_LEAD_M if table is not None and table.turns else self.lead_m
+
+    @property
     def axis(self) -> AxisChannels:
         """Names of the channels of this kind of axis."""
         return AXIS_CHANNELS[AxisKind.of(self.channels)]
@@ -149,10 +161,16 @@ class RecordingMap(_Strict):
             if name not in CHANNELS or name == "time_s":
                 known = ", ".join(channel for channel in CHANNELS if channel != "time_s")
                 raise FieldError(("channels", name), f"is no channel, allowed {known}; correct the name")
-            si = CHANNELS[name].unit
-            if source.factor_to(si, self.lead_m) is None:
-                allowed = [*units_of(si, self.lead_m), *_CONSTANTS]
-                lead = "" if self.lead_m else " (angle and length convert if lead_m is given)"
+            si, lead_m = CHANNELS[name].unit, self.travel_per_turn_m
+            if self.lead_m is not None and lead_m is not None and not isclose(self.lead_m, lead_m, rel_tol=1e-3):
+                raise FieldError(
+                    ("lead_m",),
+                    f"given {self.lead_m:g} beside {self.axis.table_position} as an angle, allowed none: a load that "
+                    "turns has no lead, its gear ratio is found from the encoders; remove it",
+                )
+            if source.factor_to(si, lead_m) is None:
+                allowed = [*units_of(si, lead_m), *_CONSTANTS]
+                lead = "" if lead_m else " (angle and length convert if lead_m is given)"
                 raise FieldError(
                     ("channels", name, "unit"),
                     f"given {source.unit!r}, allowed {', '.join(allowed)}{lead}; correct the unit",

@@ -63,7 +63,7 @@ def find_roles(
     of = {kind: [name for name in live if labels[name].quantity is kind] for kind in Quantity}
     for name in of[Quantity.OTHER] + of[Quantity.ACCELERATION]:
         roles.left_out.setdefault(name, f"{labels[name].quantity} by its name, not needed")
-    _positions(live, labels, of[Quantity.POSITION], roles)
+    _positions(live, labels, of[Quantity.POSITION], bool(of[Quantity.EFFORT]), roles)
     moved = motion(live[roles.motor], period_s) if roles.motor else None
     _velocities(where, live, labels, of[Quantity.VELOCITY], moved, period_s, roles)
     _efforts(live, labels, of[Quantity.EFFORT], roles)
@@ -170,8 +170,13 @@ def _accelerates(values: FloatArray, moved: MeasuredMotion, period_s: float) -> 
     return proportional(smoothed(values, period_s), moved.acceleration).share > IS_DERIVATIVE
 
 
-def _positions(live: dict[str, FloatArray], labels: dict[str, Label], names: list[str], roles: Roles) -> None:
-    """Tell set-point, motor and second encoder."""
+def _positions(
+    live: dict[str, FloatArray], labels: dict[str, Label], names: list[str], driven_by: bool, roles: Roles
+) -> None:
+    """Tell set-point, motor and second encoder.
+
+    Where no effort drives the motion (`driven_by`), a set-point tells nothing: two positions are two encoders.
+    """
     names = list(names)
     for name in names[1:]:
         alike = [one for one in names[: names.index(name)] if _copies(live[one], live[name])]
@@ -181,7 +186,7 @@ def _positions(live: dict[str, FloatArray], labels: dict[str, Label], names: lis
             names.remove(name)
     commands = [name for name in names if labels[name].command]
     measured = [name for name in names if name not in commands]
-    if not commands and len(measured) > 1:
+    if driven_by and not commands and len(measured) > 1:
         plain = [name for name in measured if not (labels[name].motor or labels[name].table or labels[name].measured)]
         commands, why = computed_one({name: live[name] for name in measured}, plain)
         roles.unsure += [f"{name}: taken for the set-point, because {why}" for name in commands]

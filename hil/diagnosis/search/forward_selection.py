@@ -6,7 +6,8 @@ that are no longer needed are removed: a first term may have imitated two causes
 
 import math
 import time
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -66,6 +67,7 @@ def search(prepared: Prepared, progress: Progress = lambda text: None, deadline_
     base = fit_nominal_parameters(prepared.train, deadline_s=deadline_s)
     require_finite(base)
     given, nominal = base.estimator.evaluate(base.hypothesis.given), base
+    begun = given, nominal
     rivals, needed, considered = dict[Key, list[RivalFit]](), dict[Key, float](), list[Considered]()
     tried, fitted = [effects(())], set[str]()
     while len(base.terms) < MOST_TERMS:
@@ -78,7 +80,12 @@ def search(prepared: Prepared, progress: Progress = lambda text: None, deadline_
         considered += additions.considered
         if additions.best is None:
             considered += [one.considered for one in additions.fits]
-            break
+            factors = unexplained_channels(base)
+            if not factors:
+                break
+            step("searching the channels that are explained, beside those that are not")
+            base, nominal, given = (beside(one, factors) for one in (base, nominal, given))
+            continue
         choice = chosen(additions.best, additions.fits, round_)
         considered += choice.considered
         rivals[choice.named.fit.terms[-1].key] = choice.rivals
@@ -103,8 +110,24 @@ def search(prepared: Prepared, progress: Progress = lambda text: None, deadline_
     present = {*fitted, *(term.effect for term in final.terms)}
     not_tried = tuple(one.id for one in LIBRARY if one.id not in present) if stopped_at else ()
     rivals = {key: value for key, value in rivals.items() if key in kept}
-    given, nominal, final = (fit.without_deadline() for fit in (given, nominal, final))
+    given, nominal, final = (fit.without_deadline() for fit in (*begun, final))
     return Searched(prepared, given, nominal, final, rivals, needed, tuple(considered), stopped_at, not_tried)
+
+
+def unexplained_channels(fit: Fit) -> dict[str, float]:
+    """Factor on the noise of each channel that a fit does not explain, where it explains another; else empty.
+
+    What is left of such a channel counts as noise, so that it decides nothing of the others.
+    """
+    rms = {name: max(ratios[name] for ratios in fit.noise_ratios) ** 0.5 for name in fit.noise_ratios[0]}
+    quiet = [name for name, value in rms.items() if value**2 <= CRITERIA.floor and name not in fit.data.observability.hidden]
+    return {name: value for name, value in rms.items() if value**2 > CRITERIA.floor} if quiet else {}
+
+
+def beside(fit: Fit, factors: Mapping[str, float]) -> Fit:
+    """Fit again with the noise of channels multiplied by factors; without any, the hypothesis as it is."""
+    estimator = replace(fit.estimator, data=fit.data.louder(factors))
+    return estimator.fit(fit.hypothesis, evaluations=ENDED if factors else 1)
 
 
 def _without(fit: Fit, index: int) -> Fit:

@@ -129,6 +129,7 @@ def scene(runs: Sequence[Measured], bench: Bench, blocks: Sequence[dict[str, Flo
     longest = max(range(len(runs)), key=lambda i: runs[i].motor.size)
     first_s, last_s, level = estimate.force_window(runs[longest], disturbances[longest])
     travel = max(float(np.ptp(run.position_command_m)) for run in runs)
+    facts = axis_facts(bench, runs)
     lead = 2.0 * np.pi * ratio / physics.angle_per_unit
     # a screw-locked effect is periodic in the angle and along the travel: orders and periods start each other
     periods = estimate.friction_periods(runs, disturbances, ratio)
@@ -150,7 +151,7 @@ def scene(runs: Sequence[Measured], bench: Bench, blocks: Sequence[dict[str, Flo
         peak_speed=max(float(np.max(np.abs(d.velocity))) for d in disturbances),
         viscous_speed=max(physics.viscous_speed, 1e-6),
         travel_m=travel,
-        positions_m=axis_facts(bench, runs).positions_m,
+        positions_m=facts.positions_m,
         duration_s=max(run.motor.size * run.period_s for run in runs),
         period_s=runs[0].period_s,
         ratio=ratio,
@@ -167,8 +168,8 @@ def scene(runs: Sequence[Measured], bench: Bench, blocks: Sequence[dict[str, Flo
         lines_hz=estimate.lines_hz(runs[longest], disturbances[longest]),
         window=(runs[longest].start.time_s + first_s, runs[longest].start.time_s + last_s, level),
         rest_m=estimate.rest_position(runs, disturbances, ratio),
-        stretch=max(stretch, 0.5e-6),
-        most_stretch=max(most_stretch, 1e-6),
+        stretch=max(min(stretch, facts.lost_m), 0.5e-6),
+        most_stretch=max(min(most_stretch, facts.lost_m), 1e-6),
     )
 
 

@@ -186,8 +186,14 @@ def _quiet(fit: Fit, without: Fit) -> bool:
 
 
 def _torque(fit: Fit, without: Fit, term: Term, held_out: Dataset) -> tuple[float, float] | None:
-    """Torque missed on held-out recordings with a term of the plant and without it."""
-    if BY_ID[term.effect].block in (Block.CONTROLLER, Block.SENSOR) or term.windows:
+    """Torque missed on held-out recordings with a term of the plant and without it.
+
+    An error of the transmission is no torque on an axis without a spring.
+    """
+    mechanism = BY_ID[term.effect]
+    if mechanism.block in (Block.CONTROLLER, Block.SENSOR) or term.windows:
+        return None
+    if mechanism.in_transmission and not fit.bench.axis.SPRINGS:
         return None
     left, other = torque_missed(fit, held_out), torque_missed(without, held_out)
     if left is None or other is None or not np.isfinite(other):  # the twin without it does not hold the motion

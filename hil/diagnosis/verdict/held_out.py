@@ -1,6 +1,9 @@
 """Test the terms of a search on held-out recordings."""
 
+from dataclasses import replace
+
 from hil.diagnosis.search.events import with_events_of
+from hil.diagnosis.search.forward_selection import beside
 from hil.diagnosis.stages import Searched, Tested
 from hil.diagnosis.verdict.cross_validation import cross_validate
 from hil.diagnosis.verdict.findings import renamed
@@ -15,5 +18,10 @@ def test_on_held_out(searched: Searched) -> Tested:
     nominal, held_out, final = searched.nominal, searched.prepared.held_out, renamed(searched.final)
     if not searched.stopped_at or any(term.windows for term in final.terms):
         final = with_events_of(held_out, final)
-    proof = cross_validate(nominal, final, held_out)
+    set_aside = final.data.set_aside
+    if set_aside:
+        beside_them = cross_validate(beside(nominal, set_aside), final, held_out.louder(set_aside))
+        proof = replace(beside_them, final=beside(beside_them.final, {}))
+    else:
+        proof = cross_validate(nominal, final, held_out)
     return Tested(searched, proof, reported_refit(nominal))

@@ -14,7 +14,7 @@ from hil.twin.stepping.contact import COMPILE, Resistance
 from hil.twin.stepping.contact import rigid as _rigid
 from hil.twin.stepping.friction import friction as _friction
 from hil.twin.stepping.records import coupling_of, shapes_of, step_of
-from hil.twin.stepping.transmission import AxisMotion, along, moment
+from hil.twin.stepping.transmission import AxisMotion, along, follow, moment
 from hil.twin.stepping.transmission import transmit as _transmit
 
 _current, _torque, _motor_torque = stages.current, stages.torque, stages.motor_torque
@@ -135,4 +135,6 @@ def read(constants, modes, values, codes, delta, memory):  # type: ignore[no-unt
     effects = _Effects(values, codes[0], own.mechanisms)
     position, table = along(shapes.motor, delta[0]), along(shapes.table, delta[0]) * c.ratio
     at = moment(c, own.clock, 0.0, 0.0, position, 0.0, table)
+    if c.rigid > 0 and effects.codes.transmission:
+        table = follow(own, position, at, effects) * c.ratio
     return _motor_reading(position, at, effects), _table_reading(table, at, effects)

@@ -33,7 +33,7 @@ _NUMBERS = (
     "period", "ratio", "angle_per_unit", "coulomb", "viscous", "viscous_speed", "spring", "screw", "damper",
     "slow_velocity", "observer",
 )  # fmt: skip
-_FLAGS = ("any_active", "coupled", "always_fine", "play", "slips", "screw_apart")
+_FLAGS = ("any_active", "coupled", "always_fine", "play", "slips", "screw_apart", "rigid")
 CONSTANTS = np.dtype(
     [(name, np.float64) for name in _NUMBERS]
     + [(name, np.int64) for name in _FLAGS]
@@ -49,6 +49,7 @@ MEMORY = np.dtype(
         ("push", np.float64),  # force on the table over this tick beside the mechanisms [N]
         ("spring_extra", np.float64),  # deflection by mechanisms of the transmission at the last step
         ("floating", np.float64),  # 1: the table floats in a gap
+        ("carried", np.float64),  # table of a rigid axis [motor units]
         ("last_speed", np.float64),  # of the motor at the last tick
         # torques of the slip elements of each contact; the first is the deflection of a contact after Dahl
         ("motor_contact", np.float64, (ELEMENTS,)),
@@ -143,6 +144,7 @@ def pack(
     c["slow_velocity"] = SLOW_M_S if physics.linear else min(SLOW_RAD_S, SLOW_M_S / gains.ratio_m_rad)
     c["spring"] = physics.chain.transmission_stiffness_n_m_rad
     c["screw"] = physics.chain.screw_stiffness_n_m_rad
+    c["rigid"] = not physics.chain.transmission.any()
     c["screw_apart"] = not np.array_equal(physics.chain.screw, physics.chain.transmission)
     # s^T C s: resists the two sides of the transmission moving apart as two bodies. Play removes it; for a lead error
     # the table's place with the error counts. The rest of the damping drives no mode.

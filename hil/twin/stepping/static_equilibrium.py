@@ -22,6 +22,7 @@ def settle(constants, modes, values, codes, delta, memory):  # type: ignore[no-u
     hysteretic effects have not begun.
     """
     c, own, on, shapes, step = constants[0], memory[0], codes[0], shapes_of(modes), step_of(modes, False)
+    own.carried = along(shapes.motor, delta[0])
     if not (on.transmission or on.table_force):
         return
     effects = _Effects(values, on, own.mechanisms)

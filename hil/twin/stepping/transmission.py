@@ -1,4 +1,7 @@
-"""Forces of the transmission beside its nominal spring: lead errors, play, soft zones, a screw of varying stiffness."""
+"""Forces of the transmission beside its nominal spring: lead errors, play, soft zones, a screw of varying stiffness.
+
+On a rigid axis no spring gives way: the table is where the transmission is not deflected, and rests in a gap.
+"""
 
 from typing import NamedTuple
 
@@ -10,6 +13,7 @@ from hil.twin.stepping.contact import COMPILE
 
 _transmission, _screw = stages.transmission, stages.screw
 NUDGE = 1e-9  # of the deflection [motor units], to measure the local stiffness
+FOLLOWS = 20  # steps in which a table follows its motor: one for a lead error or a flank, more for a soft zone
 
 
 class AxisMotion(NamedTuple):
@@ -77,3 +81,17 @@ def transmit(c, own, shapes, motion, at, effects, delta):  # type: ignore[no-unt
             effective = along(shapes.screw, delta[0]) + 0.5 * h * along(shapes.screw, delta[1])
         screw = -c.screw * effective * (_screw(1.0, at, effects) - 1.0)
     return Force(spring, damped, screw)
+
+
+@njit(**COMPILE)
+def follow(own, position, at, effects):  # type: ignore[no-untyped-def]
+    """Position of the table of a rigid axis [motor units], which friction holds in a gap: hysteresis of play.
+
+    M. Brokate and J. Sprekels, Hysteresis and Phase Transitions, 1996, section 2.1.
+    """
+    for _ in range(FOLLOWS):
+        effective = _transmission(position - own.carried, at, effects)
+        if effective == 0.0:
+            break
+        own.carried += effective
+    return own.carried

@@ -70,7 +70,9 @@ def sentence(term: Term, bench: Bench) -> str:
     """Describe a term in a sentence with its values, and its variant in brackets."""
     mechanism, axis = BY_ID[term.effect], bench.axis
     variant = mechanism.variants[term.variant]
-    told_by = variant.text or mechanism.text
+    # forms of a transmission are forces, which a rigid axis does not have
+    forms = bool(axis.SPRINGS) or not mechanism.in_transmission
+    told_by = variant.text if variant.text and forms else mechanism.text
     text, opposite = told_by.sentence, told_by.reversed
     given = list(term.values)
     if given[mechanism.strength] < 0.0 and opposite:
@@ -85,7 +87,7 @@ def sentence(term: Term, bench: Bench) -> str:
     values["wave"] = "" if order is None else _wave(order, bench)
     values["viscous_speed"] = quantity(bench.axis.physics().viscous_speed, "m/s" if axis.linear else "rad/s")
     told = of_load(text, axis.turns).format(**values, variant=variant.name)
-    if not variant.name or "{variant}" in text or variant.name in told:
+    if not variant.name or not forms or "{variant}" in text or variant.name in told:
         return told
     return f"{told.removesuffix('.')} ({_variant_in_words(variant.name)})."
 

@@ -27,7 +27,8 @@ class Dataset:
 
     `observer_s` is the time constant of the motor's observer in the block residuals, `travel_m` the largest range of
     the position set-points. What nothing explains of a channel counts as noise if the channel is in `set_aside`, with
-    the factor on its noise.
+    the factor on its noise. `smooth` and `apart`: runs without noise, and the residuals (n,) by channel of their noise
+    (`hil.identification.noise_apart`).
     """
 
     runs: tuple[Measured, ...]
@@ -35,6 +36,8 @@ class Dataset:
     observer_s: float = FASTEST_OBSERVER_S
     travel_m: float = 0.1
     set_aside: Mapping[str, float] = field(default_factory=dict)
+    smooth: tuple[Measured, ...] = ()
+    apart: tuple[dict[str, FloatArray], ...] = ()
     _scales: dict[tuple[float, float], tuple[dict[str, FloatArray], ...]] = field(
         default_factory=dict, init=False, repr=False
     )
@@ -46,7 +49,7 @@ class Dataset:
 
     def over(self, runs: Sequence[Measured]) -> "Dataset":
         """Other recordings of the same axis with the same observer, travel, and channels that are set aside."""
-        return replace(self, runs=tuple(runs))
+        return replace(self, runs=tuple(runs), smooth=(), apart=())
 
     def louder(self, factors: Mapping[str, float]) -> "Dataset":
         """The same recordings with channels set aside, each with the factor on its noise."""

@@ -260,13 +260,20 @@ class Hypothesis:
         """Residuals on a data set, block by block or in closed loop; `fast`: with the steps of a search."""
         key = (data, closed, fast)
         if key not in self._done:
-            self._done[key] = Residuals(
-                data,
-                tuple(
-                    differences(run.response, self.respond(run), self.bench, run.evaluated)
-                    if closed
-                    else self.blocks(run, data.observer_s, fast)
-                    for run in data.runs
-                ),
-            )
+            if closed:
+                channels = [
+                    differences(run.response, self.respond(run), self.bench, run.evaluated) for run in data.runs
+                ]
+            elif data.apart:
+                free = [
+                    self.blocks(smooth, data.observer_s, fast, rests=run)
+                    for smooth, run in zip(data.smooth, runs, strict=True)
+                ]
+                channels = [
+                    {name: values + noise[name] for name, values in one.items()}
+                    for one, noise in zip(free, data.apart, strict=True)
+                ]
+            else:
+                channels = [self.blocks(run, data.observer_s, fast) for run in runs]
+            self._done[key] = Residuals(data, tuple(channels))
         return self._done[key]

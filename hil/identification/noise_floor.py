@@ -125,6 +125,9 @@ def noise_ratios(hypothesis: Hypothesis, data: Dataset) -> tuple[dict[str, float
     of_runs = []
     for index, (run, channels) in enumerate(zip(data.runs, residuals.channels, strict=True)):
         ratios = {name: float(part @ part) / part.size for (of, name), part in residuals.parts.items() if of == index}
+        if data.apart:  # no more of it goes through this hypothesis
+            of_runs.append(ratios)
+            continue
         if ratios.get("table", 0.0) > 1.0:
             added = _amplified_by_transmission(hypothesis, run, channels["table"], data.observer_s)
             ratios["table"] /= max(1.0, 1.0 + added / run.noise.table_m**2)

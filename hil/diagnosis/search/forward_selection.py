@@ -6,7 +6,6 @@ that are no longer needed are removed: a first term may have imitated two causes
 
 import math
 import time
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -24,11 +23,14 @@ from hil.diagnosis.search.rivals import ENDED, RivalFit, chosen, ended
 from hil.diagnosis.search.score_test import screen_library
 from hil.diagnosis.search.shape import chance_below_noise
 from hil.diagnosis.stages import Prepared, Progress, Searched
+from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.inference import bic_gain, standard_errors, whitening
+from hil.identification.noise_apart import noise_apart
 from hil.identification.nominal_fit import fit_nominal_parameters, require_finite
 from hil.identification.parallel import in_parallel
 from hil.identification.terms import Key, Term, compatible, effects, free_slot
+from hil.identification.torque_left import fit_plain
 from hil.twin.library import BY_ID, LIBRARY
 from hil.twin.physics import Active
 
@@ -71,6 +73,9 @@ def search(prepared: Prepared, progress: Progress = lambda text: None, deadline_
     rivals, needed, considered = dict[Key, list[RivalFit]](), dict[Key, float](), list[Considered]()
     tried, fitted = [effects(())], set[str]()
     while len(base.terms) < MOST_TERMS:
+        if base.within_noise and not base.data.apart and (plain := fit_plain(base.data)):
+            quiet = noise_apart(base.data, base.hypothesis, plain)
+            base, nominal, given = (over(quiet, one) for one in (base, nominal, given))
         step(f"screening the library beside {len(base.terms)} terms")
         if stopped_at:
             break
@@ -84,7 +89,8 @@ def search(prepared: Prepared, progress: Progress = lambda text: None, deadline_
             if not factors:
                 break
             step("searching the channels that are explained, beside those that are not")
-            base, nominal, given = (beside(one, factors) for one in (base, nominal, given))
+            louder = base.data.louder(factors)
+            base, nominal, given = (over(louder, one) for one in (base, nominal, given))
             continue
         choice = chosen(additions.best, additions.fits, round_)
         considered += choice.considered
@@ -120,14 +126,13 @@ def unexplained_channels(fit: Fit) -> dict[str, float]:
     What is left of such a channel counts as noise, so that it decides nothing of the others.
     """
     rms = {name: max(ratios[name] for ratios in fit.noise_ratios) ** 0.5 for name in fit.noise_ratios[0]}
-    quiet = [name for name, value in rms.items() if value**2 <= CRITERIA.floor and name not in fit.data.observability.hidden]
-    return {name: value for name, value in rms.items() if value**2 > CRITERIA.floor} if quiet else {}
+    left = {name: value for name, value in rms.items() if value**2 > CRITERIA.floor}
+    return left if set(rms) - set(left) - fit.data.observability.hidden else {}
 
 
-def beside(fit: Fit, factors: Mapping[str, float]) -> Fit:
-    """Fit again with the noise of channels multiplied by factors; without any, the hypothesis as it is."""
-    estimator = replace(fit.estimator, data=fit.data.louder(factors))
-    return estimator.fit(fit.hypothesis, evaluations=ENDED if factors else 1)
+def over(data: Dataset, fit: Fit, evaluations: int = ENDED) -> Fit:
+    """Fit the hypothesis of a fit to another data set."""
+    return replace(fit.estimator, data=data).fit(fit.hypothesis, evaluations=evaluations)
 
 
 def _without(fit: Fit, index: int) -> Fit:
@@ -204,7 +209,7 @@ def _pruned(fit: Fit, reference: Fit) -> tuple[Fit, dict[Key, float], list[Consi
         pairs = in_parallel([partial(ablated, index) for index in range(len(fit.terms))])
         weakest = min(range(len(pairs)), key=lambda index: pairs[index][0])
         evidence, rest = pairs[weakest]
-        need = Need(evidence, removed(rest, fit, reference), fit.noise_energy, chance_below_noise(fit, rest, weakest))
+        need = Need(evidence, removed(rest, fit, reference), fit.noise_energy, chance_below_noise(fit, rest))
         ledger = examine(NEEDED, need, CRITERIA)
         if accepted(ledger):
             return fit, {term.key: value for term, (value, _) in zip(fit.terms, pairs, strict=True)}, pruned

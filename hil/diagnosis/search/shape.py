@@ -1,6 +1,9 @@
 """Test whether the shape that a term adds to the torque, or to the difference of the encoders, is in what a fit leaves.
 
-    r = c s + inertia, friction and offset,      s = r of the fit without the term - r of the fit with it
+    r = c s + inertia, friction and offset,      s = r of the fit without the term - r of the fit with it,
+
+s of the smoothed motion and of the torque that the plain model needs for it: what a term makes of the noise of position
+and torque, which is in r too, is no evidence.
 
 Least squares on the rows that slide: `c / error` is Student's t, with an error that counts the autocovariance, and as
 many degrees of freedom as independent rows. Thousands of rows together tell what hides in the noise of each one.
@@ -17,23 +20,19 @@ from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.search.score_test import Candidate
 from hil.diagnosis.structure_left import TORQUE, channels, left_in_channel
 from hil.identification.estimator import Fit
+from hil.identification.noise_apart import smoothed_runs
 from hil.identification.plain_model import MOTION, plain_columns
 from hil.identification.structure import ResidualSeries, autocovariance
 from hil.identification.torque_left import fit_plain, measured_motion
-from hil.twin.library import BY_ID, LIBRARY
+from hil.twin.library import LIBRARY
 
 _FEWEST_ROWS = 100
 _RANK = 1e-9  # share of a column, beside the others, below which it is not told
 
 
-def chance_below_noise(fit: Fit, without: Fit, index: int = -1) -> float | None:
-    """Chance of the shape of a term, by default the last one, where the fit without it is within its noise; else None.
-
-    A delay or a resonance is no dependence on a quantity, and passes less of the noise itself: 1.
-    """
-    if not without.within_noise:
-        return None
-    return 1.0 if BY_ID[fit.terms[index].effect].shifts_phase else chance_of_shape(fit, without)
+def chance_below_noise(fit: Fit, without: Fit) -> float | None:
+    """Chance of the shape of a term where the fit without it is within its noise; else None."""
+    return chance_of_shape(fit, without) if without.within_noise else None
 
 
 def chance_of_shape(fit: Fit, without: Fit, fitted: bool = True) -> float:
@@ -44,16 +43,21 @@ def chance_of_shape(fit: Fit, without: Fit, fitted: bool = True) -> float:
     plain, best = fit_plain(fit.data), 1.0
     if plain is None:
         return best
+    quiet = fit.data.over(fit.data.smooth or smoothed_runs(fit.data.runs, plain))
     motions = [measured_motion(run).moved for run in fit.data.runs]
     for channel in channels(fit.data):
-        before, after = (left_in_channel(one.hypothesis, fit.data, channel, plain) for one in (without, fit))
-        rows = [one.rows for one in before]
-        left, other = (
-            np.concatenate([one.left[at] for one, at in zip(each, rows, strict=True)]) for each in (before, after)
+        measured, before, after = (
+            left_in_channel(one.hypothesis, data, channel, plain)
+            for one, data in ((without, fit.data), (without, quiet), (fit, quiet))
         )
-        if left.size < _FEWEST_ROWS or not (np.isfinite(left).all() and np.isfinite(other).all()):
+        rows = [one.rows for one in measured]
+        left, there, other = (
+            np.concatenate([one.left[at] for one, at in zip(each, rows, strict=True)])
+            for each in (measured, before, after)
+        )
+        if left.size < _FEWEST_ROWS or not all(np.isfinite(one).all() for one in (left, there, other)):
             continue
-        columns = [left - other, np.ones_like(left)]
+        columns = [there - other, np.ones_like(left)]
         if channel == TORQUE:
             plains = [plain_columns(moved) for moved in motions]
             columns += [
@@ -106,9 +110,7 @@ def shown(base: Fit, candidates: Sequence[Candidate]) -> list[Candidate]:
     """Candidates whose shape, at the values where their search begins, is in what a base leaves, the clearest first."""
     found = []
     for one in candidates:
-        term = one.term
-        if not BY_ID[term.effect].shifts_phase:
-            begun = base.estimator.evaluate(base.hypothesis.with_term(term))
-            found.append((chance_of_shape(begun, base, fitted=False), one))
+        begun = base.estimator.evaluate(base.hypothesis.with_term(one.term))
+        found.append((chance_of_shape(begun, base, fitted=False), one))
     level = [(chance, one) for chance, one in found if chance < CRITERIA.significance]
     return [one for _, one in sorted(level, key=lambda pair: pair[0])]

@@ -3,11 +3,13 @@
 from dataclasses import replace
 
 from hil.diagnosis.search.events import with_events_of
-from hil.diagnosis.search.forward_selection import beside
+from hil.diagnosis.search.forward_selection import over
 from hil.diagnosis.stages import Searched, Tested
 from hil.diagnosis.verdict.cross_validation import cross_validate
 from hil.diagnosis.verdict.findings import renamed
 from hil.diagnosis.verdict.refit import reported_refit
+from hil.identification.noise_apart import noise_apart
+from hil.identification.torque_left import fit_plain
 
 
 def test_on_held_out(searched: Searched) -> Tested:
@@ -18,10 +20,13 @@ def test_on_held_out(searched: Searched) -> Tested:
     nominal, held_out, final = searched.nominal, searched.prepared.held_out, renamed(searched.final)
     if not searched.stopped_at or any(term.windows for term in final.terms):
         final = with_events_of(held_out, final)
-    set_aside = final.data.set_aside
-    if set_aside:
-        beside_them = cross_validate(beside(nominal, set_aside), final, held_out.louder(set_aside))
-        proof = replace(beside_them, final=beside(beside_them.final, {}))
-    else:
-        proof = cross_validate(nominal, final, held_out)
-    return Tested(searched, proof, reported_refit(nominal))
+    data, plain = final.data, fit_plain(final.data)
+    if data is searched.prepared.train:
+        return Tested(searched, cross_validate(nominal, final, held_out), reported_refit(nominal))
+    there = held_out.louder(data.set_aside)
+    if data.apart and plain:
+        there = noise_apart(there, nominal.hypothesis, plain)
+    proof = cross_validate(over(data, nominal), final, there)
+    return Tested(
+        searched, replace(proof, final=over(searched.prepared.train, proof.final, 1)), reported_refit(nominal)
+    )

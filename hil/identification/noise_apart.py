@@ -1,0 +1,40 @@
+"""Recordings whose noise goes through one twin only: no hypothesis gains by passing less of it.
+
+    r(theta) = r(theta, smooth) + [r(reference, measured) - r(reference, smooth)]
+
+The noise of a measured torque drives the twin, and that of the encoder corrects it. Least squares of r(theta, measured)
+prefers an axis that answers less: more inertia, a resonance, a lag (errors in variables; W. E. Deming, Statistical
+Adjustment of Data, 1943). The smooth recording has the smoothed motion and, where the axis slides, the torque that the
+plain model needs for it. What it lacks of the recording, effects included, stays in the brackets.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from hil.identification.dataset import Dataset
+from hil.identification.hypothesis import Hypothesis
+from hil.identification.measured import Measured
+from hil.identification.plain_model import PlainModel
+from hil.identification.torque_left import measured_motion
+
+
+def noise_apart(data: Dataset, reference: Hypothesis, plain: PlainModel) -> Dataset:
+    """The recordings of a data set with their noise as it goes through the twin of a reference."""
+    smooth = smoothed_runs(data.runs, plain)
+    apart = []
+    for run, without in zip(data.runs, smooth, strict=True):
+        measured, free = (reference.blocks(one, data.observer_s, rests=run) for one in (run, without))
+        apart.append({name: measured[name] - free[name] for name in measured})
+    return replace(data, smooth=smooth, apart=tuple(apart))
+
+
+def smoothed_runs(runs: Sequence[Measured], plain: PlainModel) -> tuple[Measured, ...]:
+    """Recordings with smoothed motion and, where the axis slides, the torque that the plain model needs for it."""
+    found = []
+    for run in runs:
+        motion = measured_motion(run)
+        torque = np.where(motion.sliding(plain.slowest), plain.predict(motion.moved), run.torque)
+        found.append(replace(run, motor=motion.moved.position, torque=torque, torque_command=torque))
+    return tuple(found)

@@ -13,8 +13,8 @@ _PER_SI = {
     "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0},
     "m": {"m": 1.0, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "in": 0.0254, "ft": 0.3048},
     "rad": {
-        "rad": 1.0, "mrad": 1e-3, "deg": pi / 180, "mdeg": pi / 180e3, "arcmin": pi / 10800, "arcsec": pi / 648000,
-        "rev": 2 * pi,
+        "rad": 1.0, "mrad": 1e-3, "deg": pi / 180, "0.1 deg": pi / 1800, "mdeg": pi / 180e3, "arcmin": pi / 10800,
+        "arcsec": pi / 648000, "rev": 2 * pi,
     },
     "m/s": {
         "m/s": 1.0, "mm/s": 1e-3, "um/s": 1e-6, "m/min": 1 / 60, "mm/min": 1e-3 / 60,

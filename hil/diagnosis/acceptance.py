@@ -152,9 +152,10 @@ def _torque_held_out(of: Ablation, c: Criteria) -> Answer | None:
 
 
 def _explains(of: Remainder, c: Criteria) -> Answer:
-    """Little is left; where inputs are open, or every channel is at its floor, most is explained."""
+    """Little is left, or noise; where inputs are open, or every channel is at its floor, most is explained."""
     stands = (
-        names_stand(of.left, of.above, c)
+        of.noise
+        or names_stand(of.left, of.above, c)
         or (of.open_inputs and of.left <= c.most_left)
         or (of.at_floor and (of.left <= c.most_left or of.above <= c.floor))
     )

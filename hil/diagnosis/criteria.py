@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from hil.identification.inference import ALIKE, TIED
 from hil.identification.law.result import REPLAYED
 from hil.identification.least_squares import SIGMAS
-from hil.identification.noise_floor import FLOOR, REPEATS
+from hil.identification.noise_floor import COLOURED, FLOOR, REPEATS
 from hil.identification.residual_scales import DISCREPANCY
 
 
@@ -65,9 +65,7 @@ class Criteria:
     # form leaves less.
     little: float = 0.05
     far: float = 0.25
-    # Largest mean square over noise on held-out recordings of a twin that lacks nothing: errors of fitted parameters
-    # may leave as much rms there as the noise twice.
-    elsewhere: float = 4.0
+    elsewhere: float = COLOURED  # largest mean square over noise on held-out recordings of a twin that lacks nothing
     # Share of a falling friction law's energy up to which drag is part of its form. Beside the best law fitted to an
     # arctangent over 5 to 150 Stribeck velocities drag takes up to 1.3 %.
     part_of_form: float = 0.02

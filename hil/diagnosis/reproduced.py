@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def _within_noise(of: Reproduced, c: Criteria) -> Answer:
-    return of.worst <= c.floor, {"worst": of.worst**0.5}
+    return of.within_noise, {"worst": of.worst**0.5}
 
 
 def _within_noise_elsewhere(of: Reproduced, c: Criteria) -> Answer | None:

@@ -19,7 +19,7 @@ from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.periods import strongest_periods
 from hil.identification.plain_model import PlainModel
-from hil.identification.structure import BINS, ResidualSeries, Structure, offset, structure
+from hil.identification.structure import BINS, ResidualSeries, Structure, offset, slow, structure
 from hil.identification.torque_left import fit_plain, measured_motion, needed_torque, torque_deviation
 from hil.quantities import digits, quantity, reading_unit
 
@@ -231,6 +231,8 @@ def _dependences(
         found = structure(parts, question.values, question.bins)
         if found is None:
             continue
+        if not question.kept:
+            found = replace(found, p=max(found.p, slow(parts, question.values, found)))
         gain = None
         if question.kept and question.name in elsewhere:
             gain = _removed(found, others, elsewhere[question.name])

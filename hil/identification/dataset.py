@@ -3,8 +3,10 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
@@ -21,14 +23,27 @@ from hil.twin.stepping.loops import LEAST_TICKS
 FASTEST_OBSERVER_TICKS, FASTEST_OBSERVER_S, SLOWEST_OBSERVER_S = LEAST_TICKS, 0.002, 0.008
 
 
+class NoiseApart(NamedTuple):
+    """A run without noise, the rows (n,) that it tells, and residuals (n,) by channel of a reference: what the noise
+    makes, and all that was measured."""
+
+    smooth: Measured
+    rows: NDArray[np.bool_]
+    noise: dict[str, FloatArray]
+    measured: dict[str, FloatArray]
+
+    def of(self, channel: str, free: FloatArray) -> FloatArray:
+        """Residual (n,) of a channel with that of the run without noise."""
+        return np.where(self.rows, free + self.noise[channel], self.measured[channel])
+
+
 @dataclass(frozen=True, eq=False)
 class Dataset:
     """Recordings of one axis prepared for a fit, with everything that does not depend on the hypothesis.
 
     `observer_s` is the time constant of the motor's observer in the block residuals, `travel_m` the largest range of
     the position set-points. What nothing explains of a channel counts as noise if the channel is in `set_aside`, with
-    the factor on its noise. `smooth` and `apart`: runs without noise, and the residuals (n,) by channel of their noise
-    (`hil.identification.noise_apart`).
+    the factor on its noise. `apart`: the noise of each run, if it is kept apart (`hil.identification.noise_apart`).
     """
 
     runs: tuple[Measured, ...]
@@ -36,8 +51,7 @@ class Dataset:
     observer_s: float = FASTEST_OBSERVER_S
     travel_m: float = 0.1
     set_aside: Mapping[str, float] = field(default_factory=dict)
-    smooth: tuple[Measured, ...] = ()
-    apart: tuple[dict[str, FloatArray], ...] = ()
+    apart: tuple[NoiseApart, ...] = ()
     _scales: dict[tuple[float, float], tuple[dict[str, FloatArray], ...]] = field(
         default_factory=dict, init=False, repr=False
     )
@@ -49,7 +63,7 @@ class Dataset:
 
     def over(self, runs: Sequence[Measured]) -> "Dataset":
         """Other recordings of the same axis with the same observer, travel, and channels that are set aside."""
-        return replace(self, runs=tuple(runs), smooth=(), apart=())
+        return replace(self, runs=tuple(runs), apart=())
 
     def louder(self, factors: Mapping[str, float]) -> "Dataset":
         """The same recordings with channels set aside, each with the factor on its noise."""

@@ -25,7 +25,7 @@ from hil.identification.coordinates import EDGE_STEP_S
 from hil.identification.dataset import Dataset
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.levenberg_marquardt import broyden, damped_step, normal_equations, robust_loss
-from hil.identification.noise_floor import FLOOR, noise_ratios
+from hil.identification.noise_floor import COLOURED, FLOOR, noise_ratios
 from hil.identification.parallel import POOL
 from hil.identification.residual_scales import TORQUE_ACCURACY, inertia
 from hil.identification.residuals import Residuals
@@ -106,8 +106,8 @@ class Fit:
 
     @property
     def within_noise(self) -> bool:
-        """True at the floor where a torque with noise drives the twin: there only the shapes of terms are evidence."""
-        return self.at_floor and not self.data.observability.exact_input
+        """True where the noise of a torque, white or coloured, drives the twin: only shapes of terms are evidence."""
+        return self.worst_ratio <= COLOURED and not self.data.observability.exact_input
 
     @property
     def at_floor(self) -> bool:

@@ -260,18 +260,20 @@ class Hypothesis:
         """Residuals on a data set, block by block or in closed loop; `fast`: with the steps of a search."""
         key = (data, closed, fast)
         if key not in self._done:
+            runs, bench = data.runs, self.bench
             if closed:
-                channels = [
-                    differences(run.response, self.respond(run), self.bench, run.evaluated) for run in data.runs
-                ]
+                channels = [differences(run.response, self.respond(run), bench, run.evaluated) for run in runs]
             elif data.apart:
                 free = [
-                    self.blocks(smooth, data.observer_s, fast, rests=run)
-                    for smooth, run in zip(data.smooth, runs, strict=True)
+                    self.blocks(one.smooth, data.observer_s, fast, rests=run)
+                    for one, run in zip(data.apart, runs, strict=True)
                 ]
                 channels = [
-                    {name: values + noise[name] for name, values in one.items()}
-                    for one, noise in zip(free, data.apart, strict=True)
+                    {
+                        name: np.where(one.rows, values + one.noise[name], one.measured[name])
+                        for name, values in each.items()
+                    }
+                    for one, each in zip(data.apart, free, strict=True)
                 ]
             else:
                 channels = [self.blocks(run, data.observer_s, fast) for run in runs]

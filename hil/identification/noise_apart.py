@@ -1,11 +1,13 @@
 """Recordings whose noise goes through one twin only: no hypothesis gains by passing less of it.
 
-    r(theta) = r(theta, smooth) + [r(reference, measured) - r(reference, smooth)]
+    r(theta) = r(theta, smooth) + [r(reference, measured) - r(reference, smooth)]        where the axis slides
+    r(theta) = r(reference, measured)                                                    in the other rows
 
 The noise of a measured torque drives the twin, and that of the encoder corrects it. Least squares of r(theta, measured)
 prefers an axis that answers less: more inertia, a resonance, a lag (errors in variables; W. E. Deming, Statistical
 Adjustment of Data, 1943). The smooth recording has the smoothed motion and, where the axis slides, the torque that the
-plain model needs for it. What it lacks of the recording, effects included, stays in the brackets.
+plain model needs for it. What it lacks of the recording, effects included, stays in the brackets. About a reversal
+smoothed motion tells nothing.
 """
 
 from collections.abc import Sequence
@@ -13,7 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hil.identification.dataset import Dataset
+from hil.identification.dataset import Dataset, NoiseApart
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.measured import Measured
 from hil.identification.plain_model import PlainModel
@@ -22,12 +24,12 @@ from hil.identification.torque_left import measured_motion
 
 def noise_apart(data: Dataset, reference: Hypothesis, plain: PlainModel) -> Dataset:
     """The recordings of a data set with their noise as it goes through the twin of a reference."""
-    smooth = smoothed_runs(data.runs, plain)
     apart = []
-    for run, without in zip(data.runs, smooth, strict=True):
-        measured, free = (reference.blocks(one, data.observer_s, rests=run) for one in (run, without))
-        apart.append({name: measured[name] - free[name] for name in measured})
-    return replace(data, smooth=smooth, apart=tuple(apart))
+    for run, smooth in zip(data.runs, smoothed_runs(data.runs, plain), strict=True):
+        measured, free = (reference.blocks(one, data.observer_s, rests=run) for one in (run, smooth))
+        noise = {name: measured[name] - free[name] for name in measured}
+        apart.append(NoiseApart(smooth, measured_motion(run).sliding(plain.slowest), noise, measured))
+    return replace(data, apart=tuple(apart))
 
 
 def smoothed_runs(runs: Sequence[Measured], plain: PlainModel) -> tuple[Measured, ...]:

@@ -22,6 +22,7 @@ BINS = 10  # of a quantity: a bend, a step and a line show in them; twice as man
 _TAPER = 4  # Bartlett window in correlation times: it shortens the correlation by an eighth
 _DECAYED = 0.05  # of the variance: the correlation time ends there
 _NARROWEST = 0.2  # bin, over one of equal width
+_BATCHES = 4  # of a bin: the fewer, the slower a noise that they know
 _FEWEST_INDEPENDENT = 2.0  # independent rows per bin, below which nothing is told
 
 
@@ -96,6 +97,29 @@ def _structure(parts: Sequence[ResidualSeries], quantity: Sequence[FloatArray], 
     errors = np.sqrt(np.diag(covariance))
     energy = float(share @ (mean**2 - errors**2))
     return Structure(edges, mean, errors, energy, float(fisher.sf(ratio, count - 1, freed)))
+
+
+def slow(parts: Sequence[ResidualSeries], quantity: Sequence[FloatArray], found: Structure) -> float:
+    """Probability that noise which is slow, however weak, makes a structure over a quantity that goes with time.
+
+    Analysis of variance of the bin means against the means of the batches of each bin (B. Schmeiser, Operations
+    Research 30 (1982) 556): an autocovariance that has decayed to a small share may go on for long.
+    """
+    left, value = (
+        np.concatenate([one[part.rows] for one, part in zip(each, parts, strict=True)])
+        for each in ([part.left for part in parts], quantity)
+    )
+    at = _bin(value, found.edges)
+    batches = [np.array_split(left[at == number], _BATCHES) for number in range(found.means.size)]
+    batches = [one for one in batches if one[-1].size]
+    free = len(batches) - 1, len(batches) * (_BATCHES - 1)
+    if free[0] < 1:
+        return 1.0
+    between = sum(one.size * (float(one.mean()) - float(left.mean())) ** 2 for one in map(np.concatenate, batches))
+    within = sum(
+        one.size * (float(one.mean()) - float(np.mean(np.concatenate(each)))) ** 2 for each in batches for one in each
+    )
+    return float(fisher.sf(between / free[0] / (within / free[1]), *free)) if within > 0.0 else 0.0
 
 
 def offset(parts: Sequence[ResidualSeries]) -> Structure | None:

@@ -21,7 +21,7 @@ from hil.identification.periods import harmonic_share, strongest_periods
 _SMOOTH_S = 0.006  # mean of the innovations: passes 60 Hz, reduces encoder counts
 _PASS_HZ = 60.0  # above, the mean attenuates a ripple by more than a fifth
 _BINS = 400  # of the travel, for zones of friction
-_ORDERS = np.arange(1, 49)  # of the motor angle; up to 48 slots or pole passings per revolution
+_ORDERS = np.arange(1, 161)  # of the motor angle: slots, pole passings, and their common multiples
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +72,8 @@ def orders(
     """Orders per motor revolution with the strongest disturbance, best first, and always orders 1 and 2.
 
     Only rows slow enough for the moving mean to pass the order are used; with few turns of them high orders overfit.
-    Orders 1 and 2 are typical of an unbalanced or bent screw.
+    Less than a turn does not tell the best from its neighbours. Orders 1 and 2 are typical of an unbalanced or bent
+    screw.
     """
     shares = []
     for order in _ORDERS:
@@ -87,7 +88,8 @@ def orders(
         phase, signal = phase[::step], signal[::step]
         shares.append(harmonic_share(phase, signal) * min(1.0, phase.size / 1000.0) if phase.size > 100 else 0.0)
     best = [float(_ORDERS[index]) for index in np.argsort(shares)[::-1][:most]]
-    return list(dict.fromkeys((*best, 1.0, 2.0)))
+    beside = [order for order in (best[0] - 1.0, best[0] + 1.0) if order >= 1.0]
+    return list(dict.fromkeys((*best, *beside, 1.0, 2.0)))
 
 
 def friction_periods(

@@ -29,8 +29,9 @@ from hil.identification.inference import bic_gain, standard_errors, whitening
 from hil.identification.noise_apart import noise_apart
 from hil.identification.nominal_fit import fit_nominal_parameters, require_finite
 from hil.identification.parallel import in_parallel
+from hil.identification.plain_model import PlainModel
 from hil.identification.terms import Key, Term, compatible, effects, free_slot
-from hil.identification.torque_left import fit_plain
+from hil.identification.torque_left import fit_plain, left_by_twin
 from hil.twin.library import BY_ID, LIBRARY
 from hil.twin.physics import Active
 
@@ -74,8 +75,10 @@ def search(prepared: Prepared, progress: Progress = lambda text: None, deadline_
     tried, fitted = [effects(())], set[str]()
     while len(base.terms) < MOST_TERMS:
         if base.within_noise and not base.data.apart and (plain := fit_plain(base.data)):
-            quiet = noise_apart(base.data, base.hypothesis, plain)
-            base, nominal, given = (over(quiet, one) for one in (base, nominal, given))
+            begin = base if base.terms else less_torque(plain, given, base)
+            quiet = noise_apart(base.data, begin.hypothesis, plain)
+            base, given = over(quiet, begin), over(quiet, given, 1)
+            nominal = over(quiet, nominal) if base.terms else base
         step(f"screening the library beside {len(base.terms)} terms")
         if stopped_at:
             break
@@ -128,6 +131,16 @@ def unexplained_channels(fit: Fit) -> dict[str, float]:
     rms = {name: max(ratios[name] for ratios in fit.noise_ratios) ** 0.5 for name in fit.noise_ratios[0]}
     left = {name: value for name, value in rms.items() if value**2 > CRITERIA.floor}
     return left if set(rms) - set(left) - fit.data.observability.hidden else {}
+
+
+def less_torque(plain: PlainModel, *fits: Fit) -> Fit:
+    """The fit that leaves least of the torque: the noise of its torque may have led a fit astray."""
+
+    def left(fit: Fit) -> float:
+        share = left_by_twin(fit.hypothesis, fit.data, plain.slowest)
+        return math.inf if share is None else share
+
+    return min(fits, key=left)
 
 
 def over(data: Dataset, fit: Fit, evaluations: int = ENDED) -> Fit:

@@ -25,8 +25,10 @@ from hil.identification.plain_model import MOTION, plain_columns
 from hil.identification.structure import ResidualSeries, autocovariance
 from hil.identification.torque_left import fit_plain, measured_motion
 from hil.twin.library import LIBRARY
+from hil.twin.parameter import Role
 
 _FEWEST_ROWS = 100
+_MANY = (Role.EDGE, Role.LINE, Role.PERIOD, Role.FREQUENCY)
 _RANK = 1e-9  # share of a column, beside the others, below which it is not told
 
 
@@ -38,12 +40,14 @@ def chance_below_noise(fit: Fit, without: Fit) -> float | None:
 def chance_of_shape(fit: Fit, without: Fit, fitted: bool = True) -> float:
     """Probability that chance makes the shape of one of all mechanisms in what the fit without it leaves.
 
-    1 where nothing tells, and for a `fitted` shape of the opposite sign.
+    By the number of values that were searched, see `_searched`. 1 where nothing tells, and for a `fitted` shape of the
+    opposite sign.
     """
     plain, best = fit_plain(fit.data), 1.0
     if plain is None:
         return best
-    quiet = fit.data.over(fit.data.smooth or smoothed_runs(fit.data.runs, plain))
+    searched = _searched(fit) - _searched(without)
+    quiet = fit.data.over([one.smooth for one in fit.data.apart] or smoothed_runs(fit.data.runs, plain))
     motions = [measured_motion(run).moved for run in fit.data.runs]
     for channel in channels(fit.data):
         measured, before, after = (
@@ -66,8 +70,18 @@ def chance_of_shape(fit: Fit, without: Fit, fitted: bool = True) -> float:
         ratio, free = _first_coefficient(np.column_stack(columns), left, rows)
         if free > 0.0:
             chance = student.sf(ratio if fitted else abs(ratio), free) * (1.0 if fitted else 2.0)
-            best = min(best, len(LIBRARY) * float(chance))
+            best = min(best, len(LIBRARY) * free**searched * float(chance))
     return best
+
+
+def _searched(fit: Fit) -> float:
+    """Logarithm, over that of the independent rows, of the number of values in which the terms were searched.
+
+    A half for each parameter beside a strength (Schwarz 1978), one for the edge of a window, a line or a period, of
+    which as many are told apart as there are rows (Y.-C. Yao, Statistics and Probability Letters 6 (1988) 181).
+    """
+    roles = [one.role for one in fit.hypothesis.coordinates if one.parameter is not None]
+    return sum(1.0 if role in _MANY else 0.5 for role in roles if role is not Role.STRENGTH)
 
 
 def _first_coefficient(

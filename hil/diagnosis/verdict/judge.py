@@ -24,13 +24,15 @@ class Remainder:
     """What all terms together leave: share of the energy above the floor, largest mean square of a channel over noise.
 
     `open_inputs`: inputs of the twin are open or nothing is known of the control law, so that something is left beside
-    any name. `at_floor`: the training recordings are explained.
+    any name. `at_floor`: the training recordings are explained. `noise`: what is left is within coloured noise, and
+    depends on nothing.
     """
 
     left: float
     above: float
     open_inputs: bool
     at_floor: bool
+    noise: bool
 
 
 def judge(tested: Tested) -> Judged:
@@ -61,7 +63,7 @@ def verdict_on_plant(given: Fit, nominal: Fit, final: Fit, held_out: Dataset) ->
     if final.terms and accepted(explanation(nominal, final, held_out)):
         return Verdict.MISSING_PHYSICS
     matters = refit_matters(given, nominal)
-    if given.at_floor and accepted(reproduction(given, held_out)):
+    if (given.at_floor or given.within_noise) and accepted(reproduction(given, held_out)):
         return Verdict.NO_MISMATCH
     if accepted(reproduction(nominal, held_out)):
         return Verdict.PARAMETER_ERROR if matters else Verdict.NO_MISMATCH
@@ -76,6 +78,7 @@ def explanation(nominal: Fit, final: Fit, held_out: Dataset) -> Ledger:
         above=max(final.on(data).worst_ratio for data in (final.data, held_out) if data.runs),
         open_inputs=coarse or not final.data.observability.closed_loop,
         at_floor=final.at_floor,
+        noise=final.within_noise and not structure_left(final, held_out),
     )
     return examine(EXPLAINED, measured, CRITERIA)
 

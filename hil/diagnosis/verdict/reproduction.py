@@ -22,6 +22,7 @@ class Reproduced:
     its deviation (rms). None where there is nothing held out, or no torque."""
 
     worst: float
+    within_noise: bool
     held_out: float | None
     structure: str
     torque: tuple[float, float] | None
@@ -34,7 +35,9 @@ def reproduction(fit: Fit, held_out: Dataset) -> Ledger:
     words = structure[0].in_words(fit.bench.axis.drive_unit) if structure else ""
     left, plain = torque_missed(fit, held_out), _missed_by_plain(fit, held_out)
     torque = None if left is None or plain is None else (left, plain)
-    return examine(REPRODUCED, Reproduced(fit.worst_ratio, elsewhere, words, torque), CRITERIA)
+    return examine(
+        REPRODUCED, Reproduced(fit.worst_ratio, fit.at_floor or fit.within_noise, elsewhere, words, torque), CRITERIA
+    )
 
 
 def behind_plain(judged: Judged) -> bool:

@@ -95,21 +95,20 @@ def _draft_parts(recordings: Sequence[Recording]) -> BenchDraft:
     else:
         lead = lead_of(recording, transmission)
         ratio = lead.value / (2.0 * pi)
-        deflection = None if transmission is None else _deflection_s2(transmission)
         turns = recording.metadata.get("lead_m") == ROTARY_LEAD_M or lead.value > LONGEST_LEAD_M
         plant = plant_or_assumed(recordings, transmission, ratio if turns else None)
         if plant.gravity_angle is not None and transmission is not None:  # it bends what the ratio is measured over
             transmission = transmission_values(recording, plant.gravity_angle.value)
             lead = lead_of(recording, transmission)
+        deflection = None if transmission is None else _deflection_s2(transmission)
+        sag = _sagging(plant, transmission)
         volts = turns and deflection is None and _in_volts(recording) and plant.viscous.significant
         if volts:
             draft.model = "dc_motor"
             _dc_motor(draft, plant, lead)
         elif turns:
-            draft.model = "rotary" if deflection is None else "rotary_two_mass"
-            _turning(draft, plant, transmission, lead)
+            _turning(draft, plant, deflection, sag, lead)
         else:
-            draft.model = "rigid" if deflection is None else "two_mass"
             _screw(draft, plant, deflection, lead)
     draft.control, draft.control_why = loop_values(recording, ratio)
     _encoders(draft, recording)
@@ -134,6 +133,7 @@ def _deflection_s2(transmission: TransmissionValues) -> Estimate | None:
 def _screw(draft: BenchDraft, plant: PlantValues, deflection: Estimate | None, lead: Estimate) -> None:
     mass = plant.inertia.scaled((2.0 * pi / lead.value) ** 2)
     inertia = f"inertia {digits(plant.inertia.value)} kg m^2 at the motor"
+    draft.model = "rigid" if deflection is None else "two_mass"
     draft.axis.append(BenchValue("lead_m", lead.value, f"m per revolution, {_error(lead)}", lead.how))
     if deflection is None:
         draft.axis.append(_value("mass_kg", mass, "kg", inertia))
@@ -189,19 +189,22 @@ def _loads(draft: BenchDraft, plant: PlantValues) -> None:
         ]
 
 
-def _turning(draft: BenchDraft, plant: PlantValues, transmission: TransmissionValues | None, lead: Estimate) -> None:
-    deflection = None if transmission is None else _deflection_s2(transmission)
+def _turning(
+    draft: BenchDraft, plant: PlantValues, deflection: Estimate | None, sag: Estimate | None, lead: Estimate
+) -> None:
     gear = gear_of(lead)
     draft.axis.append(_value("gear_ratio", gear, "motor per load"))
-    if deflection is None:
+    motor = _guess(plant.inertia.scaled(0.5))
+    load = motor.scaled(gear.value**2)
+    stiffness = sag or (None if deflection is None else _stiffness(load, deflection))
+    draft.model = "rotary" if stiffness is None else "rotary_two_mass"
+    if stiffness is None:
         draft.axis.append(_value("inertia_kg_m2", plant.inertia, "kg m^2 at the motor"))
     else:
-        motor = _guess(plant.inertia.scaled(0.5))
-        load = motor.scaled(gear.value**2)
         draft.axis += [
             _value("motor_inertia_kg_m2", motor, "kg m^2 at the motor", "half of the sum: the split is not told"),
             _value("load_inertia_kg_m2", load, "kg m^2 at the load", "the other half"),
-            _value("stiffness_n_m_rad", _sagging(plant, transmission) or _stiffness(load, deflection), "N m/rad"),
+            _value("stiffness_n_m_rad", stiffness, "N m/rad"),
         ]
         draft.unsure.append(
             "motor_inertia_kg_m2, load_inertia_kg_m2, stiffness_n_m_rad: told are the sum of the inertias at the "

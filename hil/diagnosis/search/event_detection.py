@@ -72,7 +72,7 @@ def _of_fit(fit: Fit, reversals: bool) -> list[Event]:
     return [
         event
         for run, channels in pairs
-        if run.observability.torque_measured
+        if run.observability.torque_measured and np.isfinite(channels["motor"]).all()  # a twin may be unstable
         for event in _of_run(run, disturbance(run, channels["motor"], axis, observer_s), reversals)
     ]
 

@@ -65,7 +65,10 @@ class Criteria:
     # form leaves less.
     little: float = 0.05
     far: float = 0.25
-    elsewhere: float = COLOURED  # largest mean square over noise on held-out recordings of a twin that lacks nothing
+    coloured: float = COLOURED  # the same where noise may be coloured, and depends on nothing
+    # Largest mean square over noise on held-out recordings of a twin that lacks nothing: errors of fitted parameters
+    # may leave as much rms there as the noise twice.
+    elsewhere: float = 4.0
     # Share of a falling friction law's energy up to which drag is part of its form. Beside the best law fitted to an
     # arctangent over 5 to 150 Stribeck velocities drag takes up to 1.3 %.
     part_of_form: float = 0.02

@@ -16,7 +16,9 @@ def _within_noise(of: Reproduced, c: Criteria) -> Answer:
 
 
 def _within_noise_elsewhere(of: Reproduced, c: Criteria) -> Answer | None:
-    return None if of.held_out is None else (of.held_out <= c.elsewhere, {"worst": of.held_out**0.5})
+    if of.held_out is None:
+        return None
+    return of.held_out <= (c.coloured if of.coloured else c.elsewhere), {"worst": of.held_out**0.5}
 
 
 def _without_structure(of: Reproduced, c: Criteria) -> Answer:

@@ -24,9 +24,9 @@ from hil.identification.measured import Measured
 # as large as the noise makes 41 %. An encoder at rest has a constant error of up to half a count, whose square is three
 # times that of counting noise.
 FLOOR = 1.25**2
-# The same where a noisy torque drives the twin, and for a prediction: coloured noise, or errors of fitted parameters,
-# leave as much rms as the white noise twice. What remains must depend on nothing.
-COLOURED = 4.0
+# The same where the noise of a torque drives the twin: coloured noise may have three times the rms of its white part.
+# What remains must depend on nothing.
+COLOURED = 9.0
 # Least ratio of the non-repeating energy without a term to that with it; a term below it is refuted. Most terms repeat
 # with the motion and have 1; the refit of the other parameters changes it by less than 5 %.
 REPEATS = 0.95

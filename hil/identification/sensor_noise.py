@@ -50,11 +50,13 @@ def estimate_noise(
     The count is that of the bench, or that of the recording if it is coarser.
     """
     count = _count(motor, bench.motor_count)
-    motor_noise, table_noise = max(white_noise(motor), count / np.sqrt(12.0)), 0.0
+    white, table_noise = white_noise(motor), 0.0
     if table.size and bench.encoders.table is not None:
         ratio_m = bench.axis.ratio_m_rad
         counts = np.hypot(_count(table, bench.encoders.table.resolution_m), ratio_m * count)
         table_noise = max(white_noise(table - ratio_m * motor), float(counts) / np.sqrt(12.0))
+        white = min(white, table_noise / abs(ratio_m))  # in slow rows the motion itself looks like noise
+    motor_noise = max(white, count / np.sqrt(12.0))
     if not np.array_equal(command, torque):
         of_torque = _of_drive(command, torque)
     else:  # the steps of a held command are no noise

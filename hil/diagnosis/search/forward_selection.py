@@ -129,7 +129,8 @@ def unexplained_channels(fit: Fit) -> dict[str, float]:
     What is left of such a channel counts as noise, so that it decides nothing of the others.
     """
     rms = {name: max(ratios[name] for ratios in fit.noise_ratios) ** 0.5 for name in fit.noise_ratios[0]}
-    left = {name: value for name, value in rms.items() if value**2 > CRITERIA.floor}
+    floor = CRITERIA.floor if fit.data.observability.exact_input else CRITERIA.coloured
+    left = {name: value for name, value in rms.items() if value**2 > floor}
     return left if set(rms) - set(left) - fit.data.observability.hidden else {}
 
 

@@ -2,7 +2,6 @@
 
 The comment on a rule is its reason. `promises` decides before a candidate is fitted; rules are asked at six moments,
 and on a twin without new terms at a seventh (`hil.diagnosis.reproduced`):
-
     VALUES     on the fitted values of a candidate
     ADDED      on the fit with one more term, against the fit without it; HARMLESS: and its channels
     NEEDED     on each term beside the others

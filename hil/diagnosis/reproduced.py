@@ -12,13 +12,13 @@ if TYPE_CHECKING:
 
 
 def _within_noise(of: Reproduced, c: Criteria) -> Answer:
-    return of.within_noise, {"worst": of.worst**0.5}
+    return of.worst <= (c.coloured if of.noisy else c.floor), {"worst": of.worst**0.5}
 
 
 def _within_noise_elsewhere(of: Reproduced, c: Criteria) -> Answer | None:
     if of.held_out is None:
         return None
-    return of.held_out <= (c.coloured if of.coloured else c.elsewhere), {"worst": of.held_out**0.5}
+    return of.held_out <= (c.coloured if of.noisy else c.elsewhere), {"worst": of.held_out**0.5}
 
 
 def _without_structure(of: Reproduced, c: Criteria) -> Answer:

@@ -201,7 +201,7 @@ def _dependences(
 ) -> Iterator[Dependence]:
     """Answers to the questions on one channel, (training, held-out) residuals."""
     parts, others = left
-    least = _least_energy(fit.data, channel, plain)
+    least = least_energy(fit.data, channel, plain)
     rows = np.concatenate([part.left[part.rows] for part in parts])
     total = float(np.mean((rows - rows.mean()) ** 2)) if rows.size else 0.0
     if not total > 0.0:
@@ -216,7 +216,7 @@ def _dependences(
             question,
             constant,
             constant.energy / square,
-            constant.energy / _least_energy(fit.data, channel, plain),
+            constant.energy / least_energy(fit.data, channel, plain),
             gain,
         )
     asked = questions(fit.hypothesis, fit.data, plain)
@@ -239,7 +239,7 @@ def _dependences(
         yield Dependence(channel, question, found, found.energy / total, found.energy / least, gain)
 
 
-def _least_energy(data: Dataset, channel: str, plain: PlainModel) -> float:
+def least_energy(data: Dataset, channel: str, plain: PlainModel) -> float:
     """Mean square of a residual from which a dependence is material.
 
     A creeping encoder stays within a count, and the counts of two of them beat: that of two encoders is their noise.

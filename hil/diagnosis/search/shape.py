@@ -18,7 +18,7 @@ from scipy.stats import t as student
 from hil.arrays import FloatArray
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.search.score_test import Candidate
-from hil.diagnosis.structure_left import TORQUE, channels, left_in_channel
+from hil.diagnosis.structure_left import TORQUE, channels, least_energy, left_in_channel
 from hil.identification.estimator import Fit
 from hil.identification.noise_apart import smoothed_runs
 from hil.identification.plain_model import MOTION, plain_columns
@@ -40,8 +40,8 @@ def chance_below_noise(fit: Fit, without: Fit) -> float | None:
 def chance_of_shape(fit: Fit, without: Fit, fitted: bool = True) -> float:
     """Probability that chance makes the shape of one of all mechanisms in what the fit without it leaves.
 
-    By the number of values that were searched, see `_searched`. 1 where nothing tells, and for a `fitted` shape of the
-    opposite sign.
+    By the number of values that were searched, see `_searched`. 1 where nothing tells, for a `fitted` shape of the
+    opposite sign, and for less than what correct simulations of one axis differ by.
     """
     plain, best = fit_plain(fit.data), 1.0
     if plain is None:
@@ -67,8 +67,9 @@ def chance_of_shape(fit: Fit, without: Fit, fitted: bool = True) -> float:
             columns += [
                 np.concatenate([one[name][at] for one, at in zip(plains, rows, strict=True)]) for name in MOTION
             ]
-        ratio, free = _first_coefficient(np.column_stack(columns), left, rows)
-        if free > 0.0:
+        size, ratio, free = _first_coefficient(np.column_stack(columns), left, rows)
+        least = least_energy(fit.data, channel, plain) * (1.0 if channel == TORQUE else CRITERIA.material)
+        if free > 0.0 and size**2 * float(np.mean((there - other) ** 2)) > least:
             chance = student.sf(ratio if fitted else abs(ratio), free) * (1.0 if fitted else 2.0)
             best = min(best, len(LIBRARY) * free**searched * float(chance))
     return best
@@ -86,8 +87,8 @@ def _searched(fit: Fit) -> float:
 
 def _first_coefficient(
     matrix: FloatArray, signal: FloatArray, rows: Sequence[NDArray[np.bool_]]
-) -> tuple[float, float]:
-    """Coefficient of the first column (n, p) over its error, and the degrees of freedom; (0, 0) where it is not told.
+) -> tuple[float, float, float]:
+    """Coefficient of the first column (n, p), the same over its error, and the degrees of freedom; 0 where not told.
 
     The error counts the autocovariance of what the columns leave (Newey and West 1987); rows (m,) of each run count.
     """
@@ -97,7 +98,7 @@ def _first_coefficient(
     solved = weights @ signal
     own = scaled[:, 0] - scaled[:, 1:] @ np.linalg.lstsq(scaled[:, 1:], scaled[:, 0], rcond=_RANK)[0]
     if float(own @ own) < _RANK:  # the others make it
-        return 0.0, 0.0
+        return 0.0, 0.0, 0.0
     splits = np.cumsum([int(at.sum()) for at in rows])[:-1]
     residual = np.split(signal - scaled @ solved, splits)
     parts = [ResidualSeries(_spread(left, at), at) for left, at in zip(residual, rows, strict=True)]
@@ -110,7 +111,9 @@ def _first_coefficient(
         variance += float(lags[0] * products[0] + 2.0 * lags[1:] @ products[1 : lags.size])
     total = max(float(covariance[0] + 2.0 * covariance[1:].sum()), float(covariance[0]))
     free = signal.size * float(covariance[0]) / total - matrix.shape[1] if total > 0.0 else 0.0
-    return (float(solved[0]) / variance**0.5, free) if variance > 0.0 and free > 0.0 else (0.0, 0.0)
+    if not (variance > 0.0 and free > 0.0):
+        return 0.0, 0.0, 0.0
+    return float(solved[0] / scale[0]) if scale[0] > 0.0 else 0.0, float(solved[0]) / variance**0.5, free
 
 
 def _spread(values: FloatArray, at: NDArray[np.bool_]) -> FloatArray:

@@ -24,8 +24,8 @@ class Remainder:
     """What all terms together leave: share of the energy above the floor, largest mean square of a channel over noise.
 
     `open_inputs`: inputs of the twin are open or nothing is known of the control law, so that something is left beside
-    any name. `at_floor`: the training recordings are explained. `noise`: what is left is within coloured noise, and
-    depends on nothing.
+    any name. `at_floor`: the training recordings are explained. `noise`: what is left beside a
+    noisy torque depends on nothing.
     """
 
     left: float
@@ -78,7 +78,7 @@ def explanation(nominal: Fit, final: Fit, held_out: Dataset) -> Ledger:
         above=max(final.on(data).worst_ratio for data in (final.data, held_out) if data.runs),
         open_inputs=coarse or not final.data.observability.closed_loop,
         at_floor=final.at_floor,
-        noise=final.within_noise and not structure_left(final, held_out),
+        noise=not final.data.observability.exact_input and not structure_left(final, held_out),
     )
     return examine(EXPLAINED, measured, CRITERIA)
 

@@ -18,13 +18,12 @@ from hil.identification.torque_left import fit_plain, left_by_plain, left_by_twi
 @dataclass(frozen=True)
 class Reproduced:
     """What a twin leaves: the largest mean square of a channel over its noise in training and on held-out recordings
-    (`coloured`: noise that may have a colour),
+    (`noisy`: the noise of a torque drives it, of any colour),
     the strongest structure in words, and the torque missed on held-out motion by the twin and by the plain model, over
     its deviation (rms). None where there is nothing held out, or no torque."""
 
     worst: float
-    within_noise: bool
-    coloured: bool
+    noisy: bool
     held_out: float | None
     structure: str
     torque: tuple[float, float] | None
@@ -37,11 +36,8 @@ def reproduction(fit: Fit, held_out: Dataset) -> Ledger:
     words = structure[0].in_words(fit.bench.axis.drive_unit) if structure else ""
     left, plain = torque_missed(fit, held_out), _missed_by_plain(fit, held_out)
     torque = None if left is None or plain is None else (left, plain)
-    return examine(
-        REPRODUCED,
-        Reproduced(fit.worst_ratio, fit.at_floor or fit.within_noise, fit.within_noise, elsewhere, words, torque),
-        CRITERIA,
-    )
+    noisy = not fit.data.observability.exact_input
+    return examine(REPRODUCED, Reproduced(fit.worst_ratio, noisy, elsewhere, words, torque), CRITERIA)
 
 
 def behind_plain(judged: Judged) -> bool:

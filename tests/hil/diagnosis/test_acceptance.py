@@ -22,7 +22,7 @@ from hil.diagnosis.search.events import InsideWindows
 from hil.diagnosis.verdict.reproduction import Reproduced
 
 # A new constant needs a sealed draw that improves beyond its interval, or it takes the place of another (CONTRIBUTING).
-CONSTANTS = 48
+CONSTANTS = 49
 RULE_COUNT = 21
 
 ROOT = Path(acceptance.__file__).parent
@@ -166,11 +166,16 @@ def test_held_out_recordings_refute(quantities: dict[str, Any], rule: str) -> No
 
 
 def test_open_inputs_leave_something_beside_a_right_name() -> None:
-    measured = {"left": 0.3, "above": 4.0, "open_inputs": False, "at_floor": False}
+    measured = {"left": 0.3, "above": 4.0, "open_inputs": False, "at_floor": False, "noise": False}
     closed: Any = SimpleNamespace(**measured)
     opened: Any = SimpleNamespace(**(measured | {"open_inputs": True}))
     assert not accepted(examine(EXPLAINED, closed, CRITERIA))
     assert accepted(examine(EXPLAINED, opened, CRITERIA))
+
+
+def test_noise_of_any_colour_beside_a_name_is_no_mismatch() -> None:
+    left: Any = SimpleNamespace(left=0.96, above=20.0, open_inputs=False, at_floor=False, noise=True)
+    assert accepted(examine(EXPLAINED, left, CRITERIA))
 
 
 def test_a_score_must_promise_evidence_and_energy() -> None:
@@ -186,14 +191,18 @@ def test_a_score_must_promise_evidence_and_energy() -> None:
     ("quantities", "rule"),
     [
         ({"worst": 1.6}, "within the noise"),
+        ({"worst": 9.1, "noisy": True}, "within the noise"),
         ({"held_out": 4.1}, "within the noise, held out"),
+        ({"held_out": 9.1, "noisy": True}, "within the noise, held out"),
         ({"structure": "over the speed"}, "structure"),
         ({"torque": (0.026, 0.02)}, "plain model"),
     ],
 )
 def test_a_twin_that_leaves_something_reproduces_nothing(quantities: dict[str, Any], rule: str) -> None:
-    usual = {"worst": 1.5, "held_out": 3.9, "structure": "", "torque": (0.024, 0.02)}
+    usual = {"worst": 1.5, "noisy": False, "held_out": 3.9, "structure": "", "torque": (0.024, 0.02)}
     assert accepted(examine(REPRODUCED, Reproduced(**usual), CRITERIA))
+    coloured = usual | {"worst": 8.9, "noisy": True, "held_out": 8.9}
+    assert accepted(examine(REPRODUCED, Reproduced(**coloured), CRITERIA))
     assert examine(REPRODUCED, Reproduced(**(usual | quantities)), CRITERIA)[-1].rule == rule
 
 

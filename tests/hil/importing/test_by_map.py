@@ -242,6 +242,10 @@ def test_another_file_is_refused(tmp_path: Path, name: str, message: str) -> Non
         ),
         (changed(torque_n_m={"column": "i", "unit": "mm"}), r"torque_n_m\.unit: given 'mm', allowed N m"),
         (
+            changed(table_position_m={"column": "x_set", "unit": "deg"}),
+            r"lead_m: given 0.01 beside table_position_m as an angle, allowed none",
+        ),
+        (
             {**changed(motor_position_rad={"column": "enc", "unit": "mm"}), "lead_m": None},
             r"unit: given 'mm', allowed rad, .*if lead_m is given",
         ),

@@ -288,3 +288,12 @@ def test_torque_and_command_get_signs_that_agree(tmp_path: Path, turned: tuple[s
     found = channels(draft_map(write(tmp_path / "log.csv", changed)))
     assert found["torque_command_n_m"].get("sign", 1) == (-1 if "torque_command_Nm" in turned else 1)
     assert found["torque_n_m"].get("sign", 1) == (-1 if "torque_measured_Nm" in turned else 1)
+
+
+def test_two_positions_without_a_torque_are_two_encoders(tmp_path: Path) -> None:
+    angle = np.round(np.degrees(AXIS["angle"]) / 0.01) * 0.01
+    turned = np.round(angle / 18.0 / 0.1)
+    columns = {"time_s": AXIS["t"], "motor_angle_deg": angle, "stage_angle (0.1 deg)": turned}
+    recording = imported(write(tmp_path / "stage.csv", columns))
+    np.testing.assert_allclose(recording["table_position_m"], np.radians(0.1 * turned), atol=1e-9)
+    assert recording.metadata["lead_m"] == pytest.approx(2.0 * np.pi)

@@ -40,6 +40,9 @@ UNITS: dict[str, tuple[str, float]] = {
 _MISREAD = {"km": 1e3, "uN m": 1e-6}
 _SPELLED = {"um": "µm", "um/s": "µm/s", "uN m": "µN m", "deg": "degrees", "rev": "revolutions", "in": "inches"}
 
+ROTARY_LEAD_M = 2.0 * pi
+"""Lead of a rotary axis: one metre of its load stands for one radian."""
+
 # a screw turns rad, rad/s, rad/s^2 into m, m/s, m/s^2
 _SCREW = {"rad": "m", "rad/s": "m/s", "rad/s^2": "m/s^2"}
 

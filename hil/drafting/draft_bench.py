@@ -18,8 +18,7 @@ from hil.errors import InputError
 from hil.identification.derived_channels import with_position
 from hil.identification.least_squares import Estimate
 from hil.importing.by_map import STEP
-from hil.importing.usual_values import ROTARY_LEAD_M
-from hil.quantities import digits, unit_of
+from hil.quantities import ROTARY_LEAD_M, digits, unit_of
 from hil.recording.quantum import count_of, is_decimal
 from hil.recording.recording import Recording
 from hil.twin.mechanisms import constant_load, gravity_torque

@@ -7,7 +7,8 @@ from hil.drafting.plant_values import TransmissionValues
 from hil.identification.derivatives import motion
 from hil.identification.least_squares import Estimate, least_squares
 from hil.identification.plain_model import plain_columns
-from hil.importing.usual_values import ROTARY_LEAD_M, usual_lead
+from hil.importing.usual_values import usual_lead
+from hil.quantities import ROTARY_LEAD_M
 from hil.recording.recording import Recording
 
 DIRECT = 0.02  # deviation from equal angles of motor and load up to which there is no gear

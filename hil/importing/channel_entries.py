@@ -29,8 +29,8 @@ from hil.importing.unit_choice import (
     unit_by_convention,
 )
 from hil.importing.units import unit_named
-from hil.importing.usual_values import LEADS_M, ROTARY_LEAD_M, improbable, mixed_up, screw_units, usual_lead
-from hil.quantities import UNITS
+from hil.importing.usual_values import LEADS_M, improbable, mixed_up, screw_units, usual_lead
+from hil.quantities import ROTARY_LEAD_M, UNITS
 
 SAME_COUNTS = 1e-3  # deviation of the factor between motor and set-point, both in counts: following errors are below
 _LEAD_NOT_TOLD = "not told; masses at the table scale with it"

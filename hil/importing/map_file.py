@@ -14,8 +14,7 @@ from hil.channels import AXIS_CHANNELS, CHANNELS, AxisChannels, AxisKind
 from hil.errors import FieldError
 from hil.files.csv_columns import CsvFormat
 from hil.files.date_stamps import DAY_S
-from hil.importing.usual_values import ROTARY_LEAD_M
-from hil.quantities import UNITS, si_factor, units_of
+from hil.quantities import ROTARY_LEAD_M, UNITS, si_factor, units_of
 
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "d": DAY_S, "date": 1.0}  # of a unit of time
 # units that need a constant, and the fields that may give it

@@ -8,7 +8,6 @@ from hil.arrays import FloatArray
 from hil.importing.unit_choice import ANGLES, LENGTHS, MATCH
 from hil.quantities import UNITS
 
-ROTARY_LEAD_M = 2.0 * pi  # of a rotary axis: one metre of its load stands for one radian
 COUNTS = tuple(
     float(n * k) for n in (1, 4) for k in (500, 1000, 1024, 2000, 2048, 2500, 4096, 5000, 8192, 10000)
 ) + tuple(2.0**power for power in range(12, 25))

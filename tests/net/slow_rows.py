@@ -21,7 +21,7 @@ from hil.drafting.plant_values import PlantValues, plant_values
 from hil.errors import InputError
 from hil.identification.derived_channels import with_position
 from hil.identification.least_squares import Estimate
-from hil.importing.usual_values import ROTARY_LEAD_M
+from hil.quantities import ROTARY_LEAD_M
 from hil.recording.recording import Recording, read_recording
 
 FILES = (

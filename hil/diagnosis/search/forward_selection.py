@@ -74,7 +74,8 @@ def search(prepared: Prepared, progress: Progress = lambda text: None, deadline_
     rivals, needed, considered = dict[Key, list[RivalFit]](), dict[Key, float](), list[Considered]()
     tried, fitted = [effects(())], set[str]()
     while len(base.terms) < MOST_TERMS:
-        if base.within_noise and not base.data.apart and (plain := fit_plain(base.data)):
+        begins = not base.terms or bool(base.data.set_aside)  # what was found above the noise, rows at rest may tell
+        if begins and base.within_noise and not base.data.apart and (plain := fit_plain(base.data)):
             begin = base if base.terms else less_torque(plain, given, base)
             quiet = noise_apart(base.data, begin.hypothesis, plain)
             base, given = over(quiet, begin), over(quiet, given, 1)

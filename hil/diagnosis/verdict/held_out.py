@@ -24,8 +24,9 @@ def test_on_held_out(searched: Searched) -> Tested:
     if data is searched.prepared.train:
         return Tested(searched, cross_validate(nominal, final, held_out), reported_refit(nominal))
     there = held_out.louder(data.set_aside)
-    if data.apart and plain:
-        there = noise_apart(there, nominal.hypothesis, plain)
+    if data.apart and plain:  # by a twin that holds the motion
+        reference = nominal if nominal.within_noise else final
+        there = noise_apart(there, reference.hypothesis, plain)
     proof = cross_validate(over(data, nominal), final, there)
     return Tested(
         searched, replace(proof, final=over(searched.prepared.train, proof.final, 1)), reported_refit(nominal)

@@ -2,6 +2,7 @@
 
 The comment on a rule is its reason. `promises` decides before a candidate is fitted; rules are asked at six moments,
 and on a twin without new terms at a seventh (`hil.diagnosis.reproduced`):
+
     VALUES     on the fitted values of a candidate
     ADDED      on the fit with one more term, against the fit without it; HARMLESS: and its channels
     NEEDED     on each term beside the others
@@ -144,10 +145,8 @@ def _moves(of: Ablation, c: Criteria) -> Answer:
 
 
 def _torque_held_out(of: Ablation, c: Criteria) -> Answer | None:
-    if of.torque is None:  # an error of a sensor, or not told
-        return None
-    left, without = of.torque
-    return left - without <= c.discrepancy, {"left": left, "without": without}
+    left, without = of.torque or (0.0, 0.0)  # None: an error of a sensor, or not told
+    return None if of.torque is None else (left - without <= c.discrepancy, {"left": left, "without": without})
 
 
 def _explains(of: Remainder, c: Criteria) -> Answer:

@@ -17,6 +17,7 @@ class Criteria:
     """
 
     floor: float = FLOOR  # mean square over noise up to which a channel is explained
+    coloured: float = COLOURED  # the same beside a noisy torque, if what is left depends on nothing
     repeats: float = REPEATS  # least ratio of what differs from lap to lap, without a term over with it
     tied: float = TIED  # evidence from which a rival is refuted
     alike: float = ALIKE  # energy per row up to which it is not
@@ -65,7 +66,6 @@ class Criteria:
     # form leaves less.
     little: float = 0.05
     far: float = 0.25
-    coloured: float = COLOURED  # the same where noise may be coloured, and depends on nothing
     # Largest mean square over noise on held-out recordings of a twin that lacks nothing: errors of fitted parameters
     # may leave as much rms there as the noise twice.
     elsewhere: float = 4.0

@@ -24,8 +24,8 @@ from hil.identification.measured import Measured
 # as large as the noise makes 41 %. An encoder at rest has a constant error of up to half a count, whose square is three
 # times that of counting noise.
 FLOOR = 1.25**2
-# The same where the noise of a torque drives the twin: coloured noise may have three times the rms of its white part.
-# What remains must depend on nothing.
+# The same where a measured torque drives the twin with its noise, which may be coloured: three times the rms of the
+# white noise, if what is left depends on nothing. No sealed draw tells this factor.
 COLOURED = 9.0
 # Least ratio of the non-repeating energy without a term to that with it; a term below it is refuted. Most terms repeat
 # with the motion and have 1; the refit of the other parameters changes it by less than 5 %.

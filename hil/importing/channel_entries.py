@@ -222,8 +222,8 @@ class ChannelEntries:
             elif motor == "m":
                 keys |= {"counts_per_m": float(f"{1.0 / per_count:.8g}")}
             else:  # a screw's angle beside its lead is a length
-                turns = channel == "table_position_m" and lever not in (0.0, 1.0)
-                unit, size = ("m", per_count * lever) if turns else (motor, per_count)
+                length = channel == "table_position_m" and lever not in (0.0, 1.0)
+                unit, size = ("m", per_count * lever) if length else (motor, per_count)
                 keys |= {"unit": unit, "scale": float(f"{size:.8g}")}
         self._add(channel, name, what, keys)
 

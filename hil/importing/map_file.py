@@ -156,17 +156,18 @@ class RecordingMap(_Strict):
                 "given neither or both of time and sample_rate_hz, allowed one; "
                 "name the column of time stamps, or the rate if there is none",
             )
+        lead_m = self.travel_per_turn_m
+        if self.lead_m is not None and lead_m is not None and not isclose(self.lead_m, lead_m, rel_tol=1e-3):
+            raise FieldError(
+                ("lead_m",),
+                f"given {self.lead_m:g} beside {self.axis.table_position} as an angle, allowed none: a load that "
+                "turns has no lead, its gear ratio is found from the encoders; remove it",
+            )
         for name, source in self.channels.items():
             if name not in CHANNELS or name == "time_s":
                 known = ", ".join(channel for channel in CHANNELS if channel != "time_s")
                 raise FieldError(("channels", name), f"is no channel, allowed {known}; correct the name")
-            si, lead_m = CHANNELS[name].unit, self.travel_per_turn_m
-            if self.lead_m is not None and lead_m is not None and not isclose(self.lead_m, lead_m, rel_tol=1e-3):
-                raise FieldError(
-                    ("lead_m",),
-                    f"given {self.lead_m:g} beside {self.axis.table_position} as an angle, allowed none: a load that "
-                    "turns has no lead, its gear ratio is found from the encoders; remove it",
-                )
+            si = CHANNELS[name].unit
             if source.factor_to(si, lead_m) is None:
                 allowed = [*units_of(si, lead_m), *_CONSTANTS]
                 lead = "" if lead_m else " (angle and length convert if lead_m is given)"

@@ -171,11 +171,11 @@ def _accelerates(values: FloatArray, moved: MeasuredMotion, period_s: float) -> 
 
 
 def _positions(
-    live: dict[str, FloatArray], labels: dict[str, Label], names: list[str], driven_by: bool, roles: Roles
+    live: dict[str, FloatArray], labels: dict[str, Label], names: list[str], has_effort: bool, roles: Roles
 ) -> None:
     """Tell set-point, motor and second encoder.
 
-    Where no effort drives the motion (`driven_by`), a set-point tells nothing: two positions are two encoders.
+    Where no effort is recorded, a set-point tells nothing: two positions are two encoders.
     """
     names = list(names)
     for name in names[1:]:
@@ -186,7 +186,7 @@ def _positions(
             names.remove(name)
     commands = [name for name in names if labels[name].command]
     measured = [name for name in names if name not in commands]
-    if driven_by and not commands and len(measured) > 1:
+    if has_effort and not commands and len(measured) > 1:
         plain = [name for name in measured if not (labels[name].motor or labels[name].table or labels[name].measured)]
         commands, why = computed_one({name: live[name] for name in measured}, plain)
         roles.unsure += [f"{name}: taken for the set-point, because {why}" for name in commands]

@@ -24,8 +24,8 @@ class Remainder:
     """What all terms together leave: share of the energy above the floor, largest mean square of a channel over noise.
 
     `open_inputs`: inputs of the twin are open or nothing is known of the control law, so that something is left beside
-    any name. `at_floor`: the training recordings are explained. `noise`: what is left beside a
-    noisy torque depends on nothing.
+    any name. `at_floor`: the training recordings are explained. `noise`: the torque is noisy, and
+    what is left depends on nothing.
     """
 
     left: float

@@ -17,8 +17,8 @@ from hil.identification.torque_left import fit_plain, left_by_plain, left_by_twi
 
 @dataclass(frozen=True)
 class Reproduced:
-    """What a twin leaves: the largest mean square of a channel over its noise in training and on held-out recordings
-    (`noisy`: the noise of a torque drives it, of any colour),
+    """What a twin leaves. `worst` and `held_out`: largest mean square of a channel over its noise, in training and on
+    held-out recordings. `noisy`: the noise of a measured torque drives the twin. Beside them
     the strongest structure in words, and the torque missed on held-out motion by the twin and by the plain model, over
     its deviation (rms). None where there is nothing held out, or no torque."""
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.signal import lfilter
 
 from hil.arrays import FloatArray
-from hil.identification.structure import ResidualSeries, autocovariance, structure
+from hil.identification.structure import ResidualSeries, autocovariance, slow, structure
 
 ROWS = 6000
 
@@ -90,3 +90,16 @@ def test_autocovariance_is_that_of_the_noise() -> None:
     found = autocovariance(series(slow_noise(6, 0.9)))
     assert found[0] == pytest.approx(1.0, rel=0.2)
     assert found[5] / found[0] == pytest.approx(0.9**5, abs=0.15)
+
+
+def test_weak_slow_noise_is_no_structure_over_time_and_a_step_is() -> None:
+    rng, n = np.random.default_rng(5), 20_000
+    time, rows = np.arange(n) * 1e-3, np.ones(n, dtype=bool)
+    drift = np.repeat(rng.normal(0.0, 0.3, n // 200), 200)  # a tenth of the white variance, over a fifth of a bin
+    noise = rng.normal(0.0, 1.0, n) + drift
+    for step, told in ((0.0, False), (0.5, True)):
+        parts = [ResidualSeries(noise + step * (time > 10.0), rows)]
+        found = structure(parts, [time])
+        assert found is not None
+        assert found.p < 1e-3  # the autocovariance has decayed in a row
+        assert (slow(parts, [time], found) < 1e-4) == told

@@ -144,9 +144,11 @@ def _moves(of: Ablation, c: Criteria) -> Answer:
     return not of.quiet, {}
 
 
-def _torque_held_out(of: Ablation, c: Criteria) -> Answer | None:
-    left, without = of.torque or (0.0, 0.0)  # None: an error of a sensor, or not told
-    return None if of.torque is None else (left - without <= c.discrepancy, {"left": left, "without": without})
+def _torque(of: Addition | Ablation, c: Criteria) -> Answer | None:
+    if of.torque is None:  # an error of a sensor, or not told
+        return None
+    left, without = of.torque
+    return left - without <= c.discrepancy, {"left": left, "without": without}
 
 
 def _explains(of: Remainder, c: Criteria) -> Answer:
@@ -189,6 +191,20 @@ _SHAPE: Rule[Addition | Need] = Rule(
     "its shape is not in what the twin leaves below the noise (by chance {chance:.1g}): it only passes less noise",
     _shape,
 )
+# a torque on the axis shows in the torque; errors of sensors may not
+_TORQUE: Rule[Addition | Ablation] = Rule(
+    "torque",
+    "the torque of the motion is predicted no worse with it",
+    "with it the twin leaves {left:.2%} of the torque, without it {without:.2%}",
+    _torque,
+)
+# a real effect pays with no channel for another
+_CHANNELS: Rule[Addition | Ablation] = Rule(
+    "channels",
+    "it makes no channel worse",
+    "with it the training recordings are reproduced worse in {channels}",
+    _channels,
+)
 VALUES: tuple[Rule[bool], ...] = (
     # the condition of each mechanism (`Mechanism.is_valid`): else its name does not apply
     Rule(
@@ -209,6 +225,7 @@ FORM: tuple[Rule[Addition], ...] = (
         "the force is not constant within its windows, or these follow the motion",
         _constant,
     ),
+    _TORQUE,
 )
 ADDED: tuple[Rule[Addition], ...] = (
     _EVIDENCE,
@@ -222,15 +239,7 @@ ADDED: tuple[Rule[Addition], ...] = (
     ),
     *FORM,
 )
-HARMLESS: tuple[Rule[Addition], ...] = (
-    # a real effect pays with no channel for another
-    Rule(
-        "channels",
-        "it makes no channel worse",
-        "with it the training recordings are reproduced worse in {channels}",
-        _channels,
-    ),
-)
+HARMLESS: tuple[Rule[Addition | Ablation], ...] = (_CHANNELS,)
 NEEDED: tuple[Rule[Addition | Need], ...] = (_EVIDENCE, _MATERIAL, _SHAPE)
 COMPARED: tuple[Rule[RivalFit], ...] = (
     # a rival is refuted by very strong evidence and by more than the model discrepancy
@@ -272,20 +281,8 @@ HELD_OUT: tuple[Rule[Ablation], ...] = (
         "its strength is below its standard error",
         _strength,
     ),
-    # a torque on the axis shows in the torque; errors of sensors may not
-    Rule(
-        "torque, held out",
-        "the torque of held-out motion is predicted no worse with it",
-        "with it the twin leaves {left:.2%} of the torque on held-out motion, without it {without:.2%}",
-        _torque_held_out,
-    ),
-    # a real effect pays with no channel for another
-    Rule(
-        "channels, all terms",
-        "it makes no channel worse",
-        "with it the training recordings are reproduced worse in {channels}",
-        _channels,
-    ),
+    _TORQUE,
+    _CHANNELS,
 )
 EXPLAINED: tuple[Rule[Remainder], ...] = (
     # the true mechanism in another form leaves little
@@ -296,4 +293,4 @@ EXPLAINED: tuple[Rule[Remainder], ...] = (
         _explains,
     ),
 )
-RULES = (*VALUES, *ADDED, *HARMLESS, *COMPARED, *HELD_OUT, *EXPLAINED, *REPRODUCED)
+RULES = tuple(dict.fromkeys((*VALUES, *ADDED, *HARMLESS, *COMPARED, *HELD_OUT, *EXPLAINED, *REPRODUCED)))

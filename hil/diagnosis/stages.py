@@ -8,7 +8,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -55,7 +55,7 @@ class Searched:
     given: Fit
     nominal: Fit
     final: Fit
-    rivals: dict[Key, list[RivalFit]] = field(default_factory=dict)
+    rivals: Mapping[Key, Sequence[RivalFit]] = field(default_factory=dict)
     needed: dict[Key, float] = field(default_factory=dict)  # evidence that each term is needed
     considered: tuple[Considered, ...] = ()  # every candidate that was fitted, with its ledger
     stopped_at: str = ""  # step of the search at which the time was over; empty if it was completed

@@ -15,6 +15,7 @@ where the sign of the velocity is not known, it goes on from one to the next:
     e(z) = a^2 z^-1 / (1 - (2 - 2 a - a^2) z^-1 + (1 - 2 a) z^-2),   a = T / tau      of a rigid axis
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
@@ -25,6 +26,7 @@ from scipy.signal import lfilter
 from hil.arrays import FloatArray
 from hil.identification.dataset import Dataset
 from hil.identification.derivatives import matched
+from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.measured import Measured
 from hil.identification.plain_model import MotionData, PlainModel, fit_plain_model, motion_data
@@ -48,6 +50,19 @@ def torque_deviation(every: Sequence[Dataset], slowest: float) -> float:
     return float(np.std(torque)) if torque.size else 0.0
 
 
+def torque_missed(fit: Fit, data: Dataset) -> float | None:
+    """Torque that the motion of a data set needs beyond that of a twin, over its deviation (rms); None: nothing slides.
+
+    Infinite where the twin does not hold the motion.
+    """
+    plain = fit_plain(fit.data) if data.runs and data.observability.torque_measured else None
+    deviation = torque_deviation([data], plain.slowest) if plain else 0.0
+    if plain is None or not deviation:
+        return None
+    left = left_by_twin(fit.hypothesis, data, plain.slowest, deviation)
+    return math.inf if left is None else left
+
+
 def left_by_plain(model: PlainModel, data: Dataset, deviation: float | None = None) -> float | None:
     """Share of the torque's standard `deviation` that the plain model leaves on a data set; None where nothing slides.
 
@@ -66,6 +81,7 @@ def left_by_plain(model: PlainModel, data: Dataset, deviation: float | None = No
     return _share(found, data, model.slowest, deviation)
 
 
+@lru_cache(maxsize=16)
 def left_by_twin(hypothesis: Hypothesis, data: Dataset, slowest: float, deviation: float | None = None) -> float | None:
     """Share of the torque's standard `deviation` that a twin leaves where the motor is faster than `slowest`, or None.
 

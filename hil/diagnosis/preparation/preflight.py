@@ -29,6 +29,7 @@ WRONG_BY = 4.0
 SLOPE_TOLERANCE = 0.2  # of positions against set-points; following errors are below 5 %
 _RELATED = 0.5  # least squared correlation of two channels for a factor between them: half of the variance
 _SWINGS = 6  # of the command between its limits in a move one way: to speed up and to brake make two
+_POSITIVE = {"inertia": "inertia", "coulomb": "friction"}
 SATURATED = 0.5  # share of the moving rows at the torque limit: above, most rows do not obey the control law
 
 _POSITION_UNITS = misread_factors("mm", "um", "nm", "deg", "rev", "km", "in")
@@ -71,7 +72,7 @@ def preflight(recordings: Sequence[Recording], bench: Bench) -> Preflight:
     problems = [
         f"{run.name}: {problem}"
         for run, recording in zip(runs, recordings, strict=True)
-        for problem in _problems(run, bench, set(recording.metadata.get(DERIVED, {})))
+        for problem in _problems(run, bench, set(recording.metadata.get(DERIVED, {})), runs)
     ]
     return Preflight(runs, tuple(problems))
 
@@ -98,7 +99,7 @@ def _raw_problems(recording: Recording, bench: Bench) -> Iterator[str]:
         )
 
 
-def _problems(run: Measured, bench: Bench, derived: set[str]) -> Iterator[str]:
+def _problems(run: Measured, bench: Bench, derived: set[str], runs: Sequence[Measured]) -> Iterator[str]:
     names, ratio = AXIS_CHANNELS[run.kind], bench.axis.ratio_m_rad
     command = run.position_command_m
     top = float(np.max(np.abs(run.velocity_command_m_s)))
@@ -135,7 +136,7 @@ def _problems(run: Measured, bench: Bench, derived: set[str]) -> Iterator[str]:
     if run.observability.closed_loop:  # else the saturated rows obey the plant like the others
         yield from _saturation(run, bench, moving)
     if not found and run.observability.torque_measured:  # the check of the torque needs a valid measured motion
-        yield from _torque_problems(run, bench)
+        yield from _torque_problems(run, bench, runs)
 
 
 def _position_problems(run: Measured, bench: Bench, motor: str, table: str) -> Iterator[str]:
@@ -165,7 +166,7 @@ def _set_point_problems(run: Measured, name: str) -> Iterator[str]:
         yield f"{name}: {_factor(slope, _VELOCITY_UNITS, 'the derivative of the position set-points')}"
 
 
-def _torque_problems(run: Measured, bench: Bench) -> Iterator[str]:
+def _torque_problems(run: Measured, bench: Bench, runs: Sequence[Measured]) -> Iterator[str]:
     names, unit = AXIS_CHANNELS[run.kind], "N" if bench.axis.linear else "N m"
     physics = bench.axis.physics()
     inertia = float(physics.chain.inertia_kg_m2.sum())
@@ -181,17 +182,18 @@ def _torque_problems(run: Measured, bench: Bench) -> Iterator[str]:
         if _correlation(run.torque_command, run.torque) > 0.5 and not 0.5 / WRONG_BY < slope < 2.0 * WRONG_BY:
             yield f"{names.torque}: {_factor(slope, _TORQUE_UNITS, names.torque_command)}"
             return
-    measured = regress(run, bench)
+    measured = regress([run], bench)
     if measured is None:
         return
     j, coulomb = measured["inertia"], measured["coulomb"]
-    both = {"inertia": j, "friction": coulomb}
-    negative = next((name for name, one in both.items() if one.value < -3.0 * one.std_error), None)
-    # neither can be negative, and both have the sign of the torque
-    if negative and not any(one.value > 3.0 * one.std_error for one in both.values()):
+    negative = [name for name in _POSITIVE if measured[name].significant and measured[name].value < 0.0]
+    # neither can be negative, and both have the sign of the torque, which is that of all recordings
+    one_alone = len(negative) == 1 and len(runs) > 1
+    if negative and not (_right_sign(measured) or (one_alone and _right_sign(regress(runs, bench)))):
+        value = measured[negative[0]]
         yield (
-            f"{names.torque} has the wrong sign: its regression gives a negative {negative}, "
-            f"{both[negative].value:.3g} ± {both[negative].std_error:.1g}; correct the sign of the channel, or of the "
+            f"{names.torque} has the wrong sign: its regression gives a negative {_POSITIVE[negative[0]]}, "
+            f"{value.value:.3g} ± {value.std_error:.1g}; correct the sign of the channel, or of the "
             "encoder"
         )
         return
@@ -205,13 +207,17 @@ def _torque_problems(run: Measured, bench: Bench) -> Iterator[str]:
         yield f"{names.torque}: {_factor(factor, units | _TORQUE_UNITS, against)}"
 
 
-def regress(run: Measured, bench: Bench) -> PlainModel | None:
-    """Fit the plain model to a recording; None without sliding motion.
+def _right_sign(model: PlainModel | None) -> bool:
+    return model is not None and any(model[name].significant and model[name].value > 0.0 for name in _POSITIVE)
+
+
+def regress(runs: Sequence[Measured], bench: Bench) -> PlainModel | None:
+    """Fit the plain model to recordings; None without sliding motion.
 
     It has gravity or a spring where the torque follows the position.
     """
     load_ratio = bench.axis.ratio_m_rad if bench.axis.turns else None
-    return fit_plain_model([motion_data(run.motor, run.torque, run.period_s)], load_ratio, spring=True)
+    return fit_plain_model([motion_data(run.motor, run.torque, run.period_s) for run in runs], load_ratio, spring=True)
 
 
 def _saturation(run: Measured, bench: Bench, moving: NDArray[np.bool_]) -> Iterator[str]:

@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
+import numpy as np
+
 from hil.diagnosis.acceptance import ADDED, HARMLESS, VALUES
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.ledger import Considered, Ledger, accepted, examine
@@ -14,9 +16,14 @@ from hil.diagnosis.search.events import InsideWindows, inside_windows
 from hil.diagnosis.search.initial_values import claimable
 from hil.diagnosis.search.shape import chance_below_noise
 from hil.diagnosis.wording import channel_names
+from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.inference import bic_gain
 from hil.identification.noise_floor import unrepeated
+from hil.identification.terms import Term
+from hil.identification.torque_left import torque_missed
+from hil.twin.library import BY_ID
+from hil.twin.mechanism import Block
 
 
 @dataclass(frozen=True)
@@ -91,6 +98,11 @@ class Addition:
         return inside_windows(self.fit, self.base)
 
     @cached_property
+    def torque(self) -> tuple[float, float] | None:
+        """Torque missed with the term and without it, see `torque_of`."""
+        return torque_of(self.fit, self.base, self.fit.terms[-1], self.fit.data)
+
+    @cached_property
     def harm(self) -> Mapping[str, Harm]:
         """Each recorded channel with the term."""
         return harm(self.fit, self.base, self.given)
@@ -135,6 +147,22 @@ def removed_by_channel(without: Fit, fit: Fit, reference: Fit) -> dict[str, floa
         gain = float(a @ a - b @ b) - CRITERIA.form * max(float(n @ n - a @ a), 0.0)
         found[channel] = found.get(channel, 0.0) + max(gain, 0.0)
     return found
+
+
+def torque_of(fit: Fit, without: Fit, term: Term, data: Dataset) -> tuple[float, float] | None:
+    """Torque missed on recordings with a term of the plant and without it; None where the torque says nothing of it.
+
+    An error of the transmission is no torque on an axis without a spring.
+    """
+    mechanism = BY_ID[term.effect]
+    if mechanism.block in (Block.CONTROLLER, Block.SENSOR) or term.windows:
+        return None
+    if mechanism.in_transmission and not fit.bench.axis.SPRINGS:
+        return None
+    left, other = torque_missed(fit, data), torque_missed(without, data)
+    if left is None or other is None or not np.isfinite(other):  # the twin without it does not hold the motion
+        return None
+    return left, other
 
 
 def harm(fit: Fit, without: Fit, given: Fit) -> dict[str, Harm]:

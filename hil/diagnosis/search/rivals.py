@@ -49,6 +49,12 @@ class RivalFit:
         """The explanation by a fit."""
         return cls(fit.terms, fit.reduced, evidence, more)
 
+    def beside(self, named: RivalFit) -> RivalFit:
+        """The same beside one of the other explanations, that is named now."""
+        return replace(
+            self, evidence=self.evidence - named.evidence, more=self.more - named.more, named=named.reduced, behind=""
+        )
+
     @property
     def ledger(self) -> Ledger:
         """Answers of the rules that compare it with the named explanation."""

@@ -48,7 +48,7 @@ def race(base: Fit, candidates: Sequence[Candidate]) -> list[Fit]:
     The best is converged in all its variants, others only if their cost is near it.
     """
     return _Race(
-        base, [one for one in candidates[:_STARTED] if one.share > CRITERIA.hopeless * candidates[0].share]
+        base, [one for one in candidates[:_STARTED] if one.share >= CRITERIA.hopeless * candidates[0].share]
     ).run()
 
 

@@ -8,29 +8,30 @@ also falls if its strength is within its standard error, if it worsens a channel
 if it changes only what the noise of the sensors does, see `noise_free`.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
 
-from hil.diagnosis.acceptance import HELD_OUT
+from hil.diagnosis.acceptance import HELD_OUT, NEEDED
 from hil.diagnosis.criteria import CRITERIA
-from hil.diagnosis.ledger import Ledger, examine, refusal
-from hil.diagnosis.search.addition import Harm, harm
+from hil.diagnosis.ledger import Ledger, accepted, examine, refusal
+from hil.diagnosis.search.addition import Addition, Harm, harm, torque_of
 from hil.diagnosis.search.forward_selection import claimed
 from hil.diagnosis.search.initial_values import axis_facts
+from hil.diagnosis.search.rivals import ENDED, RivalFit
 from hil.diagnosis.verdict.noise_free import energy_without_noise
-from hil.diagnosis.verdict.reproduction import torque_missed
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.inference import bic_margin, standard_errors
 from hil.identification.noise_floor import unrepeated
 from hil.identification.parallel import in_parallel
-from hil.identification.terms import Term
+from hil.identification.terms import Key, Term, compatible, free_slot
 from hil.twin.library import BY_ID
-from hil.twin.mechanism import Block
 from hil.twin.parameter import Role
+
+Rivals = Mapping[Key, Sequence[RivalFit]]
 
 _LEAST = 1e-12  # of the energy of the noise: a channel that the twin was given is left without a residual
 
@@ -80,27 +81,59 @@ class Ablation:
 
 @dataclass(frozen=True, eq=False)
 class CrossValidation:
-    """The final fit after harmful terms were dropped, and the ablations of its terms and of the dropped ones."""
+    """The final fit after harmful terms were dropped, and the ablations of its terms and of the dropped ones.
+
+    `rivals` are those of each term, of one that took the place of a dropped one too.
+    """
 
     final: Fit
     ablations: tuple[Ablation, ...]
     dropped: tuple[Ablation, ...]
+    rivals: Rivals = field(default_factory=dict)
 
 
-def cross_validate(nominal: Fit, final: Fit, held_out: Dataset) -> CrossValidation:
-    """Ablate every term; drop those that held-out recordings or laps refute, the most harmful first."""
+def cross_validate(nominal: Fit, final: Fit, held_out: Dataset, rivals: Rivals | None = None) -> CrossValidation:
+    """Ablate every term; drop those that held-out recordings or laps refute, the most harmful first.
+
+    The strongest rival that the training recordings do not tell from a dropped term takes its place, and is tested in
+    turn.
+    """
     dropped: list[Ablation] = []
+    known = dict(rivals or {})
     given = nominal.estimator.evaluate(nominal.hypothesis.given)
     while True:
         ablations = _ablate(given, nominal, final, held_out)
         harmful = [ablation for ablation in ablations if ablation.refuted]
         if not harmful:
-            return CrossValidation(final, tuple(ablations), tuple(dropped))
+            return CrossValidation(final, tuple(ablations), tuple(dropped), known)
         worst = min(harmful, key=lambda ablation: ablation.gain or 0.0)
         dropped.append(worst)
-        final = worst.without
-        if final.terms:
-            final = claimed(final.refit(30))
+        fit, rest = final, worst.without
+        final = claimed(rest.refit(30)) if rest.terms else rest
+        others = known.pop(worst.term.key, ())
+        for index, rival in enumerate(others):
+            if rival.tied and (other := _instead(fit, worst.term, rival.terms[-1], final)):
+                final = other
+                known[final.terms[-1].key] = [one.beside(rival) for one in others[index + 1 :]]
+                break
+
+
+def _instead(fit: Fit, dropped: Term, rival: Term, without: Fit) -> Fit | None:
+    """Fit a rival in the place of a dropped term; None if it is not needed beside the others, or not valid.
+
+    An event is found in each recording, so that none takes a place here.
+    """
+    others = [term for term in fit.terms if term.key != dropped.key]
+    term = replace(rival, slot=free_slot(rival.effect, others))
+    if term.windows or not compatible([*others, term, *(entry.active() for entry in fit.hypothesis.kept)]):
+        return None
+    index = next(index for index, one in enumerate(fit.terms) if one.key == dropped.key)
+    start = fit.hypothesis.without(index).with_term(term)
+    found = claimed(fit.estimator.fit(start, evaluations=ENDED))
+    if term.key not in {one.key for one in found.terms}:
+        return None
+    addition = Addition(found, without, without, without)
+    return found if addition.valid and accepted(examine(NEEDED, addition, CRITERIA)) else None
 
 
 def by_channel(fit: Fit, least: float = 1.0) -> dict[str, float]:
@@ -150,7 +183,7 @@ def _ablate(given: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> list[Abl
             bool(there and own_held_out and _change(own_held_out, there) > CRITERIA.acts * _change(final, other)),
             clear[index],
             _quiet(final, other),
-            _torque(final, other, term, held_out),
+            torque_of(final, other, term, held_out),
             harm(final, other, given),
         )
 
@@ -183,22 +216,6 @@ def _quiet(fit: Fit, without: Fit) -> bool:
     return removed is not None and removed < min(
         CRITERIA.material * fit.noise_energy, CRITERIA.on_motion * (without.cost - fit.cost)
     )
-
-
-def _torque(fit: Fit, without: Fit, term: Term, held_out: Dataset) -> tuple[float, float] | None:
-    """Torque missed on held-out recordings with a term of the plant and without it.
-
-    An error of the transmission is no torque on an axis without a spring.
-    """
-    mechanism = BY_ID[term.effect]
-    if mechanism.block in (Block.CONTROLLER, Block.SENSOR) or term.windows:
-        return None
-    if mechanism.in_transmission and not fit.bench.axis.SPRINGS:
-        return None
-    left, other = torque_missed(fit, held_out), torque_missed(without, held_out)
-    if left is None or other is None or not np.isfinite(other):  # the twin without it does not hold the motion
-        return None
-    return left, other
 
 
 def _gain(fit: Fit, without: Fit) -> float:

@@ -2,8 +2,6 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.ledger import Ledger, examine
 from hil.diagnosis.reproduced import REPRODUCED
@@ -11,8 +9,7 @@ from hil.diagnosis.stages import Judged
 from hil.diagnosis.structure_left import structure_left
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
-from hil.identification.plain_model import PlainModel
-from hil.identification.torque_left import fit_plain, left_by_plain, left_by_twin, torque_deviation
+from hil.identification.torque_left import fit_plain, left_by_plain, torque_deviation, torque_missed
 
 
 @dataclass(frozen=True)
@@ -53,24 +50,7 @@ def with_less_torque(given: Judged, other: Judged) -> Judged:
     return other if left is not None and less is not None and less < left else given
 
 
-def torque_missed(fit: Fit, held_out: Dataset) -> float | None:
-    """Torque that held-out motion needs beyond that of a twin, over its deviation (rms); None: nothing slides there.
-
-    Infinite where the twin does not hold the motion.
-    """
-    plain = _plain(fit, held_out)
-    deviation = torque_deviation([held_out], plain.slowest) if plain else 0.0
-    if plain is None or not deviation:
-        return None
-    left = left_by_twin(fit.hypothesis, held_out, plain.slowest, deviation)
-    return np.inf if left is None else left
-
-
 def _missed_by_plain(fit: Fit, held_out: Dataset) -> float | None:
-    plain = _plain(fit, held_out)
-    return None if plain is None else left_by_plain(plain, held_out, torque_deviation([held_out], plain.slowest))
-
-
-def _plain(fit: Fit, held_out: Dataset) -> PlainModel | None:
     told = held_out.runs and held_out.observability.torque_measured
-    return fit_plain(fit.data) if told else None
+    plain = fit_plain(fit.data) if told else None
+    return None if plain is None else left_by_plain(plain, held_out, torque_deviation([held_out], plain.slowest))

@@ -53,7 +53,7 @@ def test_physics_is_no_reason_to_refuse(terms: tuple[Term, ...]) -> None:
 
 
 def test_the_regression_finds_inertia_and_friction(run: Recording) -> None:
-    found = regress(preflight([run], OWNER).accepted()[0], OWNER)
+    found = regress(preflight([run], OWNER).accepted(), OWNER)
     assert found is not None
     inertia, viscous, coulomb, offset = found.fit.values
     axis = OWNER.axis
@@ -76,7 +76,7 @@ def test_motion_in_one_direction_tells_no_friction_and_no_unit(run: Recording) -
         "torque_command_n_m": None,
     }
     prepared = preflight([changed(run, **columns)], OWNER).accepted()[0]
-    found = regress(prepared, OWNER)
+    found = regress([prepared], OWNER)
     assert found is not None
     assert found["coulomb"].std_error == math.inf
 

@@ -182,14 +182,14 @@ def _torque_problems(run: Measured, bench: Bench, runs: Sequence[Measured]) -> I
         if _correlation(run.torque_command, run.torque) > 0.5 and not 0.5 / WRONG_BY < slope < 2.0 * WRONG_BY:
             yield f"{names.torque}: {_factor(slope, _TORQUE_UNITS, names.torque_command)}"
             return
-    measured = regress([run], bench)
+    measured = regress(run, bench)
     if measured is None:
         return
     j, coulomb = measured["inertia"], measured["coulomb"]
     negative = [name for name in _POSITIVE if measured[name].significant and measured[name].value < 0.0]
     # neither can be negative, and both have the sign of the torque, which is that of all recordings
-    one_alone = len(negative) == 1 and len(runs) > 1
-    if negative and not (_right_sign(measured) or (one_alone and _right_sign(regress(runs, bench)))):
+    others = [one for one in runs if one is not run and len(negative) == 1]
+    if negative and not (_right_sign(measured) or any(_right_sign(regress(one, bench)) for one in others)):
         value = measured[negative[0]]
         yield (
             f"{names.torque} has the wrong sign: its regression gives a negative {_POSITIVE[negative[0]]}, "
@@ -211,13 +211,13 @@ def _right_sign(model: PlainModel | None) -> bool:
     return model is not None and any(model[name].significant and model[name].value > 0.0 for name in _POSITIVE)
 
 
-def regress(runs: Sequence[Measured], bench: Bench) -> PlainModel | None:
-    """Fit the plain model to recordings; None without sliding motion.
+def regress(run: Measured, bench: Bench) -> PlainModel | None:
+    """Fit the plain model to a recording; None without sliding motion.
 
     It has gravity or a spring where the torque follows the position.
     """
     load_ratio = bench.axis.ratio_m_rad if bench.axis.turns else None
-    return fit_plain_model([motion_data(run.motor, run.torque, run.period_s) for run in runs], load_ratio, spring=True)
+    return fit_plain_model([motion_data(run.motor, run.torque, run.period_s)], load_ratio, spring=True)
 
 
 def _saturation(run: Measured, bench: Bench, moving: NDArray[np.bool_]) -> Iterator[str]:

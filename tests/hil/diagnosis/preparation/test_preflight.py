@@ -10,6 +10,7 @@ import pytest
 from diagnosis_runs import bench, changed, recorded
 from linear_stage import BENCH as STAGE
 from linear_stage import moved
+from scipy.signal import savgol_filter
 
 from hil.bench.bench_file import load_bench
 from hil.diagnosis.preparation.preflight import _factor_between, preflight, regress
@@ -53,7 +54,7 @@ def test_physics_is_no_reason_to_refuse(terms: tuple[Term, ...]) -> None:
 
 
 def test_the_regression_finds_inertia_and_friction(run: Recording) -> None:
-    found = regress(preflight([run], OWNER).accepted(), OWNER)
+    found = regress(preflight([run], OWNER).accepted()[0], OWNER)
     assert found is not None
     inertia, viscous, coulomb, offset = found.fit.values
     axis = OWNER.axis
@@ -76,7 +77,7 @@ def test_motion_in_one_direction_tells_no_friction_and_no_unit(run: Recording) -
         "torque_command_n_m": None,
     }
     prepared = preflight([changed(run, **columns)], OWNER).accepted()[0]
-    found = regress([prepared], OWNER)
+    found = regress(prepared, OWNER)
     assert found is not None
     assert found["coulomb"].std_error == math.inf
 
@@ -198,3 +199,15 @@ def test_friction_that_varies_is_no_wrong_sign() -> None:
     turned = replace(slow, columns=slow.columns | {"force_n": -slow.columns["force_n"]})
     with pytest.raises(InputError, match="wrong sign"):
         preflight([turned], STAGE).accepted()
+
+
+def test_a_negative_inertia_of_one_recording_is_no_wrong_sign_beside_others(run: Recording) -> None:
+    """All recordings have one sign; without friction it is that of a disturbance."""
+    slowing = -1e-3 * savgol_filter(run["motor_position_rad"], 41, 3, 2, delta=run.period_s)
+    slowing += np.random.default_rng(5).normal(0.0, 0.02, slowing.size)
+    disturbed = replace(changed(run, torque_n_m=slowing, torque_command_n_m=slowing), name="disturbed")
+    assert "wrong sign: its regression gives a negative inertia" in refused(disturbed)
+    assert len(preflight([run, disturbed], OWNER).accepted()) == 2
+    turned = replace(changed(run, torque_n_m=-1.0, torque_command_n_m=-1.0), name="turned")
+    with pytest.raises(InputError, match="turned: torque_n_m has the wrong sign"):
+        preflight([run, turned], OWNER).accepted()

@@ -9,7 +9,7 @@ from diagnosis_runs import bench, dataset, recorded
 from hil.bench.bench_file import load_bench
 from hil.diagnosis.preparation.preflight import preflight
 from hil.diagnosis.search.score_test import Candidate
-from hil.diagnosis.search.successive_halving import _Race, _soft, given_points
+from hil.diagnosis.search.successive_halving import _Race, _soft, given_points, race
 from hil.identification.dataset import prepare_dataset
 from hil.identification.estimator import Estimator, Fit
 from hil.identification.hypothesis import Hypothesis
@@ -66,3 +66,11 @@ def test_a_start_is_compared_beside_the_parameters_that_the_mismatch_has_bent() 
     contest = _Race(base, [Candidate(drift, 0.5, (weak,))])
     begun = contest._least(contest.candidates[0], base.hypothesis.x, _soft, contest._cost_beside_base)
     assert [fit.terms for fit in begun] == [(weak,), (drift,)]
+
+
+def test_a_candidate_whose_shape_alone_speaks_for_it_is_fitted() -> None:
+    """Below the noise the clearest shape may explain nothing at its start."""
+    truth, load = bench(), Term("constant_load", 0, (0.4,))
+    data = prepare_dataset(preflight([recorded(truth, load)], truth).accepted(), truth)
+    (found,) = race(fit_nominal_parameters(data), [Candidate(load, 0.0, ())])
+    assert found.terms[0].effect == "constant_load"

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from diagnosis_runs import bench, dataset, evaluated, fitted, recorded
 
 from hil.bench.bench_file import Bench
 from hil.diagnosis.acceptance import paying
+from hil.diagnosis.search.rivals import RivalFit
 from hil.diagnosis.verdict.cross_validation import cross_validate
 from hil.identification.dataset import Dataset
 from hil.identification.hypothesis import Hypothesis
@@ -55,3 +58,22 @@ def test_a_term_beside_a_refit_that_is_worse_than_the_bench_file_is_dropped(trai
     final = evaluated(nominal.hypothesis.with_term(Term("cogging_torque", 0, (0.01, 6.0, 0.0))), train)
     (dropped,) = cross_validate(nominal, final, dataset([], OWNER)).dropped
     assert "motor_position_rad" in paying(dropped.harm)
+
+
+def test_the_rival_that_training_does_not_tell_from_a_refuted_term_takes_its_place() -> None:
+    """A load beside cogging that is not there; what else is tied with it is not tried again."""
+    load = Term("constant_load", 0, (0.4,))
+    data, plain = runs(load), Hypothesis(OWNER)
+    nominal = evaluated(plain, data)
+    wrong = evaluated(Hypothesis(OWNER, (Term("cogging_torque", 0, (0.4, 7.0, 0.2)),)), data)
+    offset = RivalFit((Term("constant_load", 0, (0.2,)),), 1.0, 0.0, 0.0)
+    play = RivalFit((Term("backlash", 0, (5e-5,)),), 1.0, 0.0, 0.0)
+    key = wrong.terms[0].key
+    proof = cross_validate(nominal, wrong, data.over(()), {key: [offset, play]})
+    (named,) = proof.final.terms
+    assert named.effect == "constant_load"
+    assert named.values[0] == pytest.approx(0.4, rel=0.05)
+    assert [one.term.key for one in proof.dropped] == [key]
+    assert [one.terms for one in proof.rivals[named.key]] == [play.terms]
+    objected = replace(offset, objection="it is late")
+    assert cross_validate(nominal, wrong, data.over(()), {key: [objected]}).final.terms == ()

@@ -140,7 +140,7 @@ class _PlainText:
 
     def _device_information(self) -> Iterator[str]:
         section = self.sections.get("deviceinfo", Section("DeviceInfo", 1))
-        yield from (f"{name}={section.text(name.lower())}" for name in _NAMES)
+        yield from (f"{name}={text}" for name in _NAMES if (text := section.text(name.lower())))
         for name in _NUMBERS:
             value = section.values.get(name.lower())
             if value is None or not value.text:

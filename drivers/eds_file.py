@@ -6,6 +6,7 @@ it makes up the others. Kept is what a client needs: type, access, mapping, limi
 """
 
 import io
+import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -15,12 +16,24 @@ from typing import Final
 from canopen.objectdictionary import ObjectDictionary, ODVariable, datatypes
 from canopen.objectdictionary.eds import import_eds
 
-from drivers.eds_text import ADVICE, EdsError, Section, Value, decode, node_formula, number, octal, read_bytes, sections
+from drivers.eds_text import (
+    ADVICE,
+    EdsError,
+    EdsValue,
+    Section,
+    decode,
+    node_formula,
+    number,
+    octal,
+    read_bytes,
+    sections,
+)
 from drivers.object_types import COUNTERS, data_type_name, profile_type, size_of
 from drivers.pdo import Entry
 
 _DOMAIN, _VAR, _ARRAY, _RECORD = 2, 7, 8, 9  # object codes of CiA 301
 _LAST_TYPE: Final = 0x1B  # UNSIGNED64; others are defined in sections of their own
+_OBJECT: Final = re.compile(r"([0-9a-f]{4})(?:sub([0-9a-f]{1,2}))?")  # as `section_key` has it
 _UNSIGNED8: Final = 0x05
 _BYTES: Final = 0x0F  # DOMAIN
 _COUNT: Final = f"ParameterName=Number of entries\nDataType={_UNSIGNED8}\nAccessType=ro\nDefaultValue="
@@ -33,7 +46,7 @@ _NUMBERS: Final = (
 _NAMES: Final = ("VendorName", "ProductName", "OrderCode")
 _VALUES: Final = ("LowLimit", "HighLimit", "DefaultValue", "ParameterValue")
 _MATTERS: Final = frozenset(key.lower() for key in (*_IDENTITY, *_VALUES, "DataType", "ObjectType", "AccessType"))
-_MOST_VARIABLES: Final = 50_000  # ten times those of a large drive; in compact form a small file may have millions
+_MOST_VARIABLES: Final = 20_000  # some times those of a large drive; in compact form a small file may have millions
 _SHOWN_NOTES: Final = 5
 _Declared = dict[tuple[int, int], str]  # line and text of the data type, by index and sub-index
 
@@ -122,12 +135,10 @@ class _PlainText:
 
     def __post_init__(self) -> None:
         self._lines = ["[DeviceInfo]", *self._device_information(), *self._dummies()]
-        names: dict[str, list[int]] = {}
-        for key in self.sections:
-            index, sub, number_text = key.partition("sub")
-            if len(index) == 4 and all(c in "0123456789abcdef" for c in index):
-                names.setdefault(index, []).extend([int(number_text, 16)] if sub else [])
-        for index, subindices in sorted(names.items()):
+        found: dict[str, list[int]] = {}
+        for match in filter(None, map(_OBJECT.fullmatch, self.sections)):
+            found.setdefault(match[1], []).extend([int(match[2], 16)] if match[2] else [])
+        for index, subindices in sorted(found.items()):
             self._lines += self._object(index, sorted(subindices))
             if len(self.declared) > _MOST_VARIABLES:
                 raise EdsError(f"has more than {_MOST_VARIABLES} objects", where=self.where, advice=ADVICE)
@@ -190,7 +201,7 @@ class _PlainText:
             yield from (f"[{index}sub0]", f"{_COUNT}{last}")
         for subindex in {*range(1, last + 1)} - given:
             own = Section(main.name, main.line, dict(main.values))
-            own.values["parametername"] = Value(names.text(str(subindex)) or f"{name}{subindex}", main.line)
+            own.values["parametername"] = EdsValue(names.text(str(subindex)) or f"{name}{subindex}", main.line)
             if values.text(str(subindex)):
                 own.values["parametervalue"] = values.values[str(subindex)]
             yield from [f"[{index}sub{subindex:x}]", *self._variable(index, subindex, own, main)]
@@ -216,11 +227,10 @@ class _PlainText:
         found = number(value.text)
         if found is not None and found > _LAST_TYPE:
             found = number(self.sections.get(f"{found:04x}sub1", section).text("defaultvalue"))
-        found = found if found is not None and 0 < found <= _LAST_TYPE else _BYTES
-        self.declared[index, subindex] = (
-            f"line {value.line}: [{section.name}] DataType={value.text} ({data_type_name(found)})"
-        )
-        return found
+        kind = found if found is not None and 0 < found <= _LAST_TYPE else 0
+        name = data_type_name(kind) if kind else "unknown"
+        self.declared[index, subindex] = f"line {value.line}: [{section.name}] DataType={value.text} ({name})"
+        return kind or _BYTES
 
 
 def _value(text: str, data_type: int) -> str:

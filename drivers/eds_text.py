@@ -34,7 +34,7 @@ class EdsError(ConfigurationError):
     """An EDS file cannot be read, or does not describe the device that is needed."""
 
 
-class Value(NamedTuple):
+class EdsValue(NamedTuple):
     """Text behind a key, without comment, and its line from 1."""
 
     text: str
@@ -47,8 +47,8 @@ class Section:
 
     name: str
     line: int
-    values: dict[str, Value] = field(default_factory=dict)
-    repeated: list[tuple[str, Value]] = field(default_factory=list)  # key and the value that does not count
+    values: dict[str, EdsValue] = field(default_factory=dict)
+    repeated: list[tuple[str, EdsValue]] = field(default_factory=list)  # key and the value that does not count
 
     def text(self, key: str, otherwise: str = "") -> str:
         """Text of a key."""
@@ -97,7 +97,7 @@ def sections(text: str) -> dict[str, Section]:
         key, sign, value = re.match(r"([^=:]*)([=:]?)(.*)", content, re.DOTALL).groups()  # type: ignore[union-attr]
         if section is None or not sign:
             continue
-        _add(section, _flat(key), Value(re.split(r"(?:^|\s);", value)[0].strip(), line))
+        _add(section, _flat(key), EdsValue(re.split(r"(?:^|\s);", value)[0].strip(), line))
     return found
 
 
@@ -145,7 +145,7 @@ def _lines(text: str) -> Iterator[tuple[int, str]]:
             yield line, stripped
 
 
-def _add(section: Section, key: str, value: Value) -> None:
+def _add(section: Section, key: str, value: EdsValue) -> None:
     before = section.values.get(key)
     if before is not None and not value.text:
         return

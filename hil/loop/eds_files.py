@@ -25,12 +25,12 @@ MODES: Final = {
 
 def drive_eds(section: DriveSection) -> Path:
     """Return the EDS file of the drive."""
-    return Path(section.eds) if section.eds else EDS_FOLDER / "servo_drive.eds"
+    return EDS_FOLDER / "servo_drive.eds" if section.eds is None else Path(section.eds)
 
 
 def encoder_eds(section: DriveSection) -> Path:
     """Return the EDS file of the linear encoder."""
-    return Path(section.encoder.eds) if section.encoder.eds else EDS_FOLDER / "linear_encoder.eds"
+    return EDS_FOLDER / "linear_encoder.eds" if section.encoder.eds is None else Path(section.encoder.eds)
 
 
 def check_eds_files(bench: Bench) -> list[str]:

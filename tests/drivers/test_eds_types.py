@@ -67,7 +67,7 @@ def test_another_sign_is_said_with_its_line(tmp_path: Path) -> None:
         ("6064", "DataType=0x0003", r"line \d+: \[6064\] DataType=0x0003 \(INTEGER16\), allowed INTEGER32"),
         ("6077", "DataType=4", r"line \d+: \[6077\] DataType=4 \(INTEGER32\), allowed INTEGER16"),
         ("6071", "DataType=", r"line \d+: \[6071\] has no DataType, allowed INTEGER16"),
-        ("6041", "DataType=word", r"line \d+: \[6041\] DataType=word \(DOMAIN\), allowed UNSIGNED16"),
+        ("6041", "DataType=word", r"line \d+: \[6041\] DataType=word \(unknown\), allowed UNSIGNED16"),
         ("6041", "DataType=0x0005", r"line \d+: \[6041\] DataType=0x0005 \(UNSIGNED8\), allowed UNSIGNED16"),
         ("6076", "DataType=0x0008", r"0x6076:00 .*given: line \d+: \[6076\] DataType=0x0008 \(REAL32\)"),
     ],

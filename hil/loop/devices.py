@@ -46,6 +46,7 @@ class Devices:
     master: Master
     drive: Drive
     encoder: Encoder | None
+    notes: tuple[str, ...] = ()  # what the description of the devices leaves in doubt
 
     def set_up(self) -> None:
         """Configure the devices, power stage off; blocking. Raises HilError if a device refuses."""
@@ -95,7 +96,7 @@ class Rig(Devices):
     ) -> None:
         self.bench, self.section = bench, bench.drive or DriveSection()
         check_runnable(bench)
-        check_eds_files(bench)
+        self.notes = check_eds_files(bench)
         self.nodes: SimulatedNodes | None = None
         self.encoder = None
         self.ports: list[CanPort] = []

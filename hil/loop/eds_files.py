@@ -33,13 +33,13 @@ def encoder_eds(section: DriveSection) -> Path:
     return EDS_FOLDER / "linear_encoder.eds" if section.encoder.eds is None else Path(section.encoder.eds)
 
 
-def check_eds_files(bench: Bench) -> list[str]:
+def check_eds_files(bench: Bench) -> tuple[str, ...]:
     """Read the EDS files of a bench and return what they leave in doubt, one sentence each.
 
     Raises FieldError at the field of a file that cannot be read, or lacks process data of the mode, or has them with
     another type.
     """
-    notes = []
+    notes: list[str] = []
     for use in _uses(bench):
         try:
             eds = read_eds(use.path, use.node_id)
@@ -48,7 +48,7 @@ def check_eds_files(bench: Bench) -> list[str]:
         except EdsError as error:
             raise FieldError(use.field, f"given {error}") from None
         notes += [f"{use.path}, {note}" for note in eds.notes]
-    return notes
+    return tuple(notes)
 
 
 class _Use(NamedTuple):

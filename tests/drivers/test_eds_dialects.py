@@ -115,7 +115,7 @@ DefaultValue=$NODEID+0x40000180
 PDOMapping=0
 
 [6064]
-ParameterName=Position actual value
+ParameterName=Größe in µm: Lage = 2°
 ObjectType=0x7
 DataType=0x0004
 AccessType=ro
@@ -230,7 +230,7 @@ ENCODINGS = {
     "UTF-16": lambda text: text.encode("utf-16"),
     "UTF-16 BE": lambda text: b"\xfe\xff" + text.encode("utf-16-be"),
     "UTF-16 without mark": lambda text: text.encode("utf-16-le"),
-    "cp1252": lambda text: ("; Größe in µm, \x81\n" + text).encode("latin-1"),
+    "cp1252": lambda text: b"; \x81\n" + text.encode("cp1252"),
     "NULs at the end": lambda text: text.encode() + b"\x1a" + bytes(300),
 }
 ENDS = ["\n", "\r\n", "\r", "\r\r\n"]
@@ -333,9 +333,13 @@ NrOfEntries=1
     assert 4 not in gain
 
 
+ARRAY = "[2005]\nObjectType=8\nDataType=3\n[2005sub1]\nParameterName=First\n"
+
+
 def test_types_that_the_file_defines_or_leaves_out(tmp_path: Path) -> None:
     more = "[A0]\nParameterName=Limited\n[A0sub1]\nDefaultValue=0x06\n[2001]\nDataType=0xA0\n[2002]\nObjectType=2\n"
-    eds = read(tmp_path, CLEAN + more + "[2003]\nDataType=0xB0\n[2004sub0]\nAccessType=R\n")
+    eds = read(tmp_path, CLEAN + more + "[2003]\nDataType=0xB0\n[2004sub0]\nAccessType=R\n" + ARRAY)
+    assert eds.dictionary.get_variable(0x2005, 1).data_type == 3
     types = {index: eds.dictionary.get_variable(index, 0).data_type for index in range(0x2001, 0x2005)}
     assert types == {0x2001: 6, 0x2002: 15, 0x2003: 15, 0x2004: 5}
 

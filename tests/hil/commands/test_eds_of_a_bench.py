@@ -44,7 +44,11 @@ def test_what_a_file_leaves_in_doubt_is_noted(tmp_path: Path) -> None:
     ran = hil(tmp_path, "validate", str(bench(tmp_path, eds)))
     assert ran.returncode == 0, ran.stderr
     assert ran.stderr.startswith(f"note: {eds}, line ")
-    assert "[6064] DataType=0x0007 (UNSIGNED32) is read as INTEGER32, which CiA fixes for this object" in ran.stderr
+    said = "[6064] DataType=0x0007 (UNSIGNED32) is read as INTEGER32, which CiA fixes for this object"
+    assert said in ran.stderr
+    ran = hil(tmp_path, "run", str(PROFILE), "--bench", str(bench(tmp_path, eds)), "--virtual")
+    assert ran.returncode == 0, ran.stderr
+    assert said in ran.stderr
 
 
 @pytest.mark.parametrize(

@@ -338,7 +338,7 @@ ARRAY = "[2005]\nObjectType=8\nDataType=3\n[2005sub1]\nParameterName=First\n"
 
 def test_types_that_the_file_defines_or_leaves_out(tmp_path: Path) -> None:
     more = "[A0]\nParameterName=Limited\n[A0sub1]\nDefaultValue=0x06\n[2001]\nDataType=0xA0\n[2002]\nObjectType=2\n"
-    eds = read(tmp_path, CLEAN + more + "[2003]\nDataType=0xB0\n[2004sub0]\nAccessType=R\n" + ARRAY)
+    eds = read(tmp_path, CLEAN + more + "[2003]\nDataType=0xB0\nDefaultValue=4\n[2004sub0]\nAccessType=R\n" + ARRAY)
     assert eds.dictionary.get_variable(0x2005, 1).data_type == 3
     types = {index: eds.dictionary.get_variable(index, 0).data_type for index in range(0x2001, 0x2005)}
     assert types == {0x2001: 6, 0x2002: 15, 0x2003: 15, 0x2004: 5}

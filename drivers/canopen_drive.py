@@ -20,7 +20,6 @@ from drivers.cia402 import (
     next_controlword,
 )
 from drivers.cia402_setup import (
-    CONTROLWORD,
     FEEDBACK,
     NO_INFO,
     TARGET,
@@ -28,6 +27,7 @@ from drivers.cia402_setup import (
     DriveSettings,
     HomingSettings,
     clear_fault,
+    commands,
     set_up_drive,
     switch_off,
 )
@@ -79,7 +79,7 @@ class CanopenDrive(CanopenNode, Drive):
     # -- before the loop --------------------------------------------------------------------------------------------
 
     def _take_mode(self, mode: OperationMode) -> None:
-        self._pack = layout([CONTROLWORD, TARGET[mode]]).pack
+        self._pack = layout(commands(mode)).pack
         self._target_bits = TARGET[mode].bits
         self._holds_position = TARGET[mode].index == TARGET[OperationMode.CYCLIC_SYNC_POSITION].index
 

@@ -3,7 +3,6 @@
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from struct import Struct
 from typing import Final
 
 from drivers.canopen_master import NMT_PRE_OPERATIONAL, CanopenMaster
@@ -11,11 +10,12 @@ from drivers.canopen_node import CanopenNode, condition_names
 from drivers.counting import Unwrapper
 from drivers.emcy import Emergency
 from drivers.object_index import ObjectIndex as Index
-from drivers.pdo import EVERY_SYNC
+from drivers.pdo import EVERY_SYNC, Entry, layout
 from drivers.port import Condition, ConfigurationError, Encoder, EncoderError, EncoderSample
 from drivers.sdo_setup import EDS_FOLDER, DeviceSetup
 
-_POSITION: Final = Struct("<i")
+PROCESS_DATA: Final = (Entry(Index.ENCODER_POSITION, 0, 32, True),)
+_POSITION: Final = layout(PROCESS_DATA)
 _PLAIN_DIRECTION, _REVERSED = 0x0000, 0x0008  # 0x6000 bit 3: measuring direction
 _OK = Condition.OK
 _new = tuple.__new__  # makes a named tuple without its Python-level constructor
@@ -65,9 +65,7 @@ class CanopenEncoder(CanopenNode, Encoder):
             device.disable_pdos()
             device.write(Index.ENCODER_OPERATING_PARAMETERS, 0, _REVERSED if settings.reversed else _PLAIN_DIRECTION)
             device.write(Index.PRODUCER_HEARTBEAT_TIME, 0, round(1000 * settings.heartbeat_s))
-            device.map_pdo(
-                Index.TPDO_COMMUNICATION, (device.entry(Index.ENCODER_POSITION),), EVERY_SYNC, 0x180 + settings.node_id
-            )
+            device.map_pdo(Index.TPDO_COMMUNICATION, PROCESS_DATA, EVERY_SYNC, 0x180 + settings.node_id)
             self._unwrapper = Unwrapper(
                 device.read(Index.ENCODER_MEASURING_RANGE) or 1 << 32, device.read(Index.ENCODER_POSITION)
             )

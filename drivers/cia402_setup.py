@@ -31,6 +31,11 @@ FEEDBACK: Final = (
 )
 
 
+def commands(mode: OperationMode) -> tuple[Entry, Entry]:
+    """Return the process data that the drive gets; it answers with FEEDBACK."""
+    return CONTROLWORD, TARGET[mode]
+
+
 @dataclass(frozen=True, slots=True)
 class HomingSettings:
     """Objects 0x6098, 0x6099, 0x609A, 0x607C."""
@@ -114,8 +119,9 @@ def set_up_drive(master: CanopenMaster, settings: DriveSettings) -> DriveAnswer:
         info = _write_watchdogs(device, master, settings, info)
         if device.has(Index.MAX_TORQUE):
             info = replace(info, max_torque_n_m=device.read(Index.MAX_TORQUE) * info.torque_resolution_n_m)
-        commands = (CONTROLWORD, TARGET[settings.mode])
-        device.map_pdo(Index.RPDO_COMMUNICATION, commands, settings.command_transmission, 0x200 + node_id)
+        device.map_pdo(
+            Index.RPDO_COMMUNICATION, commands(settings.mode), settings.command_transmission, 0x200 + node_id
+        )
         device.map_pdo(Index.TPDO_COMMUNICATION, FEEDBACK, EVERY_SYNC, 0x180 + node_id)
         demand = DEMAND.get(settings.mode) if settings.watch_setpoint else None
         if demand is not None and device.has(demand.index) and device.has(Index.TPDO_COMMUNICATION + 1, 1):

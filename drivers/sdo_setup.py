@@ -13,10 +13,11 @@ from pathlib import Path
 from typing import Any, Final
 
 import canopen
-from canopen.objectdictionary import ObjectDictionaryError, ODVariable, datatypes
+from canopen.objectdictionary import ODVariable, datatypes
 from canopen.sdo import SdoAbortedError, SdoClient, SdoCommunicationError
 
 from drivers.bus import CanPort
+from drivers.eds_file import read_eds
 from drivers.object_index import ObjectIndex as Index
 from drivers.pdo import PDO_INVALID, PDO_NO_RTR, Entry, layout
 from drivers.port import ConfigurationError, IdentityError, ResponseTimeout
@@ -26,7 +27,6 @@ RESPONSE_TIMEOUT_S: Final = 0.5
 _PUMP_S: Final = 0.001
 _SDO_BYTES: Final = 8  # CiA 301: every SDO frame has eight bytes
 _MOST_ANSWERS: Final = 16  # of one transfer: the objects used here have 8 bytes or less, in two segments
-_MOST_EDS_BYTES: Final = 2_000_000  # ten times the EDS of a large drive
 
 
 class SetupNetwork(canopen.Network):  # type: ignore[misc]  # canopen is not typed
@@ -76,61 +76,50 @@ class _PumpedSdoClient(SdoClient):  # type: ignore[misc]
             raise SdoAbortedError(struct.unpack_from("<L", response, 4)[0])
         return response
 
-
-class _PumpedNode(canopen.RemoteNode):  # type: ignore[misc]
-    """canopen's RemoteNode with the pumped client."""
-
-    def add_sdo(self, rx_cobid: int, tx_cobid: int) -> SdoClient:
-        client = _PumpedSdoClient(rx_cobid, tx_cobid, self.object_dictionary)
-        self.sdo_channels.append(client)
-        if self.has_network():
-            self.network.subscribe(client.tx_cobid, client.on_response)
-        return client
-
-
-def _node(node_id: int, eds: Path) -> _PumpedNode:
-    """Node of an EDS. Raises ConfigurationError for a file that is no readable EDS."""
-    where, advice = f"{eds}", "Give the EDS file of the device, as its maker supplies it."
-    if not eds.is_file() or eds.stat().st_size > _MOST_EDS_BYTES:  # a pipe or a device may never end
-        raise ConfigurationError("is no EDS file", where=where, allowed=f"up to {_MOST_EDS_BYTES} bytes", advice=advice)
-    try:
-        return _PumpedNode(node_id, str(eds))
-    except Exception as error:  # canopen and configparser raise many kinds for a damaged file
-        text = (str(error) or type(error).__name__).splitlines()[0]
-        raise ConfigurationError(f"is no readable EDS file ({text})", where=where, advice=advice) from None
+    def upload(self, index: int, subindex: int) -> bytes:
+        """As canopen's, but an answer that says its length is never cut to the one in the EDS, which may be wrong."""
+        with self.open(index, subindex, buffering=0) as stream:
+            data = bytes(stream.read())
+        variable = self.od.get_variable(index, subindex)
+        return data if stream.size is not None or variable is None else data[: len(variable) // 8]
 
 
 class DeviceSetup:
     """Configures one node by SDO. Errors name node, object, value and what the device said.
 
-    Raises ResponseTimeout (no answer), ConfigurationError (refused, or reads back differently), IdentityError.
+    Types are those of the EDS, signs those of CiA 301, 402 and 406. Raises EdsError, ResponseTimeout (no answer),
+    ConfigurationError (refused, or reads back differently), IdentityError.
     """
 
     def __init__(self, network: SetupNetwork, node_id: int, eds: Path) -> None:
-        self._node = _node(node_id, eds)
-        self._network = network
+        self._description = read_eds(eds, node_id)
         self.node_id, self.eds = node_id, eds
-        self.dictionary = self._node.object_dictionary
+        self.dictionary = self._description.dictionary
+        self._network = network
+        self._sdo = _PumpedSdoClient(0x600 + node_id, 0x580 + node_id, self.dictionary)
+        self._sdo.network = network
 
     def __enter__(self) -> DeviceSetup:
-        self._node.associate_network(self._network)
+        self._network.subscribe(self._sdo.tx_cobid, self._sdo.on_response)
         return self
 
     def __exit__(self, *exception: object) -> None:
-        self._node.remove_network()
+        self._network.unsubscribe(self._sdo.tx_cobid, self._sdo.on_response)
 
     def read(self, index: int, subindex: int = 0) -> int:
-        """An integer object."""
-        variable = self._variable(index, subindex)
-        data = self._transfer(index, subindex, lambda: self._node.sdo.upload(index, subindex))
-        try:
-            return int(variable.decode_raw(data))
-        except (ObjectDictionaryError, ValueError, TypeError, struct.error) as error:
+        """An integer object. A longer answer than the EDS says is right if its value has room in the type."""
+        variable = self._integer(index, subindex)
+        data = self._transfer(index, subindex, lambda: self._sdo.upload(index, subindex))
+        size, signed = len(variable) // 8, _is_signed(variable)
+        value = int.from_bytes(data, "little", signed=signed)
+        lowest = -(1 << (8 * size - 1)) if signed else 0
+        if len(data) < size or not lowest <= value < lowest + (1 << 8 * size):
             raise ConfigurationError(
-                f"the answer is no number as the EDS describes it ({error})", where=self._where(index, subindex),
-                given=f"{bytes(data[:8]).hex(' ') or 'no byte'}", allowed=f"{len(variable) // 8} bytes",
+                "the answer is no number as the EDS describes it", where=self._where(index, subindex),
+                given=f"{data[:8].hex(' ') or 'no byte'}", allowed=f"{size} bytes",
                 advice="Give the EDS of the device that is connected.",
-            ) from error  # fmt: skip
+            )  # fmt: skip
+        return value
 
     def has(self, index: int, subindex: int = 0) -> bool:
         """Return True if the EDS has the object."""
@@ -151,13 +140,14 @@ class DeviceSetup:
     def write_only(self, index: int, subindex: int, value: int) -> None:
         """Write without reading back."""
         try:
-            data = self._variable(index, subindex).encode_raw(value)
-        except (ValueError, OverflowError, struct.error) as error:
+            variable = self._integer(index, subindex)
+            data = int(value).to_bytes(len(variable) // 8, "little", signed=_is_signed(variable))
+        except OverflowError as error:
             raise ConfigurationError(
                 f"the value does not fit the object ({error})", where=self._where(index, subindex), given=str(value),
                 advice="Correct the bench description.",
             ) from error  # fmt: skip
-        self._transfer(index, subindex, lambda: self._node.sdo.download(index, subindex, data), value)
+        self._transfer(index, subindex, lambda: self._sdo.download(index, subindex, data), value)
 
     def check_identity(self, profile: int, serial_number: int | None = None) -> None:
         """Device profile (0x1000), vendor, product, major revision (0x1018) as in the EDS; serial number if given."""
@@ -183,6 +173,7 @@ class DeviceSetup:
     def map_pdo(self, communication: int, entries: Sequence[Entry], transmission_type: int, cob_id: int) -> None:
         """Write a PDO as CiA 301 prescribes (invalid, number 0, entries, number, type, valid), reading each back."""
         layout(entries)
+        self._description.check(entries)
         mapping = communication + 0x200
         flags = 0 if communication < Index.TPDO_COMMUNICATION else PDO_NO_RTR
         self.write_only(communication, 1, cob_id | flags | PDO_INVALID)
@@ -213,10 +204,14 @@ class DeviceSetup:
             allowed="1..255 x 10^n s", advice="Choose a period of 1, 2, 4 or 5 ms, or 500 or 250 us.",
         )  # fmt: skip
 
-    def entry(self, index: int, subindex: int = 0) -> Entry:
-        """Mapping entry of an object, its length from the EDS."""
+    def _integer(self, index: int, subindex: int) -> ODVariable:
         variable = self._variable(index, subindex)
-        return Entry(index, subindex, len(variable), variable.data_type in datatypes.SIGNED_TYPES)
+        if variable.data_type not in datatypes.INTEGER_TYPES:
+            raise ConfigurationError(
+                "the EDS has another data type than an integer", where=self._where(index, subindex),
+                given=self._description.where(index, subindex), advice=f"Correct {self.eds.name}.",
+            )  # fmt: skip
+        return variable
 
     def _variable(self, index: int, subindex: int) -> ODVariable:
         variable = self.dictionary.get_variable(index, subindex)
@@ -233,7 +228,7 @@ class DeviceSetup:
         return f"node {self.node_id}, object 0x{index:04X}:{subindex:02X}{name}"
 
     def _transfer(self, index: int, subindex: int, action: Callable[[], Any], value: int | None = None) -> Any:
-        self._node.sdo.answers_left = _MOST_ANSWERS
+        self._sdo.answers_left = _MOST_ANSWERS
         try:
             return action()
         except SdoAbortedError as error:
@@ -249,3 +244,7 @@ class DeviceSetup:
                 given=f"{RESPONSE_TIMEOUT_S} s",
                 advice="Is the device powered, its node-ID and bit rate right, the bus terminated?",
             ) from error  # fmt: skip
+
+
+def _is_signed(variable: ODVariable) -> bool:
+    return variable.data_type in datatypes.SIGNED_TYPES

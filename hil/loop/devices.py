@@ -8,7 +8,6 @@ Another protocol is a subclass of `Devices` and one line in `PROTOCOLS`.
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cached_property
-from pathlib import Path
 from types import TracebackType
 from typing import Self
 
@@ -16,23 +15,17 @@ from drivers.bus import BusConfig, CanPort, PumpedPort, PythonCanPort, open_bus
 from drivers.canopen_drive import CanopenDrive, DriveSettings
 from drivers.canopen_encoder import CanopenEncoder, EncoderSettings
 from drivers.canopen_master import CanopenMaster
-from drivers.cia402 import OperationMode
 from drivers.inprocess import InProcessBus
 from drivers.modelled_bus import frame_bits
 from drivers.port import Drive, DriverError, Encoder, Master, PlantLike
-from drivers.sdo_setup import EDS_FOLDER
 from drivers.serial_encoder import SerialEncoder, SerialFormat, SerialSettings
 from hil.bench.bench_file import Bench
 from hil.bench.hardware import DriveMode, DriveSection
 from hil.errors import FieldError, HilError
+from hil.loop.eds_files import MODES, check_eds_files, drive_eds, encoder_eds
 from hil.loop.simulated_bench import SimulatedNodes
 from hil.loop.stall import command_deadline_s, late_limit_s
 
-MODES = {
-    DriveMode.CST: OperationMode.CYCLIC_SYNC_TORQUE,
-    DriveMode.CSV: OperationMode.CYCLIC_SYNC_VELOCITY,
-    DriveMode.CSP: OperationMode.CYCLIC_SYNC_POSITION,
-}
 _TARGET_BYTES = {DriveMode.CST: 2, DriveMode.CSV: 4, DriveMode.CSP: 4}
 
 
@@ -53,6 +46,7 @@ class Devices:
     master: Master
     drive: Drive
     encoder: Encoder | None
+    notes: tuple[str, ...] = ()  # what the description of the devices leaves in doubt
 
     def set_up(self) -> None:
         """Configure the devices, power stage off; blocking. Raises HilError if a device refuses."""
@@ -102,6 +96,7 @@ class Rig(Devices):
     ) -> None:
         self.bench, self.section = bench, bench.drive or DriveSection()
         check_runnable(bench)
+        self.notes = check_eds_files(bench)
         self.nodes: SimulatedNodes | None = None
         self.encoder = None
         self.ports: list[CanPort] = []
@@ -154,8 +149,7 @@ class Rig(Devices):
         section = self.section
         return DriveSettings(
             node_id=section.node_id, mode=MODES[section.mode], period_s=self.bench.gains.period_s,
-            eds=Path(section.eds) if section.eds else EDS_FOLDER / "servo_drive.eds",
-            serial_number=section.serial_number, heartbeat_s=section.heartbeat_s,
+            eds=drive_eds(section), serial_number=section.serial_number, heartbeat_s=section.heartbeat_s,
             missed_answers_allowed=section.missed_answers, rated_torque_n_m=section.rated_torque_n_m,
             command_deadline_s=command_deadline_s(self.bench), watch_setpoint=section.watch_setpoint)  # fmt: skip
 
@@ -165,8 +159,7 @@ class Rig(Devices):
         if connection.interface == "canopen":
             return CanopenEncoder(self.master, EncoderSettings(
                 node_id=connection.node_id, serial_number=connection.serial_number, step_m=table.resolution_m,
-                eds=Path(connection.eds) if connection.eds else EDS_FOLDER / "linear_encoder.eds",
-                reversed=table.direction < 0, heartbeat_s=self.section.heartbeat_s,
+                eds=encoder_eds(self.section), reversed=table.direction < 0, heartbeat_s=self.section.heartbeat_s,
                 missed_answers_allowed=self.section.missed_answers))  # fmt: skip
         serial_line = self.nodes.serial if self.nodes is not None else None
         device = serial_line.device if serial_line is not None else str(connection.device)

@@ -12,6 +12,7 @@ from drive_rig import Rig, in_process
 from drivers.bus import BusConfig, PythonCanPort, open_bus
 from drivers.canopen_drive import DriveSettings
 from drivers.cia402 import DriveState, OperationMode
+from drivers.cia402_setup import FEEDBACK
 from drivers.port import ConfigurationError, IdentityError, ResponseTimeout
 from drivers.sdo_setup import EDS_FOLDER, DeviceSetup, SetupNetwork
 from drivers.sim.sdo_server import SdoServer
@@ -70,8 +71,7 @@ def test_set_up_against_canopens_server(local_node: tuple[SetupNetwork, canopen.
         device.check_identity(402)
         device.set_interpolation_time(0.00025)
         assert (node.sdo[0x60C2][1].raw, node.sdo[0x60C2][2].raw) in ((25, -5), (250, -6))
-        entries = (device.entry(0x6041), device.entry(0x6064), device.entry(0x6077))
-        device.map_pdo(0x1800, entries, 1, 0x185)
+        device.map_pdo(0x1800, FEEDBACK, 1, 0x185)
         assert [node.sdo[0x1A00][k].raw for k in range(4)] == [3, 0x60410010, 0x60640020, 0x60770010]
         assert node.sdo[0x1800][1].raw == 0x40000185
         with pytest.raises(ConfigurationError, match=r"0x6041:00 \(Statusword\): the device refuses.*0x06010002"):

@@ -7,7 +7,7 @@ would continue to serve the drive's watchdog if this process hangs.
 from typing import Final
 
 from drivers.bus import BusHealth, CanPort
-from drivers.sdo_setup import SetupNetwork
+from drivers.sdo_client import SetupNetwork
 
 SYNC: Final = 0x080
 NMT_START: Final = 1

@@ -21,6 +21,7 @@ _SPACING_S: Final = 0.01  # between an answer and the next request
 _ASK_AFTER_S: Final = 0.1  # a drive that is armed sooner is asked nothing
 _SLOWER: Final = 1.5  # than its transitions to enabled a drive may be when it is disarmed
 _SLOWEST_S: Final = 0.5
+_BEFORE_READY: Final = (DriveState.SWITCH_ON_DISABLED, DriveState.QUICK_STOP_ACTIVE)
 _SWITCHED_OFF: Final = (DriveState.SWITCH_ON_DISABLED, DriveState.READY_TO_SWITCH_ON, DriveState.SWITCHED_ON)
 
 
@@ -125,11 +126,6 @@ def hindrances(statusword: int, sent: int, mode: OperationMode | None, read: Map
         found.append("remote (statusword bit 9) is 0: the drive does not obey the bus; give the bus the control")
     if state in _SWITCHED_OFF and not statusword & Statusword.VOLTAGE_ENABLED:
         found.append("no main voltage (statusword bit 4 is 0)")
-    if (
-        state in (DriveState.SWITCH_ON_DISABLED, DriveState.QUICK_STOP_ACTIVE)
-        and not statusword & Statusword.QUICK_STOP
-    ):
-        found.append("quick stop (statusword bit 5 is 0), by an input of the drive or its commissioning tool")
     if statusword & Statusword.WARNING:
         found.append("a warning is active (statusword bit 7)")
     if statusword & Statusword.INTERNAL_LIMIT:
@@ -140,6 +136,8 @@ def hindrances(statusword: int, sent: int, mode: OperationMode | None, read: Map
         found.append(f"the drive holds controlword 0x{held:04X}, sent is 0x{sent:04X}: its RPDO does not act")
     if state is DriveState.OPERATION_ENABLED and mode is not None:
         found.append(f"the mode display (object 0x6061) reads {mode_name(shown)}, commanded is {mode_name(mode)}")
+    if not found and state in _BEFORE_READY and not statusword & Statusword.QUICK_STOP:  # 0 without another cause, too
+        found.append("quick stop (statusword bit 5 is 0), by an input of the drive or its commissioning tool")
     return found
 
 

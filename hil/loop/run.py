@@ -138,6 +138,7 @@ def run_profile(
             ended = f"{type(error).__name__}: {error}"
             raise
         finally:
+            rig.release()
             disturbances = None if virtual else Disturbances.now().since(before)
             notifier.stopping(ended)
             run = certificate.of_run(session.late.values, session.skipped, gains.period_s, disturbances)

@@ -109,10 +109,10 @@ def set_up_drive(master: CanopenMaster, settings: DriveSettings) -> DriveAnswer:
     node_id = settings.node_id
     with DeviceSetup(master.network, node_id, settings.eds) as device:
         device.wait_answer()
+        device.check_identity(402, settings.serial_number)
         if device.has(Index.CONSUMER_HEARTBEAT_TIME, 1):  # the set-up sends none
             with contextlib.suppress(SettingRefused):
                 device.write_only(Index.CONSUMER_HEARTBEAT_TIME, 1, 0)
-        device.check_identity(402, settings.serial_number)
         modes = device.peek(Index.SUPPORTED_MODES)
         if modes is not None and not modes >> (settings.mode - 1) & 1:
             raise ConfigurationError(

@@ -21,6 +21,7 @@ from drivers.sdo_client import MOST_ANSWERS, RESPONSE_TIMEOUT_S, PumpedNode, Set
 
 EDS_FOLDER: Final = Path(__file__).parent / "eds"
 BOOT_LIMIT_S: Final = 5.0  # drives take some seconds from power-on to their first answer
+_NMT_PRE_OPERATIONAL: Final = 128
 _ASK_AGAIN_S: Final = 0.01
 _MOST_EDS_BYTES: Final = 2_000_000  # ten times the EDS of a large drive
 
@@ -83,7 +84,7 @@ class DeviceSetup:
         """Enter NMT pre-operational and wait until the device answers: it may still boot."""
         started_s = self._network.time_s
         while True:
-            self._node.nmt.state = "PRE-OPERATIONAL"
+            self._network.send_message(0x000, bytes([_NMT_PRE_OPERATIONAL, self.node_id]))
             try:
                 self.read(Index.DEVICE_TYPE)
                 return

@@ -201,12 +201,6 @@ class Slave:
             self._operational_s = self.network.now_s + self.manners.operational_s
         self._rpdo_s = math.inf
 
-    def trip(self, code: int) -> None:
-        """Go to FAULT with an EMCY."""
-        self.od.write(0x603F, 0, code)
-        self.node.emcy.set(code, 0x11)
-        self._enter(FAULT)
-
     def _takes(self, can_id: int, data: bytes) -> bool:
         """See each frame before durand does; False keeps it from it."""
         if can_id == 0x701:
@@ -260,9 +254,11 @@ class Slave:
         self._step(now_s)
 
     def _lost(self, code: int) -> None:
-        """Abort connection option code 0x6007: 1 is a fault. Here of an enabled drive."""
+        """A lost connection: EMCY (CiA 301), and a fault if 0x6007 is 1, of most drives only while they are enabled."""
+        self.node.emcy.set(code, 0x11)
         if (self._powered or self.manners.trips_when_off) and (0x6007 not in self.od or self.od.read(0x6007, 0) == 1):
-            self.trip(code)
+            self.od.write(0x603F, 0, code)
+            self._enter(FAULT)
 
     def _step(self, now_s: float) -> None:
         """Carry out the transition that is due; begin the one that the controlword asks for."""

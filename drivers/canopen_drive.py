@@ -6,19 +6,14 @@ Faults are bits of `DriveSample.condition`. A condition of TRIPPING sets the goa
 """
 
 import math
+from dataclasses import replace
 from typing import Final
 
 from drivers.acting_setpoint import MORE_CYCLES, ActingSetpoint
 from drivers.canopen_master import CanopenMaster
 from drivers.canopen_node import CanopenNode, condition_names
-from drivers.cia402 import (
-    ENABLE_OPERATION,
-    POWERED,
-    STATE_BY_STATUS,
-    DriveState,
-    OperationMode,
-    next_controlword,
-)
+from drivers.cia402 import ENABLE_OPERATION, POWERED, STATE_BY_STATUS, DriveState, OperationMode, next_controlword
+from drivers.cia402_arming import Arming
 from drivers.cia402_setup import (
     FEEDBACK,
     NO_INFO,
@@ -31,7 +26,7 @@ from drivers.cia402_setup import (
     set_up_drive,
     switch_off,
 )
-from drivers.emcy import Emergency
+from drivers.emcy import Emergency, error_text
 from drivers.pdo import layout, saturate
 from drivers.port import Condition, Drive, DriveFault, DriveGoal, DriveSample
 
@@ -57,6 +52,7 @@ class CanopenDrive(CanopenNode, Drive):
 
     def __init__(self, master: CanopenMaster, settings: DriveSettings) -> None:
         super().__init__(master, settings, "drive")
+        self._wanted = settings  # those in force: self.settings
         self.goal = DriveGoal.DISABLED
         self.info = NO_INFO
         self.tripped = Condition.OK  # what tripped the drive, until reset_fault
@@ -64,6 +60,8 @@ class CanopenDrive(CanopenNode, Drive):
         self._send, self._rpdo_id = master.port.send, 0x200 + settings.node_id
         self._unpack = layout(FEEDBACK).unpack
         self._acting: ActingSetpoint | None = None
+        self._arming = Arming(master.port, settings.node_id)
+        self._error_code = 0  # object 0x603F at the set-up
         master.port.listen(0x280 + settings.node_id, self._on_demand)
         self._take_mode(settings.mode)
         self._rad_per_count = self._n_m_per_mille = self._target_per_unit = 0.0
@@ -89,10 +87,13 @@ class CanopenDrive(CanopenNode, Drive):
         With other settings: the same node in another mode, as from homing to CST; `master.start` again afterwards.
         Raises ResponseTimeout, IdentityError or ConfigurationError; nothing moves in either case.
         """
-        self.settings = settings or self.settings
-        self._take_mode(self.settings.mode)
-        answer = set_up_drive(self._master, self.settings)
+        self._wanted = wanted = settings or self._wanted
+        self._take_mode(wanted.mode)
+        answer = set_up_drive(self._master, wanted)
         self.info = info = answer.info
+        self.settings = replace(wanted, heartbeat_s=info.heartbeat_s)
+        self.notes, self._error_code = info.notes, answer.error_code
+        self._arming.begin(wanted.mode, mode_shown=answer.mode_shown)
         self._rad_per_count = info.rad_per_count
         self._n_m_per_mille = info.torque_resolution_n_m
         in_torque = self.settings.mode is OperationMode.CYCLIC_SYNC_TORQUE
@@ -149,7 +150,7 @@ class CanopenDrive(CanopenNode, Drive):
         age = self._master.syncs - self._answered
         statusword = self._statusword
         state = STATE_BY_STATUS[statusword & 0x7F]
-        enabled = state is _ENABLED_STATE
+        enabled = state is _ENABLED_STATE and self._arming.mode_shown
         if age or not enabled or self._latched or self._health.state or now_s > self._heartbeat_deadline_s:
             condition = self._diagnose(age, state, now_s)
         else:
@@ -161,6 +162,8 @@ class CanopenDrive(CanopenNode, Drive):
 
     def _diagnose(self, age: int, state: DriveState, now_s: float) -> Condition:
         condition = self._node_condition(age, now_s)
+        if self._answered == self._set_up_at:  # it may take some time to become operational, and is not enabled
+            condition &= ~Condition.STALE
         if state in (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE):
             condition |= Condition.FAULT
         if self.goal is DriveGoal.ENABLED:
@@ -178,11 +181,11 @@ class CanopenDrive(CanopenNode, Drive):
     def command(self, now_s: float, setpoint: float) -> None:
         """Send controlword and set-point: N m (CST), rad/s (CSV), rad (CSP).
 
-        Until the drive reports OPERATION ENABLED the target is the present position (CSP) or zero. After a stop command
-        without effect the master is cut off and nothing is sent.
+        Until the drive reports OPERATION ENABLED and its mode the target is the present position (CSP) or zero. After a
+        stop command without effect the master is cut off and nothing is sent.
         """
         state = STATE_BY_STATUS[self._statusword & 0x7F]
-        if state is _ENABLED_STATE and self.goal is _ENABLED:
+        if state is _ENABLED_STATE and self.goal is _ENABLED and self._arming.mode_shown:
             controlword = ENABLE_OPERATION | self.controlword_bits
             target = round(setpoint * self._target_per_unit)
             if not -32768 <= target <= 32767:  # fits every target object otherwise
@@ -190,6 +193,10 @@ class CanopenDrive(CanopenNode, Drive):
             self._stop_cycles = 0
         else:
             self._await_stop(state, now_s)
+            if self.goal is DriveGoal.ENABLED:
+                self._arming.step(state, now_s)
+            else:
+                self._arming.stop()
             if self._master.silent:
                 return
             self._was_enabled = False
@@ -218,7 +225,10 @@ class CanopenDrive(CanopenNode, Drive):
             ramp_s = _RAMP_MARGIN * speed / self.info.quick_stop_rad_s2 if self.info.quick_stop_rad_s2 else math.inf
             self._ramp_cycles = (ramp_s + _RAMP_EXTRA_S) / period_s
         # the effect of a command is reported at the second SYNC after it, and some answers may be missed
-        answer_cycles = max(self.settings.missed_answers_allowed + 3, _TRANSITION_S / period_s)
+        answer_s = _TRANSITION_S
+        if self.goal is DriveGoal.DISABLED:  # at rest
+            answer_s = max(answer_s, self._arming.disarm_s)
+        answer_cycles = max(self.settings.missed_answers_allowed + 3, answer_s / period_s)
         limit = answer_cycles if state is _ENABLED_STATE else self._ramp_cycles
         if self._stop_cycles >= limit and not self._master.silent:
             self._master.cut_off(now_s)
@@ -241,7 +251,7 @@ class CanopenDrive(CanopenNode, Drive):
     def reset_fault(self) -> None:
         """Clear the latched fault; send one rising edge of its reset bit to a drive in FAULT. Goal: DISABLED."""
         self.goal = DriveGoal.DISABLED
-        self._latched, self.tripped = 0, Condition.OK
+        self._latched, self.tripped, self._error_code = 0, Condition.OK, 0
         if self._acting is not None:
             self._acting.text = ""
         # without a fault nothing is requested, which could reset a later one
@@ -251,13 +261,23 @@ class CanopenDrive(CanopenNode, Drive):
 
     @property
     def error_code(self) -> int:
-        """CiA 301 code of the last EMCY, 0 without one."""
-        return self.emergencies[-1].code if self.emergencies else 0
+        """CiA 301 code of the last EMCY, else of the fault that the set-up found; 0 without one."""
+        return self.emergencies[-1].code if self.emergencies else self._error_code
 
     @property
     def status(self) -> str:
-        """CiA 402 state and statusword."""
-        return f"{STATE_BY_STATUS[self._statusword & 0x7F].name}, statusword 0x{self._statusword:04X}"
+        """CiA 402 state and statusword; with what hinders a drive that is to be enabled."""
+        text = f"{STATE_BY_STATUS[self._statusword & 0x7F].name}, statusword 0x{self._statusword:04X}"
+        if self.goal is not DriveGoal.ENABLED:
+            return text
+        answers = self._answered != self._set_up_at
+        return text + self._arming.hindrances(self._statusword, self._controlword, answers=answers)
+
+    def _cause(self) -> str:
+        """Text of the last EMCY, else of the error code that the set-up found, else of the bus."""
+        if self._error_code and not any(emergency.active for emergency in self.emergencies):
+            return f"error code (object 0x603F) {error_text(self._error_code)}"
+        return super()._cause()
 
     def check(self) -> None:
         """Raise DriveFault if something tripped the drive since the last `reset_fault`."""

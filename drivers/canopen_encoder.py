@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from drivers.canopen_master import NMT_PRE_OPERATIONAL, CanopenMaster
+from drivers.canopen_master import CanopenMaster
 from drivers.canopen_node import CanopenNode, condition_names
 from drivers.counting import Unwrapper
 from drivers.emcy import Emergency
@@ -52,7 +52,7 @@ class CanopenEncoder(CanopenNode, Encoder):
         """
         settings, master = self.settings, self._master
         with DeviceSetup(master.network, settings.node_id, settings.eds) as device:
-            master.nmt(NMT_PRE_OPERATIONAL, settings.node_id)
+            device.wait_answer()
             device.check_identity(406, settings.serial_number)
             step_m = device.read(Index.ENCODER_STEP_SETTINGS, 1) / 1e9
             if step_m <= 0 or (settings.step_m is not None and not math.isclose(step_m, settings.step_m)):

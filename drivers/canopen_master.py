@@ -7,7 +7,7 @@ would continue to serve the drive's watchdog if this process hangs.
 from typing import Final
 
 from drivers.bus import BusHealth, CanPort
-from drivers.sdo_setup import SetupNetwork
+from drivers.sdo_client import SetupNetwork
 
 SYNC: Final = 0x080
 NMT_START: Final = 1
@@ -15,6 +15,7 @@ NMT_STOP: Final = 2
 NMT_PRE_OPERATIONAL: Final = 128
 NMT_RESET_NODE: Final = 129
 _OPERATIONAL: Final = b"\x05"
+_NO_HEARTBEAT_AWAITED: Final = bytes.fromhex("2316100100000000")  # SDO download of 0 to 0x1016:01, CiA 301
 
 
 class CanopenMaster:
@@ -63,6 +64,11 @@ class CanopenMaster:
         self.syncs += 1
         self.sync_time_s = now_s
         self._send(SYNC, b"", now_s)
+
+    def release(self, node_id: int) -> None:
+        """Leave a drive whose power is off: without PDOs and without awaiting the heartbeat, which would trip it."""
+        self.nmt(NMT_PRE_OPERATIONAL, node_id, self.sync_time_s)
+        self._send(0x600 + node_id, _NO_HEARTBEAT_AWAITED, self.sync_time_s)
 
     def cut_off(self, now_s: float) -> None:
         """Withhold SYNC, heartbeat and set-points until `start`, and stop all nodes by NMT.

@@ -165,6 +165,7 @@ class Drive(Protocol):
 
     goal: DriveGoal
     tripped: Condition  # conditions that tripped the drive since its last reset
+    notes: tuple[str, ...] = ()  # what the set-up found that the user should know
 
     @abstractmethod
     def set_up(self) -> None:
@@ -202,7 +203,7 @@ class Drive(Protocol):
     @property
     @abstractmethod
     def status(self) -> str:
-        """State of the device in words, for messages."""
+        """State of the device in words, for messages; with what keeps it from being enabled, if it is to be."""
 
 
 class Encoder(Protocol):

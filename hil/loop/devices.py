@@ -64,6 +64,9 @@ class Devices:
         """Share of the bus's time used in each period; 0 where the protocol has no limit."""
         return 0.0
 
+    def release(self) -> None:
+        """Leave devices whose power is off, so that they do not trip when the loop has ended. Does not wait."""
+
     def close(self) -> None:
         """Close the connections."""
         if self.encoder is not None:
@@ -120,6 +123,10 @@ class Rig(Devices):
         if isinstance(self.encoder, CanopenEncoder):
             frames.append(4)
         return sum(map(frame_bits, frames)) / (self.section.bitrate * self.bench.gains.period_s)
+
+    def release(self) -> None:
+        if not self.master.silent and not self.drive.read(self.master.sync_time_s).powered:
+            self.master.release(self.section.node_id)
 
     def close(self) -> None:
         super().close()

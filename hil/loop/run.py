@@ -123,7 +123,7 @@ def run_profile(
             certificate.KEY: (certified := certificate.before_run(gains.period_s, rig.bus_load(), section, conditions)),
             "overridden": [doubt for doubt in doubts if doubt],
             "segments": [run._asdict() for run in trajectory.runs],
-            "notes": [*trajectory.notes, *rig.notes],
+            "notes": [*trajectory.notes, *rig.notes, *rig.drive.notes],
         }
         recorder = Recorder(folder, name, cycle.channels, gains.period_s, metadata, lossless=virtual)
         ended = "failed"
@@ -138,11 +138,12 @@ def run_profile(
             ended = f"{type(error).__name__}: {error}"
             raise
         finally:
+            rig.release()
             disturbances = None if virtual else Disturbances.now().since(before)
             notifier.stopping(ended)
             run = certificate.of_run(session.late.values, session.skipped, gains.period_s, disturbances)
             recording = recorder.close(ended, {certificate.KEY: certified | run})
-    notes = (*trajectory.notes, *rig.notes)
+        notes = (*trajectory.notes, *rig.notes, *rig.drive.notes)
     if recorder.path.stem != name:
         notes += (
             f"{name}.parquet or {name}.arrows of an earlier run is in {folder} and stays; this run is "

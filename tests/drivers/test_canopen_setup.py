@@ -46,6 +46,20 @@ def test_a_period_that_cannot_be_expressed_is_refused() -> None:
         in_process(settings=DriveSettings(period_s=0.0011112)).set_up()
 
 
+def test_a_late_answer_to_an_earlier_request_is_no_answer_to_this_one() -> None:
+    rig = in_process()
+    answer = rig.node._on_sdo
+
+    def after_a_late_one(can_id: int, data: bytes, now_s: float) -> None:
+        rig.node_port.send(0x585, bytes.fromhex("43001000 92010200"), now_s)
+        answer(can_id, data, now_s)
+
+    rig.node_port.ignore(0x605, answer)
+    rig.node_port.listen(0x605, after_a_late_one)
+    rig.set_up()
+    assert rig.drive.info.rated_torque_n_m == 4.0
+
+
 # -- an independent SDO server ----------------------------------------------------------------------------------------
 
 

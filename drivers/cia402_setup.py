@@ -115,6 +115,7 @@ def set_up_drive(master: CanopenMaster, settings: DriveSettings) -> DriveAnswer:
     with DeviceSetup(master.network, node_id, settings.eds) as device:
         device.wait_answer()
         device.check_identity(402, settings.serial_number)
+        device.check_types((*commands(settings.mode), *FEEDBACK))
         if device.has(Index.CONSUMER_HEARTBEAT_TIME, 1):  # the set-up sends none
             with contextlib.suppress(SettingRefused):
                 device.write_only(Index.CONSUMER_HEARTBEAT_TIME, 1, 0)

@@ -72,6 +72,10 @@ class DeviceSetup:
         """Return True if the EDS has the object."""
         return self.dictionary.get_variable(index, subindex) is not None
 
+    def check_types(self, entries: Sequence[Entry]) -> None:
+        """Raise EdsError unless the EDS has process data as they are sent."""
+        self._description.check(entries)
+
     def wait_answer(self) -> None:
         """Enter NMT pre-operational and wait until the device answers: it may still boot."""
         started_s = self._network.time_s
@@ -169,7 +173,7 @@ class DeviceSetup:
         A mapping that is as wanted is left alone: some devices have fixed ones.
         """
         layout(entries)
-        self._description.check(entries)
+        self.check_types(entries)
         mapping = communication + 0x200
         flags = 0 if communication < Index.TPDO_COMMUNICATION else PDO_NO_RTR
         self._invalidate(communication, cob_id | flags)

@@ -14,13 +14,14 @@ NMT_START: Final = 1
 NMT_STOP: Final = 2
 NMT_PRE_OPERATIONAL: Final = 128
 NMT_RESET_NODE: Final = 129
+CONSUMED_HEARTBEATS: Final = 3  # a consumer misses a heartbeat after so many of its periods without one
 _OPERATIONAL: Final = b"\x05"
 
 
 class CanopenMaster:
     """CANopen master on a port; drives and encoders of the bus share it.
 
-    node_id: of the master, for its heartbeat. heartbeat_s: its period; consumers are set to three of them.
+    node_id: of the master, for its heartbeat. heartbeat_s: its period; consumers are set to CONSUMED_HEARTBEATS of them.
     """
 
     __slots__ = ("_heartbeat_due_s", "_heartbeat_id", "_send", "health", "heartbeat_s", "network", "node_id",
@@ -47,6 +48,10 @@ class CanopenMaster:
         self.silent = False
         self.nmt(NMT_START, now_s=now_s)
         self._heartbeat_due_s = now_s + self.heartbeat_s
+        self.beat(now_s)
+
+    def beat(self, now_s: float) -> None:
+        """Send a heartbeat."""
         self._send(self._heartbeat_id, _OPERATIONAL, now_s)
 
     def sync(self, now_s: float) -> None:
@@ -59,7 +64,7 @@ class CanopenMaster:
             self._heartbeat_due_s += self.heartbeat_s
             if self._heartbeat_due_s <= now_s:  # after a pause of the loop: do not send the missed heartbeats
                 self._heartbeat_due_s = now_s + self.heartbeat_s
-            self._send(self._heartbeat_id, _OPERATIONAL, now_s)
+            self.beat(now_s)
         self.syncs += 1
         self.sync_time_s = now_s
         self._send(SYNC, b"", now_s)

@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from drivers.acting_setpoint import DEMAND
-from drivers.canopen_master import NMT_PRE_OPERATIONAL, CanopenMaster
+from drivers.canopen_master import CONSUMED_HEARTBEATS, NMT_PRE_OPERATIONAL, CanopenMaster
 from drivers.cia402 import FAULT_RESET, POWERED, DriveState, OperationMode, state_of
+from drivers.heartbeat_trial import FAULTS, reset_fault, watches_master
 from drivers.object_index import ObjectIndex as Index
 from drivers.pdo import EVENT_DRIVEN, EVERY_SYNC, Entry
 from drivers.port import ConfigurationError
@@ -73,6 +74,7 @@ class DriveInfo:
     quick_stop_rad_s2: float  # 0x6085 as the drive has it after the set-up
     supervises_commands: bool  # it has a deadline of the RPDO (0x1400:5)
     max_torque_n_m: float  # 0x6072, to which the drive limits its torque
+    watches_master: bool = False  # it reported that the heartbeat of the master ended, when it was tried
     reports_demand: bool = False  # the set-point that acts is in a second TPDO
 
 
@@ -111,6 +113,7 @@ def set_up_drive(master: CanopenMaster, settings: DriveSettings) -> DriveAnswer:
             device.write(Index.QUICK_STOP_DECELERATION, 0, round(settings.quick_stop_rad_s2 / info.rad_per_count))
         if settings.mode is OperationMode.HOMING and settings.homing is not None:
             _write_homing(device, settings.homing, info.rad_per_count)
+        info = replace(info, watches_master=watches_master(device, master))
         info = _write_watchdogs(device, master, settings, info)
         if device.has(Index.MAX_TORQUE):
             info = replace(info, max_torque_n_m=device.read(Index.MAX_TORQUE) * info.torque_resolution_n_m)
@@ -181,7 +184,7 @@ def _write_watchdogs(device: DeviceSetup, master: CanopenMaster, settings: Drive
     device.write(Index.ERROR_BEHAVIOUR, 1, 1)  # and stay operational, so that the master sees it
     device.set_interpolation_time(settings.period_s)
     device.write(Index.COMMUNICATION_CYCLE_PERIOD, 0, round(settings.period_s * 1e6))
-    device.write(Index.CONSUMER_HEARTBEAT_TIME, 1, master.node_id << 16 | round(3000 * master.heartbeat_s))
+    device.write(Index.CONSUMER_HEARTBEAT_TIME, 1, master.node_id << 16 | round(1000 * CONSUMED_HEARTBEATS * master.heartbeat_s))
     device.write(Index.PRODUCER_HEARTBEAT_TIME, 0, round(1000 * settings.heartbeat_s))
     # CiA 301: the event timer of an RPDO is a deadline in ms; without it only the client notices a lost command path
     supervised = device.has(Index.RPDO_COMMUNICATION, RPDO_EVENT_TIMER)
@@ -208,13 +211,12 @@ def switch_off(master: CanopenMaster, settings: DriveSettings, now_s: float) -> 
 
 
 def clear_fault(master: CanopenMaster, settings: DriveSettings) -> None:
-    """Send one rising edge of "fault reset" by SDO, power stage off. Raises DriverError if the fault remains."""
+    """Reset a latched fault by SDO, power stage off. Raises DriverError if the fault remains."""
     with DeviceSetup(master.network, settings.node_id, settings.eds) as device:
         master.nmt(NMT_PRE_OPERATIONAL, settings.node_id)
-        for controlword in (0, FAULT_RESET, 0):
-            device.write_only(Index.CONTROLWORD, 0, controlword)
+        reset_fault(device)
         state = state_of(device.read(Index.STATUSWORD))
-    if state in (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE):
+    if state in FAULTS:
         raise ConfigurationError(
             "the fault remains after its reset", where=f"drive node {settings.node_id}, object 0x6041",
             given=state.name, advice="Remove its cause; the drive's error code is object 0x603F.",

@@ -104,7 +104,7 @@ def run(
     although jitter or bus load exceed the budget of the bench. seed: of the noise of simulated sensors.
 
     Returns the recording, one row per tick of the velocity loop. Raises FieldError for a profile that the bench does
-    not allow, NotPunctual (a HilError) for an exceeded budget, HilError for a device that cannot be set up or
+    not allow, NotArmed (a HilError) for an exceeded budget, HilError for a device that cannot be set up or
     if the run stopped before its end; the recording up to there stays in `folder`.
     """
     from hil.loop.run import run_profile

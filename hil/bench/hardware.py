@@ -60,7 +60,11 @@ class DriveSection(BenchSection):
     rated_torque_n_m: Positive | None = Field(
         None, description="object 0x6076, whose 1/1000 is the resolution of torque; absent: as the drive says [N m, N]"
     )
-    heartbeat_s: Positive = 0.02
+    heartbeat_s: Annotated[float, Field(ge=0.001, le=21.845)] = Field(
+        0.02,
+        description="between two heartbeats, of the master and of each device; three without one are a fault: whole "
+        "ms in objects of 16 bit [s]",
+    )
     watch_setpoint: bool = Field(
         True,
         description="compare the set-point that acts in the drive (object 0x6074, 0x606B or 0x6062 in a second "
@@ -80,7 +84,7 @@ class DriveSection(BenchSection):
     overrun_s: Positive = Field(
         0.05,
         description="lateness at which the axis is stopped; at most the deadline of the "
-        "set-points less two periods [s]",
+        "set-points or two heartbeats, less two periods [s]",
     )
     command_deadline_s: Annotated[float, Field(gt=0.0, le=65.535)] | None = Field(
         None,

@@ -47,7 +47,9 @@ def test_a_deadline_has_three_periods_and_at_most_a_twentieth_of_a_second() -> N
     assert command_deadline_s(bench_with(drive={"mode": "cst", "following_error_m": 1.0})) == LONGEST_S
     assert command_deadline_s(bench_with(drive={"mode": "csv"})) == LONGEST_S  # the drive holds a speed
     assert command_deadline_s(bench_with(drive={"mode": "cst", "command_deadline_s": 0.2})) == 0.2
-    assert late_limit_s(bench_with(drive={"command_deadline_s": 0.2})) == 0.05  # overrun_s
+    patient = {"command_deadline_s": 0.2, "heartbeat_s": 0.1}
+    assert late_limit_s(bench_with(drive=patient)) == 0.05  # overrun_s
+    assert late_limit_s(bench_with(drive=patient | {"overrun_s": 0.3})) == pytest.approx(0.198)  # two heartbeats less
 
 
 def test_the_drive_has_the_deadline_of_the_bench() -> None:

@@ -9,7 +9,7 @@ from drivers.emcy import Emergency, decode_emergency
 from drivers.port import Condition
 
 _OPERATIONAL: Final = 5
-_NMT_STATES: Final = (0, 4, _OPERATIONAL, 127)  # of a heartbeat, CiA 301: boot-up, stopped, operational, pre-operational
+_NMT_STATES: Final = (0, 4, _OPERATIONAL, 127)  # CiA 301: boot-up, stopped, operational, pre-operational
 _KEPT_EMERGENCIES: Final = 100  # a device that sends them without end does not fill the memory
 
 

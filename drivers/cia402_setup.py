@@ -184,7 +184,8 @@ def _write_watchdogs(device: DeviceSetup, master: CanopenMaster, settings: Drive
     device.write(Index.ERROR_BEHAVIOUR, 1, 1)  # and stay operational, so that the master sees it
     device.set_interpolation_time(settings.period_s)
     device.write(Index.COMMUNICATION_CYCLE_PERIOD, 0, round(settings.period_s * 1e6))
-    device.write(Index.CONSUMER_HEARTBEAT_TIME, 1, master.node_id << 16 | round(1000 * CONSUMED_HEARTBEATS * master.heartbeat_s))
+    consumed_ms = round(1000 * CONSUMED_HEARTBEATS * master.heartbeat_s)
+    device.write(Index.CONSUMER_HEARTBEAT_TIME, 1, master.node_id << 16 | consumed_ms)
     device.write(Index.PRODUCER_HEARTBEAT_TIME, 0, round(1000 * settings.heartbeat_s))
     # CiA 301: the event timer of an RPDO is a deadline in ms; without it only the client notices a lost command path
     supervised = device.has(Index.RPDO_COMMUNICATION, RPDO_EVENT_TIMER)

@@ -110,3 +110,40 @@ def test_every_setting_that_stops_the_axis_is_read_back(index: int, subindex: in
     with pytest.raises(ConfigurationError, match=f"0x{index:04X}:0{subindex}.*reads back another value"):
         rig.set_up()
     assert rig.node.state is DriveState.SWITCH_ON_DISABLED
+
+
+# -- PDOs -------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("communication", "flags"), [(0x1400, 0), (0x1800, 1 << 30)])
+def test_a_pdo_is_invalid_while_it_is_mapped_and_valid_afterwards(communication: int, flags: int) -> None:
+    """CiA 301, 7.5.2.36: invalid, number of entries 0, entries, number, valid; the order in which it is written."""
+    rig = in_process()
+    written: list[tuple[int, int, int]] = []
+    write = rig.node.dictionary.write
+
+    def seen(index: int, subindex: int, data: bytes) -> None:
+        written.append((index, subindex, int.from_bytes(data, "little")))
+        write(index, subindex, data)
+
+    rig.node._sdo = SdoServer(rig.node.dictionary.read, seen)
+    cob_id = communication - 0x1400 + 0x205 if communication < 0x1800 else 0x185
+    with DeviceSetup(rig.master.network, 5, EDS_FOLDER / "servo_drive.eds") as device:
+        entry = device.entry(0x6040 if communication < 0x1800 else 0x6041)
+        device.map_pdo(communication, (entry,), 1, cob_id)
+    mapping = communication + 0x200
+    assert written == [
+        (communication, 1, cob_id | flags | 1 << 31), (mapping, 0, 0), (mapping, 1, entry.word), (mapping, 0, 1),
+        (communication, 2, 1), (communication, 1, cob_id | flags),
+    ]  # fmt: skip
+
+
+def test_pdos_that_are_not_used_are_invalid_whatever_the_drive_had() -> None:
+    rig = in_process()
+    every = [base + k for base in (0x1400, 0x1800) for k in range(4) if base + k << 8 | 1 in rig.node.values]
+    for index in every:
+        rig.node.values[index << 8 | 1] &= 0x7FFFFFFF
+    rig.set_up()
+    valid = [index for index in every if not rig.node.values[index << 8 | 1] & 1 << 31]
+    assert len(every) > 3
+    assert valid == [0x1400, 0x1800, 0x1801]  # set-points, feedback, the set-point that acts

@@ -9,8 +9,8 @@ others are foreign and counted. Error frames of a controller are decoded, since 
 bus-off would stay invisible.
 """
 
-from collections.abc import Callable
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Any, Final, Protocol

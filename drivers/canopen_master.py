@@ -21,7 +21,8 @@ _OPERATIONAL: Final = b"\x05"
 class CanopenMaster:
     """CANopen master on a port; drives and encoders of the bus share it.
 
-    node_id: of the master, for its heartbeat. heartbeat_s: its period; consumers are set to CONSUMED_HEARTBEATS of them.
+    node_id: of the master, for its heartbeat. heartbeat_s: its period, of which consumers await
+    CONSUMED_HEARTBEATS.
     """
 
     __slots__ = ("_heartbeat_due_s", "_heartbeat_id", "_send", "health", "heartbeat_s", "network", "node_id",

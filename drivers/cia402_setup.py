@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 
 from drivers.acting_setpoint import DEMAND
 from drivers.canopen_master import CONSUMED_HEARTBEATS, NMT_PRE_OPERATIONAL, CanopenMaster
-from drivers.cia402 import FAULT_RESET, POWERED, DriveState, OperationMode, state_of
+from drivers.cia402 import POWERED, OperationMode, state_of
 from drivers.heartbeat_trial import FAULTS, reset_fault, watches_master
 from drivers.object_index import ObjectIndex as Index
 from drivers.pdo import EVENT_DRIVEN, EVERY_SYNC, Entry

@@ -50,7 +50,7 @@ class DriveSection(BenchSection):
 
     protocol: str = Field("canopen", description="protocol of the drive, a key of hil.loop.devices.PROTOCOLS")
     interface: Literal["inprocess", "virtual", "udp_multicast", "socketcan"] = "inprocess"
-    channel: str = Field("hil", description="socketcan: can0; udp_multicast: a group address")
+    channel: str = Field("hil", description="socketcan: can0; udp_multicast: an IPv4 group, heard on this PC alone")
     bitrate: Annotated[int, Field(ge=10_000, le=1_000_000, description="bit/s")] = 1_000_000
     mode: DriveMode = DriveMode.CST
     node_id: NodeId = 5
@@ -95,7 +95,9 @@ class DriveSection(BenchSection):
     supervision: SupervisionSection = SupervisionSection()
     bus_load: Share = Field(0.7, description="largest share of the bus's time at which the drive is armed")
     over_budget: Literal["refuse", "arm"] = Field(
-        "refuse", description="jitter_p99 or bus_load exceeded: arm or not; the recording says so"
+        "refuse",
+        description="jitter_p99 or bus_load exceeded, or a drive that does not report a missing heartbeat: arm or not; "
+        "the recording says so",
     )
 
     @model_validator(mode="after")

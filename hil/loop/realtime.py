@@ -28,7 +28,7 @@ _WAKE_UP = Path("/dev/cpu_dma_latency")  # PM QoS: the longest time that an idle
 
 
 class NotArmed(HilError):
-    """The machine or the bus cannot keep the period, or the drive not miss this PC. what: the finding alone."""
+    """The machine or the bus cannot keep the period, or the drive would not miss this PC. what: the finding alone."""
 
     def __init__(self, what: str, advice: str) -> None:
         super().__init__(f"{what}. The drive was not armed: {advice}, or arm all the same with --force")

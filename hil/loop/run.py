@@ -67,11 +67,11 @@ def run_profile(
     """Run a profile on a bench and record it as `folder`/`name`.parquet.
 
     virtual: as fast as the machine allows, by a clock that is always on time; simulated benches only. force: arm
-    although jitter or bus load exceed the budget. reset_fault: first reset a fault that the drive has latched. seed:
-    of the simulated sensors, instead of the bench's. planned: told the trajectory before the axis moves. rig: an
-    opened one, left open.
+    although jitter or bus load exceed the budget, or the drive did not report a missing heartbeat. reset_fault: first
+    reset a fault that the drive has latched. seed: of the simulated sensors, instead of the bench's. planned: told the
+    trajectory before the axis moves. rig: an opened one, left open.
 
-    Raises InputError for what cannot be run, NotArmed for a budget exceeded, HilError for devices that fail,
+    Raises InputError for what cannot be run, NotArmed for what `force` overrides, HilError for devices that fail,
     StillPowered if the drive does not confirm at the end that its power is off.
     """
     section = bench.drive or DriveSection()

@@ -159,7 +159,7 @@ def test_nothing_from_outside_of_loopback_is_heard(loopback: tuple[PythonCanPort
 
 
 def test_a_socket_on_another_group_hears_nothing(loopback: tuple[PythonCanPort, socket.socket]) -> None:
-    port, sender = loopback
+    port, _ = loopback
     other = PythonCanPort(open_bus(BusConfig("udp_multicast", "239.74.163.80")))
     heard: list[bytes] = []
     port.listen(None, lambda can_id, data, now_s: heard.append(data))

@@ -130,6 +130,13 @@ def test_a_drive_that_misses_the_master_shows_it_at_set_up() -> None:
     assert rig.node.values[0x6007_00] == 1
     assert rig.drive.emergencies == []
     assert rig.enable().condition is Condition.OK
+    for _ in range(200):
+        rig.cycle()
+    rig.drive.goal = DriveGoal.DISABLED
+    for _ in range(5):
+        rig.cycle()
+    rig.set_up()  # the time of the set-up is another one
+    assert rig.drive.info.watches_master
 
 
 @pytest.mark.parametrize("lost", [MASTER, EMCY])

@@ -68,9 +68,7 @@ def test_a_run_that_fails_carries_it_as_well(tmp_path: Path) -> None:
 
 
 def test_a_bench_may_allow_to_arm_above_its_budget_and_the_recording_says_so(tmp_path: Path) -> None:
-    with pytest.raises(
-        NotArmed, match=r"The drive was not armed: raise .* or say drive.watch_setpoint: false, or arm"
-    ):
+    with pytest.raises(NotArmed, match=r"The drive was not armed: raise .* or say drive.watch_setpoint: false, or arm"):
         run_profile(bench_with(drive={"bitrate": 250_000}), MOVE, tmp_path, "run", virtual=True)
     bench = bench_with(drive={"bitrate": 250_000, "over_budget": "arm"})
     ran = run_profile(bench, MOVE, tmp_path, "run", virtual=True)

@@ -26,6 +26,7 @@ RESPONSE_TIMEOUT_S: Final = 0.5
 _PUMP_S: Final = 0.001
 _SDO_BYTES: Final = 8  # CiA 301: every SDO frame has eight bytes
 _MOST_ANSWERS: Final = 16  # of one transfer: the objects used here have 8 bytes or less, in two segments
+_PDO_COMMUNICATION: Final = (*range(0x1400, 0x1600), *range(0x1800, 0x1A00))  # of up to 512 each way, CiA 301
 _MOST_EDS_BYTES: Final = 2_000_000  # ten times the EDS of a large drive
 
 
@@ -195,8 +196,7 @@ class DeviceSetup:
 
     def disable_pdos(self) -> None:
         """Set all PDOs of the EDS invalid, so that none acts on the drive or loads the bus unintended."""
-        first = (Index.RPDO_COMMUNICATION, Index.TPDO_COMMUNICATION)
-        for index in (communication + k for communication in first for k in range(4)):
+        for index in _PDO_COMMUNICATION:
             if self.has(index, 1):
                 self.write_only(index, 1, self.read(index, 1) | PDO_INVALID)
 

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import re
 import threading
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import canopen
 import pytest
-from drive_rig import Rig, in_process
+from drive_rig import Mass, Rig, in_process
 
 from drivers.bus import BusConfig, PythonCanPort, open_bus
-from drivers.canopen_drive import DriveSettings
+from drivers.canopen_drive import CanopenDrive, DriveSettings
+from drivers.canopen_master import CanopenMaster
 from drivers.cia402 import DriveState, OperationMode
+from drivers.inprocess import InProcessBus
 from drivers.port import ConfigurationError, IdentityError, ResponseTimeout
 from drivers.sdo_setup import EDS_FOLDER, DeviceSetup, SetupNetwork
+from drivers.sim.drive_node import SimulatedDrive
 from drivers.sim.sdo_server import SdoServer
 
 
@@ -138,12 +143,27 @@ def test_a_pdo_is_invalid_while_it_is_mapped_and_valid_afterwards(communication:
     ]  # fmt: skip
 
 
-def test_pdos_that_are_not_used_are_invalid_whatever_the_drive_had() -> None:
-    rig = in_process()
-    every = [base + k for base in (0x1400, 0x1800) for k in range(4) if base + k << 8 | 1 in rig.node.values]
+@pytest.fixture
+def many_pdos(tmp_path: Path) -> Path:
+    """EDS of a drive with PDOs at the ends of their ranges."""
+    text = (EDS_FOLDER / "servo_drive.eds").read_text()
+    parts = re.split(r"(?m)^(?=\[)", text)
+    copies = (("[1401", "[1407"), ("[1601", "[1607"), ("[1401", "[19FF"), ("[1601", "[1BFF"))
+    more = [part.replace(old, new) for old, new in copies for part in parts if part.startswith(old)]
+    path = tmp_path / "many_pdos.eds"
+    path.write_text(text + "\n" + "".join(more))
+    return path
+
+
+def test_pdos_that_are_not_used_are_invalid_whatever_the_drive_had(many_pdos: Path) -> None:
+    bus = InProcessBus()
+    port, node = bus.port(), SimulatedDrive(bus.port(), Mass(), eds=many_pdos)
+    every = [
+        key >> 8 for key in node.values if key & 0xFF == 1 and (0x14 <= key >> 16 < 0x16 or 0x18 <= key >> 16 < 0x1A)
+    ]
     for index in every:
-        rig.node.values[index << 8 | 1] &= 0x7FFFFFFF
-    rig.set_up()
-    valid = [index for index in every if not rig.node.values[index << 8 | 1] & 1 << 31]
-    assert len(every) > 3
-    assert valid == [0x1400, 0x1800, 0x1801]  # set-points, feedback, the set-point that acts
+        node.values[index << 8 | 1] &= 0x7FFFFFFF
+    CanopenDrive(CanopenMaster(port), DriveSettings(eds=many_pdos)).set_up()
+    valid = [index for index in every if not node.values[index << 8 | 1] & 1 << 31]
+    assert {0x1401, 0x1407, 0x19FF} <= set(every)
+    assert sorted(valid) == [0x1400, 0x1800, 0x1801]  # set-points, feedback, the set-point that acts

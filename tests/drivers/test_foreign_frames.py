@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import socket
 from collections.abc import Iterator
 from pathlib import Path
@@ -145,7 +146,13 @@ def test_nothing_from_outside_of_loopback_is_heard(loopback: tuple[PythonCanPort
     heard: list[bytes] = []
     port.listen(None, lambda can_id, data, now_s: heard.append(data))
     own = {family[4][0] for family in socket.getaddrinfo(socket.gethostname(), None, socket.AF_INET)}
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as outside:
+    with (
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as outside,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as member,  # of another program, on the network
+    ):
+        with contextlib.suppress(OSError):
+            group = socket.inet_aton(GROUP) + socket.inet_aton("0.0.0.0")
+            member.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, group)
         for address in {"127.0.0.1", GROUP} | own:  # the group: by the route of the network, if there is one
             try:
                 outside.sendto(msgpack.packb(MESSAGE), (address, PORT))

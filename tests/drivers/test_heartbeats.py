@@ -123,7 +123,15 @@ def tried(change: Callable[[Rig, ModelledBus], Any] = lambda rig, bus: None) -> 
 
 
 def test_a_drive_that_misses_the_master_shows_it_at_set_up() -> None:
-    rig = tried()
+    states: list[DriveState] = []
+
+    def watch(rig: Rig, bus: ModelledBus) -> None:
+        set_state = rig.node._set_state
+        rig.node._set_state = lambda state: (states.append(state), set_state(state))
+        rig.node.values[0x6007_00] = 1  # left by the run before
+
+    rig = tried(watch)
+    assert DriveState.FAULT not in states  # without a reaction
     assert rig.drive.info.watches_master
     assert rig.node.state is DriveState.SWITCH_ON_DISABLED
     assert rig.node.values[0x1016_01] == 1 << 16 | 60

@@ -287,7 +287,7 @@ class CanopenDrive(CanopenNode, Drive):
         texts += [self._acting.text] if self._acting is not None and self._acting.text else []
         raise DriveFault(
             f"tripped: {condition_names(self.tripped)}",
-            where=self._name,
+            where=self.name,
             given="; ".join(texts),
             advice="Remove the cause, then reset the fault.",
         )

@@ -57,7 +57,7 @@ class CanopenEncoder(CanopenNode, Encoder):
             step_m = device.read(Index.ENCODER_STEP_SETTINGS, 1) / 1e9
             if step_m <= 0 or (settings.step_m is not None and not math.isclose(step_m, settings.step_m)):
                 raise ConfigurationError(
-                    "another measuring step than described", where=f"{self._name}, object 0x6005:01",
+                    "another measuring step than described", where=f"{self.name}, object 0x6005:01",
                     given=f"{step_m:g} m", allowed=f"{settings.step_m or '> 0'} m",
                     advice="Correct the bench description or the encoder's settings.",
                 )  # fmt: skip
@@ -103,7 +103,7 @@ class CanopenEncoder(CanopenNode, Encoder):
         if condition:
             raise EncoderError(
                 condition_names(condition),
-                where=self._name,
+                where=self.name,
                 given=self._cause(),
                 advice="Check the encoder, its supply and its wiring.",
             )

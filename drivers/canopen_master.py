@@ -14,6 +14,7 @@ NMT_START: Final = 1
 NMT_STOP: Final = 2
 NMT_PRE_OPERATIONAL: Final = 128
 NMT_RESET_NODE: Final = 129
+CONSUMED_HEARTBEATS: Final = 3  # a consumer misses a heartbeat after so many of its periods without one
 _OPERATIONAL: Final = b"\x05"
 _NO_HEARTBEAT_AWAITED: Final = bytes.fromhex("2316100100000000")  # SDO download of 0 to 0x1016:01, CiA 301
 
@@ -21,7 +22,8 @@ _NO_HEARTBEAT_AWAITED: Final = bytes.fromhex("2316100100000000")  # SDO download
 class CanopenMaster:
     """CANopen master on a port; drives and encoders of the bus share it.
 
-    node_id: of the master, for its heartbeat. heartbeat_s: its period; consumers are set to three of them.
+    node_id: of the master, for its heartbeat. heartbeat_s: its period, of which consumers await
+    CONSUMED_HEARTBEATS.
     """
 
     __slots__ = ("_heartbeat_due_s", "_heartbeat_id", "_send", "health", "heartbeat_s", "network", "node_id",
@@ -48,6 +50,10 @@ class CanopenMaster:
         self.silent = False
         self.nmt(NMT_START, now_s=now_s)
         self._heartbeat_due_s = now_s + self.heartbeat_s
+        self.beat(now_s)
+
+    def beat(self, now_s: float) -> None:
+        """Send a heartbeat."""
         self._send(self._heartbeat_id, _OPERATIONAL, now_s)
 
     def sync(self, now_s: float) -> None:
@@ -60,7 +66,7 @@ class CanopenMaster:
             self._heartbeat_due_s += self.heartbeat_s
             if self._heartbeat_due_s <= now_s:  # after a pause of the loop: do not send the missed heartbeats
                 self._heartbeat_due_s = now_s + self.heartbeat_s
-            self._send(self._heartbeat_id, _OPERATIONAL, now_s)
+            self.beat(now_s)
         self.syncs += 1
         self.sync_time_s = now_s
         self._send(SYNC, b"", now_s)

@@ -12,11 +12,13 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from drivers.acting_setpoint import DEMAND
-from drivers.canopen_master import NMT_PRE_OPERATIONAL, CanopenMaster
-from drivers.cia402 import FAULT_RESET, POWERED, DriveState, OperationMode, state_of
+from drivers.canopen_master import CONSUMED_HEARTBEATS, NMT_PRE_OPERATIONAL, CanopenMaster
+from drivers.cia402 import POWERED, OperationMode, state_of
 from drivers.cia402_arming import mode_name
 from drivers.cia402_watchdogs import write_reactions, write_timing, write_watchdogs
 from drivers.emcy import error_text
+from drivers.fault_reset import FAULTS, RESET_LIMIT_S, reset_fault
+from drivers.heartbeat_trial import watches_master
 from drivers.object_index import ObjectIndex as Index
 from drivers.pdo import EVENT_DRIVEN, EVERY_SYNC, Entry
 from drivers.port import ConfigurationError
@@ -31,8 +33,6 @@ TARGET: Final = {
 _DEADLINE_PERIODS: Final = 3  # shortest deadline: one set-point lost, one late
 _OFF_LIMIT_S: Final = 1.0  # a stop ramp under way ends within it, from 0.6 m/s at 1 m/s^2
 _MODE_LIMIT_S: Final = 1.0  # until the mode display follows: some drives change it in a slow task
-_RESET_LIMIT_S: Final = 3.0  # until a fault is reset: some drives charge their DC link anew
-_FAULTS: Final = (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE)
 CONTROLWORD: Final = Entry(Index.CONTROLWORD, 0, 16)
 FEEDBACK: Final = (
     Entry(Index.STATUSWORD, 0, 16),
@@ -89,6 +89,7 @@ class DriveInfo:
     quick_stop_rad_s2: float  # 0x6085 as the drive has it after the set-up, 0: not known
     supervises_commands: bool  # it has a deadline of the RPDO (0x1400:5)
     max_torque_n_m: float  # 0x6072, to which the drive limits its torque
+    watches_master: bool = False  # it reported that the heartbeat of the master ended, when it was tried
     reports_demand: bool = False  # the set-point that acts is in a second TPDO
     heartbeat_s: float = math.inf
     notes: tuple[str, ...] = ()
@@ -136,14 +137,16 @@ def set_up_drive(master: CanopenMaster, settings: DriveSettings) -> DriveAnswer:
             device.write(Index.QUICK_STOP_DECELERATION, 0, round(settings.quick_stop_rad_s2 / info.rad_per_count))
         if settings.mode is OperationMode.HOMING and settings.homing is not None:
             _write_homing(device, settings.homing, info.rad_per_count)
+        watched = watches_master(device, master)
         write_reactions(device)
         write_timing(device, settings.period_s, settings.mode)
         watchdogs = write_watchdogs(
-            device, master.node_id, 3 * master.heartbeat_s, settings.heartbeat_s,
+            device, master.node_id, CONSUMED_HEARTBEATS * master.heartbeat_s, settings.heartbeat_s,
             max(settings.command_deadline_s, _DEADLINE_PERIODS * settings.period_s))  # fmt: skip
         deceleration = (device.peek(Index.QUICK_STOP_DECELERATION) or 0) * info.rad_per_count
         info = replace(info, quick_stop_rad_s2=deceleration, heartbeat_s=watchdogs.heartbeat_s,
-                       supervises_commands=watchdogs.supervises_commands)  # fmt: skip
+                       supervises_commands=watchdogs.supervises_commands,
+                       watches_master=watchdogs.supervises_commands if watched is None else watched)  # fmt: skip
         max_torque = device.peek(Index.MAX_TORQUE)
         if max_torque is not None:
             info = replace(info, max_torque_n_m=max_torque * info.torque_resolution_n_m)
@@ -157,7 +160,7 @@ def set_up_drive(master: CanopenMaster, settings: DriveSettings) -> DriveAnswer:
                 device.map_pdo(Index.TPDO_COMMUNICATION + 1, [demand], EVERY_SYNC, 0x280 + node_id)
                 info = replace(info, reports_demand=True)
         statusword = _await_off(device)
-        error_code = (device.peek(Index.ERROR_CODE) or 0) if state_of(statusword) in _FAULTS else 0
+        error_code = (device.peek(Index.ERROR_CODE) or 0) if state_of(statusword) in FAULTS else 0
         if device.kept:
             info = replace(info, notes=(f"drive node {node_id} keeps its own settings: {', '.join(device.kept)}",))
         return DriveAnswer(info, device.read(Index.POSITION_ACTUAL), statusword, mode_shown, error_code)
@@ -254,19 +257,15 @@ def switch_off(master: CanopenMaster, settings: DriveSettings, now_s: float) -> 
 
 
 def clear_fault(master: CanopenMaster, settings: DriveSettings) -> None:
-    """Send one rising edge of "fault reset" by SDO, power stage off. Raises DriverError if the fault remains."""
+    """Reset a latched fault by SDO, power stage off. Raises DriverError if the fault remains."""
     with DeviceSetup(master.network, settings.node_id, settings.eds) as device:
         device.wait_answer()
-        device.write_only(Index.CONTROLWORD, 0, 0)
-        device.wait(Index.STATUSWORD, lambda word: state_of(word) is not DriveState.FAULT_REACTION_ACTIVE, _OFF_LIMIT_S)
-        device.write_only(Index.CONTROLWORD, 0, FAULT_RESET)
-        statusword = device.wait(Index.STATUSWORD, lambda word: state_of(word) not in _FAULTS, _RESET_LIMIT_S)
-        device.write_only(Index.CONTROLWORD, 0, 0)
-        if state_of(statusword) in _FAULTS:
+        statusword = reset_fault(device)
+        if state_of(statusword) in FAULTS:
             code = device.peek(Index.ERROR_CODE)
             raise ConfigurationError(
                 "the fault remains after its reset", where=f"drive node {settings.node_id}, object 0x6041",
                 given=f"{state_of(statusword).name}, error code (object 0x603F) "
-                f"{'unknown' if code is None else error_text(code)}, waited {_RESET_LIMIT_S:g} s",
+                f"{'unknown' if code is None else error_text(code)}, waited {RESET_LIMIT_S:g} s",
                 advice="Remove its cause.",
             )  # fmt: skip

@@ -23,6 +23,7 @@ EDS_FOLDER: Final = Path(__file__).parent / "eds"
 BOOT_LIMIT_S: Final = 5.0  # drives take some seconds from power-on to their first answer
 _NMT_PRE_OPERATIONAL: Final = 128
 _ASK_AGAIN_S: Final = 0.01
+_PDO_COMMUNICATION: Final = (*range(0x1400, 0x1600), *range(0x1800, 0x1A00))  # of up to 512 each way, CiA 301
 
 
 class SettingRefused(ConfigurationError):
@@ -188,8 +189,7 @@ class DeviceSetup:
 
     def disable_pdos(self) -> None:
         """Set all PDOs of the EDS invalid, so that none acts on the drive or loads the bus unintended."""
-        first = (Index.RPDO_COMMUNICATION, Index.TPDO_COMMUNICATION)
-        for index in (communication + k for communication in first for k in range(4)):
+        for index in _PDO_COMMUNICATION:
             cob_id = self.peek(index, 1)
             if cob_id is not None and not cob_id & PDO_INVALID:
                 self._invalidate(index, cob_id)

@@ -15,6 +15,7 @@ from drivers.bus import BusConfig, CanPort, PumpedPort, PythonCanPort, open_bus
 from drivers.canopen_drive import CanopenDrive, DriveSettings
 from drivers.canopen_encoder import CanopenEncoder, EncoderSettings
 from drivers.canopen_master import CanopenMaster
+from drivers.canopen_node import CanopenNode
 from drivers.inprocess import InProcessBus
 from drivers.modelled_bus import frame_bits
 from drivers.port import Drive, DriverError, Encoder, Master, PlantLike
@@ -66,6 +67,14 @@ class Devices:
 
     def release(self) -> None:
         """Leave devices whose power is off, so that they do not trip when the loop has ended. Does not wait."""
+
+    def misses_this_pc(self) -> bool:
+        """Return True if the drive has shown that it notices when this program ends, or where none can show it."""
+        return True
+
+    def take_notes(self) -> Iterator[str]:
+        """Yield what was received and not acted on since the last call."""
+        yield from ()
 
     def close(self) -> None:
         """Close the connections."""
@@ -127,6 +136,20 @@ class Rig(Devices):
     def release(self) -> None:
         if not self.master.silent and not self.drive.read(self.master.sync_time_s).powered:
             self.master.release(self.section.node_id)
+
+    def misses_this_pc(self) -> bool:
+        return self.drive.info.watches_master
+
+    def take_notes(self) -> Iterator[str]:
+        foreign = self.master.health.foreign
+        if foreign:
+            kinds = ", ".join(f"{count} x {kind}" for kind, count in sorted(foreign.items()))
+            yield f"bus: frames that CANopen does not have (CiA 301) came and were not acted on: {kinds}"
+            foreign.clear()
+        for node in (self.drive, self.encoder):
+            if isinstance(node, CanopenNode) and node.malformed_frames:
+                yield f"{node.name}: {node.malformed_frames} frames of a wrong length or value were not acted on"
+                node.malformed_frames = 0
 
     def close(self) -> None:
         super().close()
@@ -214,6 +237,12 @@ def check_runnable(bench: Bench) -> None:
             ("drive", "interface"),
             "given inprocess without a section `simulation`, allowed socketcan, "
             "virtual or udp_multicast for real devices; choose one or add `simulation`",
+        )
+    if section.heartbeat_s < bench.gains.period_s:
+        raise FieldError(
+            ("drive", "heartbeat_s"),
+            f"given {section.heartbeat_s:g}, allowed the period of the loop, which sends it, or more: "
+            f"{bench.gains.period_s:g}; raise it",
         )
     if bench.encoders.motor.direction < 0:
         raise FieldError(

@@ -11,7 +11,7 @@ Every failure stops the drive as follows; the recording stays readable:
     drive trips (EMCY, fault, stale, heartbeat lost, bus-off, rebooted)  -> QUICK_STOP
     linear encoder lost: fed back to the position loop -> QUICK_STOP, else -> STOP
     following error, travel limit, loop too late, ctrl-C                -> STOP; a second time -> QUICK_STOP
-    exception in the loop                                               -> QUICK_STOP unrecorded, then the exception
+    exception in the loop, third ctrl-C                                 -> QUICK_STOP unrecorded, then the exception
     stop command without answer                                         -> SYNC, heartbeat, RPDO withheld, NMT stop
 """
 
@@ -103,7 +103,6 @@ class Session:
         self.skipped = 0  # ticks left out between the rows
         self._left_out = 0  # ticks left out since the first row, also while the power is switched off
         self._stops_asked = 0
-        self._switching_off = False
         self._phase = LoopPhase.RUN
         self._ending, self._reason = Ending.COMPLETE, "the profile is done"
         self._last_tick = len(trajectory) - 1  # row at which the phase ends
@@ -111,11 +110,9 @@ class Session:
         self.late = LatenessLog(len(trajectory) + self._ticks(_AROUND_S))
 
     def ask_stop(self) -> None:
-        """Stop the axis: under control the first time, by the drive's own ramp the second, at once the third. Nothing
-        ends the switching-off."""
+        """Stop the axis: under control the first time, by the drive's own ramp the second, unrecorded the third. Only
+        counts for the next tick: an exception raised here could come between two lines that switch the power off."""
         self._stops_asked += 1
-        if self._stops_asked > 2 and not self._switching_off:
-            raise KeyboardInterrupt
 
     def run(self) -> Outcome:
         """Arm, run, stop, disarm. Raises HilError when the drive cannot be armed or a device fails in the loop, and
@@ -165,7 +162,7 @@ class Session:
         self._drive.goal = DriveGoal.ENABLED
         for _ in range(self._ticks(ARM_TIMEOUT_S)):
             sample, seen = self._exchange()
-            if self._drive.tripped and (late_s := max(self.late.values)) > self._late_limit_s:
+            if self._drive.tripped and (late_s := max(*self.late.values, self._late_s())) > self._late_limit_s:
                 raise HilError(f"the loop was {late_s:.3f} s late while the drive was armed, which stops the drive "
                                f"(allowed: {self._late_limit_s:.3f} s): take load off the machine")  # fmt: skip
             self._drive.check()
@@ -175,10 +172,8 @@ class Session:
             self._drive.command(self._now_s, 0.0)
             if self._stops_asked:
                 raise StoppedByUser("interrupted while the drive was armed; nothing moved")
-        raise HilError(
-            f"the drive did not enable within {ARM_TIMEOUT_S:.0f} s: it is {self._drive.status}; check its enable "
-            "input and safe torque off"
-        )
+        raise HilError(f"the drive did not enable within {ARM_TIMEOUT_S:.0f} s: it is {self._drive.status}; check its "
+                       "enable input and safe torque off")  # fmt: skip
 
     def _check_start(self, sample: DriveSample, seen: EncoderSample) -> None:
         start_m = self._trajectory.position_m[0]
@@ -205,10 +200,8 @@ class Session:
             motor, torque = sample.motor_position_rad, sample.torque_n_m
             if skipped != self._left_out:
                 cycle.skip(tick + skipped, tick + self._left_out - 1, motor)
-                self._stall = stalled(
-                    bench, late.last_s, tick + self._left_out, cycle.setpoint(tick + self._left_out)[1]
-                )
                 skipped = self.skipped = self._left_out
+                self._stall = stalled(bench, late.last_s, tick + skipped, cycle.setpoint(tick + skipped)[1])
             setpoint, passed = step(tick, Samples(motor, seen.position_m, torque, sample.state, error_code,
                                                   late.last_s, cycle_s, sample.age_cycles, seen.age_cycles,
                                                   skipped))  # fmt: skip
@@ -229,17 +222,24 @@ class Session:
         drive.command(self._now_s, setpoint)
         return tick + 1
 
+    def _late_s(self) -> float:
+        """Lateness of the tick so far: a loop that stalls inside it finds what the drive did meanwhile."""
+        return max(self.late.last_s, self._clock.since(self._clock_tick))
+
     # -- faults and stops ----------------------------------------------------------------------------------
 
     def _supervise(self, tick: int, sample: DriveSample, seen: EncoderSample, passed: int) -> None:
-        """Change the phase and the set-points from this tick on if a rule requires it."""
+        """Change the phase and the set-points from this tick on if a rule requires it; KeyboardInterrupt for a third
+        request to stop."""
+        if self._stops_asked > 2:
+            raise KeyboardInterrupt
         if self._phase is LoopPhase.QUICK_STOP:
             if not sample.powered:
                 self._last_tick = min(self._last_tick, tick + self._ticks(AFTERMATH_S))
             return
         stopping = self._phase is LoopPhase.STOP
         stall = self._stall if self._stall.acts(tick, self._rig.bench.gains) else NO_STALL
-        findings = list(find(self._rig, seen, passed, self.late.last_s, self._stops_asked, stopping=stopping,
+        findings = list(find(self._rig, seen, passed, self._late_s(), self._stops_asked, stopping=stopping,
                              stall=stall))  # fmt: skip
         quick = any(finding.quick for finding in findings)
         if not findings or (stopping and not quick):  # a controlled stop goes on
@@ -273,7 +273,7 @@ class Session:
         would end a ramp. Nothing that fails here ends it before the drive was asked. Raises StillPowered from `cause`
         if it does not say in two fresh answers, or to that question, that its power is off. ended: how the run ended.
         """
-        drive, self._switching_off = self._drive, True
+        drive = self._drive
         drive.goal, confirmed, braking = goal, 0, False
         for tick in range(self._ticks(DISARM_TIMEOUT_S + QUICK_STOP_LIMIT_S)):
             with contextlib.suppress(Exception):

@@ -86,9 +86,9 @@ _BEAT = "heartbeat time-out + 1"
 
 RULES: tuple[Trip, ...] = (
     # first, because a late loop has the drive trip by its own watchdog
-    Trip("loop late", _E.OVERRUN, "lateness > overrun_s, or > deadline of the RPDO less two periods", _R.STOP, "1",
-         "the loop was {lateness_s:.3f} s late, allowed {late_limit_s:.3f} s (drive.overrun_s, "
-         "drive.command_deadline_s): take load off the machine", loop=LoopSign.LATE),
+    Trip("loop late", _E.OVERRUN, "lateness > overrun_s, or > deadline of the RPDO or two heartbeats, less two periods",
+         _R.STOP, "1", "the loop was {lateness_s:.3f} s late, allowed {late_limit_s:.3f} s (drive.overrun_s, "
+         "drive.command_deadline_s, drive.heartbeat_s): take load off the machine", loop=LoopSign.LATE),
     Trip("after a stall", _E.OVERRUN, "ticks were left out less than three time constants of the position loop ago; "
          "only bounds are passed that this can break, and it moved the axis by a fifth of them or more", _R.TWICE, "1",
          "the axis did not follow because the loop had been {stall_s:.3f} s late: take load off the machine",

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import re
 import threading
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import canopen
 import pytest
-from drive_rig import Rig, in_process
+from drive_rig import Mass, Rig, in_process
 
 from drivers.bus import BusConfig, PythonCanPort, open_bus
-from drivers.canopen_drive import DriveSettings
+from drivers.canopen_drive import CanopenDrive, DriveSettings
+from drivers.canopen_master import CanopenMaster
 from drivers.cia402 import DriveState, OperationMode
 from drivers.cia402_setup import FEEDBACK
+from drivers.inprocess import InProcessBus
 from drivers.port import ConfigurationError, IdentityError, ResponseTimeout
 from drivers.sdo_setup import EDS_FOLDER, DeviceSetup, SetupNetwork
+from drivers.sim.drive_node import SimulatedDrive
 from drivers.sim.sdo_server import SdoServer
 
 
@@ -124,3 +129,55 @@ def test_every_setting_that_stops_the_axis_is_read_back(index: int, subindex: in
     with pytest.raises(ConfigurationError, match=f"0x{index:04X}:0{subindex}.*reads back another value"):
         rig.set_up()
     assert rig.node.state is DriveState.SWITCH_ON_DISABLED
+
+
+# -- PDOs -------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("communication", "flags"), [(0x1400, 0), (0x1800, 1 << 30)])
+def test_a_pdo_is_invalid_while_it_is_mapped_and_valid_afterwards(communication: int, flags: int) -> None:
+    """CiA 301, 7.5.2.36: invalid, number of entries 0, entries, number, valid; the order in which it is written."""
+    rig = in_process()
+    written: list[tuple[int, int, int]] = []
+    write = rig.node.dictionary.write
+
+    def seen(index: int, subindex: int, data: bytes) -> None:
+        written.append((index, subindex, int.from_bytes(data, "little")))
+        write(index, subindex, data)
+
+    rig.node._sdo = SdoServer(rig.node.dictionary.read, seen)
+    cob_id = communication - 0x1400 + 0x205 if communication < 0x1800 else 0x185
+    with DeviceSetup(rig.master.network, 5, EDS_FOLDER / "servo_drive.eds") as device:
+        entry = device.entry(0x6040 if communication < 0x1800 else 0x6041)
+        device.map_pdo(communication, (entry,), 1, cob_id)
+    mapping = communication + 0x200
+    assert written == [
+        (communication, 1, cob_id | flags | 1 << 31), (mapping, 0, 0), (mapping, 1, entry.word), (mapping, 0, 1),
+        (communication, 2, 1), (communication, 1, cob_id | flags),
+    ]  # fmt: skip
+
+
+@pytest.fixture
+def many_pdos(tmp_path: Path) -> Path:
+    """EDS of a drive with PDOs at the ends of their ranges."""
+    text = (EDS_FOLDER / "servo_drive.eds").read_text()
+    parts = re.split(r"(?m)^(?=\[)", text)
+    copies = (("[1401", "[1407"), ("[1601", "[1607"), ("[1401", "[19FF"), ("[1601", "[1BFF"))
+    more = [part.replace(old, new) for old, new in copies for part in parts if part.startswith(old)]
+    path = tmp_path / "many_pdos.eds"
+    path.write_text(text + "\n" + "".join(more))
+    return path
+
+
+def test_pdos_that_are_not_used_are_invalid_whatever_the_drive_had(many_pdos: Path) -> None:
+    bus = InProcessBus()
+    port, node = bus.port(), SimulatedDrive(bus.port(), Mass(), eds=many_pdos)
+    every = [
+        key >> 8 for key in node.values if key & 0xFF == 1 and (0x14 <= key >> 16 < 0x16 or 0x18 <= key >> 16 < 0x1A)
+    ]
+    for index in every:
+        node.values[index << 8 | 1] &= 0x7FFFFFFF
+    CanopenDrive(CanopenMaster(port), DriveSettings(eds=many_pdos)).set_up()
+    valid = [index for index in every if not node.values[index << 8 | 1] & 1 << 31]
+    assert {0x1401, 0x1407, 0x19FF} <= set(every)
+    assert sorted(valid) == [0x1400, 0x1800, 0x1801]  # set-points, feedback, the set-point that acts

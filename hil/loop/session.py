@@ -23,7 +23,7 @@ from typing import Protocol
 from drivers.port import Condition, DriveGoal, DriveSample, EncoderSample
 from hil.errors import HilError, StillPowered, StoppedByUser
 from hil.loop.clock import SKIP_FROM, Clock, LatenessLog, next_due
-from hil.loop.cycle import Cycle, Samples
+from hil.loop.cycle import STOP_SEGMENT, Cycle, Samples
 from hil.loop.devices import Devices, driver_errors
 from hil.loop.outcome import Outcome
 from hil.loop.stall import NO_STALL, stalled
@@ -39,7 +39,6 @@ QUICK_STOP_LIMIT_S = 2.0  # longest wait for the end of a quick stop
 AFTERMATH_S = 0.1  # recorded after the power stage is off
 DISARM_TIMEOUT_S = 0.2  # beside a ramp of the drive
 _AROUND_S = ARM_TIMEOUT_S + LONGEST_STOP_S + SETTLE_S + QUICK_STOP_LIMIT_S + AFTERMATH_S + DISARM_TIMEOUT_S
-STOP_SEGMENT = -1  # in the recording: set-points of a stop
 _NO_ENCODER = EncoderSample(0.0, 0, 0.0, 0, Condition.OK)
 
 
@@ -244,7 +243,7 @@ class Session:
         quick = any(finding.quick for finding in findings)
         if not findings or (stopping and not quick):  # a controlled stop goes on
             return
-        if self._phase is LoopPhase.RUN:
+        if self._phase is LoopPhase.RUN or findings[0].ending is Ending.SIGN:  # a stop may show why it became necessary
             self._ending, self._reason = findings[0].ending, findings[0].reason
         stop = None if quick else self._stop(tick, sample, seen, measured=passed != 0)
         if stop is None:  # the drive stops by itself

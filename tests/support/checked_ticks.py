@@ -7,7 +7,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from hil.loop.checks import Bounds, Facts, Limit, Memory, check
+from hil.loop.checks import check
+from hil.loop.limits import Bounds, Facts, Limit, Memory
 
 PERIOD_S = 2.0**-10  # nearly a millisecond; powers of two, so that a value can be equal to its bound
 OFF = Bounds(has_table=True, commands_torque=True, following_error_m=math.inf, following_error_s=0.0,

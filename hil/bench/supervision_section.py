@@ -40,7 +40,9 @@ class SupervisionSection(BenchSection):
     )
     torque: Positive | None = Field(None, description="measured; absent: 1.5 x the torque limit [N m, N]")
     torque_difference: Positive | None = Field(
-        None, description="measured against commanded, smoothed; absent: 0.3 x the torque limit [N m, N]"
+        None,
+        description="measured against commanded, smoothed; absent: 0.3 x the torque limit, or the "
+        "drive's if it is lower [N m, N]",
     )
     load_torque: Positive | None = Field(
         None, description="of weight and process, which may drive the axis against its motor; absent: half of the "

@@ -18,7 +18,7 @@ FROZEN_SHARE = 0.1  # of the encoder difference: backlash and windup of a usable
 FROZEN_COUNTS = 4.0  # noise of a quantised position is below
 SPEED_MARGIN = 1.5  # overshoot of the velocity beyond the limit of the set-points
 TORQUE_MARGIN = 1.5  # measured peaks beyond the limit of the command
-ACTING_SHARE = 0.3  # of the torque limit: error of a torque constant, ripple and offset are below
+ACTING_SHARE = 0.3  # of the torque that can act: error of a torque constant, ripple and offset are below
 FROZEN_TORQUE_SHARE = 0.5  # of the torque that can act: stiction of a usable axis is below
 LOAD_SHARE = 0.5  # of the torque that can act: weight and process forces of a usable axis are below
 RUNAWAY_PERIODS = 3.0  # of full torque: one until it acts, one of averaging, one of noise
@@ -52,7 +52,7 @@ def make_bounds(rig: Devices, limits: MotionLimits | None) -> Bounds:
         frozen_m=given.frozen_m or max(FROZEN_SHARE * difference_m, FROZEN_COUNTS * count_m),
         frozen_torque=given.frozen_torque or FROZEN_TORQUE_SHARE * acting,
         torque=given.torque or TORQUE_MARGIN * torque,
-        torque_difference=given.torque_difference or ACTING_SHARE * torque,
+        torque_difference=given.torque_difference or ACTING_SHARE * acting,
         drive_torque=drive_torque,
         continuous_torque=given.continuous_torque or math.inf,
         thermal_time_s=given.thermal_time_s,

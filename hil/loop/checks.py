@@ -13,7 +13,6 @@ from numba import njit
 from hil.loop.limits import Bounds, Limit, Memory
 from hil.loop.sign_check import sign, stop_fails
 
-
 SMOOTHING = 0.125  # share of a new value: noise of one count in one period is no speed
 TORQUE_TICKS = 3  # in a row beyond the torque bound: one sample may be an impact
 RESIDUAL_TICKS = 20  # a force shows at the table first, then in the motor and the torque: some ms of an axis

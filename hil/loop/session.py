@@ -25,7 +25,7 @@ from hil.errors import HilError, StillPowered, StoppedByUser
 from hil.loop.clock import SKIP_FROM, Clock, LatenessLog, next_due
 from hil.loop.cycle import STOP_SEGMENT, Cycle, Samples
 from hil.loop.devices import Devices, driver_errors
-from hil.loop.outcome import Outcome
+from hil.loop.outcome import Outcome, with_stop
 from hil.loop.stall import NO_STALL, stalled
 from hil.loop.stopping import LONGEST_STOP_S, plan_stop
 from hil.loop.supervision import Ending, find
@@ -129,11 +129,8 @@ class Session:
                 self._power_off(DriveGoal.QUICK_STOP, f"{type(error).__name__}: {error}", error)
                 raise
         self._power_off(DriveGoal.DISABLED, f"{self._ending}: {self._reason}")
-        if self._drive.tripped & Condition.UNANSWERED:
-            if self._ending is Ending.COMPLETE:
-                self._ending = Ending.DRIVE_FAULT
-            self._reason += "; the drive did not follow its controlword: SYNC, heartbeat and set-points were withheld"
-        return Outcome(self._ending, self._reason, rows, self.late.values, self.skipped, self._stops_asked > 0)
+        ending, reason = with_stop(self._ending, self._reason, self._drive.tripped)
+        return Outcome(ending, reason, rows, self.late.values, self.skipped, self._stops_asked > 0)
 
     # -- one tick -------------------------------------------------------------------------------------------------
 

@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 from drivers.port import Condition, DriverError, EncoderSample
 from hil.bench.hardware import DriveSection
-from hil.loop.limits import Limit
 from hil.loop.devices import Devices
+from hil.loop.limits import Limit
 from hil.loop.stall import NO_STALL, Stall
 
 

@@ -10,9 +10,9 @@ from bench_runs import MOVE, bench_with
 
 from hil.bench.hardware import DriveMode
 from hil.loop.bounds import make_bounds, make_cycle
-from hil.loop.limits import Bounds
 from hil.loop.cycle import Setpoint
 from hil.loop.devices import Rig
+from hil.loop.limits import Bounds
 from hil.loop.stopping import plan_stop
 from hil.motion.pieces import MotionLimits
 from hil.motion.time_optimal import MotionState

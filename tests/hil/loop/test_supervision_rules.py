@@ -10,8 +10,8 @@ import pytest
 from bench_runs import bench_with
 
 from drivers.port import Condition
-from hil.loop.limits import Limit
 from hil.loop.devices import Rig
+from hil.loop.limits import Limit
 from hil.loop.stall import Stall
 from hil.loop.supervision import RULES, Ending, LoopSign, Reaction, StopCause, find, rules_table
 

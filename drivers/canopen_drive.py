@@ -34,7 +34,7 @@ from drivers.cia402_setup import (
 from drivers.emcy import Emergency
 from drivers.pdo import layout, saturate
 from drivers.port import Condition, Drive, DriveFault, DriveGoal, DriveSample
-from drivers.stop_watch import Answer, StopVerdict, StopWatch
+from drivers.stop_watch import StopAnswer, StopVerdict, StopWatch
 
 __all__ = ["TRIPPING", "CanopenDrive", "DriveInfo", "DriveSettings", "HomingSettings"]
 
@@ -214,8 +214,9 @@ class CanopenDrive(CanopenNode, Drive):
         if self.goal is DriveGoal.ENABLED or state not in POWERED:
             self._stop.reset()
             return
-        answer = Answer(abs(self._speed_counts_s) * self._rad_per_count, self._rad_per_count / self.settings.period_s,
-                        state is _ENABLED_STATE, self._master.syncs == self._answered)  # fmt: skip
+        count, fresh = self._rad_per_count / self.settings.period_s, self._master.syncs == self._answered
+        speed = abs(self._speed_counts_s) * self._rad_per_count
+        answer = StopAnswer(speed, count, enabled=state is _ENABLED_STATE, fresh=fresh)
         verdict = self._stop.step(answer, self.info.quick_stop_rad_s2)
         if verdict is StopVerdict.ACCELERATES:
             self._latched |= Condition.RUNAWAY

@@ -61,6 +61,7 @@ def make_bounds(rig: Devices, limits: MotionLimits | None) -> Bounds:
         residual_torque=residual.torque if residual else math.inf,
         load_torque=given.load_torque or LOAD_SHARE * acting,
         runaway_m_s=_runaway_m_s(rig.bench, acting),
+        position_gain_1_s=gains.position_gain_1_s,
         sign_m=max(min(SIGN_SHARE * error_m, SIGN_M), FROZEN_COUNTS * max(motor_count_m, count_m)),
     )
 

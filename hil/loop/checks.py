@@ -45,7 +45,7 @@ def _unpacked(a):  # type: ignore[no-untyped-def]
     """Bounds from an array: a tuple as argument of the compiled cycle costs 50 ns for each field."""
     return Bounds(
         a[0] != 0.0, a[1] != 0.0, a[2], a[3], a[4], a[5], a[6], a[7], a[8], a[9], a[10], a[11], a[12], a[13], a[14],
-        a[15], a[16], a[17], a[18], a[19], a[20], a[21],
+        a[15], a[16], a[17], a[18], a[19], a[20], a[21], a[22],
     )  # fmt: skip
 
 

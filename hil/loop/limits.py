@@ -56,6 +56,7 @@ class Bounds(NamedTuple):
     residual_torque: float
     load_torque: float  # of weight and process: it may drive the axis against the motor
     runaway_m_s: float  # speed gained against the torque, or beyond a stop, by which an axis runs away
+    position_gain_1_s: float
     sign_m: float  # way of the first motion within which set-point and feedback agree in sign
 
 
@@ -87,8 +88,8 @@ class Memory(IntEnum):
     SIGN_KNOWN = 22  # the first motion had the sign of the set-points
     COMMAND_AT_REST = 23  # set-point and feedback where the set-points stood still last
     FED_BACK_AT_REST = 24
-    STOPPING = 25  # since the tick before
-    EXCESS = 26  # least speed beyond that of the stop since it began
+    STOP_SPEED = 25  # highest of the controlled stop: at its begin, or of its set-points; 0: no stop
+    STOP_MARGIN = 26
 
 
 class Facts(NamedTuple):

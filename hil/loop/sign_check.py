@@ -11,6 +11,7 @@ from numba import njit
 
 from hil.loop.limits import Limit, Memory
 
+STOP_OVERSHOOT = 0.25  # of the speed of a stop, beyond its end or its begin, in a usable loop
 _M = Memory
 _SIGN, _STOP_FAILS = int(Limit.SIGN), int(Limit.STOP_FAILS)
 
@@ -42,12 +43,16 @@ def sign(b, m, f, velocity_m_s):  # type: ignore[no-untyped-def]
 
 @njit(_nrt=False, error_model="numpy", inline="never")
 def stop_fails(b, m, f, velocity_m_s):  # type: ignore[no-untyped-def]
-    """Limit.STOP_FAILS where the axis gets faster while it is stopped: than the set-points, or the other way."""
+    """Limit.STOP_FAILS where the axis is faster than it and its set-points were since the stop began, or turns back.
+
+    A position error at its begin is made good at the speed that the position loop asks for it."""
     if not f.stopping:
-        m[_M.STOPPING] = 0.0
+        m[_M.STOP_SPEED] = 0.0
         return 0
-    along = velocity_m_s if f.velocity_m_s >= 0.0 else -velocity_m_s
-    excess = max(along - abs(f.velocity_m_s), -along)
-    m[_M.EXCESS] = excess if m[_M.STOPPING] == 0.0 else min(m[_M.EXCESS], excess)
-    m[_M.STOPPING] = 1.0
-    return _STOP_FAILS if excess - max(m[_M.EXCESS], 0.0) > b.runaway_m_s else 0
+    if m[_M.STOP_SPEED] == 0.0:
+        m[_M.STOP_SPEED] = abs(velocity_m_s)
+        m[_M.STOP_MARGIN] = b.runaway_m_s + b.position_gain_1_s * abs(f.position_m - f.fed_back_m)
+    m[_M.STOP_SPEED] = max(m[_M.STOP_SPEED], abs(f.velocity_m_s))
+    along_m_s = velocity_m_s if f.velocity_m_s >= 0.0 else -velocity_m_s
+    margin_m_s = m[_M.STOP_MARGIN] + STOP_OVERSHOOT * m[_M.STOP_SPEED]
+    return _STOP_FAILS if along_m_s > m[_M.STOP_SPEED] + margin_m_s or -along_m_s > margin_m_s else 0

@@ -134,9 +134,10 @@ RULES: tuple[Trip, ...] = (
          "first motion is against the set-points by > sign_m, at most 0.5 mm", _R.QUICK_STOP, "1",
          "feedback or torque acts with the wrong sign: the axis moves against its torque or its set-points; correct "
          "the phase order of the motor, the direction of its encoder or the polarity (0x607E)", _L.SIGN),
-    Trip("stop without effect", _E.SIGN, "faster by runaway_m_s than when its controlled stop was nearest to its "
-         "set-points", _R.QUICK_STOP, "1", "the axis got faster while the loop stopped it: feedback or torque acts "
-         "with the wrong sign, or a force from outside drives the axis", _L.STOP_FAILS),
+    Trip("stop without effect", _E.SIGN, "in a controlled stop: faster by runaway_m_s than at its begin, or "
+         "backwards by it; and more by what the loop may overshoot", _R.QUICK_STOP, "1",
+         "the axis got faster while the loop stopped it: feedback or torque acts with the wrong sign, or a force from "
+         "outside drives the axis", _L.STOP_FAILS),
     Trip("motor encoder frozen", _E.ENCODER_FAULT,
          "value repeats; table moved > frozen_m or measured torque changed > frozen_torque (CST)", _R.QUICK_STOP, "1",
          "the motor encoder is frozen, or the axis blocked: its value repeats while table or torque change",

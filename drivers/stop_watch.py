@@ -1,0 +1,75 @@
+"""The stop of a drive as its answers show it: under way, too long, or an acceleration."""
+
+import math
+from collections import deque
+from enum import IntEnum
+from typing import Final, NamedTuple
+
+_TRANSITION_S: Final = 0.01  # some drives take several ms for a transition of the state machine
+_RAMP_MARGIN: Final = 1.5  # measured speed and the drive's ramp differ by its following error
+_RAMP_EXTRA_S: Final = 0.1  # standstill detection of drives takes some 10 ms
+_FASTER_S: Final = 0.02  # of the ramp: what a loop that takes over a weight, or swings, adds to the speed is below
+_RISING_ANSWERS: Final = 6  # over which the speed still rises: a transient of the loop is over by then
+_NOISE_COUNTS: Final = 4  # of the encoder, between two answers
+
+
+class StopVerdict(IntEnum):
+    """What is to be done about a stop."""
+
+    GOES_ON = 0
+    ACCELERATES = 1  # the drive brakes with the wrong sign: no ramp of it can stop the axis
+    LATE = 2  # the drive does not follow its controlword, or its ramp does not end
+
+
+class StopAnswer(NamedTuple):
+    """What an answer says: speed without sign since the one before [rad/s], and a count in a period [rad/s]; enabled:
+    the stop did not begin yet; fresh: it belongs to the latest SYNC."""
+
+    speed: float
+    count: float
+    enabled: bool
+    fresh: bool
+
+
+class StopWatch:
+    """Watches one stop after the other; `reset` between them.
+
+    A drive that stays enabled is late after the cycles of an answer, one under power after its ramp, or after an answer
+    once it accelerated.
+    """
+
+    def __init__(self, period_s: float, missed_answers_allowed: int) -> None:
+        self._period_s = period_s
+        # the effect of a command is reported at the second SYNC after it, and some answers may be missed
+        self._answer_cycles = max(missed_answers_allowed + 3, _TRANSITION_S / period_s)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the stop before."""
+        self._cycles, self._limit = 0, math.inf
+        self._top = 0.0  # highest speed until the drive reported the stop
+        self._speeds: deque[float] = deque(maxlen=_RISING_ANSWERS)
+        self._accelerated = False
+
+    def step(self, answer: StopAnswer, ramp_rad_s2: float) -> StopVerdict:
+        """Judge one cycle of a stop; ramp_rad_s2: deceleration of the drive (0x6085), 0 or infinite: unknown."""
+        if self._cycles == 0:
+            ramp_s = _RAMP_MARGIN * answer.speed / ramp_rad_s2 if ramp_rad_s2 else math.inf
+            self._limit = (ramp_s + _RAMP_EXTRA_S) / self._period_s
+        if answer.enabled or self._cycles == 0:
+            self._top = max(self._top, answer.speed)
+        elif answer.fresh:
+            self._speeds.append(answer.speed)
+        cycles, self._cycles = self._cycles, self._cycles + 1
+        if not self._accelerated and ramp_rad_s2 and self._rises(answer.count, ramp_rad_s2):
+            self._accelerated, self._limit = True, cycles + self._answer_cycles
+            return StopVerdict.ACCELERATES
+        late = cycles >= (self._answer_cycles if answer.enabled else self._limit)
+        return StopVerdict.LATE if late else StopVerdict.GOES_ON
+
+    def _rises(self, count: float, ramp_rad_s2: float) -> bool:
+        """Return True if the last two speeds are beyond all before the stop, and beyond that of some answers ago."""
+        if len(self._speeds) < _RISING_ANSWERS:
+            return False
+        noise, speeds = _NOISE_COUNTS * count, list(self._speeds)
+        return min(speeds[-2:]) > max(self._top + _FASTER_S * ramp_rad_s2, speeds[0]) + noise

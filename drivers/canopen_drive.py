@@ -73,6 +73,7 @@ class CanopenDrive(CanopenNode, Drive):
         self._controlword = 0
         self._was_enabled = self._reset_requested = False
         self._speed_counts_s = 0.0  # between the last two answers
+        self.stop_margin = 0.0  # speed [rad/s] that a sound stop may reach beyond that at its begin
         self._stop = StopWatch(settings.period_s, settings.missed_answers_allowed)
 
     # -- before the loop --------------------------------------------------------------------------------------------
@@ -217,7 +218,7 @@ class CanopenDrive(CanopenNode, Drive):
         count, fresh = self._rad_per_count / self.settings.period_s, self._master.syncs == self._answered
         speed = abs(self._speed_counts_s) * self._rad_per_count
         answer = StopAnswer(speed, count, enabled=state is _ENABLED_STATE, fresh=fresh)
-        verdict = self._stop.step(answer, self.info.quick_stop_rad_s2)
+        verdict = self._stop.step(answer, self.info.quick_stop_rad_s2, self.stop_margin)
         if verdict is StopVerdict.ACCELERATES:
             self._latched |= Condition.RUNAWAY
         elif verdict is StopVerdict.LATE and not self._master.silent:

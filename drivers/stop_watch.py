@@ -8,8 +8,9 @@ from typing import Final, NamedTuple
 _TRANSITION_S: Final = 0.01  # some drives take several ms for a transition of the state machine
 _RAMP_MARGIN: Final = 1.5  # measured speed and the drive's ramp differ by its following error
 _RAMP_EXTRA_S: Final = 0.1  # standstill detection of drives takes some 10 ms
-_FASTER_S: Final = 0.02  # of the ramp: what a loop that takes over a weight, or swings, adds to the speed is below
-_RISING_ANSWERS: Final = 6  # over which the speed still rises: a transient of the loop is over by then
+_FASTER_S: Final = 0.02  # of the ramp: what a loop that swings adds to the speed is below
+_HALF: Final = 4  # answers between two rises of the speed that are compared
+_UNBROKEN: Final = 0.9  # share: a loop that takes over a weight slows its rise by more, one of the wrong sign does not
 _NOISE_COUNTS: Final = 4  # of the encoder, between two answers
 
 
@@ -47,29 +48,34 @@ class StopWatch:
     def reset(self) -> None:
         """Forget the stop before."""
         self._cycles, self._limit = 0, math.inf
-        self._top = 0.0  # highest speed until the drive reported the stop
-        self._speeds: deque[float] = deque(maxlen=_RISING_ANSWERS)
+        self._top = 0.0  # highest speed until the answer that reports the stop, which tells of the period before
+        self._begins = True
+        self._speeds: deque[float] = deque(maxlen=2 * _HALF + 1)
         self._accelerated = False
 
-    def step(self, answer: StopAnswer, ramp_rad_s2: float) -> StopVerdict:
-        """Judge one cycle of a stop; ramp_rad_s2: deceleration of the drive (0x6085), 0 or infinite: unknown."""
+    def step(self, answer: StopAnswer, ramp_rad_s2: float, margin: float = 0.0) -> StopVerdict:
+        """Judge one cycle of a stop. ramp_rad_s2: deceleration of the drive (0x6085), 0 or infinite: unknown. margin:
+        speed [rad/s] that a sound stop may reach beyond that at its begin; 0: what the ramp takes off in 20 ms."""
         if self._cycles == 0:
             ramp_s = _RAMP_MARGIN * answer.speed / ramp_rad_s2 if ramp_rad_s2 else math.inf
             self._limit = (ramp_s + _RAMP_EXTRA_S) / self._period_s
-        if answer.enabled or self._cycles == 0:
+        if answer.enabled or self._begins:
             self._top = max(self._top, answer.speed)
         elif answer.fresh:
             self._speeds.append(answer.speed)
+        self._begins = answer.enabled
         cycles, self._cycles = self._cycles, self._cycles + 1
-        if not self._accelerated and ramp_rad_s2 and self._rises(answer.count, ramp_rad_s2):
+        if not self._accelerated and ramp_rad_s2 and self._runs_away(answer.count, margin or _FASTER_S * ramp_rad_s2):
             self._accelerated, self._limit = True, cycles + self._answer_cycles
             return StopVerdict.ACCELERATES
         late = cycles >= (self._answer_cycles if answer.enabled else self._limit)
         return StopVerdict.LATE if late else StopVerdict.GOES_ON
 
-    def _rises(self, count: float, ramp_rad_s2: float) -> bool:
-        """Return True if the last two speeds are beyond all before the stop, and beyond that of some answers ago."""
-        if len(self._speeds) < _RISING_ANSWERS:
+    def _runs_away(self, count: float, margin: float) -> bool:
+        """Return True if the speed is beyond that before the stop, and rises no slower than some answers ago."""
+        if len(self._speeds) < 2 * _HALF + 1:
             return False
-        noise, speeds = _NOISE_COUNTS * count, list(self._speeds)
-        return min(speeds[-2:]) > max(self._top + _FASTER_S * ramp_rad_s2, speeds[0]) + noise
+        noise, speeds = _NOISE_COUNTS * count, self._speeds
+        before, lately = speeds[_HALF] - speeds[0], speeds[-1] - speeds[_HALF]
+        beyond = speeds[-1] > self._top + margin + noise
+        return beyond and lately > noise and lately >= _UNBROKEN * before

@@ -20,7 +20,6 @@ SPEED_MARGIN = 1.5  # overshoot of the velocity beyond the limit of the set-poin
 TORQUE_MARGIN = 1.5  # measured peaks beyond the limit of the command
 ACTING_SHARE = 0.3  # of the torque that can act: error of a torque constant, ripple and offset are below
 FROZEN_TORQUE_SHARE = 0.5  # of the torque that can act: stiction of a usable axis is below
-LOAD_SHARE = 0.5  # of the torque that can act: weight and process forces of a usable axis are below
 RUNAWAY_PERIODS = 3.0  # of full torque: one until it acts, one of averaging, one of noise
 SIGN_SHARE = 0.25  # of the following error: what an axis may give way before it follows its first motion
 SIGN_M = 5e-4  # rad where the axis turns
@@ -36,7 +35,7 @@ def make_bounds(rig: Devices, limits: MotionLimits | None) -> Bounds:
     difference_m = given.encoder_difference_m or error_m
     table, residual = rig.bench.encoders.table, given.residual
     drive_torque = rig.drive.info.max_torque_n_m if isinstance(rig, Rig) else math.inf
-    acting = min(torque, drive_torque)
+    acting = rig.acting_torque
     count_m = table.resolution_m if table is not None else 0.0
     motor_count_m = rig.bench.motor_count * gains.ratio_m_rad
     return Bounds(
@@ -59,7 +58,7 @@ def make_bounds(rig: Devices, limits: MotionLimits | None) -> Bounds:
         residual_motor_m=residual.motor_m if residual else math.inf,
         residual_table_m=(residual.table_m if residual else None) or math.inf,
         residual_torque=residual.torque if residual else math.inf,
-        load_torque=given.load_torque or LOAD_SHARE * acting,
+        load_torque=rig.load_torque,
         runaway_m_s=_runaway_m_s(rig.bench, acting),
         position_gain_1_s=gains.position_gain_1_s,
         sign_m=max(min(SIGN_SHARE * error_m, SIGN_M), FROZEN_COUNTS * max(motor_count_m, count_m)),

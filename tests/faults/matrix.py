@@ -43,8 +43,8 @@ REST_M_S = 1e-3
 
 
 class Run(NamedTuple):
-    """A run: seed, fault, state at which it struck, ending, cycles to detection (-1: none), violations, description, and
-    the way from detection, without one from the fault."""
+    """A run: seed, fault, state at which it struck, ending, cycles to detection (-1: none), violations, description,
+    and the way from detection, without one from the fault."""
 
     seed: int
     fault: str

@@ -10,7 +10,7 @@ import random
 from collections.abc import Callable
 from typing import Any
 
-from observed_run import PERIOD_S, Handles, Observed
+from observed_run import END_M, PERIOD_S, Handles, Observed
 from reach import ANSWER_S, REST_M
 
 from drivers.cia402 import DriveState
@@ -134,7 +134,7 @@ def sign_violations(place: str, state: DriveState, seen: Observed) -> list[str]:
     if state is DriveState.QUICK_STOP_ACTIVE:
         return wrong
     if seen.detected is None:
-        return wrong if seen.outcome is not None and abs(seen.end_m) < FIRST_MOTION_M else [*wrong, "not detected"]
+        return wrong if abs(seen.end_m - END_M) < FIRST_MOTION_M else [*wrong, "not detected"]
     way_m, allowed_m = seen.travel_m, reach_m(seen, in_drive=place == "drive")
     if way_m > allowed_m:
         wrong.append(f"travelled {1e3 * way_m:.1f} mm from detection, allowed {1e3 * allowed_m:.1f} mm")

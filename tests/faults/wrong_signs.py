@@ -28,7 +28,7 @@ STATES = (DriveState.SWITCHED_ON, DriveState.OPERATION_ENABLED, DriveState.OPERA
           DriveState.QUICK_STOP_ACTIVE)  # fmt: skip
 FIRST_MOTION_M = 1e-3  # within which the first motion after arming shows a wrong sign
 DIVERGES = 5.0  # time constants J / Kp of the drive's velocity loop until it shows
-ANSWERS = 10  # periods of full torque until the drive takes "disable voltage": six speeds, two in a row, one each way
+ANSWERS = 11  # periods of full torque until the drive takes "disable voltage": nine speeds, one each way
 
 
 class TurnedPlant:
@@ -118,7 +118,7 @@ def reach_m(seen: Observed, *, in_drive: bool) -> float:
         return speed * ANSWER_S + speed**2 / (2.0 * min(ramp, full)) + REST_M
     inertia = gains.ratio_m_rad / acceleration_m_s2(bench, 1.0)
     diverges_s = DIVERGES * inertia / gains.velocity_gain_n_m_s_rad
-    speed += 0.02 * ramp + full * ANSWERS * PERIOD_S
+    speed += gains.ratio_m_rad * rig.drive.stop_margin + full * ANSWERS * PERIOD_S
     physics = bench.axis.physics()
     alone = acceleration_m_s2(bench, physics.coulomb_n_m)
     return speed * (diverges_s + ANSWER_S) + speed**2 / (2.0 * alone) + REST_M

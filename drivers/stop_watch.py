@@ -23,11 +23,11 @@ class StopVerdict(IntEnum):
 
 
 class StopAnswer(NamedTuple):
-    """What an answer says: speed without sign since the one before [rad/s], and a count in a period [rad/s]; enabled:
+    """What an answer says: speed without sign since the one before, and one count in a period [rad/s]; enabled:
     the stop did not begin yet; fresh: it belongs to the latest SYNC."""
 
     speed: float
-    count: float
+    one_count: float
     enabled: bool
     fresh: bool
 
@@ -65,7 +65,11 @@ class StopWatch:
             self._speeds.append(answer.speed)
         self._begins = answer.enabled
         cycles, self._cycles = self._cycles, self._cycles + 1
-        if not self._accelerated and ramp_rad_s2 and self._runs_away(answer.count, margin or _FASTER_S * ramp_rad_s2):
+        if (
+            not self._accelerated
+            and ramp_rad_s2
+            and self._runs_away(answer.one_count, margin or _FASTER_S * ramp_rad_s2)
+        ):
             self._accelerated, self._limit = True, cycles + self._answer_cycles
             return StopVerdict.ACCELERATES
         late = cycles >= (self._answer_cycles if answer.enabled else self._limit)

@@ -65,11 +65,8 @@ class StopWatch:
             self._speeds.append(answer.speed)
         self._begins = answer.enabled
         cycles, self._cycles = self._cycles, self._cycles + 1
-        if (
-            not self._accelerated
-            and ramp_rad_s2
-            and self._runs_away(answer.one_count, margin or _FASTER_S * ramp_rad_s2)
-        ):
+        margin = margin or _FASTER_S * ramp_rad_s2
+        if not self._accelerated and ramp_rad_s2 and self._runs_away(answer.one_count, margin):
             self._accelerated, self._limit = True, cycles + self._answer_cycles
             return StopVerdict.ACCELERATES
         late = cycles >= (self._answer_cycles if answer.enabled else self._limit)

@@ -11,6 +11,7 @@ Every failure stops the drive as follows; the recording stays readable:
     drive trips (EMCY, fault, stale, heartbeat lost, bus-off, rebooted)  -> QUICK_STOP
     linear encoder lost: fed back to the position loop -> QUICK_STOP, else -> STOP
     following error, travel limit, loop too late, ctrl-C                -> STOP; a second time -> QUICK_STOP
+    wrong sign: faster against the torque, or in a STOP                 -> QUICK_STOP; its ramp too -> power off
     exception in the loop                                               -> QUICK_STOP unrecorded, then the exception
     stop command without answer                                         -> SYNC, heartbeat, RPDO withheld, NMT stop
 """

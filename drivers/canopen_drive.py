@@ -5,14 +5,21 @@ Faults are bits of `DriveSample.condition`. A condition of TRIPPING sets the goa
 `reset_fault`; `check` raises it as DriveFault.
 """
 
-import math
 from dataclasses import replace
 from typing import Final
 
 from drivers.acting_setpoint import MORE_CYCLES, ActingSetpoint
 from drivers.canopen_master import CanopenMaster
 from drivers.canopen_node import CanopenNode, condition_names
-from drivers.cia402 import ENABLE_OPERATION, POWERED, STATE_BY_STATUS, DriveState, OperationMode, next_controlword
+from drivers.cia402 import (
+    DISABLE_VOLTAGE,
+    ENABLE_OPERATION,
+    POWERED,
+    STATE_BY_STATUS,
+    DriveState,
+    OperationMode,
+    next_controlword,
+)
 from drivers.cia402_arming import Arming
 from drivers.cia402_setup import (
     FEEDBACK,
@@ -29,6 +36,7 @@ from drivers.cia402_setup import (
 from drivers.emcy import Emergency, error_text
 from drivers.pdo import layout, saturate
 from drivers.port import Condition, Drive, DriveFault, DriveGoal, DriveSample
+from drivers.stop_watch import StopAnswer, StopVerdict, StopWatch
 
 __all__ = ["TRIPPING", "CanopenDrive", "DriveInfo", "DriveSettings", "HomingSettings"]
 
@@ -36,12 +44,10 @@ __all__ = ["TRIPPING", "CanopenDrive", "DriveInfo", "DriveSettings", "HomingSett
 TRIPPING: Final = (
     Condition.STALE | Condition.HEARTBEAT_LOST | Condition.EMERGENCY | Condition.FAULT | Condition.DISABLED
     | Condition.BUS_OFF | Condition.NOT_OPERATIONAL | Condition.UNANSWERED | Condition.OTHER_SETPOINT
+    | Condition.RUNAWAY
 )  # fmt: skip
 # Bound once: a look-up of an enumeration member takes time in the loop.
 _OK, _ENABLED_STATE, _ENABLED = Condition.OK, DriveState.OPERATION_ENABLED, DriveGoal.ENABLED
-_TRANSITION_S: Final = 0.01  # some drives take several ms for a transition of the state machine
-_RAMP_MARGIN: Final = 1.5  # measured speed and the drive's ramp differ by its following error
-_RAMP_EXTRA_S: Final = 0.1  # standstill detection of drives takes some 10 ms
 _new = tuple.__new__  # makes a named tuple without the call of its Python constructor
 
 
@@ -71,8 +77,9 @@ class CanopenDrive(CanopenNode, Drive):
         self._torque = 0
         self._controlword = 0
         self._was_enabled = self._reset_requested = False
-        self._moved_counts = 0  # between the last two answers
-        self._stop_cycles, self._ramp_cycles = 0, math.inf  # since a stop was commanded; allowed for its ramp
+        self._speed_counts_s = 0.0  # between the last two answers
+        self.stop_margin = 0.0  # speed [rad/s] that a sound stop may reach beyond that at its begin
+        self._stop = StopWatch(settings.period_s, settings.missed_answers_allowed)
 
     # -- before the loop --------------------------------------------------------------------------------------------
 
@@ -111,7 +118,7 @@ class CanopenDrive(CanopenNode, Drive):
         self.tripped = Condition.OK
         self.goal = DriveGoal.DISABLED
         self._was_enabled = self._reset_requested = False
-        self._stop_cycles = 0
+        self._stop = StopWatch(self.settings.period_s, self.settings.missed_answers_allowed)
 
     def clear_fault(self) -> None:
         clear_fault(self._master, self.settings)
@@ -123,10 +130,13 @@ class CanopenDrive(CanopenNode, Drive):
             self.malformed_frames += 1
             return
         self._statusword, raw, self._torque = self._unpack(data)
-        self._moved_counts = ((raw - self._raw_counts + 0x80000000) & 0xFFFFFFFF) - 0x80000000
-        self._counts += self._moved_counts
+        moved = ((raw - self._raw_counts + 0x80000000) & 0xFFFFFFFF) - 0x80000000
+        self._counts += moved
         self._raw_counts = raw
+        before_s = self._sample_time_s
         self._take_answer(now_s)
+        if self._sample_time_s > before_s:
+            self._speed_counts_s = moved / (self._sample_time_s - before_s)
 
     def _on_demand(self, can_id: int, data: bytes, now_s: float) -> None:
         acting = self._acting
@@ -190,7 +200,7 @@ class CanopenDrive(CanopenNode, Drive):
             target = round(setpoint * self._target_per_unit)
             if not -32768 <= target <= 32767:  # fits every target object otherwise
                 target = self._fit(target)
-            self._stop_cycles = 0
+            self._stop.reset()
         else:
             self._await_stop(state, now_s)
             if self.goal is DriveGoal.ENABLED:
@@ -200,7 +210,7 @@ class CanopenDrive(CanopenNode, Drive):
             if self._master.silent:
                 return
             self._was_enabled = False
-            controlword = next_controlword(
+            controlword = DISABLE_VOLTAGE if self._latched & Condition.RUNAWAY else next_controlword(
                 state, enable=self.goal is DriveGoal.ENABLED, quick_stop=self.goal is DriveGoal.QUICK_STOP,
                 reset_fault=self._reset_requested, previous=self._controlword,
             )  # fmt: skip
@@ -213,27 +223,22 @@ class CanopenDrive(CanopenNode, Drive):
         self._send(self._rpdo_id, self._pack(controlword, target), now_s)
 
     def _await_stop(self, state: DriveState, now_s: float) -> None:
-        """Cut the master off if the drive stays enabled, or under power for longer than its ramp takes, after a stop
-        command. An answer that does not come counts as the state before it.
-        """
+        """Give up a stop: "disable voltage" where it accelerates the motor, and silence of the master where the drive
+        stays enabled, or under power for longer than its ramp takes. An answer that does not come counts as the state
+        before it."""
         if self.goal is DriveGoal.ENABLED or state not in POWERED:
-            self._stop_cycles = 0
+            self._stop.reset()
             return
-        period_s = self.settings.period_s
-        if self._stop_cycles == 0:
-            speed = abs(self._moved_counts) * self._rad_per_count / period_s
-            ramp_s = _RAMP_MARGIN * speed / self.info.quick_stop_rad_s2 if self.info.quick_stop_rad_s2 else math.inf
-            self._ramp_cycles = (ramp_s + _RAMP_EXTRA_S) / period_s
-        # the effect of a command is reported at the second SYNC after it, and some answers may be missed
-        answer_s = _TRANSITION_S
-        if self.goal is DriveGoal.DISABLED:  # at rest
-            answer_s = max(answer_s, self._arming.disarm_s)
-        answer_cycles = max(self.settings.missed_answers_allowed + 3, answer_s / period_s)
-        limit = answer_cycles if state is _ENABLED_STATE else self._ramp_cycles
-        if self._stop_cycles >= limit and not self._master.silent:
+        count, fresh = self._rad_per_count / self.settings.period_s, self._master.syncs == self._answered
+        speed = abs(self._speed_counts_s) * self._rad_per_count
+        answer = StopAnswer(speed, count, enabled=state is _ENABLED_STATE, fresh=fresh)
+        slowest_s = self._arming.disarm_s if self.goal is DriveGoal.DISABLED else 0.0  # at rest
+        verdict = self._stop.step(answer, self.info.quick_stop_rad_s2, self.stop_margin, slowest_s)
+        if verdict is StopVerdict.ACCELERATES:
+            self._latched |= Condition.RUNAWAY
+        elif verdict is StopVerdict.LATE and not self._master.silent:
             self._master.cut_off(now_s)
             self._latched |= Condition.UNANSWERED
-        self._stop_cycles += 1
 
     def confirm_off(self, now_s: float) -> bool:
         for statusword in switch_off(self._master, self.settings, now_s):

@@ -100,6 +100,7 @@ class Condition(IntFlag):
     DISABLED = 2048  # the drive left OPERATION ENABLED by itself
     OTHER_SETPOINT = 8192  # the set-point that acts in the drive is none of those commanded
     UNANSWERED = 4096  # the drive did not follow a stop command; the master has cut it off
+    RUNAWAY = 16384  # the drive's own stop accelerated the motor; it gets "disable voltage"
 
 
 class DriveGoal(IntEnum):

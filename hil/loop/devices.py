@@ -5,6 +5,7 @@ own connection, which the loop polls in its own thread, because a second thread 
 Another protocol is a subclass of `Devices` and one line in `PROTOCOLS`.
 """
 
+import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cached_property
@@ -39,6 +40,9 @@ def driver_errors() -> Iterator[None]:
         raise HilError(str(error)) from error
 
 
+LOAD_SHARE = 0.5  # of the torque that can act: weight and process forces of a usable axis are below
+
+
 class Devices:
     """Opened devices of a bench behind `drivers.port`; a context manager. Each protocol has a subclass."""
 
@@ -60,6 +64,16 @@ class Devices:
     def late_limit_s(self) -> float:
         """Lateness of a tick at which the axis is stopped."""
         return late_limit_s(self.bench)
+
+    @property
+    def acting_torque(self) -> float:
+        """Highest torque that can act: limit of the control law, or of the drive if it is lower [N m or N]."""
+        return self.bench.gains.torque_limit_n_m
+
+    @property
+    def load_torque(self) -> float:
+        """Torque up to which weight and process may drive the axis against its motor [N m or N]."""
+        return self.section.supervision.load_torque or LOAD_SHARE * self.acting_torque
 
     def bus_load(self) -> float:
         """Share of the bus's time used in each period; 0 where the protocol has no limit."""
@@ -124,6 +138,15 @@ class Rig(Devices):
             except DriverError:
                 self.close()
                 raise
+
+    def set_up(self) -> None:
+        super().set_up()
+        velocity_gain = self.bench.gains.velocity_gain_n_m_s_rad  # alone it holds the load at this speed
+        self.drive.stop_margin = self.load_torque / velocity_gain if velocity_gain > 0.0 else math.inf
+
+    @property
+    def acting_torque(self) -> float:
+        return min(super().acting_torque, self.drive.info.max_torque_n_m)
 
     def bus_load(self) -> float:
         """Share of the bus's time that SYNC, RPDO, TPDOs and encoder take, with the longest bit stuffing."""

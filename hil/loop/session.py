@@ -11,6 +11,7 @@ Every failure stops the drive as follows; the recording stays readable:
     drive trips (EMCY, fault, stale, heartbeat lost, bus-off, rebooted)  -> QUICK_STOP
     linear encoder lost: fed back to the position loop -> QUICK_STOP, else -> STOP
     following error, travel limit, loop too late, ctrl-C                -> STOP; a second time -> QUICK_STOP
+    wrong sign: faster against the torque, or in a STOP                 -> QUICK_STOP; its ramp too -> power off
     exception in the loop, third ctrl-C                                 -> QUICK_STOP unrecorded, then the exception
     stop command without answer                                         -> SYNC, heartbeat, RPDO withheld, NMT stop
 """
@@ -23,9 +24,9 @@ from typing import Protocol
 from drivers.port import Condition, DriveGoal, DriveSample, EncoderSample
 from hil.errors import HilError, StillPowered, StoppedByUser
 from hil.loop.clock import SKIP_FROM, Clock, LatenessLog, next_due
-from hil.loop.cycle import Cycle, Samples
+from hil.loop.cycle import STOP_SEGMENT, Cycle, Samples
 from hil.loop.devices import Devices, driver_errors
-from hil.loop.outcome import Outcome
+from hil.loop.outcome import Outcome, with_stop
 from hil.loop.stall import NO_STALL, stalled
 from hil.loop.stopping import LONGEST_STOP_S, plan_stop
 from hil.loop.supervision import Ending, find
@@ -39,7 +40,6 @@ QUICK_STOP_LIMIT_S = 2.0  # longest wait for the end of a quick stop
 AFTERMATH_S = 0.1  # recorded after the power stage is off
 DISARM_TIMEOUT_S = 0.2  # beside a ramp of the drive
 _AROUND_S = ARM_TIMEOUT_S + LONGEST_STOP_S + SETTLE_S + QUICK_STOP_LIMIT_S + AFTERMATH_S + DISARM_TIMEOUT_S
-STOP_SEGMENT = -1  # in the recording: set-points of a stop
 _NO_ENCODER = EncoderSample(0.0, 0, 0.0, 0, Condition.OK)
 
 
@@ -127,11 +127,8 @@ class Session:
                 self._power_off(DriveGoal.QUICK_STOP, f"{type(error).__name__}: {error}", error)
                 raise
         self._power_off(DriveGoal.DISABLED, f"{self._ending}: {self._reason}")
-        if self._drive.tripped & Condition.UNANSWERED:
-            if self._ending is Ending.COMPLETE:
-                self._ending = Ending.DRIVE_FAULT
-            self._reason += "; the drive did not follow its controlword: SYNC, heartbeat and set-points were withheld"
-        return Outcome(self._ending, self._reason, rows, self.late.values, self.skipped, self._stops_asked > 0)
+        ending, reason = with_stop(self._ending, self._reason, self._drive.tripped)
+        return Outcome(ending, reason, rows, self.late.values, self.skipped, self._stops_asked > 0)
 
     # -- one tick -------------------------------------------------------------------------------------------------
 
@@ -244,7 +241,7 @@ class Session:
         quick = any(finding.quick for finding in findings)
         if not findings or (stopping and not quick):  # a controlled stop goes on
             return
-        if self._phase is LoopPhase.RUN:
+        if self._phase is LoopPhase.RUN or findings[0].ending is Ending.SIGN:  # a stop may show why it became necessary
             self._ending, self._reason = findings[0].ending, findings[0].reason
         stop = None if quick else self._stop(tick, sample, seen, measured=passed != 0)
         if stop is None:  # the drive stops by itself

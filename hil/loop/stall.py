@@ -47,8 +47,12 @@ def stalled(bench: Bench, lateness_s: float, row: int, velocity_m_s: float) -> S
 
 def full_torque_acceleration_m_s2(bench: Bench) -> float:
     """Acceleration at the table of the whole axis as one body under the torque limit, without friction."""
-    gains = bench.gains
-    return gains.ratio_m_rad * gains.torque_limit_n_m / float(bench.twin().chain.inertia_kg_m2.sum())
+    return acceleration_m_s2(bench, bench.gains.torque_limit_n_m)
+
+
+def acceleration_m_s2(bench: Bench, torque: float) -> float:
+    """Acceleration at the table of the whole axis as one body under a torque [N m or N], without friction."""
+    return bench.gains.ratio_m_rad * torque / float(bench.twin().chain.inertia_kg_m2.sum())
 
 
 def command_deadline_s(bench: Bench) -> float:

@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 from drivers.port import Condition, DriverError, EncoderSample
 from hil.bench.hardware import DriveSection
-from hil.loop.checks import Limit
 from hil.loop.devices import Devices
+from hil.loop.limits import Limit
 from hil.loop.stall import NO_STALL, Stall
 
 
@@ -30,6 +30,7 @@ class Ending(StrEnum):
     VELOCITY = "velocity"
     TORQUE = "torque"
     RESIDUAL = "twin's residual"
+    SIGN = "wrong sign"
 
 
 class Reaction(StrEnum):
@@ -129,6 +130,14 @@ RULES: tuple[Trip, ...] = (
          "the motor encoder jumped further than the axis can move: check encoder and cable", _L.MOTOR_JUMP),
     Trip("table encoder jump", _E.ENCODER_FAULT, "step > velocity bound x time + frozen_m", _R.BY_FEEDBACK, "1",
          "the table encoder jumped further than the axis can move: check encoder and cable", _L.TABLE_JUMP),
+    Trip("wrong sign", _E.SIGN, "faster by runaway_m_s while the torque, > load_torque, is against the motion; or the "
+         "first motion is against the set-points by > sign_m, at most 0.5 mm", _R.QUICK_STOP, "1",
+         "feedback or torque acts with the wrong sign: the axis moves against its torque or its set-points; correct "
+         "the phase order of the motor, the direction of its encoder or the polarity (0x607E)", _L.SIGN),
+    Trip("stop without effect", _E.SIGN, "in a controlled stop: faster by runaway_m_s than at its begin, or "
+         "backwards by it; and more by what the loop may overshoot", _R.QUICK_STOP, "1",
+         "the axis got faster while the loop stopped it: feedback or torque acts with the wrong sign, or a force from "
+         "outside drives the axis", _L.STOP_FAILS),
     Trip("motor encoder frozen", _E.ENCODER_FAULT,
          "value repeats; table moved > frozen_m or measured torque changed > frozen_torque (CST)", _R.QUICK_STOP, "1",
          "the motor encoder is frozen, or the axis blocked: its value repeats while table or torque change",
@@ -149,7 +158,7 @@ RULES: tuple[Trip, ...] = (
          "the motor is faster than its bound (drive.supervision.velocity_m_s)", _L.VELOCITY),
     Trip("acting set-point", _E.DRIVE_FAULT, "smoothed measured less commanded torque > torque_difference (CST)",
          _R.QUICK_STOP, "16", "the torque differs from its command (drive.supervision.torque_difference): set-points "
-         "do not reach the drive, or it limits them", _L.ACTING_TORQUE),
+         "do not reach the drive, or it limits them or turns their sign", _L.ACTING_TORQUE),
     Trip("torque", _E.TORQUE, "measured torque > torque", _R.QUICK_STOP, "3",
          "the torque exceeds its bound (drive.supervision.torque)", _L.TORQUE),
     Trip("following error", _E.FOLLOWING_ERROR,

@@ -14,11 +14,12 @@ from drive_rig import Mass, Rig, in_process
 from drivers.bus import BusConfig, PythonCanPort, open_bus
 from drivers.canopen_drive import CanopenDrive, DriveSettings
 from drivers.canopen_master import CanopenMaster
-from drivers.cia402 import DriveState, OperationMode
+from drivers.cia402 import POWERED, DriveState, OperationMode
 from drivers.cia402_setup import CONTROLWORD, FEEDBACK
 from drivers.inprocess import InProcessBus
 from drivers.port import ConfigurationError, IdentityError, ResponseTimeout
 from drivers.sdo_setup import EDS_FOLDER, DeviceSetup, SetupNetwork
+from drivers.sim.cia402_device import STATUS
 from drivers.sim.drive_node import SimulatedDrive
 from drivers.sim.sdo_server import SdoServer
 
@@ -61,6 +62,29 @@ def test_a_late_answer_to_an_earlier_request_is_no_answer_to_this_one() -> None:
 
     rig.node_port.ignore(0x605, answer)
     rig.node_port.listen(0x605, after_a_late_one)
+    rig.set_up()
+    assert rig.drive.info.rated_torque_n_m == 4.0
+
+
+@pytest.mark.parametrize("state", POWERED[:3])
+def test_a_drive_whose_power_stays_on_is_refused(state: DriveState) -> None:
+    rig = in_process()
+    rig.node._status = lambda extra: None
+    rig.node.values[0x6041_00] = STATUS[state]
+    with pytest.raises(ConfigurationError, match=rf"still on after \"disable voltage\"; given: {state.name}, 0x"):
+        rig.set_up()
+
+
+@pytest.mark.parametrize("share", [0.9985, 1.0015])
+def test_a_rated_torque_that_is_lower_or_higher_than_described_is_refused(share: float) -> None:
+    rig = in_process(settings=DriveSettings(rated_torque_n_m=4.0 * share))  # the drive has 4 N m
+    with pytest.raises(ConfigurationError, match=r"another rated torque.*given: 4\.0 N m"):
+        rig.set_up()
+
+
+@pytest.mark.parametrize("share", [0.9995, 1.0, 1.0005])
+def test_a_rated_torque_may_differ_by_its_rounding(share: float) -> None:
+    rig = in_process(settings=DriveSettings(rated_torque_n_m=4.0 * share))
     rig.set_up()
     assert rig.drive.info.rated_torque_n_m == 4.0
 

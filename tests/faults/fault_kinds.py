@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from observed_run import Handles
+from wrong_signs import encoder_in_the_loop, in_the_drive, torque_in_the_loop
 
 from drivers.bus import BusState
 from drivers.cia402 import DriveState
@@ -32,7 +33,7 @@ DRIVE, ENCODER, HIL = "drive fault", "encoder fault", "HilError"
 SETTLING_CYCLES = 40 + 82 + 2  # a stall that passes, three time constants of the position loop
 SETPOINT_CYCLES = 3 + 4  # missed_answers + 4
 FOLLOWING, LATE, ASKED, NAN = "following error", "loop too late", "interrupted", "not a number"
-MEASURED = frozenset({ENCODER, FOLLOWING, "velocity", "torque", DRIVE, "travel limit"})
+MEASURED = frozenset({ENCODER, FOLLOWING, "velocity", "torque", DRIVE, "travel limit", "wrong sign"})
 
 
 @dataclass(frozen=True)
@@ -49,6 +50,8 @@ class Kind:
     hears: bool = True
     coasts: bool = False  # power goes off at once: friction alone stops the axis
     stalls: bool = False  # the loop does nothing for a time: the way counts from the fault
+    sign: str = ""  # what acts with the wrong sign: "loop", or "drive", whose own ramp accelerates then
+    cst: bool = False  # in this mode alone
 
 
 def _bus(kind: FaultKind, can_id: int, count: Callable[[Handles], int], **more: Any) -> Callable[[Handles], None]:
@@ -303,6 +306,10 @@ KINDS: tuple[Kind, ...] = (
     Kind("cycle late, 51 to 300 ms", _late_cycle(0.051, 0.3), _ends(LATE), 2, stalls=True),
     Kind("cycle stalls, 2 to 51 ms", _stall_within(0.002, 0.051), _ends(COMPLETE, LATE), SETTLING_CYCLES, stalls=True),
     Kind("cycle stalls, 52 to 300 ms", _stall_within(0.052, 0.3), _ends(LATE), 3, stalls=True),
+    Kind("wrong sign of the motor encoder in the loop", encoder_in_the_loop, MEASURED | _PASSES, sign="loop"),
+    Kind("wrong sign of the torque in the loop", torque_in_the_loop, MEASURED | _PASSES, sign="loop", cst=True),
+    *(Kind(f"wrong sign of the {name} in the drive", in_the_drive(encoder=name == "motor encoder"), MEASURED | _PASSES,
+           sign="drive") for name in ("motor encoder", "torque")),
     Kind("wall clock steps", _wall_clock, _PASSES),
     Kind("another set-point acts", _other_setpoint, _D, SETPOINT_CYCLES),
     Kind("recorder dead", _recorder, _ends(HIL), 2),

@@ -15,8 +15,9 @@ from drivers.bus import BusConfig, PythonCanPort, open_bus
 from drivers.canopen_drive import CanopenDrive, DriveSettings
 from drivers.canopen_master import CanopenMaster
 from drivers.cia402 import POWERED, DriveState, OperationMode
-from drivers.cia402_setup import CONTROLWORD, FEEDBACK
+from drivers.cia402_setup import FEEDBACK
 from drivers.inprocess import InProcessBus
+from drivers.pdo import Entry
 from drivers.port import ConfigurationError, IdentityError, ResponseTimeout
 from drivers.sdo_setup import EDS_FOLDER, DeviceSetup, SetupNetwork
 from drivers.sim.cia402_device import STATUS
@@ -172,7 +173,7 @@ def test_a_pdo_is_invalid_while_it_is_mapped_and_valid_afterwards(communication:
     rig.node._sdo = SdoServer(rig.node.dictionary.read, seen)
     cob_id = communication - 0x1400 + 0x205 if communication < 0x1800 else 0x185
     with DeviceSetup(rig.master.network, 5, EDS_FOLDER / "servo_drive.eds") as device:
-        entry = CONTROLWORD if communication < 0x1800 else FEEDBACK[0]
+        entry = Entry(0x6060 if communication < 0x1800 else 0x6061, 0, 8, True)  # not the mapping it has
         device.map_pdo(communication, (entry,), 1, cob_id)
     mapping = communication + 0x200
     assert written == [

@@ -94,7 +94,7 @@ def test_the_axis_is_stopped_two_periods_before_the_deadline_or_at_the_overrun()
 
 
 def test_the_axis_is_stopped_before_the_drive_misses_a_heartbeat() -> None:
-    """Three are awaited and one may have been due: two of them, less two periods; one where they are that short."""
+    """Three are awaited and one may have been due: two of them less two periods, and no less than a period."""
     patient = {"command_deadline_s": 1.0, "overrun_s": 1.0}
     limits_s = [late_limit_s(bench_with(drive=patient | {"heartbeat_s": given})) for given in (0.02, 0.1, 0.001)]
     assert limits_s == pytest.approx([0.038, 0.198, 0.001])

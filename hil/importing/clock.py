@@ -44,16 +44,12 @@ def find_clock(table: ForeignTable, labels: dict[str, Label], rate_hz: float | N
         return _of_rate(rows, rate_hz, "given with --rate")
     told = _written_rate(table)
     named = time_columns(table, labels)
+    even = [rate for name in named if (rate := _of_intervals(table, labels, name))]
     found = clock_of(table, labels, named or _unnamed(table, labels), told)
-    if found is not None:
+    if found is not None and not even:
         return found
-    for name in named:
-        values = table.columns[name] * SECONDS.get(labels[name].unit or "", 0.0)
-        usual = float(np.median(values[1:])) if values.size > 2 else 0.0
-        if usual > 0.0 and np.all(np.abs(values[1:] - usual) < _INTERVAL * usual) and _plausible(1.0 / usual):
-            return _of_rate(rows, 1.0 / usual, f"intervals in the column {name}")
-    if told is not None:
-        return _of_rate(rows, *told)
+    if even or told:
+        return _of_rate(rows, *(even[0] if even else told or (0.0, "")))
     text = next((remark for remark in table.remarks if label(remark.split(":")[0]).quantity is Quantity.TIME), None)
     raise InputError(
         f"{table.path}: no column of time stamps is found"
@@ -75,7 +71,9 @@ def clock_of(
     The one with most different stamps counts; a column of fractions of a second is added to one of whole seconds.
     `told` is the rate [Hz] that the file gives elsewhere, with its source.
     """
-    stamps = [_stamps(table, labels, name) for name in names if growing(table.columns[name])]
+    # rows out of order make no clock of any column; they are refused by what is named one
+    grow = [name for name in names if growing(table.columns[name])] or list(names[:1])
+    stamps = [_stamps(table, labels, name) for name in grow if np.nanmax(table.columns[name], initial=0.0)]
     others = [name for name, one in labels.items() if one.quantity in (Quantity.TIME, Quantity.UNKNOWN)]
     for name in others:
         if name in table.columns and name not in [one.time.column for one in stamps]:
@@ -103,6 +101,14 @@ def clock_of(
     by_name = labels[best.time.column].quantity is Quantity.TIME or best.time.unit == "date"
     how = "by its name" if by_name else "grows by equal steps"
     return StampClock(best.seconds - best.seconds[0], best.time, None, how, tuple(notes))
+
+
+def _of_intervals(table: ForeignTable, labels: dict[str, Label], name: str) -> tuple[float, str] | None:
+    """Rate of a column of time that holds the interval of each row, all equal, in a unit that the file says."""
+    values = table.columns[name] * SECONDS.get(labels[name].unit or "", 0.0)
+    usual = float(np.median(values[1:]))
+    even = usual > 0.0 and name not in table.dates and bool(np.all(np.abs(values[1:] - usual) < _INTERVAL * usual))
+    return (1.0 / usual, f"intervals in the column {name}") if even and _plausible(1.0 / usual) else None
 
 
 def _stamps(table: ForeignTable, labels: dict[str, Label], name: str) -> Stamps:

@@ -26,6 +26,7 @@ class Label:
     unit: str | None
     odd_unit: bool = False
     electric: str | None = None  # A or V if the word says current or voltage
+    part: bool = False  # of a torque: friction, gravity
     letter: bool = False  # one letter says its quantity, beside nothing else that is known
 
     @property
@@ -69,6 +70,7 @@ def label(column: str, unit_text: str = "", words_beside: str = "") -> Label:
         unit,
         odd,
         _electric(words) if quantity is Quantity.EFFORT else None,
+        _any(words, known.part),
         not words_beside and quantity is not Quantity.TIME and (len(name.strip()) == 1 or (letter and _strange(words))),
     )
 

@@ -6,8 +6,6 @@ from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
-
 from hil.errors import InputError
 from hil.files.date_stamps import is_date
 from hil.importing.header_rows import COMMENT, Header, read_header
@@ -94,10 +92,8 @@ def _layout(path: Path, body: list[str]) -> _Layout:
         # a blank counts only where nothing else separates
         score = (share - (0.01 if delimiter == " " else 0.0), width)
         if score > best:
-            told = (
-                np.mean([number_of(field, form) is not None for field in column]) for column in zip(*whole, strict=True)
-            )
-            best, found = score, _Layout(delimiter, form, tuple(share > _MOSTLY for share in told))
+            told = ([number_of(field, form) is not None for field in column] for column in zip(*whole, strict=True))
+            best, found = score, _Layout(delimiter, form, tuple(sum(one) > _MOSTLY * len(one) for one in told))
     if best[0] < _LEAST_SHARE:
         raise InputError(
             f"{path}: has no rows of numbers in two columns or more, its lines are such as {body[-1].strip()[:60]!r}; "

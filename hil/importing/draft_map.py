@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from hil.channels import CHANNELS
+from hil.errors import InputError
 from hil.importing.channel_clocks import on_one_clock
 from hil.importing.channel_entries import ChannelEntries
 from hil.importing.clock import find_clock
@@ -48,7 +49,8 @@ def draft_map(path: Path, rate_hz: float | None = None, axis: str | None = None)
     dense = filled | {"time_s": clock.time_s}
     dense = with_gaps_filled(dense)[0] if moving_little(dense, named) else dense
     regular = at_regular_times(path, {name: dense[name] for name in filled}, dense["time_s"])
-    roles = find_roles(str(path), regular.longest_part(), labels, regular.period_s, axis)
+    roles = find_roles(str(path), regular.longest_part(), labels, regular.period_s, axis, table.constants)
+    _refuse_same_name(table, roles.used)
     used = {name: columns[name] for name in roles.used}
     refuse_missing(table, used)
     # only now it is known which columns must be complete, and which repeat when a sample does
@@ -119,6 +121,16 @@ def _with_scale(one: DraftedChannel, table: ForeignTable, lead_m: float | None) 
         one.entry["offset"] = offset * (in_si or 0.0)
     if factor != 1.0:
         one.entry["scale"] = float(str(one.entry.get("scale", 1.0))) * factor
+
+
+def _refuse_same_name(table: ForeignTable, used: Collection[str]) -> None:
+    titles = [table.titles.get(name, name) for name in used]
+    twice = next((title for title in titles if titles.count(title) > 1), None)
+    if twice is not None:
+        raise InputError(
+            f"{table.path}: {twice!r} names two columns of the header that may both be used, allowed one; say which by a "
+            "map with csv.column_names: hil import FILE --map MAP.yaml"
+        )
 
 
 def _scale_notes(table: ForeignTable, used: Collection[str]) -> list[str]:

@@ -15,6 +15,7 @@ from hil.importing.units import unit_of_text
 
 COMMENT = re.compile(r"^\s*(#|%|//)+\s?")
 _UNIT = re.compile(r"[\[(]?\s*[a-zA-Zµμ°%‰Ω·/^*\d. _-]{0,14}\s*[\])]?(\s*\(\w*\))?")
+NAMELESS = "column "  # beginning of the name of a column over which nothing stands
 _NEAR = 4  # lines above the numbers whose text may be that of the columns, where they have none else
 
 
@@ -158,7 +159,7 @@ def _different(named: Row | None, texts: Sequence[Row], width: int) -> tuple[str
     pairs = named is not None and width % 2 == 0 and not any(named.fields[::2]) and all(named.fields[1::2])
     for index in range(width):
         title = _title(named, texts, index) if named else ""
-        name = title or (f"time{index // 2 + 1}" if pairs else f"column {index + 1}")
+        name = title or (f"time{index // 2 + 1}" if pairs else f"{NAMELESS}{index + 1}")
         times = 1 + sum(one == name or one.rpartition(" (")[0] == name for one in names)
         names.append(name if times == 1 else f"{name} ({times})")
     return tuple(names)

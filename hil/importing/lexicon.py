@@ -110,6 +110,7 @@ class Lexicon(_Entry):
     measured: Words
     motor: Words
     table: Words
+    part: Words
     attached_after: Words
     attached_before: Words
     electric: dict[Literal["A", "V"], Words]

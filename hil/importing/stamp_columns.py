@@ -13,7 +13,7 @@ from hil.recording.stamps import REPEATS
 SLOWEST_HZ, FASTEST_HZ = 5.0, 2e5  # of recordings of an axis: outside lies a wrong unit of the stamps
 SLOWEST_TOLD_HZ = 2.0  # with a unit in the name
 _SAME = 0.02  # relative deviation of a clock from another one of the same rows
-_BACK = 1e-3  # share of the rows at which stamps may run back: more is no clock
+_FORWARDS = 0.5  # of the way of stamps: less is no clock
 _UNEVEN = 3.0  # times the usual step, of stamps that are made of two columns
 # Seconds from the beginning of a clock's count to 1970: of Unix, of Windows (1601), of .NET (year 1).
 _EPOCHS_S = {"s": (0.0,), "ms": (0.0,), "us": (0.0,), "ns": (0.0,), "100 ns": (11644473600.0, 62135596800.0)}
@@ -57,9 +57,9 @@ class Stamps:
 
 
 def growing(stamps: FloatArray) -> bool:
-    """True for stamps (n,) that hardly ever run back, and are not all equal."""
+    """True for stamps (n,) that go forwards for most of their way; a fraction of a second begins again and again."""
     steps = np.diff(stamps[np.isfinite(stamps)])
-    return bool(steps.size and np.mean(steps < 0.0) <= _BACK and steps.any())
+    return bool(steps.sum() > _FORWARDS * np.abs(steps).sum())
 
 
 def fraction_of(coarse: Stamps, name: str, values: FloatArray, told: Label) -> Stamps | None:

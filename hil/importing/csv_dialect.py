@@ -17,6 +17,7 @@ SAMPLE_LINES = 400  # from the beginning, more than any preamble, and as many fr
 MOST_LINES = 200_000  # read for the draft: minutes of a recording
 _DELIMITERS = (";", "\t", ",", "|", " ")
 _LEAST_SHARE = 0.3  # of fields with numbers or dates
+_PAIRED = 0.1  # share of the rows that all channels of a file have, if some end before the others
 _MOSTLY = 0.5  # share of the rows in which a column of numbers has some
 _FOLLOW = 3  # rows of numbers in turn, at which they begin
 _ENCODINGS = ("utf-8", "cp1252", "cp850")  # the last one reads every byte
@@ -84,6 +85,9 @@ def _layout(path: Path, body: list[str]) -> _Layout:
         rows = [split_line(line, delimiter) for line in body]
         widths = [len(row) for row in rows]
         width = max(widths, key=widths.count, default=0)
+        wide = max((one for one in set(widths) if widths.count(one) > _PAIRED * len(rows)), default=width)
+        if wide % 2 == 0 and wide >= width + 2:  # channels of lower rate, with their times, end before the others
+            width, rows = wide, [row for row in rows if len(row) == wide]
         if width < 2:
             continue
         whole = [["" if is_date(field) else field for field in row] for row in rows if len(row) == width]

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from hil.arrays import FloatArray
 from hil.channels import CHANNELS
 from hil.errors import InputError
 from hil.importing.channel_clocks import on_one_clock
@@ -18,7 +19,7 @@ from hil.importing.held_samples import rows_per_slowest_sample
 from hil.importing.lexicon import Quantity
 from hil.importing.map_draft import DraftedChannel, MapDraft
 from hil.importing.map_file import ChannelSource
-from hil.importing.on_change import held, written_on_change
+from hil.importing.on_change import held, written_in_turn, written_on_change
 from hil.importing.roles import find_roles
 from hil.importing.rows import at_regular_times, complete_rows, filled_in, without_duplicates
 from hil.importing.slow_gaps import moving_little, with_gaps_filled
@@ -33,14 +34,14 @@ def draft_map(path: Path, rate_hz: float | None = None, axis: str | None = None)
     table = read_table(path)
     own = on_one_clock(table, _labels(table))
     table = own.table
-    on_change = [name for name, values in table.columns.items() if written_on_change(values)]
+    on_change = [name for name, values in table.columns.items() if written_on_change(values) or written_in_turn(values)]
     filled_up = {name: held(table.columns[name]) for name in on_change}
     distinct = without_duplicates(table.columns | filled_up)
     lines = table.lines[distinct.rows] if table.lines is not None else None
     table = replace(table, columns=distinct.columns, lines=lines)
     labels = _labels(table)
     clock = find_clock(table, labels, rate_hz)
-    columns = {name: values for name, values in table.columns.items() if name not in clock.columns}
+    columns = {name: _scaled(table, name) for name in table.columns if name not in clock.columns}
     may_wrap = [name for name in columns if labels[name].quantity in (Quantity.POSITION, Quantity.UNKNOWN)]
     wraps = {name: size for name in may_wrap if (size := wrap_range(columns[name])) is not None}
     columns |= {name: unwrapped(columns[name], size) for name, size in wraps.items()}
@@ -101,7 +102,7 @@ def draft_map(path: Path, rate_hz: float | None = None, axis: str | None = None)
     for one in draft.channels:
         entry, column = one.entry, str(one.entry["column"])
         _with_scale(one, table, draft.lead_m)
-        entry |= {"time": own.times[column].model_dump(exclude_none=True)} if column in own.times else {}
+        entry |= {"time": own.times[column].model_dump(exclude_defaults=True)} if column in own.times else {}
         entry |= {"wraps_at": wraps[column] / table.scales.get(column, (1.0, 0.0))[0]} if column in wraps else {}
         entry |= {"empty": "hold"} if column in on_change else {}
     return draft
@@ -111,6 +112,12 @@ def _labels(table: ForeignTable) -> dict[str, Label]:
     """Meaning of the columns by all that the file says of them."""
     told = {name: (table.units.get(name, ""), table.words.get(name, "")) for name in table.columns}
     return {name: replace(label(table.titles.get(name, name), *of), column=name) for name, of in told.items()}
+
+
+def _scaled(table: ForeignTable, name: str) -> FloatArray:
+    """A column (n,) with the factor and offset that the file gives for it."""
+    factor, offset = table.scales.get(name, (1.0, 0.0))
+    return factor * table.columns[name] + offset
 
 
 def _with_scale(one: DraftedChannel, table: ForeignTable, lead_m: float | None) -> None:
@@ -128,8 +135,8 @@ def _refuse_same_name(table: ForeignTable, used: Collection[str]) -> None:
     twice = next((title for title in titles if titles.count(title) > 1), None)
     if twice is not None:
         raise InputError(
-            f"{table.path}: {twice!r} names two columns of the header that may both be used, allowed one; say which by a "
-            "map with csv.column_names: hil import FILE --map MAP.yaml"
+            f"{table.path}: {twice!r} names two columns of the header that may both be used, allowed one; say which "
+            "by a map with csv.column_names: hil import FILE --map MAP.yaml"
         )
 
 

@@ -45,7 +45,7 @@ def choose_efforts(
     shares = {name: max(driven(live[name], moved, period_s).share, 0.0) for name in names}
     best = max(shares.values(), default=0.0)
     for name in list(names):
-        if shares[name] < NOTHING or (best > EXPLAINED and shares[name] < _WEAK * best):
+        if (best > NOTHING > shares[name]) or (best > EXPLAINED and shares[name] < _WEAK * best):
             found.left_out[name] = f"inertia and friction of the motion explain {shares[name]:.0%} of it"
             names = [one for one in names if one != name]
 

@@ -146,11 +146,11 @@ def _check(
     given: Callable[[int, str], str],
     share: float,
 ) -> None:
-    first, *others = columns.items()
-    for name, values in others:
-        if values.size != first[1].size:
+    first = next(iter(columns), "")
+    for name, values in columns.items():
+        if values.size != columns[first].size:
             raise InputError(
-                f"{path}: {name}: given {values.size} rows, {first[0]} has {first[1].size}; "
+                f"{path}: {name}: given {values.size} rows, {first} has {columns[first].size}; "
                 "all columns must be equally long"
             )
     for name, values in columns.items():

@@ -18,6 +18,7 @@ COMMENT = re.compile(r"^\s*(#|%|//)+\s?")
 _UNIT = re.compile(r"[\[(]?\s*[a-zA-Zµμ°%‰Ω·/^*\d. _-]{0,14}\s*[\])]?(\s*\(\w*\))?")
 NAMELESS = "column "  # beginning of the name of a column over which nothing stands
 _BRACKET = re.compile(r"[\[(](.*?)[\])]")
+_FACTOR = re.compile(r"(?:(?P<value>\d+(?:[.,]\d+)?)|1/(?P<part>\d+))\s*[*x·]?\s*(?P<unit>[^\d\s].*)")
 _WORD = re.compile(r"[^\W\d]")
 _NEAR = 4  # lines above the numbers whose text may be that of the columns, where they have none else
 
@@ -92,6 +93,8 @@ def read_header(lines: Sequence[str], delimiter: str, width: int, form: NumberFo
             case _ if row is not named:
                 header.notes.append(f"header: line {row.line + 1} is not used: {shown(row.text)!r}")
         used.add(row.line)
+    for name in header.names:
+        _read_factor(header, name)
     if named is None:
         near = [index for index in range(len(lines)) if lines[index].strip() and index not in used][-_NEAR:]
         if near and len(split_line(COMMENT.sub("", lines[near[-1]]), delimiter)) > 1:
@@ -149,7 +152,7 @@ def _kind(fields: Sequence[str], form: NumberForm) -> RowKind:
         return RowKind.UNKNOWN
     if all(re.sub(r"\d+$", "", one.lower()) in lexicon().types for one in named):
         return RowKind.TYPES
-    units = sum(unit_of_text(one) is not None or one in ("-", "[-]", "[]") for one in named)
+    units = sum(unit_of_text(one) is not None or one in ("-", "[-]", "[]") or bool(_factor(one)) for one in named)
     if all(_UNIT.fullmatch(one) for one in named) and units >= max(1, len(named) / 2):
         return RowKind.UNITS
     return RowKind.TEXT if sum(bool(_WORD.search(one)) for one in named) > len(named) / 2 else RowKind.UNKNOWN
@@ -188,6 +191,23 @@ def _different(named: Row | None, texts: Sequence[Row], width: int) -> tuple[str
         times = 1 + sum(one == name or one.rpartition(" (")[0] == name for one in names)
         names.append(name if times == 1 else f"{name} ({times})")
     return tuple(names)
+
+
+def _read_factor(header: Header, name: str) -> None:
+    """Take the number before a unit as a factor: [0.1 Nm], 1/100 deg."""
+    bracket = _BRACKET.search(header.titles.get(name, name))
+    text = header.units.get(name, bracket[1] if bracket else "").strip(" []()")
+    if match := _factor(text):
+        value = float((match["value"] or match["part"]).replace(",", "."))
+        factor, offset = header.scales.get(name, (1.0, 0.0))
+        header.scales[name] = factor * (value if match["value"] else 1.0 / value), offset
+        header.units[name] = match["unit"]
+
+
+def _factor(text: str) -> re.Match[str] | None:
+    """Number and unit of a text that is no unit itself."""
+    match = _FACTOR.fullmatch(text.strip(" []()"))
+    return match if match and unit_named(text) is None and unit_named(match["unit"]) else None
 
 
 def _number(text: str, form: NumberForm) -> float | None:

@@ -11,14 +11,14 @@ from hil.importing.column_names import label, plain_words
 from hil.importing.lexicon import RowKind, lexicon
 from hil.importing.map_file import SECONDS
 from hil.importing.number_form import NumberForm, number_of
-from hil.importing.text_rows import shown, split_line
+from hil.importing.text_rows import label_of_pairs, shown, split_line
 from hil.importing.units import unit_named, unit_of_text
 
 COMMENT = re.compile(r"^\s*(#|%|//)+\s?")
 _UNIT = re.compile(r"[\[(]?\s*[a-zA-Zµμ°%‰Ω·/^*\d. _-]{0,14}\s*[\])]?(\s*\(\w*\))?")
 NAMELESS = "column "  # beginning of the name of a column over which nothing stands
 _BRACKET = re.compile(r"[\[(](.*?)[\])]")
-_FACTOR = re.compile(r"(?:(?P<value>\d+(?:[.,]\d+)?)|1/(?P<part>\d+))\s*[*x·]?\s*(?P<unit>[^\d\s].*)")
+_FACTOR = re.compile(r"(?:(?P<value>\d+(?:[.,]\d+)?)|1/(?P<part>\d+))\s*[*x·]?\s*(?P<unit>[^\d\s/].*)")
 _WORD = re.compile(r"[^\W\d]")
 _NEAR = 4  # lines above the numbers whose text may be that of the columns, where they have none else
 
@@ -112,8 +112,8 @@ def _row(index: int, line: str, delimiter: str, width: int, form: NumberForm) ->
     fields = split_line(rest if kind else text, delimiter)
     while len(fields) > width and not fields[-1]:
         fields.pop()
-    if width > 2 and width % 2 == 0 and len(fields) == width and len({_unnumbered(one) for one in fields[::2]}) == 1:
-        kind = _kind_of_label(_unnumbered(fields[0]))  # a column of time beside each channel
+    if len(fields) == width and (pair := label_of_pairs(fields)):  # a column of time beside each channel
+        kind = _kind_of_label(pair)
         fields = [one for value in fields[1::2] for one in ("", value)]
     elif kind is None and len(fields) in (width, width + 1) and (kind := _kind_of_label(fields[0])):
         fields = ["", *fields[1:]] if len(fields) == width else fields[1:]
@@ -124,11 +124,6 @@ def _row(index: int, line: str, delimiter: str, width: int, form: NumberForm) ->
         return None
     fields += [""] * (width - len(fields))
     return Row(index, line, kind or _kind(fields, form), tuple(fields), given == width)
-
-
-def _unnumbered(label: str) -> str:
-    """A label without its number, or a text of its own where there is none: 0.Name -> Name."""
-    return re.sub(r"[\d.]+", "", label)
 
 
 def _regrouped(text: str, delimiter: str, width: int) -> list[str]:

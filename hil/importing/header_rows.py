@@ -24,7 +24,7 @@ _NEAR = 4  # lines above the numbers whose text may be that of the columns, wher
 
 
 @dataclass(frozen=True)
-class Row:
+class HeaderRow:
     """A row above the numbers with a field for each column; its line (from 0) and text."""
 
     line: int
@@ -105,7 +105,7 @@ def read_header(lines: Sequence[str], delimiter: str, width: int, form: NumberFo
     return header
 
 
-def _row(index: int, line: str, delimiter: str, width: int, form: NumberForm) -> Row | None:
+def _row(index: int, line: str, delimiter: str, width: int, form: NumberForm) -> HeaderRow | None:
     text = COMMENT.sub("", line)
     word, colon, rest = text.partition(":")
     kind = _kind_of_label(word) if colon and delimiter not in word else None
@@ -123,7 +123,7 @@ def _row(index: int, line: str, delimiter: str, width: int, form: NumberForm) ->
     if given not in (width, width - 1) or not any(fields):
         return None
     fields += [""] * (width - len(fields))
-    return Row(index, line, kind or _kind(fields, form), tuple(fields), given == width)
+    return HeaderRow(index, line, kind or _kind(fields, form), tuple(fields), given == width)
 
 
 def _regrouped(text: str, delimiter: str, width: int) -> list[str]:
@@ -153,7 +153,7 @@ def _kind(fields: Sequence[str], form: NumberForm) -> RowKind:
     return RowKind.TEXT if sum(bool(_WORD.search(one)) for one in named) > len(named) / 2 else RowKind.UNKNOWN
 
 
-def _names(texts: Sequence[Row]) -> Row | None:
+def _names(texts: Sequence[HeaderRow]) -> HeaderRow | None:
     """The row of names: one that says so, else that with most words of quantities, else the last."""
     told = next((row for row in texts if row.kind is RowKind.NAMES), None)
     if told or not texts:
@@ -162,7 +162,7 @@ def _names(texts: Sequence[Row]) -> Row | None:
     return next(row for row in (texts if best else reversed(texts)) if row.sure == best)
 
 
-def _titles(named: Row | None, texts: Sequence[Row], names: Sequence[str]) -> dict[str, str]:
+def _titles(named: HeaderRow | None, texts: Sequence[HeaderRow], names: Sequence[str]) -> dict[str, str]:
     """Text of each column whose name is another one: a repeated one, or one of another row."""
     if named is None:
         return {}
@@ -170,13 +170,13 @@ def _titles(named: Row | None, texts: Sequence[Row], names: Sequence[str]) -> di
     return {name: title for name, title in own if title and name != title}
 
 
-def _title(named: Row, texts: Sequence[Row], index: int) -> str:
+def _title(named: HeaderRow, texts: Sequence[HeaderRow], index: int) -> str:
     """Text over a column: of the row of names if it has letters there, else of another row."""
     fields = [named.fields[index], *(row.fields[index] for row in texts)]
     return next((one for one in fields if _WORD.search(one)), fields[0])
 
 
-def _different(named: Row | None, texts: Sequence[Row], width: int) -> tuple[str, ...]:
+def _different(named: HeaderRow | None, texts: Sequence[HeaderRow], width: int) -> tuple[str, ...]:
     """Names of the columns, different from each other: Time, Time (2)."""
     names: list[str] = []
     pairs = named is not None and width % 2 == 0 and not any(named.fields[::2]) and all(named.fields[1::2])

@@ -9,7 +9,14 @@ from hypothesis import strategies as st
 
 from hil.importing.number_form import NumberForm, find_form, number_of, numbers_of
 
-FORMS = [NumberForm("."), NumberForm(","), NumberForm(".", ","), NumberForm(",", "."), NumberForm(".", "'"), NumberForm(",", " ")]  # fmt: skip
+FORMS = [
+    NumberForm("."),
+    NumberForm(","),
+    NumberForm(".", ","),
+    NumberForm(",", "."),
+    NumberForm(".", "'"),
+    NumberForm(",", " "),
+]
 
 
 def written(value: float, form: NumberForm, decimals: int) -> str:
@@ -42,6 +49,8 @@ def test_marks_of_whole_numbers_are_thousands_only_beside_smaller_ones() -> None
     assert find_form(lengths)[0] == NumberForm(".")
 
 
-@pytest.mark.parametrize(("text", "value"), [("+ 0.5", 0.5), ("- 2", -2.0), ("\u22121.5", -1.5), ("1_0", None), ("OK", None)])  # fmt: skip
+@pytest.mark.parametrize(
+    ("text", "value"), [("+ 0.5", 0.5), ("- 2", -2.0), ("\u22121.5", -1.5), ("1_0", None), ("OK", None)]
+)
 def test_signs_and_texts(text: str, value: float | None) -> None:
     assert number_of(text, NumberForm()) == value

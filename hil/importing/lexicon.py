@@ -30,6 +30,19 @@ class Quantity(StrEnum):
     UNKNOWN = "unknown"
 
 
+class RowKind(StrEnum):
+    """Kind of a row above the numbers: by a word before its fields, else by the fields (TEXT, UNKNOWN)."""
+
+    NAMES = "names"
+    UNITS = "units"
+    TYPES = "types"
+    SCALE = "scale"
+    OFFSET = "offset"
+    PERIOD = "period"
+    TEXT = "text"
+    UNKNOWN = "unknown"
+
+
 class Constant(StrEnum):
     """Constant that a file may give beside its columns."""
 
@@ -97,6 +110,7 @@ class Lexicon(_Entry):
     measured: Words
     motor: Words
     table: Words
+    part: Words
     attached_after: Words
     attached_before: Words
     electric: dict[Literal["A", "V"], Words]
@@ -110,8 +124,8 @@ class Lexicon(_Entry):
     scalars: ScalarNames
     missing: Words
     infinite: Words
-    name_line: Words
-    unit_line: Words
+    rows: dict[RowKind, Annotated[str, BeforeValidator(_pattern)]]
+    types: Words
 
     @model_validator(mode="after")
     def _is_complete(self) -> Self:
@@ -139,7 +153,7 @@ class Lexicon(_Entry):
 def plain_spelling(unit: str) -> str:
     """Text of a unit in lower case, without blanks, multiplication signs and points, with plain digits."""
     key = unicodedata.normalize("NFKC", unit).strip().lower().replace("μ", "µ")
-    return re.sub(r"[\s·*⋅.]+", "", key)
+    return re.sub(r"/se[ck]\b", "/s", re.sub(r"[\s·*⋅.]+", "", key))
 
 
 @cache

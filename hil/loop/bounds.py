@@ -7,6 +7,7 @@ import numpy as np
 from hil.bench.bench_file import Bench
 from hil.bench.hardware import DriveMode
 from hil.channels import AxisKind
+from hil.control.cascade import Gains
 from hil.loop.cycle import Cycle, Setpoint, Watch
 from hil.loop.devices import Devices, Rig
 from hil.loop.limits import Bounds
@@ -21,7 +22,9 @@ TORQUE_MARGIN = 1.5  # measured peaks beyond the limit of the command
 ACTING_SHARE = 0.3  # of the torque that can act: error of a torque constant, ripple and offset are below
 FROZEN_TORQUE_SHARE = 0.5  # of the torque that can act: stiction of a usable axis is below
 RUNAWAY_PERIODS = 3.0  # of full torque: one until it acts, one of averaging, one of noise
-SIGN_SHARE = 0.25  # of the following error: what an axis may give way before it follows its first motion
+SIGN_SHARE = (
+    0.25  # of the following error, at most SIGN_M, at least what the loop yields to a load: way of the first motion
+)
 SIGN_M = 5e-4  # rad where the axis turns
 
 
@@ -61,8 +64,19 @@ def make_bounds(rig: Devices, limits: MotionLimits | None) -> Bounds:
         load_torque=rig.load_torque,
         runaway_m_s=_runaway_m_s(rig.bench, acting),
         position_gain_1_s=gains.position_gain_1_s,
-        sign_m=max(min(SIGN_SHARE * error_m, SIGN_M), FROZEN_COUNTS * max(motor_count_m, count_m)),
+        sign_m=max(
+            min(SIGN_SHARE * error_m, SIGN_M),
+            FROZEN_COUNTS * max(motor_count_m, count_m),
+            _yield_m(gains, rig.load_torque),
+        ),
     )
+
+
+def _yield_m(gains: Gains, load_torque: float) -> float:
+    """Way by which the loop yields to a load until its integrator, or its position loop, holds it."""
+    by_position = gains.velocity_gain_n_m_s_rad * gains.position_gain_1_s
+    stiffness = max(gains.integral_gain_n_m_rad, by_position)
+    return load_torque * gains.ratio_m_rad / stiffness if stiffness > 0.0 else math.inf
 
 
 def _runaway_m_s(bench: Bench, torque: float) -> float:

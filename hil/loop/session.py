@@ -241,7 +241,7 @@ class Session:
         quick = any(finding.quick for finding in findings)
         if not findings or (stopping and not quick):  # a controlled stop goes on
             return
-        if self._phase is LoopPhase.RUN or findings[0].ending is Ending.SIGN:  # a stop may show why it became necessary
+        if self._phase is LoopPhase.RUN or findings[0].ending in (Ending.SIGN, Ending.STOP_FAILS):  # the graver
             self._ending, self._reason = findings[0].ending, findings[0].reason
         stop = None if quick else self._stop(tick, sample, seen, measured=passed != 0)
         if stop is None:  # the drive stops by itself

@@ -31,6 +31,7 @@ class Ending(StrEnum):
     TORQUE = "torque"
     RESIDUAL = "twin's residual"
     SIGN = "wrong sign"
+    STOP_FAILS = "stop without effect"
 
 
 class Reaction(StrEnum):
@@ -131,13 +132,13 @@ RULES: tuple[Trip, ...] = (
     Trip("table encoder jump", _E.ENCODER_FAULT, "step > velocity bound x time + frozen_m", _R.BY_FEEDBACK, "1",
          "the table encoder jumped further than the axis can move: check encoder and cable", _L.TABLE_JUMP),
     Trip("wrong sign", _E.SIGN, "faster by runaway_m_s while the torque, > load_torque, is against the motion; or the "
-         "first motion is against the set-points by > sign_m, at most 0.5 mm", _R.QUICK_STOP, "1",
+         "first motion is against the set-points by > sign_m", _R.QUICK_STOP, "1",
          "feedback or torque acts with the wrong sign: the axis moves against its torque or its set-points; correct "
          "the phase order of the motor, the direction of its encoder or the polarity (0x607E)", _L.SIGN),
-    Trip("stop without effect", _E.SIGN, "in a controlled stop: faster by runaway_m_s than at its begin, or "
+    Trip("stop without effect", _E.STOP_FAILS, "in a controlled stop: faster by runaway_m_s than at its begin, or "
          "backwards by it; and more by what the loop may overshoot", _R.QUICK_STOP, "1",
-         "the axis got faster while the loop stopped it: feedback or torque acts with the wrong sign, or a force from "
-         "outside drives the axis", _L.STOP_FAILS),
+         "the axis got faster while the loop stopped it: feedback or torque acts with the wrong sign, the loop is "
+         "unstable, or a force from outside drives the axis", _L.STOP_FAILS),
     Trip("motor encoder frozen", _E.ENCODER_FAULT,
          "value repeats; table moved > frozen_m or measured torque changed > frozen_torque (CST)", _R.QUICK_STOP, "1",
          "the motor encoder is frozen, or the axis blocked: its value repeats while table or torque change",

@@ -33,7 +33,9 @@ DRIVE, ENCODER, HIL = "drive fault", "encoder fault", "HilError"
 SETTLING_CYCLES = 40 + 82 + 2  # a stall that passes, three time constants of the position loop
 SETPOINT_CYCLES = 3 + 4  # missed_answers + 4
 FOLLOWING, LATE, ASKED, NAN = "following error", "loop too late", "interrupted", "not a number"
-MEASURED = frozenset({ENCODER, FOLLOWING, "velocity", "torque", DRIVE, "travel limit", "wrong sign"})
+MEASURED = frozenset(
+    {ENCODER, FOLLOWING, "velocity", "torque", DRIVE, "travel limit", "wrong sign", "stop without effect"}
+)
 
 
 @dataclass(frozen=True)

@@ -157,7 +157,7 @@ def table(runs: list[Run]) -> str:
     for name, group in by.items():
         cycles = sorted(run.cycles for run in group if run.cycles >= 0 and run.state == ENABLED.name)
         spread = f"{cycles[len(cycles) // 2]}, {cycles[-1]}" if cycles else ""
-        far_mm = 1e3 * max(run.travel_m for run in group)
+        far_mm = 1e3 * max((run.travel_m for run in group if run.cycles >= 0), default=0.0)
         endings = ", ".join(f"{ending} {count}" for ending, count in Counter(run.ended for run in group).most_common())
         lines.append(
             f"| {name} | {len(group)} | {endings} | {spread} | {far_mm:.1f} | {sum(bool(run.wrong) for run in group)} |"

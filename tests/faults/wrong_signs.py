@@ -134,7 +134,9 @@ def sign_violations(place: str, state: DriveState, seen: Observed) -> list[str]:
     if state is DriveState.QUICK_STOP_ACTIVE:
         return wrong
     if seen.detected is None:
-        return wrong if abs(seen.end_m - END_M) < FIRST_MOTION_M else [*wrong, "not detected"]
+        assert seen.rig is not None
+        passed = abs(seen.end_m - END_M) < seen.rig.section.following_error_m  # struck near the end of the move
+        return wrong if passed else [*wrong, "not detected"]
     way_m, allowed_m = seen.travel_m, reach_m(seen, in_drive=place == "drive")
     if way_m > allowed_m:
         wrong.append(f"travelled {1e3 * way_m:.1f} mm from detection, allowed {1e3 * allowed_m:.1f} mm")

@@ -62,6 +62,8 @@ def split_line(line: str, delimiter: str) -> list[str]:
     """Fields of a line; the delimiter " " stands for one or more blanks."""
     if delimiter == " ":
         return line.split()
+    if '"' not in line:
+        return [field.strip() for field in line.replace("\0", "").rstrip("\r\n").split(delimiter)]
     try:
         row = next(csv.reader([line.replace("\0", "").rstrip("\r\n")], delimiter=delimiter), [])
     except csv.Error:

@@ -22,10 +22,8 @@ TORQUE_MARGIN = 1.5  # measured peaks beyond the limit of the command
 ACTING_SHARE = 0.3  # of the torque that can act: error of a torque constant, ripple and offset are below
 FROZEN_TORQUE_SHARE = 0.5  # of the torque that can act: stiction of a usable axis is below
 RUNAWAY_PERIODS = 3.0  # of full torque: one until it acts, one of averaging, one of noise
-SIGN_SHARE = (
-    0.25  # of the following error, at most SIGN_M, at least what the loop yields to a load: way of the first motion
-)
-SIGN_M = 5e-4  # rad where the axis turns
+SIGN_SHARE = 0.25  # of the following error: way of the first motion, unless the loop yields further to a load
+SIGN_M = 5e-4  # at most; rad where the axis turns
 
 
 def make_bounds(rig: Devices, limits: MotionLimits | None) -> Bounds:

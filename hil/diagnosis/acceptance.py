@@ -29,20 +29,23 @@ if TYPE_CHECKING:
     from hil.diagnosis.search.rivals import RivalFit
     from hil.diagnosis.verdict.cross_validation import Ablation
     from hil.diagnosis.verdict.judge import Remainder
+    from hil.identification.residuals import ChannelEnergy
 
 
 def _values(valid: bool, c: Criteria) -> Answer:
     return valid, {}
 
 
-def promises(share: float, cost: float, rows: int, noise_energy: float, c: Criteria = CRITERIA) -> bool:
-    """True if a score, a share of the residual energy `cost` over so many rows, promises the evidence of a term.
+def promises(shares: Mapping[str, float], channels: Mapping[str, ChannelEnergy], c: Criteria = CRITERIA) -> bool:
+    """True if a score, a share of the residual energy of each channel, promises the evidence of a term in one of them.
 
-    Rao's score test: what a linear step explains bounds what a small effect can explain. Without it a mechanism is not
-    fitted.
+    Rao's score test: what a linear step explains bounds what a small effect can explain. Else it is not fitted.
     """
-    enough = 1.0 - math.exp(-c.evidence / rows)  # share of white residuals whose removal gives the evidence of a term
-    return share > enough and share * cost > c.material * noise_energy
+    return any(
+        shares.get(name, 0.0) > 1.0 - math.exp(-c.evidence / own.rows)  # of white residuals: the evidence of a term
+        and shares.get(name, 0.0) * own.energy > c.material_alone * own.noise
+        for name, own in channels.items()
+    )
 
 
 def _evidence(of: Addition | Need, c: Criteria) -> Answer | None:
@@ -54,8 +57,7 @@ def _evidence(of: Addition | Need, c: Criteria) -> Answer | None:
 def _material(of: Addition | Need, c: Criteria) -> Answer | None:
     if of.chance is not None:
         return None
-    removed = of.gain / of.noise_energy if of.noise_energy else 0.0
-    return removed >= c.material, {"removed": removed, "needed": c.material}
+    return of.removed >= c.material_alone, {"removed": of.removed, "needed": c.material_alone}
 
 
 def _worth(of: Addition, c: Criteria) -> Answer | None:
@@ -127,8 +129,8 @@ def _no_objection(of: RivalFit, c: Criteria) -> Answer:
 
 
 def _predicts(of: Ablation, c: Criteria) -> Answer | None:
-    if of.gain is None:
-        return None
+    if of.gain is None or (of.torque and of.torque[1] - of.torque[0] > c.discrepancy):
+        return None  # the torque is its witness: a position counts bursts and slow motion more
     return of.gain >= (0.0 if of.acts else -c.tied), {"evidence": of.gain}
 
 
@@ -177,11 +179,11 @@ _EVIDENCE: Rule[Addition | Need] = Rule(
     "the evidence for it is {evidence:.0f} (BIC difference), needed {needed:.0f}",
     _evidence,
 )
-# two correct simulations of one axis differ by less
+# two correct simulations of one axis differ by less; quiet channels do not hide what it removes from another
 _MATERIAL: Rule[Addition | Need] = Rule(
     "material energy",
-    "it removes {removed:.3g} noise² per row, needed {needed:.3g}",
-    "it removes {removed:.3g} noise² per row, needed {needed:.3g}",
+    "it removes {removed:.3g} noise² per row of a channel, needed {needed:.3g}",
+    "it removes {removed:.3g} noise² per row of a channel, needed {needed:.3g}",
     _material,
 )
 # a torque with noise drives the twin: a term that passes less of it leaves less, and explains nothing
@@ -253,7 +255,7 @@ COMPARED: tuple[Rule[RivalFit], ...] = (
     Rule("as the cause", "nothing speaks against it as the cause", "{objection}", _no_objection),
 )
 HELD_OUT: tuple[Rule[Ablation], ...] = (
-    # prediction; motion without its effect does not refute it
+    # prediction, in torque where that tells; motion without its effect does not refute it
     Rule(
         "held-out recordings",
         "held-out recordings are reproduced no worse with it",

@@ -105,6 +105,11 @@ class Criteria:
     likely: float = 0.5  # confidence from which an effect is called likely, not doubtful
 
     @property
+    def material_alone(self) -> float:
+        """Least energy per row that a term removes from one channel: two simulations of one axis differ by 0.03."""
+        return 2.0 * self.material
+
+    @property
     def nothing(self) -> float:
         """Energy above the noise per row below which nothing is left to explain."""
         return 0.5 * self.material

@@ -7,6 +7,7 @@ recorded are absent.
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,6 +18,18 @@ from hil.identification.residual_scales import TORQUE_ACCURACY
 from hil.twin.axis import Response
 
 _LOST = 1e6  # bound of weighted residuals: beyond, an unstable hypothesis is not resolved further
+
+
+class ChannelEnergy(NamedTuple):
+    """Energy of the weighted residuals of a channel, its rows, and the energy of the noise that is there, in noise^2.
+
+    That is the energy of each residual, up to one for each row: the noise of a channel is an upper bound where its
+    inputs are open.
+    """
+
+    energy: float
+    rows: int
+    noise: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +64,17 @@ class Residuals:
     def parts(self) -> dict[tuple[int, str], FloatArray]:
         """Weighted residuals of the evaluated rows by (index of the run, channel); size <= 1 at the noise floor."""
         return dict(zip(self._keys(), np.split(self.vector, self.splits), strict=True))
+
+    @cached_property
+    def by_channel(self) -> dict[str, ChannelEnergy]:
+        """Energy of each channel over all runs; a hidden one has none."""
+        found = dict[str, ChannelEnergy]()
+        parts = ((name, part) for (_, name), part in self.parts.items() if name not in self.data.observability.hidden)
+        for channel, part in parts:
+            energy, rows, noise = found.get(channel, ChannelEnergy(0.0, 0, 0.0))
+            own = float(part @ part)
+            found[channel] = ChannelEnergy(energy + own, rows + part.size, noise + min(own, float(part.size)))
+        return found
 
     @cached_property
     def splits(self) -> tuple[int, ...]:

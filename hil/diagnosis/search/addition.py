@@ -56,14 +56,9 @@ class Addition:
         return bic_gain(self.fit, self.base)
 
     @cached_property
-    def gain(self) -> float:
-        """Energy that the term removes, see `removed`."""
+    def removed(self) -> float:
+        """Energy that the term removes from a channel over its noise, see `removed`."""
         return removed(self.base, self.fit, self.reference)
-
-    @property
-    def noise_energy(self) -> float:
-        """Energy of the noise of the base."""
-        return self.base.noise_energy
 
     @cached_property
     def explained(self) -> float | None:
@@ -135,8 +130,9 @@ class Addition:
 
 
 def removed(without: Fit, fit: Fit, reference: Fit) -> float:
-    """Energy that a term removes from all channels, see `removed_by_channel`."""
-    return sum(removed_by_channel(without, fit, reference).values())
+    """Energy that a term removes from a channel, over that of the noise there; of the channel where it is largest."""
+    gains, noise = removed_by_channel(without, fit, reference), without.residuals.by_channel
+    return max((gains[name] / own.noise for name, own in noise.items() if own.noise), default=0.0)
 
 
 def removed_by_channel(without: Fit, fit: Fit, reference: Fit) -> dict[str, float]:

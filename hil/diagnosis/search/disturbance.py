@@ -121,8 +121,7 @@ def rest_position(runs: Sequence[Measured], disturbances: Sequence[Disturbance],
 def scale_periods(runs: Sequence[Measured], errors: Sequence[FloatArray], most: int = 2) -> list[float]:
     """Periods [m] below 1 mm in which an error (n,) of the linear encoder repeats, best first."""
     x = np.concatenate([run.table_m for run in runs])
-    periods_m = strongest_periods(x, np.concatenate(list(errors)), 0.5e-6, 2e-6, most + 2)
-    return [period_m for period_m in periods_m if period_m < 1e-3][:most]
+    return strongest_periods(x, np.concatenate(list(errors)), 0.5e-6, 2e-6, most, longest=1e-3)
 
 
 def lines_hz(run: Measured, d: Disturbance, most: int = 4) -> list[float]:

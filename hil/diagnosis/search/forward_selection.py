@@ -40,14 +40,13 @@ MOST_TERMS = 8  # at once: more than an engineer can act on; limits the duration
 
 @dataclass(frozen=True)
 class Need:
-    """Need of a term beside all others: evidence (BIC difference), energy it removes and that of the noise.
+    """Need of a term beside all others: evidence (BIC difference), energy it removes from a channel over its noise.
 
     `chance`: of its shape below the noise (`search.shape`); None above it.
     """
 
     evidence: float
-    gain: float
-    noise_energy: float
+    removed: float
     chance: float | None
 
 
@@ -224,7 +223,7 @@ def _pruned(fit: Fit, reference: Fit) -> tuple[Fit, dict[Key, float], list[Consi
         pairs = in_parallel([partial(ablated, index) for index in range(len(fit.terms))])
         weakest = min(range(len(pairs)), key=lambda index: pairs[index][0])
         evidence, rest = pairs[weakest]
-        need = Need(evidence, removed(rest, fit, reference), fit.noise_energy, chance_below_noise(fit, rest))
+        need = Need(evidence, removed(rest, fit, reference), chance_below_noise(fit, rest))
         ledger = examine(NEEDED, need, CRITERIA)
         if accepted(ledger):
             return fit, {term.key: value for term, (value, _) in zip(fit.terms, pairs, strict=True)}, pruned

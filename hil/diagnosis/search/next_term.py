@@ -60,7 +60,7 @@ def next_term(search: SearchRound, candidates: Sequence[Candidate], step: Progre
         if not promising:
             return Additions([], None)
     else:
-        promising = [one for one in candidates if promises(one.share, base.cost, base.rows, base.noise_energy)]
+        promising = [one for one in candidates if promises(one.by_channel, base.residuals.by_channel)]
     additions = list[Addition]()
     if promising:
         step("fitting " + ", ".join(one.term.effect for one in promising[:3]))

@@ -8,8 +8,8 @@ hypothesis can explain (Rao's score test with nuisance parameters). If a scalabl
 and D are those without the latter.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.linalg import qr
@@ -39,13 +39,15 @@ class Candidate:
     """A mechanism to be fitted: its scaled start, and the share of the residual energy that it would explain.
 
     `others` are starts of the same mechanism at less strength or other values, since large changes act nonlinearly.
-    `own` is the share at the values of the term, `share` that at the best strength.
+    `own` is the share at the values of the term, `share` that at the best strength, `by_channel` the same of each
+    channel alone.
     """
 
     term: Term
     share: float
     others: tuple[Term, ...] = ()
     own: float = 0.0
+    by_channel: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +57,7 @@ class _View:
     weights: FloatArray
     nuisance: FloatArray
     residual: FloatArray
+    channels: tuple[str, ...]  # of each part
     splits: tuple[int, ...]
     filters: list[FloatArray] | None
 
@@ -63,6 +66,15 @@ class _View:
         seen = change if self.filters is None else whitened(change, self.splits, self.filters)
         seen = self.weights * seen
         return np.asarray(seen - self.nuisance @ (self.nuisance.T @ seen), dtype=np.float64)
+
+    def explained(self, left: FloatArray) -> dict[str, float]:
+        """Share of the energy of each channel that is gone where `left` (m,) is left; negative where there is more."""
+        before, after = dict.fromkeys(self.channels, 0.0), dict.fromkeys(self.channels, 0.0)
+        parts = (np.split(values, self.splits) for values in (self.residual, left))
+        for channel, a, b in zip(self.channels, *parts, strict=True):
+            before[channel] += float(a @ a)
+            after[channel] += float(b @ b)
+        return {name: 1.0 - after[name] / energy if energy > 0.0 else 0.0 for name, energy in before.items()}
 
 
 def _view(base: Fit, white: bool) -> _View:
@@ -74,7 +86,8 @@ def _view(base: Fit, white: bool) -> _View:
     weights = np.concatenate([_weights(part) for part in residuals.split(seen)])
     nuisance, _ = qr(weights[:, None] * slopes, mode="economic", overwrite_a=True, check_finite=False)
     residual = weights * seen
-    return _View(weights, nuisance, residual - nuisance @ (nuisance.T @ residual), residuals.splits, filters)
+    left, channels = residual - nuisance @ (nuisance.T @ residual), tuple(channel for _, channel in residuals.parts)
+    return _View(weights, nuisance, left, channels, residuals.splits, filters)
 
 
 def _weights(part: FloatArray) -> FloatArray:
@@ -116,7 +129,7 @@ def screen_library(base: Fit) -> list[Candidate]:
             begun = [term for term in begun if claimable(term, base.bench, base.data.runs)]
         if not begun or not claimable(begun[0], base.bench, base.data.runs):
             return None
-        return Candidate(begun[0], same[0].share, tuple(begun[1:]))
+        return Candidate(begun[0], same[0].share, tuple(begun[1:]), by_channel=_most(one.by_channel for one in same))
 
     candidates = [gathered(effect, same) for effect, same in best.items()]
     return sorted((one for one in candidates if one is not None), key=lambda one: -one.share)
@@ -208,7 +221,9 @@ def screen(base: Fit, points: Sequence[StartPoint], views: Sequence[_View] = ())
     def candidate(start: StartPoint) -> Candidate:
         directions = [direction(start, values) for values in _directions(start)]
         gone = direction(start, _scaled(start, np.zeros(2 * start.harmonics))) if start.instead else np.zeros(base.rows)
-        return max((scored(start, directions, gone, view) for view in views), key=lambda one: one.share)
+        found = [scored(start, directions, gone, view) for view in views]
+        best = max(found, key=lambda one: one.share)
+        return replace(best, by_channel=_most(one.by_channel for one in found))
 
     def scored(start: StartPoint, directions: list[FloatArray], gone: FloatArray, view: _View) -> Candidate:
         energy = float(view.residual @ view.residual)
@@ -217,19 +232,33 @@ def screen(base: Fit, points: Sequence[StartPoint], views: Sequence[_View] = ())
         products, target = span.T @ span, -(span.T @ without)
         coefficients = np.asarray(np.linalg.pinv(products, hermitian=True) @ target, dtype=np.float64)
         left = without + span @ coefficients
-        share = 1.0 - float(left @ left) / energy
+        share, by_channel = 1.0 - float(left @ left) / energy, view.explained(left)
         if start.strength < 0:
             # a start that cannot be scaled is also scored at its own strength
             whole = float(2.0 * target[0] - products[0, 0]) / energy
-            return Candidate(start.term(), max(share if coefficients[0] > 0.0 else 0.0, whole), own=whole)
+            at_own = view.explained(without + span[:, 0])
+            if coefficients[0] <= 0.0:
+                share, by_channel = 0.0, at_own
+            by_channel = _most([by_channel, at_own])
+            return Candidate(start.term(), max(share, whole), own=whole, by_channel=by_channel)
         return Candidate(
             start.term(_scaled(start, coefficients)),
             share,
             tuple(start.term(_scaled(start, factor * coefficients)) for factor in _WEAKER),
             share,
+            by_channel,
         )
 
     return sorted(POOL.map(candidate, points), key=lambda one: -one.share)
+
+
+def _most(shares: Iterable[Mapping[str, float]]) -> dict[str, float]:
+    """The largest share of each channel."""
+    found = dict[str, float]()
+    for one in shares:
+        for name, share in one.items():
+            found[name] = max(found.get(name, 0.0), share)
+    return found
 
 
 def _pairs(start: StartPoint) -> list[tuple[int, int]]:

@@ -100,7 +100,7 @@ class _Race:
 
     @cached_property
     def search(self) -> Estimator:
-        """The estimator of the first fits."""
+        """Estimator of the first fits."""
         return replace(self.base.estimator, torque_accuracy=SEARCH_ACCURACY, fast=True)
 
     @cached_property
@@ -127,6 +127,7 @@ class _Race:
         others = [fit for fit in _unique([*second[:2], *ranked[:_FINISHED]]) if fit is not ranked[0]]
         results = [leader, *self._followers(leader, ranked[0], others)]
         del second, ranked, others
+        results = in_parallel([partial(self._from_start, fit) for fit in results])
         best = min(results, key=lambda fit: fit.cost)
         if not self.search.expired:
             results += [*self._variants(best), *self._equivalents(best)]
@@ -199,9 +200,17 @@ class _Race:
 
     def _from_bench_file(self, fit: Fit) -> Fit:
         """Fit the same mechanism from the parameters of the bench with its own derivatives."""
-        candidate = next(one for one in self.candidates if one.term.effect == fit.terms[-1].effect)
-        again = self._given_start(candidate).refit(SECOND, soft=SOFT)
+        again = self._given_start(self._candidate(fit)).refit(SECOND, soft=SOFT)
         return _finish(again) if self._gain(again) > 0.0 else again
+
+    def _candidate(self, fit: Fit) -> Candidate:
+        return next(one for one in self.candidates if one.term.effect == fit.terms[-1].effect)
+
+    def _from_start(self, fit: Fit) -> Fit:
+        """The fit, or that from a start of its mechanism beside the base's values which leaves less already."""
+        start = self._best_start(self._candidate(fit), self.base.hypothesis.x)
+        start = self.base.estimator.evaluate(start.hypothesis)
+        return fit if fit.cost <= start.cost else start.refit(LONG)
 
     def _variants(self, fit: Fit) -> list[Fit]:
         """Fit the other variants of the last term from its values."""
@@ -221,9 +230,8 @@ class _Race:
         for alike in likenesses(terms, fit.bench):
             if offered(alike[0], self.base.hypothesis, terms[:-1]):
                 begun = in_parallel([partial(fit.estimator.evaluate, rebased.replaced(-1, term)) for term in alike])
-                jobs.append(
-                    partial(_fit_fast_first, fit.estimator, min(begun, key=lambda other: other.cost).hypothesis)
-                )
+                nearest = min(begun, key=lambda other: other.cost).hypothesis
+                jobs.append(partial(_fit_fast_first, fit.estimator, nearest))
         return in_parallel(jobs)
 
     def _gain(self, fit: Fit) -> float:

@@ -20,6 +20,7 @@ from hil.diagnosis.reproduced import REPRODUCED
 from hil.diagnosis.search.addition import Harm
 from hil.diagnosis.search.events import InsideWindows
 from hil.diagnosis.verdict.reproduction import Reproduced
+from hil.identification.residuals import ChannelEnergy
 
 # A new constant needs a sealed draw that improves beyond its interval, or it takes the place of another (CONTRIBUTING).
 CONSTANTS = 49
@@ -32,8 +33,7 @@ def addition(**quantities: Any) -> Any:
     """A term that passes every rule, but for the quantities given."""
     usual = {
         "evidence": 500.0,
-        "gain": 900.0,
-        "noise_energy": 1000.0,
+        "removed": 0.9,
         "explained": 0.9,
         "chance": None,
         "beside": 0,
@@ -68,7 +68,7 @@ def test_every_constant_of_evidence_is_used() -> None:
     [
         ({"evidence": 19.9}, "evidence"),
         ({"evidence": math.nan}, "evidence"),
-        ({"gain": 19.0}, "material energy"),
+        ({"removed": 0.039}, "material energy"),
         ({"explained": 0.019}, "share of the mismatch"),
         ({"explained": 0.09, "beside": 2}, "share of the mismatch"),
         ({"chance": 1e-4, "evidence": 1e6}, "shape below the noise"),
@@ -91,10 +91,10 @@ def test_a_term_is_refuted_by_the_first_rule_that_it_fails(quantities: dict[str,
     [
         {},
         {"evidence": 20.0},
-        {"gain": 20.0},
+        {"removed": 0.04},
         {"explained": 0.1, "beside": 2},
         {"explained": None},  # nothing is above the noise
-        {"chance": 4e-5, "evidence": 0.0, "gain": 0.0},  # the noise of a row says nothing of thousands
+        {"chance": 4e-5, "evidence": 0.0, "removed": 0.0},  # the noise of a row says nothing of thousands
         {"unrepeated": (105.0, 100.0)},
         {"inside": InsideWindows(0.2, 1.0, 50.0, 1.0, True)},  # one push may have any form
         {"inside": InsideWindows(0.01, 1.0, 3.9, 1.0, False)},  # as well as outside
@@ -105,10 +105,11 @@ def test_a_term_at_the_bounds_is_accepted(quantities: dict[str, Any]) -> None:
     assert accepted(examine(ADDED, addition(**quantities), CRITERIA))
 
 
-@given(st.floats(0.0, 1e6), st.floats(0.0, 1e6))
-def test_more_evidence_and_energy_never_turn_accepted_into_refuted(evidence: float, gain: float) -> None:
+@given(st.floats(0.0, 1e6), st.floats(0.0, 1e3))
+def test_more_evidence_and_energy_never_turn_accepted_into_refuted(evidence: float, removed: float) -> None:
     before, after = (
-        accepted(examine(ADDED, addition(evidence=evidence + more, gain=gain + more), CRITERIA)) for more in (0.0, 10.0)
+        accepted(examine(ADDED, addition(evidence=evidence + 10.0 * more, removed=removed + more), CRITERIA))
+        for more in (0.0, 1.0)
     )
     assert after or not before
 
@@ -149,6 +150,7 @@ def test_a_rival_is_tied_or_refuted(evidence: float, more: float, objection: str
         ({"clear": False}, "strength"),
         ({"quiet": True}, "motion without noise"),
         ({"torque": (0.026, 0.02)}, "torque"),
+        ({"torque": (0.016, 0.02), "gain": -11.0}, "held-out recordings"),  # hardly less torque
     ],
 )
 def test_held_out_recordings_refute(quantities: dict[str, Any], rule: str) -> None:
@@ -167,6 +169,12 @@ def test_held_out_recordings_refute(quantities: dict[str, Any], rule: str) -> No
     assert examine(HELD_OUT, refuted, CRITERIA)[-1].rule == rule
 
 
+def test_less_torque_held_out_outweighs_the_position() -> None:
+    usual = {"laps": None, "clear": True, "quiet": False, "harm": {}, "acts": True, "gain": -200.0}
+    term: Any = SimpleNamespace(**usual, torque=(0.30, 0.81))
+    assert accepted(examine(HELD_OUT, term, CRITERIA))
+
+
 def test_open_inputs_leave_something_beside_a_right_name() -> None:
     measured = {"left": 0.3, "above": 4.0, "open_inputs": False, "at_floor": False, "noise": False}
     closed: Any = SimpleNamespace(**measured)
@@ -183,10 +191,15 @@ def test_noise_of_any_colour_beside_a_name_is_no_mismatch() -> None:
 def test_a_score_must_promise_evidence_and_energy() -> None:
     rows = 1000
     share = 1.0 - math.exp(-CRITERIA.evidence / rows)
-    assert promises(1.01 * share, 1e6, rows, rows)
-    assert not promises(0.99 * share, 1e6, rows, rows)
-    assert not promises(1.01 * share, CRITERIA.material * rows, rows, rows)
-    assert promises(1.01 * share, CRITERIA.material * rows, rows, 0.01 * rows)  # the noise is an upper bound
+
+    def promised(share: float, energy: float, noise: float = 1000.0) -> bool:
+        channels = {"table": ChannelEnergy(energy, rows, noise), "motor": ChannelEnergy(1e9, rows, 1000.0)}
+        return promises({"table": share, "motor": 0.0}, channels)
+
+    assert promised(1.01 * share, 1e6)
+    assert not promised(0.99 * share, 1e6)
+    assert not promised(1.01 * share, CRITERIA.material_alone * rows)
+    assert promised(1.01 * share, CRITERIA.material_alone * rows, 0.01 * rows)  # the noise is an upper bound
 
 
 @pytest.mark.parametrize(

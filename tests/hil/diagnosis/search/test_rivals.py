@@ -65,7 +65,6 @@ def explained(cost: float, motor: float, table: float) -> Any:
     return SimpleNamespace(
         cost=cost,
         rows=2000,
-        noise_energy=2000.0,
         excess=0.0,
         within_noise=False,
         terms=(),
@@ -79,7 +78,7 @@ def test_a_little_harm_does_not_set_aside_what_explains_nearly_all(monkeypatch: 
     """An eccentric pulley explained nine tenths of what play left, and a third more remained in the motor."""
     for name, value in {
         "evidence": 1e3,
-        "gain": 1e6,
+        "removed": 1e3,
         "explained": 0.9,
         "unrepeated": (0.0, 0.0),
         "inside": None,

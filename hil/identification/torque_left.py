@@ -63,6 +63,20 @@ def torque_missed(fit: Fit, data: Dataset) -> float | None:
     return math.inf if left is None else left
 
 
+def mismatch_left(before: Fit, after: Fit, data: Dataset) -> float:
+    """Share of the energy above the floor of a fit on a data set that another leaves, in [0, 1].
+
+    The position of the motor counts slow motion and bursts more than all other motion. Where the torque that it needs
+    beyond the twin's falls more, that is its share.
+    """
+    was, left = (dict(fit.on(data).excess_by_channel) for fit in (before, after))
+    missed, missing = torque_missed(before, data), torque_missed(after, data)
+    if missed and missing is not None and math.isfinite(missed):
+        left["motor"] = min(left["motor"], was["motor"] * (missing / missed) ** 2)
+    total, rest = sum(was.values()), sum(left.values())
+    return min(rest / total, 1.0) if total > 0.0 else float(rest > 0.0)
+
+
 def left_by_plain(model: PlainModel, data: Dataset, deviation: float | None = None) -> float | None:
     """Share of the torque's standard `deviation` that the plain model leaves on a data set; None where nothing slides.
 

@@ -29,15 +29,17 @@ from hil.identification.measured import Measured
 from hil.identification.noise_floor import rms
 from hil.identification.residual_scales import inertia
 from hil.identification.residuals import differences
+from hil.identification.terms import Term
 from hil.twin.axis import Response
 from hil.twin.library import BY_ID
 from hil.twin.mechanism import Stage
+from hil.twin.physics import Active
 from hil.twin.stepping.loops import INTEGRATOR_S
 from hil.twin.stepping.stages import stage_of
 
 LOW_PASS_HZ, LOW_PASS_ORDER = 100.0, 4  # as in the inverse-dynamics identification of EMPS
 CONTROLLER_BLOCK, MOTOR_BLOCK, TABLE_BLOCK = "controller", "motor and load", "transmission and table"
-_DRIVE = (Stage.CURRENT, Stage.CHANNEL, Stage.ANSWER)
+_IN_TORQUE = (Stage.CURRENT, Stage.CHANNEL, Stage.ANSWER)
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,10 +126,15 @@ def held_on_motor(hypothesis: Hypothesis, run: Measured, observer_s: float) -> t
     """
     twin = hypothesis.twin(observer_s, run=run)
     measured = hypothesis.undelayed(twin, run)
-    mechanical = tuple(active for active in twin.active if stage_of(BY_ID[active.effect], active.variant) not in _DRIVE)
+    mechanical = tuple(active for active in twin.active if not in_measured_torque(active))
     inputs = measured._replace(torque_command=measured.torque)
     held = replace(twin, active=mechanical).observe(run.position_command_m, run.velocity_command_m_s, inputs, run.start)
     return measured, held
+
+
+def in_measured_torque(of: Term | Active) -> bool:
+    """True for a mechanism of the drive or of a recorded channel: the measured torque contains it already."""
+    return stage_of(BY_ID[of.effect], of.variant) in _IN_TORQUE
 
 
 def low_pass(values: FloatArray, period_s: float) -> FloatArray:

@@ -22,6 +22,7 @@ from hil.identification.inference import bic_gain
 from hil.identification.noise_floor import unrepeated
 from hil.identification.terms import Term
 from hil.identification.torque_left import torque_missed
+from hil.identification.twin_deviation import in_measured_torque
 from hil.twin.library import BY_ID
 from hil.twin.mechanism import Block
 
@@ -64,13 +65,16 @@ class Addition:
     def explained(self) -> float | None:
         """Share that the term removes from the energy above the noise of the channel in which it removes most.
 
-        A channel with a large mismatch of its own does not hide what a term explains of another. None where the energy
-        of that channel above the noise is not material.
+        A channel with a large mismatch of its own does not hide what a term explains of another, and slow motion or a
+        burst not what it explains of the torque. None where the energy of that channel above the noise is not material.
         """
         gained = removed_by_channel(self.base, self.fit, self.reference)
         channel = max(gained, key=lambda name: gained[name])
         above = self.base.excess_by_channel[channel]
-        return gained[channel] / above if above > CRITERIA.nothing * self.base.data.rows else None
+        if not above > CRITERIA.nothing * self.base.data.rows:
+            return None
+        left, without = self.torque or (0.0, 0.0)
+        return max(gained[channel] / above, 1.0 - (left / without) ** 2 if without > 0.0 else 0.0)
 
     @property
     def beside(self) -> int:
@@ -151,7 +155,7 @@ def torque_of(fit: Fit, without: Fit, term: Term, data: Dataset) -> tuple[float,
     An error of the transmission is no torque on an axis without a spring.
     """
     mechanism = BY_ID[term.effect]
-    if mechanism.block in (Block.CONTROLLER, Block.SENSOR) or term.windows:
+    if mechanism.block in (Block.CONTROLLER, Block.SENSOR) or in_measured_torque(term) or term.windows:
         return None
     if mechanism.in_transmission and not fit.bench.axis.SPRINGS:
         return None

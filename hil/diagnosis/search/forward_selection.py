@@ -31,7 +31,7 @@ from hil.identification.nominal_fit import fit_nominal_parameters, require_finit
 from hil.identification.parallel import in_parallel
 from hil.identification.plain_model import PlainModel
 from hil.identification.terms import Key, Term, compatible, effects, free_slot
-from hil.identification.torque_left import fit_plain, left_by_twin
+from hil.identification.torque_left import fit_plain, left_by_twin, mismatch_left
 from hil.twin.library import BY_ID, LIBRARY
 from hil.twin.physics import Active
 
@@ -111,7 +111,7 @@ def search(prepared: Prepared, progress: Progress = lambda text: None, deadline_
         if effects(base.terms) in tried:
             break  # the term that was added has been removed again
         tried.append(effects(base.terms))
-        if len(base.terms) >= CRITERIA.in_vain and base.excess > CRITERIA.most_left * nominal.excess:
+        if len(base.terms) >= CRITERIA.in_vain and mismatch_left(nominal, base, base.data) > CRITERIA.most_left:
             break
     step("fitting the explanation to convergence")
     final = ended(again(revised(base).refit(ENDED), ENDED))

@@ -141,12 +141,6 @@ def by_channel(fit: Fit, least: float = 1.0) -> dict[str, float]:
     return fit.energy(lambda ratio: max(ratio, least))
 
 
-def explained_share(before: Fit, after: Fit) -> float:
-    """Share of the energy above the floor of `before` that `after` removes, in [0, 1]."""
-    left, was = after.excess, before.excess
-    return min(max(1.0 - left / was, 0.0), 1.0) if was > 0.0 else float(left == 0.0)
-
-
 def _ablate(given: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> list[Ablation]:
     rebased = final.hypothesis.rebased
 

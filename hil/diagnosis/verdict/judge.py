@@ -10,13 +10,13 @@ from hil.diagnosis.ledger import Ledger, accepted, examine
 from hil.diagnosis.result import Verdict
 from hil.diagnosis.stages import Judged, Tested
 from hil.diagnosis.structure_left import structure_left
-from hil.diagnosis.verdict.cross_validation import explained_share
 from hil.diagnosis.verdict.each_alone import Change, changed
 from hil.diagnosis.verdict.reproduction import reproduction
 from hil.diagnosis.verdict.unnamed import unnamed_terms
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.inference import bic_gain
+from hil.identification.torque_left import mismatch_left
 
 
 @dataclass(frozen=True)
@@ -85,8 +85,7 @@ def explanation(nominal: Fit, final: Fit, held_out: Dataset) -> Ledger:
 
 def unexplained_share(nominal: Fit, final: Fit, held_out: Dataset) -> float:
     """Share of the energy above the floor that the terms leave, on held-out recordings if there are any."""
-    evidence = held_out if held_out.runs else final.data
-    return 1.0 - explained_share(nominal.on(evidence), final.on(evidence))
+    return mismatch_left(nominal, final, held_out if held_out.runs else final.data)
 
 
 def explains_most(nominal: Fit, final: Fit, held_out: Dataset) -> bool:

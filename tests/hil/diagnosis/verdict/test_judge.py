@@ -10,7 +10,7 @@ from hil.bench.bench_file import Bench
 from hil.diagnosis.acceptance import names_stand
 from hil.diagnosis.result import Verdict
 from hil.diagnosis.search.rivals import RivalFit
-from hil.diagnosis.verdict.cross_validation import cross_validate, explained_share
+from hil.diagnosis.verdict.cross_validation import cross_validate
 from hil.diagnosis.verdict.findings import diagnosed_bench, findings, renamed
 from hil.diagnosis.verdict.judge import verdict_on_plant
 from hil.diagnosis.verdict.testability import not_testable
@@ -22,6 +22,7 @@ from hil.identification.measured import take
 from hil.identification.noise_floor import FLOOR
 from hil.identification.nominal_fit import fit_nominal_parameters
 from hil.identification.terms import Term
+from hil.identification.torque_left import mismatch_left
 
 OWNER = bench()
 LOAD = Term("constant_load", 0, (0.4,))
@@ -100,7 +101,7 @@ def test_a_mismatch_without_a_term_or_with_a_poor_one_is_unexplained() -> None:
     plain = believed(found)
     assert verdict_on_plant(plain, plain, plain, held_out) is Verdict.UNEXPLAINED
     poor = believed(found, Term("constant_load", 0, (0.02,)))
-    assert explained_share(plain.on(held_out), poor.on(held_out)) < 0.5
+    assert mismatch_left(plain, poor, held_out) > 0.5
     assert verdict_on_plant(plain, plain, poor, held_out) is Verdict.UNEXPLAINED
 
 

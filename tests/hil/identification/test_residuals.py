@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from diagnosis_runs import bench, changed, dataset, recorded
@@ -114,3 +117,16 @@ def test_a_twin_that_runs_away_gives_no_finite_difference_and_no_warning(away: f
     assert not np.isfinite(found["torque"][25:]).any()
     assert not np.isfinite(found["table"][25:]).any()
     assert np.isfinite(found["torque"][:25]).all()
+
+
+def test_the_energy_of_each_channel_is_counted_once_and_a_hidden_one_has_none() -> None:
+    recording = recorded(OWNER, PLAY)
+    data = dataset(preflight([recording], OWNER).accepted(), OWNER)
+    residuals = Hypothesis(OWNER).residuals(data)
+    assert sum(one.energy for one in residuals.by_channel.values()) == pytest.approx(
+        residuals.vector @ residuals.vector
+    )
+    assert sum(one.rows for one in residuals.by_channel.values()) == residuals.vector.size
+    assert all(one.noise <= one.rows for one in residuals.by_channel.values())
+    hidden = SimpleNamespace(observability=SimpleNamespace(hidden={"table"}), runs=data.runs, scales=data.scales)
+    assert "table" not in replace(residuals, data=hidden).by_channel

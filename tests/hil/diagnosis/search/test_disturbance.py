@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 from concealed_run import concealed_run
 from diagnosis_runs import bench
 
-from hil.diagnosis.search.disturbance import Disturbance, friction_zones, lines_hz
+from hil.diagnosis.search.disturbance import Disturbance, friction_zones, lines_hz, scale_periods
 from hil.identification.measured import take
 
 OWNER = bench()
@@ -37,3 +40,11 @@ def test_lines_are_those_of_the_disturbance_over_time() -> None:
     found = lines_hz(run, Disturbance(torque, velocity, np.abs(velocity) > 1e-3))
     assert found[0] == pytest.approx(8.3, abs=0.3 / time_s[-1])
     assert not lines_hz(run, Disturbance(torque, velocity, np.zeros(velocity.size, dtype=bool)))
+
+
+def test_a_short_period_of_the_second_encoder_is_found_beside_long_errors_that_are_stronger() -> None:
+    x = np.linspace(0.0, 0.02, 40001)
+    run: Any = SimpleNamespace(table_m=x)
+    long = sum(20e-6 * np.sin(2.0 * np.pi * (n + 0.37) * x / np.ptp(x)) for n in range(1, 7))
+    found = scale_periods([run], [long + 1e-6 * np.sin(2.0 * np.pi * x / 20e-6)])
+    assert found[0] == pytest.approx(20e-6, rel=1e-3)

@@ -74,3 +74,16 @@ def test_a_candidate_whose_shape_alone_speaks_for_it_is_fitted() -> None:
     data = prepare_dataset(preflight([recorded(truth, load)], truth).accepted(), truth)
     (found,) = race(fit_nominal_parameters(data), [Candidate(load, 0.0, ())])
     assert found.terms[0].effect == "constant_load"
+
+
+def test_a_fit_that_leaves_more_than_its_start_begins_there_again() -> None:
+    """A small effect far below the fit's own steps: few evaluations led the parameters of the base away."""
+    truth, load = bench(), Term("constant_load", 0, (0.4,))
+    data = prepare_dataset(preflight([recorded(truth, load)], truth).accepted(), truth)
+    base = fit_nominal_parameters(data)
+    contest = _Race(base, [Candidate(load, 0.5)])
+    astray = base.estimator.evaluate(base.hypothesis.with_term(Term("constant_load", 0, (-0.4,))))
+    found = contest._from_start(astray)
+    assert found.cost < 0.5 * base.cost < astray.cost
+    assert found.terms[0].values[0] == pytest.approx(0.4, rel=0.1)
+    assert contest._from_start(found) is found

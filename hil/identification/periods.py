@@ -26,12 +26,15 @@ def strongest_periods(
     """At most `most` periods of a signal (n,) over a position (n,), strongest first, in the unit of the position.
 
     The signal is averaged in bins of `width`, or wider ones over a long range. Periods lie between `shortest`, at least
-    four bins, and `longest`, and 2.5 times the range.
+    four bins, and `longest`, and 2.5 times the range. What varies over more than `longest` is taken off first: seen at
+    uneven places, it has its share at every period.
     """
     span = float(np.ptp(position)) if position.size else 0.0
     width, shortest = max(width, span / _MOST_BINS), max(shortest, 4.0 * span / _MOST_BINS)
     if position.size < _FEWEST_ROWS or span < 4.0 * shortest:
         return []
+    if longest < span:
+        signal = signal - _slow(position, signal, longest)
     count = int(np.ceil(span / width))
     index = np.minimum(((position - position.min()) / span * count).astype(int), count - 1)
     rows = np.bincount(index, minlength=count)
@@ -49,3 +52,11 @@ def strongest_periods(
         found.append(float(1.0 / frequency[peak]))
         spectrum[max(peak - apart, 0) : peak + apart] = 0.0
     return found
+
+
+def _slow(position: FloatArray, signal: FloatArray, width: float) -> FloatArray:
+    """Means (n,) of a signal over positions in bins of a width, joined by straight lines."""
+    index = ((position - position.min()) / width).astype(int)
+    rows = np.bincount(index)
+    where, mean = (np.bincount(index, weights=one)[rows > 0] / rows[rows > 0] for one in (position, signal))
+    return np.asarray(np.interp(position, where, mean))

@@ -57,12 +57,8 @@ def structure(parts: Sequence[ResidualSeries], quantity: Sequence[FloatArray], b
     None where these are too few. Bins have equally many rows, but are not narrower than a fifth of equal ones: what a
     plateau of the quantity has within it is the pattern of its counts.
     """
-<<<<<<< Updated upstream
     few = sum(np.count_nonzero(part.rows) for part in parts) < bins
     while bins > 1 and not few:
-=======
-    while bins > 1:
->>>>>>> Stashed changes
         found = _structure(parts, quantity, bins)
         if found:
             return found

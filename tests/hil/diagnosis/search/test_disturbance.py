@@ -46,5 +46,5 @@ def test_a_short_period_of_the_second_encoder_is_found_beside_long_errors_that_a
     x = np.linspace(0.0, 0.02, 40001)
     run: Any = SimpleNamespace(table_m=x)
     long = sum(20e-6 * np.sin(2.0 * np.pi * (n + 0.37) * x / np.ptp(x)) for n in range(1, 7))
-    found = scale_periods([run], [long + 1e-6 * np.sin(2.0 * np.pi * x / 20e-6)])
+    found = scale_periods([run], [long + 3e-6 * np.sin(2.0 * np.pi * x / 20e-6)])
     assert found[0] == pytest.approx(20e-6, rel=1e-3)

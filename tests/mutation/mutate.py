@@ -142,6 +142,7 @@ def in_fork(copy: Path, suite: Suite, output: Path, mutated: bool) -> int:
         os.dup2(file.fileno(), 1)
         os.dup2(file.fileno(), 2)
     os.chdir(copy)
+    os.environ["PYTHONPATH"] = str(copy)  # of the processes that tests start
     sys.dont_write_bytecode = mutated
     options = ["-q", "-x", "-p", "no:cacheprovider", "-W", "ignore::pytest.PytestAssertRewriteWarning"]  # of a library
     if not suite.compiled:

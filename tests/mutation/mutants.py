@@ -6,7 +6,7 @@ Left out are changes that say nothing of the tests:
   its first use or changes nothing; of signs and `not` only the deletion, of which the others are repetitions
 - `^` for `|`: the flags that are joined have no bit in common; powers: that of two counts takes minutes
 - annotations, which nothing evaluates; the `*` before keyword arguments, which is no operator
-- decorators of numba and their arguments, and `slots` of dataclasses, without which the same values come out
+- decorators of numba and their arguments, `slots` and `frozen` of dataclasses, without which the same values come out
 """
 
 from __future__ import annotations
@@ -60,7 +60,11 @@ def mutants_of(source: str) -> list[Mutant]:
         for occurrence, (begin, _) in enumerate(places):
             annotated = any(first <= begin < last for first, last in spans)
             line, column = source.splitlines()[begin[0] - 1], begin[1]
-            same = line.startswith("@njit") or line[:column].endswith("slots=") or line[column:].startswith("*,")
+            same = (
+                line.startswith("@njit")
+                or line[:column].endswith(("slots=", "frozen="))
+                or line[column:].startswith("*,")
+            )
             dotted = name.endswith("/ExceptionReplacer") and re.match(r"\w+\.", line[column:])  # which it cannot change
             if not (annotated or same or dotted):
                 found.append(Mutant(name, occurrence))

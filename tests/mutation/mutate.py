@@ -1,6 +1,6 @@
 """Mutants of the live axis, from the set-up of its devices to the supervision: how many do the tests notice?
 
-    python tests/mutation/mutate.py [--sample N] [--seed S] [--only PART]     from the root; as make mutation does
+    python tests/mutation/mutate.py [--sample N] [--seed S] [--only PART] [--from MODULE]     from the root
 
 The operators of cosmic-ray change one operator, number, keyword or condition of a module in a copy of the project, and
 the tests of that module (`modules.py`) run there. A mutant is killed if a test fails, or if one takes `Suite.test_s` of
@@ -54,6 +54,7 @@ def main() -> None:
     parser.add_argument("--sample", type=int, default=0, help="mutants of each module; 0: all")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", default="", help="only modules whose path contains this")
+    parser.add_argument("--from", dest="first", default="", help="begin with this module, as after an interruption")
     options = parser.parse_args()
     for name in LIBRARIES:
         importlib.import_module(name)
@@ -61,7 +62,8 @@ def main() -> None:
         copy = Path(folder) / "project"
         ignored = shutil.ignore_patterns(".git", ".venv", "build", "runs", ".*_cache", "*.egg-info")
         shutil.copytree(ROOT, copy, ignore=ignored)
-        lines = [mutate(copy, module, options.sample, options.seed) for module in MODULES if options.only in module]
+        modules = [module for module in MODULES if options.only in module and module >= options.first]
+        lines = [mutate(copy, module, options.sample, options.seed) for module in modules]
     print("\n".join(["| module | mutants | run | killed | of those by time | survived |", "|---|---|---|---|---|---|",
                      *lines]))  # fmt: skip
 
@@ -70,7 +72,8 @@ def mutate(copy: Path, module: str, sample: int, seed: int) -> str:
     """Run mutants of one module; returns its line of the table."""
     suite, source = MODULES[module], copy / module
     text, status = source.read_text(encoding="utf-8"), source.stat()
-    unmutated(copy, suite)
+    if not unmutated(copy, suite):
+        return f"| `{module}` | the tests fail without a mutant | | | | |"
     mutants = mutants_of(text)
     drawn = random.Random(seed).sample(mutants, min(sample or len(mutants), len(mutants)))
     killed = by_time = 0
@@ -85,16 +88,16 @@ def mutate(copy: Path, module: str, sample: int, seed: int) -> str:
               f"{run.processor_s:.0f} s]", flush=True)  # fmt: skip
     source.write_text(text, encoding="utf-8")
     os.utime(source, ns=(status.st_atime_ns, status.st_mtime_ns))
-    unmutated(copy, suite)
+    if not unmutated(copy, suite):
+        return f"| `{module}` | the tests fail without a mutant | | | | |"
     return f"| `{module}` | {len(mutants)} | {len(drawn)} | {killed} | {by_time} | {len(drawn) - killed} |"
 
 
-def unmutated(copy: Path, suite: Suite) -> None:
-    """Run the tests without a mutant; the first run compiles. Raises SystemExit if one fails."""
+def unmutated(copy: Path, suite: Suite) -> bool:
+    """Run the tests without a mutant, the first time with what must be compiled; returns whether all pass."""
     run = run_tests(copy, suite, mutated=False)
-    print(f"without a mutant: exit code {run.code}, {run.processor_s:.0f} s", flush=True)
-    if run.code != 0:
-        raise SystemExit(f"the tests fail without a mutant: {run.failed}")
+    print(f"without a mutant: exit code {run.code}, {run.processor_s:.0f} s {run.failed}", flush=True)
+    return run.code == 0
 
 
 def run_tests(copy: Path, suite: Suite, *, mutated: bool = True) -> Run:

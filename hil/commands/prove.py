@@ -65,8 +65,8 @@ def prove(
         str | None,
         typer.Option(
             "--scheduler",
-            help="Diagnose on a dask.distributed cluster, as tcp://10.0.0.1:8786; needs the extra cluster of hil-servo. "
-            "Whoever reaches the scheduler executes code as its user: use it in a network that you trust",
+            help="Diagnose on a dask.distributed cluster, as tcp://10.0.0.1:8786; needs the extra cluster of "
+            "hil-servo; whoever reaches the scheduler executes code as its user: use it in a network that you trust",
         ),
     ] = None,
     show: Annotated[

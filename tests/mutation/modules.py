@@ -70,7 +70,7 @@ MODULES = {
     "hil/loop/checks.py": Suite(_loop("checks", "encoder_checks"), compiled=False),
     "hil/loop/clock.py": Suite(_loop("clock", "late_ticks")),
     "hil/loop/cycle.py": Suite(_loop("session_times", "virtual", "session"), test_s=240),
-    "hil/loop/devices.py": Suite(_loop("run_bus", "session_arming", "odd_drives", "run")),
+    "hil/loop/devices.py": Suite(_loop("devices", "run_bus", "session_arming", "odd_drives", "run")),
     "hil/loop/disturbances.py": Suite(_loop("realtime", "latency")),
     "hil/loop/eds_files.py": Suite(_EDS_OF_A_BENCH),
     "hil/loop/latency.py": Suite(_loop("latency") + _DOCTOR),

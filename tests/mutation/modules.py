@@ -29,7 +29,7 @@ _SERIAL = _drivers("serial")
 _FAULTS = _drivers("faults_devices", "faults_watchdogs", "faults_frames")
 _DRIVE = _drivers("cia402", "faults_devices", "faults_watchdogs", "acting_setpoint", "faults_frames", "stop_answered",
                   "canopen_drive")  # fmt: skip
-_SET_UP = _drivers("canopen_setup", "heartbeats", "eds_types") + _loop("odd_drives")
+_SET_UP = _drivers("drive_reactions", "canopen_setup", "heartbeats", "eds_types") + _loop("odd_drives")
 _SESSION = _loop("session", "session_times", "session_arming", "session_power_off", "supervision", "late_ticks",
                  "interrupted")  # fmt: skip
 
@@ -55,11 +55,11 @@ MODULES = {
     "drivers/inprocess.py": Suite(_drivers("foreign_frames", "canopen_client", "heartbeats")),
     "drivers/loopback_bus.py": Suite(_drivers("bus", "foreign_frames", "processes")),
     "drivers/modelled_bus.py": Suite(_drivers("bus") + _FAULTS),
-    "drivers/object_index.py": Suite(_SET_UP + _drivers("acting_setpoint", "encoders", "canopen_drive")),
+    "drivers/object_index.py": Suite(_drivers("object_index")),
     "drivers/object_types.py": Suite(_drivers("eds_types", "eds")),
     "drivers/pdo.py": Suite(_drivers("pdo", "canopen_setup", "canopen_drive")),
     "drivers/port.py": Suite(_drivers("cia402", "canopen_setup", "canopen_drive") + _FAULTS),
-    "drivers/sdo_client.py": Suite(_drivers("canopen_setup", "eds_types", "heartbeats")),
+    "drivers/sdo_client.py": Suite(_drivers("sdo_client", "canopen_setup", "eds_types")),
     "drivers/sdo_setup.py": Suite(_SET_UP),
     "drivers/serial_encoder.py": Suite(_SERIAL),
     "drivers/serial_frames.py": Suite(_SERIAL),
@@ -74,7 +74,7 @@ MODULES = {
     "hil/loop/disturbances.py": Suite(_loop("realtime", "latency")),
     "hil/loop/eds_files.py": Suite(_EDS_OF_A_BENCH),
     "hil/loop/latency.py": Suite(_loop("latency") + _DOCTOR),
-    "hil/loop/limits.py": Suite(_loop("checks", "encoder_checks", "sign_check"), compiled=False),
+    "hil/loop/limits.py": Suite(_loop("limits", "checks", "encoder_checks", "sign_check"), compiled=False),
     "hil/loop/machine.py": Suite(_DOCTOR),
     "hil/loop/notify.py": Suite(_loop("notify")),
     "hil/loop/outcome.py": Suite(_loop("session_power_off", "session_times")),
@@ -82,7 +82,7 @@ MODULES = {
     "hil/loop/run.py": Suite(_loop("session_arming", "run_bus", "certificate", "run")),
     "hil/loop/session.py": Suite(_SESSION),
     "hil/loop/sign_check.py": Suite(_loop("sign_check"), compiled=False),
-    "hil/loop/simulated_bench.py": Suite(_loop("run_bus", "virtual", "run")),
+    "hil/loop/simulated_bench.py": Suite(_loop("simulated_bench", "run_bus", "virtual", "run")),
     "hil/loop/stall.py": Suite(_loop("stall")),
     "hil/loop/stopping.py": Suite(_loop("bounds")),
     "hil/loop/suitability.py": Suite(_loop("latency")),

@@ -79,7 +79,7 @@ MODULES = {
     "hil/loop/notify.py": Suite(_loop("notify")),
     "hil/loop/outcome.py": Suite(_loop("session_power_off", "session_times")),
     "hil/loop/realtime.py": Suite((*_loop("realtime", "certificate"), *_DOCTOR)),
-    "hil/loop/run.py": Suite(_loop("session_arming", "run_bus", "certificate", "run")),
+    "hil/loop/run.py": Suite(_loop("run_checks", "session_arming", "run_bus", "certificate", "run")),
     "hil/loop/session.py": Suite(_SESSION),
     "hil/loop/sign_check.py": Suite(_loop("sign_check"), compiled=False),
     "hil/loop/simulated_bench.py": Suite(_loop("simulated_bench", "run_bus", "virtual", "run")),

@@ -119,6 +119,10 @@ def error_frame(error_class: int, detail: int = 0) -> can.Message:
     return can.Message(arbitration_id=error_class, is_error_frame=True, data=bytes([0, detail, 0, 0, 0, 0, 0, 0]))
 
 
+def test_the_states_of_a_controller_differ() -> None:
+    assert [state.name for state in BusState] == ["ACTIVE", "PASSIVE", "OFF"]
+
+
 @pytest.mark.parametrize(
     ("error_class", "text"),
     [

@@ -153,6 +153,7 @@ def test_what_a_reset_cleared_is_not_told_with_a_later_fault(watch: bool) -> Non
             rig.drive.check()
     rig.drive.reset_fault()
     rig.drive.check()
+    assert rig.drive.error_code == 0
     rig.node.emergency(0x4310, 0x09, rig.now_s)
     rig.cycle()
     with pytest.raises(DriveFault, match="0x4310") as caught:

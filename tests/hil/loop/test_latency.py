@@ -148,8 +148,8 @@ def test_what_is_beyond_the_histogram_is_counted_at_its_end(
     ({2e-6: 2}, "no period missed in 2 ticks (95 % sure: fewer than 1 in 1); p99.9 2.0 us, at most 100 us"),
     ({1e-5: 999, 0.0021: 1}, "2 periods missed in 1000 ticks, p99.9 10 us (good: none, at most 100 us); a bench "
                              "arms, and no stall outlasts 3 periods"),
-    ({1e-5: 9, 0.0075: 1}, "7 periods missed in 10 ticks; p99 7500 us, at most 500 us (drive.jitter_p99); longest stall "
-                           "7500 us, allowed 3000 us (drive.missed_answers)"),
+    ({1e-5: 9, 0.0075: 1}, "7 periods missed in 10 ticks; p99 7500 us, at most 500 us (drive.jitter_p99); longest "
+                           "stall 7500 us, allowed 3000 us (drive.missed_answers)"),
 ])  # fmt: skip
 def test_a_judgement_in_words(latencies_s: dict[float, int], reason: str) -> None:
     assert judge(1000.0, series(latencies_s)).reason == reason

@@ -36,7 +36,7 @@ from drivers.cia402_setup import (
 from drivers.emcy import Emergency, error_text
 from drivers.pdo import layout, saturate
 from drivers.port import Condition, Drive, DriveFault, DriveGoal, DriveSample
-from drivers.stop_watch import StopAnswer, StopVerdict, StopWatch
+from drivers.stop_watch import StopAnswer, StopVerdict, StopWatch, ramp_limit_s
 
 __all__ = ["TRIPPING", "CanopenDrive", "DriveInfo", "DriveSettings", "HomingSettings"]
 
@@ -59,8 +59,7 @@ class CanopenDrive(CanopenNode, Drive):
     def __init__(self, master: CanopenMaster, settings: DriveSettings) -> None:
         super().__init__(master, settings, "drive")
         self._wanted = settings  # those in force: self.settings
-        self.goal = DriveGoal.DISABLED
-        self.info = NO_INFO
+        self.goal, self.info = DriveGoal.DISABLED, NO_INFO
         self.tripped = Condition.OK  # what tripped the drive, until reset_fault
         self.controlword_bits = 0  # mode-specific bits (homing start), or-ed in while enabled
         self._send, self._rpdo_id = master.port.send, 0x200 + settings.node_id
@@ -71,13 +70,10 @@ class CanopenDrive(CanopenNode, Drive):
         master.port.listen(0x280 + settings.node_id, self._on_demand)
         self._take_mode(settings.mode)
         self._rad_per_count = self._n_m_per_mille = self._target_per_unit = 0.0
-        self._statusword = 0
-        self._raw_counts = 0  # as read from the drive, wraps
-        self._counts = 0  # unwrapped
-        self._torque = 0
-        self._controlword = 0
+        self._statusword = self._controlword = self._torque = 0
+        self._raw_counts = self._counts = 0  # as read from the drive, which wraps; unwrapped
         self._was_enabled = self._reset_requested = False
-        self._speed_counts_s = 0.0  # between the last two answers
+        self._speed = 0.0  # between the last two answers, without sign [rad/s]
         self.stop_margin = 0.0  # speed [rad/s] that a sound stop may reach beyond that at its begin
         self._stop = StopWatch(settings.period_s, settings.missed_answers_allowed)
 
@@ -115,8 +111,7 @@ class CanopenDrive(CanopenNode, Drive):
         self._raw_counts = self._counts = answer.counts
         self._statusword = answer.statusword
         self._begin()
-        self.tripped = Condition.OK
-        self.goal = DriveGoal.DISABLED
+        self.tripped, self.goal = Condition.OK, DriveGoal.DISABLED
         self._was_enabled = self._reset_requested = False
         self._stop = StopWatch(self.settings.period_s, self.settings.missed_answers_allowed)
 
@@ -136,7 +131,7 @@ class CanopenDrive(CanopenNode, Drive):
         before_s = self._sample_time_s
         self._take_answer(now_s)
         if self._sample_time_s > before_s:
-            self._speed_counts_s = moved / (self._sample_time_s - before_s)
+            self._speed = abs(moved) * self._rad_per_count / (self._sample_time_s - before_s)
 
     def _on_demand(self, can_id: int, data: bytes, now_s: float) -> None:
         acting = self._acting
@@ -230,9 +225,8 @@ class CanopenDrive(CanopenNode, Drive):
             self._stop.reset()
             return
         count, fresh = self._rad_per_count / self.settings.period_s, self._master.syncs == self._answered
-        speed = abs(self._speed_counts_s) * self._rad_per_count
-        answer = StopAnswer(speed, count, enabled=state is _ENABLED_STATE, fresh=fresh)
-        slowest_s = self._arming.disarm_s if self.goal is DriveGoal.DISABLED else 0.0  # at rest
+        answer = StopAnswer(self._speed, count, enabled=state is _ENABLED_STATE, fresh=fresh)
+        slowest_s = self.transition_s if self.goal is DriveGoal.DISABLED else 0.0  # at rest
         verdict = self._stop.step(answer, self.info.quick_stop_rad_s2, self.stop_margin, slowest_s)
         if verdict is StopVerdict.ACCELERATES:
             self._latched |= Condition.RUNAWAY
@@ -240,8 +234,16 @@ class CanopenDrive(CanopenNode, Drive):
             self._master.cut_off(now_s)
             self._latched |= Condition.UNANSWERED
 
+    @property
+    def ramp_s(self) -> float:
+        return ramp_limit_s(self._speed, self.info.quick_stop_rad_s2, unknown_s=0.0)
+
+    @property
+    def transition_s(self) -> float:
+        return self._arming.disarm_s
+
     def confirm_off(self, now_s: float) -> bool:
-        for statusword in switch_off(self._master, self.settings, now_s):
+        for statusword in switch_off(self._master, self.settings, now_s, self.ramp_s):
             self._statusword = statusword
             if STATE_BY_STATUS[statusword & 0x7F] not in POWERED:
                 return True

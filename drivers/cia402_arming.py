@@ -20,7 +20,7 @@ _ANSWER_S: Final = 0.5  # an answer that takes longer is not awaited
 _SPACING_S: Final = 0.01  # between an answer and the next request
 _ASK_AFTER_S: Final = 0.1  # a drive that is armed sooner is asked nothing
 _SLOWER: Final = 1.5  # than its transitions to enabled a drive may be when it is disarmed
-_SLOWEST_S: Final = 0.5
+_SLOWEST_S: Final = 1.0
 _BEFORE_READY: Final = (DriveState.SWITCH_ON_DISABLED, DriveState.QUICK_STOP_ACTIVE)
 _SWITCHED_OFF: Final = (DriveState.SWITCH_ON_DISABLED, DriveState.READY_TO_SWITCH_ON, DriveState.SWITCHED_ON)
 

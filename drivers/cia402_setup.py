@@ -31,7 +31,8 @@ TARGET: Final = {
     OperationMode.HOMING: Entry(Index.TARGET_POSITION, 0, 32, True),
 }
 _DEADLINE_PERIODS: Final = 3  # shortest deadline: one set-point lost, one late
-_OFF_LIMIT_S: Final = 1.0  # a stop ramp under way ends within it, from 0.6 m/s at 1 m/s^2
+_OFF_LIMIT_S: Final = 1.0  # until a drive at rest says that its power is off
+_LONGEST_RAMP_S: Final = 10.0  # of a drive that is asked meanwhile
 _MODE_LIMIT_S: Final = 1.0  # until the mode display follows: some drives change it in a slow task
 CONTROLWORD: Final = Entry(Index.CONTROLWORD, 0, 16)
 FEEDBACK: Final = (
@@ -241,9 +242,10 @@ def _write_homing(device: DeviceSetup, homing: HomingSettings, rad_per_count: fl
     device.write(Index.HOME_OFFSET, 0, round(homing.offset_rad / rad_per_count))
 
 
-def switch_off(master: CanopenMaster, settings: DriveSettings, now_s: float) -> Iterator[int]:
-    """Command "disable voltage" by SDO and yield the statusword as often as it is asked for, for _OFF_LIMIT_S.
+def switch_off(master: CanopenMaster, settings: DriveSettings, now_s: float, ramp_s: float) -> Iterator[int]:
+    """Command "disable voltage" by SDO and yield the statusword as often as it is asked for.
 
+    For _OFF_LIMIT_S, or ramp_s that a ramp of the drive takes, which ignores commands in its reaction to a fault.
     The node is in NMT pre-operational for it: without PDOs, so that no set-point acts. Raises DriverError.
     """
     network = master.network
@@ -251,7 +253,7 @@ def switch_off(master: CanopenMaster, settings: DriveSettings, now_s: float) -> 
     with DeviceSetup(network, settings.node_id, settings.eds) as device:
         master.nmt(NMT_PRE_OPERATIONAL, settings.node_id)
         device.write_only(Index.CONTROLWORD, 0, 0)
-        while network.time_s < now_s + _OFF_LIMIT_S:
+        while network.time_s < now_s + max(_OFF_LIMIT_S, min(ramp_s, _LONGEST_RAMP_S)):
             yield device.read(Index.STATUSWORD)
             network.pump()
 

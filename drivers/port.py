@@ -184,6 +184,16 @@ class Drive(Protocol):
     def command(self, now_s: float, setpoint: float) -> None:
         """Send goal and set-point; the target is zero, or the position held, until the drive is enabled."""
 
+    @property
+    def ramp_s(self) -> float:
+        """Longest time that its stop from the present speed takes; 0: not known."""
+        return 0.0
+
+    @property
+    def transition_s(self) -> float:
+        """Longest time that it takes to leave OPERATION ENABLED at rest, as its arming has shown; 0: not known."""
+        return 0.0
+
     @abstractmethod
     def confirm_off(self, now_s: float) -> bool:
         """Switch the power stage off by another way than the cyclic data, and ask for its state; blocking.

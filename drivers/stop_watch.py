@@ -14,6 +14,11 @@ _UNBROKEN: Final = 0.9  # share: a loop that takes over a weight slows its rise 
 _NOISE_COUNTS: Final = 4  # of the encoder, between two answers
 
 
+def ramp_limit_s(speed: float, ramp_rad_s2: float, unknown_s: float = math.inf) -> float:
+    """Longest time in which a drive ends a ramp from a speed [rad/s]; ramp_rad_s2: its deceleration, 0: unknown."""
+    return _RAMP_MARGIN * speed / ramp_rad_s2 + _RAMP_EXTRA_S if ramp_rad_s2 else unknown_s
+
+
 class StopVerdict(IntEnum):
     """What is to be done about a stop."""
 
@@ -61,8 +66,7 @@ class StopWatch:
         transition, if longer than most do.
         """
         if self._cycles == 0:
-            ramp_s = _RAMP_MARGIN * answer.speed / ramp_rad_s2 if ramp_rad_s2 else math.inf
-            self._limit = (ramp_s + _RAMP_EXTRA_S) / self._period_s
+            self._limit = ramp_limit_s(answer.speed, ramp_rad_s2) / self._period_s
         if answer.enabled or self._begins:
             self._top = max(self._top, answer.speed)
         elif answer.fresh:

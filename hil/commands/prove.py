@@ -65,7 +65,8 @@ def prove(
         str | None,
         typer.Option(
             "--scheduler",
-            help="Diagnose on a dask.distributed cluster, as tcp://10.0.0.1:8786; needs the extra cluster of hil-servo",
+            help="Diagnose on a dask.distributed cluster, as tcp://10.0.0.1:8786; needs the extra cluster of "
+            "hil-servo; whoever reaches the scheduler executes code as its user: use it in a network that you trust",
         ),
     ] = None,
     show: Annotated[

@@ -18,7 +18,8 @@ def recover(
 ) -> None:
     """Make a readable recording of a run that was killed, or whose disk was full or damaged; NAME.arrows stays.
 
-    Whole blocks of the file are used, and the rows that are still in memory. Gaps are marked in the recording.
+    Whole blocks of the file are used, and the rows that are still in memory. Gaps are marked in the recording. Call it
+    as the user of the run: rows in memory (/dev/shm/hil-ring-*) are its alone, and root takes them from any user.
     """
     from hil.loop.certificate import of_rows
     from hil.recording.recover import remains, unfinished, write_remains

@@ -22,8 +22,8 @@ class Outcome:
     reason: str
     rows: int
     lateness_s: Sequence[float]
-    skipped: int = 0
-    stop_asked: bool = False
+    skipped: int
+    stop_asked: bool
 
 
 def with_stop(ending: Ending, reason: str, tripped: Condition) -> tuple[Ending, str]:

@@ -36,10 +36,10 @@ from hil.motion.trajectory import Trajectory
 
 ARM_TIMEOUT_S = 2.0
 SETTLE_S = 0.1  # hold after a controlled stop
-QUICK_STOP_LIMIT_S = 2.0  # longest wait for the end of a quick stop
+QUICK_STOP_LIMIT_S = 2.0  # wait for the end of a quick stop; a longer ramp of the drive: LONGEST_STOP_S at most
 AFTERMATH_S = 0.1  # recorded after the power stage is off
-DISARM_TIMEOUT_S = 0.2  # beside a ramp of the drive
-_AROUND_S = ARM_TIMEOUT_S + LONGEST_STOP_S + SETTLE_S + QUICK_STOP_LIMIT_S + AFTERMATH_S + DISARM_TIMEOUT_S
+DISARM_TIMEOUT_S = 0.2  # beside a ramp of the drive; more for one whose transitions take longer
+_AROUND_S = ARM_TIMEOUT_S + 2 * LONGEST_STOP_S + SETTLE_S + AFTERMATH_S + DISARM_TIMEOUT_S
 _NO_ENCODER = EncoderSample(0.0, 0, 0.0, 0, Condition.OK)
 
 
@@ -176,10 +176,8 @@ class Session:
         start_m = self._trajectory.position_m[0]
         actual_m = self._position_m(sample, seen)
         if abs(actual_m - start_m) > self._rig.section.following_error_m:
-            raise HilError(
-                f"the axis stands at {actual_m:.6f} m, the set-points begin at {start_m:.6f} m: it moved "
-                "while the drive was armed; find out why"
-            )
+            raise HilError(f"the axis stands at {actual_m:.6f} m, the set-points begin at {start_m:.6f} m: it moved "
+                           "while the drive was armed; find out why")  # fmt: skip
 
     def _loop(self, sample: DriveSample, seen: EncoderSample) -> int:
         """Run from tick 0, whose samples are given, to the end. Returns the number of recorded rows."""
@@ -248,7 +246,7 @@ class Session:
             self._cycle.hold(tick, STOP_SEGMENT)
             self._phase = LoopPhase.QUICK_STOP
             self._drive.goal = DriveGoal.QUICK_STOP
-            self._last_tick = tick + self._ticks(QUICK_STOP_LIMIT_S)
+            self._last_tick = tick + self._ticks(self._ramp_s)
         else:
             self._cycle.follow(stop, tick, STOP_SEGMENT)
             self._phase = LoopPhase.STOP
@@ -265,6 +263,11 @@ class Session:
         """Position of the axis from the encoder of the position loop."""
         return seen.position_m if self._from_table else self._ratio * sample.motor_position_rad
 
+    @property
+    def _ramp_s(self) -> float:
+        """How long a stop of the drive from the present speed is waited for."""
+        return max(QUICK_STOP_LIMIT_S, min(self._drive.ramp_s, LONGEST_STOP_S))
+
     def _power_off(self, goal: DriveGoal, ended: str, cause: BaseException | None = None) -> None:
         """Switch the power stage off, unrecorded: by its controlword, then by another way (`Drive.confirm_off`), which
         would end a ramp. Nothing that fails here ends it before the drive was asked. Raises StillPowered from `cause`
@@ -272,18 +275,18 @@ class Session:
         """
         drive = self._drive
         drive.goal, confirmed, braking = goal, 0, False
-        for tick in range(self._ticks(DISARM_TIMEOUT_S + QUICK_STOP_LIMIT_S)):
+        answer_s = max(DISARM_TIMEOUT_S, drive.transition_s)
+        for tick in range(self._ticks(answer_s + self._ramp_s)):
             with contextlib.suppress(Exception):
                 sample, _ = self._exchange()
                 confirmed = 0 if sample.powered or sample.age_cycles else confirmed + 1
                 braking = braking if sample.age_cycles else sample.powered and not sample.enabled
             if confirmed == 2:
                 return
-            if tick >= self._ticks(DISARM_TIMEOUT_S) and not braking:
+            if tick >= self._ticks(answer_s) and not braking:
                 break
             with contextlib.suppress(Exception):
                 drive.command(self._now_s, 0.0)
-        said = f"The drive still reports {drive.status}"
         try:
             if drive.confirm_off(self._now_s):
                 return

@@ -65,6 +65,15 @@ def test_set_points_older_than_the_cycles_do_not_count() -> None:
     assert acting.text == "the set-point -500 acts, commanded were 0 to 500"
 
 
+def test_the_last_of_the_cycles_allowed_counts_and_no_older_one() -> None:
+    _, rig = running()
+    cycles = rig.drive.settings.missed_answers_allowed + 3
+    for age, differs in ((cycles, False), (cycles + 1, True)):
+        for torque in (0.5, *[0.0] * (age - 1)):
+            rig.cycle(torque)
+        assert rig.drive._acting.differs(frame(CST, round(0.5 * rig.drive._target_per_unit))) is differs
+
+
 def test_lost_commands_are_seen_in_the_demand_and_three_are_not() -> None:
     bus, rig = running()
     for torque in (0.2, 0.4, 0.6):

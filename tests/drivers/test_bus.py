@@ -119,6 +119,32 @@ def error_frame(error_class: int, detail: int = 0) -> can.Message:
     return can.Message(arbitration_id=error_class, is_error_frame=True, data=bytes([0, detail, 0, 0, 0, 0, 0, 0]))
 
 
+def test_the_states_of_a_controller_differ() -> None:
+    assert [state.name for state in BusState] == ["ACTIVE", "PASSIVE", "OFF"]
+
+
+@pytest.mark.parametrize(
+    ("error_class", "text"),
+    [
+        (0x001, "transmit time-out"), (0x002, "arbitration lost"), (0x004, "controller problem"),
+        (0x008, "protocol violation"), (0x010, "transceiver"), (0x020, "no acknowledge"), (0x040, "bus off"),
+        (0x080, "bus error"), (0x100, "restarted"), (0x200, "error frame"), (0x0A0, "no acknowledge, bus error"),
+    ],
+)  # fmt: skip
+def test_error_classes_are_told_in_words(error_class: int, text: str) -> None:
+    port = PythonCanPort(ErrorSource([error_frame(error_class)]))
+    port.poll(0.0)
+    assert port.health.last_error == text
+
+
+@pytest.mark.parametrize("data", [b"", b"\x00"])
+def test_an_error_frame_without_its_detail_changes_no_state(data: bytes) -> None:
+    port = PythonCanPort(ErrorSource([can.Message(arbitration_id=0x004, is_error_frame=True, data=data)]))
+    port.poll(0.0)
+    assert port.health.state is BusState.ACTIVE
+    assert port.health.error_frames == 1
+
+
 @pytest.mark.parametrize(
     ("frames", "state"),
     [

@@ -18,7 +18,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drivers.eds_file import read_eds
-from drivers.eds_text import MOST_BYTES, EdsError, node_formula, number
+from drivers.eds_text import MOST_BYTES, EdsError, node_formula, number, octal
 from drivers.sdo_setup import EDS_FOLDER
 
 CLEAN = """[FileInfo]
@@ -281,6 +281,14 @@ def test_what_is_no_number(text: str) -> None:
     assert number(text) is None
 
 
+@pytest.mark.parametrize(("text", "value"), [
+    ("077", 63), ("'0010' ; ten", 8), ("0" * 19 + "7", 7), ("0" * 20 + "7", None), ("08", None), ("77", None),
+    ("0", None), ("0x7", None), ("", None),
+])  # fmt: skip
+def test_a_leading_zero_may_mean_octal(text: str, value: int | None) -> None:
+    assert octal(text) == value
+
+
 # -- what is left in doubt is said ------------------------------------------------------------------------------------
 
 
@@ -325,7 +333,11 @@ NrOfEntries=1
 NrOfEntries=1
 3=7
 """
-    gain = read(tmp_path, CLEAN + compact).dictionary[0x2000]
+    eds, at = read(tmp_path, CLEAN + compact), CLEAN.count("\n") + 2
+    assert eds.where(0x2000, 0) == f"line {at}: [2000] CompactSubObj"
+    assert eds.where(0x2000, 3) == f"line {at + 3}: [2000] DataType=0x0003 (INTEGER16)"
+    assert eds.where(0x2000, 4) == "0x2000:04 has no DataType"
+    gain = eds.dictionary[0x2000]
     assert [(v.subindex, v.name, v.data_type, v.default, v.value) for v in gain.values()] == [
         (0, "Number of entries", 5, 3, None), (1, "Gain1", 3, -3, None), (2, "Second", 3, -3, None),
         (3, "Gain3", 3, -3, 7),
@@ -375,8 +387,10 @@ def test_a_file_that_is_no_eds_is_refused_in_one_sentence(tmp_path: Path, data: 
 def test_folders_and_missing_files_are_refused(tmp_path: Path) -> None:
     with pytest.raises(EdsError, match="is a folder"):
         read_eds(tmp_path, 9)
-    with pytest.raises(EdsError, match="cannot be read"):
+    with pytest.raises(EdsError, match=r"none\.eds: cannot be read \(No such file or directory\)"):
         read_eds(tmp_path / "none.eds", 9)
+    with pytest.raises(EdsError, match=r"cannot be read \(.*null byte\)"):
+        read_eds(tmp_path / "no\0ne.eds", 9)
     with pytest.raises(EdsError, match="no regular file"):
         read_eds(Path("/dev/zero"), 9)
 

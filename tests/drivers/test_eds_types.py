@@ -7,11 +7,20 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from canopen.objectdictionary.datatypes import (
+    INTEGER16,
+    INTEGER32,
+    UNSIGNED16,
+    UNSIGNED32,
+    UNSIGNED64,
+    VISIBLE_STRING,
+)
 from drive_rig import Rig, in_process
 
 from drivers.canopen_drive import DriveSettings
 from drivers.cia402 import DriveState
 from drivers.eds_file import read_eds
+from drivers.object_types import profile_type
 from drivers.port import ConfigurationError
 from drivers.sdo_setup import EDS_FOLDER, DeviceSetup, SetupNetwork
 
@@ -49,6 +58,16 @@ def test_every_sign_is_that_of_the_profile(tmp_path: Path) -> None:
     expected = positions(rig_with(tmp_path))
     assert expected == pytest.approx((-9.42477796, -0.02))
     assert positions(rig_with(tmp_path, *turned)) == expected
+
+
+@pytest.mark.parametrize(("index", "data_type", "read_as"), [
+    (0x13FF, INTEGER32, INTEGER32), (0x1400, INTEGER32, UNSIGNED32), (0x1BFF, INTEGER32, UNSIGNED32),
+    (0x1C00, INTEGER32, INTEGER32), (0x6041, INTEGER16, UNSIGNED16), (0x6064, UNSIGNED32, INTEGER32),
+    (0x6064, UNSIGNED16, INTEGER16), (0x6004, UNSIGNED32, INTEGER32), (0x2000, UNSIGNED32, UNSIGNED32),
+    (0x6041, VISIBLE_STRING, VISIBLE_STRING), (0x6040, UNSIGNED64, UNSIGNED64),
+])  # fmt: skip
+def test_the_sign_of_a_known_object_is_fixed_and_its_length_kept(index: int, data_type: int, read_as: int) -> None:
+    assert profile_type(index, 0, data_type) == read_as
 
 
 def test_another_sign_is_said_with_its_line(tmp_path: Path) -> None:

@@ -101,6 +101,24 @@ def test_preset_takes_effect_on_the_device() -> None:
     assert bench.measure(0.26) == pytest.approx(0.11)
 
 
+@pytest.mark.parametrize(("heard_ms", "lost"), [(60, False), (61, True)])
+def test_an_encoder_without_heartbeat_is_lost_after_three(heard_ms: int, lost: bool) -> None:
+    bench = Bench(EncoderSettings(heartbeat_s=0.02))
+    bench.encoder.set_up()
+    bench.master.start(0.0)
+    bench.measure(0.0)
+    bench.node.values[0x1017_00] = 0
+    condition = bench.encoder.read(0.001 + 1e-3 * heard_ms).condition
+    assert condition is (Condition.HEARTBEAT_LOST if lost else Condition.OK)
+
+
+def test_a_step_of_zero_is_refused() -> None:
+    bench = Bench(EncoderSettings())
+    bench.node.values[0x6005_01] = 0
+    with pytest.raises(ConfigurationError, match=r"object 0x6005:01.*given: 0 m; allowed: > 0 m"):
+        bench.encoder.set_up()
+
+
 def test_another_resolution_than_believed_is_refused() -> None:
     with pytest.raises(ConfigurationError, match=r"encoder node 6.*another measuring step.*5e-07 m; allowed: 1e-06 m"):
         Bench(EncoderSettings(step_m=1e-6)).encoder.set_up()

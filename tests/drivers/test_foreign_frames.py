@@ -165,6 +165,15 @@ def test_nothing_from_outside_of_loopback_is_heard(loopback: tuple[PythonCanPort
     assert port.health.foreign == {}
 
 
+def test_the_socket_is_confined_to_loopback(loopback: tuple[PythonCanPort, socket.socket]) -> None:
+    """python-can's port; no hop beyond this PC; no membership of other sockets (IP_MULTICAST_ALL, linux/in.h)."""
+    bus = loopback[0]._bus
+    assert bus.fileno() == bus._socket.fileno()
+    assert bus._socket.getsockname() == (GROUP, 43113)
+    assert [bus._socket.getsockopt(socket.IPPROTO_IP, option) for option in (socket.IP_MULTICAST_TTL, 49)] == [0, 0]
+    assert not bus._socket.getblocking()
+
+
 def test_a_socket_on_another_group_hears_nothing(loopback: tuple[PythonCanPort, socket.socket]) -> None:
     port, _ = loopback
     other = PythonCanPort(open_bus(BusConfig("udp_multicast", "239.74.163.80")))

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from drive_rig import Rig, running, servo
+from drive_rig import Rig, in_process, running, servo
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -98,6 +98,15 @@ def test_a_master_that_is_cut_off_repeats_nmt_stop_and_sends_nothing_else() -> N
         master.sync(tick * PERIOD_S)
     assert everything == [(NMT, bytes([NMT_STOP, 0]))] * 21  # the first may have been lost
     assert master.syncs == 20  # samples grow old
+
+
+def test_a_drive_that_is_released_awaits_no_heartbeat_and_is_pre_operational() -> None:
+    rig = in_process()
+    rig.set_up()
+    assert rig.node.values[0x1016_01]
+    rig.master.release(5)
+    assert rig.node.values[0x1016_01] == 0
+    assert rig.node.nmt_state == 127
 
 
 def test_nmt_stop_that_is_lost_at_first_still_stops_the_drive() -> None:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import pairwise
+from pathlib import Path
 
 import pytest
 from drive_rig import Mass
@@ -101,6 +103,22 @@ def test_broken_lines_are_counted_and_the_first_one_is_never_believed() -> None:
     assert [r.position_m for r in parser.feed(b"777\n2.0 mm\n")] == [pytest.approx(0.002)]
 
 
+@pytest.mark.parametrize(("data", "discarded"), [(b"abc", 3), (b"\xff", 1), (b"ab\xaa", 2), (b"\xaa", 0), (b"", 0)])
+def test_bytes_outside_of_frames_go_at_once_but_for_half_a_mark(data: bytes, discarded: int) -> None:
+    parser = BinaryParser()
+    assert parser.feed(data) == []
+    assert parser.discarded_bytes == discarded
+    assert len(parser.feed(encode_frame(1, 1))) == 1
+    assert parser.discarded_bytes == len(data)
+
+
+@pytest.mark.parametrize(("elapsed_us", "told"), [(0, 0), (1234, 1234), (0xFFFE, 0xFFFE), (0xFFFF, None)])
+@pytest.mark.parametrize("status", [0, 1, 255])
+def test_status_and_elapsed_time_of_a_frame(elapsed_us: int, told: int | None, status: int) -> None:
+    (reading,) = BinaryParser().feed(encode_frame(-7, 255, status, elapsed_us))
+    assert reading == (-7, None, 255, status == 0, told)
+
+
 # -- on a pseudo-terminal ---------------------------------------------------------------------------------------------
 
 
@@ -183,6 +201,35 @@ def test_a_vanished_line_is_noticed(line: Line, hang_up: bool) -> None:
     conditions = [line.reader.read(k * 1e-3).condition for k in range(1, 140)]
     assert bool(conditions[-1] & Condition.LINE_LOST) is hang_up
     assert conditions[-1] & Condition.STALE
+
+
+def test_before_the_first_position_the_sample_is_late_at_zero(line: Line) -> None:
+    assert line.reader.read(0.5) == EncoderSample(0.0, 1, 0.0, 0, Condition.LATE)
+
+
+@pytest.mark.parametrize("older_first", [True, False])
+def test_another_device_under_the_same_name_is_no_line_any_more(tmp_path: Path, older_first: bool) -> None:
+    plants = [SimulatedSerialEncoder(Mass(), format=SerialFormat.BINARY, bits=32) for _ in range(2)]
+    first, second = plants if older_first else plants[::-1]
+    name = tmp_path / "encoder"
+    name.symlink_to(first.device)
+    reader = SerialEncoder(SerialSettings(str(name)))
+    assert not any(reader.read(k * 1e-3).condition & Condition.LINE_LOST for k in range(140))
+    name.unlink()
+    name.symlink_to(second.device)
+    conditions = [reader.read(0.2 + k * 1e-3).condition for k in range(140)]
+    assert conditions[-1] & Condition.LINE_LOST
+    reader.close()
+    for plant in plants:
+        plant.close()
+
+
+def test_a_position_is_as_old_as_its_transmission_takes() -> None:
+    line = Line()
+    line.reader.settings = replace(line.reader.settings, latency_s=0.25)
+    line.send(1.0)
+    assert line.read(1.0).time_s == 0.75
+    line.close()
 
 
 def test_binary_wrap_direction_alarm_and_lost_frames() -> None:

@@ -10,6 +10,7 @@ from drivers.cia402 import DriveState, HomingPhase, OperationMode
 from drivers.homing import HomingRun
 from drivers.modelled_bus import Fault, FaultKind
 from drivers.port import Condition, DriveFault, DriveGoal, ServoTarget
+from drivers.stop_watch import StopAnswer
 
 
 def deaf(rig: Rig) -> None:
@@ -114,6 +115,18 @@ def test_after_the_cut_no_set_point_is_sent() -> None:
     assert sent == []
 
 
+def test_the_noise_of_a_speed_is_that_of_one_count_in_a_period() -> None:
+    rig = in_process(settings=DriveSettings(period_s=0.002))
+    rig.set_up()
+    rig.enable()
+    seen: list[StopAnswer] = []
+    step = rig.drive._stop.step
+    rig.drive._stop.step = lambda answer, *more: (seen.append(answer), step(answer, *more))[1]
+    rig.drive.goal = DriveGoal.QUICK_STOP
+    rig.cycle()
+    assert seen[0].one_count == pytest.approx(rig.drive.info.rad_per_count / 0.002)
+
+
 def test_power_off_is_confirmed_by_sdo_only_if_the_drive_says_so() -> None:
     rig = in_process()
     rig.set_up()
@@ -140,6 +153,7 @@ def test_what_a_reset_cleared_is_not_told_with_a_later_fault(watch: bool) -> Non
             rig.drive.check()
     rig.drive.reset_fault()
     rig.drive.check()
+    assert rig.drive.error_code == 0
     rig.node.emergency(0x4310, 0x09, rig.now_s)
     rig.cycle()
     with pytest.raises(DriveFault, match="0x4310") as caught:

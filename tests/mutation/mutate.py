@@ -1,10 +1,10 @@
-"""Mutants of the safety rules, the session and the CiA 402 machine: how many do the tests notice?
+"""Mutants of the live axis, from the set-up of its devices to the supervision: how many do the tests notice?
 
-    python tests/mutation/mutate.py [--sample N] [--seed S] [--only PART]     from the root; as make mutation does
+    python tests/mutation/mutate.py [--sample N] [--seed S] [--only PART] [--from MODULE]     from the root
 
 The operators of cosmic-ray change one operator, number, keyword or condition of a module in a copy of the project, and
-the tests of that module run there. A mutant is killed if a test fails, or if one takes TEST_S of processor time, which
-a busy machine does not change. The tests run without a mutant before and after those of each
+the tests of that module (`modules.py`) run there. A mutant is killed if a test fails, or if one takes `Suite.test_s` of
+processor time, which a busy machine does not change. The tests run without a mutant before and after those of each
 module and must pass. It prints each mutant, then a line for each module. `mutants.py` says which mutants are left out.
 
 Each run is a fork of this process, which has imported the libraries but nothing of the project.
@@ -28,6 +28,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import pytest
+from modules import MODULES, Suite
 from mutants import mutants_of
 
 ROOT = Path(__file__).parents[2]
@@ -35,41 +36,6 @@ LIBRARIES = ("hypothesis", "numba", "pyarrow.parquet", "pydantic", "canopen", "s
              "scipy.optimize", "typer.testing", "rich.console", "msgpack", "yaml")  # fmt: skip
 
 
-class Suite(NamedTuple):
-    """Tests of a module, those that end soonest first. compiled: with numba; else the module runs as plain Python."""
-
-    tests: tuple[str, ...]
-    compiled: bool = True
-
-
-def _tests(folder: str, *names: str) -> tuple[str, ...]:
-    return tuple(f"tests/{folder}/test_{name}.py" for name in names)
-
-
-_DRIVE = _tests("drivers", "cia402", "faults_devices", "faults_watchdogs", "acting_setpoint", "faults_frames",
-                "stop_answered", "canopen_drive")  # fmt: skip
-_SESSION = _tests("hil/loop", "session", "session_times", "session_arming", "session_power_off", "supervision",
-                  "late_ticks", "interrupted")  # fmt: skip
-MODULES = {
-    "drivers/cia402.py": Suite(_tests("drivers", "cia402")),
-    "drivers/homing.py": Suite(_tests("drivers", "stop_answered", "canopen_drive")),
-    "drivers/canopen_drive.py": Suite(_DRIVE),
-    "drivers/bus.py": Suite(_tests("drivers", "bus", "foreign_frames")),
-    "drivers/canopen_master.py": Suite(_tests("drivers", "heartbeats", "faults_watchdogs")),
-    "drivers/canopen_node.py": Suite(_tests("drivers", "heartbeats", "faults_watchdogs", "faults_frames", "encoders")),
-    "drivers/heartbeat_trial.py": Suite(_tests("drivers", "heartbeats")),
-    "hil/loop/clock.py": Suite(_tests("hil/loop", "clock", "late_ticks")),
-    "drivers/cia402_setup.py": Suite(_tests("drivers", "canopen_setup", "canopen_drive", "eds")),
-    "drivers/stop_watch.py": Suite(_tests("drivers", "stop_watch", "stop_answered")),
-    "hil/loop/checks.py": Suite(_tests("hil/loop", "checks", "encoder_checks"), compiled=False),
-    "hil/loop/sign_check.py": Suite(_tests("hil/loop", "sign_check"), compiled=False),
-    "hil/loop/stall.py": Suite(_tests("hil/loop", "stall")),
-    "hil/loop/stopping.py": Suite(_tests("hil/loop", "bounds")),
-    "hil/loop/bounds.py": Suite(_tests("hil/loop", "bounds")),
-    "hil/loop/supervision.py": Suite(_tests("hil/loop", "supervision_rules", "stall")),
-    "hil/loop/session.py": Suite(_SESSION),
-}
-TEST_S = 20  # processor time of a test: the slowest takes 3 s
 BROKEN = 70  # exit code where pytest itself could not be run
 HANG_S = 1200.0  # of all tests by the wall clock: one waits for something that does not come
 
@@ -88,6 +54,7 @@ def main() -> None:
     parser.add_argument("--sample", type=int, default=0, help="mutants of each module; 0: all")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", default="", help="only modules whose path contains this")
+    parser.add_argument("--from", dest="first", default="", help="begin with this module, as after an interruption")
     options = parser.parse_args()
     for name in LIBRARIES:
         importlib.import_module(name)
@@ -95,7 +62,8 @@ def main() -> None:
         copy = Path(folder) / "project"
         ignored = shutil.ignore_patterns(".git", ".venv", "build", "runs", ".*_cache", "*.egg-info")
         shutil.copytree(ROOT, copy, ignore=ignored)
-        lines = [mutate(copy, module, options.sample, options.seed) for module in MODULES if options.only in module]
+        modules = [module for module in MODULES if options.only in module and module >= options.first]
+        lines = [mutate(copy, module, options.sample, options.seed) for module in modules]
     print("\n".join(["| module | mutants | run | killed | of those by time | survived |", "|---|---|---|---|---|---|",
                      *lines]))  # fmt: skip
 
@@ -104,7 +72,8 @@ def mutate(copy: Path, module: str, sample: int, seed: int) -> str:
     """Run mutants of one module; returns its line of the table."""
     suite, source = MODULES[module], copy / module
     text, status = source.read_text(encoding="utf-8"), source.stat()
-    unmutated(copy, suite)
+    if not unmutated(copy, suite):
+        return f"| `{module}` | the tests fail without a mutant | | | | |"
     mutants = mutants_of(text)
     drawn = random.Random(seed).sample(mutants, min(sample or len(mutants), len(mutants)))
     killed = by_time = 0
@@ -119,16 +88,16 @@ def mutate(copy: Path, module: str, sample: int, seed: int) -> str:
               f"{run.processor_s:.0f} s]", flush=True)  # fmt: skip
     source.write_text(text, encoding="utf-8")
     os.utime(source, ns=(status.st_atime_ns, status.st_mtime_ns))
-    unmutated(copy, suite)
+    if not unmutated(copy, suite):
+        return f"| `{module}` | the tests fail without a mutant | | | | |"
     return f"| `{module}` | {len(mutants)} | {len(drawn)} | {killed} | {by_time} | {len(drawn) - killed} |"
 
 
-def unmutated(copy: Path, suite: Suite) -> None:
-    """Run the tests without a mutant; the first run compiles. Raises SystemExit if one fails."""
+def unmutated(copy: Path, suite: Suite) -> bool:
+    """Run the tests without a mutant, the first time with what must be compiled; returns whether all pass."""
     run = run_tests(copy, suite, mutated=False)
-    print(f"without a mutant: exit code {run.code}, {run.processor_s:.0f} s", flush=True)
-    if run.code != 0:
-        raise SystemExit(f"the tests fail without a mutant: {run.failed}")
+    print(f"without a mutant: exit code {run.code}, {run.processor_s:.0f} s {run.failed}", flush=True)
+    return run.code == 0
 
 
 def run_tests(copy: Path, suite: Suite, *, mutated: bool = True) -> Run:
@@ -159,12 +128,15 @@ def run_tests(copy: Path, suite: Suite, *, mutated: bool = True) -> Run:
 
 
 class Limit:
-    """Plugin of pytest: each test may take TEST_S of processor time."""
+    """Plugin of pytest: each test may take test_s of processor time."""
+
+    def __init__(self, test_s: int) -> None:
+        self._test_s = test_s
 
     def pytest_runtest_setup(self) -> None:
         used = resource.getrusage(resource.RUSAGE_SELF)
         _, hard = resource.getrlimit(resource.RLIMIT_CPU)
-        resource.setrlimit(resource.RLIMIT_CPU, (round(used.ru_utime + used.ru_stime) + TEST_S, hard))
+        resource.setrlimit(resource.RLIMIT_CPU, (round(used.ru_utime + used.ru_stime) + self._test_s, hard))
 
 
 def in_fork(copy: Path, suite: Suite, output: Path, mutated: bool) -> int:
@@ -173,13 +145,14 @@ def in_fork(copy: Path, suite: Suite, output: Path, mutated: bool) -> int:
         os.dup2(file.fileno(), 1)
         os.dup2(file.fileno(), 2)
     os.chdir(copy)
+    os.environ["PYTHONPATH"] = str(copy)  # of the processes that tests start
     sys.dont_write_bytecode = mutated
     options = ["-q", "-x", "-p", "no:cacheprovider", "-W", "ignore::pytest.PytestAssertRewriteWarning"]  # of a library
     if not suite.compiled:
         os.environ["NUMBA_DISABLE_JIT"] = "1"
         sys.modules["numba"].config.DISABLE_JIT = 1
         options.append("--noconftest")  # which compiles kernels
-    return int(pytest.main([*options, *suite.tests], plugins=[Limit()] if mutated else []))
+    return int(pytest.main([*options, *suite.tests], plugins=[Limit(suite.test_s)] if mutated else []))
 
 
 if __name__ == "__main__":

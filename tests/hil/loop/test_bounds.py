@@ -9,7 +9,7 @@ import pytest
 from bench_runs import MOVE, bench_with
 
 from hil.bench.hardware import DriveMode
-from hil.loop.bounds import make_bounds, make_cycle
+from hil.loop.bounds import FROZEN_COUNTS, make_bounds, make_cycle
 from hil.loop.cycle import Setpoint
 from hil.loop.devices import Rig
 from hil.loop.limits import Bounds
@@ -66,6 +66,13 @@ def test_a_load_may_drive_the_axis_with_half_of_the_torque_that_can_act() -> Non
         bounds = make_bounds(rig, LIMITS)
         assert (bounds.load_torque, bounds.torque_difference) == (150.0, 90.0)
         assert rig.drive.stop_margin == pytest.approx(150.0 / 8557.43)
+
+
+def test_the_first_motion_is_judged_from_some_counts_of_a_coarse_encoder_on() -> None:
+    coarse = bench_with(encoders={"motor": {"counts_per_rev": 20}})
+    with Rig(coarse) as rig:
+        rig.set_up()
+        assert make_bounds(rig, LIMITS).sign_m == pytest.approx(FROZEN_COUNTS * 0.01 / 20)
 
 
 @pytest.mark.parametrize(("error_m", "sign_m"), [(0.0012, 0.0003), (0.002, 0.0005), (0.02, 0.0005)])

@@ -19,7 +19,10 @@ from patient_bench import patient_bench, patient_bench_file
 from processes import DEADLINE_S, wait_for
 
 from drivers.cia402 import DriveState
+from hil.bench.hardware import DriveSection
+from hil.loop.certificate import before_run, of_rows, of_run
 from hil.loop.clock import LatenessLog
+from hil.loop.disturbances import Disturbances
 from hil.loop.realtime import NotArmed
 from hil.loop.run import run_profile
 from hil.recording.recording import read_recording
@@ -76,6 +79,27 @@ def test_a_bench_may_allow_to_arm_above_its_budget_and_the_recording_says_so(tmp
     assert ran.doubts[0].endswith("the drive was armed all the same, as --force or drive.over_budget asks")
     assert "not armed" not in ran.doubts[0]
     assert read_recording(ran.recording).metadata["overridden"] == list(ran.doubts)
+
+
+def test_the_certificate_of_rows_counts_the_ticks_between_them() -> None:
+    columns = {"time_s": np.array([0.0, 1.0, 2.0, 5.0, 6.0, 8.0]) * 1e-3, "lateness_s": np.array([0.0] * 5 + [1.5e-3])}
+    metadata = {"period_s": 0.001, "real_time": {"clock": "wall"}}
+    found = of_rows(columns, metadata)["real_time"]
+    assert found["clock"] == "wall"
+    assert (found["run"]["ticks"], found["run"]["skipped"], found["run"]["missed"]) == (6, 3, 1)
+    assert metadata["real_time"] == {"clock": "wall"}
+    assert of_rows({"time_s": columns["time_s"]}, metadata) == {}
+    assert of_rows(columns, {"period_s": 0.001}) == {}
+
+
+def test_the_certificate_before_a_run_has_what_the_machine_granted() -> None:
+    section = DriveSection(jitter_p99=0.25, bus_load=0.5)
+    virtual = before_run(0.002, 0.4, section, None)
+    assert virtual == {"clock": "virtual", "period_s": 0.002, "bus_load": 0.4,
+                       "budget": {"jitter_p99_s": 0.0005, "bus_load": 0.5}}  # fmt: skip
+    assert before_run(0.002, 0.4, section, {"machine": 1}) == virtual | {"clock": "wall", "machine": 1}
+    counted = of_run([0.0, 0.0], 4, 0.002, Disturbances(5, 6, 7, 8))["run"]
+    assert [counted[name] for name in ("ticks", "skipped", "page_faults", "threads")] == [2, 4, 5, 8]
 
 
 def test_lateness_is_kept_in_memory_that_does_not_grow() -> None:

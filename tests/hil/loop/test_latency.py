@@ -8,6 +8,7 @@ import os
 import re
 import subprocess
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from command_line import hil, refused
@@ -16,7 +17,7 @@ from hypothesis import strategies as st
 
 from hil.loop import latency
 from hil.loop.disturbances import Disturbances
-from hil.loop.latency import HALF_DECADES, Latencies, Series, load, measure
+from hil.loop.latency import HALF_DECADES, Cyclictest, Latencies, Series, load, measure
 from hil.loop.suitability import RATES_HZ, Suitability, beside, judge
 
 # What cyclictest 2.4 writes for 6 wake-ups, three of them beyond its histogram.
@@ -123,6 +124,45 @@ def test_the_histogram_of_cyclictest_is_read(tmp_path: Path, monkeypatch: pytest
     assert found.reference == Latencies({15e-6: 2, 1200e-6: 1, 1.0: 2, 2.5: 1})
     asked = (tmp_path / "asked").read_text().split()
     assert {"--interval=2000", "--loops=50", "--priority=80", "--mlockall", "--secaligned"} <= set(asked)
+
+
+@pytest.mark.parametrize(("cycles", "most_us", "counts"), [
+    (3, 1200, {15e-6: 2, 1200e-6: 1}),
+    (4, 2_500_000, {15e-6: 2, 1200e-6: 1, 2.5: 1}),
+    (5, 2_500_000, {15e-6: 2, 1200e-6: 1, 2.5: 1, 1.0: 1}),
+    (4, 0, {15e-6: 2, 1200e-6: 1, 1.000001: 1}),  # at least beyond the histogram
+])  # fmt: skip
+def test_what_is_beyond_the_histogram_is_counted_at_its_end(
+    tmp_path: Path, cycles: int, most_us: int, counts: dict[float, int]
+) -> None:
+    results = tmp_path / "results.json"
+    told = {"histogram": {"15": 2, "1200": 1}, "cycles": cycles, "max": most_us}
+    results.write_text(json.dumps({"thread": {"0": told}}))
+    ended = Cyclictest(SimpleNamespace(communicate=lambda: ("", "")), results)
+    ended.finish()
+    assert ended() == (Latencies(counts), "")
+
+
+@pytest.mark.parametrize(("latencies_s", "reason"), [
+    ({2e-6: 8, 5e-5: 1}, "no period missed in 9 ticks (95 % sure: fewer than 1 in 3); p99.9 50 us, at most 100 us"),
+    ({2e-6: 2}, "no period missed in 2 ticks (95 % sure: fewer than 1 in 1); p99.9 2.0 us, at most 100 us"),
+    ({1e-5: 999, 0.0021: 1}, "2 periods missed in 1000 ticks, p99.9 10 us (good: none, at most 100 us); a bench "
+                             "arms, and no stall outlasts 3 periods"),
+    ({1e-5: 9, 0.0075: 1}, "7 periods missed in 10 ticks; p99 7500 us, at most 500 us (drive.jitter_p99); longest "
+                           "stall 7500 us, allowed 3000 us (drive.missed_answers)"),
+])  # fmt: skip
+def test_a_judgement_in_words(latencies_s: dict[float, int], reason: str) -> None:
+    assert judge(1000.0, series(latencies_s)).reason == reason
+
+
+@pytest.mark.parametrize(("loop", "other", "words"), [
+    (4, 2, "periods missed: loop 4, cyclictest 2: the machine, not this program"),
+    (5, 2, "periods missed: loop 5, cyclictest 2: more than the machine explains"),
+    (1, 1, "periods missed: loop 1, cyclictest 1: the machine, not this program"),
+    (1, 0, "periods missed: loop 1, cyclictest 0: more than the machine explains"),
+])  # fmt: skip
+def test_twice_the_missed_periods_of_cyclictest_are_the_machine(loop: int, other: int, words: str) -> None:
+    assert beside(*(Latencies({1e-6: 100, 0.001 * count + 1e-5: 1}) for count in (loop, other)), 0.001) == words
 
 
 def test_why_cyclictest_gave_nothing_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

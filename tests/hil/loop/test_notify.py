@@ -74,7 +74,7 @@ def test_a_manager_that_does_not_read_never_blocks_the_loop(manager: Manager) ->
     [
         ({"WATCHDOG_USEC": "2000000"}, 2.0),
         ({"WATCHDOG_USEC": "2000000", "WATCHDOG_PID": str(os.getpid())}, 2.0),
-        ({"WATCHDOG_USEC": "2000000", "WATCHDOG_PID": "1"}, 0.0),  # meant for another process
+        *(({"WATCHDOG_USEC": "2000000", "WATCHDOG_PID": pid}, 0.0) for pid in ("1", "0", "99999999")),  # of another
         ({"WATCHDOG_USEC": "soon"}, 0.0),
         ({}, 0.0),
     ],
@@ -100,6 +100,29 @@ def test_the_watchdog_is_fed_only_while_ticks_advance(manager: Manager) -> None:
     assert manager.received() == []
     clock.wait(110)
     assert len(manager.received()) == 1
+    notifier.close()
+
+
+@pytest.mark.parametrize(("watchdog_us", "fed"), [("2000", 6), ("8000", 3), ("12000", 2)])
+def test_the_watchdog_is_fed_four_times_or_with_each_tick(manager: Manager, watchdog_us: str, fed: int) -> None:
+    notifier = Notifier({"NOTIFY_SOCKET": manager.address, "WATCHDOG_USEC": watchdog_us})
+    clock = NotifyingClock(0.001, notifier)
+    clock.start()
+    for tick in range(1, 7):
+        clock.wait(tick)
+    assert len(manager.received()) == 1 + fed
+    notifier.close()
+
+
+def test_without_a_watchdog_the_status_is_renewed_every_ten_seconds(manager: Manager) -> None:
+    notifier = Notifier({"NOTIFY_SOCKET": manager.address})
+    clock = NotifyingClock(1.0, notifier)
+    clock.start()
+    clock._start_ns -= 10**12  # as if the ticks had been waited for
+    manager.received()
+    for tick in range(1, 21):
+        clock.wait(tick)
+    assert [states[1][-13:] for states in manager.received()] == ["tick 10, 10 s", "tick 20, 20 s"]
     notifier.close()
 
 

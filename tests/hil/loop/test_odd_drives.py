@@ -118,6 +118,8 @@ COMPLETE = {
     "mode display only when enabled, left over": Manners(shows_mode_enabled=True, values={(0x60FF, 0): 9000}),
     "mode 0 refused": Manners(refuses_mode_0=True),
     "transitions of 200 ms": Manners(transition_s=0.2),
+    "transitions of 300 ms": Manners(transition_s=0.3),
+    "transitions of 600 ms": Manners(transition_s=0.6),
     "transitions and mode display slow": Manners(transition_s=0.2, shows_mode_enabled=True, mode_s=0.3),
     "main voltage after 500 ms": Manners(voltage_s=0.5),
     "halt left over in the controlword": Manners(values={(0x6040, 0): 0x0100}),

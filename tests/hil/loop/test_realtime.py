@@ -9,6 +9,7 @@ import subprocess
 import sys
 import threading
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from bench_runs import MOVE, bench_with
@@ -111,6 +112,45 @@ def test_percentiles_are_nearest_ranks(lateness_s: list[float]) -> None:
     assert {jitter.p50_s, jitter.p99_s, jitter.max_s} <= set(lateness_s)
     assert jitter.max_s == max(lateness_s)
     assert jitter.missed == sum(late >= 0.001 for late in lateness_s)
+
+
+def test_jitter_in_one_line() -> None:
+    jitter = Jitter.of([k * 1e-5 for k in range(1, 101)], 0.0009)
+    assert jitter.text == "p50 500 us, p99 990 us, largest 1000 us, 11 of 100 ticks missed"
+    assert Jitter.of([], 0.001) == Jitter(0, 0.0, 0.0, 0.0, 0)
+
+
+@pytest.mark.parametrize(("duration_s", "ticks"), [(0.0, 2), (0.0026, 3), (0.0104, 10), (0.0106, 11)])
+def test_jitter_is_measured_over_as_many_ticks_as_fit(duration_s: float, ticks: int) -> None:
+    waited: list[int] = []
+    clock = type("Clock", (), {"start": lambda self: waited.append(0),
+                               "wait": lambda self, tick: waited.append(tick) or 1e-4 * tick})()  # fmt: skip
+    jitter = measure_jitter(0.001, duration_s, clock)
+    assert waited == list(range(ticks + 1))
+    assert (jitter.ticks, jitter.max_s) == (ticks, pytest.approx(1e-4 * ticks))
+
+
+@pytest.mark.parametrize(("version", "realtime_file", "preemptible"), [
+    ("#1 SMP PREEMPT_RT", "", True), ("#1 SMP PREEMPT_DYNAMIC", "1", True), ("#1 SMP", "0", False),
+    ("#1 SMP", "", False),
+])  # fmt: skip
+def test_the_machine_tells_whether_its_kernel_is_preemptible(
+    monkeypatch: pytest.MonkeyPatch, version: str, realtime_file: str, preemptible: bool
+) -> None:
+    def read_text(path: Path) -> str:
+        if str(path) == "/sys/kernel/realtime" and realtime_file:
+            return realtime_file + "\n"
+        raise OSError
+
+    monkeypatch.setattr(os, "uname", lambda: SimpleNamespace(release="6.1", version=version))
+    monkeypatch.setattr(Path, "read_text", read_text)
+    found = machine_state()
+    assert (found["kernel"], found["preempt_rt"], found["governor"]) == ("6.1", preemptible, "unknown")
+
+
+@pytest.mark.parametrize(("text", "cores"), [("", set()), ("3", {3}), ("0-2,5", {0, 1, 2, 5}), ("1,8-9", {1, 8, 9})])
+def test_a_list_of_cores(text: str, cores: set[int]) -> None:
+    assert realtime.core_list(text) == cores
 
 
 def test_jitter_beyond_the_budget_is_refused() -> None:

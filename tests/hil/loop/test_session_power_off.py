@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,7 +14,7 @@ from bench_runs import MOVE, MOVING, bench_with, run
 from faulty_bench import FaultyBench
 from typer.testing import CliRunner
 
-from drivers.cia402 import DriveState
+from drivers.cia402 import POWERED, DriveState
 from drivers.port import Condition, DriveGoal
 from drivers.sdo_setup import EDS_FOLDER
 from drivers.sim.drive_node import SimulatedDrive
@@ -23,6 +25,7 @@ from hil.loop.session import DISARM_TIMEOUT_S, Session
 from hil.loop.supervision import Ending
 from hil.motion.profile import Profile
 from hil.motion.trajectory import plan
+from hil.recording.recording import read_recording
 
 RPDO = 0x205
 PROFILE = Path(__file__).parents[3] / "profiles" / "friction_sweep.yaml"
@@ -203,8 +206,7 @@ def test_the_ramp_of_the_drive_is_not_cut_off_by_the_end_of_a_run(tmp_path: Path
                 raise ZeroDivisionError
 
         rigs.append(rig)
-        rig.nodes.drive.values[0x6085_00] //= slower
-        rig.drive.info = replace(rig.drive.info, quick_stop_rad_s2=rig.drive.info.quick_stop_rad_s2 / slower)
+        slow_down(rig, slower)
         return {500: fail}
 
     with pytest.raises(KeyboardInterrupt if requests else ZeroDivisionError):
@@ -214,6 +216,54 @@ def test_the_ramp_of_the_drive_is_not_cut_off_by_the_end_of_a_run(tmp_path: Path
     plant.advance(0.0, 0.001)
     assert abs(plant.table_position_m - before_m) < 0.01 * 0.001  # 10 mm/s: the end of the ramp
     assert rigs[0].nodes.drive.state is DriveState.SWITCH_ON_DISABLED
+
+
+@pytest.mark.parametrize("cause", ["quick stop", "exception", "fault", "RPDO lost"])
+def test_a_slow_ramp_of_the_drive_is_waited_for(at: FaultyBench, cause: str) -> None:
+    """It takes 2.5 s; in the reaction to a fault the drive takes no command, in a quick stop none may cut it off."""
+    off: list[float] = []  # speed of the motor where its power goes off
+
+    def begin(rig: Rig, session: Session) -> None:
+        slow_down(rig, 40)
+        drive, set_state = rig.nodes.drive, rig.nodes.drive._set_state
+
+        def seen(state: DriveState) -> None:
+            if state not in POWERED:
+                off.append(drive._velocity_rad_s())
+            set_state(state)
+
+        drive._set_state = seen
+        if cause == "quick stop":
+            session.ask_stop()
+            session.ask_stop()
+        elif cause == "exception":
+            raise ZeroDivisionError
+        elif cause == "fault":
+            rig.nodes.drive.trip(0x2310, 0x03, 1e-3 * MOVING)
+        else:
+            at.lose(RPDO)
+
+    with pytest.raises(ZeroDivisionError) if cause == "exception" else nullcontext():
+        at.run(bench_with(), lambda rig, session: {MOVING: lambda: begin(rig, session)})
+    assert at.rig.nodes.drive.state not in POWERED
+    assert abs(off[0]) < 0.1 * SPEED_M_S / 0.01 * 2 * math.pi
+
+
+def test_a_ramp_without_end_is_waited_for_as_long_as_a_controlled_stop_may_take(at: FaultyBench) -> None:
+    def begin(rig: Rig, session: Session) -> None:
+        slow_down(rig, 10_000)
+        rig.nodes.drive.trip(0x2310, 0x03, 1e-3 * MOVING)
+
+    with pytest.raises(StillPowered, match="FAULT_REACTION_ACTIVE"):
+        at.run(bench_with(), lambda rig, session: {MOVING: lambda: begin(rig, session)})
+    rows = len(read_recording(at.folder / "run.parquet"))
+    assert MOVING + 9_900 < rows < MOVING + 10_100
+
+
+def slow_down(rig: Rig, factor: int) -> None:
+    """Make the ramp of the drive (0x6085) slower, as if the set-up had found it so."""
+    rig.nodes.drive.values[0x6085_00] //= factor
+    rig.drive.info = replace(rig.drive.info, quick_stop_rad_s2=rig.drive.info.quick_stop_rad_s2 / factor)
 
 
 def test_a_drive_that_reports_no_state_any_more_is_not_taken_for_off(at: FaultyBench) -> None:

@@ -6,11 +6,12 @@ field.
 
 import csv
 import math
+from collections import Counter
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
-from typing import TextIO
+from typing import Any, TextIO
 
 import numpy as np
 import pyarrow as pa
@@ -18,6 +19,7 @@ import pyarrow.csv as pacsv
 
 from hil.arrays import FloatArray
 from hil.errors import InputError
+from hil.files.input_file import check_values, lines_of
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,7 @@ def read_header(path: Path, form: CsvFormat = PLAIN) -> tuple[str, ...]:
         names = list(form.column_names)
     elif line == 0:
         raise InputError(f"{path}: the file is empty; give a CSV file with a header and rows of numbers")
-    repeated = [name for name in dict.fromkeys(names) if names.count(name) > 1]
+    repeated = [name for name, times in Counter(names).items() if times > 1]
     if repeated:
         raise InputError(
             f"{path}:{line}: {repeated[0]}: stands twice in the header, allowed once; rename or remove one"
@@ -67,7 +69,7 @@ def read_columns(
     _refuse_absent(path, wanted, names)
     lines_above = line_of_row(path, 0, form) - 1
     try:
-        table = pacsv.read_csv(
+        batches = pacsv.open_csv(
             _with_single_blanks(path, form) if form.delimiter == " " else path,
             read_options=pacsv.ReadOptions(
                 column_names=list(names), skip_rows=lines_above, encoding=form.encoding, use_threads=False
@@ -79,9 +81,10 @@ def read_columns(
                 decimal_point=form.decimal_point,
             ),
         )
+        table = _table(path, batches, len(wanted))
         columns = {name: table.column(name).to_numpy() for name in wanted}
         problem = None
-    except (pa.ArrowInvalid, UnicodeDecodeError) as error:
+    except (pa.ArrowException, UnicodeError) as error:
         columns, problem = {}, error
     if problem is not None or any(
         np.isinf(values).any() or np.isnan(values).mean() > missing for values in columns.values()
@@ -89,6 +92,16 @@ def read_columns(
         _raise_first_bad_field(path, names, wanted, form)
         raise InputError(f"{path}: cannot be read as CSV: {problem}; correct the file")
     return columns
+
+
+def _table(path: Path, batches: Any, columns: int) -> pa.Table:
+    """The rows of a reader, counted as they come: two characters may be a value of 8 bytes."""
+    read, rows = [], 0
+    for batch in batches:
+        read.append(batch)
+        rows += batch.num_rows
+        check_values(path, rows * columns, f"more than {rows} rows of {columns} columns")
+    return pa.Table.from_batches(read, batches.schema)
 
 
 def read_texts(path: Path, name: str, form: CsvFormat = PLAIN) -> list[str]:
@@ -131,13 +144,13 @@ def _opened(path: Path, form: CsvFormat) -> TextIO:
 
 def _with_single_blanks(path: Path, form: CsvFormat) -> pa.BufferReader:
     with _opened(path, form) as file:
-        text = "\n".join(" ".join(line.split()) for line in file)
+        text = "\n".join(" ".join(line.split()) for line in lines_of(path, file))
     return pa.BufferReader(text.encode(form.encoding))
 
 
 def _rows(path: Path, file: TextIO, form: CsvFormat) -> Iterator[tuple[int, list[str]]]:
     """Line number and fields of each line that is not blank, from the header on."""
-    lines: Iterator[str] = islice(file, form.skip_lines, None)
+    lines: Iterator[str] = islice(lines_of(path, file), form.skip_lines, None)
     if form.delimiter == " ":
         lines = (" ".join(line.split()) for line in lines)
     reader = csv.reader(lines, delimiter=form.delimiter)
@@ -145,7 +158,7 @@ def _rows(path: Path, file: TextIO, form: CsvFormat) -> Iterator[tuple[int, list
         for fields in reader:
             if fields:
                 yield reader.line_num + form.skip_lines, fields
-    except (UnicodeDecodeError, csv.Error) as error:
+    except (UnicodeError, csv.Error) as error:
         line = reader.line_num + form.skip_lines + 1
         raise InputError(f"{path}:{line}: is not text of a CSV file ({error}); give a CSV file") from None
 

@@ -17,7 +17,9 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.errors import InputError
+from hil.files.input_file import MOST_BYTES, check_file, parsing
 
+MOST_JSON_BYTES = MOST_BYTES // 10  # three characters may become an object of 72 bytes
 _NAME_KEYS, _VALUE_KEYS = ("name", "channel", "id"), ("values", "data", "samples")  # of an object per channel
 _STAMP_KEYS = (("secs", "sec"), ("nsecs", "nanosec", "nsec"))
 
@@ -39,15 +41,15 @@ class JsonContent:
                 raise InputError(
                     f"{path}: row {row + 1}: {name}: given {value!r}, allowed a finite number; correct the value"
                 )
-        return np.array([np.nan if value is None else value for value in self.lists[name]], dtype=np.float64)
+        with parsing(path, f"column {name}", "correct its numbers"):  # whole numbers of any length
+            return np.array([np.nan if value is None else value for value in self.lists[name]], dtype=np.float64)
 
 
 def read_json(path: Path) -> JsonContent:
     """Read `path`. Raises InputError: no JSON, or no lists in it."""
-    try:
+    check_file(path, "a JSON file up to this size, or the recording as CSV or Parquet", MOST_JSON_BYTES)
+    with parsing(path, "JSON file"):
         data = json.loads(path.read_bytes())
-    except (OSError, ValueError, RecursionError) as error:
-        raise InputError(f"{path}: is no readable JSON file ({error}); it is cut or damaged") from None
     lists, scalars, units = dict[str, list[Any]](), dict[str, float](), dict[str, str]()
     _collect(data, lists, scalars, units)
     if not lists:

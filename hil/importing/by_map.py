@@ -8,6 +8,7 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.channels import CHANNELS, AxisChannels
+from hil.files.input_file import bounded, is_file
 from hil.files.yaml_model import load_model
 from hil.importing.foreign_columns import FEW_MISSING, read_foreign
 from hil.importing.map_file import SECONDS, RecordingMap
@@ -22,6 +23,7 @@ STEP = "step"  # key of a channel's metadata: step of its values before they are
 MAPS = Path(__file__).parents[1] / "maps"
 
 
+@bounded
 def import_recording(source: str | Path, map_path: str | Path) -> Recording:
     """Read `source` (.csv, .txt, .mat, .parquet, .json) by the map file `map_path`, or by a shipped map's name (emps).
 
@@ -86,7 +88,7 @@ def import_recording(source: str | Path, map_path: str | Path) -> Recording:
 
 def _find_map(map_path: str | Path) -> Path:
     shipped = MAPS / f"{map_path}.yaml"
-    return shipped if not Path(map_path).exists() and shipped.is_file() else Path(map_path)
+    return shipped if not is_file(Path(map_path)) and is_file(shipped) else Path(map_path)
 
 
 def _time_s(the_map: RecordingMap, raw: dict[str, FloatArray]) -> FloatArray:

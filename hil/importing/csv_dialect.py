@@ -2,12 +2,15 @@
 
 import csv
 import re
+from collections import Counter
 from collections.abc import Collection
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 
 from hil.errors import InputError
+from hil.files.input_file import lines_of
 from hil.importing.lexicon import lexicon
 from hil.importing.map_file import CsvOptions
 from hil.importing.units import unit_named
@@ -68,7 +71,7 @@ def find_dialect(path: Path) -> CsvDialect:
             given |= {"skip_lines": first, "column_names": names}
         else:
             given |= {"skip_lines": header, "skip_rows": sum(header < index < first for index in above)}
-    repeated = [name for name in dict.fromkeys(names) if names.count(name) > 1 and name.strip()]
+    repeated = [name for name, times in Counter(names).items() if times > 1 and name.strip()]
     if repeated:
         raise InputError(f"{path}: {repeated[0]!r} names two columns of the header, allowed one; rename or remove one")
     return CsvDialect(CsvOptions.model_validate(given), names, unit_row or ("",) * width, tuple(lines[:first]))
@@ -113,15 +116,15 @@ def _sample(path: Path) -> tuple[list[str], str]:
             raise InputError(f"{path}: is not text but binary data; export the recording as CSV, .mat, Parquet or JSON")
         else:
             encoding = "utf-8"
-    try:
-        return _lines(path, encoding), encoding
-    except UnicodeDecodeError:
-        return _lines(path, "cp1252"), "cp1252"
+    for known in (encoding, "cp1252"):
+        with suppress(UnicodeDecodeError):
+            return _lines(path, known), known
+    return _lines(path, "cp850"), "cp850"  # of a console; it has a letter for each byte
 
 
 def _lines(path: Path, encoding: str) -> list[str]:
     with path.open(encoding="utf-8-sig" if encoding == "utf-8" else encoding) as file:
-        return [line.rstrip("\r\n") for line in islice(file, SAMPLE_LINES)]
+        return [line.rstrip("\r\n") for line in islice(lines_of(path, file), SAMPLE_LINES)]
 
 
 def _layout(path: Path, lines: list[str]) -> tuple[str, str, int, int]:
@@ -130,7 +133,7 @@ def _layout(path: Path, lines: list[str]) -> tuple[str, str, int, int]:
     body = [line for line in lines[len(lines) // 2 :] if line.strip()]
     for delimiter in _DELIMITERS:
         rows = [_fields(line, delimiter) for line in body]
-        width = max((len(row) for row in rows), key=[len(row) for row in rows].count, default=0)
+        width = Counter(len(row) for row in rows).most_common(1)[0][0] if rows else 0
         if width < 2:
             continue
         fields = [field for row in rows if len(row) == width for field in row]

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from hil.files.input_file import bounded
 from hil.importing.channel_entries import ChannelEntries
 from hil.importing.clock import find_clock
 from hil.importing.column_names import label
@@ -20,6 +21,7 @@ from hil.importing.slow_gaps import moving_little, with_gaps_filled
 from hil.importing.wraps import unwrapped, wrap_range
 
 
+@bounded
 def draft_map(path: Path, rate_hz: float | None = None, axis: str | None = None) -> MapDraft:
     """Draft the map of `path`; `rate_hz` and `axis` are what the user says beside the file.
 

@@ -14,7 +14,7 @@ from hil.files.date_stamps import seconds_of
 from hil.files.input_file import check_file
 from hil.importing.mat_file import load_mat, mat_column, mat_scalar
 from hil.importing.on_change import held
-from hil.recording.arrow_files import MOST_BYTES, numbers, read_parquet
+from hil.recording.arrow_files import numbers, read_parquet
 
 TEXT_ENDINGS = (".csv", ".txt", ".tsv", ".dat", ".asc")
 FEW_MISSING = 0.05  # share of rows without a value: more is a channel of another rate, or a damaged file
@@ -32,7 +32,7 @@ class Foreign:
 
 def check_foreign(path: Path) -> None:
     """Refuse what is no file. Raises InputError."""
-    check_file(path, f"the path of a recording: {', '.join(_ENDINGS)}", MOST_BYTES)
+    check_file(path, f"the path of a recording: {', '.join(_ENDINGS)}")
 
 
 def format_of(path: Path) -> str:
@@ -105,8 +105,12 @@ def read_foreign(
 def parquet_dates(path: Path, name: str) -> FloatArray:
     """A column of time stamps of a Parquet file in seconds (n,) since midnight before the first."""
     column = read_parquet(path, (name,)).column(name)
+    if pa.types.is_dictionary(column.type):
+        codes = column.unify_dictionaries().combine_chunks()
+        words = [*map(str, codes.dictionary.to_pylist()), ""]
+        return seconds_of([words[code] for code in codes.indices.fill_null(-1).to_pylist()])
     if not pa.types.is_timestamp(column.type):
-        return seconds_of([str(text) for text in column.to_pylist()])
+        return seconds_of([str(number) for number in column.to_pylist()])
     nanoseconds = column.cast(pa.timestamp("ns", column.type.tz), safe=False).cast(pa.int64()).to_numpy()
     return np.asarray((nanoseconds - nanoseconds[0]) * 1e-9, dtype=np.float64)
 

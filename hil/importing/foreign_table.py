@@ -17,6 +17,7 @@ from hil.arrays import FloatArray
 from hil.errors import InputError
 from hil.files import json_columns
 from hil.files.date_stamps import is_date, seconds_of
+from hil.files.input_file import lines_of
 from hil.importing.csv_dialect import find_dialect, number_of
 from hil.importing.foreign_columns import check_foreign, format_of, parquet_dates
 from hil.importing.header_values import HeaderValue, header_values
@@ -24,7 +25,7 @@ from hil.importing.lexicon import Constant
 from hil.importing.map_file import CsvOptions
 from hil.importing.mat_file import load_mat
 from hil.importing.unit_lines import described, told_units
-from hil.recording.arrow_files import numbers, read_parquet, stored_unit
+from hil.recording.arrow_files import is_number, numbers, parquet_schema, read_parquet, stored_unit
 
 MOST_ROWS = 200_000  # read of a text file for the draft: minutes of a recording
 WIDEST = 64  # columns of a matrix in a .mat file: a wider one is no table of channels
@@ -73,7 +74,7 @@ def _text(path: Path) -> ForeignTable:
     encoding = "utf-8-sig" if options.encoding == "utf-8" else options.encoding
     rows: list[list[str]] = []
     with path.open(encoding=encoding, errors="replace", newline="") as file:
-        below = islice(file, options.skip_lines, None)
+        below = islice(lines_of(path, file), options.skip_lines, None)
         lines = (
             (" ".join(line.split()) for line in below)
             if options.delimiter == " "
@@ -131,13 +132,15 @@ def _mat(path: Path) -> ForeignTable:
 
 
 def _parquet(path: Path) -> ForeignTable:
-    table = read_parquet(path)
+    schema = parquet_schema(path)
+    wanted = [one.name for one in schema if is_number(one.type) or pa.types.is_timestamp(one.type)]
+    table = read_parquet(path, wanted)
     columns, units, remarks = {}, {}, []
     dates = set[str]()
-    for one in table.schema:
-        if pa.types.is_floating(one.type) or pa.types.is_integer(one.type):
+    for one in schema:
+        if is_number(one.type):
             columns[one.name] = numbers(path, table, one.name)
-            unit = stored_unit(table, one.name)
+            unit = stored_unit(schema, one.name)
             if unit:
                 units[one.name] = unit
         elif pa.types.is_timestamp(one.type):

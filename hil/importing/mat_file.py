@@ -8,12 +8,14 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.errors import InputError
+from hil.importing.mat_size import check_mat_size
 
 
 def load_mat(path: Path) -> dict[str, Any]:
     """Variables of a .mat file; fields of structures as NAME.FIELD, signals of Simulink by their label."""
     from scipy.io import loadmat
 
+    check_mat_size(path)
     try:
         content = loadmat(path, struct_as_record=False, squeeze_me=False)
         variables: dict[str, Any] = {}

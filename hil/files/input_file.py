@@ -24,7 +24,7 @@ from hil.errors import InputError
 MOST_VALUES = 50_000_000  # of 8 bytes: 400 MB, 75 min at 1 kHz with 11 channels
 MOST_BYTES = 8 * MOST_VALUES  # of a file; of text this is eight characters for each value
 MOST_IN_LINE = 200_000  # characters of a line of text: a thousand columns have 20 000
-LONGEST_S = 10.0  # of processor time for one file
+LONGEST_S = 15.0  # of processor time for one file
 MOST_GROWTH = 1_500_000_000  # bytes of memory
 _LOOK_S = 0.05  # of processor time between two looks
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 # SI unit -> units of foreign recordings: value [SI unit] = factor x value [unit]
 _PER_SI = {
-    "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0},
+    "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "100 ns": 1e-7, "ns": 1e-9, "min": 60.0},
     "m": {"m": 1.0, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "in": 0.0254, "ft": 0.3048},
     "rad": {
         "rad": 1.0, "mrad": 1e-3, "deg": pi / 180, "0.1 deg": pi / 1800, "mdeg": pi / 180e3, "arcmin": pi / 10800,

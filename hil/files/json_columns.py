@@ -6,6 +6,7 @@
 [{"stamp": {"secs": 1, "nsecs": 5}, "name": ["a"], "position": [0.1]}, ...]     a message per row, as of ROS
 {"columns": ["t", "x"], "data": [[0, 0.1], ...]}     a table
 [{"name": "x", "unit": "mm", "values": [...]}, ...]  an object per channel
+{"t": 0, "x": 0.1}                                   one such record in each line
 """
 
 import json
@@ -49,7 +50,7 @@ def read_json(path: Path) -> JsonContent:
     """Read `path`. Raises InputError: no JSON, or no lists in it."""
     check_file(path, "a JSON file up to this size, or the recording as CSV or Parquet", MOST_JSON_BYTES)
     with parsing(path, "JSON file"):
-        data = json.loads(path.read_bytes())
+        data = _loaded(path, path.read_text(encoding="utf-8-sig"))
     lists, scalars, units = dict[str, list[Any]](), dict[str, float](), dict[str, str]()
     _collect(data, lists, scalars, units)
     if not lists:
@@ -57,6 +58,26 @@ def read_json(path: Path) -> JsonContent:
             f"{path}: holds no list of numbers, allowed lists by name or a record per row; export the channels as lists"
         )
     return JsonContent(lists, scalars, units)
+
+
+def _loaded(path: Path, text: str) -> Any:
+    """The content: one value, or one in each line."""
+    try:
+        return json.loads(text)
+    except json.JSONDecodeError as error:
+        lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip()]
+        if not error.msg.startswith("Extra data") or len(lines) < 2:
+            raise
+    rows = []
+    for number, line in lines:
+        try:
+            rows.append(json.loads(line))
+        except json.JSONDecodeError as error:
+            raise InputError(
+                f"{path}:{number}: column {error.colno} is no JSON ({error.msg}): given {line.strip()[:60]!r}, allowed "
+                "a record per line; the line is cut or damaged: import the part of the file before it"
+            ) from None
+    return rows
 
 
 def _first(row: dict[str, Any], keys: tuple[str, ...], kind: type) -> Any:

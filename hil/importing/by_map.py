@@ -10,6 +10,7 @@ from hil.arrays import FloatArray
 from hil.channels import CHANNELS, AxisChannels
 from hil.files.input_file import bounded, is_file
 from hil.files.yaml_model import load_model
+from hil.importing.channel_clocks import merge, seconds
 from hil.importing.foreign_columns import FEW_MISSING, read_foreign
 from hil.importing.map_file import SECONDS, RecordingMap
 from hil.importing.rows import complete_rows
@@ -38,21 +39,26 @@ def import_recording(source: str | Path, map_path: str | Path) -> Recording:
     source, map_path = Path(source), _find_map(map_path)
     the_map = load_model(map_path, RecordingMap)
     wanted = [entry.column for entry in the_map.channels.values()]
-    if the_map.time is not None:
-        wanted.append(the_map.time.column)
+    times = {entry.column: entry.time for entry in the_map.channels.values() if entry.time is not None}
+    clocks = [part for one in (the_map.time, *times.values()) if one for part in (one, one.fraction) if part]
+    wanted += [part.column for part in clocks]
     gains = {entry.gain for entry in the_map.channels.values() if isinstance(entry.gain, str)}
-    dates = the_map.time.column if the_map.time is not None and the_map.time.unit == "date" else None
+    dates = {part.column for part in clocks if part.unit == "date"}
     few = FEW_MISSING if the_map.missing == "leave_out" else 0.0
     on_change = sorted({entry.column for entry in the_map.channels.values() if entry.empty == "hold"})
-    foreign = read_foreign(source, wanted, sorted(gains), the_map.csv.format(), dates, few, on_change)
+    sparse = wanted if times else []
+    foreign = read_foreign(source, wanted, sorted(gains), the_map.csv, sorted(dates), few, on_change, sparse)
+    given, rows_kept = foreign.columns, None
+    if the_map.time is not None and times:
+        given, rows_kept = merge(given, the_map.time, times)
 
-    raw = {"time_s": _time_s(the_map, foreign.columns)}
+    raw = {"time_s": _time_s(the_map, given)}
     origins: dict[str, dict[str, str | float]] = {}
     for name, entry in the_map.channels.items():
         gain = foreign.scalars[entry.gain] if isinstance(entry.gain, str) else 1.0
         factor = entry.factor_to(CHANNELS[name].unit, the_map.travel_per_turn_m, gain)
         assert factor is not None  # the map was validated
-        values = foreign.columns[entry.column]
+        values = given[entry.column]
         if entry.wraps_at is not None:
             values = unwrapped(values, entry.wraps_at)
         raw[name] = factor * values + entry.offset
@@ -65,9 +71,12 @@ def import_recording(source: str | Path, map_path: str | Path) -> Recording:
     clock = the_map.time.column if the_map.time is not None else "sample_rate_hz"
     positions = [name for name in (the_map.axis.motor_position, the_map.axis.table_position) if name in raw]
     complete = complete_rows(raw, the_map.rows_per_sample, positions)
-    rows = regular_rows(
-        complete.columns, lambda row: f"{foreign.place(int(complete.rows[row]))}: {clock}", the_map.resample_hz
-    )
+
+    def place(row: int) -> str:
+        at = int(complete.rows[row])
+        return f"{foreign.place(at if rows_kept is None else int(rows_kept[at]))}: {clock}"
+
+    rows = regular_rows(complete.columns, place, the_map.resample_hz)
     columns = dict(rows.columns)
     derived = _derive(columns, the_map.axis, rows)
     metadata: dict[str, Any] = {
@@ -81,8 +90,8 @@ def import_recording(source: str | Path, map_path: str | Path) -> Recording:
         "clock": _describe_clock(rows),
     }
     metadata |= clock_metadata(rows)
-    if complete.notes or rows.notes:
-        metadata[CLOCK_NOTES] = [*complete.notes, *rows.notes]
+    if notes := [*foreign.notes, *complete.notes, *rows.notes]:
+        metadata[CLOCK_NOTES] = notes
     return Recording(source.stem, columns, rows.period_s, metadata)
 
 
@@ -93,10 +102,8 @@ def _find_map(map_path: str | Path) -> Path:
 
 def _time_s(the_map: RecordingMap, raw: dict[str, FloatArray]) -> FloatArray:
     if the_map.time is not None:
-        stamps, factor = raw[the_map.time.column], SECONDS[the_map.time.unit]
-        if abs(factor * stamps[0]) > EPOCH_S:
-            stamps = stamps - stamps[0]
-        return np.asarray(factor * stamps, dtype=np.float64)
+        first = float(raw[the_map.time.column][0])
+        return seconds(raw, the_map.time, first if abs(first) * SECONDS[the_map.time.unit] > EPOCH_S else 0.0)
     assert the_map.sample_rate_hz is not None
     rows = next(iter(raw.values())).size
     return np.asarray(np.arange(rows) / the_map.sample_rate_hz, dtype=np.float64)

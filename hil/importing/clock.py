@@ -1,5 +1,6 @@
-"""Find the clock of a foreign table: a column of time stamps with its unit, or a sampling rate."""
+"""Find the clock of a foreign table: all columns that may be time are read and compared; else a sampling rate."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,12 +10,11 @@ from hil.errors import InputError
 from hil.importing.column_names import Label, label
 from hil.importing.foreign_table import ForeignTable
 from hil.importing.lexicon import Constant, Quantity, lexicon
-from hil.importing.map_file import SECONDS
-from hil.recording.stamps import REPEATS
+from hil.importing.map_file import SECONDS, TimeColumn
+from hil.importing.stamp_columns import FASTEST_HZ, SLOWEST_HZ, Stamps, fraction_of, growing, unit_of_stamps
 
-SLOWEST_HZ, FASTEST_HZ = 5.0, 2e5  # of recordings of an axis: outside lies a wrong unit of the stamps
-
-SLOWEST_TOLD_HZ = 2.0  # with a unit in the name
+SAME = 0.01  # relative deviation of two clocks of the same rows
+_INTERVAL = 0.01  # relative deviation of the intervals of an even clock
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,109 +22,130 @@ class StampClock:
     """A column with its unit, or a rate [Hz]; `time_s` (n,) from 0, not yet regular."""
 
     time_s: FloatArray
-    column: str | None
-    unit: str
+    time: TimeColumn | None
     rate_hz: float | None
     how: str
     unsure: tuple[str, ...] = ()
 
+    @property
+    def columns(self) -> set[str]:
+        """Columns of the stamps."""
+        parts = [self.time, self.time.fraction] if self.time else []
+        return {part.column for part in parts if part}
+
 
 def find_clock(table: ForeignTable, labels: dict[str, Label], rate_hz: float | None) -> StampClock:
-    """Find the clock. `rate_hz`, the rate that the user gives, overrules a column of stamps.
+    """Find the clock. `rate_hz`, the rate that the user gives, overrules columns of stamps.
 
     Raises InputError: no clock, or a row without a stamp.
     """
     rows = len(next(iter(table.columns.values())))
     if rate_hz is not None:
         return _of_rate(rows, rate_hz, "given with --rate")
-    column = _column(table, labels)
-    if column is None:
-        found = _written_rate(table)
-        if found is None:
-            text = next((remark for remark in table.remarks if _says_time(remark)), None)
-            raise InputError(
-                f"{table.path}: no column of time stamps is found"
-                + (f" ({text})" if text else "")
-                + ", allowed one in seconds or a known rate; say the rate of the rows: hil import FILE --rate HZ"
-            )
-        return _of_rate(rows, *found)
-    return _of_column(table, column, labels[column])
+    told = _written_rate(table)
+    named = time_columns(table, labels)
+    found = clock_of(table, labels, named or _unnamed(table, labels), told)
+    if found is not None:
+        return found
+    for name in named:
+        values = table.columns[name] * SECONDS.get(labels[name].unit or "", 0.0)
+        usual = float(np.median(values[1:])) if values.size > 2 else 0.0
+        if usual > 0.0 and np.all(np.abs(values[1:] - usual) < _INTERVAL * usual) and _plausible(1.0 / usual):
+            return _of_rate(rows, 1.0 / usual, f"intervals in the column {name}")
+    if told is not None:
+        return _of_rate(rows, *told)
+    text = next((remark for remark in table.remarks if label(remark.split(":")[0]).quantity is Quantity.TIME), None)
+    raise InputError(
+        f"{table.path}: no column of time stamps is found"
+        + (f" ({text})" if text else "")
+        + ", allowed one in seconds or a known rate; say the rate of the rows: hil import FILE --rate HZ"
+    )
 
 
-def _says_time(remark: str) -> bool:
-    return label(remark.split(":")[0]).quantity is Quantity.TIME
+def time_columns(table: ForeignTable, labels: dict[str, Label]) -> list[str]:
+    """Columns of time by their names, and those of dates."""
+    return [name for name in table.columns if labels[name].quantity is Quantity.TIME or name in table.dates]
 
 
-def _of_rate(rows: int, rate_hz: float, how: str) -> StampClock:
-    return StampClock(np.arange(rows) / rate_hz, None, "s", rate_hz, how)
+def clock_of(
+    table: ForeignTable, labels: dict[str, Label], names: Sequence[str], told: tuple[float, str] | None
+) -> StampClock | None:
+    """The clock that the columns `names` make, of which the others only tell the unit; None if none of them grows.
+
+    The one with most different stamps counts; a column of fractions of a second is added to one of whole seconds.
+    `told` is the rate [Hz] that the file gives elsewhere, with its source.
+    """
+    stamps = [_stamps(table, labels, name) for name in names if growing(table.columns[name])]
+    others = [name for name, one in labels.items() if one.quantity in (Quantity.TIME, Quantity.UNKNOWN)]
+    for name in others:
+        if name in table.columns and name not in [one.time.column for one in stamps]:
+            stamps += [both for one in stamps if (both := fraction_of(one, name, table.columns[name], labels[name]))]
+    if not stamps:
+        return None
+    known = [one for one in stamps if one.sure]
+    best = max(stamps, key=lambda one: (one.distinct, one.sure))
+    _refuse_missing(table, best)
+    note = ""
+    if not best.sure:
+        best, note = unit_of_stamps(best, labels[best.time.column], known, told)
+    notes = [note] if note else []
+    for one in known:
+        if one.time.column not in (best.time.column, best.time.fraction and best.time.fraction.column):
+            off = abs(one.span_s - best.span_s)
+            if off > SAME * best.span_s + one.digit_s + best.digit_s:
+                notes.append(
+                    f"clock: {one.time.column} runs {one.span_s:.6g} s and {best.time.column} {best.span_s:.6g} s over "
+                    f"the same rows; {best.time.column} is taken"
+                )
+    step_s = best.span_s / max(best.seconds.size - 1, 1)
+    if told is not None and step_s > 0.0 and abs(step_s * told[0] - 1.0) > 2.0 * SAME:
+        notes.append(f"clock: {told[1]}, but the stamps of {best.time.column} step by {step_s:.6g} s; they are taken")
+    by_name = labels[best.time.column].quantity is Quantity.TIME or best.time.unit == "date"
+    how = "by its name" if by_name else "grows by equal steps"
+    return StampClock(best.seconds - best.seconds[0], best.time, None, how, tuple(notes))
 
 
-def _written_rate(table: ForeignTable) -> tuple[float, str] | None:
-    for name, value in table.scalars.items():
-        plain = name.lower()
-        if plain in lexicon().scalars.rate and SLOWEST_HZ <= value <= FASTEST_HZ:
-            return value, f"scalar {name} of the file"
-        if plain in lexicon().scalars.period and SLOWEST_HZ <= 1.0 / (value or 1e9) <= FASTEST_HZ:
-            return 1.0 / value, f"scalar {name} of the file, as period in s"
-    told = table.constants.get(Constant.RATE)
-    return (told.value, f"header of the file: {told.text}") if told and SLOWEST_HZ <= told.value <= FASTEST_HZ else None
+def _stamps(table: ForeignTable, labels: dict[str, Label], name: str) -> Stamps:
+    unit = "date" if name in table.dates else labels[name].unit
+    return Stamps.of(TimeColumn(column=name, unit=unit or "s"), table.columns[name], unit is not None)
 
 
-def _column(table: ForeignTable, labels: dict[str, Label]) -> str | None:
-    """Column of stamps: one that is named so, else the first that grows by nearly equal steps; None without one."""
-    named = [name for name in table.columns if labels[name].quantity is Quantity.TIME or name in table.dates]
-    if named:
-        return max(named, key=lambda name: _growing(table.columns[name]))
+def _unnamed(table: ForeignTable, labels: dict[str, Label]) -> list[str]:
+    """The first column without a known quantity that grows by nearly equal steps; row numbers are none."""
     for name, values in table.columns.items():
         steps = np.diff(values)
         if labels[name].quantity is Quantity.UNKNOWN and steps.size and np.isfinite(steps).all() and steps.min() > 0:
             row_numbers = bool(np.all(steps == 1.0) and values[0] in (0.0, 1.0))
             if np.ptp(steps) < 0.2 * np.median(steps) and not row_numbers:
-                return name
-    return None
+                return [name]
+    return []
 
 
-def _growing(values: FloatArray) -> float:
-    return float(np.mean(np.diff(values) > 0))
-
-
-def _of_column(table: ForeignTable, column: str, told: Label) -> StampClock:
-    stamps = table.columns[column]
-    bad = np.flatnonzero(~np.isfinite(stamps))
+def _refuse_missing(table: ForeignTable, stamps: Stamps) -> None:
+    bad = np.flatnonzero(~np.isfinite(stamps.seconds))
     if bad.size:
+        line, text = table.texts.get(stamps.time.column, (0, "an empty field"))
+        place = f"{table.path}:{line}" if line else table.place(int(bad[0]))
         raise InputError(
-            f"{table.path}: {column}: row {bad[0] + 1} of the numbers has no time stamp; correct the row, or cut the "
-            "file before it"
+            f"{place}: {stamps.time.column}: given {text!r}, allowed a time stamp in each row; import the part of the "
+            "file before it, or the rows by their rate: hil import FILE --rate HZ"
         )
-    if column in table.dates:
-        unit, note = "date", ""
-    else:
-        steps = np.diff(stamps)
-        forward = steps[steps > 0.0]
-        few_digits = np.mean(steps == 0.0) > REPEATS
-        # without a step forwards there is no clock, which the rows then say
-        step = float(forward.sum() / steps.size if few_digits else np.median(forward)) if forward.size else 1.0
-        unit, note = _unit(told, step)
-    how = "by its name" if told.quantity is Quantity.TIME else "grows by equal steps"
-    time_s = (stamps - stamps[0]) * SECONDS[unit]
-    return StampClock(time_s, column, unit, None, how, (note,) if note else ())
 
 
-def _unit(told: Label, step: float) -> tuple[str, str]:
-    """Unit of stamps with this step, and a note if it is guessed or if the name says another one."""
-    plausible = [
-        unit for unit in ("s", "ms", "us", "ns", "d") if SLOWEST_HZ <= 1.0 / (step * SECONDS[unit]) <= FASTEST_HZ
-    ]
-    slow = told.unit is not None and SLOWEST_TOLD_HZ <= 1.0 / (step * SECONDS[told.unit]) < SLOWEST_HZ
-    if slow or told.unit in plausible or (told.unit is not None and not plausible):
-        return str(told.unit), ""
-    # of seconds, milliseconds, ... the one with the rate nearest to 1 kHz, the usual one of a servo drive
-    best = min(plausible or ["s"], key=lambda unit: abs(np.log(step * SECONDS[unit] / 1e-3)))
-    if told.unit is not None:
-        return best, (
-            f"clock: {told.column!r} says {told.unit}, but steps of {step:g} {told.unit} are no rate of a recording; "
-            f"{best} is taken"
-        )
-    if len(plausible) == 1:
-        return best, ""
-    return best, f"clock: the unit of {told.column!r} is not given; {best} is taken (steps of {step:g} {best})"
+def _of_rate(rows: int, rate_hz: float, how: str) -> StampClock:
+    return StampClock(np.arange(rows) / rate_hz, None, rate_hz, how)
+
+
+def _plausible(rate_hz: float) -> bool:
+    return SLOWEST_HZ <= rate_hz <= FASTEST_HZ
+
+
+def _written_rate(table: ForeignTable) -> tuple[float, str] | None:
+    for name, value in table.scalars.items():
+        plain = name.lower()
+        if plain in lexicon().scalars.rate and _plausible(value):
+            return value, f"scalar {name} of the file"
+        if plain in lexicon().scalars.period and _plausible(1.0 / (value or 1e9)):
+            return 1.0 / value, f"scalar {name} of the file, as period in s"
+    told = table.constants.get(Constant.RATE)
+    return (told.value, f"header of the file: {told.text}") if told and _plausible(told.value) else None

@@ -6,8 +6,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from hil.importing.lexicon import Quantity, lexicon
-from hil.importing.units import QUANTITY_OF_UNIT, split_unit, unit_named, whole_unit
+from hil.importing.units import QUANTITY_OF_UNIT, split_unit, unit_named, unit_of_text, whole_unit
 
+_NOTHING = (Quantity.UNKNOWN, False)
 LEAST_WITHIN = 4  # letters of a word that is also found within a longer one: shorter ones occur in others by chance
 
 
@@ -25,7 +26,7 @@ class Label:
     unit: str | None
     odd_unit: bool = False
     electric: str | None = None  # A or V if the word says current or voltage
-    letter: bool = False  # the name is one letter
+    letter: bool = False  # one letter says its quantity, beside nothing else that is known
 
     @property
     def sure(self) -> bool:
@@ -37,13 +38,16 @@ def label(column: str, unit_text: str = "", words_beside: str = "") -> Label:
     name, unit, odd = split_unit(column.strip())
     if unit is None and not odd:
         name, unit = _unit_after_blank(name)
-        unit = unit or whole_unit(name)
+        unit = unit or whole_unit(name.rpartition(".")[2])
     if unit_text and unit is None:
-        unit, odd = unit_named(unit_text), unit_named(unit_text) is None
-    tokens = _tokens(name)
-    words = _words(tokens) + _words(_tokens(words_beside))
+        unit, odd = unit_of_text(unit_text), unit_of_text(unit_text) is None
+    tokens = plain_words(name)
+    beside = _words(plain_words(words_beside))
+    words = _words(tokens) + beside
     number = next((match[1] for token in reversed(tokens) if (match := re.search(r"(\d+)$", token))), "")
-    quantity = _quantity(words)
+    # of a path the last words count: pid.x.output
+    parts = [_words(plain_words(part)) for part in reversed(name.split("."))]
+    quantity, letter = next((found for part in (*parts, beside) if (found := _found(part)) != _NOTHING), _NOTHING)
     of_unit = QUANTITY_OF_UNIT.get(unit or "")
     if unit == "N m" and quantity is Quantity.POSITION and not _any(words, ("moment",)):
         unit = "nm"
@@ -65,7 +69,7 @@ def label(column: str, unit_text: str = "", words_beside: str = "") -> Label:
         unit,
         odd,
         _electric(words) if quantity is Quantity.EFFORT else None,
-        len(name.strip()) == 1 and quantity is not Quantity.TIME and not words_beside,
+        not words_beside and quantity is not Quantity.TIME and (len(name.strip()) == 1 or (letter and _strange(words))),
     )
 
 
@@ -83,7 +87,11 @@ def _unit_after_blank(name: str) -> tuple[str, str | None]:
         last, rest = " ".join(words[-take:]), " ".join(words[:-take])
         unit = unit_named(last) if rest else None
         of_unit = QUANTITY_OF_UNIT.get(unit or "")
-        if unit and of_unit and (len(last) > 1 or not last.isalpha() or of_unit == _quantity(_words(_tokens(rest)))):
+        if (
+            unit
+            and of_unit
+            and (len(last) > 1 or not last.isalpha() or of_unit == _quantity(_words(plain_words(rest))))
+        ):
             return rest, unit
     return name, None
 
@@ -92,12 +100,25 @@ def _words(tokens: list[str]) -> list[str]:
     return [word for token in tokens for word in _split_suffix(re.sub(r"\d+$", "", token)) if word]
 
 
+def _found(words: list[str]) -> tuple[Quantity, bool]:
+    """Quantity of words, and True if only one letter says it."""
+    long = _quantity([word for word in words if len(word) > 1])
+    return (long, False) if long is not Quantity.UNKNOWN else ((found := _quantity(words)), found is not long)
+
+
+def _strange(words: list[str]) -> bool:
+    """True if words of more than one letter have no meaning for the role of a column."""
+    known = lexicon()
+    roles = (*known.command, *known.measured, *known.motor, *known.table)
+    return any(len(word) > 1 and not _any([word], roles) and _quantity([word]) is Quantity.UNKNOWN for word in words)
+
+
 def _quantity(words: list[str]) -> Quantity:
     return next((kind for kind, known in lexicon().quantities.items() if _any(words, known)), Quantity.UNKNOWN)
 
 
-def _tokens(name: str) -> list[str]:
-    """motorPos_Ist2 -> motor, pos, ist2, without accents and in lower case."""
+def plain_words(name: str) -> list[str]:
+    """Words of a name in lower case without accents: motorPos_Ist2 -> motor, pos, ist2."""
     plain = name.replace("ß", "ss").replace("ω", "omega").replace("τ", "tau").replace("φ", "phi").replace("θ", "theta")
     plain = unicodedata.normalize("NFKD", plain).encode("ascii", "ignore").decode()
     plain = re.sub(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])|(?<=\d)(?=[A-Za-z])", " ", plain)

@@ -1,185 +1,124 @@
-"""Find how a text file of columns is written: delimiter, decimal point, header, row of units, comments."""
+"""Find how a text file of columns is written: encoding, delimiter, marks of the numbers, and the rows above them."""
 
-import csv
-import re
 from collections import Counter
-from collections.abc import Collection
-from contextlib import suppress
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
 
 from hil.errors import InputError
+from hil.files.date_stamps import is_date
 from hil.files.input_file import lines_of
-from hil.importing.lexicon import lexicon
+from hil.importing.header_rows import COMMENT, Header, read_header
 from hil.importing.map_file import CsvOptions
-from hil.importing.units import unit_named
+from hil.importing.number_form import NumberForm, find_form, number_of
+from hil.importing.text_rows import split_line
 
-SAMPLE_LINES = 400  # read to find the format: more than any preamble
+SAMPLE_LINES = 400  # from the beginning, more than any preamble, and as many from the whole file
+MOST_LINES = 200_000  # read for the draft: minutes of a recording
 _DELIMITERS = (";", "\t", ",", "|", " ")
-_POINT = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
-_COMMA = re.compile(r"[+-]?(\d+,?\d*|,\d+)([eE][+-]?\d+)?")
-_COMMENT = re.compile(r"^\s*(#|%|//)+\s?")
-_UNIT = re.compile(r"[\[(]?\s*[a-zA-Zµμ°%‰Ω·/^*\d. _-]{0,14}\s*[\])]?")
+_LEAST_SHARE = 0.3  # of fields with numbers or dates
+_MOSTLY = 0.5  # share of the rows in which a column of numbers has some
+_FOLLOW = 3  # rows of numbers in turn, at which they begin
+_ENCODINGS = ("utf-8", "cp1252", "cp850")  # the last one reads every byte
 
 
 @dataclass(frozen=True)
 class CsvDialect:
-    """Options of a map, names as the map must spell them, units of a unit row, and the lines above the numbers."""
+    """Options of a map, what stands above the columns, and these lines."""
 
     options: CsvOptions
-    names: tuple[str, ...]
-    units: tuple[str, ...]
+    header: Header
     above: tuple[str, ...]
+
+
+class _Layout(NamedTuple):
+    """Delimiter, form of the numbers, and for each column if it has numbers or dates in most rows."""
+
+    delimiter: str
+    form: NumberForm
+    read: tuple[bool, ...]
 
 
 def find_dialect(path: Path) -> CsvDialect:
     """Find the dialect of `path`. Raises InputError: empty, no text, or no rows of numbers."""
-    lines, encoding = _sample(path)
-    delimiter, point, width, first = _layout(path, lines)
-    above = [index for index in range(first) if lines[index].strip()]
-    given: dict[str, object] = {"delimiter": delimiter, "decimal_point": point, "encoding": encoding}
-    channels = _second_fields(lines[:first], delimiter, width, lexicon().name_line)
-    if channels:  # a column of time beside each channel
-        names = tuple(name for index, channel in enumerate(channels, 1) for name in (f"time{index}", channel))
-        # lines such as "SampleTime;1;SampleTime;1" are half numbers
-        first = next(i for i in range(first, len(lines)) if _starts_with_number(lines[i], delimiter, point))
-        given |= {"skip_lines": first, "column_names": names}
-        of_channels = _second_fields(lines[:first], delimiter, width, lexicon().unit_line) or [""] * len(channels)
-        units = tuple(text for unit in of_channels for text in ("", unit))
-        return CsvDialect(CsvOptions.model_validate(given), names, units, tuple(lines[:first]))
-    unit_row: tuple[str, ...] = ()
-    header = None
-    for index in reversed(above[-4:]):
-        fields = _fields(_without_word(lines[index]), delimiter)
-        if len(fields) not in (width, width - 1) or not any(fields):
-            continue
-        named = [field for field in fields if field]
-        if header is None and not unit_row and index != above[0] and _units(named) and len(above) > 1:
-            unit_row = (*fields, *[""] * (width - len(fields)))
-            continue
-        header = index
-        break
-    if header is None:
-        names = tuple(f"column {index + 1}" for index in range(width))
-        given |= {"skip_lines": first, "column_names": names}
+    lines, encoding = _lines(path)
+    head = lines[:SAMPLE_LINES]
+    spread = lines[:: max(1, len(lines) // SAMPLE_LINES)]
+    body = [line for line in (*head[len(head) // 2 :], *spread[len(spread) // 10 :]) if line.strip()]
+    layout = _layout(path, body)
+    delimiter, form, width = layout.delimiter, layout.form, len(layout.read)
+    first = _first_row(path, head, layout)
+    above = head[:first]
+    header = read_header(above, delimiter, width, form)
+    given: dict[str, object] = {"delimiter": delimiter, "decimal_point": form.decimal, "thousands": form.thousands}
+    given |= {"encoding": encoding}
+    if header.line is None or split_line(above[header.line], delimiter) != list(header.names):
+        given |= {"skip_lines": first, "column_names": header.names}
     else:
-        raw = _fields(_COMMENT.sub("", lines[header]), delimiter, strip=False)
-        names = tuple(raw)
-        if _COMMENT.match(lines[header]) or len(raw) < width or delimiter == " ":
-            names = tuple(name.strip() or f"column {index + 1}" for index, name in enumerate((*raw, "")[:width]))
-            given |= {"skip_lines": first, "column_names": names}
-        else:
-            given |= {"skip_lines": header, "skip_rows": sum(header < index < first for index in above)}
-    repeated = [name for name, times in Counter(names).items() if times > 1 and name.strip()]
-    if repeated:
-        raise InputError(f"{path}: {repeated[0]!r} names two columns of the header, allowed one; rename or remove one")
-    return CsvDialect(CsvOptions.model_validate(given), names, unit_row or ("",) * width, tuple(lines[:first]))
+        between = sum(bool(line.strip()) for line in above[header.line + 1 :])
+        given |= {"skip_lines": header.line, "skip_rows": between}
+    return CsvDialect(CsvOptions.model_validate(given), header, tuple(above))
 
 
-def _without_word(line: str) -> str:
-    """A line without the mark of a comment and the word for units: "# units: s, mm" -> "s, mm"."""
-    word, colon, rest = _COMMENT.sub("", line).partition(":")
-    return rest if colon and word.strip().lower() in lexicon().unit_line else _COMMENT.sub("", line)
-
-
-def _starts_with_number(line: str, delimiter: str, point: str) -> bool:
-    fields = _fields(line, delimiter)
-    return bool(fields and fields[0] and _is_number(fields[0], point))
-
-
-def _second_fields(above: list[str], delimiter: str, width: int, words: Collection[str]) -> list[str]:
-    """Every second field of the line whose other fields are `words`: "Name;Position;Name;Torque"; empty without one."""
-    for line in above:
-        fields = _fields(line, delimiter)
-        if len(fields) == width > 2 and width % 2 == 0 and {one.lower() for one in fields[::2]} <= set(words):
-            return fields[1::2]
-    return []
-
-
-def number_of(text: str, decimal_point: str) -> float | None:
-    """Number of a field, NaN where it is empty or stands for a missing number; None for other text."""
-    text = text.strip()
-    if (_COMMA if decimal_point == "," else _POINT).fullmatch(text):
-        return float(text.replace(",", "."))
-    return float("nan") if text.lower() in ("", *lexicon().missing) else None
-
-
-def _sample(path: Path) -> tuple[list[str], str]:
+def _lines(path: Path) -> tuple[list[str], str]:
     with path.open("rb") as file:
         start = file.read(4096)
-        if not start.strip():
-            raise InputError(f"{path}: the file is empty; give a file with a header and rows of numbers")
-        if start.startswith((b"\xff\xfe", b"\xfe\xff")):
-            encoding = "utf-16"
-        elif b"\x00" in start or sum(byte < 9 or 13 < byte < 32 for byte in start) > len(start) // 50:
-            raise InputError(f"{path}: is not text but binary data; export the recording as CSV, .mat, Parquet or JSON")
-        else:
-            encoding = "utf-8"
-    for known in (encoding, "cp1252"):
-        with suppress(UnicodeDecodeError):
-            return _lines(path, known), known
-    return _lines(path, "cp850"), "cp850"  # of a console; it has a letter for each byte
+    if not start.strip():
+        raise InputError(f"{path}: the file is empty; give a file with a header and rows of numbers")
+    wide = start.startswith((b"\xff\xfe", b"\xfe\xff"))
+    if not wide and (b"\x00" in start or sum(byte < 9 or 13 < byte < 32 for byte in start) > len(start) // 50):
+        raise InputError(f"{path}: is not text but binary data; export the recording as CSV, .mat, Parquet or JSON")
+    for encoding in ("utf-16",) if wide else _ENCODINGS:
+        try:
+            with path.open(encoding="utf-8-sig" if encoding == "utf-8" else encoding) as file:
+                return [line.rstrip("\r\n") for line in islice(lines_of(path, file), MOST_LINES)], encoding
+        except UnicodeDecodeError:
+            continue
+    raise InputError(f"{path}: is damaged UTF-16 text; export the recording again as UTF-8")
 
 
-def _lines(path: Path, encoding: str) -> list[str]:
-    with path.open(encoding="utf-8-sig" if encoding == "utf-8" else encoding) as file:
-        return [line.rstrip("\r\n") for line in islice(lines_of(path, file), SAMPLE_LINES)]
-
-
-def _layout(path: Path, lines: list[str]) -> tuple[str, str, int, int]:
-    """Delimiter, decimal point, number of columns, and index of the first line of numbers."""
-    best: tuple[float, int, str, str, int] | None = None
-    body = [line for line in lines[len(lines) // 2 :] if line.strip()]
+def _layout(path: Path, body: list[str]) -> _Layout:
+    best: tuple[float, int] = (0.0, 0)
+    found = _Layout("", NumberForm(), ())
     for delimiter in _DELIMITERS:
-        rows = [_fields(line, delimiter) for line in body]
+        rows = [split_line(line, delimiter) for line in body]
         width = Counter(len(row) for row in rows).most_common(1)[0][0] if rows else 0
         if width < 2:
             continue
-        fields = [field for row in rows if len(row) == width for field in row]
-        for point in (".",) if delimiter == "," else (".", ","):
-            share = sum(_is_number(field, point) for field in fields) / sum(len(row) for row in rows)
-            # a blank counts only where nothing else separates
-            score = (share - (0.01 if delimiter == " " else 0.0), width, delimiter, point, width)
-            if best is None or score[:2] > best[:2]:
-                best = score
-    if best is None or best[0] < 0.3:
+        whole = [["" if is_date(field) else field for field in row] for row in rows if len(row) == width]
+        form, share = find_form(whole)
+        share *= len(whole) / len(rows)
+        # a blank counts only where nothing else separates
+        score = (share - (0.01 if delimiter == " " else 0.0), width)
+        if score > best:
+            told = (
+                np.mean([number_of(field, form) is not None for field in column]) for column in zip(*whole, strict=True)
+            )
+            best, found = score, _Layout(delimiter, form, tuple(bool(share > _MOSTLY) for share in told))
+    if best[0] < _LEAST_SHARE:
         raise InputError(
-            f"{path}: has no rows of numbers in two columns or more; give a text file with a header and rows of "
-            "numbers separated by comma, semicolon, tab or blank"
+            f"{path}: has no rows of numbers in two columns or more, its lines are such as {body[-1].strip()[:60]!r}; "
+            "give a text file with rows of numbers separated by comma, semicolon, tab or blank"
         )
-    _, _, delimiter, point, width = best
-    # an export with quoted decimal commas between commas
-    if delimiter == "," and point == "." and _quoted_commas(body):
-        point = ","
-    for index, line in enumerate(lines):
-        fields = _fields(line, delimiter)
-        if len(fields) == width and sum(_is_number(field, point) for field in fields if field) >= max(1, width / 2):
-            return delimiter, point, width, index
-    raise InputError(f"{path}: has no rows of numbers; give a file with a header and rows of numbers")
+    return found
 
 
-def _quoted_commas(body: list[str]) -> bool:
-    fields = [field for line in body for field in _fields(line, ",")]
-    return sum(bool("," in field and _COMMA.fullmatch(field)) for field in fields) > len(fields) / 4
+def _first_row(path: Path, lines: Sequence[str], layout: _Layout) -> int:
+    """Index of the first row of numbers, with others below it."""
+    filled = [(index, line) for index, line in enumerate(lines) if line.strip()]
+    rows = [(index, _is_row(split_line(COMMENT.sub("#", line), layout.delimiter), layout)) for index, line in filled]
+    for place, (index, _) in enumerate(rows):
+        if all(good for _, good in rows[place : place + _FOLLOW]):
+            return index
+    raise InputError(f"{path}: has no rows of numbers one below the other; give a file with rows of numbers")
 
 
-def _fields(line: str, delimiter: str, strip: bool = True) -> list[str]:
-    if delimiter == " ":
-        return line.split()
-    try:
-        fields = next(csv.reader([line], delimiter=delimiter), [])
-    except csv.Error:
-        return []
-    return [field.strip() for field in fields] if strip else fields
-
-
-def _is_number(field: str, point: str) -> bool:
-    return number_of(field, point) is not None or field.lower() in lexicon().infinite
-
-
-def _units(fields: list[str]) -> bool:
-    """True for a row of units: short words, of which some are units."""
-    return all(_UNIT.fullmatch(field) for field in fields) and sum(
-        unit_named(field.strip("[]() ")) is not None or field in ("-", "[-]", "[]") for field in fields
-    ) >= max(1, len(fields) / 2)
+def _is_row(fields: list[str], layout: _Layout) -> bool:
+    """True if numbers or dates stand where most rows have them, or nothing."""
+    told = [field for field, is_read in zip(fields, layout.read, strict=False) if is_read]
+    given = [is_date(field) or number_of(field, layout.form) is not None for field in told if field]
+    return len(fields) >= len(layout.read) - 1 and bool(given) and all(given)

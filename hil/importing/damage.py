@@ -11,6 +11,7 @@ from hil.arrays import FloatArray
 from hil.errors import InputError
 from hil.identification.derivatives import motion
 from hil.importing.foreign_columns import FEW_MISSING
+from hil.importing.foreign_table import ForeignTable
 from hil.importing.relations import NO_SPREAD, driven, proportional, roughness
 from hil.importing.roles import Roles
 from hil.recording.stamps import GAP_STEPS
@@ -27,28 +28,32 @@ CLIPPED = 0.002  # share of the rows at the largest or least torque: without a l
 TOLD = 0.8  # share of the torque that the motion of each half must explain before its sign is judged
 
 
-def refuse_missing(path: Path, columns: dict[str, FloatArray], texts: dict[str, str]) -> None:
+def refuse_missing(table: ForeignTable, columns: dict[str, FloatArray]) -> None:
     """Refuse a column (n,) with text among its numbers, infinity, or many missing values. Raises InputError."""
     for name, values in columns.items():
-        if name in texts:
-            raise InputError(f"{path}: {name} has text and no number in some rows: {texts[name]!r}; correct the values")
+        if name in table.texts:
+            line, text = table.texts[name]
+            raise InputError(
+                f"{table.path}:{line}: {name} has text and no number: given {text!r}, allowed a number in each row; "
+                "import the part of the file before it, or leave the column out by a map"
+            )
         if np.isinf(values).any():
-            row = int(np.argmax(np.isinf(values))) + 1
-            raise InputError(f"{path}: {name} is infinite and no number in row {row} of the numbers; correct the value")
+            row = int(np.argmax(np.isinf(values)))
+            raise InputError(f"{table.place(row)}: {name} is infinite and no number; import the part before it")
         missing = np.isnan(values)
         if missing.mean() <= FEW_MISSING:
             continue
         steps = np.diff(np.flatnonzero(~missing))
         if steps.size > 10 and steps.min() > 1 and np.ptp(steps) <= 1:
             raise InputError(
-                f"{path}: {name} has a number only in every {round(float(np.median(steps)))}th row: two rates in one "
-                "file; export one rate, or leave the column out by a map"
+                f"{table.path}: {name} has a number only in every {round(float(np.median(steps)))}th row: two rates in "
+                "one file; export one rate, or leave the column out by a map"
             )
         first = int(np.argmax(missing))
         after = " and never after" if 0 < first == np.sum(~missing) else ""
         raise InputError(
-            f"{path}: {name} has no number in {100.0 * missing.mean():.3g} % of the rows, first in row {first + 1} of "
-            f"the numbers{after}; cut the file there or correct the values"
+            f"{table.path}: {name} has no number in {100.0 * missing.mean():.3g} % of the rows, first in "
+            f"{table.place(first).removeprefix(f'{table.path}: ')}{after}; import the part of the file before it"
         )
 
 

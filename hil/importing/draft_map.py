@@ -1,19 +1,23 @@
 """Draft the map of a foreign file: its clock, its columns by role, and an entry for each channel."""
 
+from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from hil.channels import CHANNELS
 from hil.files.input_file import bounded
+from hil.importing.channel_clocks import on_one_clock
 from hil.importing.channel_entries import ChannelEntries
 from hil.importing.clock import find_clock
-from hil.importing.column_names import label
+from hil.importing.column_names import Label, label
 from hil.importing.damage import jump_notes, limit_notes, refuse_damage, refuse_missing
-from hil.importing.foreign_table import read_table
+from hil.importing.foreign_table import ForeignTable, read_table
 from hil.importing.held_samples import rows_per_slowest_sample
 from hil.importing.lexicon import Quantity
-from hil.importing.map_draft import MapDraft
+from hil.importing.map_draft import DraftedChannel, MapDraft
+from hil.importing.map_file import ChannelSource
 from hil.importing.on_change import held, written_on_change
 from hil.importing.roles import find_roles
 from hil.importing.rows import at_regular_times, complete_rows, filled_in, without_duplicates
@@ -28,13 +32,16 @@ def draft_map(path: Path, rate_hz: float | None = None, axis: str | None = None)
     Raises InputError: a damaged file, no clock, no motion, no column that goes with it, contradicting columns.
     """
     table = read_table(path)
+    own = on_one_clock(table, _labels(table))
+    table = own.table
     on_change = [name for name, values in table.columns.items() if written_on_change(values)]
     filled_up = {name: held(table.columns[name]) for name in on_change}
     distinct = without_duplicates(table.columns | filled_up)
-    table = replace(table, columns=distinct.columns)
-    labels = {name: label(name, table.units.get(name, ""), table.words.get(name, "")) for name in table.columns}
+    lines = table.lines[distinct.rows] if table.lines is not None else None
+    table = replace(table, columns=distinct.columns, lines=lines)
+    labels = _labels(table)
     clock = find_clock(table, labels, rate_hz)
-    columns = {name: values for name, values in table.columns.items() if name != clock.column}
+    columns = {name: values for name, values in table.columns.items() if name not in clock.columns}
     may_wrap = [name for name in columns if labels[name].quantity in (Quantity.POSITION, Quantity.UNKNOWN)]
     wraps = {name: size for name in may_wrap if (size := wrap_range(columns[name])) is not None}
     columns |= {name: unwrapped(columns[name], size) for name, size in wraps.items()}
@@ -45,7 +52,7 @@ def draft_map(path: Path, rate_hz: float | None = None, axis: str | None = None)
     regular = at_regular_times(path, {name: dense[name] for name in filled}, dense["time_s"])
     roles = find_roles(str(path), regular.longest_part(), labels, regular.period_s, axis)
     used = {name: columns[name] for name in roles.used}
-    refuse_missing(path, used, table.texts)
+    refuse_missing(table, used)
     # only now it is known which columns must be complete, and which repeat when a sample does
     positions = [name for name in (roles.motor, roles.table) if name]
     ratio = rows_per_slowest_sample({name: filled[name] for name in used}, positions)
@@ -65,7 +72,15 @@ def draft_map(path: Path, rate_hz: float | None = None, axis: str | None = None)
         missing=any(np.isnan(values).any() for values in used.values()),
         left_out=roles.left_out | dict(remark.split(": ", 1) for remark in table.remarks),
         unsure=[
-            *(*distinct.notes, *clock.unsure, *complete.notes, *regular.notes),
+            *(
+                *table.notes,
+                *_scale_notes(table, used),
+                *own.notes,
+                *distinct.notes,
+                *clock.unsure,
+                *complete.notes,
+                *regular.notes,
+            ),
             *(
                 note
                 for name in positions
@@ -83,7 +98,34 @@ def draft_map(path: Path, rate_hz: float | None = None, axis: str | None = None)
         ],
     )
     ChannelEntries(draft, labels, roles, live, regular.period_s).fill()
-    for entry in (one.entry for one in draft.channels):
-        entry |= {"wraps_at": wraps[str(entry["column"])]} if entry["column"] in wraps else {}
-        entry |= {"empty": "hold"} if entry["column"] in on_change else {}
+    for one in draft.channels:
+        entry, column = one.entry, str(one.entry["column"])
+        _with_scale(one, table, draft.lead_m)
+        entry |= {"time": own.times[column].model_dump(exclude_none=True)} if column in own.times else {}
+        entry |= {"wraps_at": wraps[column] / table.scales.get(column, (1.0, 0.0))[0]} if column in wraps else {}
+        entry |= {"empty": "hold"} if column in on_change else {}
     return draft
+
+
+def _labels(table: ForeignTable) -> dict[str, Label]:
+    """Meaning of the columns by all that the file says of them."""
+    told = {name: (table.units.get(name, ""), table.words.get(name, "")) for name in table.columns}
+    return {name: replace(label(table.titles.get(name, name), *of), column=name) for name, of in told.items()}
+
+
+def _with_scale(one: DraftedChannel, table: ForeignTable, lead_m: float | None) -> None:
+    """Add factor and offset that the file gives for a column."""
+    factor, offset = table.scales.get(str(one.entry["column"]), (1.0, 0.0))
+    if offset:
+        in_si = ChannelSource.model_validate(one.entry).factor_to(CHANNELS[one.channel].unit, lead_m)
+        one.entry["offset"] = offset * (in_si or 0.0)
+    if factor != 1.0:
+        one.entry["scale"] = float(str(one.entry.get("scale", 1.0))) * factor
+
+
+def _scale_notes(table: ForeignTable, used: Collection[str]) -> list[str]:
+    given = {name: scale for name, scale in table.scales.items() if name in used and scale != (1.0, 0.0)}
+    return [
+        f"{name}: the header's factor {factor:g} and offset {offset:g} are taken"
+        for name, (factor, offset) in given.items()
+    ]

@@ -6,14 +6,17 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
+from numpy.typing import NDArray
 
 from hil.arrays import FloatArray
 from hil.errors import InputError
-from hil.files import csv_columns, json_columns
+from hil.files import json_columns
 from hil.files.date_stamps import seconds_of
 from hil.files.input_file import check_file
+from hil.importing.map_file import CsvOptions
 from hil.importing.mat_file import load_mat, mat_column, mat_scalar
 from hil.importing.on_change import held
+from hil.importing.text_rows import Cell, TextRows, header_names, line_of, read_rows, split_line
 from hil.recording.arrow_files import numbers, read_parquet
 
 TEXT_ENDINGS = (".csv", ".txt", ".tsv", ".dat", ".asc")
@@ -28,6 +31,7 @@ class Foreign:
     columns: dict[str, FloatArray]
     scalars: dict[str, float]
     place: Callable[[int], str]
+    notes: tuple[str, ...] = ()
 
 
 def check_foreign(path: Path) -> None:
@@ -50,33 +54,34 @@ def read_foreign(
     path: Path,
     wanted: Collection[str],
     wanted_scalars: Collection[str],
-    form: csv_columns.CsvFormat,
-    dates: str | None = None,
+    options: CsvOptions,
+    dates: Collection[str] = (),
     missing: float = 0.0,
     on_change: Collection[str] = (),
+    sparse: Collection[str] = (),
 ) -> Foreign:
-    """The columns `wanted` and, from a .mat file, the scalars; `dates` is a column of dates, returned in seconds.
+    """The columns `wanted` and, from a .mat file, the scalars; `dates` are columns of dates, returned in seconds.
 
-    Those of `on_change` hold their last value where they have none.
+    Those of `on_change` hold their last value where they have none; those of `sparse` may have no values in many rows.
 
     Raises InputError with file, row and column: no such file or format, a missing column, text, infinity, values
     missing in a larger share of the rows than `missing`, columns of different length.
     """
     check_foreign(path)
-    wanted = tuple(name for name in dict.fromkeys(wanted) if name != dates)
+    wanted = tuple(name for name in dict.fromkeys(wanted) if name not in dates)
     if wanted_scalars and path.suffix.lower() != ".mat":
         raise InputError(
             f"{path}: the map takes {', '.join(wanted_scalars)} from the file by name, allowed with "
             ".mat files only; write the number into the map"
         )
     columns, scalars, stamps = dict[str, FloatArray](), dict[str, float](), dict[str, FloatArray]()
+    lines: NDArray[np.int64] | None = None
+    notes: tuple[str, ...] = ()
     match format_of(path):
         case ".csv":
-            rest = [name for name in wanted if name not in on_change]
-            for names, share in ((rest, missing), (on_change, 1.0)):
-                columns |= csv_columns.read_columns(path, names, form, share) if names else {}
-            if dates is not None:
-                stamps[dates] = seconds_of(csv_columns.read_texts(path, dates, form))
+            rows = read_rows(path, header_names(path, options), options)
+            columns, stamps = _chosen(path, rows, wanted, dates)
+            lines, notes = rows.lines, rows.notes
         case ".mat":
             variables = load_mat(path)
             columns = {name: mat_column(path, variables, name) for name in wanted}
@@ -84,22 +89,45 @@ def read_foreign(
         case ".parquet":
             table = read_parquet(path, wanted)
             columns = {name: numbers(path, table, name) for name in wanted}
-            if dates is not None:
-                stamps[dates] = parquet_dates(path, dates)
+            stamps = {name: parquet_dates(path, name) for name in dates}
         case _:
             content = json_columns.read_json(path)
             columns = {name: content.numbers(path, name) for name in wanted}
-            if dates is not None:
-                stamps[dates] = seconds_of([str(text) for text in content.lists.get(dates, [])])
+            stamps = {name: seconds_of([str(text) for text in content.lists.get(name, [])]) for name in dates}
 
     columns |= {name: held(columns[name]) for name in on_change}
 
     def place(row: int) -> str:
-        text = format_of(path) == ".csv"
-        return f"{path}:{csv_columns.line_of_row(path, row, form)}" if text else f"{path}: row {row + 1}"
+        return f"{path}: row {row + 1}" if lines is None else f"{path}:{lines[row]}"
 
-    _check(path, columns | stamps, place, missing)
-    return Foreign(columns | stamps, scalars, place)
+    def given(row: int, name: str) -> str:
+        if lines is None:
+            return f"{(columns | stamps)[name][row]}"
+        text = split_line(line_of(path, int(lines[row]), options.encoding), options.delimiter)
+        names = header_names(path, options)
+        return repr(text[names.index(name)]) if names.index(name) < len(text) else "no field"
+
+    checked = {name: values for name, values in (columns | stamps).items() if name not in sparse}
+    _check(checked, path, place, given, missing)
+    return Foreign(columns | stamps, scalars, place, notes)
+
+
+def _chosen(
+    path: Path, rows: TextRows, wanted: Collection[str], dates: Collection[str]
+) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
+    """The columns `wanted` and `dates` of the rows of a text file. Raises InputError: absent, or text among them."""
+    names = (*rows.numbers, *rows.dates)
+    for name in (*wanted, *dates):
+        if name not in names:
+            raise InputError(f"{path}: column {name!r} is missing; the file has {', '.join(names)}")
+        of_kind = name in (rows.dates if name in dates else rows.numbers)
+        if name in rows.texts or not of_kind:
+            line, text = rows.texts.get(name, Cell(int(rows.lines[0]), "dates" if name in rows.dates else "numbers"))
+            raise InputError(
+                f"{path}:{line}: {name}: given {text!r}, allowed a {'date' if name in dates else 'finite number'}; "
+                "leave the column out of the map, or import the part of the file before it"
+            )
+    return {name: rows.numbers[name] for name in wanted}, {name: rows.dates[name] for name in dates}
 
 
 def parquet_dates(path: Path, name: str) -> FloatArray:
@@ -115,7 +143,13 @@ def parquet_dates(path: Path, name: str) -> FloatArray:
     return np.asarray((nanoseconds - nanoseconds[0]) * 1e-9, dtype=np.float64)
 
 
-def _check(path: Path, columns: dict[str, FloatArray], place: Callable[[int], str], share: float) -> None:
+def _check(
+    columns: dict[str, FloatArray],
+    path: Path,
+    place: Callable[[int], str],
+    given: Callable[[int, str], str],
+    share: float,
+) -> None:
     first, *others = columns.items()
     for name, values in others:
         if values.size != first[1].size:
@@ -128,8 +162,9 @@ def _check(path: Path, columns: dict[str, FloatArray], place: Callable[[int], st
         few = missing.mean() <= share
         bad = np.flatnonzero(np.isinf(values) | (missing & ~np.bool_(few)))
         if bad.size:
+            row = int(bad[0])
             raise InputError(
-                f"{place(int(bad[0]))}: {name}: given {values[bad[0]]}, allowed a finite number"
+                f"{place(row)}: {name}: given {given(row, name)}, allowed a finite number"
                 + (f", or none in up to {100.0 * share:g} % of the rows" if share else "")
-                + "; correct the value, cut the recording before it, or write 'missing: leave_out' into the map"
+                + "; import the part of the file before it, or write 'missing: leave_out' into the map"
             )

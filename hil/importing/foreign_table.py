@@ -1,33 +1,28 @@
-"""Read all columns of numbers of a foreign file, without a map.
+"""Read all columns of numbers of a foreign file, without a map. What is no number becomes NaN here."""
 
-What is no number becomes NaN here; the import by the drafted map then reads the wanted columns strictly and names line
-and column of what is wrong.
-"""
-
-import csv
 from collections import Counter
 from dataclasses import dataclass, field, replace
-from itertools import islice
 from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
+from numpy.typing import NDArray
 
 from hil.arrays import FloatArray
 from hil.errors import InputError
 from hil.files import json_columns
 from hil.files.date_stamps import is_date, seconds_of
-from hil.files.input_file import lines_of
-from hil.importing.csv_dialect import find_dialect, number_of
+from hil.importing.csv_dialect import MOST_LINES, find_dialect
 from hil.importing.foreign_columns import check_foreign, format_of, parquet_dates
 from hil.importing.header_values import HeaderValue, header_values
 from hil.importing.lexicon import Constant
 from hil.importing.map_file import CsvOptions
 from hil.importing.mat_file import load_mat
+from hil.importing.text_rows import Cell, read_rows
 from hil.importing.unit_lines import described, told_units
 from hil.recording.arrow_files import is_number, numbers, parquet_schema, read_parquet, stored_unit
 
-MOST_ROWS = 200_000  # read of a text file for the draft: minutes of a recording
+LEAST_NUMBERS = 0.01  # share of rows with a number: with fewer a column is one of text
 WIDEST = 64  # columns of a matrix in a .mat file: a wider one is no table of channels
 
 
@@ -36,8 +31,9 @@ class ForeignTable:
     """Columns of equal length, NaN where a field is no number; units and scalars as the file gives them.
 
     `constants` are what lines above the numbers, or scalars, give by a name that is known. `dates` are columns of dates
-    or times of day, in seconds; `texts` is the first text among the numbers of a column, `words` what a line above says
-    of it.
+    or times of day, in seconds; `texts` is the first text among the numbers of a column, `words` what lines above say
+    of it, `titles` its text in the file where the column has another name. `scales` are factor and offset that the file
+    gives and the columns have. `notes` say what of the file is left out, `lines` (n,) are those of the rows.
     """
 
     path: Path
@@ -48,8 +44,16 @@ class ForeignTable:
     constants: dict[Constant, HeaderValue] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
     dates: frozenset[str] = frozenset()
-    texts: dict[str, str] = field(default_factory=dict)
+    texts: dict[str, Cell] = field(default_factory=dict)
     words: dict[str, str] = field(default_factory=dict)
+    titles: dict[str, str] = field(default_factory=dict)
+    scales: dict[str, tuple[float, float]] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+    lines: NDArray[np.int64] | None = None
+
+    def place(self, row: int) -> str:
+        """Place of a row (from 0) of the numbers in the file."""
+        return f"{self.path}: row {row + 1} of the numbers" if self.lines is None else f"{self.path}:{self.lines[row]}"
 
 
 def read_table(path: Path) -> ForeignTable:
@@ -70,42 +74,36 @@ def read_table(path: Path) -> ForeignTable:
 
 def _text(path: Path) -> ForeignTable:
     dialect = find_dialect(path)
-    options = dialect.options
-    encoding = "utf-8-sig" if options.encoding == "utf-8" else options.encoding
-    rows: list[list[str]] = []
-    with path.open(encoding=encoding, errors="replace", newline="") as file:
-        below = islice(lines_of(path, file), options.skip_lines, None)
-        lines = (
-            (" ".join(line.split()) for line in below)
-            if options.delimiter == " "
-            else (line.replace("\0", "") for line in below)
-        )
-        skip = (options.column_names is None) + options.skip_rows
-        try:
-            reader = (row for row in csv.reader(lines, delimiter=options.delimiter) if row)
-            rows = list(islice(reader, skip, skip + MOST_ROWS))
-        except csv.Error as error:
-            raise InputError(f"{path}: is not text of a CSV file ({error}); give a CSV file") from None
-    columns, remarks = {}, []
-    dates, texts = set[str](), dict[str, str]()
-    for index, name in enumerate(dialect.names):
-        fields = [row[index] if index < len(row) else "" for row in rows]
-        given = [number_of(field, options.decimal_point) for field in fields]
-        values = np.array(given, dtype=np.float64)  # NaN for text
-        if np.isfinite(values).mean() > 0.01:
-            columns[name] = values
-            if None in given:
-                texts[name] = fields[given.index(None)]
-        elif fields and is_date(fields[0]):
-            columns[name] = seconds_of(fields)
-            dates.add(name)
-        elif name.strip():
-            remarks.append(f"{name.strip()}: text such as {next((f for f in fields if f.strip()), '')!r}, no numbers")
-    told = described(dialect.above, dialect.names)
-    units = {name: unit for name, (_, unit) in told.items()} | told_units(dialect.above, dialect.names)
-    units |= {name: unit.strip("[]() ") for name, unit in zip(dialect.names, dialect.units, strict=True) if unit}
-    constants, words = header_values(dialect.above, {}), {name: text for name, (text, _) in told.items()}
-    return ForeignTable(path, columns, units, {}, options, constants, tuple(remarks), frozenset(dates), texts, words)
+    header = dialect.header
+    rows = read_rows(path, header.names, dialect.options, MOST_LINES)
+    columns, remarks = dict[str, FloatArray](), []
+    read = rows.numbers | rows.dates
+    for name, values in ((name, read[name]) for name in header.names):
+        if np.isfinite(values).mean() > LEAST_NUMBERS:
+            factor, offset = header.scales.get(name, (1.0, 0.0))
+            columns[name] = factor * values + offset
+        elif name in rows.texts:
+            remarks.append(f"{name}: text such as {rows.texts[name].text!r}, no numbers")
+    titles = {name: header.titles.get(name, name) for name in header.names}
+    told = described(dialect.above, list(titles.values()))
+    of_lines = {title: unit for title, (_, unit) in told.items()} | told_units(dialect.above, list(titles.values()))
+    units = {name: of_lines[title] for name, title in titles.items() if title in of_lines} | header.units
+    words = {name: told[title][0] for name, title in titles.items() if title in told} | header.words
+    return ForeignTable(
+        path,
+        columns,
+        units,
+        csv=dialect.options,
+        constants=header_values(dialect.above, {}),
+        remarks=tuple(remarks),
+        dates=frozenset(rows.dates),
+        texts={name: cell for name, cell in rows.texts.items() if name in columns},
+        words=words,
+        titles=header.titles,
+        scales=header.scales,
+        notes=(*header.notes, *rows.notes),
+        lines=rows.lines,
+    )
 
 
 def _mat(path: Path) -> ForeignTable:

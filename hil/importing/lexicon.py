@@ -30,6 +30,19 @@ class Quantity(StrEnum):
     UNKNOWN = "unknown"
 
 
+class RowKind(StrEnum):
+    """Kind of a row above the numbers: by a word before its fields, else by the fields (TEXT, UNKNOWN)."""
+
+    NAMES = "names"
+    UNITS = "units"
+    TYPES = "types"
+    SCALE = "scale"
+    OFFSET = "offset"
+    PERIOD = "period"
+    TEXT = "text"
+    UNKNOWN = "unknown"
+
+
 class Constant(StrEnum):
     """Constant that a file may give beside its columns."""
 
@@ -110,8 +123,8 @@ class Lexicon(_Entry):
     scalars: ScalarNames
     missing: Words
     infinite: Words
-    name_line: Words
-    unit_line: Words
+    rows: dict[RowKind, Annotated[str, BeforeValidator(_pattern)]]
+    types: Words
 
     @model_validator(mode="after")
     def _is_complete(self) -> Self:

@@ -12,11 +12,19 @@ from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, model_validato
 
 from hil.channels import AXIS_CHANNELS, CHANNELS, AxisChannels, AxisKind
 from hil.errors import FieldError
-from hil.files.csv_columns import CsvFormat
 from hil.files.date_stamps import DAY_S
 from hil.quantities import ROTARY_LEAD_M, UNITS, si_factor, units_of
 
-SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "d": DAY_S, "date": 1.0}  # of a unit of time
+SECONDS = {
+    "s": 1.0,
+    "ms": 1e-3,
+    "us": 1e-6,
+    "100 ns": 1e-7,
+    "ns": 1e-9,
+    "min": 60.0,
+    "d": DAY_S,
+    "date": 1.0,
+}  # of a unit of time
 # units that need a constant, and the fields that may give it
 _CONSTANTS = {
     "counts": ("counts_per_rev", "counts_per_m"),
@@ -36,6 +44,7 @@ class CsvOptions(_Strict):
 
     delimiter: str = Field(default=",", min_length=1, max_length=1, description="between the fields")
     decimal_point: Literal[".", ","] = Field(default=".", description="of the numbers")
+    thousands: Literal["", ".", ",", "'", " "] = Field(default="", description="mark between thousands")
     skip_lines: int = Field(default=0, ge=0, le=1_000_000, description="lines above the header")
     skip_rows: int = Field(
         default=0, ge=0, le=1_000_000, description="rows between header and numbers, such as one of units"
@@ -43,17 +52,15 @@ class CsvOptions(_Strict):
     column_names: tuple[str, ...] | None = Field(default=None, description="names for a file without a header")
     encoding: str = Field(default="utf-8", description="of the text")
 
-    def format(self) -> CsvFormat:
-        return CsvFormat(**self.model_dump())
-
 
 class TimeColumn(_Strict):
     """The column of time stamps."""
 
     column: str = Field(description="name in the file")
-    unit: Literal["s", "ms", "us", "ns", "min", "d", "date"] = Field(
+    unit: Literal["s", "ms", "us", "100 ns", "ns", "min", "d", "date"] = Field(
         description="of the stamps; d: days, date: text such as 2024-03-01 12:00:00.001 or 12:00:00.001"
     )
+    fraction: Self | None = Field(default=None, description="column of the part of a second, added to this one")
 
 
 class ChannelSource(_Strict):
@@ -68,6 +75,9 @@ class ChannelSource(_Strict):
     )
     empty: Literal["missing", "hold"] = Field(
         default="missing", description="an empty cell: no value, or hold the last one, of a column written on change"
+    )
+    time: TimeColumn | None = Field(
+        default=None, description="stamps of this channel, if it has its own: it is interpolated to those of the file"
     )
     sign: Literal[1, -1] = Field(default=1, description="-1 if the column is positive the other way")
     counts_per_rev: PositiveFloat | None = Field(default=None, description="unit counts, rotary encoder")

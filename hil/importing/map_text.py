@@ -15,6 +15,7 @@ _KEYS = """\
 #   sign    -1 if the column is positive the other way
 #   scale   factor beside the unit (1);  offset: added afterwards, in SI (0)
 #   empty   hold: an empty cell stands for the value before, of a column that is written on change
+#   time    column and unit of its own stamps; it is then interpolated to those of the file
 #   wraps_at                                  range of a counter or angle that starts again, in the unit of the column
 #   counts_per_rev, counts_per_m              for the unit counts
 #   torque_constant_n_m_a, force_constant_n_a for the unit A
@@ -29,9 +30,12 @@ def map_text(draft: MapDraft) -> str:
     if draft.unsure:
         lines += ["# Please check:", *(f"#   - {note}" for note in draft.unsure)]
     lines += [f"about: {_value(f'{name}, map drafted from the file itself')}"]
-    if clock.column is not None:
-        lines += [f"time:                     # {clock.how}", f"  column: {_value(clock.column)}"]
-        lines += [f"  unit: {clock.unit}                 # s, ms, us, ns, min, d (days), date (text)"]
+    if clock.time is not None:
+        lines += [f"time:                     # {clock.how}", f"  column: {_value(clock.time.column)}"]
+        lines += [f"  unit: {clock.time.unit}                 # s, ms, us, 100 ns, ns, min, d (days), date (text)"]
+        lines += (
+            [f"  fraction: {_value(clock.time.fraction.model_dump(exclude_none=True))}"] if clock.time.fraction else []
+        )
     else:
         lines += [f"sample_rate_hz: {clock.rate_hz!r}   # instead of time stamps; {clock.how}"]
     if draft.resample_hz is not None:
@@ -55,6 +59,8 @@ def map_text(draft: MapDraft) -> str:
 
 
 def _value(value: object) -> str:
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{key}: {_value(item)}" for key, item in value.items()) + "}"
     if isinstance(value, tuple):
         return "[" + ", ".join(_value(item) for item in value) + "]"
     if not isinstance(value, str):

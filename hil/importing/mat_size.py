@@ -56,7 +56,7 @@ def _count(path: Path, data: bytes, order: Literal["big", "little"], values: int
             size, padded = 0, 0  # its elements follow
             values += _VALUES_OF_ARRAY
         elif kind >> 16:  # a small element: size and type in four bytes, data in the next four
-            kind, size, padded = kind & 0xFFFF, kind >> 16, 0
+            kind, size, padded = kind & 0xFFFF, min(kind >> 16, 4), 0
         else:
             padded = size + -size % 8
         values += min(size, len(data) - at) // _BYTES.get(kind, 1)

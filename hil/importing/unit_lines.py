@@ -4,7 +4,7 @@ import re
 from collections.abc import Sequence
 
 from hil.importing.column_names import label
-from hil.importing.lexicon import Quantity, lexicon
+from hil.importing.lexicon import Quantity, RowKind, lexicon
 from hil.importing.units import QUANTITY_OF_UNIT, unit_named
 
 _COMMENT = re.compile(r"^[\s\"#%/;!]+")
@@ -38,7 +38,7 @@ def _list_of_units(line: str) -> list[str]:
     """Units of a line that holds nothing else: "# units: s, mm, %"; at least two of them, each of a quantity once."""
     text = _COMMENT.sub("", line).strip(' "\r\n')
     word, colon, rest = text.partition(":")
-    text = rest if colon and word.strip().lower() in lexicon().unit_line else text
+    text = rest if colon and re.fullmatch(lexicon().rows[RowKind.UNITS], word.strip().lower()) else text
     for separator in _SEPARATORS:
         units = [field.strip(' []()"') for field in re.split(separator, text.strip())]
         if len(units) > 1 and all(unit_named(unit) or unit in ("", "-") for unit in units) and any(units):

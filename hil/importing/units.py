@@ -36,6 +36,13 @@ def unit_named(text: str) -> str | None:
     return "counts" if unit_of.get(_BITS.sub("", key)) == "counts" else unit_of.get(key)
 
 
+def unit_of_text(text: str) -> str | None:
+    """Unit of a text that says nothing else, with a quantity before or behind it: Nm (Torque), Angle [deg]."""
+    whole = unit_named(text.strip(" []()"))
+    bracket = _BRACKETS.search(text)
+    return whole or (unit_named(text[: bracket.start()]) or unit_named(bracket[1]) if bracket else None)
+
+
 def split_unit(name: str) -> tuple[str, str | None, bool]:
     """Name without its unit, the unit if it has one, and True if a unit stands there that is not known."""
     for pattern in (_BRACKETS, _SLASH, _WORD_IN):
@@ -57,6 +64,7 @@ def split_unit(name: str) -> tuple[str, str | None, bool]:
 
 
 def whole_unit(name: str) -> str | None:
-    """Unit of an angle or its speed that is the whole name of a column: turns, rpm."""
-    unit = unit_named(name) if len(name.strip()) >= LEAST_ALONE else None
-    return unit if UNITS.get(unit or "", ("",))[0] in ("rad", "rad/s") else None
+    """Unit of a time, a torque, an angle or its speed that is the whole name of a column: ms, Nm, turns, rpm."""
+    unit, letters = unit_named(name), len(name.strip())
+    si = UNITS.get(unit or "", ("",))[0]
+    return unit if (si in ("rad", "rad/s") and letters >= LEAST_ALONE) or (si in ("s", "N m") and letters > 1) else None

@@ -1,0 +1,173 @@
+"""Tell what each row above the numbers is by what it contains: names, units, types, scale, offset, description.
+
+What a row says of a column is kept with the column; a row that is not used is said.
+"""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from hil.importing.column_names import label, plain_words
+from hil.importing.lexicon import RowKind, lexicon
+from hil.importing.number_form import NumberForm, number_of
+from hil.importing.text_rows import shown, split_line
+from hil.importing.units import unit_of_text
+
+COMMENT = re.compile(r"^\s*(#|%|//)+\s?")
+_UNIT = re.compile(r"[\[(]?\s*[a-zA-Zµμ°%‰Ω·/^*\d. _-]{0,14}\s*[\])]?(\s*\(\w*\))?")
+_NEAR = 4  # lines above the numbers whose text may be that of the columns, where they have none else
+
+
+@dataclass(frozen=True)
+class Row:
+    """A row above the numbers with a field for each column; its line (from 0) and text."""
+
+    line: int
+    text: str
+    kind: RowKind
+    fields: tuple[str, ...]
+
+
+@dataclass
+class Header:
+    """What stands above the columns.
+
+    `names` are different for each column; `titles` the text of the file for a column with another name. `scales` are
+    factor and offset with which a column becomes a value in its unit. `line` is the row that alone gives the names.
+    """
+
+    names: tuple[str, ...]
+    titles: dict[str, str] = field(default_factory=dict)
+    units: dict[str, str] = field(default_factory=dict)
+    words: dict[str, str] = field(default_factory=dict)
+    scales: dict[str, tuple[float, float]] = field(default_factory=dict)
+    line: int | None = None
+    notes: list[str] = field(default_factory=list)
+
+
+def read_header(lines: Sequence[str], delimiter: str, width: int, form: NumberForm) -> Header:
+    """Read the lines above `width` columns of numbers."""
+    rows = [row for index, line in enumerate(lines) if (row := _row(index, line, delimiter, width, form)) is not None]
+    texts = [row for row in rows if row.kind in (RowKind.NAMES, RowKind.TEXT)]
+    named = _names(texts)
+    if named is None:
+        # short names may be those of units: s, v, a
+        named = next((row for row in rows if row.kind is RowKind.UNITS), None)
+        rows = [row for row in rows if row is not named]
+    header = Header(_different(named, texts, width))
+    if named is not None and named.fields == header.names and named.text == lines[named.line]:
+        header.line = named.line
+    used = {named.line} if named else set[int]()
+    header.titles = _titles(named, texts, header.names)
+    for row in rows:
+        given = {name: text for name, text in zip(header.names, row.fields, strict=True) if text}
+        match row.kind:
+            case RowKind.UNITS if not header.units:
+                header.units = given
+            case RowKind.SCALE | RowKind.OFFSET:
+                _add_scale(header, row.kind, given, form)
+            case RowKind.TYPES | RowKind.PERIOD | RowKind.NAMES if row is not named:
+                pass
+            case RowKind.TEXT if row is not named:
+                header.words = {name: f"{header.words.get(name, '')} {text}".strip() for name, text in given.items()}
+            case _ if row is not named:
+                header.notes.append(f"header: line {row.line + 1} is not used: {shown(row.text)!r}")
+        used.add(row.line)
+    if named is None:
+        near = [index for index in range(len(lines)) if lines[index].strip() and index not in used][-_NEAR:]
+        if near and len(split_line(COMMENT.sub("", lines[near[-1]]), delimiter)) > 1:
+            header.notes.append(
+                f"header: line {near[-1] + 1} does not have the {width} fields of the rows, its names are not used: "
+                f"{shown(lines[near[-1]])!r}"
+            )
+    return header
+
+
+def _row(index: int, line: str, delimiter: str, width: int, form: NumberForm) -> Row | None:
+    text = COMMENT.sub("", line)
+    word, colon, rest = text.partition(":")
+    kind = _kind_of_label(word) if colon and delimiter not in word else None
+    fields = split_line(rest if kind else text, delimiter)
+    if width > 2 and width % 2 == 0 and len(fields) == width and len(set(fields[::2])) == 1 and fields[0]:
+        kind = _kind_of_label(fields[0])  # a column of time beside each channel
+        fields = [one for value in fields[1::2] for one in ("", value)]
+    elif kind is None and len(fields) in (width, width + 1) and (kind := _kind_of_label(fields[0])):
+        fields = ["", *fields[1:]] if len(fields) == width else fields[1:]
+    elif len(fields) > width:
+        fields = _regrouped(text, delimiter, width) or fields[: width + (len(fields) > width + 1)]
+    if len(fields) not in (width, width - 1) or not any(fields):
+        return None
+    fields += [""] * (width - len(fields))
+    return Row(index, line, kind or _kind(fields, form), tuple(fields))
+
+
+def _regrouped(text: str, delimiter: str, width: int) -> list[str]:
+    """Fields of a line whose names hold the delimiter: "Torque, actual [Nm]"; empty where it does not fit."""
+    mark = re.escape(delimiter)
+    for pattern in (rf"{mark}(?!\s)", rf"(?<=[\])])\s*{mark}"):
+        fields = [one.strip(' "') for one in re.split(pattern, text)]
+        if len(fields) == width:
+            return fields
+    return []
+
+
+def _kind_of_label(text: str) -> RowKind | None:
+    words = " ".join(plain_words(re.sub(r"[\[(].*", "", text)))
+    return next((kind for kind, known in lexicon().rows.items() if re.fullmatch(known, words)), None)
+
+
+def _kind(fields: Sequence[str], form: NumberForm) -> RowKind:
+    named = [one for one in fields if one]
+    if all(number_of(one, form) is not None for one in named):
+        return RowKind.UNKNOWN
+    if all(re.sub(r"\d+$", "", one.lower()) in lexicon().types for one in named):
+        return RowKind.TYPES
+    units = sum(unit_of_text(one) is not None or one in ("-", "[-]", "[]") for one in named)
+    if all(_UNIT.fullmatch(one) for one in named) and units >= max(1, len(named) / 2):
+        return RowKind.UNITS
+    return RowKind.TEXT
+
+
+def _names(texts: Sequence[Row]) -> Row | None:
+    """The row of names: one that says so, else that with most words of quantities, else the last."""
+    told = next((row for row in texts if row.kind is RowKind.NAMES), None)
+    if told or not texts:
+        return told
+    sure = {row.line: sum(label(one).sure for one in row.fields if one) for row in texts}
+    best = max(sure.values())
+    return next(row for row in (texts if best else reversed(texts)) if sure[row.line] == best)
+
+
+def _titles(named: Row | None, texts: Sequence[Row], names: Sequence[str]) -> dict[str, str]:
+    """Text of each column whose name is another one: a repeated one, or one of another row."""
+    if named is None:
+        return {}
+    own = zip(names, (_title(named, texts, index) for index in range(len(names))), strict=True)
+    return {name: title for name, title in own if title and name != title}
+
+
+def _title(named: Row, texts: Sequence[Row], index: int) -> str:
+    """Text over a column: of the row of names if it has letters there, else of another row."""
+    fields = [named.fields[index], *(row.fields[index] for row in texts)]
+    return next((one for one in fields if re.search(r"[^\W\d]", one)), fields[0])
+
+
+def _different(named: Row | None, texts: Sequence[Row], width: int) -> tuple[str, ...]:
+    """Names of the columns, different from each other: Time, Time (2)."""
+    names: list[str] = []
+    pairs = named is not None and width % 2 == 0 and not any(named.fields[::2]) and all(named.fields[1::2])
+    for index in range(width):
+        title = _title(named, texts, index) if named else ""
+        name = title or (f"time{index // 2 + 1}" if pairs else f"column {index + 1}")
+        times = 1 + sum(one == name or one.rpartition(" (")[0] == name for one in names)
+        names.append(name if times == 1 else f"{name} ({times})")
+    return tuple(names)
+
+
+def _add_scale(header: Header, kind: RowKind, given: dict[str, str], form: NumberForm) -> None:
+    for name, text in given.items():
+        # a header is written by another part of the program than the numbers: both marks may stand there
+        value = next((one for mark in (form.decimal, ".", ",") if (one := number_of(text, NumberForm(mark)))), None)
+        if value is not None:
+            factor, offset = header.scales.get(name, (1.0, 0.0))
+            header.scales[name] = (value, offset) if kind is RowKind.SCALE else (factor, value)

@@ -1,0 +1,133 @@
+"""One column of stamps: its unit, its digits, and the fraction of a second in another column."""
+
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from hil.arrays import FloatArray
+from hil.importing.column_names import Label
+from hil.importing.map_file import SECONDS, TimeColumn
+from hil.recording.stamps import REPEATS
+
+SLOWEST_HZ, FASTEST_HZ = 5.0, 2e5  # of recordings of an axis: outside lies a wrong unit of the stamps
+SLOWEST_TOLD_HZ = 2.0  # with a unit in the name
+_SAME = 0.02  # relative deviation of a clock from another one of the same rows
+_BACK = 1e-3  # share of the rows at which stamps may run back: more is no clock
+_UNEVEN = 3.0  # times the usual step, of stamps that are made of two columns
+# Seconds from the beginning of a clock's count to 1970: of Unix, of Windows (1601), of .NET (year 1).
+_EPOCHS_S = {"s": (0.0,), "ms": (0.0,), "us": (0.0,), "ns": (0.0,), "100 ns": (11644473600.0, 62135596800.0)}
+_YEAR_S = 365.25 * 86400.0
+_SINCE, _UNTIL = 20.0 * _YEAR_S, 130.0 * _YEAR_S  # 1990 to 2100
+
+
+@dataclass(frozen=True, eq=False)
+class Stamps:
+    """Stamps (n,) [s]; `first` in the unit of the column; `sure` if the file says a unit that is one of a recording."""
+
+    time: TimeColumn
+    seconds: FloatArray
+    first: float
+    sure: bool
+
+    @classmethod
+    def of(cls, time: TimeColumn, stamps: FloatArray, sure: bool) -> Self:
+        """Stamps of one column (n,) in its unit, from 0 where they count from long ago."""
+        good = stamps[np.isfinite(stamps)]
+        start = float(good[0]) if good.size and time.unit != "date" else 0.0
+        seconds = (stamps - start) * SECONDS[time.unit]
+        step_s = float(np.ptp(seconds[np.isfinite(seconds)])) / max(good.size - 1, 1) if good.size else 0.0
+        likely = time.unit == "date" or (step_s > 0.0 and SLOWEST_TOLD_HZ <= 1.0 / step_s <= FASTEST_HZ)
+        return cls(time, seconds, start, sure and likely)
+
+    @property
+    def distinct(self) -> int:
+        """Number of different stamps."""
+        return int(np.unique(self.seconds).size)
+
+    @property
+    def span_s(self) -> float:
+        return float(np.nanmax(self.seconds) - np.nanmin(self.seconds))
+
+    @property
+    def digit_s(self) -> float:
+        """Least step."""
+        steps = np.diff(self.seconds)
+        return float(np.min(steps[steps > 0.0], initial=self.span_s))
+
+
+def growing(stamps: FloatArray) -> bool:
+    """True for stamps (n,) that hardly ever run back, and are not all equal."""
+    steps = np.diff(stamps[np.isfinite(stamps)])
+    return bool(steps.size and np.mean(steps < 0.0) <= _BACK and steps.any())
+
+
+def fraction_of(coarse: Stamps, name: str, values: FloatArray, told: Label) -> Stamps | None:
+    """Stamps with the fraction of a second in another column (n,), which begins again with each second; else None."""
+    ranges = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
+    most = float(np.nanmax(values, initial=0.0))
+    if np.nanmin(values, initial=0.0) < 0.0 or most <= 0.0 or coarse.time.unit not in ("date", "s"):
+        return None
+    if np.any(coarse.seconds != np.floor(coarse.seconds)):
+        return None
+    unit = told.unit if told.unit in ranges else next((one for one, size in ranges.items() if most < size), None)
+    if unit is None or most >= ranges[unit]:
+        return None
+    seconds = coarse.seconds + SECONDS[unit] * values
+    steps = np.diff(seconds)
+    if not growing(seconds) or steps.min() <= 0.0 or steps.max() > _UNEVEN * np.median(steps):
+        return None
+    time = TimeColumn(column=coarse.time.column, unit=coarse.time.unit, fraction=TimeColumn(column=name, unit=unit))
+    return Stamps(time, seconds, 0.0, True)
+
+
+def unit_of_stamps(
+    stamps: Stamps, told: Label, known: list[Stamps], rate: tuple[float, str] | None
+) -> tuple[Stamps, str]:
+    """Stamps in the unit that another clock of the file, their age, or else their step tells, and a note if guessed."""
+    raw = stamps.seconds / SECONDS[stamps.time.unit]
+    steps = np.diff(raw)
+    forward = steps[steps > 0.0]
+    few_digits = np.mean(steps == 0.0) > REPEATS
+    # without a step forwards there is no clock, which the rows then say
+    step = float(forward.sum() / steps.size if few_digits else np.median(forward)) if forward.size else 1.0
+
+    def in_unit(unit: str) -> Stamps:
+        time = stamps.time.model_copy(update={"unit": unit})
+        return replace(stamps, time=time, seconds=raw * SECONDS[unit], sure=True)
+
+    units = [unit for unit in SECONDS if unit != "date"]
+    spans = [(one.span_s, one.digit_s, one.time.column) for one in known]
+    spans += [((raw.size - 1) / rate[0], 0.0, rate[1])] if rate else []
+    for span_s, digit_s, other in spans:
+        span = float(np.ptp(raw))
+        unit = min(units, key=lambda one: abs(np.log(max(span * SECONDS[one], 1e-12) / max(span_s, 1e-12))))
+        if abs(span * SECONDS[unit] - span_s) <= _SAME * span_s + digit_s:
+            return in_unit(unit), f"clock: {stamps.time.column} is in {unit} by its relation to {other}"
+    for unit, starts in _EPOCHS_S.items():
+        if any(_SINCE < stamps.first * SECONDS[unit] - start < _UNTIL for start in starts) and _is_rate(step, unit):
+            return in_unit(unit), ""
+    unit, note = unit_by_step(told, step)
+    return in_unit(unit), note
+
+
+def _is_rate(step: float, unit: str) -> bool:
+    return SLOWEST_HZ <= 1.0 / (step * SECONDS[unit]) <= FASTEST_HZ
+
+
+def unit_by_step(told: Label, step: float) -> tuple[str, str]:
+    """Unit of stamps with this step, and a note if it is guessed or if the name says another one."""
+    plausible = [unit for unit in ("s", "ms", "us", "ns", "d") if _is_rate(step, unit)]
+    slow = told.unit is not None and SLOWEST_TOLD_HZ <= 1.0 / (step * SECONDS[told.unit]) < SLOWEST_HZ
+    if slow or told.unit in plausible or (told.unit is not None and not plausible):
+        return str(told.unit), ""
+    # of seconds, milliseconds, ... the one with the rate nearest to 1 kHz, the usual one of a servo drive
+    best = min(plausible or ["s"], key=lambda unit: abs(np.log(step * SECONDS[unit] / 1e-3)))
+    if told.unit is not None:
+        return best, (
+            f"clock: {told.column!r} says {told.unit}, but steps of {step:g} {told.unit} are no rate of a recording; "
+            f"{best} is taken"
+        )
+    if len(plausible) == 1:
+        return best, ""
+    return best, f"clock: the unit of {told.column!r} is not given; {best} is taken (steps of {step:g} {best})"

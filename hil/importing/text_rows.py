@@ -1,0 +1,220 @@
+"""Read the rows of a text file, for the draft of a map and for the import by it alike.
+
+A line without a number is a message, and everything after the last complete row is an end tag or a footer: they are
+left out, and said. Any other line that is no row is damaged.
+"""
+
+import csv
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+from typing import NamedTuple, TextIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hil.arrays import FloatArray
+from hil.errors import InputError
+from hil.files.date_stamps import is_date, read_dates
+from hil.files.input_file import lines_of
+from hil.importing.map_file import CsvOptions
+from hil.importing.number_form import NumberForm, numbers_of
+
+_CHUNK = 20_000  # rows that are converted at once
+_MOSTLY = 0.5  # share of numbers from which text in a column is out of place
+_LONGEST = 50  # lines of a footer: more are a column that has no numbers any more
+_SHOWN = 60  # characters of a line in a message
+
+
+class Cell(NamedTuple):
+    """A field that is no number, and its line (from 1)."""
+
+    line: int
+    text: str
+
+
+@dataclass(frozen=True, eq=False)
+class TextRows:
+    """Columns (n,) of numbers, NaN without one; columns of dates [s]; lines (n,) from 1.
+
+    `texts` is the first text of a column that is no number.
+    """
+
+    numbers: dict[str, FloatArray]
+    dates: dict[str, FloatArray]
+    texts: dict[str, Cell]
+    lines: NDArray[np.int64]
+    notes: tuple[str, ...]
+
+
+def open_text(path: Path, encoding: str) -> TextIO:
+    """Open a text file, whose characters may be damaged. Raises InputError: an unknown encoding."""
+    try:
+        return path.open(encoding="utf-8-sig" if encoding == "utf-8" else encoding, errors="replace", newline="")
+    except LookupError:
+        raise InputError(
+            f"{path}: given the encoding {encoding!r}, allowed one that Python knows; give utf-8 or latin-1"
+        ) from None
+
+
+def split_line(line: str, delimiter: str) -> list[str]:
+    """Fields of a line; the delimiter " " stands for one or more blanks."""
+    if delimiter == " ":
+        return line.split()
+    try:
+        row = next(csv.reader([line.replace("\0", "").rstrip("\r\n")], delimiter=delimiter), [])
+    except csv.Error:
+        return [line]
+    return [field.strip() for field in row]
+
+
+def header_names(path: Path, options: CsvOptions) -> tuple[str, ...]:
+    """Names of the columns by the options of a map. Raises InputError: an empty file, a name that stands twice."""
+    if options.column_names is not None:
+        return options.column_names
+    with open_text(path, options.encoding) as file:
+        lines = enumerate(islice(lines_of(path, file), options.skip_lines, None), options.skip_lines + 1)
+        number, header = next(((number, line) for number, line in lines if line.strip()), (0, ""))
+    names = tuple(split_line(header, options.delimiter))
+    if not names:
+        raise InputError(f"{path}: the file is empty; give a file with a header and rows of numbers")
+    repeated = next((name for name, times in Counter(names).items() if name and times > 1), None)
+    if repeated is not None:
+        raise InputError(
+            f"{path}:{number}: {repeated!r} stands twice in the header, allowed once; give all names in the map: "
+            "csv.column_names, with skip_lines up to the numbers"
+        )
+    return names
+
+
+def read_rows(path: Path, names: Sequence[str], options: CsvOptions, most: int | None = None) -> TextRows:
+    """Read all columns, or the first `most` rows of them. Raises InputError: a damaged row, with its line and text."""
+    reader = _Reader(path, tuple(names), options)
+    with open_text(path, options.encoding) as file:
+        lines = enumerate(islice(lines_of(path, file), options.skip_lines, None), options.skip_lines + 1)
+        below = (one for one in lines if one[1].strip())
+        skip = (options.column_names is None) + options.skip_rows
+        for number, line in islice(below, skip, skip + most if most else None):
+            reader.take(number, line, split_line(line, options.delimiter))
+    return reader.finish()
+
+
+class _Reader:
+    def __init__(self, path: Path, names: tuple[str, ...], options: CsvOptions) -> None:
+        self.path, self.names, self.encoding = path, names, options.encoding
+        self.form = NumberForm(options.decimal_point, options.thousands)
+        self.rows: list[list[str]] = []
+        self.lines: list[int] = []
+        self.parts: dict[str, list[FloatArray]] = {name: [] for name in names}
+        self.fields: dict[str, list[str]] = {}  # of columns of dates, which are read as a whole
+        self.texts: dict[str, dict[int, str]] = {name: {} for name in names}  # by row
+        self.others: list[tuple[int, str, bool]] = []  # lines that are no rows: number, text, damaged
+        self.converted = 0
+
+    def take(self, number: int, line: str, fields: list[str]) -> None:
+        """Take a line that is not blank: a row, or another line."""
+        width, given = len(self.names), len(fields)
+        extra = [field for field in fields[width:] if field]
+        if given != width and not self._numbers(fields[:width]):
+            self.others.append((number, line, False))
+        elif given > width and self._numbers(extra):
+            self.others.append((number, line, True))
+        elif given < width and not self._in_pairs():
+            self.others.append((number, line, not any(self._words(field) for field in fields)))
+        else:
+            self.rows.append(fields[:width] + [""] * (width - given))
+            self.lines.append(number)
+        if len(self.rows) == _CHUNK:
+            self._convert()
+
+    def _in_pairs(self) -> bool:
+        return len(self.names) > 3 and self.names[0] == "time1"
+
+    def _numbers(self, fields: Sequence[str]) -> bool:
+        values, _ = numbers_of(fields, self.form)
+        return bool(np.isfinite(values).any()) or any(is_date(field) for field in fields)
+
+    def _words(self, field: str) -> bool:
+        return bool(numbers_of([field], self.form)[1]) and not is_date(field)
+
+    def _convert(self) -> None:
+        for name, column in zip(self.names, zip(*self.rows, strict=True), strict=True):
+            if name in self.fields or (not self.converted and any(is_date(field) for field in column[:3])):
+                self.fields.setdefault(name, []).extend(column)
+                continue
+            values, texts = numbers_of(column, self.form)
+            self.parts[name].append(values)
+            self.texts[name] |= {self.converted + row: text for row, text in texts.items()}
+        self.converted += len(self.rows)
+        self.rows = []
+
+    def finish(self) -> TextRows:
+        if self.rows:
+            self._convert()
+        rows = self.converted
+        read = {name: read_dates(fields) for name, fields in self.fields.items()}
+        dates = {name: one.seconds for name, one in read.items()}
+        for name, values in dates.items():
+            found = np.flatnonzero(np.isnan(values))
+            self.texts[name] = {int(row): self.fields[name][row] for row in found if self.fields[name][row]}
+        numbers = {name: np.concatenate(parts) for name, parts in self.parts.items() if parts}
+        usual = [name for name in (*numbers, *dates) if len(self.texts[name]) < _MOSTLY * max(rows, 1)]
+        wrong = np.zeros(rows, dtype=np.bool_)
+        for name in usual:
+            wrong[list(self.texts[name])] = True
+        told = np.logical_or.reduce([np.isfinite((numbers | dates)[name]) for name in usual] or [wrong])
+        complete = np.flatnonzero(~wrong & told)
+        last = int(complete[-1]) if complete.size and rows - complete[-1] <= _LONGEST else rows - 1
+        kept = ~(wrong & ~told) & (np.arange(rows) <= last)
+        lines = np.array(self.lines, dtype=np.int64)
+        self._refuse_cut(int(lines[last]) if rows else 0)
+        texts = {
+            name: Cell(int(lines[first]), self.texts[name][first])
+            for name in (*numbers, *dates)
+            if (first := next((row for row in sorted(self.texts[name]) if kept[row]), None)) is not None
+        }
+        others = sorted([number for number, _, _ in self.others] + lines[~kept].tolist())
+        return TextRows(
+            {name: values[kept] for name, values in numbers.items()},
+            {name: values[kept] for name, values in dates.items()},
+            texts,
+            lines[kept],
+            (*self._notes(others, lines[kept]), *dict.fromkeys(one.note for one in read.values() if one.note)),
+        )
+
+    def _refuse_cut(self, last: int) -> None:
+        cut = next(((number, line) for number, line, damaged in self.others if damaged and number < last), None)
+        if cut is not None:
+            raise InputError(
+                f"{self.path}:{cut[0]}: given {shown(cut[1])!r}, allowed {len(self.names)} fields as in the other "
+                "rows; the row is cut or damaged: export the recording again, or import the part before it"
+            )
+
+    def _notes(self, others: list[int], lines: NDArray[np.int64]) -> tuple[str, ...]:
+        if not others:
+            return ()
+        end = int(lines[-1]) if lines.size else 0
+        notes = []
+        for numbers, what in (
+            ([one for one in others if one < end], "between the rows"),
+            ([one for one in others if one > end], "after the last row"),
+        ):
+            if numbers:
+                text = shown(line_of(self.path, numbers[0], self.encoding))
+                many = f"lines {numbers[0]} to {numbers[-1]} ({len(numbers)})" if len(numbers) > 1 else ""
+                notes.append(f"text {what}: {many or f'line {numbers[0]}'} is no row and left out: {text!r}")
+        return tuple(notes)
+
+
+def line_of(path: Path, number: int, encoding: str) -> str:
+    """Text of a line (from 1) of a file."""
+    with open_text(path, encoding) as file:
+        return next(islice(lines_of(path, file), number - 1, None), "")
+
+
+def shown(line: str) -> str:
+    """Beginning of a line for a message."""
+    text = line.strip()
+    return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}..."

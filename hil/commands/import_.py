@@ -11,7 +11,10 @@ from hil.report.console import err, out
 def import_(
     source: Annotated[
         Path,
-        typer.Argument(help="Foreign recording: .csv, .txt, .mat, .parquet or .json.", show_default=False),
+        typer.Argument(
+            help="Foreign recording: text such as .csv, .mat, .npy, .npz, .mf4, .xml, .parquet or .json.",
+            show_default=False,
+        ),
     ],
     map_file: Annotated[
         str | None,

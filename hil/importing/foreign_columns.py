@@ -1,6 +1,6 @@
 """Read columns of a foreign file by name: CSV, MATLAB .mat to version 7, Parquet, JSON. No map is known here."""
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,17 +11,19 @@ from numpy.typing import NDArray
 from hil.arrays import FloatArray
 from hil.errors import InputError
 from hil.files import json_columns
+from hil.files.csv_columns import CsvFormat, line_of_row, read_whole
 from hil.files.date_stamps import seconds_of
 from hil.files.input_file import check_file
 from hil.importing.map_file import CsvOptions
-from hil.importing.mat_file import load_mat, mat_column, mat_scalar
+from hil.importing.mat_file import mat_column, mat_scalar
 from hil.importing.on_change import held
 from hil.importing.text_rows import Cell, TextRows, header_names, line_of, read_rows, split_line
+from hil.importing.variables import VARIABLE_ENDINGS, load_variables
 from hil.recording.arrow_files import numbers, read_parquet
 
 TEXT_ENDINGS = (".csv", ".txt", ".tsv", ".dat", ".asc")
 FEW_MISSING = 0.05  # share of rows without a value: more is a channel of another rate, or a damaged file
-_ENDINGS = (".csv", ".mat", ".parquet", ".json", *TEXT_ENDINGS[1:])
+_ENDINGS = (".csv", *VARIABLE_ENDINGS, ".parquet", ".json", *TEXT_ENDINGS[1:])
 
 
 @dataclass(frozen=True)
@@ -40,14 +42,17 @@ def check_foreign(path: Path) -> None:
 
 
 def format_of(path: Path) -> str:
-    """Format of a file by its ending: .csv (any text), .mat, .parquet, .json. Raises InputError for another one."""
+    """Format of a file by its ending: .csv (any text), .mat (of variables), .parquet, .json.
+
+    Raises InputError for another one.
+    """
     ending = path.suffix.lower()
     if ending not in _ENDINGS:
         raise InputError(
             f"{path}: the ending {path.suffix!r} cannot be imported, allowed {', '.join(_ENDINGS)}; "
             "export the recording to one of them"
         )
-    return ".csv" if ending in TEXT_ENDINGS else ending
+    return ".csv" if ending in TEXT_ENDINGS else ".mat" if ending in VARIABLE_ENDINGS else ending
 
 
 def read_foreign(
@@ -79,11 +84,14 @@ def read_foreign(
     notes: tuple[str, ...] = ()
     match format_of(path):
         case ".csv":
-            rows = read_rows(path, header_names(path, options), options)
-            columns, stamps = _chosen(path, rows, wanted, dates)
-            lines, notes = rows.lines, rows.notes
+            names = header_names(path, options)
+            columns = {} if dates or options.thousands else _whole(path, names, wanted, options)
+            if not columns:
+                rows = read_rows(path, names, options)
+                columns, stamps = _chosen(path, rows, wanted, dates)
+                lines, notes = rows.lines, rows.notes
         case ".mat":
-            variables = load_mat(path)
+            variables = load_variables(path).arrays
             columns = {name: mat_column(path, variables, name) for name in wanted}
             scalars = {name: mat_scalar(path, variables, name) for name in wanted_scalars}
         case ".parquet":
@@ -98,7 +106,13 @@ def read_foreign(
     columns |= {name: held(columns[name]) for name in on_change}
 
     def place(row: int) -> str:
-        return f"{path}: row {row + 1}" if lines is None else f"{path}:{lines[row]}"
+        if lines is not None:
+            return f"{path}:{lines[row]}"
+        return (
+            f"{path}:{line_of_row(path, row, _form(options))}"
+            if format_of(path) == ".csv"
+            else f"{path}: row {row + 1}"
+        )
 
     def given(row: int, name: str) -> str:
         if lines is None:
@@ -110,6 +124,15 @@ def read_foreign(
     checked = {name: values for name, values in (columns | stamps).items() if name not in sparse}
     _check(checked, path, place, given, missing)
     return Foreign(columns | stamps, scalars, place, notes)
+
+
+def _whole(path: Path, names: Sequence[str], wanted: Collection[str], options: CsvOptions) -> dict[str, FloatArray]:
+    """The columns `wanted` where each row has a number in each, read in one go; empty for other files."""
+    return read_whole(path, names, wanted, _form(options)) or {}
+
+
+def _form(options: CsvOptions) -> CsvFormat:
+    return CsvFormat(**options.model_dump(exclude={"thousands"}))
 
 
 def _chosen(

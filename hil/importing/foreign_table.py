@@ -17,9 +17,9 @@ from hil.importing.foreign_columns import check_foreign, format_of, parquet_date
 from hil.importing.header_values import HeaderValue, header_values
 from hil.importing.lexicon import Constant
 from hil.importing.map_file import CsvOptions
-from hil.importing.mat_file import load_mat
 from hil.importing.text_rows import Cell, read_rows
 from hil.importing.unit_lines import described, told_units
+from hil.importing.variables import load_variables
 from hil.recording.arrow_files import is_number, numbers, parquet_schema, read_parquet, stored_unit
 
 LEAST_NUMBERS = 0.01  # share of rows with a number: with fewer a column is one of text
@@ -108,7 +108,8 @@ def _text(path: Path) -> ForeignTable:
 
 def _mat(path: Path) -> ForeignTable:
     columns, scalars, others = dict[str, FloatArray](), dict[str, float](), []
-    for name, variable in load_mat(path).items():
+    arrays, units = load_variables(path)
+    for name, variable in arrays.items():
         values = np.asarray(variable)
         if values.dtype.kind not in "fiub":
             others.append(name)
@@ -126,7 +127,7 @@ def _mat(path: Path) -> ForeignTable:
             f"{path}: holds no vector of numbers (there are {', '.join(others) or 'no variables'}), allowed a vector "
             "per channel or a matrix with a column per channel; save the vectors themselves, not a structure"
         )
-    return ForeignTable(path, columns, {}, scalars, constants=header_values((), scalars), remarks=tuple(remarks))
+    return ForeignTable(path, columns, units, scalars, constants=header_values((), scalars), remarks=tuple(remarks))
 
 
 def _parquet(path: Path) -> ForeignTable:

@@ -14,14 +14,14 @@ from hil.files import json_columns
 from hil.files.csv_columns import CsvFormat, line_of_row, read_whole
 from hil.files.date_stamps import seconds_of
 from hil.files.input_file import check_file
+from hil.importing.long_text import long_form
 from hil.importing.map_file import CsvOptions
 from hil.importing.mat_file import mat_column, mat_scalar
 from hil.importing.on_change import held
 from hil.importing.text_rows import Cell, TextRows, header_names, line_of, read_rows, split_line
-from hil.importing.variables import VARIABLE_ENDINGS, load_variables
+from hil.importing.variables import TEXT_ENDINGS, VARIABLE_ENDINGS, load_variables
 from hil.recording.arrow_files import numbers, read_parquet
 
-TEXT_ENDINGS = (".csv", ".txt", ".tsv", ".dat", ".asc")
 FEW_MISSING = 0.05  # share of rows without a value: more is a channel of another rate, or a damaged file
 _ENDINGS = (".csv", *VARIABLE_ENDINGS, ".parquet", ".json", *TEXT_ENDINGS[1:])
 
@@ -42,7 +42,7 @@ def check_foreign(path: Path) -> None:
 
 
 def format_of(path: Path) -> str:
-    """Format of a file by its ending: .csv (any text), .mat (of variables), .parquet, .json.
+    """Format of a file: .csv (any text of rows), .mat (of variables by name), .parquet, .json.
 
     Raises InputError for another one.
     """
@@ -52,7 +52,9 @@ def format_of(path: Path) -> str:
             f"{path}: the ending {path.suffix!r} cannot be imported, allowed {', '.join(_ENDINGS)}; "
             "export the recording to one of them"
         )
-    return ".csv" if ending in TEXT_ENDINGS else ".mat" if ending in VARIABLE_ENDINGS else ending
+    if ending in VARIABLE_ENDINGS or (ending in TEXT_ENDINGS and long_form(path)):
+        return ".mat"
+    return ".csv" if ending in TEXT_ENDINGS else ending
 
 
 def read_foreign(

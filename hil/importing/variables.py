@@ -1,4 +1,5 @@
-"""Read files that hold variables by name: MATLAB .mat, NumPy .npy and .npz, ASAM MDF 4 (.mf4), XML of records."""
+"""Read files that hold variables by name: MATLAB .mat, NumPy .npy and .npz, ASAM MDF 4 (.mf4), XML of records, text with
+a value per line."""
 
 import zipfile
 from collections import Counter
@@ -11,8 +12,10 @@ from numpy.lib import format as npy_format
 
 from hil.errors import InputError
 from hil.files.input_file import check_values, parsing
+from hil.importing.long_text import long_form, read_long
 from hil.importing.mat_file import load_mat
 
+TEXT_ENDINGS = (".csv", ".txt", ".tsv", ".dat", ".asc")
 VARIABLE_ENDINGS = (".mat", ".npy", ".npz", ".mf4", ".xml")
 _WHOLE_NAN = 0x7FF0_0000_0000_0000  # an IEEE 754 number without a value, whose bits were written as a whole number
 
@@ -34,6 +37,11 @@ def load_variables(path: Path) -> Variables:
                 return Variables(_numpy(path), {})
         case ".mf4":
             return _mdf(path)
+        case ending if ending in TEXT_ENDINGS:
+            with parsing(path, "text with a value per line"):
+                form = long_form(path)
+                assert form is not None, "its form has changed"
+                return Variables(read_long(path, form), {"time": "s"})
         case _:
             with parsing(path, "XML file of records"):
                 return Variables(_records(path), {})

@@ -21,7 +21,10 @@ _DATES = (
     rf"(?P<d>\d{{1,2}})(?P<sep>[-/])(?P<m>\d{{1,2}})(?P=sep){_YEAR}",
     rf"(?P<name>\d{{1,2}}[-. ]+[^\W\d]{{3,9}}[-., ]+{_YEAR}|[^\W\d]{{3,9}}\.? +\d{{1,2}},? +\d{{4}})",
 )
-_FORMS = [re.compile(rf"{day}(?:T|[ ,;]\s*){_TIME}{_ZONE}") for day in _DATES] + [re.compile(_TIME + _ZONE)]
+_FORMS = [re.compile(rf"{day}(?:T|[ ,;]\s*){_TIME}{_ZONE}") for day in _DATES] + [
+    re.compile(_TIME + _ZONE),
+    re.compile(r"(?P<min>\d{1,3}):(?P<s>\d{2}[.,]\d+)"),  # of a stopwatch
+]
 _WITHIN = 10.0  # usual steps: of the hour by which a clock is set, and of the whole hour at which it is
 
 
@@ -70,7 +73,8 @@ def _seconds(texts: Sequence[str], form: re.Pattern[str]) -> FloatArray:
         if key not in ordinals:  # of months by name each next one is the next day
             ordinals[key] = _ordinal(*key[1:]) if not key[0] else float(len(ordinals))
         days[row] = ordinals[key] if dated else 0.0
-        hour = int(part["h"]) % 12 + 12 * (part["half"].lower() == "pm") if part["half"] else int(part["h"])
+        hour, half = int(part.get("h") or 0), (part.get("half") or "").lower()
+        hour = hour % 12 + 12 * (half == "pm") if half else hour
         # 12:00:00:123 is a form of some loggers for milliseconds
         second = float(re.sub("[,:]", ".", part["s"] or "0"))
         seconds[row] = HOUR_S * hour + 60.0 * int(part["min"]) + second

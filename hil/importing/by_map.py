@@ -12,7 +12,7 @@ from hil.files.input_file import bounded, is_file
 from hil.files.yaml_model import load_model
 from hil.importing.channel_clocks import merge, seconds
 from hil.importing.foreign_columns import FEW_MISSING, read_foreign
-from hil.importing.map_file import SECONDS, RecordingMap
+from hil.importing.map_file import RecordingMap
 from hil.importing.rows import complete_rows
 from hil.importing.wraps import unwrapped
 from hil.recording.quantum import count_of
@@ -103,7 +103,7 @@ def _find_map(map_path: str | Path) -> Path:
 def _time_s(the_map: RecordingMap, raw: dict[str, FloatArray]) -> FloatArray:
     if the_map.time is not None:
         first = float(raw[the_map.time.column][0])
-        return seconds(raw, the_map.time, first if abs(first) * SECONDS[the_map.time.unit] > EPOCH_S else 0.0)
+        return seconds(raw, the_map.time, first if abs(first) * the_map.time.seconds > EPOCH_S else 0.0)
     assert the_map.sample_rate_hz is not None
     rows = next(iter(raw.values())).size
     return np.asarray(np.arange(rows) / the_map.sample_rate_hz, dtype=np.float64)

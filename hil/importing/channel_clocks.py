@@ -14,7 +14,8 @@ from hil.importing.clock import StampClock, clock_of, time_columns
 from hil.importing.column_names import Label
 from hil.importing.foreign_table import ForeignTable
 from hil.importing.lexicon import Quantity
-from hil.importing.map_file import SECONDS, TimeColumn
+from hil.importing.map_file import TimeColumn
+from hil.importing.stamp_columns import growing
 
 _ROW = 0.01  # of a step: by which two clocks of the same rows differ at most
 
@@ -66,12 +67,12 @@ def merge(
 
     Columns of `times` are interpolated by their own stamps; NaN ends a column of fewer rows.
     """
-    unit, first = SECONDS[time.unit], float(columns[time.column][np.isfinite(columns[time.column])][0])
+    first = float(columns[time.column][np.isfinite(columns[time.column])][0])
     at_s = seconds(columns, time, first)
     merged = dict(columns)
     kept = np.isfinite(at_s)
     for name, own in times.items():
-        own_s = seconds(columns, own, first * unit / SECONDS[own.unit])
+        own_s = seconds(columns, own, first * time.seconds / own.seconds)
         good = np.isfinite(own_s) & np.isfinite(columns[name])
         order = np.argsort(own_s[good], kind="stable")
         merged[name] = np.interp(at_s, own_s[good][order], columns[name][good][order])
@@ -82,9 +83,9 @@ def merge(
 
 def seconds(columns: Mapping[str, FloatArray], time: TimeColumn, start: float = 0.0) -> FloatArray:
     """Stamps (n,) [s] of a column less `start`, in its unit, with the fraction of a second."""
-    stamps = (columns[time.column] - start) * SECONDS[time.unit]
+    stamps = (columns[time.column] - start) * time.seconds
     part = time.fraction
-    return np.asarray(stamps + SECONDS[part.unit] * columns[part.column] if part else stamps, dtype=np.float64)
+    return np.asarray(stamps + part.seconds * columns[part.column] if part else stamps, dtype=np.float64)
 
 
 def _groups(table: ForeignTable, labels: dict[str, Label]) -> list[tuple[list[str], list[str]]]:
@@ -108,7 +109,7 @@ def _clock(table: ForeignTable, labels: dict[str, Label], times: list[str]) -> S
     """Clock of one group, on the rows that it has."""
     stamped = np.logical_or.reduce([np.isfinite(table.columns[name]) for name in times])
     part = replace(table, columns={name: table.columns[name][stamped] for name in times}, lines=None)
-    return clock_of(part, labels, times, None)
+    return clock_of(part, labels, [name for name in times if growing(part.columns[name])], None)
 
 
 def _rank(labels: dict[str, Label], channels: list[str]) -> int:

@@ -5,18 +5,19 @@ from math import pi
 import numpy as np
 
 from hil.arrays import FloatArray
-from hil.channels import AXIS_CHANNELS, SPEED_SET_POINT, AxisKind
+from hil.channels import AXIS_CHANNELS, AxisKind
 from hil.errors import InputError
-from hil.identification.derivatives import MeasuredMotion, motion, smoothed
+from hil.identification.derivatives import MeasuredMotion, motion
 from hil.importing.column_names import Label
 from hil.importing.effort_entry import effort_entry, signs_of
 from hil.importing.encoder_counts import CountSize, angle_unit, assumed, from_length, from_speed, scale_count
+from hil.importing.header_rows import NAMELESS
 from hil.importing.lexicon import Constant, Quantity
 from hil.importing.map_draft import DraftedChannel, MapDraft
 from hil.importing.map_file import ChannelSource
-from hil.importing.relations import derivative_of, driven, explained, lateness_s, proportional
+from hil.importing.relations import derivative_of, driven, lateness_s, proportional
 from hil.importing.roles import SAME_POSITION, Roles
-from hil.importing.speed_unit import FOLLOWS, speed_unit
+from hil.importing.speed_unit import speed_entry
 from hil.importing.unit_choice import (
     MATCH,
     UnitChoice,
@@ -27,6 +28,7 @@ from hil.importing.unit_choice import (
     position_unit,
     prefers_length,
     unit_by_convention,
+    unit_of_nameless,
 )
 from hil.importing.units import unit_named
 from hil.importing.usual_values import LEADS_M, improbable, mixed_up, screw_units, usual_lead
@@ -35,9 +37,6 @@ from hil.quantities import ROTARY_LEAD_M, UNITS
 SAME_COUNTS = 1e-3  # deviation of the factor between motor and set-point, both in counts: following errors are below
 _LEAD_NOT_TOLD = "not told; masses at the table scale with it"
 LATE_ROWS = 0.5  # by which a set-point may seem late: its rounding and the sampling of the encoder
-# Shares of a speed set-point: what the velocity of the position set-point must leave, and the most of this that the
-# following error may leave, if it is the output of the position loop.
-LEAST_LEFT, LOOP_LEAVES = 1e-4, 0.25
 
 
 class ChannelEntries:
@@ -70,8 +69,9 @@ class ChannelEntries:
         self._velocity_command()
         self._efforts(self._motion(roles.motor))
         if not (roles.effort or roles.effort_command or roles.table):
+            told = "".join(f"{name}: {why}; " for name, why in roles.left_out.items() if "explain" in why)
             raise InputError(
-                f"{self.draft.table.path}: beside the position {roles.motor} no torque, force, current, voltage or "
+                f"{self.draft.table.path}: {told}beside the position {roles.motor} no torque, force, current, voltage or "
                 "second encoder is found; record one, or write its column into a map: hil import FILE --map MAP.yaml"
             )
 
@@ -90,9 +90,11 @@ class ChannelEntries:
     def _units_of_positions(self) -> None:
         roles, labels, live = self.roles, self.labels, self.live
         positions = [name for name in (roles.command, roles.table, roles.motor) if name]
-        prefers, by_convention = prefers_length(positions, self.effort), unit_by_convention(self.effort)
-        self.draft.unsure += [by_convention.note] if by_convention else []
         far, motor = roles.table or roles.command, roles.motor
+        prefers, by_convention = prefers_length(positions, self.effort), unit_by_convention(self.effort)
+        if prefers is None and by_convention is None and motor and self._says_nothing(motor):
+            by_convention = unit_of_nameless(motor, live[motor])
+        self.draft.unsure += [by_convention.note] if by_convention else []
         in_counts = "counts" in [labels[name].unit for name in (far, motor) if name]
         geared = far is not None and labels[far].unit is None and prefers_length([far], None) is False
         if far and motor and not geared and not by_convention and not in_counts and not are_counts(live[motor]):
@@ -125,6 +127,13 @@ class ChannelEntries:
             self._choose(column, position_unit(column, live[column], told, hints, prefers))
         for column, unit in self.units.items():
             self.draft.unsure += improbable(column, live[column], unit, self.period_s)
+
+    def _says_nothing(self, motor: str) -> bool:
+        """True if no column has a unit, and the file has no names, or a velocity that is the derivative as it is."""
+        if any(one.unit for name, one in self.labels.items() if name in self.live):
+            return False
+        same = [abs(factor - 1.0) < MATCH for _, factor in self._unnamed_speeds(motor)]
+        return motor in self.roles.how and (motor.startswith(NAMELESS) or any(same))
 
     def _unnamed_speeds(self, column: str) -> list[tuple[str, float]]:
         """Measured velocities without a unit that are the derivative of `column`, with the derivative over them."""
@@ -249,32 +258,17 @@ class ChannelEntries:
         if command is None:
             self.draft.left_out[name] = "a velocity set-point without a position set-point"
             return
-        relation = derivative_of(self.live[name], self._motion(command), self.period_s)
-        channel, how = "velocity_command_m_s", f"the derivative of {command}"
-        if self._holds_following_error(name, command):
-            channel, how = SPEED_SET_POINT, "output of the position loop: it holds the following error"
-        elif relation.share < FOLLOWS:
-            self.draft.left_out[name] = f"no derivative of {command} (share {relation.share:.2f})"
-            return
         entry = next(one.entry for one in self.draft.channels if one.channel == "position_command_m")
-        unit = speed_unit(self.labels[name].unit, relation, ChannelSource.model_validate(entry), self.draft.lead_m)
-        if unit is None:
-            told = f"in {self.labels[name].unit} " if self.labels[name].unit else ""
-            why = f"{abs(relation.factor):.4g} x the derivative of {command} in {self.units[command]}"
-            self.draft.left_out[name] = f"{told}no velocity: {why}"
-            self.draft.unsure.append(f"{name}: is {told}{why}, which no unit of a speed explains; it is not used")
-            return
-        turned = any("sign" in one.entry for one in self.draft.channels if one.channel == "position_command_m")
-        sign = {"sign": -1} if (relation.factor < 0.0) != turned else {}
-        self.draft.channels.append(DraftedChannel(channel, {"column": name, "unit": unit, **sign}, how))
-
-    def _holds_following_error(self, name: str, command: str) -> bool:
-        """True if the following error explains most of what the velocity of the set-point leaves of a speed."""
-        motor, velocity = self.live[str(self.roles.motor)], self._motion(command).velocity
-        error = self.live[command] - proportional(self.live[command], motor).factor * motor
-        speed = smoothed(self.live[name], self.period_s)
-        alone, both = explained(speed, velocity), explained(speed, velocity, smoothed(error, self.period_s))
-        return 1.0 - alone > LEAST_LEFT and 1.0 - both < LOOP_LEAVES * (1.0 - alone)
+        source, live = ChannelSource.model_validate(entry), self.live
+        motor = live[str(self.roles.motor)]
+        found = speed_entry(
+            self.labels[name], live[name], live[command], motor, self.period_s, source, self.draft.lead_m
+        )
+        self.draft.unsure += [found.note] if found.note else []
+        if found.channel:
+            self.draft.channels.append(DraftedChannel(found.channel, {"column": name, **found.keys}, found.how))
+        else:
+            self.draft.left_out[name] = found.how
 
     def _efforts(self, moved: MeasuredMotion) -> None:
         names = AXIS_CHANNELS[self.kind]

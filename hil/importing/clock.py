@@ -44,16 +44,15 @@ def find_clock(table: ForeignTable, labels: dict[str, Label], rate_hz: float | N
         return _of_rate(rows, rate_hz, "given with --rate")
     told = _written_rate(table)
     named = time_columns(table, labels)
-    found = clock_of(table, labels, named or _unnamed(table, labels), told)
-    if found is not None:
+    grow = [name for name in named or _unnamed(table, labels) if growing(table.columns[name])]
+    if found := clock_of(table, labels, grow, told):
         return found
-    for name in named:
-        values = table.columns[name] * SECONDS.get(labels[name].unit or "", 0.0)
-        usual = float(np.median(values[1:])) if values.size > 2 else 0.0
-        if usual > 0.0 and np.all(np.abs(values[1:] - usual) < _INTERVAL * usual) and _plausible(1.0 / usual):
-            return _of_rate(rows, 1.0 / usual, f"intervals in the column {name}")
-    if told is not None:
-        return _of_rate(rows, *told)
+    even = [rate for name in named if (rate := _of_intervals(table, labels, name))]
+    if even or told:
+        return _of_rate(rows, *(even[0] if even else told or (0.0, "")))
+    # rows out of order make no clock of any column; they are refused by what is named one
+    if found := clock_of(table, labels, named[:1], told):
+        return found
     text = next((remark for remark in table.remarks if label(remark.split(":")[0]).quantity is Quantity.TIME), None)
     raise InputError(
         f"{table.path}: no column of time stamps is found"
@@ -70,12 +69,12 @@ def time_columns(table: ForeignTable, labels: dict[str, Label]) -> list[str]:
 def clock_of(
     table: ForeignTable, labels: dict[str, Label], names: Sequence[str], told: tuple[float, str] | None
 ) -> StampClock | None:
-    """The clock that the columns `names` make, of which the others only tell the unit; None if none of them grows.
+    """The clock that the columns `names` make, of which the others only tell the unit; None without names.
 
     The one with most different stamps counts; a column of fractions of a second is added to one of whole seconds.
     `told` is the rate [Hz] that the file gives elsewhere, with its source.
     """
-    stamps = [_stamps(table, labels, name) for name in names if growing(table.columns[name])]
+    stamps = [_stamps(table, labels, name) for name in names]
     others = [name for name, one in labels.items() if one.quantity in (Quantity.TIME, Quantity.UNKNOWN)]
     for name in others:
         if name in table.columns and name not in [one.time.column for one in stamps]:
@@ -105,16 +104,30 @@ def clock_of(
     return StampClock(best.seconds - best.seconds[0], best.time, None, how, tuple(notes))
 
 
+def _of_intervals(table: ForeignTable, labels: dict[str, Label], name: str) -> tuple[float, str] | None:
+    """Rate of a column of time that holds the interval of each row, all equal, in a unit that the file says."""
+    values = table.columns[name] * SECONDS.get(labels[name].unit or "", 0.0)
+    usual = float(np.median(values[1:]))
+    even = usual > 0.0 and name not in table.dates and bool(np.all(np.abs(values[1:] - usual) < _INTERVAL * usual))
+    return (1.0 / usual, f"intervals in the column {name}") if even and _plausible(1.0 / usual) else None
+
+
 def _stamps(table: ForeignTable, labels: dict[str, Label], name: str) -> Stamps:
     unit = "date" if name in table.dates else labels[name].unit
-    return Stamps.of(TimeColumn(column=name, unit=unit or "s"), table.columns[name], unit is not None)
+    time = TimeColumn(column=name, unit=unit or "s", scale=table.scales.get(name, (1.0, 0.0))[0])
+    return Stamps.of(time, table.columns[name], unit is not None)
 
 
 def _unnamed(table: ForeignTable, labels: dict[str, Label]) -> list[str]:
     """The first column without a known quantity that grows by nearly equal steps; row numbers are none."""
     for name, values in table.columns.items():
         steps = np.diff(values)
-        if labels[name].quantity is Quantity.UNKNOWN and steps.size and np.isfinite(steps).all() and steps.min() > 0:
+        if (
+            (labels[name].quantity is Quantity.UNKNOWN or labels[name].letter)
+            and steps.size
+            and np.isfinite(steps).all()
+            and steps.min() > 0
+        ):
             row_numbers = bool(np.all(steps == 1.0) and values[0] in (0.0, 1.0))
             if np.ptp(steps) < 0.2 * np.median(steps) and not row_numbers:
                 return [name]
@@ -127,7 +140,7 @@ def _refuse_missing(table: ForeignTable, stamps: Stamps) -> None:
         line, text = table.texts.get(stamps.time.column, (0, "an empty field"))
         place = f"{table.path}:{line}" if line else table.place(int(bad[0]))
         raise InputError(
-            f"{place}: {stamps.time.column}: given {text!r}, allowed a time stamp in each row; import the part of the "
+            f"{place}: {stamps.time.column}: the row has no time stamp: given {text!r}; import the part of the "
             "file before it, or the rows by their rate: hil import FILE --rate HZ"
         )
 

@@ -26,6 +26,7 @@ class Label:
     unit: str | None
     odd_unit: bool = False
     electric: str | None = None  # A or V if the word says current or voltage
+    part: bool = False  # of a torque: friction, gravity
     letter: bool = False  # one letter says its quantity, beside nothing else that is known
 
     @property
@@ -49,7 +50,8 @@ def label(column: str, unit_text: str = "", words_beside: str = "") -> Label:
     parts = [_words(plain_words(part)) for part in reversed(name.split("."))]
     quantity, letter = next((found for part in (*parts, beside) if (found := _found(part)) != _NOTHING), _NOTHING)
     of_unit = QUANTITY_OF_UNIT.get(unit or "")
-    if unit == "N m" and quantity is Quantity.POSITION and not _any(words, ("moment",)):
+    strange = letter and _strange(words)
+    if unit == "N m" and quantity is Quantity.POSITION and not strange and not _any(words, ("moment",)):
         unit = "nm"
     elif unit == "rev" and quantity not in (Quantity.POSITION, Quantity.UNKNOWN):
         unit = None  # speed_rev is a reversal
@@ -69,7 +71,8 @@ def label(column: str, unit_text: str = "", words_beside: str = "") -> Label:
         unit,
         odd,
         _electric(words) if quantity is Quantity.EFFORT else None,
-        not words_beside and quantity is not Quantity.TIME and (len(name.strip()) == 1 or (letter and _strange(words))),
+        _any(words, known.part),
+        not words_beside and quantity is not Quantity.TIME and (len(name.strip()) == 1 or strange),
     )
 
 

@@ -5,7 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from hil.arrays import FloatArray
-from hil.importing.relations import noise
+from hil.identification.derivatives import motion
+from hil.importing.relations import driven, noise, proportional
 from hil.importing.unit_choice import are_counts
 from hil.recording.quantum import count_of, is_decimal
 
@@ -13,6 +14,9 @@ QUIET = 0.3  # of the noise of the measured positions: a set-point is computed a
 _OF_COUNTS = 0.3  # of the noise that counting gives: less is a step by chance, as of a constant feed
 _OF_DIGITS = 2.0  # times the noise that rounding gives: more is a sensor's
 _DECIMAL = 1e-3  # relative deviation of a step from a power of ten: noise is in it
+
+_LIKE, _LIKE_SHARE = 0.01, 0.98  # a set-point is in the unit of the motion, and following errors are below 5 %
+_CLEARLY = 10.0  # difference of log likelihoods from which one of two motions answers the torque better
 
 
 class Computed(NamedTuple):
@@ -39,6 +43,23 @@ def computed_one(positions: dict[str, FloatArray], plain: list[str]) -> Computed
         if rounded[name] == "digits" and all(rounded[other] == "counts" for other in others):
             return Computed([name], f"it is rounded to digits, {' and '.join(others)} to counts of an encoder")
     return Computed([], "")
+
+
+def unanswered_one(two: dict[str, FloatArray], efforts: list[FloatArray], period_s: float) -> Computed:
+    """Find the set-point among two like positions (n,): inertia and friction of it explain the torque clearly worse.
+
+    The torque answers the motion that it makes, a set-point comes before it.
+    """
+    (first, one), (second, other) = two.items()
+    relation = proportional(one, other)
+    if not efforts or relation.share < _LIKE_SHARE or abs(relation.factor - 1.0) > _LIKE:
+        return Computed([], "")
+    moved = {name: motion(values, period_s) for name, values in two.items()}
+    left = {name: min(1.0 - driven(effort, moved[name], period_s).share for effort in efforts) for name in two}
+    worse, better = (first, second) if left[first] > left[second] else (second, first)
+    gain = 0.5 * one.size * float(np.log(left[worse] / max(left[better], 1e-12)))
+    why = f"inertia and friction of {better} explain the torque better"
+    return Computed([worse], why) if gain > _CLEARLY else Computed([], "")
 
 
 def _rounding(values: FloatArray, noise_abs: float) -> str:

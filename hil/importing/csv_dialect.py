@@ -7,8 +7,6 @@ from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
-
 from hil.errors import InputError
 from hil.files.date_stamps import is_date
 from hil.files.input_file import lines_of
@@ -21,6 +19,7 @@ SAMPLE_LINES = 400  # from the beginning, more than any preamble, and as many fr
 MOST_LINES = 200_000  # read for the draft: minutes of a recording
 _DELIMITERS = (";", "\t", ",", "|", " ")
 _LEAST_SHARE = 0.3  # of fields with numbers or dates
+_PAIRED = 0.1  # share of the rows that all channels of a file have, if some end before the others
 _MOSTLY = 0.5  # share of the rows in which a column of numbers has some
 _FOLLOW = 3  # rows of numbers in turn, at which they begin
 _ENCODINGS = ("utf-8", "cp1252", "cp850")  # the last one reads every byte
@@ -86,7 +85,11 @@ def _layout(path: Path, body: list[str]) -> _Layout:
     found = _Layout("", NumberForm(), ())
     for delimiter in _DELIMITERS:
         rows = [split_line(line, delimiter) for line in body]
-        width = Counter(len(row) for row in rows).most_common(1)[0][0] if rows else 0
+        widths = Counter(len(row) for row in rows)
+        width = widths.most_common(1)[0][0] if rows else 0
+        wide = max((one for one, times in widths.items() if times > _PAIRED * len(rows)), default=width)
+        if wide % 2 == 0 and wide >= width + 2:  # channels of lower rate, with their times, end before the others
+            width, rows = wide, [row for row in rows if len(row) == wide]
         if width < 2:
             continue
         whole = [["" if is_date(field) else field for field in row] for row in rows if len(row) == width]
@@ -95,10 +98,8 @@ def _layout(path: Path, body: list[str]) -> _Layout:
         # a blank counts only where nothing else separates
         score = (share - (0.01 if delimiter == " " else 0.0), width)
         if score > best:
-            told = (
-                np.mean([number_of(field, form) is not None for field in column]) for column in zip(*whole, strict=True)
-            )
-            best, found = score, _Layout(delimiter, form, tuple(bool(share > _MOSTLY) for share in told))
+            told = ([number_of(field, form) is not None for field in column] for column in zip(*whole, strict=True))
+            best, found = score, _Layout(delimiter, form, tuple(sum(one) > _MOSTLY * len(one) for one in told))
     if best[0] < _LEAST_SHARE:
         raise InputError(
             f"{path}: has no rows of numbers in two columns or more, its lines are such as {body[-1].strip()[:60]!r}; "

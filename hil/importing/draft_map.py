@@ -6,7 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
+from hil.arrays import FloatArray
 from hil.channels import CHANNELS
+from hil.errors import InputError
 from hil.files.input_file import bounded
 from hil.importing.channel_clocks import on_one_clock
 from hil.importing.channel_entries import ChannelEntries
@@ -18,7 +20,7 @@ from hil.importing.held_samples import rows_per_slowest_sample
 from hil.importing.lexicon import Quantity
 from hil.importing.map_draft import DraftedChannel, MapDraft
 from hil.importing.map_file import ChannelSource
-from hil.importing.on_change import held, written_on_change
+from hil.importing.on_change import held, written_in_turn, written_on_change
 from hil.importing.roles import find_roles
 from hil.importing.rows import at_regular_times, complete_rows, filled_in, without_duplicates
 from hil.importing.slow_gaps import moving_little, with_gaps_filled
@@ -34,14 +36,14 @@ def draft_map(path: Path, rate_hz: float | None = None, axis: str | None = None)
     table = read_table(path)
     own = on_one_clock(table, _labels(table))
     table = own.table
-    on_change = [name for name, values in table.columns.items() if written_on_change(values)]
+    on_change = [name for name, values in table.columns.items() if written_on_change(values) or written_in_turn(values)]
     filled_up = {name: held(table.columns[name]) for name in on_change}
     distinct = without_duplicates(table.columns | filled_up)
     lines = table.lines[distinct.rows] if table.lines is not None else None
     table = replace(table, columns=distinct.columns, lines=lines)
     labels = _labels(table)
     clock = find_clock(table, labels, rate_hz)
-    columns = {name: values for name, values in table.columns.items() if name not in clock.columns}
+    columns = {name: _scaled(table, name) for name in table.columns if name not in clock.columns}
     may_wrap = [name for name in columns if labels[name].quantity in (Quantity.POSITION, Quantity.UNKNOWN)]
     wraps = {name: size for name in may_wrap if (size := wrap_range(columns[name])) is not None}
     columns |= {name: unwrapped(columns[name], size) for name, size in wraps.items()}
@@ -50,7 +52,8 @@ def draft_map(path: Path, rate_hz: float | None = None, axis: str | None = None)
     dense = filled | {"time_s": clock.time_s}
     dense = with_gaps_filled(dense)[0] if moving_little(dense, named) else dense
     regular = at_regular_times(path, {name: dense[name] for name in filled}, dense["time_s"])
-    roles = find_roles(str(path), regular.longest_part(), labels, regular.period_s, axis)
+    roles = find_roles(str(path), regular.longest_part(), labels, regular.period_s, axis, table.constants)
+    _refuse_same_name(table, roles.used)
     used = {name: columns[name] for name in roles.used}
     refuse_missing(table, used)
     # only now it is known which columns must be complete, and which repeat when a sample does
@@ -101,7 +104,7 @@ def draft_map(path: Path, rate_hz: float | None = None, axis: str | None = None)
     for one in draft.channels:
         entry, column = one.entry, str(one.entry["column"])
         _with_scale(one, table, draft.lead_m)
-        entry |= {"time": own.times[column].model_dump(exclude_none=True)} if column in own.times else {}
+        entry |= {"time": own.times[column].model_dump(exclude_defaults=True)} if column in own.times else {}
         entry |= {"wraps_at": wraps[column] / table.scales.get(column, (1.0, 0.0))[0]} if column in wraps else {}
         entry |= {"empty": "hold"} if column in on_change else {}
     return draft
@@ -113,6 +116,12 @@ def _labels(table: ForeignTable) -> dict[str, Label]:
     return {name: replace(label(table.titles.get(name, name), *of), column=name) for name, of in told.items()}
 
 
+def _scaled(table: ForeignTable, name: str) -> FloatArray:
+    """A column (n,) with the factor and offset that the file gives for it."""
+    factor, offset = table.scales.get(name, (1.0, 0.0))
+    return factor * table.columns[name] + offset
+
+
 def _with_scale(one: DraftedChannel, table: ForeignTable, lead_m: float | None) -> None:
     """Add factor and offset that the file gives for a column."""
     factor, offset = table.scales.get(str(one.entry["column"]), (1.0, 0.0))
@@ -121,6 +130,16 @@ def _with_scale(one: DraftedChannel, table: ForeignTable, lead_m: float | None) 
         one.entry["offset"] = offset * (in_si or 0.0)
     if factor != 1.0:
         one.entry["scale"] = float(str(one.entry.get("scale", 1.0))) * factor
+
+
+def _refuse_same_name(table: ForeignTable, used: Collection[str]) -> None:
+    titles = [table.titles.get(name, name) for name in used]
+    twice = next((title for title in titles if titles.count(title) > 1), None)
+    if twice is not None:
+        raise InputError(
+            f"{table.path}: {twice!r} names two columns of the header that may both be used, allowed one; say which "
+            "by a map with csv.column_names: hil import FILE --map MAP.yaml"
+        )
 
 
 def _scale_notes(table: ForeignTable, used: Collection[str]) -> list[str]:

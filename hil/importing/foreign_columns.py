@@ -23,7 +23,7 @@ from hil.importing.variables import TEXT_ENDINGS, VARIABLE_ENDINGS, load_variabl
 from hil.recording.arrow_files import numbers, read_parquet
 
 FEW_MISSING = 0.05  # share of rows without a value: more is a channel of another rate, or a damaged file
-_ENDINGS = (".csv", *VARIABLE_ENDINGS, ".parquet", ".json", *TEXT_ENDINGS[1:])
+_ENDINGS = (".csv", ".mat", ".parquet", ".json", *VARIABLE_ENDINGS[1:], *TEXT_ENDINGS[1:])
 
 
 @dataclass(frozen=True)
@@ -175,11 +175,11 @@ def _check(
     given: Callable[[int, str], str],
     share: float,
 ) -> None:
-    first, *others = columns.items()
-    for name, values in others:
-        if values.size != first[1].size:
+    first = next(iter(columns), "")
+    for name, values in columns.items():
+        if values.size != columns[first].size:
             raise InputError(
-                f"{path}: {name}: given {values.size} rows, {first[0]} has {first[1].size}; "
+                f"{path}: {name}: given {values.size} rows, {first} has {columns[first].size}; "
                 "all columns must be equally long"
             )
     for name, values in columns.items():

@@ -33,7 +33,7 @@ class ForeignTable:
     `constants` are what lines above the numbers, or scalars, give by a name that is known. `dates` are columns of dates
     or times of day, in seconds; `texts` is the first text among the numbers of a column, `words` what lines above say
     of it, `titles` its text in the file where the column has another name. `scales` are factor and offset that the file
-    gives and the columns have. `notes` say what of the file is left out, `lines` (n,) are those of the rows.
+    gives for a column. `notes` say what of the file is left out, `lines` (n,) are those of the rows.
     """
 
     path: Path
@@ -80,8 +80,7 @@ def _text(path: Path) -> ForeignTable:
     read = rows.numbers | rows.dates
     for name, values in ((name, read[name]) for name in header.names):
         if np.isfinite(values).mean() > LEAST_NUMBERS:
-            factor, offset = header.scales.get(name, (1.0, 0.0))
-            columns[name] = factor * values + offset
+            columns[name] = values
         elif name in rows.texts:
             remarks.append(f"{name}: text such as {rows.texts[name].text!r}, no numbers")
     titles = {name: header.titles.get(name, name) for name in header.names}

@@ -15,6 +15,8 @@ from hil.importing.units import unit_of_text
 
 COMMENT = re.compile(r"^\s*(#|%|//)+\s?")
 _UNIT = re.compile(r"[\[(]?\s*[a-zA-Zµμ°%‰Ω·/^*\d. _-]{0,14}\s*[\])]?(\s*\(\w*\))?")
+NAMELESS = "column "  # beginning of the name of a column over which nothing stands
+_WORD = re.compile(r"[^\W\d]")
 _NEAR = 4  # lines above the numbers whose text may be that of the columns, where they have none else
 
 
@@ -125,7 +127,7 @@ def _kind(fields: Sequence[str], form: NumberForm) -> RowKind:
     units = sum(unit_of_text(one) is not None or one in ("-", "[-]", "[]") for one in named)
     if all(_UNIT.fullmatch(one) for one in named) and units >= max(1, len(named) / 2):
         return RowKind.UNITS
-    return RowKind.TEXT
+    return RowKind.TEXT if sum(bool(_WORD.search(one)) for one in named) > len(named) / 2 else RowKind.UNKNOWN
 
 
 def _names(texts: Sequence[Row]) -> Row | None:
@@ -149,7 +151,7 @@ def _titles(named: Row | None, texts: Sequence[Row], names: Sequence[str]) -> di
 def _title(named: Row, texts: Sequence[Row], index: int) -> str:
     """Text over a column: of the row of names if it has letters there, else of another row."""
     fields = [named.fields[index], *(row.fields[index] for row in texts)]
-    return next((one for one in fields if re.search(r"[^\W\d]", one)), fields[0])
+    return next((one for one in fields if _WORD.search(one)), fields[0])
 
 
 def _different(named: Row | None, texts: Sequence[Row], width: int) -> tuple[str, ...]:
@@ -158,7 +160,7 @@ def _different(named: Row | None, texts: Sequence[Row], width: int) -> tuple[str
     pairs = named is not None and width % 2 == 0 and not any(named.fields[::2]) and all(named.fields[1::2])
     for index in range(width):
         title = _title(named, texts, index) if named else ""
-        name = title or (f"time{index // 2 + 1}" if pairs else f"column {index + 1}")
+        name = title or (f"time{index // 2 + 1}" if pairs else f"{NAMELESS}{index + 1}")
         times = 1 + sum(one == name or one.rpartition(" (")[0] == name for one in names)
         names.append(name if times == 1 else f"{name} ({times})")
     return tuple(names)

@@ -110,6 +110,7 @@ class Lexicon(_Entry):
     measured: Words
     motor: Words
     table: Words
+    part: Words
     attached_after: Words
     attached_before: Words
     electric: dict[Literal["A", "V"], Words]
@@ -152,7 +153,7 @@ class Lexicon(_Entry):
 def plain_spelling(unit: str) -> str:
     """Text of a unit in lower case, without blanks, multiplication signs and points, with plain digits."""
     key = unicodedata.normalize("NFKC", unit).strip().lower().replace("μ", "µ")
-    return re.sub(r"[\s·*⋅.]+", "", key)
+    return re.sub(r"/se[ck]\b", "/s", re.sub(r"[\s·*⋅.]+", "", key))
 
 
 @cache

@@ -60,7 +60,13 @@ class TimeColumn(_Strict):
     unit: Literal["s", "ms", "us", "100 ns", "ns", "min", "d", "date"] = Field(
         description="of the stamps; d: days, date: text such as 2024-03-01 12:00:00.001 or 12:00:00.001"
     )
+    scale: PositiveFloat = Field(default=1.0, description="factor beside the unit")
     fraction: Self | None = Field(default=None, description="column of the part of a second, added to this one")
+
+    @property
+    def seconds(self) -> float:
+        """Seconds for 1 in the column."""
+        return self.scale * SECONDS[self.unit]
 
 
 class ChannelSource(_Strict):

@@ -1,5 +1,6 @@
 """Assign columns to roles (motor, table, set-points, torque): by their names, else by relations between the columns."""
 
+from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -8,10 +9,10 @@ from hil.arrays import FloatArray
 from hil.errors import InputError
 from hil.identification.derivatives import MeasuredMotion, motion, smoothed
 from hil.importing.column_names import Label
-from hil.importing.computed_position import computed_one
-from hil.importing.lexicon import Quantity
+from hil.importing.computed_position import computed_one, unanswered_one
+from hil.importing.effort_roles import better_speed, choose_efforts
+from hil.importing.lexicon import Constant, Quantity
 from hil.importing.relations import derivative_of, driven, noise, proportional, roughness
-from hil.quantities import UNITS
 
 SAME_POSITION = 0.98  # share from which a column is another reading of a position: following errors are below 5 %
 FOLLOWED = 0.5  # share of a set-point that a controlled motion follows: less is another axis or no loop
@@ -19,7 +20,6 @@ IS_DERIVATIVE = 0.9  # share from which a column is the velocity of another: cou
 IS_DRIVEN = 0.4  # share of an unnamed effort that one mass with friction explains: gravity and springs may be more
 SAME_COLUMN = 1e-6  # of the travel: a copy in another unit deviates by printed digits, a second sensor by more
 SMOOTH = 0.3  # roughness of a motion; rows without order have 1.4
-_UNIT_RANK = ("N m", "N", "A", "mA", "%", "permille", None, "V", "mV")  # torques and forces by their SI unit
 
 
 @dataclass
@@ -47,11 +47,17 @@ class Roles:
 
 
 def find_roles(
-    where: str, columns: dict[str, FloatArray], labels: dict[str, Label], period_s: float, axis: str | None
+    where: str,
+    columns: dict[str, FloatArray],
+    labels: dict[str, Label],
+    period_s: float,
+    axis: str | None,
+    constants: Collection[Constant] = (),
 ) -> Roles:
     """Find the columns of one axis among `columns` (n,) without the clock, finite, on a regular clock.
 
-    `axis` is the number of the axis in the names. Raises InputError: no motion, columns interchanged.
+    `axis` is the number of the axis in the names; the file gives `constants`. Raises InputError: no motion, columns
+    interchanged.
     """
     roles = Roles()
     labels = _of_one_axis(where, dict(labels), columns, roles, axis)
@@ -63,10 +69,26 @@ def find_roles(
     of = {kind: [name for name in live if labels[name].quantity is kind] for kind in Quantity}
     for name in of[Quantity.OTHER] + of[Quantity.ACCELERATION]:
         roles.left_out.setdefault(name, f"{labels[name].quantity} by its name, not needed")
-    _positions(live, labels, of[Quantity.POSITION], bool(of[Quantity.EFFORT]), roles)
+    _positions(live, labels, of[Quantity.POSITION], bool(of[Quantity.EFFORT]), roles, period_s)
     moved = motion(live[roles.motor], period_s) if roles.motor else None
+    speeds = {name: live[name] for name in of[Quantity.VELOCITY] if not labels[name].command}
+    speed = better_speed(speeds, [live[name] for name in of[Quantity.EFFORT]], moved, period_s) if moved else None
+    if speed is not None:
+        roles.unsure.append(
+            f"{roles.motor}: its derivative is not {speed}, with which inertia and friction explain the torque better; "
+            f"{speed} is taken for the motion"
+        )
+        for name in of[Quantity.POSITION]:
+            roles.left_out[name] = f"no position whose derivative is {speed}"
+        roles.motor = roles.table = roles.command = roles.unfollowed = moved = None
     _velocities(where, live, labels, of[Quantity.VELOCITY], moved, period_s, roles)
-    _efforts(live, labels, of[Quantity.EFFORT], roles)
+    if moved is None and roles.motor_velocity:
+        moved = motion(np.cumsum(live[roles.motor_velocity]) * period_s, period_s)
+    if moved is not None:
+        found = choose_efforts(live, labels, of[Quantity.EFFORT], moved, period_s, constants)
+        roles.effort, roles.effort_command = found.measured, found.command
+        roles.left_out |= found.left_out
+        roles.unsure += found.unsure
     if roles.motor is None and roles.motor_velocity is None:
         told = f"; constant are {', '.join(frozen)}" if frozen else ""
         raise InputError(
@@ -171,7 +193,12 @@ def _accelerates(values: FloatArray, moved: MeasuredMotion, period_s: float) -> 
 
 
 def _positions(
-    live: dict[str, FloatArray], labels: dict[str, Label], names: list[str], has_effort: bool, roles: Roles
+    live: dict[str, FloatArray],
+    labels: dict[str, Label],
+    names: list[str],
+    has_effort: bool,
+    roles: Roles,
+    period_s: float,
 ) -> None:
     """Tell set-point, motor and second encoder.
 
@@ -189,6 +216,9 @@ def _positions(
     if has_effort and not commands and len(measured) > 1:
         plain = [name for name in measured if not (labels[name].motor or labels[name].table or labels[name].measured)]
         commands, why = computed_one({name: live[name] for name in measured}, plain)
+        if not commands and len(plain) == len(measured) == 2:
+            efforts = [live[name] for name in live if labels[name].quantity is Quantity.EFFORT]
+            commands, why = unanswered_one({name: live[name] for name in plain}, efforts, period_s)
         roles.unsure += [f"{name}: taken for the set-point, because {why}" for name in commands]
         measured = [name for name in measured if name not in commands]
     if not measured:
@@ -260,28 +290,3 @@ def _velocities(
             roles.unsure.append(
                 f"{name}: is the derivative of {roles.motor} only in part (share {share:.2f}): filtered or late"
             )
-
-
-def _efforts(live: dict[str, FloatArray], labels: dict[str, Label], names: list[str], roles: Roles) -> None:
-    """Tell commanded and measured effort; of several the one at the motor, in the unit nearest to torque."""
-
-    def rank(name: str) -> tuple[bool, int]:
-        si = UNITS.get(unit := labels[name].unit or labels[name].electric or "", (unit,))[0]
-        return labels[name].table, _UNIT_RANK.index(si if si in _UNIT_RANK else None)
-
-    voltage = [name for name in names if (labels[name].unit or labels[name].electric) in _UNIT_RANK[-2:]]
-    commands = [name for name in names if labels[name].command or name in voltage]
-    measured = [name for name in names if name not in commands]
-    commands = [name for name in commands if name not in voltage] or commands
-    roles.effort = min(measured, key=rank, default=None)
-    roles.effort_command = min(commands, key=rank, default=None)
-    if roles.effort and roles.effort_command:
-        one, other = labels[roles.effort], labels[roles.effort_command]
-        if (one.unit or one.electric) != (other.unit or other.electric):
-            roles.left_out[roles.effort_command] = f"in another unit than {roles.effort}"
-            roles.effort_command = None
-        elif len(measured) > 1 and not one.measured:
-            roles.unsure.append(f"{roles.effort}: taken for the measured torque")
-    for name in names:
-        if name not in (roles.effort, roles.effort_command):
-            roles.left_out.setdefault(name, "another torque, force, current or voltage")

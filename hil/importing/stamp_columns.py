@@ -13,12 +13,12 @@ from hil.recording.stamps import REPEATS
 SLOWEST_HZ, FASTEST_HZ = 5.0, 2e5  # of recordings of an axis: outside lies a wrong unit of the stamps
 SLOWEST_TOLD_HZ = 2.0  # with a unit in the name
 _SAME = 0.02  # relative deviation of a clock from another one of the same rows
-_BACK = 1e-3  # share of the rows at which stamps may run back: more is no clock
+_FORWARDS = 0.5  # of the way of stamps: less is no clock
 _UNEVEN = 3.0  # times the usual step, of stamps that are made of two columns
 # Seconds from the beginning of a clock's count to 1970: of Unix, of Windows (1601), of .NET (year 1).
 _EPOCHS_S = {"s": (0.0,), "ms": (0.0,), "us": (0.0,), "ns": (0.0,), "100 ns": (11644473600.0, 62135596800.0)}
 _YEAR_S = 365.25 * 86400.0
-_SINCE, _UNTIL = 20.0 * _YEAR_S, 130.0 * _YEAR_S  # 1990 to 2100
+_SINCE, _UNTIL = 30.0 * _YEAR_S, 130.0 * _YEAR_S  # 2000 to 2100
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +35,7 @@ class Stamps:
         """Stamps of one column (n,) in its unit, from 0 where they count from long ago."""
         good = stamps[np.isfinite(stamps)]
         start = float(good[0]) if good.size and time.unit != "date" else 0.0
-        seconds = (stamps - start) * SECONDS[time.unit]
+        seconds = (stamps - start) * time.seconds
         step_s = float(np.ptp(seconds[np.isfinite(seconds)])) / max(good.size - 1, 1) if good.size else 0.0
         likely = time.unit == "date" or (step_s > 0.0 and SLOWEST_TOLD_HZ <= 1.0 / step_s <= FASTEST_HZ)
         return cls(time, seconds, start, sure and likely)
@@ -57,9 +57,9 @@ class Stamps:
 
 
 def growing(stamps: FloatArray) -> bool:
-    """True for stamps (n,) that hardly ever run back, and are not all equal."""
+    """True for stamps (n,) that go forwards for most of their way; a fraction of a second begins again and again."""
     steps = np.diff(stamps[np.isfinite(stamps)])
-    return bool(steps.size and np.mean(steps < 0.0) <= _BACK and steps.any())
+    return bool(steps.sum() > _FORWARDS * np.abs(steps).sum())
 
 
 def fraction_of(coarse: Stamps, name: str, values: FloatArray, told: Label) -> Stamps | None:
@@ -85,7 +85,7 @@ def unit_of_stamps(
     stamps: Stamps, told: Label, known: list[Stamps], rate: tuple[float, str] | None
 ) -> tuple[Stamps, str]:
     """Stamps in the unit that another clock of the file, their age, or else their step tells, and a note if guessed."""
-    raw = stamps.seconds / SECONDS[stamps.time.unit]
+    raw = stamps.seconds / stamps.time.seconds
     steps = np.diff(raw)
     forward = steps[steps > 0.0]
     few_digits = np.mean(steps == 0.0) > REPEATS
@@ -93,7 +93,7 @@ def unit_of_stamps(
     step = float(forward.sum() / steps.size if few_digits else np.median(forward)) if forward.size else 1.0
 
     def in_unit(unit: str) -> Stamps:
-        time = stamps.time.model_copy(update={"unit": unit})
+        time = stamps.time.model_copy(update={"unit": unit, "scale": 1.0})
         return replace(stamps, time=time, seconds=raw * SECONDS[unit], sure=True)
 
     units = [unit for unit in SECONDS if unit != "date"]

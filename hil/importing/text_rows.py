@@ -5,6 +5,7 @@ left out, and said. Any other line that is no row is damaged.
 """
 
 import csv
+import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -103,8 +104,10 @@ def read_rows(path: Path, names: Sequence[str], options: CsvOptions, most: int |
 
 class _Reader:
     def __init__(self, path: Path, names: tuple[str, ...], options: CsvOptions) -> None:
-        self.path, self.names, self.encoding = path, names, options.encoding
+        self.path, self.names, self.encoding, self.delimiter = path, names, options.encoding, options.delimiter
         self.form = NumberForm(options.decimal_point, options.thousands)
+        # time beside each channel: those of lower rate end before the others
+        self.pairs = len(names) > 3 and len({re.sub(r"( \(\d+\)|\d+)$", "", name) for name in names[::2]}) == 1
         self.rows: list[list[str]] = []
         self.lines: list[int] = []
         self.parts: dict[str, list[FloatArray]] = {name: [] for name in names}
@@ -121,16 +124,13 @@ class _Reader:
             self.others.append((number, line, False))
         elif given > width and self._numbers(extra):
             self.others.append((number, line, True))
-        elif given < width and not self._in_pairs():
+        elif given < width and not self.pairs:
             self.others.append((number, line, not any(self._words(field) for field in fields)))
         else:
             self.rows.append(fields[:width] + [""] * (width - given))
             self.lines.append(number)
         if len(self.rows) == _CHUNK:
             self._convert()
-
-    def _in_pairs(self) -> bool:
-        return len(self.names) > 3 and self.names[0] == "time1"
 
     def _numbers(self, fields: Sequence[str]) -> bool:
         values, _ = numbers_of(fields, self.form)
@@ -169,7 +169,7 @@ class _Reader:
         last = int(complete[-1]) if complete.size and rows - complete[-1] <= _LONGEST else rows - 1
         kept = ~(wrong & ~told) & (np.arange(rows) <= last)
         lines = np.array(self.lines, dtype=np.int64)
-        self._refuse_cut(int(lines[last]) if rows else 0)
+        self._refuse_cut()
         texts = {
             name: Cell(int(lines[first]), self.texts[name][first])
             for name in (*numbers, *dates)
@@ -184,12 +184,13 @@ class _Reader:
             (*self._notes(others, lines[kept]), *dict.fromkeys(one.note for one in read.values() if one.note)),
         )
 
-    def _refuse_cut(self, last: int) -> None:
-        cut = next(((number, line) for number, line, damaged in self.others if damaged and number < last), None)
+    def _refuse_cut(self) -> None:
+        cut = next(((number, line) for number, line, damaged in self.others if damaged), None)
         if cut is not None:
+            fields = len(split_line(cut[1], self.delimiter))
             raise InputError(
-                f"{self.path}:{cut[0]}: given {shown(cut[1])!r}, allowed {len(self.names)} fields as in the other "
-                "rows; the row is cut or damaged: export the recording again, or import the part before it"
+                f"{self.path}:{cut[0]}: given {fields} fields, allowed {len(self.names)} as in the other rows: "
+                f"{shown(cut[1])!r}; the row is cut or damaged: export the recording again, or import the part before"
             )
 
     def _notes(self, others: list[int], lines: NDArray[np.int64]) -> tuple[str, ...]:

@@ -68,6 +68,16 @@ def unit_by_convention(effort: Label | None) -> UnitChoice | None:
     return UnitChoice("rad", f"{effort.column}: named as in a joint state of ROS; rad and N m are taken")
 
 
+def unit_of_nameless(column: str, values: FloatArray) -> UnitChoice | None:
+    """SI for a position (n,) in a file without names and units: rad, where it is too far for m; None for counts."""
+    if are_counts(values):
+        return None
+    unit = "m" if np.ptp(values) < _LONGEST_M else "rad"
+    return UnitChoice(
+        unit, f"{column}: no column has a name or a unit; SI is taken, {unit} for a travel of {np.ptp(values):.4g}"
+    )
+
+
 def position_unit(
     column: str, values: FloatArray, named: str | None, hints: list[tuple[float, str]], prefers_length: bool | None
 ) -> UnitChoice:

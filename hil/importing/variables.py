@@ -1,5 +1,5 @@
-"""Read files that hold variables by name: MATLAB .mat, NumPy .npy and .npz, ASAM MDF 4 (.mf4), XML of records, text with
-a value per line."""
+"""Read files that hold variables by name: MATLAB .mat, NumPy .npy and .npz, ASAM MDF 4 (.mf4), XML of records, text of
+one value in each line."""
 
 import zipfile
 from collections import Counter

@@ -23,6 +23,10 @@ _BLOCK = 20  # rows: deviations are dependent over a few rows, blocks are not
 _ERRORS = 3.0  # standard errors between the share and the middle of both clocks
 _LONG = 1.3  # periods: after a longer step either a row is late or rows are missing
 _REACH = 15  # rows on each side that tell the two apart: a late row does not shift those after it
+_DIGIT = 0.01  # of a digit: deviation of a step from whole digits
+_JUMPS = 5  # steps of each size from which their spread tells rounding from missing rows
+_ENDS = 200  # jumps at both ends of a part, which bound the period most closely
+_ROUNDING = 1.05  # digits over which rounded stamps spread about their ticks; the ticks themselves jitter a little
 _SPAN = 8  # steps over which the period is taken: rounded and late stamps even out
 
 
@@ -44,6 +48,15 @@ class StampShare:
         return abs(self.share - 1.0) + _ERRORS * self.error < 0.5
 
 
+@dataclass(frozen=True)
+class Rounded:
+    """Equal ticks whose stamps are rounded to `digit_s`: their period, and by how much it may be another one [s]."""
+
+    period_s: float
+    error_s: float
+    digit_s: float
+
+
 @dataclass(frozen=True, eq=False)
 class RowClock:
     """Ticks of the rows of each part from 0, their period [s], and the rms jitter of the stamps about them [s]."""
@@ -51,6 +64,7 @@ class RowClock:
     ticks: list[Ticks]
     period_s: float
     jitter_s: float
+    rounded: Rounded | None = None  # stamps that are those of the ticks but for their digits
 
     @property
     def missing(self) -> list[int]:
@@ -66,6 +80,10 @@ def row_clock(columns: Mapping[str, FloatArray], kept: list[slice], period_s: fl
     motion clearly says that rows are equal ticks, with rows missing where the stamps say so or with none missing.
     """
     stamps = [columns["time_s"][piece] for piece in kept]
+    if (rounded := rounded_ticks(stamps)) is not None:
+        numbers = [np.arange(times.size) for times in stamps]
+        if not stamp_share(columns, kept, numbers).says_stamps:
+            return RowClock(numbers, rounded.period_s, _jitter_s(stamps, numbers), rounded), True
     whole = all(at_whole_periods(np.diff(times), period_s) for times in stamps)
     if whole:
         counts = [[np.r_[0, np.cumsum(np.round(np.diff(times) / period_s))].astype(np.int64) for times in stamps]]
@@ -78,6 +96,41 @@ def row_clock(columns: Mapping[str, FloatArray], kept: list[slice], period_s: fl
         if (share.says_rows and _follow(stamps, ticks)) or (whole and not share.says_stamps):
             return RowClock(ticks, slope(stamps, ticks), _jitter_s(stamps, ticks)), True
     return None, shares[0].says_stamps
+
+
+def rounded_ticks(times: list[FloatArray]) -> Rounded | None:
+    """Equal ticks without a missing row that explain the stamps of all parts by rounding alone; None if none do.
+
+    The steps then have two sizes, one digit apart, evenly spread. Each pair of rows bounds the period by a digit over
+    the rows between them.
+    """
+    steps = np.concatenate([np.diff(one) for one in times])
+    small, large = float(steps.min()), float(steps.max())
+    digit = large - small
+    if digit <= 0.0 or np.any(np.minimum(steps - small, large - steps) > _DIGIT * digit):
+        return None
+    whole = small / digit
+    jumps = int(np.sum(steps > small + 0.5 * digit))
+    if abs(whole - round(whole)) > _DIGIT * max(whole, 1.0) or min(jumps, steps.size - jumps) < _JUMPS:
+        return None
+    low, high = 0.0, np.inf
+    for one in times:
+        rows = np.flatnonzero(np.diff(one) > small + 0.5 * digit)
+        rows = np.r_[rows[:_ENDS], rows[_ENDS:][-_ENDS:]]
+        last, first = rows, rows + 1  # of a digit, and of the next one
+        for begin, end, more in ((last, first, -digit), (first, last, digit)):
+            span = end[None, :] - begin[:, None]
+            period = (one[end][None, :] - one[begin][:, None] + more) / np.maximum(span, 1)
+            bounds = period[span > 0]
+            if bounds.size and more < 0.0:
+                low = max(low, float(bounds.max()))
+            elif bounds.size:
+                high = min(high, float(bounds.min()))
+    if not np.isfinite(high):
+        return None
+    period_s = 0.5 * (low + high)
+    off = max(float(np.ptp(one - period_s * np.arange(one.size))) for one in times)
+    return Rounded(round(period_s, 12), 0.5 * abs(high - low), digit) if off <= _ROUNDING * digit else None
 
 
 def _follow(times: list[FloatArray], ticks: list[Ticks]) -> bool:

@@ -8,7 +8,16 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.errors import InputError
-from hil.recording.row_clock import CLOCK_TOLERANCE, RowClock, Ticks, at_whole_periods, row_clock, row_ticks, slope
+from hil.recording.row_clock import (
+    CLOCK_TOLERANCE,
+    RowClock,
+    Ticks,
+    at_whole_periods,
+    rounded_ticks,
+    row_clock,
+    row_ticks,
+    slope,
+)
 
 LARGEST = 1e12  # above every SI value of a channel, and of a clock in microseconds per day
 GAP_STEPS = 10.0  # of the clock: above, rows are missing and are not interpolated
@@ -114,8 +123,11 @@ def regular_rows(
         return _joined(parts, time_s[0], round(mean_s, 12), None, notes)
     if few_digits:
         ticks: list[Ticks] = [np.arange(piece.stop - piece.start) for piece in kept]
-        period_s = slope([time_s[piece] for piece in kept], ticks)
-        notes = (*notes, f"clock: stamps repeat (too few digits); equal steps of {period_s:.6g} s are taken")
+        times = [time_s[piece] for piece in kept]
+        rounded = rounded_ticks(times)
+        period_s = rounded.period_s if rounded else slope(times, ticks)
+        error = f" +- {rounded.error_s:.1g} s" if rounded else ""
+        notes = (*notes, f"clock: stamps repeat (too few digits); equal steps of {period_s:.6g} s{error} are taken")
         return _joined(_at_ticks(columns, kept, ticks, period_s), time_s[0], period_s, None, notes)
     judged = {name: columns[name] for name in judged_by or columns} | {"time_s": time_s}
     clock, told = row_clock(judged, kept, typical)
@@ -158,7 +170,12 @@ def _of_uneven(within: FloatArray, typical: float, told: bool, rate_hz: float) -
 def _of_ticks(clock: RowClock, rate_hz: float | None) -> tuple[str, ...]:
     """Notes on rows that are counted: jitter of the stamps, missing rows, and another rate that the map wants."""
     notes, missing = [], clock.missing
-    if clock.jitter_s > CLOCK_TOLERANCE * clock.period_s:
+    if clock.rounded is not None:
+        notes.append(
+            f"clock: the stamps are rounded to {span_text(clock.rounded.digit_s)}; by all of them rows are equal ticks "
+            f"of {span_text(clock.period_s)} +- {span_text(clock.rounded.error_s)}"
+        )
+    elif clock.jitter_s > CLOCK_TOLERANCE * clock.period_s:
         notes.append(
             f"clock: the stamps jitter by {span_text(clock.jitter_s)}, but the rows are equal ticks of "
             f"{span_text(clock.period_s)}: the row number is the clock"

@@ -136,7 +136,7 @@ def sinumerik_csv(path: Path) -> None:
 def camonitor(path: Path) -> None:
     """A line for each change of a process variable."""
     lines = []
-    later = np.interp(T + 4e-4, T, ANGLE)  # the variables are monitored one after the other
+    later = ANGLE + 4e-4 * SPEED  # the variables are monitored one after the other
     for k, (angle, torque) in enumerate(zip(later, TORQUE, strict=True)):
         stamp = f"2024-03-01 12:00:{k // 1000:02d}.{k % 1000:03d}"
         lines += [

@@ -191,8 +191,8 @@ DIALECTS: dict[str, tuple[str, Callable[[Path], None]]] = {
     "MR Configurator2": ("csv", mr_configurator),
     "ROS, rostopic echo -p": ("csv", rostopic),
     "ROS, PlotJuggler": ("csv", plotjuggler),
-    "JSON matrix": ("json", json_matrix),
-    "NumPy .npy, structured": ("npy", numpy_structured),
-    "NumPy .npz": ("npz", numpy_named),
+    "JSON, matrix": ("json", json_matrix),
+    "NumPy, structured .npy": ("npy", numpy_structured),
+    "NumPy, .npz": ("npz", numpy_named),
     "ASAM MDF 4": ("mf4", mdf),
 }

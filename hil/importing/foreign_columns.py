@@ -3,6 +3,7 @@
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -22,6 +23,7 @@ from hil.importing.text_rows import Cell, TextRows, header_names, line_of, read_
 from hil.importing.variables import TEXT_ENDINGS, VARIABLE_ENDINGS, load_variables
 from hil.recording.arrow_files import numbers, read_parquet
 
+LARGEST = 1e100  # of a measured number
 FEW_MISSING = 0.05  # share of rows without a value: more is a channel of another rate, or a damaged file
 _ENDINGS = (".csv", ".mat", ".parquet", ".json", *VARIABLE_ENDINGS[1:], *TEXT_ENDINGS[1:])
 
@@ -105,6 +107,7 @@ def read_foreign(
             columns = {name: content.numbers(path, name) for name in wanted}
             stamps = {name: seconds_of([str(text) for text in content.lists.get(name, [])]) for name in dates}
 
+    columns = {name: as_measured(values) for name, values in columns.items()}
     columns |= {name: held(columns[name]) for name in on_change}
 
     def place(row: int) -> str:
@@ -153,6 +156,13 @@ def _chosen(
                 "leave the column out of the map, or import the part of the file before it"
             )
     return {name: rows.numbers[name] for name in wanted}, {name: rows.dates[name] for name in dates}
+
+
+def as_measured(values: NDArray[Any]) -> FloatArray:
+    """Numbers of any type as float64; NaN for one that no sensor gives and whose square has no value."""
+    with np.errstate(invalid="ignore"):  # a damaged number of 4 bytes
+        numbers = values.astype(np.float64)
+        return np.where(np.isfinite(numbers) & (np.abs(numbers) > LARGEST), np.nan, numbers)
 
 
 def parquet_dates(path: Path, name: str) -> FloatArray:

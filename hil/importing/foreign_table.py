@@ -13,7 +13,7 @@ from hil.errors import InputError
 from hil.files import json_columns
 from hil.files.date_stamps import is_date, seconds_of
 from hil.importing.csv_dialect import MOST_LINES, find_dialect
-from hil.importing.foreign_columns import check_foreign, format_of, parquet_dates
+from hil.importing.foreign_columns import as_measured, check_foreign, format_of, parquet_dates
 from hil.importing.header_values import HeaderValue, header_values
 from hil.importing.lexicon import Constant
 from hil.importing.map_file import CsvOptions
@@ -62,7 +62,8 @@ def read_table(path: Path) -> ForeignTable:
     if path.stat().st_size == 0:
         raise InputError(f"{path}: the file is empty; give a file with rows of numbers")
     readers = {".csv": _text, ".mat": _mat, ".parquet": _parquet, ".json": _json}
-    table = _equal_length(readers[format_of(path)](path))
+    read = readers[format_of(path)](path)
+    table = _equal_length(replace(read, columns={name: as_measured(one) for name, one in read.columns.items()}))
     rows = max((values.size for values in table.columns.values()), default=0)
     if len(table.columns) < 2 or rows < 3:
         raise InputError(
@@ -115,9 +116,9 @@ def _mat(path: Path) -> ForeignTable:
         elif values.size == 1:
             scalars[name] = float(values.reshape(-1)[0])
         elif values.size == max(values.shape):
-            columns[name] = values.reshape(-1).astype(np.float64)
+            columns[name] = values.reshape(-1)
         elif values.ndim == 2 and values.shape[1] <= WIDEST and values.shape[0] > values.shape[1]:
-            columns |= {f"{name}[{index}]": values[:, index].astype(np.float64) for index in range(values.shape[1])}
+            columns |= {f"{name}[{index}]": values[:, index] for index in range(values.shape[1])}
         else:
             others.append(name)
     remarks = [f"{name}: neither a number, a vector nor a matrix with a column per channel" for name in others]

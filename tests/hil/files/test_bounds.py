@@ -236,6 +236,6 @@ def test_ctrl_c_while_a_file_is_read_ends_without_a_trace(tmp_path: Path) -> Non
 
 def _opened(pid: int, path: Path) -> bool:
     try:
-        return any(os.readlink(one.path) == str(path) for one in os.scandir(f"/proc/{pid}/fd"))
+        return any(os.readlink(f"/proc/{pid}/fd/{one}") == str(path) for one in os.listdir(f"/proc/{pid}/fd"))
     except OSError:
         return False

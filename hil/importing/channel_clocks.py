@@ -13,7 +13,8 @@ from hil.arrays import FloatArray
 from hil.importing.clock import StampClock, clock_of, time_columns
 from hil.importing.column_names import Label
 from hil.importing.foreign_table import ForeignTable
-from hil.importing.lexicon import Quantity
+from hil.importing.header_values import HeaderValue
+from hil.importing.lexicon import Constant, Quantity
 from hil.importing.map_file import TimeColumn
 from hil.importing.stamp_columns import growing
 
@@ -34,7 +35,7 @@ def on_one_clock(table: ForeignTable, labels: dict[str, Label]) -> OwnClocks:
     groups = _groups(table, labels)
     if len(groups) < 2:
         return OwnClocks(table)
-    clocks = [_clock(table, labels, times) for times, _ in groups]
+    clocks = [_clock(table, labels, *group) for group in groups]
     if any(clock is None for clock in clocks):
         return OwnClocks(table)
     found = [clock for clock in clocks if clock is not None]
@@ -57,7 +58,9 @@ def on_one_clock(table: ForeignTable, labels: dict[str, Label]) -> OwnClocks:
         for index in others
     )
     lines = table.lines[kept] if table.lines is not None else None
-    return OwnClocks(replace(table, columns=columns, lines=lines), times, notes)
+    rate = _told(table, groups[main][1])
+    constants = table.constants | ({Constant.RATE: rate} if rate else {})
+    return OwnClocks(replace(table, columns=columns, lines=lines, constants=constants), times, notes)
 
 
 def merge(
@@ -105,11 +108,23 @@ def _groups(table: ForeignTable, labels: dict[str, Label]) -> list[tuple[list[st
     return [group for group in groups if group[1]]
 
 
-def _clock(table: ForeignTable, labels: dict[str, Label], times: list[str]) -> StampClock | None:
+def _clock(table: ForeignTable, labels: dict[str, Label], times: list[str], channels: list[str]) -> StampClock | None:
     """Clock of one group, on the rows that it has."""
+    rate = _told(table, channels)
+    told = (rate.value, rate.text) if rate else None
     stamped = np.logical_or.reduce([np.isfinite(table.columns[name]) for name in times])
     part = replace(table, columns={name: table.columns[name][stamped] for name in times}, lines=None)
-    return clock_of(part, labels, [name for name in times if growing(part.columns[name])], None)
+    return clock_of(part, labels, [name for name in times if growing(part.columns[name])], told)
+
+
+def _told(table: ForeignTable, channels: list[str]) -> HeaderValue | None:
+    """Rate of a group of channels by the header."""
+    given = [(name, table.periods_s[name]) for name in channels if name in table.periods_s]
+    return (
+        HeaderValue(1.0 / given[0][1], f"the header gives {given[0][0]} a period of {given[0][1]:g} s")
+        if given
+        else None
+    )
 
 
 def _rank(labels: dict[str, Label], channels: list[str]) -> int:

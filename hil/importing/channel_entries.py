@@ -71,8 +71,8 @@ class ChannelEntries:
         if not (roles.effort or roles.effort_command or roles.table):
             told = "".join(f"{name}: {why}; " for name, why in roles.left_out.items() if "explain" in why)
             raise InputError(
-                f"{self.draft.table.path}: {told}beside the position {roles.motor} no torque, force, current, voltage or "
-                "second encoder is found; record one, or write its column into a map: hil import FILE --map MAP.yaml"
+                f"{self.draft.table.path}: {told}beside the position {roles.motor} no torque, force, current, voltage "
+                "or second encoder is found; record one, or write its column into a map: hil import FILE --map MAP.yaml"
             )
 
     def _motion(self, column: str) -> MeasuredMotion:

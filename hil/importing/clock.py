@@ -39,9 +39,8 @@ def find_clock(table: ForeignTable, labels: dict[str, Label], rate_hz: float | N
 
     Raises InputError: no clock, or a row without a stamp.
     """
-    rows = len(next(iter(table.columns.values())))
     if rate_hz is not None:
-        return _of_rate(rows, rate_hz, "given with --rate")
+        return _of_rate(table, labels, rate_hz, "given with --rate")
     told = _written_rate(table)
     named = time_columns(table, labels)
     grow = [name for name in named or _unnamed(table, labels) if growing(table.columns[name])]
@@ -49,7 +48,7 @@ def find_clock(table: ForeignTable, labels: dict[str, Label], rate_hz: float | N
         return found
     even = [rate for name in named if (rate := _of_intervals(table, labels, name))]
     if even or told:
-        return _of_rate(rows, *(even[0] if even else told or (0.0, "")))
+        return _of_rate(table, labels, *(even[0] if even else told or (0.0, "")))
     # rows out of order make no clock of any column; they are refused by what is named one
     if found := clock_of(table, labels, named[:1], told):
         return found
@@ -145,7 +144,16 @@ def _refuse_missing(table: ForeignTable, stamps: Stamps) -> None:
         )
 
 
-def _of_rate(rows: int, rate_hz: float, how: str) -> StampClock:
+def _of_rate(table: ForeignTable, labels: dict[str, Label], rate_hz: float, how: str) -> StampClock:
+    """Clock of equal rows; a column that numbers them tells where some are missing."""
+    for name, values in table.columns.items():
+        steps = np.diff(values)
+        counts = labels[name].quantity in (Quantity.UNKNOWN, Quantity.OTHER) and bool(np.all(steps >= 1.0))
+        if counts and np.all(steps == np.round(steps)) and np.median(steps) == 1.0 and steps.max() > 1.0:
+            time = TimeColumn(column=name, unit="s", scale=1.0 / rate_hz)
+            note = f"clock: {name} numbers the rows; where it steps by more than 1, rows are missing"
+            return StampClock((values - values[0]) / rate_hz, time, None, f"numbers of the rows, {how}", (note,))
+    rows = next(iter(table.columns.values())).size
     return StampClock(np.arange(rows) / rate_hz, None, rate_hz, how)
 
 

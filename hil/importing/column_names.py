@@ -48,7 +48,8 @@ def label(column: str, unit_text: str = "", words_beside: str = "") -> Label:
     number = next((match[1] for token in reversed(tokens) if (match := re.search(r"(\d+)$", token))), "")
     # of a path the last words count: pid.x.output
     parts = [_words(plain_words(part)) for part in reversed(name.split("."))]
-    quantity, letter = next((found for part in (*parts, beside) if (found := _found(part)) != _NOTHING), _NOTHING)
+    found = sorted((_found(part) for part in (*parts, beside)), key=lambda one: one[1])  # a letter says least
+    quantity, letter = next((one for one in found if one != _NOTHING), _NOTHING)
     of_unit = QUANTITY_OF_UNIT.get(unit or "")
     strange = letter and _strange(words)
     if unit == "N m" and quantity is Quantity.POSITION and not strange and not _any(words, ("moment",)):

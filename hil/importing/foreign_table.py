@@ -33,7 +33,8 @@ class ForeignTable:
     `constants` are what lines above the numbers, or scalars, give by a name that is known. `dates` are columns of dates
     or times of day, in seconds; `texts` is the first text among the numbers of a column, `words` what lines above say
     of it, `titles` its text in the file where the column has another name. `scales` are factor and offset that the file
-    gives for a column. `notes` say what of the file is left out, `lines` (n,) are those of the rows.
+    gives for a column, `periods_s` the periods of its rows. `notes` say what is left out; `lines` (n,) are those of the
+    rows.
     """
 
     path: Path
@@ -48,6 +49,7 @@ class ForeignTable:
     words: dict[str, str] = field(default_factory=dict)
     titles: dict[str, str] = field(default_factory=dict)
     scales: dict[str, tuple[float, float]] = field(default_factory=dict)
+    periods_s: dict[str, float] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     lines: NDArray[np.int64] | None = None
 
@@ -101,6 +103,7 @@ def _text(path: Path) -> ForeignTable:
         words=words,
         titles=header.titles,
         scales=header.scales,
+        periods_s=header.periods_s,
         notes=(*header.notes, *rows.notes),
         lines=rows.lines,
     )

@@ -9,13 +9,15 @@ from dataclasses import dataclass, field
 
 from hil.importing.column_names import label, plain_words
 from hil.importing.lexicon import RowKind, lexicon
+from hil.importing.map_file import SECONDS
 from hil.importing.number_form import NumberForm, number_of
 from hil.importing.text_rows import shown, split_line
-from hil.importing.units import unit_of_text
+from hil.importing.units import unit_named, unit_of_text
 
 COMMENT = re.compile(r"^\s*(#|%|//)+\s?")
 _UNIT = re.compile(r"[\[(]?\s*[a-zA-Zµμ°%‰Ω·/^*\d. _-]{0,14}\s*[\])]?(\s*\(\w*\))?")
 NAMELESS = "column "  # beginning of the name of a column over which nothing stands
+_BRACKET = re.compile(r"[\[(](.*?)[\])]")
 _WORD = re.compile(r"[^\W\d]")
 _NEAR = 4  # lines above the numbers whose text may be that of the columns, where they have none else
 
@@ -28,6 +30,12 @@ class Row:
     text: str
     kind: RowKind
     fields: tuple[str, ...]
+    whole: bool
+
+    @property
+    def sure(self) -> int:
+        """Number of different fields that say a quantity."""
+        return len({one for one in self.fields if one and label(one).sure})
 
 
 @dataclass
@@ -35,7 +43,8 @@ class Header:
     """What stands above the columns.
 
     `names` are different for each column; `titles` the text of the file for a column with another name. `scales` are
-    factor and offset with which a column becomes a value in its unit. `line` is the row that alone gives the names.
+    factor and offset with which a column becomes a value in its unit, `periods_s` the periods of its rows. `line` is
+    the row that alone gives the names.
     """
 
     names: tuple[str, ...]
@@ -43,6 +52,7 @@ class Header:
     units: dict[str, str] = field(default_factory=dict)
     words: dict[str, str] = field(default_factory=dict)
     scales: dict[str, tuple[float, float]] = field(default_factory=dict)
+    periods_s: dict[str, float] = field(default_factory=dict)
     line: int | None = None
     notes: list[str] = field(default_factory=list)
 
@@ -50,6 +60,8 @@ class Header:
 def read_header(lines: Sequence[str], delimiter: str, width: int, form: NumberForm) -> Header:
     """Read the lines above `width` columns of numbers."""
     rows = [row for index, line in enumerate(lines) if (row := _row(index, line, delimiter, width, form)) is not None]
+    # a row that is one field short counts where no other one tells what the columns are
+    rows = [row for row in rows if row.whole] if any(row.whole and row.sure for row in rows) else rows
     texts = [row for row in rows if row.kind in (RowKind.NAMES, RowKind.TEXT)]
     named = _names(texts)
     if named is None:
@@ -68,7 +80,12 @@ def read_header(lines: Sequence[str], delimiter: str, width: int, form: NumberFo
                 header.units = given
             case RowKind.SCALE | RowKind.OFFSET:
                 _add_scale(header, row.kind, given, form)
-            case RowKind.TYPES | RowKind.PERIOD | RowKind.NAMES if row is not named:
+            case RowKind.PERIOD:
+                bracket = _BRACKET.search(row.text)
+                unit = SECONDS.get(unit_named(bracket[1]) or "", 0.0) if bracket else 1.0
+                told = {name: _number(text, form) or 0.0 for name, text in given.items()}
+                header.periods_s = {name: unit * value for name, value in told.items() if unit * value > 0.0}
+            case RowKind.TYPES | RowKind.NAMES if row is not named:
                 pass
             case RowKind.TEXT if row is not named:
                 header.words = {name: f"{header.words.get(name, '')} {text}".strip() for name, text in given.items()}
@@ -90,17 +107,25 @@ def _row(index: int, line: str, delimiter: str, width: int, form: NumberForm) ->
     word, colon, rest = text.partition(":")
     kind = _kind_of_label(word) if colon and delimiter not in word else None
     fields = split_line(rest if kind else text, delimiter)
-    if width > 2 and width % 2 == 0 and len(fields) == width and len(set(fields[::2])) == 1 and fields[0]:
-        kind = _kind_of_label(fields[0])  # a column of time beside each channel
+    while len(fields) > width and not fields[-1]:
+        fields.pop()
+    if width > 2 and width % 2 == 0 and len(fields) == width and len({_unnumbered(one) for one in fields[::2]}) == 1:
+        kind = _kind_of_label(_unnumbered(fields[0]))  # a column of time beside each channel
         fields = [one for value in fields[1::2] for one in ("", value)]
     elif kind is None and len(fields) in (width, width + 1) and (kind := _kind_of_label(fields[0])):
         fields = ["", *fields[1:]] if len(fields) == width else fields[1:]
     elif len(fields) > width:
         fields = _regrouped(text, delimiter, width) or fields[: width + (len(fields) > width + 1)]
-    if len(fields) not in (width, width - 1) or not any(fields):
+    given = len(fields)
+    if given not in (width, width - 1) or not any(fields):
         return None
     fields += [""] * (width - len(fields))
-    return Row(index, line, kind or _kind(fields, form), tuple(fields))
+    return Row(index, line, kind or _kind(fields, form), tuple(fields), given == width)
+
+
+def _unnumbered(label: str) -> str:
+    """A label without its number, or a text of its own where there is none: 0.Name -> Name."""
+    return re.sub(r"[\d.]+", "", label)
 
 
 def _regrouped(text: str, delimiter: str, width: int) -> list[str]:
@@ -135,9 +160,8 @@ def _names(texts: Sequence[Row]) -> Row | None:
     told = next((row for row in texts if row.kind is RowKind.NAMES), None)
     if told or not texts:
         return told
-    sure = {row.line: sum(label(one).sure for one in row.fields if one) for row in texts}
-    best = max(sure.values())
-    return next(row for row in (texts if best else reversed(texts)) if sure[row.line] == best)
+    best = max(row.sure for row in texts)
+    return next(row for row in (texts if best else reversed(texts)) if row.sure == best)
 
 
 def _titles(named: Row | None, texts: Sequence[Row], names: Sequence[str]) -> dict[str, str]:
@@ -166,10 +190,14 @@ def _different(named: Row | None, texts: Sequence[Row], width: int) -> tuple[str
     return tuple(names)
 
 
+def _number(text: str, form: NumberForm) -> float | None:
+    """Number of a header, which another part of the program wrote than the rows: with either decimal mark."""
+    return next((one for mark in (form.decimal, ".", ",") if (one := number_of(text, NumberForm(mark)))), None)
+
+
 def _add_scale(header: Header, kind: RowKind, given: dict[str, str], form: NumberForm) -> None:
     for name, text in given.items():
-        # a header is written by another part of the program than the numbers: both marks may stand there
-        value = next((one for mark in (form.decimal, ".", ",") if (one := number_of(text, NumberForm(mark)))), None)
+        value = _number(text, form)
         if value is not None:
             factor, offset = header.scales.get(name, (1.0, 0.0))
             header.scales[name] = (value, offset) if kind is RowKind.SCALE else (factor, value)

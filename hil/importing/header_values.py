@@ -29,7 +29,7 @@ _TEXT_OF_NAME = re.compile(r"[^a-z0-9/:]+")
 def header_values(lines: Iterable[str], scalars: Mapping[str, float]) -> dict[Constant, HeaderValue]:
     """Constants of header `lines` and `scalars`. One that is given twice with different values is left out."""
     texts = [text for line in lines for text in dict.fromkeys([line, *re.split(r"[;,|]\s", line)])]
-    given = [(*_readings(match), text) for text in texts if (match := _split(text))]
+    given = [(*reading, text) for text in texts if (match := _split(text)) for reading in _readings(match)]
     for name, scalar in scalars.items():
         words, unit = _unit_of_name(name)
         given.append((words, scalar, [unit], f"{name} = {scalar:g}"))
@@ -46,16 +46,23 @@ def _split(line: str) -> re.Match[str] | None:
     return match if match and re.search("[a-z]", match["name"]) else None
 
 
-def _readings(match: re.Match[str]) -> tuple[str, float | None, list[str]]:
+def _readings(match: re.Match[str]) -> list[tuple[str, float | None, list[str]]]:
     """Words of a line, its number, and the texts that may be its unit.
 
-    They are in brackets after the words, or after the number: all up to a bracket or a comma, or its first words.
+    They are in brackets after the words, or after the number: all up to a bracket or a comma, or its first words; or
+    the words end with it: cycle_time_us.
     """
     value, bracket = _number(match["number"]), _BRACKET.search(match["name"])
+    each = [field.strip() for field in re.split(r"[\t;|]", match["rest"])[1:]]
+    if any(_number(field) not in (None, value) for field in each if re.fullmatch(r"[\d.,]+", field)):
+        return []  # another value for each channel
     if bracket:
-        return _plain(match["name"][: bracket.start()]), value, [_SIGNS.sub("", bracket[1])]
-    words = re.split(r"[\])};,]", match["rest"].strip(' \t;,[("'))[0].split()
-    return _plain(match["name"]), value, [_SIGNS.sub("", "".join(words[:take])) for take in (None, 3, 2, 1)]
+        return [(_plain(match["name"][: bracket.start()]), value, [_SIGNS.sub("", bracket[1])])]
+    repeated = set(re.split(r"[\s;,|]+", match["rest"].strip(" \t;,|"))) == {match["number"]}  # for each channel
+    words = [] if repeated else re.split(r"[\])};,]", match["rest"].strip(' \t;,[("'))[0].split()
+    behind = [_SIGNS.sub("", "".join(words[:take])) for take in (None, 3, 2, 1)]
+    name, unit = _unit_of_name(match["name"])
+    return [(name, value, [unit])] if unit and not words else [(_plain(match["name"]), value, behind)]
 
 
 def _constant(name: str, value: float | None, unit: str) -> tuple[Constant, float] | None:

@@ -9,7 +9,6 @@ _DIFFER = 0.99  # share of the written values that differ from the one before
 # Share of the change over the empty cells that lost rows of a motion would bring: all of it, and a value that holds one
 # row of all.
 _LOST = 0.75
-_SEVERAL = 50  # written values that tell a rate
 _FEW = 3  # empty places before two written values, and written values: fewer tell nothing
 
 
@@ -27,12 +26,6 @@ def written_on_change(values: FloatArray) -> bool:
     if places.size < _FEW or np.mean(change > 0.0) < _DIFFER:
         return False
     return bool(change[places].sum() < _LOST * (rows[places] * change[places + 1]).sum())
-
-
-def written_in_turn(values: FloatArray) -> bool:
-    """True if a column (n,) has a value in every k-th row alone: it has another rate than the rows."""
-    steps = np.diff(np.flatnonzero(np.isfinite(values)))
-    return bool(steps.size > _SEVERAL and steps.min() > 1 and np.ptp(steps) == 0)
 
 
 def held(values: FloatArray) -> FloatArray:

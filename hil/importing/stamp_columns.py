@@ -107,6 +107,10 @@ def unit_of_stamps(
     for unit, starts in _EPOCHS_S.items():
         if any(_SINCE < stamps.first * SECONDS[unit] - start < _UNTIL for start in starts) and _is_rate(step, unit):
             return in_unit(unit), ""
+    if rate is not None and told.unit is None:
+        scaled = TimeColumn(column=stamps.time.column, unit="s", scale=1.0 / (rate[0] * step))
+        note = f"clock: the unit of {told.column!r} is not given; {rate[1]}, so that a step of {step:g} is one period"
+        return replace(stamps, time=scaled, seconds=raw * scaled.scale, sure=True), note
     unit, note = unit_by_step(told, step)
     return in_unit(unit), note
 

@@ -41,14 +41,24 @@ def test_a_speed_set_point_without_it_is_the_velocity_of_the_set_point(tmp_path:
     assert channels(draft_map(write(tmp_path / "log.csv", columns)))["velocity_command_m_s"]
 
 
-@pytest.mark.parametrize(("factor", "unit"), [(1.0, "mm/s"), (0.06, "m/min"), (1.175, None), (900.0, None)])
+@pytest.mark.parametrize(("factor", "unit"), [(1.0, "mm/s"), (0.06, "m/min")])
 @pytest.mark.parametrize("name", ["v_set", "speed_command_raw"])
-def test_a_speed_whose_scale_is_no_unit_is_left_out(tmp_path: Path, factor: float, unit: str | None, name: str) -> None:
+def test_the_unit_of_a_speed_follows_from_the_set_point(tmp_path: Path, factor: float, unit: str, name: str) -> None:
     columns = renamed(AXIS | {"v": factor * np.gradient(AXIS["x_set"], AXIS["t"])}, **NAMES, v=name)
     draft = draft_map(write(tmp_path / "log.csv", columns))
-    assert channels(draft).get("velocity_command_m_s", {}).get("unit") == unit
-    assert (name in draft.left_out) == (unit is None)
-    assert any("which no unit of a speed explains" in note for note in draft.unsure) == (unit is None)
+    assert channels(draft)["velocity_command_m_s"]["unit"] == unit
+    assert name not in draft.left_out
+
+
+@pytest.mark.parametrize("factor", [1.175, 900.0])
+@pytest.mark.parametrize("name", ["v_set", "speed_command_raw"])
+def test_a_speed_whose_scale_is_no_unit_gets_that_to_the_set_point(tmp_path: Path, factor: float, name: str) -> None:
+    columns = renamed(AXIS | {"v": factor * np.gradient(AXIS["x_set"], AXIS["t"])}, **NAMES, v=name)
+    draft = draft_map(write(tmp_path / "log.csv", columns))
+    entry = channels(draft)["velocity_command_m_s"]
+    assert entry["unit"] == "m/s"
+    assert entry["scale"] == pytest.approx(1e-3 / factor, rel=1e-3)
+    assert any("is its scale to the derivative of" in note for note in draft.unsure)
 
 
 def test_a_speed_that_contradicts_its_own_unit_is_left_out(tmp_path: Path) -> None:

@@ -100,7 +100,8 @@ def test_names_in_three_languages_give_the_channels(tmp_path: Path, names: tuple
 def test_columns_without_telling_names_are_told_by_their_relations(tmp_path: Path) -> None:
     columns = renamed(AXIS, t="c1", x_act="c2", torque="c3")
     draft = draft_map(write(tmp_path / "log.csv", columns))
-    assert draft.clock.time and draft.clock.time.column == "c1"
+    assert draft.clock.time
+    assert draft.clock.time.column == "c1"
     assert channels(draft)["motor_position_m"]["column"] == "c2"
     assert channels(draft)["force_n"]["column"] == "c3"
     assert len([note for note in draft.unsure if "its name says nothing" in note]) == 2
@@ -233,7 +234,8 @@ def test_a_rate_is_taken_from_a_comment_or_the_user(tmp_path: Path) -> None:
 
 def test_a_wrong_unit_of_the_stamps_is_corrected_and_named(tmp_path: Path) -> None:
     draft = draft_map(write(tmp_path / "log.csv", renamed(AXIS, **(NAMES | {"t": "time [ms]"}))))
-    assert draft.clock.time and draft.clock.time.unit == "s"
+    assert draft.clock.time
+    assert draft.clock.time.unit == "s"
     assert any("no rate of a recording" in note for note in draft.unsure)
 
 

@@ -137,6 +137,6 @@ TARGETS: Mapping[str, Callable[[random.Random, Path], None]] = {
 }
 # share of the inputs
 WEIGHTS: Mapping[str, int] = {
-    "profiles": 3, "benches": 3, "import maps, .mat": 3, "recordings": 4, "foreign recordings": 4, "EDS": 1, "SDO frames": 4,
-    "PDO, EMCY, heartbeat frames": 5, "serial frames": 3,
+    "profiles": 3, "benches": 3, "import maps, .mat": 3, "recordings": 4, "foreign recordings": 4, "EDS": 1,
+    "SDO frames": 4, "PDO, EMCY, heartbeat frames": 5, "serial frames": 3,
 }  # fmt: skip

@@ -28,6 +28,7 @@ from hil.importing.wraps import unwrapped, wrap_range
 
 
 @bounded
+@np.errstate(invalid="ignore", over="ignore")  # an infinity is refused with its row, after sums and differences
 def draft_map(path: Path, rate_hz: float | None = None, axis: str | None = None) -> MapDraft:
     """Draft the map of `path`; `rate_hz` and `axis` are what the user says beside the file.
 

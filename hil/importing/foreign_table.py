@@ -65,9 +65,7 @@ def read_table(path: Path) -> ForeignTable:
         raise InputError(f"{path}: the file is empty; give a file with rows of numbers")
     readers = {".csv": _text, ".mat": _mat, ".parquet": _parquet, ".json": _json}
     read = readers[format_of(path)](path)
-    measured = {name: as_measured(one) for name, one in read.columns.items()}
-    finite = {name: np.where(np.isfinite(one), one, np.nan) for name, one in measured.items()}
-    table = _equal_length(replace(read, columns=finite))
+    table = _equal_length(replace(read, columns={name: as_measured(one) for name, one in read.columns.items()}))
     rows = max((values.size for values in table.columns.values()), default=0)
     if len(table.columns) < 2 or rows < 3:
         raise InputError(

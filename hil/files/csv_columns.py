@@ -18,7 +18,7 @@ import pyarrow as pa
 import pyarrow.csv as pacsv
 
 from hil.arrays import FloatArray
-from hil.errors import InputError
+from hil.errors import InputError, listed
 from hil.files.input_file import check_values, lines_of
 
 Columns = dict[str, FloatArray]
@@ -136,7 +136,7 @@ def read_texts(path: Path, name: str, form: CsvFormat = PLAIN) -> list[str]:
 def _refuse_absent(path: Path, wanted: Collection[str], names: tuple[str, ...]) -> None:
     absent = [name for name in wanted if name not in names]
     if absent:
-        raise InputError(f"{path}: column {absent[0]!r} is missing; the file has {', '.join(names)}")
+        raise InputError(f"{path}: column {absent[0]!r} is missing; the file has {listed(names)}")
 
 
 def line_of_row(path: Path, row: int, form: CsvFormat = PLAIN) -> int:

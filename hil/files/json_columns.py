@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from hil.arrays import FloatArray
-from hil.errors import InputError
+from hil.errors import InputError, listed
 from hil.files.input_file import MOST_BYTES, check_file, check_values, parsing
 
 MOST_JSON_BYTES = MOST_BYTES // 10  # three characters may become an object of 72 bytes
@@ -37,7 +37,7 @@ class JsonContent:
     def numbers(self, path: Path, name: str) -> FloatArray:
         """The list `name` as numbers (n,), null as NaN. Raises InputError: no such list, or no numbers."""
         if name not in self.lists:
-            raise InputError(f"{path}: column {name!r} is missing; the file has {', '.join(self.lists)}")
+            raise InputError(f"{path}: column {name!r} is missing; the file has {listed(self.lists)}")
         for row, value in enumerate(self.lists[name]):
             if value is not None and (isinstance(value, bool) or not isinstance(value, int | float)):
                 raise InputError(

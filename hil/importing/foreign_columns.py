@@ -10,7 +10,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from hil.arrays import FloatArray
-from hil.errors import InputError
+from hil.errors import InputError, listed
 from hil.files import json_columns
 from hil.files.csv_columns import CsvFormat, line_of_row, read_whole
 from hil.files.date_stamps import seconds_of
@@ -147,7 +147,7 @@ def _chosen(
     names = (*rows.numbers, *rows.dates)
     for name in (*wanted, *dates):
         if name not in names:
-            raise InputError(f"{path}: column {name!r} is missing; the file has {', '.join(names)}")
+            raise InputError(f"{path}: column {name!r} is missing; the file has {listed(names)}")
         of_kind = name in (rows.dates if name in dates else rows.numbers)
         if name in rows.texts or not of_kind:
             line, text = rows.texts.get(name, Cell(int(rows.lines[0]), "dates" if name in rows.dates else "numbers"))

@@ -9,7 +9,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from hil.arrays import FloatArray
-from hil.errors import InputError
+from hil.errors import InputError, listed
 from hil.files import json_columns
 from hil.files.date_stamps import is_date, seconds_of
 from hil.importing.csv_dialect import MOST_LINES, find_dialect
@@ -127,7 +127,7 @@ def _mat(path: Path) -> ForeignTable:
     remarks = [f"{name}: neither a number, a vector nor a matrix with a column per channel" for name in others]
     if not columns:
         raise InputError(
-            f"{path}: holds no vector of numbers (there are {', '.join(others) or 'no variables'}), allowed a vector "
+            f"{path}: holds no vector of numbers (there are {listed(others) or 'no variables'}), allowed a vector "
             "per channel or a matrix with a column per channel; save the vectors themselves, not a structure"
         )
     return ForeignTable(path, columns, units, scalars, constants=header_values((), scalars), remarks=tuple(remarks))

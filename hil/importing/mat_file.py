@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from hil.arrays import FloatArray
-from hil.errors import InputError
+from hil.errors import InputError, listed
 from hil.importing.mat_size import check_mat_size
 
 
@@ -81,7 +81,7 @@ def mat_scalar(path: Path, variables: dict[str, Any], name: str) -> float:
 
 def _mat_variable(path: Path, variables: dict[str, Any], name: str) -> FloatArray:
     if name not in variables:
-        raise InputError(f"{path}: column {name!r} is missing; the file has {', '.join(variables)}")
+        raise InputError(f"{path}: column {name!r} is missing; the file has {listed(variables)}")
     values = np.asarray(variables[name])
     if values.dtype.kind not in "fiub":
         raise InputError(

@@ -18,7 +18,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from hil.arrays import FloatArray
-from hil.errors import InputError
+from hil.errors import InputError, listed
 from hil.files.input_file import check_file, check_values, parsing
 
 METADATA_KEY = b"hil"  # of the schema: the metadata as JSON
@@ -58,7 +58,7 @@ def read_parquet(path: Path, wanted: Collection[str]) -> pa.Table:
     texts = []
     for name in wanted:
         if name not in schema.names:
-            raise InputError(f"{path}: column {name!r} is missing; the file has {', '.join(schema.names)}")
+            raise InputError(f"{path}: column {name!r} is missing; the file has {listed(schema.names)}")
         with parsing(path, "Parquet file", _DAMAGED):
             kind = schema.field(name).type
         if pa.types.is_string(kind) or pa.types.is_large_string(kind):

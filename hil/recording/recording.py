@@ -19,7 +19,7 @@ import pyarrow.parquet as pq
 
 from hil.arrays import FloatArray
 from hil.channels import AXIS_CHANNELS, CHANNELS, AxisChannels, AxisKind
-from hil.errors import InputError
+from hil.errors import InputError, listed
 from hil.files import csv_columns
 from hil.files.input_file import bounded, check_file, is_file
 from hil.recording.arrow_files import (
@@ -81,7 +81,7 @@ class Recording:
     def __getitem__(self, channel: str) -> FloatArray:
         """The column of a channel; raises InputError, with the channels there are, if it was not recorded."""
         if channel not in self.columns:
-            raise InputError(f"{self.name}: {channel} is not recorded; the recording has {', '.join(self.columns)}")
+            raise InputError(f"{self.name}: {channel} is not recorded; the recording has {listed(self.columns)}")
         return self.columns[channel]
 
     @property
@@ -254,7 +254,7 @@ def _known(path: Path, names: tuple[str, ...]) -> list[str]:
     if missing:
         linear = " (a linear axis has motor_position_m and force_n)" if kind is AxisKind.ROTARY else ""
         raise InputError(
-            f"{path}: {', '.join(missing)} missing, given the columns {', '.join(names)}; "
+            f"{path}: {', '.join(missing)} missing, given the columns {listed(names)}; "
             f"add them{linear}, or import the file with: hil import FILE --map MAP.yaml"
         )
     return [name for name in names if name in CHANNELS]

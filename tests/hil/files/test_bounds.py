@@ -239,3 +239,10 @@ def _opened(pid: int, path: Path) -> bool:
         return any(os.readlink(f"/proc/{pid}/fd/{one}") == str(path) for one in os.listdir(f"/proc/{pid}/fd"))
     except OSError:
         return False
+
+
+def test_a_message_lists_few_of_many_names(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text(",".join(f"c{k}" for k in range(500)) + "\n")
+    ran = hil(tmp_path, "compare", "a.csv", "--bench", "reference")
+    assert ran.returncode == 2
+    assert "c18, c19 and 480 more" in ran.stderr

@@ -1,8 +1,8 @@
 """Fuzz everything that is read: `make fuzz`, or `python tests/fuzz/fuzz.py --inputs 20000 --seed 1 --jobs 2`.
 
 An input is a failure if the code that reads it raises anything but an error raised on purpose, takes more than 5 s of
-processor time, lets the process grow by more than 500 MB, or ends it. Prints a table with counts; a failure prints its seed, and
-`--only TARGET --one SEED` repeats it with its trace. Exit code 1 with failures.
+processor time, lets the process grow by more than 500 MB, or ends it. Prints a table with counts; a failure prints its
+seed, and `--only TARGET --one SEED` repeats it with its trace. Exit code 1 with failures.
 """
 
 from __future__ import annotations

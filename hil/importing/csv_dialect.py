@@ -48,6 +48,7 @@ def find_dialect(path: Path) -> CsvDialect:
     head = lines[:SAMPLE_LINES]
     spread = lines[:: max(1, len(lines) // SAMPLE_LINES)]
     body = [line for line in (*head[len(head) // 2 :], *spread[len(spread) // 10 :]) if line.strip()]
+    body = body or [line for line in head if line.strip()]  # rows above a long blank end
     layout = _layout(path, body)
     delimiter, form, width = layout.delimiter, layout.form, len(layout.read)
     first = _first_row(path, head, layout)

@@ -104,6 +104,12 @@ REFUSED: dict[str, tuple[str, str, Callable[[Path], object], str]] = {
     "a stream": ("compare", "a.arrows", _compressed_stream, "holds compressed blocks, allowed plain ones"),
     "one line": ("import", "a.csv", lambda path: path.write_text("1," * 5_000_000), ":1: given a line of 200000"),
     "one row": ("compare", "a.csv", lambda path: path.write_text("1," * 5_000_000), ":1: given a line of 200000"),
+    "blank lines": (
+        "import",
+        "a.csv",
+        lambda path: path.write_text("t,x\n" + "\n" * 1_000_000),
+        "has no rows of numbers",
+    ),
     "null bytes": ("import", "a.csv", lambda path: _sparse_text(path, "t,x\n", 10**9), "bytes, allowed 400000000"),
     "long JSON": ("import", "a.json", lambda path: _sparse_text(path, "[", 10**8), "bytes, allowed 40000000"),
     "keys of JSON": (

@@ -23,6 +23,7 @@ from hil.importing.variables import load_variables
 from hil.recording.arrow_files import is_number, numbers, parquet_schema, read_parquet, stored_unit
 
 LEAST_NUMBERS = 0.01  # share of rows with a number: with fewer a column is one of text
+MOST_COLUMNS = 1000  # whose names are read, 1 ms each
 WIDEST = 64  # columns of a matrix in a .mat file: a wider one is no table of channels
 
 
@@ -67,6 +68,11 @@ def read_table(path: Path) -> ForeignTable:
     read = readers[format_of(path)](path)
     table = _equal_length(replace(read, columns={name: as_measured(one) for name, one in read.columns.items()}))
     rows = max((values.size for values in table.columns.values()), default=0)
+    if len(read.columns) > MOST_COLUMNS:
+        raise InputError(
+            f"{path}: given {len(read.columns)} columns of numbers, allowed {MOST_COLUMNS}; export the channels of one "
+            "axis, or import them by a map"
+        )
     if len(table.columns) < 2 or rows < 3:
         raise InputError(
             f"{path}: given {len(table.columns)} columns of numbers with {rows} rows, allowed two columns and three "

@@ -52,7 +52,9 @@ def _structures(value: Any) -> list[Any]:
     if hasattr(value, "_fieldnames"):
         return [value]
     values = np.asarray(value)
-    return [one for item in values.reshape(-1) for one in _structures(item)] if values.dtype == object else []
+    if values.dtype != object or values.ndim == 0:  # without a dimension: an object that is no array, such as sparse
+        return []
+    return [one for item in values.reshape(-1) for one in _structures(item)]
 
 
 def mat_column(path: Path, variables: dict[str, Any], name: str) -> FloatArray:

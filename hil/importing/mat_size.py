@@ -1,4 +1,4 @@
-"""Count what a MATLAB .mat file expands to, before a library makes arrays of it.
+"""Count what a MATLAB .mat file expands to, and check the types of its elements, before a library makes arrays of it.
 
 The layout is that of "MAT-File Format" (MathWorks). Version 4 has plain matrices. Versions 5 to 7 have elements of a
 type, a number of bytes and data; a matrix has elements within, and one of the type miCOMPRESSED is a zlib stream.
@@ -8,6 +8,7 @@ import zlib
 from pathlib import Path
 from typing import Literal
 
+from hil.errors import InputError
 from hil.files.input_file import MOST_BYTES, check_values
 
 _HEADER_BYTES = 128
@@ -17,15 +18,17 @@ _VALUES_OF_ARRAY = 250  # an array object takes the memory of so many numbers, e
 
 
 def check_mat_size(path: Path) -> None:
-    """Refuse a file that becomes more than `MOST_VALUES` values. Raises InputError.
+    """Refuse a file that becomes more than `MOST_VALUES` values, or that has an element of a type that there is not.
 
-    A damaged file passes: the library that reads it says what is wrong.
+    Raises InputError. Other damage passes: the library that reads the file says what is wrong.
     """
     content = path.read_bytes()
     if 0 in content[:4]:  # version 4: a value has a byte or more
         check_values(path, len(content), f"{len(content)} bytes of version 4")
         return
     order: Literal["big", "little"] = "big" if content[126:128] == b"MI" else "little"
+    if int.from_bytes(content[124:126], order) >> 8 != 1:  # version 7.3, or no .mat file
+        return
     expanded = values = 0
     at = _HEADER_BYTES
     while at + 8 <= len(content):
@@ -57,6 +60,11 @@ def _count(path: Path, data: bytes, order: Literal["big", "little"], values: int
             values += _VALUES_OF_ARRAY
         elif kind >> 16:  # a small element: size and type in four bytes, data in the next four
             kind, size, padded = kind & 0xFFFF, min(kind >> 16, 4), 0
+        elif kind not in _BYTES and size:  # scipy looks types up in a table without a check, and crashes
+            raise InputError(
+                f"{path}: is no readable .mat file (an element has the type {kind}, allowed those up to 18); "
+                "it is cut or damaged"
+            )
         else:
             padded = size + -size % 8
         values += min(size, len(data) - at) // _BYTES.get(kind, 1)

@@ -4,16 +4,21 @@ Every port, simulated or real, does four things: `listen` to a COB-ID, `send` a 
 report its `health`. The caller passes the time. `PythonCanPort` stands on any python-can bus
 (socketcan, virtual, udp_multicast); the in-process bus of `drivers.inprocess` offers the same without threads.
 
-Error frames are counted and decoded here, since the canopen package drops them and a bus-off would stay invisible.
+Frames enter here alone: a listener gets classic data frames with an 11-bit identifier, all that CANopen has (CiA 301);
+others are foreign and counted. Error frames of a controller are decoded, since the canopen package drops them and a
+bus-off would stay invisible.
 """
 
+from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Any, Final, Protocol
 
 import can
+from can.interfaces.virtual import VirtualBus
 
+from drivers.loopback_bus import DamagedData, LoopbackBus, open_loopback
 from drivers.port import BusError
 
 Listener = Callable[[int, bytes, float], None]  # COB-ID, data, time_s
@@ -36,6 +41,7 @@ class BusHealth:
     error_frames: int = 0
     frames_lost: int = 0  # frames this port could not send
     last_error: str = ""
+    foreign: Counter[str] = field(default_factory=Counter)  # received and not acted on, by kind
 
 
 class CanPort(Protocol):
@@ -76,6 +82,16 @@ _ERR_CLASS: Final = {
 }  # fmt: skip
 _BUS_OFF, _RESTARTED, _CONTROLLER = 0x040, 0x100, 0x004
 _PASSIVE, _BACK_TO_ACTIVE = 0x30, 0x40
+_MOST_FRAMES: Final = 1000  # of one poll: the loop goes on whatever floods the bus
+
+
+_CHANNELS: Final = {  # allowed, advice
+    "virtual": ("any name", ""),
+    "udp_multicast": ("an IPv4 multicast address, 224.0.0.0 to 239.255.255.255", "It reaches processes of this PC."),
+    "socketcan": (
+        "an existing channel", "Is the interface up (ip link set can0 up type can bitrate 1000000)?"
+    ),
+}  # fmt: skip
 
 
 def open_bus(config: BusConfig) -> can.BusABC:
@@ -86,13 +102,12 @@ def open_bus(config: BusConfig) -> can.BusABC:
                        allowed=", ".join(BusConfig.INTERFACES))  # fmt: skip
     options: dict[str, Any] = {"bitrate": config.bitrate} if config.interface == "socketcan" else {}
     try:
+        if config.interface == "udp_multicast":
+            return open_loopback(config.channel)
         return can.Bus(interface=config.interface, channel=config.channel, **options)
     except (can.CanError, OSError, ValueError) as error:
-        advice = "Is the interface up (ip link set can0 up type can bitrate 1000000)?"
-        raise BusError(
-            f"cannot be opened ({error})", where=where, allowed="an existing channel",
-            advice=advice if config.interface == "socketcan" else "",
-        ) from error  # fmt: skip
+        allowed, advice = _CHANNELS[config.interface]
+        raise BusError(f"cannot be opened ({error})", where=where, allowed=allowed, advice=advice) from error
 
 
 class DataFrame(can.Message):  # type: ignore[misc]  # python-can is not typed here
@@ -104,14 +119,25 @@ class DataFrame(can.Message):  # type: ignore[misc]  # python-can is not typed h
         return DataFrame(arbitration_id=self.arbitration_id, data=bytes(self.data), is_extended_id=False)
 
 
-class PythonCanPort:
-    """A python-can bus as a `CanPort`. Standard frames only; remote frames are ignored (CiA 301
-    advises against them)."""
+def foreign_kind(frame: can.Message) -> str:
+    """Return what a frame is that CANopen does not have; "" for a classic data frame with an 11-bit identifier."""
+    if frame.is_error_frame:
+        return "error frame"
+    if frame.is_fd:
+        return "CAN FD"
+    if frame.is_remote_frame:
+        return "remote frame"  # CiA 301 has it for PDOs and node guarding, and advises against it
+    return "29-bit identifier" if frame.is_extended_id else ""
 
-    __slots__ = ("_all", "_bus", "_listeners", "health")
+
+class PythonCanPort:
+    """A python-can bus as a `CanPort`."""
+
+    __slots__ = ("_all", "_bus", "_has_controller", "_listeners", "health")
 
     def __init__(self, bus: can.BusABC) -> None:
         self._bus = bus
+        self._has_controller = not isinstance(bus, VirtualBus | LoopbackBus)  # else an error frame is somebody's data
         self._listeners: dict[int, list[Listener]] = {}
         self._all: list[Listener] = []
         self.health = BusHealth()
@@ -130,24 +156,33 @@ class PythonCanPort:
             self.health.last_error = str(error)
 
     def poll(self, now_s: float, timeout_s: float = 0.0) -> None:
-        message = self._receive(timeout_s)
-        while message is not None:
-            if message.is_error_frame:
-                self._on_error_frame(message)
-            elif not message.is_remote_frame:
-                data = bytes(message.data)
-                for listener in self._listeners.get(message.arbitration_id, ()):
-                    listener(message.arbitration_id, data, now_s)
-                for listener in self._all:
-                    listener(message.arbitration_id, data, now_s)
-            message = self._receive(0.0)
+        for _ in range(_MOST_FRAMES):
+            try:
+                frame = self._bus.recv(timeout_s)
+            except DamagedData:
+                self.health.foreign["no CAN frame"] += 1
+                timeout_s = 0.0
+                continue
+            except (can.CanError, OSError, ValueError) as error:
+                raise BusError(f"receiving failed ({error})", where=f"bus {self._bus.channel_info}",
+                               advice="Was the interface taken down or the bus closed?") from error  # fmt: skip
+            if frame is None:
+                return
+            timeout_s = 0.0
+            self._hand_on(frame, now_s)
 
-    def _receive(self, timeout_s: float) -> can.Message | None:
-        try:
-            return self._bus.recv(timeout_s)
-        except (can.CanError, OSError, ValueError) as error:
-            raise BusError(f"receiving failed ({error})", where=f"bus {self._bus.channel_info}",
-                           advice="Was the interface taken down or the bus closed?") from error  # fmt: skip
+    def _hand_on(self, frame: can.Message, now_s: float) -> None:
+        if kind := foreign_kind(frame):
+            if frame.is_error_frame and self._has_controller:
+                self._on_error_frame(frame)
+            else:
+                self.health.foreign[kind] += 1
+            return
+        can_id, data = frame.arbitration_id, bytes(frame.data)
+        for listener in self._listeners.get(can_id, ()):
+            listener(can_id, data, now_s)
+        for listener in self._all:
+            listener(can_id, data, now_s)
 
     def _on_error_frame(self, message: can.Message) -> None:
         bits, data, health = message.arbitration_id, message.data, self.health

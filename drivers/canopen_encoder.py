@@ -3,19 +3,19 @@
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from struct import Struct
 from typing import Final
 
-from drivers.canopen_master import NMT_PRE_OPERATIONAL, CanopenMaster
+from drivers.canopen_master import CanopenMaster
 from drivers.canopen_node import CanopenNode, condition_names
 from drivers.counting import Unwrapper
 from drivers.emcy import Emergency
 from drivers.object_index import ObjectIndex as Index
-from drivers.pdo import EVERY_SYNC
+from drivers.pdo import EVERY_SYNC, Entry, layout
 from drivers.port import Condition, ConfigurationError, Encoder, EncoderError, EncoderSample
 from drivers.sdo_setup import EDS_FOLDER, DeviceSetup
 
-_POSITION: Final = Struct("<i")
+PROCESS_DATA: Final = (Entry(Index.ENCODER_POSITION, 0, 32, True),)
+_POSITION: Final = layout(PROCESS_DATA)
 _PLAIN_DIRECTION, _REVERSED = 0x0000, 0x0008  # 0x6000 bit 3: measuring direction
 _OK = Condition.OK
 _new = tuple.__new__  # makes a named tuple without its Python-level constructor
@@ -52,12 +52,12 @@ class CanopenEncoder(CanopenNode, Encoder):
         """
         settings, master = self.settings, self._master
         with DeviceSetup(master.network, settings.node_id, settings.eds) as device:
-            master.nmt(NMT_PRE_OPERATIONAL, settings.node_id)
+            device.wait_answer()
             device.check_identity(406, settings.serial_number)
             step_m = device.read(Index.ENCODER_STEP_SETTINGS, 1) / 1e9
             if step_m <= 0 or (settings.step_m is not None and not math.isclose(step_m, settings.step_m)):
                 raise ConfigurationError(
-                    "another measuring step than described", where=f"{self._name}, object 0x6005:01",
+                    "another measuring step than described", where=f"{self.name}, object 0x6005:01",
                     given=f"{step_m:g} m", allowed=f"{settings.step_m or '> 0'} m",
                     advice="Correct the bench description or the encoder's settings.",
                 )  # fmt: skip
@@ -65,9 +65,7 @@ class CanopenEncoder(CanopenNode, Encoder):
             device.disable_pdos()
             device.write(Index.ENCODER_OPERATING_PARAMETERS, 0, _REVERSED if settings.reversed else _PLAIN_DIRECTION)
             device.write(Index.PRODUCER_HEARTBEAT_TIME, 0, round(1000 * settings.heartbeat_s))
-            device.map_pdo(
-                Index.TPDO_COMMUNICATION, (device.entry(Index.ENCODER_POSITION),), EVERY_SYNC, 0x180 + settings.node_id
-            )
+            device.map_pdo(Index.TPDO_COMMUNICATION, PROCESS_DATA, EVERY_SYNC, 0x180 + settings.node_id)
             self._unwrapper = Unwrapper(
                 device.read(Index.ENCODER_MEASURING_RANGE) or 1 << 32, device.read(Index.ENCODER_POSITION)
             )
@@ -105,7 +103,7 @@ class CanopenEncoder(CanopenNode, Encoder):
         if condition:
             raise EncoderError(
                 condition_names(condition),
-                where=self._name,
+                where=self.name,
                 given=self._cause(),
                 advice="Check the encoder, its supply and its wiring.",
             )

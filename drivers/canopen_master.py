@@ -7,20 +7,23 @@ would continue to serve the drive's watchdog if this process hangs.
 from typing import Final
 
 from drivers.bus import BusHealth, CanPort
-from drivers.sdo_setup import SetupNetwork
+from drivers.sdo_client import SetupNetwork
 
 SYNC: Final = 0x080
 NMT_START: Final = 1
 NMT_STOP: Final = 2
 NMT_PRE_OPERATIONAL: Final = 128
 NMT_RESET_NODE: Final = 129
+CONSUMED_HEARTBEATS: Final = 3  # a consumer misses a heartbeat after so many of its periods without one
 _OPERATIONAL: Final = b"\x05"
+_NO_HEARTBEAT_AWAITED: Final = bytes.fromhex("2316100100000000")  # SDO download of 0 to 0x1016:01, CiA 301
 
 
 class CanopenMaster:
     """CANopen master on a port; drives and encoders of the bus share it.
 
-    node_id: of the master, for its heartbeat. heartbeat_s: its period; consumers are set to three of them.
+    node_id: of the master, for its heartbeat. heartbeat_s: its period, of which consumers await
+    CONSUMED_HEARTBEATS.
     """
 
     __slots__ = ("_heartbeat_due_s", "_heartbeat_id", "_send", "health", "heartbeat_s", "network", "node_id",
@@ -47,6 +50,10 @@ class CanopenMaster:
         self.silent = False
         self.nmt(NMT_START, now_s=now_s)
         self._heartbeat_due_s = now_s + self.heartbeat_s
+        self.beat(now_s)
+
+    def beat(self, now_s: float) -> None:
+        """Send a heartbeat."""
         self._send(self._heartbeat_id, _OPERATIONAL, now_s)
 
     def sync(self, now_s: float) -> None:
@@ -59,10 +66,15 @@ class CanopenMaster:
             self._heartbeat_due_s += self.heartbeat_s
             if self._heartbeat_due_s <= now_s:  # after a pause of the loop: do not send the missed heartbeats
                 self._heartbeat_due_s = now_s + self.heartbeat_s
-            self._send(self._heartbeat_id, _OPERATIONAL, now_s)
+            self.beat(now_s)
         self.syncs += 1
         self.sync_time_s = now_s
         self._send(SYNC, b"", now_s)
+
+    def release(self, node_id: int) -> None:
+        """Leave a drive whose power is off: without PDOs and without awaiting the heartbeat, which would trip it."""
+        self.nmt(NMT_PRE_OPERATIONAL, node_id, self.sync_time_s)
+        self._send(0x600 + node_id, _NO_HEARTBEAT_AWAITED, self.sync_time_s)
 
     def cut_off(self, now_s: float) -> None:
         """Withhold SYNC, heartbeat and set-points until `start`, and stop all nodes by NMT.

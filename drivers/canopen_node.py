@@ -4,11 +4,12 @@ import math
 from typing import Final, Protocol
 
 from drivers.bus import BusState
-from drivers.canopen_master import CanopenMaster
+from drivers.canopen_master import CONSUMED_HEARTBEATS, CanopenMaster
 from drivers.emcy import Emergency, decode_emergency
 from drivers.port import Condition
 
 _OPERATIONAL: Final = 5
+_NMT_STATES: Final = (0, 4, _OPERATIONAL, 127)  # CiA 301: boot-up, stopped, operational, pre-operational
 _KEPT_EMERGENCIES: Final = 100  # a device that sends them without end does not fill the memory
 
 
@@ -32,9 +33,9 @@ class CanopenNode:
 
     def __init__(self, master: CanopenMaster, settings: NodeSettings, name: str) -> None:
         self._master, self.settings, self._health = master, settings, master.health
-        self._name = f"{name} node {settings.node_id}"
+        self.name = f"{name} node {settings.node_id}"
         self.emergencies: list[Emergency] = []  # newest last
-        self.malformed_frames = 0
+        self.malformed_frames = 0  # of a length or value that they cannot have; not acted on
         self._sample_time_s = 0.0
         self._begin()
         master.port.listen(0x180 + settings.node_id, self._on_tpdo)
@@ -42,10 +43,11 @@ class CanopenNode:
         master.port.listen(0x700 + settings.node_id, self._on_heartbeat)
 
     def _begin(self) -> None:
-        """Reset after a set-up: no answer and no heartbeat yet."""
+        """Reset after a set-up: no answer, no heartbeat and no EMCY yet."""
         self._answered = self._set_up_at = self._master.syncs  # number of the SYNC answered last
         self._latched = 0  # Condition bits; an int: the truth test of an IntFlag runs Python code, which is slow
         self._heartbeat_deadline_s = math.inf  # until the first answered SYNC
+        self.emergencies.clear()
 
     def _on_tpdo(self, can_id: int, data: bytes, now_s: float) -> None:
         raise NotImplementedError
@@ -54,7 +56,7 @@ class CanopenNode:
         """Note that the latest SYNC is answered. From the first answer on heartbeats are awaited: CiA 301 begins with
         the first heartbeat, but the node was told to send them (0x1017), and one that never does is not supervised."""
         if self._answered == self._set_up_at:
-            self._heartbeat_deadline_s = now_s + 3 * self.settings.heartbeat_s
+            self._heartbeat_deadline_s = now_s + CONSUMED_HEARTBEATS * self.settings.heartbeat_s
         self._answered = self._master.syncs
         self._sample_time_s = self._master.sync_time_s
 
@@ -68,10 +70,13 @@ class CanopenNode:
         raise NotImplementedError
 
     def _on_heartbeat(self, can_id: int, data: bytes, now_s: float) -> None:
+        if len(data) != 1 or data[0] not in _NMT_STATES:
+            self.malformed_frames += 1
+            return
         if self._answered == self._set_up_at:
             return  # before the first answered SYNC the node may be in another NMT state
-        self._heartbeat_deadline_s = now_s + 3 * self.settings.heartbeat_s
-        if len(data) == 1 and data[0] & 0x7F != _OPERATIONAL:
+        self._heartbeat_deadline_s = now_s + CONSUMED_HEARTBEATS * self.settings.heartbeat_s
+        if data[0] != _OPERATIONAL:
             self._latched |= Condition.NOT_OPERATIONAL  # boot-up (0) included: it lost its configuration
 
     def _node_condition(self, age: int, now_s: float) -> Condition:

@@ -29,10 +29,14 @@ POWERED: Final = (
 
 
 class Statusword(IntFlag):
-    """Object 0x6041, the bits above those of the state (`state_of`). Bits 12 and 13 depend on the mode."""
+    """Object 0x6041, the bits beside those of the state (`state_of`). Bits 12 and 13 depend on the mode."""
 
+    VOLTAGE_ENABLED = 1 << 4  # main voltage at the power stage
+    QUICK_STOP = 1 << 5  # 0: a quick stop is asked for, by the controlword or by an input
+    WARNING = 1 << 7
     REMOTE = 1 << 9
     TARGET_REACHED = 1 << 10
+    INTERNAL_LIMIT = 1 << 11
     FOLLOWS_COMMAND = 1 << 12  # CSP, CSV, CST: the drive follows the command value
     HOMING_ATTAINED = 1 << 12  # homing mode
     HOMING_ERROR = 1 << 13  # homing mode
@@ -47,6 +51,7 @@ class Controlword(IntFlag):
     ENABLE_OPERATION = 1 << 3
     HOMING_START = 1 << 4  # homing mode: rising edge starts, 0 interrupts
     FAULT_RESET = 1 << 7  # rising edge
+    HALT = 1 << 8
 
 
 class OperationMode(IntEnum):

@@ -31,6 +31,12 @@ _REGISTER: Final = ("generic", "current", "voltage", "temperature", "communicati
                     "manufacturer")  # fmt: skip
 
 
+def error_text(code: int) -> str:
+    """Error code of an EMCY or of object 0x603F, with its class in words."""
+    text = _CODES.get(code) or _BYTES.get(code >> 8) or _NIBBLES.get(code >> 12) or "unknown class"
+    return f"0x{code:04X} {text}"
+
+
 class Emergency(NamedTuple):
     """An EMCY. code 0x00xx: errors reset. Devices that send fewer than 8 bytes have an empty `detail`."""
 
@@ -47,11 +53,10 @@ class Emergency(NamedTuple):
     @property
     def text(self) -> str:
         """Message with code, class, error register and detail."""
-        text = _CODES.get(self.code) or _BYTES.get(self.code >> 8) or _NIBBLES.get(self.code >> 12) or "unknown class"
         bits = [name for bit, name in enumerate(_REGISTER) if self.register >> bit & 1]
         register = f", error register: {', '.join(bits)}" if bits else ""
         detail = f", detail {self.detail.hex(' ')}" if any(self.detail) else ""
-        return f"EMCY 0x{self.code:04X} {text}{register}{detail}"
+        return f"EMCY {error_text(self.code)}{register}{detail}"
 
 
 def decode_emergency(data: bytes, time_s: float) -> Emergency:

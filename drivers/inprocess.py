@@ -14,7 +14,7 @@ from collections.abc import Callable
 
 import can
 
-from drivers.bus import BusHealth, CanPort, Listener
+from drivers.bus import BusHealth, CanPort, Listener, foreign_kind
 
 
 class _Routes(dict[int, tuple[Listener, ...]]):
@@ -118,6 +118,8 @@ class AsBusABC(can.BusABC):  # type: ignore[misc]  # python-can is not typed her
         self._received.put(can.Message(timestamp=time_s, arbitration_id=can_id, data=data, is_extended_id=False))
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
+        if kind := foreign_kind(msg):
+            raise can.CanOperationError(f"a CanPort carries frames of CANopen only, given: {kind}")
         self._port.send(msg.arbitration_id, bytes(msg.data), self._clock())
 
     def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:

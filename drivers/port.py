@@ -100,6 +100,7 @@ class Condition(IntFlag):
     DISABLED = 2048  # the drive left OPERATION ENABLED by itself
     OTHER_SETPOINT = 8192  # the set-point that acts in the drive is none of those commanded
     UNANSWERED = 4096  # the drive did not follow a stop command; the master has cut it off
+    RUNAWAY = 16384  # the drive's own stop accelerated the motor; it gets "disable voltage"
 
 
 class DriveGoal(IntEnum):
@@ -165,6 +166,7 @@ class Drive(Protocol):
 
     goal: DriveGoal
     tripped: Condition  # conditions that tripped the drive since its last reset
+    notes: tuple[str, ...] = ()  # what the set-up found that the user should know
 
     @abstractmethod
     def set_up(self) -> None:
@@ -202,7 +204,7 @@ class Drive(Protocol):
     @property
     @abstractmethod
     def status(self) -> str:
-        """State of the device in words, for messages."""
+        """State of the device in words, for messages; with what keeps it from being enabled, if it is to be."""
 
 
 class Encoder(Protocol):

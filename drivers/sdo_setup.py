@@ -1,149 +1,136 @@
-"""Before the loop: SDO, NMT and object dictionary by the canopen package, without its threads.
+"""Before the loop: a device is configured by SDO, with the object dictionary of the canopen package.
 
-The Network of canopen reads the bus in a Notifier thread, which an exception ends without a message. Here the caller
-that waits for an SDO response polls the port itself: one thread, the same on real and simulated buses. Every write is
-read back.
+Every write is read back. What a device takes some time for is asked for until it comes, with a bound.
 """
 
 from __future__ import annotations
 
-import struct
+import contextlib
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Final
 
-import canopen
-from canopen.objectdictionary import ObjectDictionaryError, ODVariable, datatypes
-from canopen.sdo import SdoAbortedError, SdoClient, SdoCommunicationError
+from canopen.objectdictionary import ODVariable, datatypes
+from canopen.sdo import SdoAbortedError, SdoCommunicationError
 
-from drivers.bus import CanPort
+from drivers.eds_file import read_eds
 from drivers.object_index import ObjectIndex as Index
 from drivers.pdo import PDO_INVALID, PDO_NO_RTR, Entry, layout
 from drivers.port import ConfigurationError, IdentityError, ResponseTimeout
+from drivers.sdo_client import MOST_ANSWERS, RESPONSE_TIMEOUT_S, PumpedSdoClient, SetupNetwork
 
 EDS_FOLDER: Final = Path(__file__).parent / "eds"
-RESPONSE_TIMEOUT_S: Final = 0.5
-_PUMP_S: Final = 0.001
-_SDO_BYTES: Final = 8  # CiA 301: every SDO frame has eight bytes
-_MOST_ANSWERS: Final = 16  # of one transfer: the objects used here have 8 bytes or less, in two segments
-_MOST_EDS_BYTES: Final = 2_000_000  # ten times the EDS of a large drive
+BOOT_LIMIT_S: Final = 5.0  # drives take some seconds from power-on to their first answer
+_NMT_PRE_OPERATIONAL: Final = 128
+_ASK_AGAIN_S: Final = 0.01
+_PDO_COMMUNICATION: Final = (*range(0x1400, 0x1600), *range(0x1800, 0x1A00))  # of up to 512 each way, CiA 301
 
 
-class SetupNetwork(canopen.Network):  # type: ignore[misc]  # canopen is not typed
-    """canopen's Network on a `CanPort`. `time_s` is the set-up's own time: it moves while a response is awaited."""
-
-    def __init__(self, port: CanPort) -> None:
-        self.port = port
-        self.time_s = 0.0
-        super().__init__()
-
-    def subscribe(self, can_id: int, callback: Callable[[int, bytes, float], None]) -> None:
-        super().subscribe(can_id, callback)
-        self.port.listen(can_id, callback)
-
-    def unsubscribe(self, can_id: int, callback: Callable[[int, bytes, float], None] | None = None) -> None:
-        for gone in [callback] if callback else list(self.subscribers[can_id]):
-            self.port.ignore(can_id, gone)
-        super().unsubscribe(can_id, callback)
-
-    def send_message(self, can_id: int, data: bytes, remote: bool = False) -> None:
-        self.port.send(can_id, bytes(data), self.time_s)
-
-    def pump(self) -> None:
-        """Take in what has arrived; waits up to a millisecond on a real bus, passes one on a simulated bus."""
-        self.time_s += _PUMP_S
-        self.port.poll(self.time_s, _PUMP_S)
-
-
-class _PumpedSdoClient(SdoClient):  # type: ignore[misc]
-    """canopen's SDO client, waiting by pumping the port. answers_left: that one transfer may still take."""
-
-    answers_left = 0
-
-    def read_response(self) -> bytes:
-        deadline_s = self.network.time_s + RESPONSE_TIMEOUT_S
-        while self.responses.empty():
-            if self.network.time_s >= deadline_s:
-                raise SdoCommunicationError("No SDO response received")
-            self.network.pump()
-        response: bytes = self.responses.get_nowait()
-        self.answers_left -= 1
-        if self.answers_left < 0:  # also ends a segmented answer without end
-            raise SdoCommunicationError(f"more than {_MOST_ANSWERS} answers to one request")
-        if len(response) != _SDO_BYTES:
-            raise SdoCommunicationError(f"an answer of {len(response)} bytes, allowed {_SDO_BYTES}")
-        if response[0] == 0x80:
-            raise SdoAbortedError(struct.unpack_from("<L", response, 4)[0])
-        return response
-
-
-class _PumpedNode(canopen.RemoteNode):  # type: ignore[misc]
-    """canopen's RemoteNode with the pumped client."""
-
-    def add_sdo(self, rx_cobid: int, tx_cobid: int) -> SdoClient:
-        client = _PumpedSdoClient(rx_cobid, tx_cobid, self.object_dictionary)
-        self.sdo_channels.append(client)
-        if self.has_network():
-            self.network.subscribe(client.tx_cobid, client.on_response)
-        return client
-
-
-def _node(node_id: int, eds: Path) -> _PumpedNode:
-    """Node of an EDS. Raises ConfigurationError for a file that is no readable EDS."""
-    where, advice = f"{eds}", "Give the EDS file of the device, as its maker supplies it."
-    if not eds.is_file() or eds.stat().st_size > _MOST_EDS_BYTES:  # a pipe or a device may never end
-        raise ConfigurationError("is no EDS file", where=where, allowed=f"up to {_MOST_EDS_BYTES} bytes", advice=advice)
-    try:
-        return _PumpedNode(node_id, str(eds))
-    except Exception as error:  # canopen and configparser raise many kinds for a damaged file
-        text = (str(error) or type(error).__name__).splitlines()[0]
-        raise ConfigurationError(f"is no readable EDS file ({text})", where=where, advice=advice) from None
+class SettingRefused(ConfigurationError):
+    """The device aborts the transfer of an object."""
 
 
 class DeviceSetup:
     """Configures one node by SDO. Errors name node, object, value and what the device said.
 
-    Raises ResponseTimeout (no answer), ConfigurationError (refused, or reads back differently), IdentityError.
+    Types are those of the EDS, signs those of CiA 301, 402 and 406. Raises EdsError, ResponseTimeout (no answer),
+    ConfigurationError (refused, or reads back differently), IdentityError. `kept`: settings that a device need not have
+    and keeps as they are, in words.
     """
 
     def __init__(self, network: SetupNetwork, node_id: int, eds: Path) -> None:
-        self._node = _node(node_id, eds)
-        self._network = network
+        self._description = read_eds(eds, node_id)
         self.node_id, self.eds = node_id, eds
-        self.dictionary = self._node.object_dictionary
+        self.dictionary = self._description.dictionary
+        self._network = network
+        self._sdo = PumpedSdoClient(0x600 + node_id, 0x580 + node_id, self.dictionary)
+        self._sdo.network = network
+        self.kept: list[str] = []
 
     def __enter__(self) -> DeviceSetup:
-        self._node.associate_network(self._network)
+        self._network.subscribe(self._sdo.tx_cobid, self._sdo.on_response)
         return self
 
     def __exit__(self, *exception: object) -> None:
-        self._node.remove_network()
+        self._network.unsubscribe(self._sdo.tx_cobid, self._sdo.on_response)
 
     def read(self, index: int, subindex: int = 0) -> int:
-        """An integer object."""
-        variable = self._variable(index, subindex)
-        data = self._transfer(index, subindex, lambda: self._node.sdo.upload(index, subindex))
-        try:
-            return int(variable.decode_raw(data))
-        except (ObjectDictionaryError, ValueError, TypeError, struct.error) as error:
+        """An integer object. A longer answer than the EDS says is right if its value has room in the type."""
+        variable = self._integer(index, subindex)
+        data = self._transfer(index, subindex, lambda: self._sdo.upload(index, subindex))
+        size, signed = len(variable) // 8, _is_signed(variable)
+        value = int.from_bytes(data, "little", signed=signed)
+        lowest = -(1 << (8 * size - 1)) if signed else 0
+        if len(data) < size or not lowest <= value < lowest + (1 << 8 * size):
             raise ConfigurationError(
-                f"the answer is no number as the EDS describes it ({error})", where=self._where(index, subindex),
-                given=f"{bytes(data[:8]).hex(' ') or 'no byte'}", allowed=f"{len(variable) // 8} bytes",
+                "the answer is no number as the EDS describes it", where=self._where(index, subindex),
+                given=f"{data[:8].hex(' ') or 'no byte'}", allowed=f"{size} bytes",
                 advice="Give the EDS of the device that is connected.",
-            ) from error  # fmt: skip
+            )  # fmt: skip
+        return value
 
     def has(self, index: int, subindex: int = 0) -> bool:
         """Return True if the EDS has the object."""
         return self.dictionary.get_variable(index, subindex) is not None
 
-    def write(self, index: int, subindex: int, value: int, *, read_back: tuple[int, int] | None = None) -> None:
-        """Write, then read the same object (or `read_back`) and compare."""
-        self.write_only(index, subindex, value)
-        where = read_back or (index, subindex)
-        got = self.read(*where)
-        if got != value:
+    def check_types(self, entries: Sequence[Entry]) -> None:
+        """Raise EdsError unless the EDS has process data as they are sent."""
+        self._description.check(entries)
+
+    def wait_answer(self) -> None:
+        """Enter NMT pre-operational and wait until the device answers: it may still boot."""
+        started_s = self._network.time_s
+        while True:
+            self._network.send_message(0x000, bytes([_NMT_PRE_OPERATIONAL, self.node_id]))
+            try:
+                self.read(Index.DEVICE_TYPE)
+                return
+            except ResponseTimeout as error:
+                if self._network.time_s - started_s >= BOOT_LIMIT_S:
+                    waited = f"waited {self._network.time_s - started_s:.1f} s"
+                    raise ResponseTimeout(error.what, where=error.where, given=waited, advice=error.advice) from error
+
+    def wait(self, index: int, good: Callable[[int], bool], limit_s: float) -> int:
+        """Read an object until its value is good, limit_s at most. Returns the last value, good or not."""
+        started_s = self._network.time_s
+        while not good(value := self.read(index)) and self._network.time_s - started_s < limit_s:
+            again_s = self._network.time_s + _ASK_AGAIN_S
+            while self._network.time_s < again_s:
+                self._network.pump()
+        return value
+
+    def peek(self, index: int, subindex: int = 0) -> int | None:
+        """Value of an object; None if the EDS does not know it or the device refuses."""
+        try:
+            return self.read(index, subindex) if self.has(index, subindex) else None
+        except SettingRefused:
+            return None
+
+    def prefer(self, index: int, subindex: int, value: int) -> int | None:
+        """Write a setting that a device need not have. Returns the value it has then, None if that is unknown."""
+        try:
+            if self.has(index, subindex):
+                self.write(index, subindex, value)
+                return value
+        except SettingRefused:
+            pass
+        got = self.peek(index, subindex)
+        self.kept.append(f"{self._object(index, subindex)} {'unknown' if got is None else got} instead of {value}")
+        return got
+
+    def write(self, index: int, subindex: int, value: int, *, mask: int = -1) -> None:
+        """Write, read back and compare the bits of the mask. A refusal is none if the device has the value already."""
+        try:
+            self.write_only(index, subindex, value)
+        except SettingRefused:
+            got = self.peek(index, subindex)
+            if got is None or (got ^ value) & mask:
+                raise
+            return
+        got = self.read(index, subindex)
+        if (got ^ value) & mask:
             raise ConfigurationError(
-                "reads back another value than was written", where=self._where(*where),
+                "reads back another value than was written", where=self._where(index, subindex),
                 given=f"{value} (0x{value & 0xFFFFFFFF:X})", allowed=f"the drive keeps {got} (0x{got & 0xFFFFFFFF:X})",
                 advice="The device does not support this setting.",
             )  # fmt: skip
@@ -151,13 +138,14 @@ class DeviceSetup:
     def write_only(self, index: int, subindex: int, value: int) -> None:
         """Write without reading back."""
         try:
-            data = self._variable(index, subindex).encode_raw(value)
-        except (ValueError, OverflowError, struct.error) as error:
+            variable = self._integer(index, subindex)
+            data = int(value).to_bytes(len(variable) // 8, "little", signed=_is_signed(variable))
+        except OverflowError as error:
             raise ConfigurationError(
                 f"the value does not fit the object ({error})", where=self._where(index, subindex), given=str(value),
                 advice="Correct the bench description.",
             ) from error  # fmt: skip
-        self._transfer(index, subindex, lambda: self._node.sdo.download(index, subindex, data), value)
+        self._transfer(index, subindex, lambda: self._sdo.download(index, subindex, data), value)
 
     def check_identity(self, profile: int, serial_number: int | None = None) -> None:
         """Device profile (0x1000), vendor, product, major revision (0x1018) as in the EDS; serial number if given."""
@@ -181,24 +169,35 @@ class DeviceSetup:
                 )  # fmt: skip
 
     def map_pdo(self, communication: int, entries: Sequence[Entry], transmission_type: int, cob_id: int) -> None:
-        """Write a PDO as CiA 301 prescribes (invalid, number 0, entries, number, type, valid), reading each back."""
+        """Write a PDO as CiA 301 prescribes (invalid, number 0, entries, number, type, valid), reading each back.
+
+        A mapping that is as wanted is left alone: some devices have fixed ones.
+        """
         layout(entries)
+        self.check_types(entries)
         mapping = communication + 0x200
         flags = 0 if communication < Index.TPDO_COMMUNICATION else PDO_NO_RTR
-        self.write_only(communication, 1, cob_id | flags | PDO_INVALID)
-        self.write_only(mapping, 0, 0)
-        for k, entry in enumerate(entries, start=1):
-            self.write(mapping, k, entry.word)
-        self.write(mapping, 0, len(entries))
+        self._invalidate(communication, cob_id | flags)
+        words = [entry.word for entry in entries]
+        if self.read(mapping, 0) != len(words) or [self.peek(mapping, k + 1) for k in range(len(words))] != words:
+            self.write_only(mapping, 0, 0)
+            for k, word in enumerate(words, start=1):
+                self.write(mapping, k, word)
+            self.write(mapping, 0, len(words))
         self.write(communication, 2, transmission_type)
-        self.write(communication, 1, cob_id | flags)
+        self.write(communication, 1, cob_id | flags, mask=~PDO_NO_RTR)  # devices without RTR fix this bit
 
     def disable_pdos(self) -> None:
         """Set all PDOs of the EDS invalid, so that none acts on the drive or loads the bus unintended."""
-        first = (Index.RPDO_COMMUNICATION, Index.TPDO_COMMUNICATION)
-        for index in (communication + k for communication in first for k in range(4)):
-            if self.has(index, 1):
-                self.write_only(index, 1, self.read(index, 1) | PDO_INVALID)
+        for index in _PDO_COMMUNICATION:
+            cob_id = self.peek(index, 1)
+            if cob_id is not None and not cob_id & PDO_INVALID:
+                self._invalidate(index, cob_id)
+
+    def _invalidate(self, communication: int, cob_id: int) -> None:
+        """Set a PDO invalid; one that is fixed stays valid, and does not act in NMT pre-operational."""
+        with contextlib.suppress(SettingRefused):
+            self.write_only(communication, 1, cob_id | PDO_INVALID)
 
     def set_interpolation_time(self, period_s: float) -> None:
         """0x60C2: value x 10^index seconds; exact or refused."""
@@ -213,10 +212,14 @@ class DeviceSetup:
             allowed="1..255 x 10^n s", advice="Choose a period of 1, 2, 4 or 5 ms, or 500 or 250 us.",
         )  # fmt: skip
 
-    def entry(self, index: int, subindex: int = 0) -> Entry:
-        """Mapping entry of an object, its length from the EDS."""
+    def _integer(self, index: int, subindex: int) -> ODVariable:
         variable = self._variable(index, subindex)
-        return Entry(index, subindex, len(variable), variable.data_type in datatypes.SIGNED_TYPES)
+        if variable.data_type not in datatypes.INTEGER_TYPES:
+            raise ConfigurationError(
+                "the EDS has another data type than an integer", where=self._where(index, subindex),
+                given=self._description.where(index, subindex), advice=f"Correct {self.eds.name}.",
+            )  # fmt: skip
+        return variable
 
     def _variable(self, index: int, subindex: int) -> ODVariable:
         variable = self.dictionary.get_variable(index, subindex)
@@ -228,16 +231,18 @@ class DeviceSetup:
         return variable
 
     def _where(self, index: int, subindex: int) -> str:
+        return f"node {self.node_id}, object {self._object(index, subindex)}"
+
+    def _object(self, index: int, subindex: int) -> str:
         variable = self.dictionary.get_variable(index, subindex)
-        name = f" ({variable.name})" if variable is not None else ""
-        return f"node {self.node_id}, object 0x{index:04X}:{subindex:02X}{name}"
+        return f"0x{index:04X}:{subindex:02X}" + (f" ({variable.name})" if variable is not None else "")
 
     def _transfer(self, index: int, subindex: int, action: Callable[[], Any], value: int | None = None) -> Any:
-        self._node.sdo.answers_left = _MOST_ANSWERS
+        self._sdo.answers_left = MOST_ANSWERS
         try:
             return action()
         except SdoAbortedError as error:
-            raise ConfigurationError(
+            raise SettingRefused(
                 f"the device refuses ({error})", where=self._where(index, subindex),
                 given="" if value is None else f"{value} (0x{value & 0xFFFFFFFF:X})",
                 advice="See the device's manual for what it accepts in this state.",
@@ -249,3 +254,7 @@ class DeviceSetup:
                 given=f"{RESPONSE_TIMEOUT_S} s",
                 advice="Is the device powered, its node-ID and bit rate right, the bus terminated?",
             ) from error  # fmt: skip
+
+
+def _is_signed(variable: ODVariable) -> bool:
+    return variable.data_type in datatypes.SIGNED_TYPES

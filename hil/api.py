@@ -101,10 +101,10 @@ def run(
     """Run a profile on a real or simulated bench and record it as `folder`/`name`.parquet.
 
     On a bench with hardware the axis moves. virtual: as fast as the machine allows, simulated benches only. force: arm
-    although jitter or bus load exceed the budget of the bench. seed: of the noise of simulated sensors.
+    although jitter, bus load or the watchdog of the drive forbid it. seed: of the noise of simulated sensors.
 
     Returns the recording, one row per tick of the velocity loop. Raises FieldError for a profile that the bench does
-    not allow, NotPunctual (a HilError) for an exceeded budget, HilError for a device that cannot be set up or
+    not allow, NotArmed (a HilError) for what `force` overrides, HilError for a device that cannot be set up or
     if the run stopped before its end; the recording up to there stays in `folder`.
     """
     from hil.loop.run import run_profile

@@ -10,6 +10,7 @@ import pytest
 from bench_runs import bench_with
 from command_line import Ran, hil, refused
 
+from drivers.sdo_setup import EDS_FOLDER
 from hil.bench.bench_file import load_bench
 from hil.commands.install_service import UNITS, bench_files
 from hil.errors import FieldError, InputError
@@ -161,11 +162,12 @@ def test_a_dry_run_prints_the_files_and_writes_none(tmp_path: Path) -> None:
 def test_device_files_beside_the_bench_are_taken_along(tmp_path: Path) -> None:
     eds = tmp_path / "devices" / "drive.eds"
     eds.parent.mkdir()
-    eds.write_text("[FileInfo]\n")
+    text = f"; Größe in µm\n{(EDS_FOLDER / 'servo_drive.eds').read_text()}"
+    eds.write_bytes(text.encode("cp1252"))
     bench = bench_file(tmp_path, eds="devices/drive.eds")
     ran = hil(tmp_path, "install-service", str(bench), "--profile", PROFILE, "--root", "root")
     assert ran.returncode == 0, ran.stderr
-    assert (tmp_path / "root/etc/hil/axis1/devices/drive.eds").read_text() == "[FileInfo]\n"
+    assert (tmp_path / "root/etc/hil/axis1/devices/drive.eds").read_text("utf-8") == text
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ from drivers.port import PlantLike, ServoLike, ServoTarget
 
 _LOOP_PERIOD_S = 0.001  # of the servo, if the SYNC period is longer
 _AT_REST_RAD_S = 0.5  # below it a stop ramp ends: 5 rpm
+_AT_REST_S = 1e-3  # of the ramp, if that is less: on a linear axis half a metre per second is no rest
 
 
 def ramp(velocity: float, wanted: float, acceleration: float, period_s: float) -> float:
@@ -39,7 +40,8 @@ class DriveLoops:
     def stop_target(self, deceleration_rad_s2: float, velocity_rad_s: float, period_s: float) -> ServoTarget | None:
         """Next point of the stop ramp; None if the motor is at rest or there is no servo to brake it."""
         self._velocity_rad_s = ramp(self._velocity_rad_s, 0.0, deceleration_rad_s2, period_s)
-        resting = self._velocity_rad_s == 0.0 and abs(velocity_rad_s) < _AT_REST_RAD_S
+        at_rest = min(_AT_REST_RAD_S, _AT_REST_S * deceleration_rad_s2)
+        resting = self._velocity_rad_s == 0.0 and abs(velocity_rad_s) < at_rest
         return None if resting or self._servo is None else ServoTarget(self._velocity_rad_s)
 
     def advance(self, target: ServoTarget | None, period_s: float, limit_n_m: float) -> float:

@@ -7,9 +7,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
-import canopen
 from canopen.objectdictionary import ODVariable, datatypes
 
+from drivers.eds_file import read_eds
 from drivers.pdo import Entry
 from drivers.sim.sdo_server import AbortCode, SdoAbort
 
@@ -113,7 +113,7 @@ class Dictionary:
 
 @cache  # reading an EDS takes milliseconds, and the items do not change
 def _read_eds(eds: Path, node_id: int) -> dict[int, Item]:
-    objects = canopen.import_od(str(eds), node_id=node_id).values()
+    objects = read_eds(eds, node_id).dictionary.values()
     variables = [variable for o in objects for variable in ([o] if isinstance(o, ODVariable) else o.values())]
     return {key_of(variable.index, variable.subindex): _item(variable) for variable in variables}
 

@@ -50,7 +50,7 @@ class DriveSection(BenchSection):
 
     protocol: str = Field("canopen", description="protocol of the drive, a key of hil.loop.devices.PROTOCOLS")
     interface: Literal["inprocess", "virtual", "udp_multicast", "socketcan"] = "inprocess"
-    channel: str = Field("hil", description="socketcan: can0; udp_multicast: a group address")
+    channel: str = Field("hil", description="socketcan: can0; udp_multicast: an IPv4 group, heard on this PC alone")
     bitrate: Annotated[int, Field(ge=10_000, le=1_000_000, description="bit/s")] = 1_000_000
     mode: DriveMode = DriveMode.CST
     node_id: NodeId = 5
@@ -60,7 +60,11 @@ class DriveSection(BenchSection):
     rated_torque_n_m: Positive | None = Field(
         None, description="object 0x6076, whose 1/1000 is the resolution of torque; absent: as the drive says [N m, N]"
     )
-    heartbeat_s: Positive = 0.02
+    heartbeat_s: Annotated[float, Field(ge=0.001, le=21.845)] = Field(
+        0.02,
+        description="between two heartbeats, of the master and of each device; three without one are a fault: whole "
+        "ms in objects of 16 bit [s]",
+    )
     watch_setpoint: bool = Field(
         True,
         description="compare the set-point that acts in the drive (object 0x6074, 0x606B or 0x6062 in a second "
@@ -80,7 +84,7 @@ class DriveSection(BenchSection):
     overrun_s: Positive = Field(
         0.05,
         description="lateness at which the axis is stopped; at most the deadline of the "
-        "set-points less two periods [s]",
+        "set-points or two heartbeats, less two periods [s]",
     )
     command_deadline_s: Annotated[float, Field(gt=0.0, le=65.535)] | None = Field(
         None,
@@ -91,7 +95,9 @@ class DriveSection(BenchSection):
     supervision: SupervisionSection = SupervisionSection()
     bus_load: Share = Field(0.7, description="largest share of the bus's time at which the drive is armed")
     over_budget: Literal["refuse", "arm"] = Field(
-        "refuse", description="jitter_p99 or bus_load exceeded: arm or not; the recording says so"
+        "refuse",
+        description="jitter_p99 or bus_load exceeded, or a drive that does not report a missing heartbeat: arm or not; "
+        "the recording says so",
     )
 
     @model_validator(mode="after")

@@ -40,8 +40,14 @@ class SupervisionSection(BenchSection):
     )
     torque: Positive | None = Field(None, description="measured; absent: 1.5 x the torque limit [N m, N]")
     torque_difference: Positive | None = Field(
-        None, description="measured against commanded, smoothed; absent: 0.3 x the torque limit [N m, N]"
+        None,
+        description="measured against commanded, smoothed; absent: 0.3 x the torque limit, or the "
+        "drive's if it is lower [N m, N]",
     )
+    load_torque: Positive | None = Field(
+        None, description="of weight and process, which may drive the axis against its motor; absent: half of the "
+        "torque limit, or of the drive's if it is lower [N m, N]"
+    )  # fmt: skip
     continuous_torque: Positive | None = Field(None, description="torque over time (I2t); absent: off [N m, N]")
     thermal_time_s: Positive = Field(10.0, description="time constant of the torque over time [s]")
     residual: ResidualThresholds | None = Field(None, description="of the live twin; absent: off")

@@ -37,11 +37,13 @@ def install_service(
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Print the files, write nothing.")] = False,
 ) -> None:
     """Write a systemd service hil-bench@NAME that runs a profile on a bench, and the CAN interface it needs."""
+    from drivers.eds_text import decode, read_bytes
     from hil.bench.bench_file import bench_path
     from hil.errors import FieldError, InputError
     from hil.files.output import write_text
     from hil.files.yaml_model import located
     from hil.loop.devices import check_runnable
+    from hil.loop.eds_files import check_eds_files
     from hil.loop.simulated_bench import load_simulated
     from hil.motion.profile import load_profile
 
@@ -52,6 +54,7 @@ def install_service(
         raise InputError(f"--name: given {name!r}, allowed up to 63 letters, digits, - and _; give a shorter name")
     try:
         check_runnable(loaded)
+        check_eds_files(loaded)
         texts = unit_files() | bench_files(loaded, name, cores)
     except FieldError as error:
         raise located(source, error) from None
@@ -61,7 +64,7 @@ def install_service(
         err.print(f"Note: {hidden}", markup=False)
     here = Path("etc/hil") / name
     texts |= {here / "bench.yaml": source.read_text("utf-8"), here / "profile.yaml": profile.read_text("utf-8")}
-    texts |= {here / eds: eds.read_text("utf-8") for eds in _device_files(loaded, source)}
+    texts |= {here / eds: decode(read_bytes(eds)) for eds in _device_files(loaded, source)}
     for path, text in sorted(texts.items()):
         target = root / path
         before = target.read_text("utf-8") if target.is_file() else None

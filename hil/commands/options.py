@@ -13,7 +13,9 @@ RecordedBench = Annotated[
 Virtual = Annotated[
     bool, typer.Option("--virtual/--wall", help="Simulated bench: run as fast as possible or in wall-clock time.")
 ]
-Force = Annotated[bool, typer.Option("--force", help="Run although jitter or bus load exceed the bench's limits.")]
+Force = Annotated[
+    bool, typer.Option("--force", help="Run although jitter, bus load or the drive's watchdog forbid it.")
+]
 ResetFault = Annotated[
     bool, typer.Option("--reset-fault", help="Reset the fault that the drive has latched, after its cause is removed.")
 ]

@@ -5,13 +5,13 @@ from typing import Annotated
 
 import typer
 
-from hil.report.console import out
+from hil.report.console import err, out
 
 
 def validate(
     files: Annotated[list[Path], typer.Argument(help="Bench, profile or map files (YAML).", show_default=False)],
 ) -> None:
-    """Check bench, profile and map files: types, units, keys, limits. Every error names file, line and field."""
+    """Check bench, profile and map files, and the EDS files of a bench. Every error names file, line and field."""
     from hil.errors import InputError
 
     problems = []
@@ -32,6 +32,7 @@ def _checked(path: Path) -> str:
     from hil.files.yaml_model import load_model, located
     from hil.importing.map_file import RecordingMap
     from hil.loop.devices import check_runnable
+    from hil.loop.eds_files import check_eds_files
     from hil.loop.simulated_bench import load_simulated
     from hil.motion.profile import load_profile
 
@@ -49,6 +50,8 @@ def _checked(path: Path) -> str:
     if bench.drive is not None or bench.simulation is not None:  # with neither it describes recordings only
         try:
             check_runnable(bench)
+            for note in check_eds_files(bench):
+                err.print(f"note: {note}")
         except FieldError as error:
             raise located(path, error) from None
     return f"a bench with a {bench.axis.model} axis and {len(bench.mechanisms)} mechanisms"

@@ -124,15 +124,6 @@ def _table(path: Path, batches: Any, columns: int) -> pa.Table:
     return pa.Table.from_batches(read, batches.schema)
 
 
-def read_texts(path: Path, name: str, form: CsvFormat = PLAIN) -> list[str]:
-    """The fields of a column as texts. Raises InputError for a missing column."""
-    names = read_header(path, form)
-    _refuse_absent(path, (name,), names)
-    index = names.index(name)
-    with _opened(path, form) as file:
-        return [row[index] if index < len(row) else "" for _, row in _data_rows(path, file, form)]
-
-
 def _refuse_absent(path: Path, wanted: Collection[str], names: tuple[str, ...]) -> None:
     absent = [name for name in wanted if name not in names]
     if absent:

@@ -1,14 +1,17 @@
 """From a foreign file to a recording, in one direction. Without a map, `draft_map` writes one first.
 
 step                 modules                                                     result
-file to table        csv_dialect, mat_file, foreign_table (all columns)          `ForeignTable`
+text to rows         number_form, text_rows (for draft and import alike)         `TextRows`
+                     header_rows, csv_dialect (for the draft)                    `Header`, `CsvDialect`
+file to table        mat_file, foreign_table (all columns)                       `ForeignTable`
                      foreign_columns (those that a map names)                    `Foreign`
 words                lexicon(.yaml), units, column_names, unit_lines,            `Label`, `HeaderValue`
                      header_values
-values that hold     on_change                                               columns without empty cells
-clock                clock; hil.recording.stamps and row_clock                   `StampClock`, `RegularRows`
+clock                stamp_columns, clock; hil.recording.stamps and row_clock    `StampClock`, `RegularRows`
+                     channel_clocks (stamps of each channel)                     `OwnClocks`
+values that hold     on_change                                                   columns without empty cells
 rows                 wraps, held_samples, spikes, slow_gaps, rows                `KeptRows`
-roles                relations, computed_position, roles                         `Roles`
+roles                relations, computed_position, effort_roles, roles           `Roles`
 refusal              damage                                                      InputError, notes
 units and signs      unit_choice, usual_values, encoder_counts,                  entries of the map
                      effort_entry, speed_unit, channel_entries

@@ -54,6 +54,13 @@ def find_dialect(path: Path) -> CsvDialect:
     first = _first_row(path, head, layout)
     above = head[:first]
     header = read_header(above, delimiter, width, form)
+    if form.thousands:
+        header.notes.append(f"numbers: {form.thousands!r} is read as the mark between thousands")
+    if header.line is None and delimiter == "," and (split := _split_by_commas(above, width)):
+        raise InputError(
+            f"{path}:{split}: {above[split - 1].strip()[:60]!r} has {width // 2} fields, the rows {width}: decimal "
+            "commas between commas cannot be told apart; export with semicolons, or with points"
+        )
     given: dict[str, object] = {"delimiter": delimiter, "decimal_point": form.decimal, "thousands": form.thousands}
     given |= {"encoding": encoding}
     if header.line is None or split_line(above[header.line], delimiter) != list(header.names):
@@ -62,6 +69,12 @@ def find_dialect(path: Path) -> CsvDialect:
         between = sum(bool(line.strip()) for line in above[header.line + 1 :])
         given |= {"skip_lines": header.line, "skip_rows": between}
     return CsvDialect(CsvOptions.model_validate(given), header, tuple(above))
+
+
+def _split_by_commas(above: list[str], width: int) -> int:
+    """Line (from 1) of a header with half as many fields as the rows, 0 without one."""
+    last = max((index for index, line in enumerate(above) if line.strip()), default=-1)
+    return last + 1 if last >= 0 and 2 * len(split_line(above[last], ",")) == width else 0
 
 
 def _lines(path: Path) -> tuple[list[str], str]:

@@ -11,19 +11,20 @@ from hil.importing.column_names import label, plain_words
 from hil.importing.lexicon import RowKind, lexicon
 from hil.importing.map_file import SECONDS
 from hil.importing.number_form import NumberForm, number_of
-from hil.importing.text_rows import shown, split_line
+from hil.importing.text_rows import label_of_pairs, shown, split_line
 from hil.importing.units import unit_named, unit_of_text
 
 COMMENT = re.compile(r"^\s*(#|%|//)+\s?")
 _UNIT = re.compile(r"[\[(]?\s*[a-zA-Zµμ°%‰Ω·/^*\d. _-]{0,14}\s*[\])]?(\s*\(\w*\))?")
 NAMELESS = "column "  # beginning of the name of a column over which nothing stands
 _BRACKET = re.compile(r"[\[(](.*?)[\])]")
+_FACTOR = re.compile(r"(?:(?P<value>\d+(?:[.,]\d+)?)|1/(?P<part>\d+))\s*[*x·]?\s*(?P<unit>[^\d\s/].*)")
 _WORD = re.compile(r"[^\W\d]")
 _NEAR = 4  # lines above the numbers whose text may be that of the columns, where they have none else
 
 
 @dataclass(frozen=True)
-class Row:
+class HeaderRow:
     """A row above the numbers with a field for each column; its line (from 0) and text."""
 
     line: int
@@ -92,6 +93,8 @@ def read_header(lines: Sequence[str], delimiter: str, width: int, form: NumberFo
             case _ if row is not named:
                 header.notes.append(f"header: line {row.line + 1} is not used: {shown(row.text)!r}")
         used.add(row.line)
+    for name in header.names:
+        _read_factor(header, name)
     if named is None:
         near = [index for index in range(len(lines)) if lines[index].strip() and index not in used][-_NEAR:]
         if near and len(split_line(COMMENT.sub("", lines[near[-1]]), delimiter)) > 1:
@@ -102,15 +105,15 @@ def read_header(lines: Sequence[str], delimiter: str, width: int, form: NumberFo
     return header
 
 
-def _row(index: int, line: str, delimiter: str, width: int, form: NumberForm) -> Row | None:
+def _row(index: int, line: str, delimiter: str, width: int, form: NumberForm) -> HeaderRow | None:
     text = COMMENT.sub("", line)
     word, colon, rest = text.partition(":")
     kind = _kind_of_label(word) if colon and delimiter not in word else None
     fields = split_line(rest if kind else text, delimiter)
     while len(fields) > width and not fields[-1]:
         fields.pop()
-    if width > 2 and width % 2 == 0 and len(fields) == width and len({_unnumbered(one) for one in fields[::2]}) == 1:
-        kind = _kind_of_label(_unnumbered(fields[0]))  # a column of time beside each channel
+    if len(fields) == width and (pair := label_of_pairs(fields)):  # a column of time beside each channel
+        kind = _kind_of_label(pair)
         fields = [one for value in fields[1::2] for one in ("", value)]
     elif kind is None and len(fields) in (width, width + 1) and (kind := _kind_of_label(fields[0])):
         fields = ["", *fields[1:]] if len(fields) == width else fields[1:]
@@ -120,12 +123,7 @@ def _row(index: int, line: str, delimiter: str, width: int, form: NumberForm) ->
     if given not in (width, width - 1) or not any(fields):
         return None
     fields += [""] * (width - len(fields))
-    return Row(index, line, kind or _kind(fields, form), tuple(fields), given == width)
-
-
-def _unnumbered(label: str) -> str:
-    """A label without its number, or a text of its own where there is none: 0.Name -> Name."""
-    return re.sub(r"[\d.]+", "", label)
+    return HeaderRow(index, line, kind or _kind(fields, form), tuple(fields), given == width)
 
 
 def _regrouped(text: str, delimiter: str, width: int) -> list[str]:
@@ -149,13 +147,13 @@ def _kind(fields: Sequence[str], form: NumberForm) -> RowKind:
         return RowKind.UNKNOWN
     if all(re.sub(r"\d+$", "", one.lower()) in lexicon().types for one in named):
         return RowKind.TYPES
-    units = sum(unit_of_text(one) is not None or one in ("-", "[-]", "[]") for one in named)
+    units = sum(unit_of_text(one) is not None or one in ("-", "[-]", "[]") or bool(_factor(one)) for one in named)
     if all(_UNIT.fullmatch(one) for one in named) and units >= max(1, len(named) / 2):
         return RowKind.UNITS
     return RowKind.TEXT if sum(bool(_WORD.search(one)) for one in named) > len(named) / 2 else RowKind.UNKNOWN
 
 
-def _names(texts: Sequence[Row]) -> Row | None:
+def _names(texts: Sequence[HeaderRow]) -> HeaderRow | None:
     """The row of names: one that says so, else that with most words of quantities, else the last."""
     told = next((row for row in texts if row.kind is RowKind.NAMES), None)
     if told or not texts:
@@ -164,7 +162,7 @@ def _names(texts: Sequence[Row]) -> Row | None:
     return next(row for row in (texts if best else reversed(texts)) if row.sure == best)
 
 
-def _titles(named: Row | None, texts: Sequence[Row], names: Sequence[str]) -> dict[str, str]:
+def _titles(named: HeaderRow | None, texts: Sequence[HeaderRow], names: Sequence[str]) -> dict[str, str]:
     """Text of each column whose name is another one: a repeated one, or one of another row."""
     if named is None:
         return {}
@@ -172,13 +170,13 @@ def _titles(named: Row | None, texts: Sequence[Row], names: Sequence[str]) -> di
     return {name: title for name, title in own if title and name != title}
 
 
-def _title(named: Row, texts: Sequence[Row], index: int) -> str:
+def _title(named: HeaderRow, texts: Sequence[HeaderRow], index: int) -> str:
     """Text over a column: of the row of names if it has letters there, else of another row."""
     fields = [named.fields[index], *(row.fields[index] for row in texts)]
     return next((one for one in fields if _WORD.search(one)), fields[0])
 
 
-def _different(named: Row | None, texts: Sequence[Row], width: int) -> tuple[str, ...]:
+def _different(named: HeaderRow | None, texts: Sequence[HeaderRow], width: int) -> tuple[str, ...]:
     """Names of the columns, different from each other: Time, Time (2)."""
     names: list[str] = []
     pairs = named is not None and width % 2 == 0 and not any(named.fields[::2]) and all(named.fields[1::2])
@@ -188,6 +186,23 @@ def _different(named: Row | None, texts: Sequence[Row], width: int) -> tuple[str
         times = 1 + sum(one == name or one.rpartition(" (")[0] == name for one in names)
         names.append(name if times == 1 else f"{name} ({times})")
     return tuple(names)
+
+
+def _read_factor(header: Header, name: str) -> None:
+    """Take the number before a unit as a factor: [0.1 Nm], 1/100 deg."""
+    bracket = _BRACKET.search(header.titles.get(name, name))
+    text = header.units.get(name, bracket[1] if bracket else "").strip(" []()")
+    if match := _factor(text):
+        value = float((match["value"] or match["part"]).replace(",", "."))
+        factor, offset = header.scales.get(name, (1.0, 0.0))
+        header.scales[name] = factor * (value if match["value"] else 1.0 / value), offset
+        header.units[name] = match["unit"]
+
+
+def _factor(text: str) -> re.Match[str] | None:
+    """Number and unit of a text that is no unit itself."""
+    match = _FACTOR.fullmatch(text.strip(" []()"))
+    return match if match and unit_named(text) is None and unit_named(match["unit"]) else None
 
 
 def _number(text: str, form: NumberForm) -> float | None:

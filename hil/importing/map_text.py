@@ -33,7 +33,7 @@ def map_text(draft: MapDraft) -> str:
     if clock.time is not None:
         lines += [f"time:                     # {clock.how}", f"  column: {_value(clock.time.column)}"]
         lines += [f"  unit: {clock.time.unit}                 # s, ms, us, 100 ns, ns, min, d (days), date (text)"]
-        others = clock.time.model_dump(exclude_defaults=True, include={"scale", "fraction"})
+        others = clock.time.model_dump(exclude_defaults=True, exclude={"column", "unit"})
         lines += [f"  {key}: {_value(value)}" for key, value in others.items()]
     else:
         lines += [f"sample_rate_hz: {clock.rate_hz!r}   # instead of time stamps; {clock.how}"]

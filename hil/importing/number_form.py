@@ -67,12 +67,22 @@ def numbers_of(fields: Sequence[str], form: NumberForm) -> tuple[FloatArray, dic
 def find_form(rows: Sequence[Sequence[str]]) -> tuple[NumberForm, float]:
     """The form that reads most fields of `rows`, and the share of the fields that it reads."""
     fields = [field for row in rows for field in row]
-    share = {form: sum(number_of(field, form) is not None for field in fields) / max(len(fields), 1) for form in _FORMS}
-    best = max(_FORMS, key=lambda form: share[form])
+    # a mark that some field has as its decimal mark stands between no thousands of this file
+    decimal = {mark for mark in ".," if any(_is_decimal(field, mark) for field in fields if mark in field)}
+    forms = [form for form in _FORMS if form.thousands not in decimal]
+    share = {form: sum(number_of(field, form) is not None for field in fields) / max(len(fields), 1) for form in forms}
+    best = max(forms, key=lambda form: share[form])
     other = NumberForm("," if best.decimal == "." else ".", best.decimal)
-    if not best.thousands and share[other] == share[best] and _are_thousands(list(zip(*rows, strict=False)), other):
+    if not best.thousands and share.get(other) == share[best] and _are_thousands(list(zip(*rows, strict=False)), other):
         best = other
     return best, share[best]
+
+
+def _is_decimal(field: str, mark: str) -> bool:
+    """True for a number that reads only with `mark` before its decimals: 0,5 or 12,34."""
+    form = NumberForm(mark)
+    other = NumberForm("," if mark == "." else ".", mark)
+    return number_of(field, form) is not None and number_of(field, other) is None
 
 
 def _are_thousands(columns: list[tuple[str, ...]], form: NumberForm) -> bool:

@@ -64,11 +64,20 @@ def split_line(line: str, delimiter: str) -> list[str]:
     """Fields of a line; the delimiter " " stands for one or more blanks."""
     if delimiter == " ":
         return line.split()
+    if '"' not in line:
+        return [field.strip() for field in line.replace("\0", "").rstrip("\r\n").split(delimiter)]
     try:
         row = next(csv.reader([line.replace("\0", "").rstrip("\r\n")], delimiter=delimiter), [])
     except csv.Error:
         return [line]
     return [field.strip() for field in row]
+
+
+def label_of_pairs(fields: Sequence[str]) -> str:
+    """Text of every second field but for its number, if the others have another: Time;x;Time (2);M; "" else."""
+    stems = [re.sub(r"[\d.]+| \(\d+\)", "", field) for field in fields]
+    alike = len(stems) > 3 and len(stems) % 2 == 0 and len(set(stems[::2])) == 1 and stems[0] not in stems[1::2]
+    return stems[0] if alike else ""
 
 
 def header_names(path: Path, options: CsvOptions) -> tuple[str, ...]:
@@ -107,7 +116,7 @@ class _Reader:
         self.path, self.names, self.encoding, self.delimiter = path, names, options.encoding, options.delimiter
         self.form = NumberForm(options.decimal_point, options.thousands)
         # time beside each channel: those of lower rate end before the others
-        self.pairs = len(names) > 3 and len({re.sub(r"( \(\d+\)|\d+)$", "", name) for name in names[::2]}) == 1
+        self.pairs = bool(label_of_pairs(names))
         self.rows: list[list[str]] = []
         self.lines: list[int] = []
         self.parts: dict[str, list[FloatArray]] = {name: [] for name in names}

@@ -7,105 +7,11 @@ differ. Where a sample is late nothing is compared with it. `hil.loop.supervisio
 from __future__ import annotations
 
 import math
-from enum import IntEnum, IntFlag
-from typing import NamedTuple
 
 from numba import njit
 
-
-class Limit(IntFlag):
-    """Bounds that a tick passed."""
-
-    NONE = 0
-    FOLLOWING_ERROR = 1
-    TRAVEL = 2
-    NOT_FINITE = 4
-    MOTOR_JUMP = 8
-    TABLE_JUMP = 16
-    MOTOR_FROZEN = 32
-    TABLE_FROZEN = 64
-    MOTOR_REVERSED = 128
-    TABLE_REVERSED = 256
-    ENCODER_DIFFERENCE = 512
-    VELOCITY = 1024
-    TORQUE = 2048
-    TORQUE_TIME = 4096
-    STOPPING_DISTANCE = 8192
-    ACTING_TORQUE = 16384
-    RESIDUAL_ENCODER = 32768
-    RESIDUAL_DRIVE = 65536
-    RESIDUAL_LOAD = 131072
-
-
-class Bounds(NamedTuple):
-    """Bounds of the checks; inf: off. Torques in N m, linear axes N."""
-
-    has_table: bool
-    commands_torque: bool
-    following_error_m: float
-    following_error_s: float
-    travel_low_m: float
-    travel_high_m: float
-    deceleration_m_s2: float  # of a controlled stop
-    velocity_m_s: float
-    encoder_difference_m: float
-    frozen_m: float
-    frozen_torque: float
-    torque: float
-    torque_difference: float
-    drive_torque: float  # to which the drive limits its command
-    continuous_torque: float
-    thermal_time_s: float
-    residual_motor_m: float
-    residual_table_m: float
-    residual_torque: float
-
-
-class Memory(IntEnum):
-    """Places of what the checks remember from tick to tick."""
-
-    PRIMED = 0
-    MOTOR_START = 1
-    TABLE_START = 2
-    TORQUE_COMMAND = 3  # of the tick before
-    MOTOR = 4  # last fresh sample
-    TABLE = 5
-    MOTOR_PERIODS = 6  # since the last fresh sample
-    TABLE_PERIODS = 7
-    TABLE_AT_MOTOR = 8  # position of the table encoder when the motor encoder changed last
-    MOTOR_AT_TABLE = 9
-    TORQUE_AT_MOTOR = 10  # measured torque when the motor encoder changed last
-    VELOCITY = 11  # smoothed
-    COMMAND_ALIKE = 12  # position set-point at MOTOR_ALIKE
-    TWIN_TORQUE = 13  # of the tick before
-    TORQUE_TICKS = 14  # in a row beyond the bound
-    TORQUE_GAP = 15  # measured less commanded torque, smoothed
-    HEAT = 16  # mean square of the torque over the thermal time
-    SKIPPED = 17
-    RESIDUAL_TICKS = 18  # in a row beyond a threshold
-    MOTOR_ALIKE = 19  # where both encoders had last moved by frozen_m into the same direction
-    TABLE_ALIKE = 20
-
-
-class Facts(NamedTuple):
-    """Values of a tick that are checked; torque was measured over the period before. skipped: ticks since the start."""
-
-    position_m: float  # set-points
-    velocity_m_s: float
-    motor_m: float
-    table_m: float
-    fed_back_m: float
-    torque: float
-    command: float
-    reference: float
-    twin_motor_m: float
-    twin_table_m: float
-    twin_torque: float
-    motor_age: int
-    table_age: int
-    skipped: int
-    period_s: float
-
+from hil.loop.limits import Bounds, Limit, Memory
+from hil.loop.sign_check import sign, stop_fails
 
 SMOOTHING = 0.125  # share of a new value: noise of one count in one period is no speed
 TORQUE_TICKS = 3  # in a row beyond the torque bound: one sample may be an impact
@@ -138,26 +44,9 @@ _RESIDUAL_LOAD = int(Limit.RESIDUAL_LOAD)
 def _unpacked(a):  # type: ignore[no-untyped-def]
     """Bounds from an array: a tuple as argument of the compiled cycle costs 50 ns for each field."""
     return Bounds(
-        a[0] != 0.0,
-        a[1] != 0.0,
-        a[2],
-        a[3],
-        a[4],
-        a[5],
-        a[6],
-        a[7],
-        a[8],
-        a[9],
-        a[10],
-        a[11],
-        a[12],
-        a[13],
-        a[14],
-        a[15],
-        a[16],
-        a[17],
-        a[18],
-    )
+        a[0] != 0.0, a[1] != 0.0, a[2], a[3], a[4], a[5], a[6], a[7], a[8], a[9], a[10], a[11], a[12], a[13], a[14],
+        a[15], a[16], a[17], a[18], a[19], a[20], a[21], a[22],
+    )  # fmt: skip
 
 
 @njit(_nrt=False, error_model="numpy", inline="never")
@@ -173,6 +62,7 @@ def check(bounds, memory, facts):  # type: ignore[no-untyped-def]
         m[_M.MOTOR_START] = m[_M.MOTOR] = m[_M.MOTOR_AT_TABLE] = m[_M.MOTOR_ALIKE] = f.motor_m
         m[_M.TABLE_START] = m[_M.TABLE] = m[_M.TABLE_AT_MOTOR] = m[_M.TABLE_ALIKE] = f.table_m
         m[_M.TORQUE_AT_MOTOR] = m[_M.TWIN_TORQUE] = f.torque
+        m[_M.COMMAND_AT_REST], m[_M.FED_BACK_AT_REST] = f.position_m, f.fed_back_m
     passed = 0
     periods = 1.0 + f.skipped - m[_M.SKIPPED]
     m[_M.SKIPPED] = f.skipped
@@ -187,6 +77,7 @@ def check(bounds, memory, facts):  # type: ignore[no-untyped-def]
         moved = f.motor_m - m[_M.MOTOR]
         if abs(moved) > b.velocity_m_s * span_s + b.frozen_m:
             passed |= _MOTOR_JUMP
+        passed |= sign(b, m, f, moved / span_s) | stop_fails(b, m, f, moved / span_s)
         m[_M.VELOCITY] += SMOOTHING * (moved / span_s - m[_M.VELOCITY])
         m[_M.MOTOR], m[_M.MOTOR_PERIODS] = f.motor_m, 0.0
         if moved != 0.0:

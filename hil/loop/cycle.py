@@ -20,7 +20,8 @@ from numba import njit, typeof
 from hil.arrays import FloatArray
 from hil.channels import AXIS_CHANNELS, AxisKind
 from hil.control import cascade
-from hil.loop.checks import Bounds, Facts, Limit, Memory, check
+from hil.loop.checks import check
+from hil.loop.limits import Bounds, Facts, Limit, Memory
 from hil.motion.trajectory import Trajectory
 from hil.twin.axis import Start, Twin
 from hil.twin.stepping import kernel
@@ -129,6 +130,7 @@ class Loop(NamedTuple):
 
 
 _read, _advance, _step = kernel.read, kernel.advance, cascade.step
+STOP_SEGMENT = -1  # in the recording: set-points of a stop
 _TO_TORQUE, _TO_VELOCITY = int(Setpoint.TORQUE), int(Setpoint.VELOCITY)
 _NOT_FINITE = int(Limit.NOT_FINITE)
 
@@ -183,7 +185,8 @@ def compiled_cycle(tick, first, samples, setpoints, loop):  # type: ignore[no-un
     fed_back = table if gains.position_from_table else actual
     facts = Facts(position, velocity, actual, table, fed_back, torque, command, reference,
                   ratio * twin_motor, twin_table, twin_torque,
-                  samples.motor_age, samples.table_age, samples.skipped, gains.period_s)  # fmt: skip
+                  samples.motor_age, samples.table_age, samples.skipped, gains.period_s,
+                  setpoints[index, 3] == STOP_SEGMENT)  # fmt: skip
     passed = check(loop.bounds, loop.memory, facts) if finite else _NOT_FINITE
     if loop.setpoint == _TO_TORQUE:
         return (0.0 if passed & _NOT_FINITE else command), passed

@@ -5,10 +5,10 @@ own connection, which the loop polls in its own thread, because a second thread 
 Another protocol is a subclass of `Devices` and one line in `PROTOCOLS`.
 """
 
+import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cached_property
-from pathlib import Path
 from types import TracebackType
 from typing import Self
 
@@ -16,23 +16,18 @@ from drivers.bus import BusConfig, CanPort, PumpedPort, PythonCanPort, open_bus
 from drivers.canopen_drive import CanopenDrive, DriveSettings
 from drivers.canopen_encoder import CanopenEncoder, EncoderSettings
 from drivers.canopen_master import CanopenMaster
-from drivers.cia402 import OperationMode
+from drivers.canopen_node import CanopenNode
 from drivers.inprocess import InProcessBus
 from drivers.modelled_bus import frame_bits
 from drivers.port import Drive, DriverError, Encoder, Master, PlantLike
-from drivers.sdo_setup import EDS_FOLDER
 from drivers.serial_encoder import SerialEncoder, SerialFormat, SerialSettings
 from hil.bench.bench_file import Bench
 from hil.bench.hardware import DriveMode, DriveSection
 from hil.errors import FieldError, HilError
+from hil.loop.eds_files import MODES, check_eds_files, drive_eds, encoder_eds
 from hil.loop.simulated_bench import SimulatedNodes
 from hil.loop.stall import command_deadline_s, late_limit_s
 
-MODES = {
-    DriveMode.CST: OperationMode.CYCLIC_SYNC_TORQUE,
-    DriveMode.CSV: OperationMode.CYCLIC_SYNC_VELOCITY,
-    DriveMode.CSP: OperationMode.CYCLIC_SYNC_POSITION,
-}
 _TARGET_BYTES = {DriveMode.CST: 2, DriveMode.CSV: 4, DriveMode.CSP: 4}
 
 
@@ -45,6 +40,9 @@ def driver_errors() -> Iterator[None]:
         raise HilError(str(error)) from error
 
 
+LOAD_SHARE = 0.5  # of the torque that can act: weight and process forces of a usable axis are below
+
+
 class Devices:
     """Opened devices of a bench behind `drivers.port`; a context manager. Each protocol has a subclass."""
 
@@ -53,6 +51,7 @@ class Devices:
     master: Master
     drive: Drive
     encoder: Encoder | None
+    notes: tuple[str, ...] = ()  # what the description of the devices leaves in doubt
 
     def set_up(self) -> None:
         """Configure the devices, power stage off; blocking. Raises HilError if a device refuses."""
@@ -66,9 +65,30 @@ class Devices:
         """Lateness of a tick at which the axis is stopped."""
         return late_limit_s(self.bench)
 
+    @property
+    def acting_torque(self) -> float:
+        """Highest torque that can act: limit of the control law, or of the drive if it is lower [N m or N]."""
+        return self.bench.gains.torque_limit_n_m
+
+    @property
+    def load_torque(self) -> float:
+        """Torque up to which weight and process may drive the axis against its motor [N m or N]."""
+        return self.section.supervision.load_torque or LOAD_SHARE * self.acting_torque
+
     def bus_load(self) -> float:
         """Share of the bus's time used in each period; 0 where the protocol has no limit."""
         return 0.0
+
+    def release(self) -> None:
+        """Leave devices whose power is off, so that they do not trip when the loop has ended. Does not wait."""
+
+    def misses_this_pc(self) -> bool:
+        """Return True if the drive has shown that it notices when this program ends, or where none can show it."""
+        return True
+
+    def take_notes(self) -> Iterator[str]:
+        """Yield what was received and not acted on since the last call."""
+        yield from ()
 
     def close(self) -> None:
         """Close the connections."""
@@ -102,6 +122,7 @@ class Rig(Devices):
     ) -> None:
         self.bench, self.section = bench, bench.drive or DriveSection()
         check_runnable(bench)
+        self.notes = check_eds_files(bench)
         self.nodes: SimulatedNodes | None = None
         self.encoder = None
         self.ports: list[CanPort] = []
@@ -118,6 +139,15 @@ class Rig(Devices):
                 self.close()
                 raise
 
+    def set_up(self) -> None:
+        super().set_up()
+        velocity_gain = self.bench.gains.velocity_gain_n_m_s_rad  # alone it holds the load at this speed
+        self.drive.stop_margin = self.load_torque / velocity_gain if velocity_gain > 0.0 else math.inf
+
+    @property
+    def acting_torque(self) -> float:
+        return min(super().acting_torque, self.drive.info.max_torque_n_m)
+
     def bus_load(self) -> float:
         """Share of the bus's time that SYNC, RPDO, TPDOs and encoder take, with the longest bit stuffing."""
         target = _TARGET_BYTES[self.section.mode]
@@ -125,6 +155,24 @@ class Rig(Devices):
         if isinstance(self.encoder, CanopenEncoder):
             frames.append(4)
         return sum(map(frame_bits, frames)) / (self.section.bitrate * self.bench.gains.period_s)
+
+    def release(self) -> None:
+        if not self.master.silent and not self.drive.read(self.master.sync_time_s).powered:
+            self.master.release(self.section.node_id)
+
+    def misses_this_pc(self) -> bool:
+        return self.drive.info.watches_master
+
+    def take_notes(self) -> Iterator[str]:
+        foreign = self.master.health.foreign
+        if foreign:
+            kinds = ", ".join(f"{count} x {kind}" for kind, count in sorted(foreign.items()))
+            yield f"bus: frames that CANopen does not have (CiA 301) came and were not acted on: {kinds}"
+            foreign.clear()
+        for node in (self.drive, self.encoder):
+            if isinstance(node, CanopenNode) and node.malformed_frames:
+                yield f"{node.name}: {node.malformed_frames} frames of a wrong length or value were not acted on"
+                node.malformed_frames = 0
 
     def close(self) -> None:
         super().close()
@@ -154,8 +202,7 @@ class Rig(Devices):
         section = self.section
         return DriveSettings(
             node_id=section.node_id, mode=MODES[section.mode], period_s=self.bench.gains.period_s,
-            eds=Path(section.eds) if section.eds else EDS_FOLDER / "servo_drive.eds",
-            serial_number=section.serial_number, heartbeat_s=section.heartbeat_s,
+            eds=drive_eds(section), serial_number=section.serial_number, heartbeat_s=section.heartbeat_s,
             missed_answers_allowed=section.missed_answers, rated_torque_n_m=section.rated_torque_n_m,
             command_deadline_s=command_deadline_s(self.bench), watch_setpoint=section.watch_setpoint)  # fmt: skip
 
@@ -165,8 +212,7 @@ class Rig(Devices):
         if connection.interface == "canopen":
             return CanopenEncoder(self.master, EncoderSettings(
                 node_id=connection.node_id, serial_number=connection.serial_number, step_m=table.resolution_m,
-                eds=Path(connection.eds) if connection.eds else EDS_FOLDER / "linear_encoder.eds",
-                reversed=table.direction < 0, heartbeat_s=self.section.heartbeat_s,
+                eds=encoder_eds(self.section), reversed=table.direction < 0, heartbeat_s=self.section.heartbeat_s,
                 missed_answers_allowed=self.section.missed_answers))  # fmt: skip
         serial_line = self.nodes.serial if self.nodes is not None else None
         device = serial_line.device if serial_line is not None else str(connection.device)
@@ -214,6 +260,12 @@ def check_runnable(bench: Bench) -> None:
             ("drive", "interface"),
             "given inprocess without a section `simulation`, allowed socketcan, "
             "virtual or udp_multicast for real devices; choose one or add `simulation`",
+        )
+    if section.heartbeat_s < bench.gains.period_s:
+        raise FieldError(
+            ("drive", "heartbeat_s"),
+            f"given {section.heartbeat_s:g}, allowed the period of the loop, which sends it, or more: "
+            f"{bench.gains.period_s:g}; raise it",
         )
     if bench.encoders.motor.direction < 0:
         raise FieldError(

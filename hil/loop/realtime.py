@@ -27,8 +27,8 @@ _PR_SET_TIMERSLACK = 29  # linux/prctl.h
 _WAKE_UP = Path("/dev/cpu_dma_latency")  # PM QoS: the longest time that an idle core may take to wake up, int32 us
 
 
-class NotPunctual(HilError):
-    """The machine or the bus cannot keep the period: the drive was not armed. what: the finding alone."""
+class NotArmed(HilError):
+    """The machine or the bus cannot keep the period, or the drive would not miss this PC. what: the finding alone."""
 
     def __init__(self, what: str, advice: str) -> None:
         super().__init__(f"{what}. The drive was not armed: {advice}, or arm all the same with --force")
@@ -152,9 +152,9 @@ def machine_state() -> dict[str, Any]:
 
 
 def check_punctual(jitter: Jitter, p99_limit_s: float) -> None:
-    """Raise NotPunctual when the p99 of the lateness exceeds what the bench allows."""
+    """Raise NotArmed when the p99 of the lateness exceeds what the bench allows."""
     if jitter.p99_s > p99_limit_s:
-        raise NotPunctual(
+        raise NotArmed(
             f"drive.jitter_p99: the loop is late by {jitter.text}; allowed p99 {1e6 * p99_limit_s:.0f} us",
             "take load off the machine, give the rights for real-time scheduling (docs/service.md), raise the budget "
             "in the bench file",

@@ -22,7 +22,7 @@ from hil.loop.devices import Devices, Rig, driver_errors, open_devices
 from hil.loop.disturbances import Disturbances
 from hil.loop.notify import Notifier, NotifyingClock
 from hil.loop.outcome import Outcome
-from hil.loop.realtime import Jitter, NotPunctual, check_punctual, measure_jitter, now_text, real_time, report
+from hil.loop.realtime import Jitter, NotArmed, check_punctual, measure_jitter, now_text, real_time, report
 from hil.loop.session import Session
 from hil.loop.simulated_bench import make_plant, simulated_copy
 from hil.loop.supervision import Ending
@@ -67,11 +67,11 @@ def run_profile(
     """Run a profile on a bench and record it as `folder`/`name`.parquet.
 
     virtual: as fast as the machine allows, by a clock that is always on time; simulated benches only. force: arm
-    although jitter or bus load exceed the budget. reset_fault: first reset a fault that the drive has latched. seed:
-    of the simulated sensors, instead of the bench's. planned: told the trajectory before the axis moves. rig: an
-    opened one, left open.
+    although jitter or bus load exceed the budget, or the drive did not report a missing heartbeat. reset_fault: first
+    reset a fault that the drive has latched. seed: of the simulated sensors, instead of the bench's. planned: told the
+    trajectory before the axis moves. rig: an opened one, left open.
 
-    Raises InputError for what cannot be run, NotPunctual for a budget exceeded, HilError for devices that fail,
+    Raises InputError for what cannot be run, NotArmed for what `force` overrides, HilError for devices that fail,
     StillPowered if the drive does not confirm at the end that its power is off.
     """
     section = bench.drive or DriveSection()
@@ -101,7 +101,7 @@ def run_profile(
         rehearse(bench, trajectory, profile)
         cycle = make_cycle(rig, sample.motor_position_rad, profile.motion_limits)
         force = force or section.over_budget == "arm"
-        doubts = [_refused(force, lambda: _check_bus_load(rig, section))]
+        doubts = [_refused(force, lambda: _check_bus_load(rig, section)), _refused(force, lambda: _check_missed(rig))]
         conditions: dict[str, Any] | None = None
         notifier = Notifier()
         stack.callback(notifier.close)
@@ -123,7 +123,7 @@ def run_profile(
             certificate.KEY: (certified := certificate.before_run(gains.period_s, rig.bus_load(), section, conditions)),
             "overridden": [doubt for doubt in doubts if doubt],
             "segments": [run._asdict() for run in trajectory.runs],
-            "notes": list(trajectory.notes),
+            "notes": [*trajectory.notes, *rig.notes, *rig.drive.notes],
         }
         recorder = Recorder(folder, name, cycle.channels, gains.period_s, metadata, lossless=virtual)
         ended = "failed"
@@ -138,11 +138,12 @@ def run_profile(
             ended = f"{type(error).__name__}: {error}"
             raise
         finally:
+            rig.release()
             disturbances = None if virtual else Disturbances.now().since(before)
             notifier.stopping(ended)
             run = certificate.of_run(session.late.values, session.skipped, gains.period_s, disturbances)
             recording = recorder.close(ended, {certificate.KEY: certified | run})
-    notes = trajectory.notes
+        notes = (*trajectory.notes, *rig.notes, *rig.drive.notes, *rig.take_notes())
     if recorder.path.stem != name:
         notes += (
             f"{name}.parquet or {name}.arrows of an earlier run is in {folder} and stays; this run is "
@@ -185,10 +186,19 @@ def _check_set_points(trajectory: Trajectory, section: DriveSection) -> None:
 def _check_bus_load(rig: Devices, section: DriveSection) -> None:
     load = rig.bus_load()
     if load > section.bus_load:
-        raise NotPunctual(
+        raise NotArmed(
             f"drive.bus_load: SYNC, RPDO, TPDO and encoder take {100 * load:.0f} % of the bus at "
             f"{section.bitrate} bit/s, allowed {100 * section.bus_load:.0f} %",
             "raise the bit rate or the period, or say drive.watch_setpoint: false",
+        )
+
+
+def _check_missed(rig: Devices) -> None:
+    if not rig.misses_this_pc():
+        raise NotArmed(
+            "the drive does not report that the heartbeat of this PC ended (EMCY 0x8130): it does not watch it",
+            "check that drive.master_node_id is no other node's and that frames of this PC reach the drive (object "
+            "0x1016), and that it stops by itself when this PC fails (SAFETY.md)",
         )
 
 
@@ -196,7 +206,7 @@ def _refused(force: bool, check: Callable[[], None]) -> str:
     """Return the text of a refusal that is overridden, "" if there is none."""
     try:
         check()
-    except NotPunctual as error:
+    except NotArmed as error:
         if not force:
             raise
         return f"{error.what}; the drive was armed all the same, as --force or drive.over_budget asks"

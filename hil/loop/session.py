@@ -11,7 +11,8 @@ Every failure stops the drive as follows; the recording stays readable:
     drive trips (EMCY, fault, stale, heartbeat lost, bus-off, rebooted)  -> QUICK_STOP
     linear encoder lost: fed back to the position loop -> QUICK_STOP, else -> STOP
     following error, travel limit, loop too late, ctrl-C                -> STOP; a second time -> QUICK_STOP
-    exception in the loop                                               -> QUICK_STOP unrecorded, then the exception
+    wrong sign: faster against the torque, or in a STOP                 -> QUICK_STOP; its ramp too -> power off
+    exception in the loop, third ctrl-C                                 -> QUICK_STOP unrecorded, then the exception
     stop command without answer                                         -> SYNC, heartbeat, RPDO withheld, NMT stop
 """
 
@@ -23,9 +24,9 @@ from typing import Protocol
 from drivers.port import Condition, DriveGoal, DriveSample, EncoderSample
 from hil.errors import HilError, StillPowered, StoppedByUser
 from hil.loop.clock import SKIP_FROM, Clock, LatenessLog, next_due
-from hil.loop.cycle import Cycle, Samples
+from hil.loop.cycle import STOP_SEGMENT, Cycle, Samples
 from hil.loop.devices import Devices, driver_errors
-from hil.loop.outcome import Outcome
+from hil.loop.outcome import Outcome, with_stop
 from hil.loop.stall import NO_STALL, stalled
 from hil.loop.stopping import LONGEST_STOP_S, plan_stop
 from hil.loop.supervision import Ending, find
@@ -39,7 +40,6 @@ QUICK_STOP_LIMIT_S = 2.0  # longest wait for the end of a quick stop
 AFTERMATH_S = 0.1  # recorded after the power stage is off
 DISARM_TIMEOUT_S = 0.2  # beside a ramp of the drive
 _AROUND_S = ARM_TIMEOUT_S + LONGEST_STOP_S + SETTLE_S + QUICK_STOP_LIMIT_S + AFTERMATH_S + DISARM_TIMEOUT_S
-STOP_SEGMENT = -1  # in the recording: set-points of a stop
 _NO_ENCODER = EncoderSample(0.0, 0, 0.0, 0, Condition.OK)
 
 
@@ -103,7 +103,6 @@ class Session:
         self.skipped = 0  # ticks left out between the rows
         self._left_out = 0  # ticks left out since the first row, also while the power is switched off
         self._stops_asked = 0
-        self._switching_off = False
         self._phase = LoopPhase.RUN
         self._ending, self._reason = Ending.COMPLETE, "the profile is done"
         self._last_tick = len(trajectory) - 1  # row at which the phase ends
@@ -111,11 +110,9 @@ class Session:
         self.late = LatenessLog(len(trajectory) + self._ticks(_AROUND_S))
 
     def ask_stop(self) -> None:
-        """Stop the axis: under control the first time, by the drive's own ramp the second, at once the third. Nothing
-        ends the switching-off."""
+        """Stop the axis: under control the first time, by the drive's own ramp the second, unrecorded the third. Only
+        counts for the next tick: an exception raised here could come between two lines that switch the power off."""
         self._stops_asked += 1
-        if self._stops_asked > 2 and not self._switching_off:
-            raise KeyboardInterrupt
 
     def run(self) -> Outcome:
         """Arm, run, stop, disarm. Raises HilError when the drive cannot be armed or a device fails in the loop, and
@@ -130,11 +127,8 @@ class Session:
                 self._power_off(DriveGoal.QUICK_STOP, f"{type(error).__name__}: {error}", error)
                 raise
         self._power_off(DriveGoal.DISABLED, f"{self._ending}: {self._reason}")
-        if self._drive.tripped & Condition.UNANSWERED:
-            if self._ending is Ending.COMPLETE:
-                self._ending = Ending.DRIVE_FAULT
-            self._reason += "; the drive did not follow its controlword: SYNC, heartbeat and set-points were withheld"
-        return Outcome(self._ending, self._reason, rows, self.late.values, self.skipped, self._stops_asked > 0)
+        ending, reason = with_stop(self._ending, self._reason, self._drive.tripped)
+        return Outcome(ending, reason, rows, self.late.values, self.skipped, self._stops_asked > 0)
 
     # -- one tick -------------------------------------------------------------------------------------------------
 
@@ -165,7 +159,7 @@ class Session:
         self._drive.goal = DriveGoal.ENABLED
         for _ in range(self._ticks(ARM_TIMEOUT_S)):
             sample, seen = self._exchange()
-            if self._drive.tripped and (late_s := max(self.late.values)) > self._late_limit_s:
+            if self._drive.tripped and (late_s := max(*self.late.values, self._late_s())) > self._late_limit_s:
                 raise HilError(f"the loop was {late_s:.3f} s late while the drive was armed, which stops the drive "
                                f"(allowed: {self._late_limit_s:.3f} s): take load off the machine")  # fmt: skip
             self._drive.check()
@@ -175,10 +169,8 @@ class Session:
             self._drive.command(self._now_s, 0.0)
             if self._stops_asked:
                 raise StoppedByUser("interrupted while the drive was armed; nothing moved")
-        raise HilError(
-            f"the drive did not enable within {ARM_TIMEOUT_S:.0f} s: it is {self._drive.status}; check its enable "
-            "input and safe torque off"
-        )
+        raise HilError(f"the drive did not enable within {ARM_TIMEOUT_S:.0f} s: it is {self._drive.status}; check its "
+                       "enable input and safe torque off")  # fmt: skip
 
     def _check_start(self, sample: DriveSample, seen: EncoderSample) -> None:
         start_m = self._trajectory.position_m[0]
@@ -205,10 +197,8 @@ class Session:
             motor, torque = sample.motor_position_rad, sample.torque_n_m
             if skipped != self._left_out:
                 cycle.skip(tick + skipped, tick + self._left_out - 1, motor)
-                self._stall = stalled(
-                    bench, late.last_s, tick + self._left_out, cycle.setpoint(tick + self._left_out)[1]
-                )
                 skipped = self.skipped = self._left_out
+                self._stall = stalled(bench, late.last_s, tick + skipped, cycle.setpoint(tick + skipped)[1])
             setpoint, passed = step(tick, Samples(motor, seen.position_m, torque, sample.state, error_code,
                                                   late.last_s, cycle_s, sample.age_cycles, seen.age_cycles,
                                                   skipped))  # fmt: skip
@@ -229,22 +219,29 @@ class Session:
         drive.command(self._now_s, setpoint)
         return tick + 1
 
+    def _late_s(self) -> float:
+        """Lateness of the tick so far: a loop that stalls inside it finds what the drive did meanwhile."""
+        return max(self.late.last_s, self._clock.since(self._clock_tick))
+
     # -- faults and stops ----------------------------------------------------------------------------------
 
     def _supervise(self, tick: int, sample: DriveSample, seen: EncoderSample, passed: int) -> None:
-        """Change the phase and the set-points from this tick on if a rule requires it."""
+        """Change the phase and the set-points from this tick on if a rule requires it; KeyboardInterrupt for a third
+        request to stop."""
+        if self._stops_asked > 2:
+            raise KeyboardInterrupt
         if self._phase is LoopPhase.QUICK_STOP:
             if not sample.powered:
                 self._last_tick = min(self._last_tick, tick + self._ticks(AFTERMATH_S))
             return
         stopping = self._phase is LoopPhase.STOP
         stall = self._stall if self._stall.acts(tick, self._rig.bench.gains) else NO_STALL
-        findings = list(find(self._rig, seen, passed, self.late.last_s, self._stops_asked, stopping=stopping,
+        findings = list(find(self._rig, seen, passed, self._late_s(), self._stops_asked, stopping=stopping,
                              stall=stall))  # fmt: skip
         quick = any(finding.quick for finding in findings)
         if not findings or (stopping and not quick):  # a controlled stop goes on
             return
-        if self._phase is LoopPhase.RUN:
+        if self._phase is LoopPhase.RUN or findings[0].ending in (Ending.SIGN, Ending.STOP_FAILS):  # the graver
             self._ending, self._reason = findings[0].ending, findings[0].reason
         stop = None if quick else self._stop(tick, sample, seen, measured=passed != 0)
         if stop is None:  # the drive stops by itself
@@ -273,7 +270,7 @@ class Session:
         would end a ramp. Nothing that fails here ends it before the drive was asked. Raises StillPowered from `cause`
         if it does not say in two fresh answers, or to that question, that its power is off. ended: how the run ended.
         """
-        drive, self._switching_off = self._drive, True
+        drive = self._drive
         drive.goal, confirmed, braking = goal, 0, False
         for tick in range(self._ticks(DISARM_TIMEOUT_S + QUICK_STOP_LIMIT_S)):
             with contextlib.suppress(Exception):

@@ -1,5 +1,9 @@
 """What a late loop may do to an axis: acceleration under full torque, deadline of the drive, lateness allowed.
 
+Both watchdogs of the drive see a loop that is late: the deadline of the set-points (0x1400:5) and the heartbeat
+consumer (0x1016, CONSUMED_HEARTBEATS of the master's). The lateness allowed follows from both, so that the loop ends
+the run and names itself before the drive does it under another name.
+
 In CST the drive holds its last torque until its deadline of the RPDO (0x1400:5, CiA 301). The deadline is the time in
 which the whole axis under the torque limit moves by following_error_m: t = sqrt(2 e / a), a = r tau / J.
 """
@@ -7,13 +11,14 @@ which the whole axis under the torque limit moves by following_error_m: t = sqrt
 import math
 from typing import NamedTuple
 
+from drivers.canopen_master import CONSUMED_HEARTBEATS
 from hil.bench.bench_file import Bench
 from hil.bench.hardware import DriveMode, DriveSection
 from hil.control.cascade import Gains
 
 SHORTEST_PERIODS = 3  # of a deadline: one set-point lost, one late
 LONGEST_S = 0.05  # of a deadline by default: the heartbeat of the master is missed after about as long
-ANSWER_PERIODS = 2  # between the lateness of a tick and the time without RPDO: the tick before, and its own delay
+ANSWER_PERIODS = 2  # between the lateness of a tick and the time without a frame: the tick before, and its own delay
 SETTLING_TIMES = 3.0  # of the position loop, 1 / gain, until 95 % of a step of the set-points is followed
 
 
@@ -42,8 +47,12 @@ def stalled(bench: Bench, lateness_s: float, row: int, velocity_m_s: float) -> S
 
 def full_torque_acceleration_m_s2(bench: Bench) -> float:
     """Acceleration at the table of the whole axis as one body under the torque limit, without friction."""
-    gains = bench.gains
-    return gains.ratio_m_rad * gains.torque_limit_n_m / float(bench.twin().chain.inertia_kg_m2.sum())
+    return acceleration_m_s2(bench, bench.gains.torque_limit_n_m)
+
+
+def acceleration_m_s2(bench: Bench, torque: float) -> float:
+    """Acceleration at the table of the whole axis as one body under a torque [N m or N], without friction."""
+    return bench.gains.ratio_m_rad * torque / float(bench.twin().chain.inertia_kg_m2.sum())
 
 
 def command_deadline_s(bench: Bench) -> float:
@@ -60,6 +69,11 @@ def command_deadline_s(bench: Bench) -> float:
 
 
 def late_limit_s(bench: Bench) -> float:
-    """Time without set-points at which the axis is stopped: before the drive does it, at most overrun_s."""
-    section = bench.drive or DriveSection()
-    return min(section.overrun_s, command_deadline_s(bench) - ANSWER_PERIODS * bench.gains.period_s)
+    """Lateness at which the axis is stopped: before a watchdog of the drive does it, at most overrun_s.
+
+    A heartbeat may have been due when the loop became late: the time without one is heartbeat_s longer.
+    """
+    section, period_s = bench.drive or DriveSection(), bench.gains.period_s
+    without_heartbeat_s = (CONSUMED_HEARTBEATS - 1) * section.heartbeat_s
+    allowed_s = min(command_deadline_s(bench), without_heartbeat_s) - ANSWER_PERIODS * period_s
+    return min(section.overrun_s, max(allowed_s, period_s))

@@ -2,7 +2,7 @@
 
 import math
 
-from hil.loop.checks import Bounds
+from hil.loop.limits import Bounds
 from hil.motion.pieces import MotionLimits
 from hil.motion.time_optimal import MotionState
 from hil.motion.trajectory import Trajectory, stop_from

@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 from drivers.port import Condition, DriverError, EncoderSample
 from hil.bench.hardware import DriveSection
-from hil.loop.checks import Limit
 from hil.loop.devices import Devices
+from hil.loop.limits import Limit
 from hil.loop.stall import NO_STALL, Stall
 
 
@@ -30,6 +30,8 @@ class Ending(StrEnum):
     VELOCITY = "velocity"
     TORQUE = "torque"
     RESIDUAL = "twin's residual"
+    SIGN = "wrong sign"
+    STOP_FAILS = "stop without effect"
 
 
 class Reaction(StrEnum):
@@ -86,9 +88,9 @@ _BEAT = "heartbeat time-out + 1"
 
 RULES: tuple[Trip, ...] = (
     # first, because a late loop has the drive trip by its own watchdog
-    Trip("loop late", _E.OVERRUN, "lateness > overrun_s, or > deadline of the RPDO less two periods", _R.STOP, "1",
-         "the loop was {lateness_s:.3f} s late, allowed {late_limit_s:.3f} s (drive.overrun_s, "
-         "drive.command_deadline_s): take load off the machine", loop=LoopSign.LATE),
+    Trip("loop late", _E.OVERRUN, "lateness > overrun_s, or > deadline of the RPDO or two heartbeats, less two periods",
+         _R.STOP, "1", "the loop was {lateness_s:.3f} s late, allowed {late_limit_s:.3f} s (drive.overrun_s, "
+         "drive.command_deadline_s, drive.heartbeat_s): take load off the machine", loop=LoopSign.LATE),
     Trip("after a stall", _E.OVERRUN, "ticks were left out less than three time constants of the position loop ago; "
          "only bounds are passed that this can break, and it moved the axis by a fifth of them or more", _R.TWICE, "1",
          "the axis did not follow because the loop had been {stall_s:.3f} s late: take load off the machine",
@@ -129,6 +131,14 @@ RULES: tuple[Trip, ...] = (
          "the motor encoder jumped further than the axis can move: check encoder and cable", _L.MOTOR_JUMP),
     Trip("table encoder jump", _E.ENCODER_FAULT, "step > velocity bound x time + frozen_m", _R.BY_FEEDBACK, "1",
          "the table encoder jumped further than the axis can move: check encoder and cable", _L.TABLE_JUMP),
+    Trip("wrong sign", _E.SIGN, "faster by runaway_m_s while the torque, > load_torque, is against the motion; or the "
+         "first motion is against the set-points by > sign_m", _R.QUICK_STOP, "1",
+         "feedback or torque acts with the wrong sign: the axis moves against its torque or its set-points; correct "
+         "the phase order of the motor, the direction of its encoder or the polarity (0x607E)", _L.SIGN),
+    Trip("stop without effect", _E.STOP_FAILS, "in a controlled stop: faster by runaway_m_s than at its begin, or "
+         "backwards by it; and more by what the loop may overshoot", _R.QUICK_STOP, "1",
+         "the axis got faster while the loop stopped it: feedback or torque acts with the wrong sign, the loop is "
+         "unstable, or a force from outside drives the axis", _L.STOP_FAILS),
     Trip("motor encoder frozen", _E.ENCODER_FAULT,
          "value repeats; table moved > frozen_m or measured torque changed > frozen_torque (CST)", _R.QUICK_STOP, "1",
          "the motor encoder is frozen, or the axis blocked: its value repeats while table or torque change",
@@ -149,7 +159,7 @@ RULES: tuple[Trip, ...] = (
          "the motor is faster than its bound (drive.supervision.velocity_m_s)", _L.VELOCITY),
     Trip("acting set-point", _E.DRIVE_FAULT, "smoothed measured less commanded torque > torque_difference (CST)",
          _R.QUICK_STOP, "16", "the torque differs from its command (drive.supervision.torque_difference): set-points "
-         "do not reach the drive, or it limits them", _L.ACTING_TORQUE),
+         "do not reach the drive, or it limits them or turns their sign", _L.ACTING_TORQUE),
     Trip("torque", _E.TORQUE, "measured torque > torque", _R.QUICK_STOP, "3",
          "the torque exceeds its bound (drive.supervision.torque)", _L.TORQUE),
     Trip("following error", _E.FOLLOWING_ERROR,

@@ -111,7 +111,8 @@ def rounded_ticks(times: list[FloatArray]) -> Rounded | None:
         return None
     whole = small / digit
     jumps = int(np.sum(steps > small + 0.5 * digit))
-    if abs(whole - round(whole)) > _DIGIT * max(whole, 1.0) or min(jumps, steps.size - jumps) < _JUMPS:
+    least = _JUMPS if whole > 0.5 else 2  # a stamp that repeats is no missing row
+    if abs(whole - round(whole)) > _DIGIT * max(whole, 1.0) or min(jumps, steps.size - jumps) < least:
         return None
     low, high = 0.0, np.inf
     for one in times:

@@ -11,10 +11,11 @@ from drive_rig import Mass, running, servo
 from drivers.acting_setpoint import ActingSetpoint
 from drivers.canopen_drive import CanopenDrive, DriveSettings
 from drivers.canopen_master import CanopenMaster
-from drivers.cia402 import OperationMode
+from drivers.cia402 import DriveState, OperationMode
 from drivers.inprocess import InProcessBus
 from drivers.modelled_bus import Fault, FaultKind
 from drivers.port import Condition, DriveFault, DriveGoal
+from drivers.sim.cia402_device import STATUS
 from drivers.sim.drive_node import SimulatedDrive
 
 RPDO = 0x205
@@ -79,6 +80,23 @@ def test_lost_commands_are_seen_in_the_demand_and_three_are_not() -> None:
         rig.drive.check()
     rig.drive.reset_fault()
     rig.drive.check()
+
+
+@pytest.mark.parametrize(("state", "goal", "compared"), [
+    (DriveState.OPERATION_ENABLED, DriveGoal.ENABLED, True),
+    (DriveState.OPERATION_ENABLED, DriveGoal.QUICK_STOP, False),
+    (DriveState.OPERATION_ENABLED, DriveGoal.DISABLED, False),
+    (DriveState.QUICK_STOP_ACTIVE, DriveGoal.ENABLED, False),
+    (DriveState.SWITCHED_ON, DriveGoal.ENABLED, False),
+])  # fmt: skip
+def test_a_demand_is_compared_only_while_set_points_count(state: DriveState, goal: DriveGoal, compared: bool) -> None:
+    """While the drive stops or arms, its demand is that of its own ramp."""
+    _, rig = running()
+    rig.drive._statusword = STATUS[state]
+    rig.drive.goal = goal
+    rig.node.port.send(0x285, frame(CST, 900), rig.now_s)
+    rig.master.poll(rig.now_s + 0.001)
+    assert bool(rig.drive._latched & Condition.OTHER_SETPOINT) == compared
 
 
 def test_without_the_watch_no_second_tpdo_is_sent() -> None:

@@ -254,6 +254,7 @@ def test_what_stops_the_axis() -> None:
         Condition.NOT_OPERATIONAL,
         Condition.UNANSWERED,
         Condition.OTHER_SETPOINT,
+        Condition.RUNAWAY,
     }
 
 

@@ -57,9 +57,10 @@ def test_words_and_modes_are_coded_as_in_the_standard() -> None:
     """Client and simulated drive have these names in common: a wrong number would be wrong on both sides."""
     commands = (DISABLE_VOLTAGE, QUICK_STOP, SHUTDOWN, SWITCH_ON, ENABLE_OPERATION, FAULT_RESET)
     assert commands == (0x00, 0x02, 0x06, 0x07, 0x0F, 0x80)
-    assert [bit.value for bit in Controlword] == [0x01, 0x02, 0x04, 0x08, 0x10, 0x80]
+    assert [bit.value for bit in Controlword] == [0x01, 0x02, 0x04, 0x08, 0x10, 0x80, 0x100]
     assert {name: bit.value for name, bit in Statusword.__members__.items()} == {
-        "REMOTE": 0x0200, "TARGET_REACHED": 0x0400, "FOLLOWS_COMMAND": 0x1000, "HOMING_ATTAINED": 0x1000,
+        "VOLTAGE_ENABLED": 0x0010, "QUICK_STOP": 0x0020, "WARNING": 0x0080, "REMOTE": 0x0200, "TARGET_REACHED": 0x0400,
+        "INTERNAL_LIMIT": 0x0800, "FOLLOWS_COMMAND": 0x1000, "HOMING_ATTAINED": 0x1000,
         "HOMING_ERROR": 0x2000}  # fmt: skip
     assert [mode.value for mode in OperationMode] == [0, 6, 8, 9, 10]
 

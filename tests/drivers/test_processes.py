@@ -66,6 +66,7 @@ def test_a_drive_in_another_process_runs_in_wall_clock_time(nodes: subprocess.Po
     )
     encoder = CanopenEncoder(master, EncoderSettings(heartbeat_s=5.0, missed_answers_allowed=200))
     drive.set_up()
+    assert drive.info.watches_master  # by the clock of the other process
     encoder.set_up()
     start_s = time.monotonic()
     master.start(0.0)

@@ -203,6 +203,35 @@ def test_a_second_request_waits_until_its_edge_can_rise() -> None:
     assert reset_bits(rig, 4) == [False, True, False, False]
 
 
+def test_a_reset_asked_for_during_the_fault_reaction_waits_for_its_end() -> None:
+    """The ramp of the reaction takes no command; the edge comes when the drive is in FAULT."""
+    _, rig = running()
+    rig.node.trip(0x4310, 0x08, rig.now_s)
+    while rig.cycle().state is not DriveState.FAULT_REACTION_ACTIVE:
+        pass
+    rig.drive.reset_fault()
+    states, sent = [], reset_bits(rig, 0)
+    while rig.node.state in (DriveState.FAULT_REACTION_ACTIVE, DriveState.FAULT) and len(states) < 500:
+        states.append(rig.node.state)
+        rig.cycle()
+    assert states.count(DriveState.FAULT_REACTION_ACTIVE) > 3
+    assert sum(sent) == 1
+    assert rig.node.state is DriveState.SWITCH_ON_DISABLED
+
+
+def test_what_tripped_the_drive_first_is_kept_when_it_has_passed() -> None:
+    """Answers that come again do not take back that they were missed."""
+    bus, rig = running()
+    bus.inject(Fault(FaultKind.DROP, 0x185, count=6))
+    for _ in range(10):
+        rig.cycle()
+    assert rig.drive.read(rig.now_s).condition & Condition.STALE == 0
+    rig.node.emergency(0x4310, 0x09, rig.now_s)
+    rig.cycle()
+    assert rig.drive.tripped & Condition.STALE
+    assert rig.drive.tripped & Condition.EMERGENCY
+
+
 def test_the_last_emergency_is_the_error_code() -> None:
     _, rig = running()
     assert rig.drive.error_code == 0

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from observed_run import Handles
+from wrong_signs import encoder_in_the_loop, in_the_drive, torque_in_the_loop
 
 from drivers.bus import BusState
 from drivers.cia402 import DriveState
@@ -32,7 +33,9 @@ DRIVE, ENCODER, HIL = "drive fault", "encoder fault", "HilError"
 SETTLING_CYCLES = 40 + 82 + 2  # a stall that passes, three time constants of the position loop
 SETPOINT_CYCLES = 3 + 4  # missed_answers + 4
 FOLLOWING, LATE, ASKED, NAN = "following error", "loop too late", "interrupted", "not a number"
-MEASURED = frozenset({ENCODER, FOLLOWING, "velocity", "torque", DRIVE, "travel limit"})
+MEASURED = frozenset(
+    {ENCODER, FOLLOWING, "velocity", "torque", DRIVE, "travel limit", "wrong sign", "stop without effect"}
+)
 
 
 @dataclass(frozen=True)
@@ -49,6 +52,8 @@ class Kind:
     hears: bool = True
     coasts: bool = False  # power goes off at once: friction alone stops the axis
     stalls: bool = False  # the loop does nothing for a time: the way counts from the fault
+    sign: str = ""  # what acts with the wrong sign: "loop", or "drive", whose own ramp accelerates then
+    cst: bool = False  # in this mode alone
 
 
 def _bus(kind: FaultKind, can_id: int, count: Callable[[Handles], int], **more: Any) -> Callable[[Handles], None]:
@@ -177,6 +182,25 @@ def _late_cycle(low_s: float, high_s: float) -> Callable[[Handles], None]:
     return lambda h: h.late_s.update({0: h.rng.uniform(low_s, high_s)})
 
 
+def _stall_within(low_s: float, high_s: float) -> Callable[[Handles], None]:
+    """The tick is met in time, and the loop stands still after its SYNC, while the drive's own time goes on."""
+
+    def act(h: Handles) -> None:
+        span_s, poll = h.rng.uniform(low_s, high_s), h.rig.master.poll
+        h.stalled_s[0], h.late_s[1] = span_s, span_s - 1e-3
+
+        def stalled(now_s: float, timeout_s: float = 0.0) -> None:
+            h.rig.master.poll = poll
+            poll(now_s, timeout_s)
+            for ms in range(1, math.ceil(1e3 * span_s) + 1):
+                h.drive.tick(h.tick * 1e-3 + min(1e-3 * ms, span_s))
+            poll(h.tick * 1e-3 + span_s + 1e-3)
+
+        h.rig.master.poll = stalled
+
+    return act
+
+
 def _recorder(h: Handles) -> None:
     h.rows.fail = HilError("the recorder process ended")
 
@@ -280,8 +304,14 @@ KINDS: tuple[Kind, ...] = (
       (("motor", "drive"), ("table", "encoder"))),
     *(Kind(f"{name} encoder gives NaN or infinity", _sensor(d, _nan), _ends(NAN), 2) for name, d in
       (("motor", "drive"), ("table", "encoder"))),
-    Kind("cycle late, 1 to 40 ms", _late_cycle(0.001, 0.04), _ends(COMPLETE, LATE), SETTLING_CYCLES, stalls=True),
+    Kind("cycle late, 1 to 51 ms", _late_cycle(0.001, 0.051), _ends(COMPLETE, LATE), SETTLING_CYCLES, stalls=True),
     Kind("cycle late, 51 to 300 ms", _late_cycle(0.051, 0.3), _ends(LATE), 2, stalls=True),
+    Kind("cycle stalls, 2 to 51 ms", _stall_within(0.002, 0.051), _ends(COMPLETE, LATE), SETTLING_CYCLES, stalls=True),
+    Kind("cycle stalls, 52 to 300 ms", _stall_within(0.052, 0.3), _ends(LATE), 3, stalls=True),
+    Kind("wrong sign of the motor encoder in the loop", encoder_in_the_loop, MEASURED | _PASSES, sign="loop"),
+    Kind("wrong sign of the torque in the loop", torque_in_the_loop, MEASURED | _PASSES, sign="loop", cst=True),
+    *(Kind(f"wrong sign of the {name} in the drive", in_the_drive(encoder=name == "motor encoder"), MEASURED | _PASSES,
+           sign="drive") for name in ("motor encoder", "torque")),
     Kind("wall clock steps", _wall_clock, _PASSES),
     Kind("another set-point acts", _other_setpoint, _D, SETPOINT_CYCLES),
     Kind("recorder dead", _recorder, _ends(HIL), 2),

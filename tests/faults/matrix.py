@@ -25,6 +25,8 @@ from fault_kinds import COMPLETE, DRIVE, KINDS, Kind
 from observed_run import END_M, Observed, Stage, bench_with, observe
 from reach import stopping_m
 from set_up_faults import SET_UP, run_set_up
+from wrong_signs import STATES as SIGN_STATES
+from wrong_signs import drawn_bench, sign_violations
 
 from drivers.cia402 import DriveState
 from hil.errors import HilError
@@ -41,7 +43,8 @@ REST_M_S = 1e-3
 
 
 class Run(NamedTuple):
-    """A run: seed, fault, state at which it struck, ending, cycles to detection (-1: none), violations, description."""
+    """A run: seed, fault, state at which it struck, ending, cycles to detection (-1: none), violations, description,
+    and the way from detection, without one from the fault."""
 
     seed: int
     fault: str
@@ -50,6 +53,7 @@ class Run(NamedTuple):
     cycles: int
     wrong: list[str]
     about: str
+    travel_m: float = 0.0
 
 
 def one_run(seed: int) -> Run:
@@ -69,14 +73,25 @@ def one_run(seed: int) -> Run:
             wrong = [f"{type(error).__name__}: {error}"]
         return Run(seed, name, "set-up", "refused", 0, wrong, about)
     kind = next(kind for kind in KINDS if kind.name == name)
-    state = rng.choice(STATES)
+    if kind.sign:
+        bench, about = drawn_bench(rng, cst=kind.cst)
+    state = rng.choice(SIGN_STATES if kind.sign else STATES)
     at, later = rng.randrange(12, 290), rng.randrange(1, 40)
     seen = observe(bench, Stage(state, at, later), kind.act, rng)
     cycles = -1
     if seen.injected is not None and seen.detected is not None:
         cycles = seen.detected - seen.injected
     where = seen.ticks[seen.injected].state.name if seen.injected is not None else "not reached"
-    return Run(seed, name, where, seen.ended, cycles, verdict(kind, state, seen), f"{about}, tick {at}, {state.name}")
+    return Run(
+        seed,
+        name,
+        where,
+        seen.ended,
+        cycles,
+        verdict(kind, state, seen),
+        f"{about}, tick {at}, {state.name}",
+        seen.travel_m,
+    )
 
 
 def verdict(kind: Kind, state: DriveState, seen: Observed) -> list[str]:
@@ -90,6 +105,8 @@ def verdict(kind: Kind, state: DriveState, seen: Observed) -> list[str]:
     if seen.powered_at_end and not seen.still_powered:
         wrong.append("power is on and no error says so")
     wrong += _commands(seen)
+    if kind.sign:
+        return wrong + sign_violations(kind.sign, state, seen)
     struck = seen.ticks[seen.injected] if seen.injected is not None else None
     if struck is None or state is not ENABLED or struck.phase is not LoopPhase.RUN:
         if state in ARMING and seen.outcome is not None and seen.ended not in kind.endings | {COMPLETE, DRIVE}:
@@ -133,14 +150,20 @@ def table(runs: list[Run]) -> str:
     by: dict[str, list[Run]] = defaultdict(list)
     for run in runs:
         by[run.fault].append(run)
-    lines = ["| fault | runs | endings | cycles to detection: median, most | violations |", "|---|---|---|---|---|"]
+    lines = [
+        "| fault | runs | endings | cycles to detection: median, most | longest way, mm | violations |",
+        "|---|---|---|---|---|---|",
+    ]
     for name, group in by.items():
         cycles = sorted(run.cycles for run in group if run.cycles >= 0 and run.state == ENABLED.name)
         spread = f"{cycles[len(cycles) // 2]}, {cycles[-1]}" if cycles else ""
+        far_mm = 1e3 * max((run.travel_m for run in group if run.cycles >= 0), default=0.0)
         endings = ", ".join(f"{ending} {count}" for ending, count in Counter(run.ended for run in group).most_common())
-        lines.append(f"| {name} | {len(group)} | {endings} | {spread} | {sum(bool(run.wrong) for run in group)} |")
+        lines.append(
+            f"| {name} | {len(group)} | {endings} | {spread} | {far_mm:.1f} | {sum(bool(run.wrong) for run in group)} |"
+        )
     states = ", ".join(f"{state} {count}" for state, count in Counter(run.state for run in runs).most_common())
-    lines.append(f"| all | {len(runs)} | | | {sum(bool(run.wrong) for run in runs)} |")
+    lines.append(f"| all | {len(runs)} | | | | {sum(bool(run.wrong) for run in runs)} |")
     return "\n".join([*lines, "", f"State of the drive when the fault struck: {states}."])
 
 

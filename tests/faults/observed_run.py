@@ -133,9 +133,13 @@ class _Clock(VirtualClock):
 
     def __init__(self) -> None:
         self.look: Callable[[int], float] = lambda tick: 0.0
+        self.stalled_s: Callable[[int], float] = lambda tick: 0.0
 
     def wait(self, tick: int) -> float:
         return self.look(tick)
+
+    def since(self, tick: int) -> float:
+        return self.stalled_s(tick)
 
 
 class _Rows:
@@ -160,6 +164,7 @@ class Handles:
     rows: Any  # the recorder
     tick: int
     late_s: dict[int, float] = field(default_factory=dict)
+    stalled_s: dict[int, float] = field(default_factory=dict)  # time that passes inside a tick, likewise
     each: list[Callable[[], None]] = field(default_factory=list)  # called at every tick from now on
     undo: list[Callable[[], None]] = field(default_factory=list)  # called after the run
 
@@ -222,6 +227,7 @@ def observe(
             return handles[0].late_s.pop(tick - handles[0].tick, 0.0)
 
         clock.look = look
+        clock.stalled_s = lambda tick: handles[0].stalled_s.get(tick - handles[0].tick, 0.0) if handles else 0.0
         try:
             seen.outcome = session.run()
         except StillPowered as error:

@@ -48,18 +48,26 @@ def _tests(folder: str, *names: str) -> tuple[str, ...]:
 
 _DRIVE = _tests("drivers", "cia402", "faults_devices", "faults_watchdogs", "acting_setpoint", "faults_frames",
                 "stop_answered", "canopen_drive")  # fmt: skip
+_SESSION = _tests("hil/loop", "session", "session_times", "session_arming", "session_power_off", "supervision",
+                  "late_ticks", "interrupted")  # fmt: skip
 MODULES = {
     "drivers/cia402.py": Suite(_tests("drivers", "cia402")),
     "drivers/homing.py": Suite(_tests("drivers", "stop_answered", "canopen_drive")),
     "drivers/canopen_drive.py": Suite(_DRIVE),
+    "drivers/bus.py": Suite(_tests("drivers", "bus", "foreign_frames")),
+    "drivers/canopen_master.py": Suite(_tests("drivers", "heartbeats", "faults_watchdogs")),
+    "drivers/canopen_node.py": Suite(_tests("drivers", "heartbeats", "faults_watchdogs", "faults_frames", "encoders")),
+    "drivers/heartbeat_trial.py": Suite(_tests("drivers", "heartbeats")),
+    "hil/loop/clock.py": Suite(_tests("hil/loop", "clock", "late_ticks")),
+    "drivers/cia402_setup.py": Suite(_tests("drivers", "canopen_setup", "canopen_drive", "eds")),
+    "drivers/stop_watch.py": Suite(_tests("drivers", "stop_watch", "stop_answered")),
     "hil/loop/checks.py": Suite(_tests("hil/loop", "checks", "encoder_checks"), compiled=False),
+    "hil/loop/sign_check.py": Suite(_tests("hil/loop", "sign_check"), compiled=False),
     "hil/loop/stall.py": Suite(_tests("hil/loop", "stall")),
     "hil/loop/stopping.py": Suite(_tests("hil/loop", "bounds")),
     "hil/loop/bounds.py": Suite(_tests("hil/loop", "bounds")),
     "hil/loop/supervision.py": Suite(_tests("hil/loop", "supervision_rules", "stall")),
-    "hil/loop/session.py": Suite(
-        _tests("hil/loop", "session", "session_times", "session_arming", "session_power_off", "supervision")
-    ),
+    "hil/loop/session.py": Suite(_SESSION),
 }
 TEST_S = 20  # processor time of a test: the slowest takes 3 s
 BROKEN = 70  # exit code where pytest itself could not be run

@@ -7,14 +7,16 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from hil.loop.checks import Bounds, Facts, Limit, Memory, check
+from hil.loop.checks import check
+from hil.loop.limits import Bounds, Facts, Limit, Memory
 
 PERIOD_S = 2.0**-10  # nearly a millisecond; powers of two, so that a value can be equal to its bound
 OFF = Bounds(has_table=True, commands_torque=True, following_error_m=math.inf, following_error_s=0.0,
              travel_low_m=-math.inf, travel_high_m=math.inf, deceleration_m_s2=math.inf, velocity_m_s=math.inf,
              encoder_difference_m=math.inf, frozen_m=math.inf, frozen_torque=math.inf, torque=math.inf,
              torque_difference=math.inf, drive_torque=math.inf, continuous_torque=math.inf, thermal_time_s=1.0,
-             residual_motor_m=math.inf, residual_table_m=math.inf, residual_torque=math.inf)  # fmt: skip
+             residual_motor_m=math.inf, residual_table_m=math.inf, residual_torque=math.inf,
+             load_torque=math.inf, runaway_m_s=math.inf, position_gain_1_s=0.0, sign_m=math.inf)  # fmt: skip
 STILL = Facts(position_m=0.0, velocity_m_s=0.0, motor_m=0.0, table_m=0.0, fed_back_m=0.0, torque=0.0, command=0.0,
               reference=0.0, twin_motor_m=0.0, twin_table_m=0.0, twin_torque=0.0, motor_age=0, table_age=0, skipped=0,
               period_s=PERIOD_S)  # fmt: skip

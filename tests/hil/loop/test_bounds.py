@@ -10,9 +10,10 @@ from bench_runs import MOVE, bench_with
 
 from hil.bench.hardware import DriveMode
 from hil.loop.bounds import make_bounds, make_cycle
-from hil.loop.checks import Bounds
 from hil.loop.cycle import Setpoint
 from hil.loop.devices import Rig
+from hil.loop.limits import Bounds
+from hil.loop.simulated_bench import load_simulated
 from hil.loop.stopping import plan_stop
 from hil.motion.pieces import MotionLimits
 from hil.motion.time_optimal import MotionState
@@ -46,6 +47,37 @@ def test_bounds_follow_from_limits_gains_and_following_error() -> None:
     assert math.isfinite(bounds.drive_torque)
     off = (bounds.continuous_torque, bounds.residual_motor_m, bounds.residual_table_m, bounds.residual_torque)
     assert off == (math.inf,) * 4
+
+
+def test_an_axis_runs_away_by_what_full_torque_gives_in_three_periods_and_the_swing_of_its_motor() -> None:
+    """Two masses: after a step of the torque the motor swings by 2 a m2 / (m1 w), w^2 = k (1 / m1 + 1 / m2)."""
+    motor_kg, table_kg, stiffness_n_m, ratio_m_rad = 335.0, 384.0, 5.64e7, 0.01 / (2.0 * math.pi)
+    full_m_s2 = TORQUE_N_M / ratio_m_rad / (motor_kg + table_kg)
+    swing_s = 2.0 * table_kg / motor_kg / math.sqrt(stiffness_n_m * (1.0 / motor_kg + 1.0 / table_kg))
+    count_m = 0.01 / 2**20
+    assert bounds_of().runaway_m_s == pytest.approx(full_m_s2 * (3e-3 + swing_s) + 2.0 * count_m / 1e-3, rel=1e-3)
+
+
+def test_a_load_may_drive_the_axis_with_half_of_the_torque_that_can_act() -> None:
+    assert bounds_of().load_torque == pytest.approx(0.5 * TORQUE_N_M)
+    assert bounds_of(supervision={"load_torque": 8.0}).load_torque == 8.0
+    with Rig(load_simulated("emps")) as rig:  # its control law has no limit, its drive has one of 300 N
+        rig.set_up()
+        bounds = make_bounds(rig, LIMITS)
+        assert (bounds.load_torque, bounds.torque_difference) == (150.0, 90.0)
+        assert rig.drive.stop_margin == pytest.approx(150.0 / 8557.43)
+
+
+@pytest.mark.parametrize(("error_m", "sign_m"), [(0.0012, 0.0003), (0.002, 0.0005), (0.02, 0.0005)])
+def test_the_first_motion_shows_its_sign_within_half_a_millimetre(error_m: float, sign_m: float) -> None:
+    assert bounds_of(following_error_m=error_m).sign_m == pytest.approx(sign_m)
+    soft = bench_with(drive={"following_error_m": error_m}, control={"velocity_integral_time_ms": None})
+    with Rig(soft) as rig:  # without an integrator the position loop holds the load: 6 N m / (Kp Kv)
+        gains = soft.gains
+        held_rad = 6.0 / (gains.velocity_gain_n_m_s_rad * gains.position_gain_1_s)
+        assert make_bounds(rig, LIMITS).sign_m == pytest.approx(held_rad * gains.ratio_m_rad)
+    coarse = bounds_of(following_error_m=error_m, table={"resolution_m": 2e-4})
+    assert coarse.sign_m == pytest.approx(8e-4)
 
 
 def test_bounds_of_the_bench_come_first() -> None:

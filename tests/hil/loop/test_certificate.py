@@ -20,7 +20,7 @@ from processes import DEADLINE_S, wait_for
 
 from drivers.cia402 import DriveState
 from hil.loop.clock import LatenessLog
-from hil.loop.realtime import NotPunctual
+from hil.loop.realtime import NotArmed
 from hil.loop.run import run_profile
 from hil.recording.recording import read_recording
 
@@ -68,9 +68,7 @@ def test_a_run_that_fails_carries_it_as_well(tmp_path: Path) -> None:
 
 
 def test_a_bench_may_allow_to_arm_above_its_budget_and_the_recording_says_so(tmp_path: Path) -> None:
-    with pytest.raises(
-        NotPunctual, match=r"The drive was not armed: raise .* or say drive.watch_setpoint: false, or arm"
-    ):
+    with pytest.raises(NotArmed, match=r"The drive was not armed: raise .* or say drive.watch_setpoint: false, or arm"):
         run_profile(bench_with(drive={"bitrate": 250_000}), MOVE, tmp_path, "run", virtual=True)
     bench = bench_with(drive={"bitrate": 250_000, "over_budget": "arm"})
     ran = run_profile(bench, MOVE, tmp_path, "run", virtual=True)

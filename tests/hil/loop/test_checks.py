@@ -8,7 +8,7 @@ from itertools import repeat
 import pytest
 from checked_ticks import PERIOD_S, STILL, Checked
 
-from hil.loop.checks import Limit, Memory
+from hil.loop.limits import Limit, Memory
 
 BOTH = pytest.mark.parametrize("sign", [1.0, -1.0])
 AT, BEYOND = 1.0, 1.0 + 1e-9  # shares of a bound

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from checked_ticks import STILL, Checked
 
-from hil.loop.checks import Limit
+from hil.loop.limits import Limit
 
 STEP_M = 2.0**-17  # a tick: 8 mm/s
 FROZEN_M = 2.0**-12

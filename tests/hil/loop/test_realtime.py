@@ -19,7 +19,7 @@ from hil.loop import realtime
 from hil.loop.disturbances import Disturbances
 from hil.loop.realtime import (
     Jitter,
-    NotPunctual,
+    NotArmed,
     check_punctual,
     machine_state,
     measure_jitter,
@@ -116,13 +116,13 @@ def test_percentiles_are_nearest_ranks(lateness_s: list[float]) -> None:
 def test_jitter_beyond_the_budget_is_refused() -> None:
     jitter = Jitter.of([0.0] * 90 + [0.0007] * 10, 0.001)
     check_punctual(jitter, 0.0008)
-    with pytest.raises(NotPunctual, match=r"p99 700 us.*allowed p99 500 us.*--force"):
+    with pytest.raises(NotArmed, match=r"p99 700 us.*allowed p99 500 us.*--force"):
         check_punctual(jitter, 0.0005)
 
 
 def test_bus_load_beyond_the_budget_is_refused_or_overridden(tmp_path: Path) -> None:
     slow = bench_with(drive={"bitrate": 250_000})
-    with pytest.raises(NotPunctual, match=r"take 1\d\d % of the bus at 250000 bit/s"):
+    with pytest.raises(NotArmed, match=r"take 1\d\d % of the bus at 250000 bit/s"):
         run_profile(slow, MOVE, tmp_path, "run", virtual=True)
     assert list(tmp_path.iterdir()) == []
     ran = run_profile(slow, MOVE, tmp_path, "run", virtual=True, force=True)

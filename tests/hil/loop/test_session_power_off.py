@@ -13,7 +13,7 @@ from faulty_bench import FaultyBench
 from typer.testing import CliRunner
 
 from drivers.cia402 import DriveState
-from drivers.port import Condition
+from drivers.port import Condition, DriveGoal
 from drivers.sdo_setup import EDS_FOLDER
 from drivers.sim.drive_node import SimulatedDrive
 from hil.cli import app
@@ -107,7 +107,7 @@ def test_while_power_is_switched_off_zero_is_commanded(at: FaultyBench, mode: st
         command = rig.drive.command
 
         def seen(now_s: float, value: float) -> None:
-            if session._switching_off:
+            if rig.drive.goal is DriveGoal.DISABLED:  # the power is switched off
                 commanded.append(value)
             command(now_s, value)
 
@@ -128,7 +128,7 @@ def test_a_drive_that_never_answers_is_asked_for_a_fifth_of_a_second_only(at: Fa
         read = rig.drive.read
 
         def seen(now_s: float) -> Any:
-            if session._switching_off:
+            if rig.drive.goal is DriveGoal.DISABLED:  # the power is switched off
                 switching_off.append(now_s)
             return read(now_s)
 
@@ -199,7 +199,8 @@ def test_the_ramp_of_the_drive_is_not_cut_off_by_the_end_of_a_run(tmp_path: Path
         def fail() -> None:
             for _ in range(requests):
                 session.ask_stop()
-            raise ZeroDivisionError
+            if not requests:
+                raise ZeroDivisionError
 
         rigs.append(rig)
         rig.nodes.drive.values[0x6085_00] //= slower

@@ -7,10 +7,12 @@ from pathlib import Path
 
 import pytest
 from bench_runs import MOVING, bench_with, run
+from pydantic import ValidationError
 
 from drivers.modelled_bus import Fault, FaultKind, ModelledBus
 from drivers.port import Condition
 from hil.bench.hardware import DriveSection
+from hil.errors import FieldError
 from hil.loop.devices import Rig
 from hil.loop.session import Session
 from hil.loop.stall import (
@@ -47,7 +49,8 @@ def test_a_deadline_has_three_periods_and_at_most_a_twentieth_of_a_second() -> N
     assert command_deadline_s(bench_with(drive={"mode": "cst", "following_error_m": 1.0})) == LONGEST_S
     assert command_deadline_s(bench_with(drive={"mode": "csv"})) == LONGEST_S  # the drive holds a speed
     assert command_deadline_s(bench_with(drive={"mode": "cst", "command_deadline_s": 0.2})) == 0.2
-    assert late_limit_s(bench_with(drive={"command_deadline_s": 0.2})) == 0.05  # overrun_s
+    patient = {"command_deadline_s": 0.2, "heartbeat_s": 0.1}
+    assert late_limit_s(bench_with(drive=patient)) == 0.05  # overrun_s
 
 
 def test_the_drive_has_the_deadline_of_the_bench() -> None:
@@ -88,6 +91,22 @@ def test_the_axis_is_stopped_two_periods_before_the_deadline_or_at_the_overrun()
     assert late_limit_s(bench_with(drive=drive | {"overrun_s": 0.02})) == pytest.approx(0.02)
     slow = {"velocity_period_s": 0.004, "position_period_s": 0.004}
     assert late_limit_s(bench_with(control=slow, drive=drive | {"overrun_s": 0.05})) == pytest.approx(0.022)
+
+
+def test_the_axis_is_stopped_before_the_drive_misses_a_heartbeat() -> None:
+    """Three are awaited and one may have been due: two of them less two periods, and no less than a period."""
+    patient = {"command_deadline_s": 1.0, "overrun_s": 1.0}
+    limits_s = [late_limit_s(bench_with(drive=patient | {"heartbeat_s": given})) for given in (0.02, 0.1, 0.001)]
+    assert limits_s == pytest.approx([0.038, 0.198, 0.001])
+
+
+def test_a_heartbeat_shorter_than_the_period_of_the_loop_is_refused() -> None:
+    slow = {"velocity_period_s": 0.025, "position_period_s": 0.025}
+    with pytest.raises(FieldError, match=r"drive.heartbeat_s: given 0.02, allowed the period of the loop.*0.025"):
+        Rig(bench_with(control=slow))
+    Rig(bench_with(control=slow, drive={"heartbeat_s": 0.025})).close()
+    with pytest.raises(ValidationError, match="heartbeat_s"):
+        DriveSection(heartbeat_s=22.0)  # three in ms do not fit the 16 bit of 0x1016
 
 
 def test_a_bench_without_a_drive_has_the_values_of_the_default() -> None:

@@ -10,8 +10,8 @@ import pytest
 from bench_runs import bench_with
 
 from drivers.port import Condition
-from hil.loop.checks import Limit
 from hil.loop.devices import Rig
+from hil.loop.limits import Limit
 from hil.loop.stall import Stall
 from hil.loop.supervision import RULES, Ending, LoopSign, Reaction, StopCause, find, rules_table
 
@@ -151,7 +151,7 @@ def test_a_stall_explains_bounds_of_the_motion_and_none_of_a_sensor(rig: Rig) ->
     """A missing set-point breaks those of motion and torque; an encoder does not jump, freeze or count wrong by it."""
     moved = after(rig, 1.0, rig.section.following_error_m)
     explained = {limit for limit in Limit if limit and found(rig, limit, **moved)[0].rule == "after a stall"}
-    of_sensors = Limit.NOT_FINITE | Limit.ENCODER_DIFFERENCE | Limit.TORQUE_TIME
+    of_sensors = Limit.NOT_FINITE | Limit.ENCODER_DIFFERENCE | Limit.TORQUE_TIME | Limit.SIGN | Limit.STOP_FAILS
     for encoder in ("MOTOR", "TABLE"):
         of_sensors |= Limit[f"{encoder}_JUMP"] | Limit[f"{encoder}_FROZEN"] | Limit[f"{encoder}_REVERSED"]
     assert explained == set(Limit) - set(of_sensors) - {Limit.NONE}

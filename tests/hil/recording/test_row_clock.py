@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hil.recording.row_clock import RowClock, row_clock, row_ticks, stamp_share
+from hil.recording.row_clock import RowClock, rounded_ticks, row_clock, row_ticks, stamp_share
 
 ROWS = 2500
 
@@ -159,3 +159,19 @@ def test_rows_are_not_the_clock_where_missing_ones_cannot_be_counted() -> None:
         clock, _ = row_clock(columns, [slice(0, kept.size)], 1e-3)
         if clock is not None:
             assert np.max(np.abs(clock.ticks[0] - (kept - kept[0]))) <= 1
+
+
+@pytest.mark.parametrize(
+    ("period_s", "digit_s"), [(1.125e-3, 1e-3), (1.125e-3, 1e-4), (0.8e-3, 1e-3), (1.0005e-3, 1e-3)]
+)
+def test_the_period_of_rounded_stamps_follows_from_all_of_them(period_s: float, digit_s: float) -> None:
+    stamps = np.floor(np.arange(20_000) * period_s / digit_s + 1e-9) * digit_s
+    found = rounded_ticks([stamps])
+    assert found is not None
+    assert abs(found.period_s - period_s) <= found.error_s + 1e-12
+    assert found.error_s < 1e-4 * period_s
+
+
+def test_missing_rows_are_no_rounding() -> None:
+    rows = np.delete(np.arange(20_000), [300, 301, 4000, 9000, 9500, 9700, 12000])
+    assert rounded_ticks([rows * 1e-3]) is None

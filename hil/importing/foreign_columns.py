@@ -1,6 +1,6 @@
 """Read columns of a foreign file by name: CSV, MATLAB .mat to version 7, Parquet, JSON. No map is known here."""
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from hil.arrays import FloatArray
 from hil.errors import InputError, listed
 from hil.files import json_columns
-from hil.files.csv_columns import CsvFormat, line_of_row, read_whole
 from hil.files.date_stamps import seconds_of
 from hil.files.input_file import check_file
 from hil.importing.long_text import long_form
@@ -88,12 +87,9 @@ def read_foreign(
     notes: tuple[str, ...] = ()
     match format_of(path):
         case ".csv":
-            names = header_names(path, options)
-            columns = {} if dates or options.thousands else _whole(path, names, wanted, options)
-            if not columns:
-                rows = read_rows(path, names, options)
-                columns, stamps = _chosen(path, rows, wanted, dates)
-                lines, notes = rows.lines, rows.notes
+            rows = read_rows(path, header_names(path, options), options)
+            columns, stamps = _chosen(path, rows, wanted, dates)
+            lines, notes = rows.lines, rows.notes
         case ".mat":
             variables = load_variables(path).arrays
             columns = {name: mat_column(path, variables, name) for name in wanted}
@@ -111,13 +107,7 @@ def read_foreign(
     columns |= {name: held(columns[name]) for name in on_change}
 
     def place(row: int) -> str:
-        if lines is not None:
-            return f"{path}:{lines[row]}"
-        return (
-            f"{path}:{line_of_row(path, row, _form(options))}"
-            if format_of(path) == ".csv"
-            else f"{path}: row {row + 1}"
-        )
+        return f"{path}: row {row + 1}" if lines is None else f"{path}:{lines[row]}"
 
     def given(row: int, name: str) -> str:
         if lines is None:
@@ -129,15 +119,6 @@ def read_foreign(
     checked = {name: values for name, values in (columns | stamps).items() if name not in sparse}
     _check(checked, path, place, given, missing)
     return Foreign(columns | stamps, scalars, place, notes)
-
-
-def _whole(path: Path, names: Sequence[str], wanted: Collection[str], options: CsvOptions) -> dict[str, FloatArray]:
-    """The columns `wanted` where each row has a number in each, read in one go; empty for other files."""
-    return read_whole(path, names, wanted, _form(options)) or {}
-
-
-def _form(options: CsvOptions) -> CsvFormat:
-    return CsvFormat(**options.model_dump(exclude={"thousands"}))
 
 
 def _chosen(

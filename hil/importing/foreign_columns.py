@@ -19,12 +19,12 @@ from hil.importing.map_file import CsvOptions
 from hil.importing.mat_file import mat_column, mat_scalar
 from hil.importing.on_change import held
 from hil.importing.text_rows import Cell, TextRows, header_names, line_of, read_rows, split_line
-from hil.importing.variables import TEXT_ENDINGS, VARIABLE_ENDINGS, load_variables
+from hil.importing.variables import JSON_ENDINGS, TEXT_ENDINGS, VARIABLE_ENDINGS, load_variables
 from hil.recording.arrow_files import numbers, read_parquet
 
 LARGEST = 1e100  # of a measured number
 FEW_MISSING = 0.05  # share of rows without a value: more is a channel of another rate, or a damaged file
-_ENDINGS = (".csv", ".mat", ".parquet", ".json", *VARIABLE_ENDINGS[1:], *TEXT_ENDINGS[1:])
+_ENDINGS = (".csv", ".mat", ".parquet", *JSON_ENDINGS, *VARIABLE_ENDINGS[1:], *TEXT_ENDINGS[1:])
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ def format_of(path: Path) -> str:
         )
     if ending in VARIABLE_ENDINGS or (ending in TEXT_ENDINGS and long_form(path)):
         return ".mat"
-    return ".csv" if ending in TEXT_ENDINGS else ending
+    return ".csv" if ending in TEXT_ENDINGS else ".json" if ending in JSON_ENDINGS else ending
 
 
 def read_foreign(

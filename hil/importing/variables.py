@@ -15,7 +15,8 @@ from hil.files.input_file import check_values, parsing
 from hil.importing.long_text import long_form, read_long
 from hil.importing.mat_file import load_mat
 
-TEXT_ENDINGS = (".csv", ".txt", ".tsv", ".dat", ".asc")
+TEXT_ENDINGS = (".csv", ".txt", ".tsv", ".tab", ".dat", ".asc", ".log", ".lvm", ".prn")
+JSON_ENDINGS = (".json", ".jsonl", ".ndjson")
 VARIABLE_ENDINGS = (".mat", ".npy", ".npz", ".mf4", ".xml")
 _WHOLE_NAN = 0x7FF0_0000_0000_0000  # an IEEE 754 number without a value, whose bits were written as a whole number
 

@@ -17,7 +17,7 @@ from hil.importing.draft_map import draft_map
 from hil.importing.map_text import map_text
 
 ROWS = 300
-_TEXTS = ("csv", "txt")
+_TEXTS = ("csv", "txt", "log")
 _LIBRARIES = {"mf4": "asammdf"}
 
 
@@ -43,7 +43,7 @@ def foreign(rng: random.Random, folder: Path) -> None:
     """Foreign recording: drafted, and imported by its draft."""
     ending, data = rng.choice(_files())
     path, map_path = folder / f"foreign.{ending}", folder / "map.yaml"
-    text = ending in (*_TEXTS, "json", "xml") and rng.random() < 0.7
+    text = ending in (*_TEXTS, "json", "jsonl", "xml") and rng.random() < 0.7
     path.write_bytes(damaged_text(rng, data.decode()) if text else damaged_bytes(rng, data))
     map_path.write_text(map_text(draft_map(path, rng.choice((None, 1000.0)))))
     import_recording(path, map_path)

@@ -10,6 +10,7 @@ HilError          1   something went wrong that the user can act on
 from collections.abc import Iterable
 from typing import Self
 
+LONGEST_NAME = 60  # characters of a name of a file in a message
 FieldPath = tuple[str | int, ...]
 
 
@@ -55,8 +56,8 @@ class FieldError(InputError, ValueError):
 
 
 def listed(names: Iterable[str], most: int = 20) -> str:
-    """The first names of a file for a message, and how many there are more."""
-    every = list(names)
+    """The first names of a file for a message, each up to `LONGEST_NAME`, and how many there are more."""
+    every = [name if len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}..." for name in names]
     more = f" and {len(every) - most} more" if len(every) > most else ""
     return ", ".join(every[:most]) + more
 

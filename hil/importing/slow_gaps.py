@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hil.arrays import FloatArray
-from hil.recording.stamps import GAP_STEPS, LEAST_ROWS, span_text
+from hil.recording.clock_notes import LEAST_ROWS, span_text
+from hil.recording.stamps import GAP_STEPS
 
 _LATE = 1.0  # periods by which a stamp comes after the moment that the motion tells
 _NEAR = 0.5  # periods between that moment and the row's turn

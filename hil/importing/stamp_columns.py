@@ -63,6 +63,12 @@ def growing(stamps: FloatArray) -> bool:
     return bool(steps.sum() > _FORWARDS * np.abs(steps).sum())
 
 
+def whole_seconds(stamps: FloatArray) -> bool:
+    """True for whole numbers (n,) that grow and are seconds since 1970 of this century."""
+    whole = bool(np.isfinite(stamps).all() and np.all(stamps == np.round(stamps)) and np.ptp(stamps) > 0.0)
+    return whole and bool(np.all((stamps > _SINCE) & (stamps < _UNTIL)) and np.all(np.diff(stamps) >= 0.0))
+
+
 def fraction_of(coarse: Stamps, name: str, values: FloatArray, told: Label) -> Stamps | None:
     """Stamps with the fraction of a second in another column (n,), which begins again with each second; else None."""
     ranges = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}

@@ -56,10 +56,11 @@ def _numpy(path: Path) -> dict[str, Any]:
         found = {path.stem: np.load(path, allow_pickle=False)}
     else:
         with zipfile.ZipFile(path) as archive:
-            values = sum(_check_array(path, archive.open(one)) for one in archive.namelist() if one.endswith(".npy"))
+            names = [name for name in archive.namelist() if name.endswith(".npy")]
+            values = sum(_check_array(path, archive.open(name)) for name in names)
             check_values(path, values, f"{values} values")
-        with np.load(path, allow_pickle=False) as arrays:
-            found = dict(arrays)
+        with np.load(path, allow_pickle=False) as arrays:  # other members are no arrays and of any size
+            found = {name.removesuffix(".npy"): arrays[name] for name in names}
     variables = dict[str, Any]()
     for name, array in found.items():
         fields = array.dtype.names or ()

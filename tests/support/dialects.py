@@ -54,6 +54,25 @@ def twincat_full_stamps(path: Path) -> None:
     _lines(path, about + rows)
 
 
+def twincat_points(path: Path) -> None:
+    """Commas between fields and points in numbers, and the short header."""
+    names = "Name,ActPosition,Name,ActTorque"
+    _lines(path, [names, "Unit,deg,Unit,Nm", *_rows(",", 1e3 * T, DEG, 1e3 * T, TORQUE)], "\r\n")
+
+
+def twincat_local_time(path: Path) -> None:
+    """Stamps of local time."""
+    about = ["Name;axis", "", "Name;ActPosition;ActTorque", "Unit;rad (Angle);Nm (Torque)", ""]
+    stamps = [f"01.03.2024 12:00:{k // 1000:02d},{k % 1000:03d}" for k in range(T.size)]
+    rows = _rows(";", ANGLE, TORQUE, comma=True)
+    _lines(path, about + [f"{stamp};{row}" for stamp, row in zip(stamps, rows, strict=True)])
+
+
+def twincat_bare(path: Path) -> None:
+    """Without a header: a time column for each channel."""
+    _lines(path, _rows("\t", 1e3 * T, ANGLE, 1e3 * T, TORQUE))
+
+
 def halscope(path: Path) -> None:
     """A comment with the period, then names of pins."""
     _lines(path, ["TIME,joint.0.motor-pos-fb,pid.x.torque-fb", *_rows(",", T, ANGLE, TORQUE)])
@@ -91,6 +110,24 @@ def moteus_json_lines(path: Path) -> None:
     _lines(path, (json.dumps(dict(zip(keys, map(float, row), strict=True))) for row in rows))
 
 
+def moteus_csv(path: Path) -> None:
+    names = "time,mode,position,velocity,torque,q_current,voltage,temperature,fault"
+    columns = T, np.full(T.size, 10.0), REV, SPEED / (2 * np.pi), TORQUE, 2.0 * TORQUE
+    columns += np.full(T.size, 24.0), 30.0 + T, np.zeros(T.size)
+    _lines(path, [names, *_rows(",", *columns)])
+
+
+def json_table(path: Path) -> None:
+    rows = np.column_stack((T, ANGLE, TORQUE)).tolist()
+    path.write_text(json.dumps({"columns": ["time_s", "motor_angle_rad", "torque_Nm"], "data": rows}))
+
+
+def json_records(path: Path) -> None:
+    keys = ("time_s", "motor_angle_rad", "torque_Nm")
+    rows = zip(T.tolist(), ANGLE.tolist(), TORQUE.tolist(), strict=True)
+    path.write_text(json.dumps([dict(zip(keys, row, strict=True)) for row in rows]))
+
+
 def json_matrix(path: Path) -> None:
     rows = np.column_stack((T, ANGLE, TORQUE)).tolist()
     path.write_text(json.dumps([["time_s", "motor_angle_rad", "torque_Nm"], *rows]))
@@ -102,6 +139,10 @@ def numpy_structured(path: Path) -> None:
     for (name, _), values in zip(kinds, (T, ANGLE, TORQUE), strict=True):
         rows[name] = values
     np.save(path, rows)
+
+
+def numpy_matrix(path: Path) -> None:
+    np.save(path, np.column_stack((T, ANGLE, TORQUE)))
 
 
 def numpy_named(path: Path) -> None:
@@ -148,6 +189,24 @@ def camonitor(path: Path) -> None:
     _lines(path, lines)
 
 
+def camonitor_on_change(path: Path) -> None:
+    """Each variable at its own times, those of the position uneven, and only where its printed value has changed."""
+    random = np.random.default_rng(4)
+    lines = list[tuple[float, str]]()
+    variables = ("TrqAct", TORQUE, 1e-3, 0.0), ("PosAct", ANGLE, 2e-3, 2e-4), ("Enabled", 1.0 * (T < 2.5), 1e-3, 0.0)
+    for name, values, step_s, late_s in variables:
+        times = np.arange(0.0, T[-1] + step_s, step_s)
+        times = times + random.uniform(0.0, late_s, times.size) * (times > 0.0)
+        texts = [
+            f"{value:.6f}"
+            for value in np.interp(times, [*T, 2 * T[-1] - T[-2]], [*values, 2 * values[-1] - values[-2]])
+        ]
+        for k, (at, text) in enumerate(zip(times, texts, strict=True)):
+            if not k or text != texts[k - 1]:
+                lines.append((at, f"AX1:Motor.{name} 2024-03-01 12:00:{at:09.6f} {text}"))
+    _lines(path, [text for _, text in sorted(lines)])
+
+
 def mr_configurator(path: Path) -> None:
     """Graph of a servo amplifier: about, names with units in brackets, percent of the rated torque."""
     about = ["MR Configurator2", "Model,MR-J4-40A", "Rated torque,1.3,Nm", "Sampling time,1.0,ms", ""]
@@ -162,6 +221,45 @@ def rostopic(path: Path) -> None:
     stamps = [1_700_000_000_000_000_000 + 1_000_000 * k for k in range(T.size)]
     rows = zip(stamps, ANGLE, SPEED, TORQUE, strict=True)
     _lines(path, [names, *(f"{s},{k},{s},joint1,{a:.6f},{v:.6f},{m:.6f}" for k, (s, a, v, m) in enumerate(rows))])
+
+
+def bagpy(path: Path) -> None:
+    """A bag as CSV by bagpy."""
+    names = "Time,header.seq,header.stamp.secs,header.stamp.nsecs,header.frame_id,name_0,position_0,velocity_0,effort_0"
+    rows = zip(ANGLE, SPEED, TORQUE, strict=True)
+    lines = [
+        f"{1.7e9 + 1e-3 * k + 2e-5 * (k % 7):.6f},{k},{1_700_000_000 + k // 1000},{k % 1000 * 1_000_000},base,joint1,"
+        f"{a:.6f},{v:.6f},{m:.6f}"
+        for k, (a, v, m) in enumerate(rows)
+    ]
+    _lines(path, [names, *lines])
+
+
+def ros_messages(path: Path) -> None:
+    """A message of JointState in each line."""
+    rows = zip(ANGLE.tolist(), SPEED.tolist(), TORQUE.tolist(), strict=True)
+    _lines(
+        path,
+        (
+            json.dumps(
+                {
+                    "header": {"stamp": {"sec": 1_700_000_000 + k // 1000, "nanosec": k % 1000 * 1_000_000}},
+                    "name": ["joint1"],
+                    "position": [a],
+                    "velocity": [v],
+                    "effort": [m],
+                }
+            )
+            for k, (a, v, m) in enumerate(rows)
+        ),
+    )
+
+
+def ros2_csv(path: Path) -> None:
+    """`ros2 topic echo --csv /joint_states`: no names."""
+    rows = zip(ANGLE, SPEED, TORQUE, strict=True)
+    stamps = [f"{1_700_000_000 + k // 1000},{k % 1000 * 1_000_000}" for k in range(T.size)]
+    _lines(path, (f"{s},,joint1,{a:.6f},{v:.6f},{m:.6f}" for s, (a, v, m) in zip(stamps, rows, strict=True)))
 
 
 def plotjuggler(path: Path) -> None:
@@ -179,6 +277,9 @@ DIALECTS: dict[str, tuple[str, Callable[[Path], None]]] = {
     "TwinCAT Scope, a clock per channel": ("csv", twincat_pairs),
     "TwinCAT Scope, one clock": ("csv", twincat_one_clock),
     "TwinCAT Scope, full time stamps": ("csv", twincat_full_stamps),
+    "TwinCAT Scope, points and commas": ("csv", twincat_points),
+    "TwinCAT Scope, local time": ("csv", twincat_local_time),
+    "TwinCAT Scope, without a header": ("txt", twincat_bare),
     "SINUMERIK Trace, XML": ("xml", sinumerik_xml),
     "SINUMERIK Trace, CSV": ("csv", sinumerik_csv),
     "LinuxCNC halscope": ("csv", halscope),
@@ -187,12 +288,20 @@ DIALECTS: dict[str, tuple[str, Callable[[Path], None]]] = {
     "ODrive, JSON": ("json", odrive_json),
     "ODrive, CSV": ("csv", odrive_csv),
     "moteus, JSON lines": ("jsonl", moteus_json_lines),
+    "moteus, CSV": ("csv", moteus_csv),
     "EPICS camonitor": ("txt", camonitor),
+    "EPICS camonitor, on change": ("log", camonitor_on_change),
     "MR Configurator2": ("csv", mr_configurator),
     "ROS, rostopic echo -p": ("csv", rostopic),
     "ROS, PlotJuggler": ("csv", plotjuggler),
+    "ROS, bagpy": ("csv", bagpy),
+    "ROS, messages": ("jsonl", ros_messages),
+    "ROS, ros2 topic echo --csv": ("csv", ros2_csv),
+    "JSON, table": ("json", json_table),
+    "JSON, records": ("json", json_records),
     "JSON, matrix": ("json", json_matrix),
     "NumPy, structured .npy": ("npy", numpy_structured),
+    "NumPy, matrix .npy": ("npy", numpy_matrix),
     "NumPy, .npz": ("npz", numpy_named),
     "ASAM MDF 4": ("mf4", mdf),
 }

@@ -72,6 +72,13 @@ def _npz(path: Path) -> None:
         archive.writestr("t.npy", b"\x93NUMPY\x01\x00" + struct.pack("<H", len(shape)) + shape)
 
 
+def _npz_with_text(path: Path) -> None:
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+        with archive.open("about.txt", "w", force_zip64=True) as member:
+            for _ in range(300):
+                member.write(b"\0" * 10_000_000)
+
+
 def _parquet(path: Path) -> None:
     pq.write_table(pa.table({"t": np.zeros(30_000_000), "x": np.zeros(30_000_000)}), path)
 
@@ -99,6 +106,7 @@ REFUSED: dict[str, tuple[str, str, Callable[[Path], object], str]] = {
     "zeros in a .mat": ("import", "a.mat", _numbers, "values in arrays, cells and structures, allowed 50000000"),
     "cells in a .mat": ("import", "a.mat", _cells, "values in arrays, cells and structures, allowed 50000000"),
     "a head of .npz": ("import", "a.npz", _npz, "given an array of 1000000000000, allowed 50000000"),
+    "a text in .npz": ("import", "a.npz", _npz_with_text, "holds no vector of numbers (there are no variables)"),
     "rows of Parquet": ("import", "a.parquet", _parquet, "30000000 rows of 2 columns, allowed 50000000"),
     "texts of Parquet": ("import", "a.parquet", _texts, "columns of numbers"),
     "a stream": ("compare", "a.arrows", _compressed_stream, "holds compressed blocks, allowed plain ones"),
@@ -245,6 +253,11 @@ def _opened(pid: int, path: Path) -> bool:
         return any(os.readlink(f"/proc/{pid}/fd/{one}") == str(path) for one in os.listdir(f"/proc/{pid}/fd"))
     except OSError:
         return False
+
+
+def test_a_message_cuts_long_names(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text(f"{'x' * 5000},y\n1,2\n")
+    assert f"columns {'x' * 60}..., y;" in hil(tmp_path, "compare", "a.csv", "--bench", "reference").stderr
 
 
 def test_a_message_lists_few_of_many_names(tmp_path: Path) -> None:

@@ -18,8 +18,11 @@ from hil.importing.map_text import map_text
 from hil.importing.variables import load_variables
 
 # the ids of the columns and not their units are in these: the result is in other units, and says so
-WITHOUT_UNITS = {"LinuxCNC halsampler", "ODrive, JSON", "EPICS camonitor"}
-WITHOUT_A_CLOCK = {"LinuxCNC halsampler": 1000.0}
+WITHOUT_UNITS = {
+    "LinuxCNC halsampler", "ODrive, JSON", "EPICS camonitor", "EPICS camonitor, on change",
+    "TwinCAT Scope, without a header", "moteus, CSV", "NumPy, matrix .npy", "ROS, ros2 topic echo --csv",
+}  # fmt: skip
+WITHOUT_A_CLOCK = {"LinuxCNC halsampler": 1000.0, "TwinCAT Scope, without a header": 1000.0}
 LIBRARIES = {"mf4": "asammdf"}
 DOCUMENT = Path(__file__).parents[3] / "docs" / "recordings.md"
 

@@ -50,7 +50,7 @@ def import_recording(source: str | Path, map_path: str | Path) -> Recording:
     foreign = read_foreign(source, wanted, sorted(gains), the_map.csv, sorted(dates), few, on_change, sparse)
     given, rows_kept = foreign.columns, None
     if the_map.time is not None and times:
-        given, rows_kept = merge(given, the_map.time, times)
+        given, rows_kept = merge(source, given, the_map.time, times)
 
     raw = {"time_s": _time_s(the_map, given)}
     origins: dict[str, dict[str, str | float]] = {}

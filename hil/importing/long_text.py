@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from hil.arrays import FloatArray
+from hil.errors import InputError
 from hil.files.date_stamps import seconds_of
 from hil.files.input_file import check_values, lines_of
 
@@ -51,12 +52,18 @@ def read_long(path: Path, form: re.Pattern[str]) -> dict[str, FloatArray]:
                 values.setdefault(match["name"], []).append(float(match["value"]))
     most = max(values, key=lambda name: len(values[name]))
     check_values(path, len(values) * len(values[most]), f"{len(values)} variables of up to {len(values[most])} values")
-    times = dict(zip(stamps, _seconds(list(stamps.values())), strict=True))
+    times, arrays = dict[str, FloatArray](), dict[str, FloatArray]()
+    for name, own_s in zip(stamps, _seconds(list(stamps.values())), strict=True):  # monitors may print them late
+        order = np.argsort(own_s, kind="stable")[: np.isfinite(own_s).sum()]
+        times[name], arrays[name] = own_s[order], np.array(values[name])[order]
+    times = {name: own_s for name, own_s in times.items() if own_s.size}
     longest_s = _SLOW * float(np.median(np.diff(times[most])))
     fast = [own_s for own_s in times.values() if own_s.size > 1 and np.median(np.diff(own_s)) <= longest_s]
+    if not fast:
+        raise InputError(f"{path}: no variable has two different stamps; give a text with the channels of a motion")
     first_s, last_s = max(own_s[0] for own_s in fast), min(own_s[-1] for own_s in fast)
     time_s = times[most][(times[most] >= first_s) & (times[most] <= last_s)]
-    return {"time": time_s} | {name: _at(time_s, times[name], np.array(own), longest_s) for name, own in values.items()}
+    return {"time": time_s} | {name: _at(time_s, own_s, arrays[name], longest_s) for name, own_s in times.items()}
 
 
 def _seconds(stamps: list[list[str]]) -> list[FloatArray]:

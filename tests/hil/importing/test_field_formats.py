@@ -69,6 +69,15 @@ def test_values_that_are_older_than_three_intervals_are_held(tmp_path: Path) -> 
     np.testing.assert_array_equal(arrays["state"], [1.0] * 10 + [2.0] * 10)
 
 
+def test_values_that_are_printed_late_are_put_in_order(tmp_path: Path) -> None:
+    lines = [f"{k}.0;speed;{k}" for k in (*range(8), 9, 8, *range(10, 20))] + [f"{k}.0;force;{-k}" for k in range(20)]
+    path = tmp_path / "long.txt"
+    path.write_text("\n".join(lines))
+    arrays = load_variables(path).arrays
+    np.testing.assert_array_equal(arrays["time"], np.arange(20.0))
+    np.testing.assert_array_equal(arrays["speed"], np.arange(20.0))
+
+
 def test_an_extra_that_is_not_installed_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "asammdf", None)
     path = tmp_path / "run.mf4"

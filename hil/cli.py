@@ -101,7 +101,13 @@ def main() -> None:
     except HilError as error:
         print(error, file=sys.stderr)
         sys.exit(error.exit_code)
+    except KeyboardInterrupt:
+        print("stopped by ctrl-C", file=sys.stderr)
+        sys.exit(130)
     except OSError as error:
+        if error.errno in (errno.ENAMETOOLONG, errno.EACCES, errno.ELOOP, errno.ENOTDIR) and error.filename:
+            print(f"{error.filename}: cannot be used ({error.strerror}); give another path", file=sys.stderr)
+            sys.exit(2)
         if error.errno not in (errno.ENOSPC, errno.EPIPE, errno.EIO):  # EIO: a terminal that is closed
             raise
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what is buffered cannot be written

@@ -7,8 +7,10 @@ HilError          1   something went wrong that the user can act on
     └── FieldError    the same, at one field of a model whose file is known to the caller only
 """
 
+from collections.abc import Iterable
 from typing import Self
 
+LONGEST_NAME = 60  # characters of a name of a file in a message
 FieldPath = tuple[str | int, ...]
 
 
@@ -51,6 +53,13 @@ class FieldError(InputError, ValueError):
     def inside(self, *outer: str | int) -> Self:
         """The same error seen from the model that contains this one."""
         return type(self)((*outer, *self.field), self.message)
+
+
+def listed(names: Iterable[str], most: int = 20) -> str:
+    """The first names of a file for a message, each up to `LONGEST_NAME`, and how many there are more."""
+    every = [name if len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}..." for name in names]
+    more = f" and {len(every) - most} more" if len(every) > most else ""
+    return ", ".join(every[:most]) + more
 
 
 def field_name(field: FieldPath) -> str:

@@ -24,10 +24,11 @@ def identify(
     from hil.drafting.bench_text import bench_text
     from hil.drafting.draft_bench import draft_bench
     from hil.errors import InputError
+    from hil.files.input_file import is_file
     from hil.files.output import write_text
 
     target = target or Path(f"{runs[0].stem}.yaml")
-    if target.exists():
+    if is_file(target):
         raise InputError(f"{target}: the file exists and is not overwritten; give another name with --out or remove it")
     if target.suffix not in (".yaml", ".yml"):
         raise InputError(f"{target}: given the ending {target.suffix!r}, allowed .yaml; correct --out")

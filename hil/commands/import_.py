@@ -11,7 +11,10 @@ from hil.report.console import err, out
 def import_(
     source: Annotated[
         Path,
-        typer.Argument(help="Foreign recording: .csv, .txt, .mat, .parquet or .json.", show_default=False),
+        typer.Argument(
+            help="Foreign recording: text such as .csv, .mat, .npy, .npz, .mf4, .xml, .parquet or .json.",
+            show_default=False,
+        ),
     ],
     map_file: Annotated[
         str | None,
@@ -65,12 +68,13 @@ def import_(
 def _drafted(source: Path, target: Path, rate_hz: float | None, axis: str | None) -> Path:
     """Draft a map beside the recording to write; return its path."""
     from hil.errors import InputError
+    from hil.files.input_file import is_file
     from hil.files.output import write_text
     from hil.importing.draft_map import draft_map
     from hil.importing.map_text import map_text
 
     path = target.with_name(f"{target.stem}-map.yaml")
-    if path.exists():
+    if is_file(path):
         raise InputError(f"{path}: the map exists and is not overwritten; import with --map {path}, or remove it")
     draft = draft_map(source, rate_hz, axis)
     write_text(path, map_text(draft))

@@ -6,17 +6,19 @@ field.
 
 import csv
 import math
+from collections import Counter
 from collections.abc import Collection, Iterator
 from itertools import islice
 from pathlib import Path
-from typing import TextIO
+from typing import Any, TextIO
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.csv as pacsv
 
 from hil.arrays import FloatArray
-from hil.errors import InputError
+from hil.errors import InputError, listed
+from hil.files.input_file import check_values, lines_of
 
 
 def read_header(path: Path) -> tuple[str, ...]:
@@ -25,7 +27,7 @@ def read_header(path: Path) -> tuple[str, ...]:
         line, names = next(_rows(path, file), (0, []))
     if line == 0:
         raise InputError(f"{path}: the file is empty; give a CSV file with a header and rows of numbers")
-    repeated = [name for name in dict.fromkeys(names) if names.count(name) > 1]
+    repeated = [name for name, times in Counter(names).items() if times > 1]
     if repeated:
         raise InputError(
             f"{path}:{line}: {repeated[0]}: stands twice in the header, allowed once; rename or remove one"
@@ -42,24 +44,39 @@ def read_columns(path: Path, wanted: Collection[str]) -> dict[str, FloatArray]:
     names = read_header(path)
     absent = [name for name in wanted if name not in names]
     if absent:
-        raise InputError(f"{path}: column {absent[0]!r} is missing; the file has {', '.join(names)}")
+        raise InputError(f"{path}: column {absent[0]!r} is missing; the file has {listed(names)}")
     lines_above = line_of_row(path, 0) - 1
     try:
-        table = pacsv.read_csv(
-            path,
-            read_options=pacsv.ReadOptions(column_names=list(names), skip_rows=lines_above, use_threads=False),
-            convert_options=pacsv.ConvertOptions(
-                include_columns=list(wanted), column_types=dict.fromkeys(wanted, pa.float64())
-            ),
-        )
-        columns = {name: table.column(name).to_numpy() for name in wanted}
+        columns = _parsed(path, names, wanted, lines_above)
         problem = None
-    except (pa.ArrowInvalid, UnicodeDecodeError) as error:
+    except (pa.ArrowException, UnicodeError) as error:
         columns, problem = {}, error
     if problem is not None or not all(np.isfinite(values).all() for values in columns.values()):
         _raise_first_bad_field(path, names, wanted)
         raise InputError(f"{path}: cannot be read as CSV: {problem}; correct the file")
     return columns
+
+
+def _parsed(path: Path, names: Collection[str], wanted: Collection[str], lines_above: int) -> dict[str, FloatArray]:
+    batches = pacsv.open_csv(
+        path,
+        read_options=pacsv.ReadOptions(column_names=list(names), skip_rows=lines_above, use_threads=False),
+        convert_options=pacsv.ConvertOptions(
+            include_columns=list(wanted), column_types=dict.fromkeys(wanted, pa.float64())
+        ),
+    )
+    table = _table(path, batches, len(wanted))
+    return {name: table.column(name).to_numpy() for name in wanted}
+
+
+def _table(path: Path, batches: Any, columns: int) -> pa.Table:
+    """The rows of a reader, counted as they come: two characters may be a value of 8 bytes."""
+    read, rows = [], 0
+    for batch in batches:
+        read.append(batch)
+        rows += batch.num_rows
+        check_values(path, rows * columns, f"more than {rows} rows of {columns} columns")
+    return pa.Table.from_batches(read, batches.schema)
 
 
 def line_of_row(path: Path, row: int) -> int:
@@ -82,12 +99,12 @@ def _opened(path: Path) -> TextIO:
 
 def _rows(path: Path, file: TextIO) -> Iterator[tuple[int, list[str]]]:
     """Line number and fields of each line that is not blank, from the header on."""
-    reader = csv.reader(file)
+    reader = csv.reader(lines_of(path, file))
     try:
         for fields in reader:
             if fields:
                 yield reader.line_num, fields
-    except (UnicodeDecodeError, csv.Error) as error:
+    except (UnicodeError, csv.Error) as error:
         line = reader.line_num + 1
         raise InputError(f"{path}:{line}: is not text of a CSV file ({error}); give a CSV file") from None
 

@@ -1,14 +1,39 @@
-"""The boundary to files that others wrote: what may be opened, and what a library that parses them may raise."""
+"""The boundary to files that others wrote: every file is checked before it is opened, and bounded while it is read.
 
+A file is held by two bounds. Its size: what a file holds, and what its compressed parts say that they expand to, is
+summed before it is read, and refused above `MOST_VALUES`. Then processor time and memory: functions marked `bounded`
+end with a refusal after `LONGEST_S`, or when the process has grown by `MOST_GROWTH`. The second needs Python code in
+which it can interrupt; the first holds what libraries do in one call.
+"""
+
+import functools
+import itertools
+import resource
+import signal
 import stat
-from collections.abc import Iterator
+import threading
+import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from types import FrameType
+from typing import Concatenate, ParamSpec, TextIO, TypeVar
 
 from hil.errors import InputError
 
+MOST_VALUES = 50_000_000  # of 8 bytes: 400 MB, 75 min at 1 kHz with 11 channels
+MOST_BYTES = 8 * MOST_VALUES  # of a file; of text this is eight characters for each value
+MOST_IN_LINE = 200_000  # characters of a line of text: a thousand columns have 20 000
+LONGEST_S = 15.0  # of processor time for one file
+MOST_GROWTH = 1_500_000_000  # bytes of memory
+_LOOK_S = 0.05  # of processor time between two looks
 
-def check_file(path: Path, allowed: str, most_bytes: int | None = None) -> None:
+Given = ParamSpec("Given")
+Read = TypeVar("Read")
+Name = TypeVar("Name", bound=str | Path)
+
+
+def check_file(path: Path, allowed: str, most_bytes: int = MOST_BYTES) -> None:
     """Refuse what is no regular file, before it is opened: reading a pipe or a device may never end.
 
     allowed: what to give instead. Raises InputError, also for a file of more than `most_bytes`.
@@ -23,8 +48,41 @@ def check_file(path: Path, allowed: str, most_bytes: int | None = None) -> None:
     if not stat.S_ISREG(found.st_mode):
         kind = "Is a directory" if stat.S_ISDIR(found.st_mode) else "a pipe or device"
         raise InputError(f"{path}: is no regular file ({kind}); give {allowed}")
-    if most_bytes is not None and found.st_size > most_bytes:
+    if found.st_size > most_bytes:
         raise InputError(f"{path}: given {found.st_size} bytes, allowed {most_bytes}; give {allowed}")
+
+
+def check_values(path: Path, values: int, given: str) -> None:
+    """Refuse a file that would become more than `MOST_VALUES` numbers. given: what holds them, such as "3 rows".
+
+    Raises InputError.
+    """
+    if values > MOST_VALUES:
+        raise InputError(
+            f"{path}: given {given}, allowed {MOST_VALUES} values together; cut the recording, or record fewer channels"
+        )
+
+
+def is_file(path: Path) -> bool:
+    """True for a file that is there; False also for a path that cannot be one, such as a name of 300 characters."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
+
+
+def lines_of(path: Path, file: TextIO) -> Iterator[str]:
+    """Lines of a text, with their ends. Raises InputError for one of more than `MOST_IN_LINE` characters."""
+    for number in itertools.count(1):
+        line = file.readline(MOST_IN_LINE)
+        if len(line) == MOST_IN_LINE:
+            raise InputError(
+                f"{path}:{number}: given a line of {MOST_IN_LINE} characters or more, allowed less; give a file with a "
+                "row of numbers in each line"
+            )
+        if not line:
+            return
+        yield line
 
 
 @contextmanager
@@ -40,3 +98,56 @@ def parsing(path: Path, what: str, advice: str = "it is cut or damaged") -> Iter
     except Exception as error:
         text = (str(error) or type(error).__name__).splitlines()[0]
         raise InputError(f"{path}: is no readable {what} ({text}); {advice}") from None
+
+
+def bounded(read: Callable[Concatenate[Name, Given], Read]) -> Callable[Concatenate[Name, Given], Read]:
+    """Mark a function that reads the file of its first argument: it ends with InputError above time or memory.
+
+    It looks at both in a timer of processor time, which only the main thread of a process has; inside another marked
+    function the outer one looks. Libraries that catch all exceptions are interrupted again at the next look.
+    """
+
+    @functools.wraps(read)
+    def within(path: Name, /, *args: Given.args, **kwargs: Given.kwargs) -> Read:
+        if threading.current_thread() is not threading.main_thread() or any(signal.getitimer(signal.ITIMER_VIRTUAL)):
+            return read(path, *args, **kwargs)
+        start_s, start_bytes, exceeded = time.process_time(), _resident(), ""
+
+        def look(number: int, frame: FrameType | None) -> None:
+            nonlocal exceeded
+            if time.process_time() - start_s > LONGEST_S:
+                exceeded = f"takes more than {LONGEST_S:g} s of processor time"
+            elif _resident() - start_bytes > MOST_GROWTH:
+                exceeded = f"takes more than {MOST_GROWTH / 1e9:g} GB of memory"
+            if exceeded:
+                raise _Exceeded
+
+        before = signal.signal(signal.SIGVTALRM, look)
+        try:
+            signal.setitimer(signal.ITIMER_VIRTUAL, _LOOK_S, _LOOK_S)
+            try:
+                return read(path, *args, **kwargs)
+            finally:
+                signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
+        except MemoryError:
+            exceeded = exceeded or "takes more memory than there is"
+        except RecursionError:
+            exceeded = exceeded or "is nested too deeply"
+        except BaseException:  # a library may turn the interruption into an error of its own
+            if not exceeded:
+                raise
+        finally:
+            signal.signal(signal.SIGVTALRM, before)
+        raise InputError(f"{path}: {exceeded} to be read; it is damaged, or too long: cut it into shorter files")
+
+    return within
+
+
+class _Exceeded(BaseException):
+    """A bound is exceeded; no `except Exception` catches it."""
+
+
+def _resident() -> int:
+    """Memory of this process [bytes]."""
+    with open("/proc/self/statm", "rb") as file:
+        return int(file.read().split()[1]) * resource.getpagesize()

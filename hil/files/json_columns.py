@@ -6,6 +6,7 @@
 [{"stamp": {"secs": 1, "nsecs": 5}, "name": ["a"], "position": [0.1]}, ...]     a message per row, as of ROS
 {"columns": ["t", "x"], "data": [[0, 0.1], ...]}     a table
 [{"name": "x", "unit": "mm", "values": [...]}, ...]  an object per channel
+[["t", "x"], [0, 0.1], [1, 0.2]]                     a matrix, with a row of names or without
 {"t": 0, "x": 0.1}                                   one such record in each line
 """
 
@@ -17,8 +18,10 @@ from typing import Any
 import numpy as np
 
 from hil.arrays import FloatArray
-from hil.errors import InputError
+from hil.errors import InputError, listed
+from hil.files.input_file import MOST_BYTES, check_file, check_values, parsing
 
+MOST_JSON_BYTES = MOST_BYTES // 10  # three characters may become an object of 72 bytes
 _NAME_KEYS, _VALUE_KEYS = ("name", "channel", "id"), ("values", "data", "samples")  # of an object per channel
 _STAMP_KEYS = (("secs", "sec"), ("nsecs", "nanosec", "nsec"))
 
@@ -34,24 +37,24 @@ class JsonContent:
     def numbers(self, path: Path, name: str) -> FloatArray:
         """The list `name` as numbers (n,), null as NaN. Raises InputError: no such list, or no numbers."""
         if name not in self.lists:
-            raise InputError(f"{path}: column {name!r} is missing; the file has {', '.join(self.lists)}")
+            raise InputError(f"{path}: column {name!r} is missing; the file has {listed(self.lists)}")
         for row, value in enumerate(self.lists[name]):
             if value is not None and (isinstance(value, bool) or not isinstance(value, int | float)):
                 raise InputError(
                     f"{path}: row {row + 1}: {name}: given {value!r}, allowed a finite number; correct the value"
                 )
-        return np.array([np.nan if value is None else value for value in self.lists[name]], dtype=np.float64)
+        with parsing(path, f"column {name}", "correct its numbers"):  # whole numbers of any length
+            return np.array([np.nan if value is None else value for value in self.lists[name]], dtype=np.float64)
 
 
 def read_json(path: Path) -> JsonContent:
     """Read `path`. Raises InputError: no JSON, or no lists in it."""
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-        data = _loaded(path, text)
-    except (OSError, ValueError, RecursionError) as error:
-        raise InputError(f"{path}: is no readable JSON file ({error}); it is cut or damaged") from None
+    check_file(path, "a JSON file up to this size, or the recording as CSV or Parquet", MOST_JSON_BYTES)
+    with parsing(path, "JSON file"):
+        data = _loaded(path, path.read_text(encoding="utf-8-sig"))
     lists, scalars, units = dict[str, list[Any]](), dict[str, float](), dict[str, str]()
-    _collect(data, lists, scalars, units)
+    with parsing(path, "JSON file of numbers"):
+        _collect(path, data, lists, scalars, units)
     if not lists:
         raise InputError(
             f"{path}: holds no list of numbers, allowed lists by name or a record per row; export the channels as lists"
@@ -106,7 +109,9 @@ def _flat(row: dict[str, Any]) -> dict[str, Any]:
     return flat
 
 
-def _collect(data: Any, lists: dict[str, list[Any]], scalars: dict[str, float], units: dict[str, str]) -> None:
+def _collect(
+    path: Path, data: Any, lists: dict[str, list[Any]], scalars: dict[str, float], units: dict[str, str]
+) -> None:
     if isinstance(data, list) and data and all(isinstance(row, dict) for row in data):
         channels = [(_first(row, _NAME_KEYS, str), _first(row, _VALUE_KEYS, list), row.get("unit")) for row in data]
         if all(name is not None and values is not None for name, values, _ in channels):  # an object per channel
@@ -114,8 +119,15 @@ def _collect(data: Any, lists: dict[str, list[Any]], scalars: dict[str, float], 
             units.update({name: unit for name, _, unit in channels if isinstance(unit, str)})
         else:  # a record per row
             flat = [_flat(row) for row in data]
-            for key in dict.fromkeys(key for row in flat for key in row):
+            keys = dict.fromkeys(key for row in flat for key in row)
+            check_values(path, len(keys) * len(flat), f"{len(flat)} records with {len(keys)} keys")
+            for key in keys:
                 lists[key] = [row.get(key) for row in flat]
+    elif isinstance(data, list) and len(data) > 1 and all(isinstance(row, list) for row in data):  # a matrix
+        named = all(isinstance(name, str) for name in data[0])
+        names = data[0] if named else [f"column {number + 1}" for number in range(len(data[0]))]
+        for index, name in enumerate(names):
+            lists[name] = [row[index] if index < len(row) else None for row in data[named:]]
     elif isinstance(data, dict):
         names, rows = data.get("columns"), data.get("data", data.get("rows"))
         if isinstance(names, list) and isinstance(rows, list) and all(isinstance(row, list) for row in rows):
@@ -130,4 +142,4 @@ def _collect(data: Any, lists: dict[str, list[Any]], scalars: dict[str, float], 
             elif isinstance(value, dict) and value and all(isinstance(unit, str) for unit in value.values()):
                 units.update(value)
             elif isinstance(value, dict | list):
-                _collect(value, lists, scalars, units)
+                _collect(path, value, lists, scalars, units)

@@ -18,13 +18,14 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from hil.errors import FieldError, FieldPath, InputError, field_name
-from hil.files.input_file import check_file
+from hil.files.input_file import bounded, check_file
 
 Model = TypeVar("Model", bound=BaseModel)
 SHOWN_ERRORS = 8  # more would scroll the first one away
 MOST_BYTES = 200_000  # read in some seconds; ten times the longest profile
 
 
+@bounded
 def load_model(path: str | Path, model: type[Model]) -> Model:
     """Read `path` and validate it as `model`.
 
@@ -79,6 +80,16 @@ class _Loader(yaml.SafeLoader):
             seen.add(key.value)
         return super().construct_mapping(node, deep)
 
+    def construct_object(self, node: yaml.Node, deep: bool = False) -> Any:
+        try:
+            return super().construct_object(node, deep)
+        # a tag such as !!bool or !!timestamp that the text does not fit, an integer of more than 4300 digits
+        except (ValueError, LookupError, AttributeError, TypeError) as error:
+            given = repr(f"{node.value:.40}") if isinstance(node, yaml.ScalarNode) else "several values"
+            reason = f" ({str(error).split(';')[0]})" if isinstance(error, ValueError) else ""
+            problem = f"given {given}, which is no {node.tag.rpartition(':')[2]}{reason}; correct the value"
+            raise yaml.MarkedYAMLError(problem=problem, problem_mark=node.start_mark) from None
+
 
 for _tag, _pattern, _first in (
     ("null", r"~|null|", ["~", "n", ""]),
@@ -111,8 +122,6 @@ def _read(path: Path) -> tuple[yaml.Node, Any]:
         raise InputError(f"{where}: {_sentence(error)}") from None
     except yaml.YAMLError as error:
         raise InputError(f"{path}: not YAML text: {str(error).splitlines()[0]}; correct the file") from None
-    except ValueError as error:  # an integer of more than 4300 digits
-        raise InputError(f"{path}: {error}; correct the file") from None
     except RecursionError:
         raise InputError(f"{path}: given hundreds of nested lists, allowed a few; correct the file") from None
     finally:

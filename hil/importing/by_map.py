@@ -8,6 +8,7 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.channels import CHANNELS, AxisChannels
+from hil.files.input_file import bounded, is_file
 from hil.files.yaml_model import load_model
 from hil.importing.channel_clocks import merge, seconds
 from hil.importing.foreign_columns import FEW_MISSING, read_foreign
@@ -23,6 +24,7 @@ STEP = "step"  # key of a channel's metadata: step of its values before they are
 MAPS = Path(__file__).parents[1] / "maps"
 
 
+@bounded
 def import_recording(source: str | Path, map_path: str | Path) -> Recording:
     """Read `source` (.csv, .txt, .mat, .parquet, .json) by the map file `map_path`, or by a shipped map's name (emps).
 
@@ -48,7 +50,7 @@ def import_recording(source: str | Path, map_path: str | Path) -> Recording:
     foreign = read_foreign(source, wanted, sorted(gains), the_map.csv, sorted(dates), few, on_change, sparse)
     given, rows_kept = foreign.columns, None
     if the_map.time is not None and times:
-        given, rows_kept = merge(given, the_map.time, times)
+        given, rows_kept = merge(source, given, the_map.time, times)
 
     raw = {"time_s": _time_s(the_map, given)}
     origins: dict[str, dict[str, str | float]] = {}
@@ -95,7 +97,7 @@ def import_recording(source: str | Path, map_path: str | Path) -> Recording:
 
 def _find_map(map_path: str | Path) -> Path:
     shipped = MAPS / f"{map_path}.yaml"
-    return shipped if not Path(map_path).exists() and shipped.is_file() else Path(map_path)
+    return shipped if not is_file(Path(map_path)) and is_file(shipped) else Path(map_path)
 
 
 def _time_s(the_map: RecordingMap, raw: dict[str, FloatArray]) -> FloatArray:

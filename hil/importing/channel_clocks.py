@@ -5,11 +5,13 @@ Such channels are merged by their stamps, never by their rows.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hil.arrays import FloatArray
+from hil.errors import InputError, listed
 from hil.importing.clock import StampClock, clock_of, time_columns
 from hil.importing.column_names import Label
 from hil.importing.foreign_table import ForeignTable
@@ -33,6 +35,8 @@ class OwnClocks:
 def on_one_clock(table: ForeignTable, labels: dict[str, Label]) -> OwnClocks:
     """Put channels with clocks of their own on that of the position."""
     groups = _groups(table, labels)
+    # stamps before a number of the message only are others of the same rows
+    groups = [group for group in groups if any(labels[name].sure for name in group[1])] or groups
     if len(groups) < 2:
         return OwnClocks(table)
     clocks = [_clock(table, labels, *group) for group in groups]
@@ -49,7 +53,7 @@ def on_one_clock(table: ForeignTable, labels: dict[str, Label]) -> OwnClocks:
     assert time is not None
     own = {name: found[index].time for index in others for name in groups[index][1]}
     times = {name: one for name, one in own.items() if one is not None}
-    merged, kept = merge(table.columns, time, times)
+    merged, kept = merge(table.path, table.columns, time, times)
     columns = {name: merged[name] for name in columns}
     steps = {index: _step_text(found[index]) for index in (main, *others)}
     notes = tuple(
@@ -64,11 +68,12 @@ def on_one_clock(table: ForeignTable, labels: dict[str, Label]) -> OwnClocks:
 
 
 def merge(
-    columns: Mapping[str, FloatArray], time: TimeColumn, times: Mapping[str, TimeColumn]
+    path: Path, columns: Mapping[str, FloatArray], time: TimeColumn, times: Mapping[str, TimeColumn]
 ) -> tuple[dict[str, FloatArray], NDArray[np.intp]]:
     """Columns (n,) on the clock `time`, and the rows that are kept: those between the first and last stamps of all.
 
-    Columns of `times` are interpolated by their own stamps; NaN ends a column of fewer rows.
+    Columns of `times` are interpolated by their own stamps; NaN ends a column of fewer rows. Raises InputError: stamps
+    without a time in common.
     """
     first = float(columns[time.column][np.isfinite(columns[time.column])][0])
     at_s = seconds(columns, time, first)
@@ -81,6 +86,11 @@ def merge(
         merged[name] = np.interp(at_s, own_s[good][order], columns[name][good][order])
         kept &= (at_s >= own_s[good].min(initial=np.inf)) & (at_s <= own_s[good].max(initial=-np.inf))
     rows = np.flatnonzero(kept)
+    if not rows.size:
+        raise InputError(
+            f"{path}: the stamps of {listed([time.column, *dict.fromkeys(own.column for own in times.values())])} have "
+            "no time in common, allowed those of one recording; write the unit of each into a map"
+        )
     return {name: values[rows] for name, values in merged.items()}, rows
 
 

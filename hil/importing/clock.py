@@ -11,7 +11,15 @@ from hil.importing.column_names import Label, label
 from hil.importing.foreign_table import ForeignTable
 from hil.importing.lexicon import Constant, Quantity, lexicon
 from hil.importing.map_file import SECONDS, TimeColumn
-from hil.importing.stamp_columns import FASTEST_HZ, SLOWEST_HZ, Stamps, fraction_of, growing, unit_of_stamps
+from hil.importing.stamp_columns import (
+    FASTEST_HZ,
+    SLOWEST_HZ,
+    Stamps,
+    fraction_of,
+    growing,
+    unit_of_stamps,
+    whole_seconds,
+)
 
 SAME = 0.01  # relative deviation of two clocks of the same rows
 _INTERVAL = 0.01  # relative deviation of the intervals of an even clock
@@ -118,9 +126,14 @@ def _stamps(table: ForeignTable, labels: dict[str, Label], name: str) -> Stamps:
 
 
 def _unnamed(table: ForeignTable, labels: dict[str, Label]) -> list[str]:
-    """The first column without a known quantity that grows by nearly equal steps; row numbers are none."""
+    """The first column without a known quantity that grows by nearly equal steps, or holds whole seconds since 1970.
+
+    Row numbers are none.
+    """
     for name, values in table.columns.items():
         steps = np.diff(values)
+        if labels[name].quantity is Quantity.UNKNOWN and whole_seconds(values):
+            return [name]
         if (
             (labels[name].quantity is Quantity.UNKNOWN or labels[name].letter)
             and steps.size

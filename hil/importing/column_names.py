@@ -46,8 +46,8 @@ def label(column: str, unit_text: str = "", words_beside: str = "") -> Label:
     beside = _words(plain_words(words_beside))
     words = _words(tokens) + beside
     number = next((match[1] for token in reversed(tokens) if (match := re.search(r"(\d+)$", token))), "")
-    # of a path the last words count: pid.x.output
-    parts = [_words(plain_words(part)) for part in reversed(name.split("."))]
+    # of a path the last words count: pid.x.output, /joint_states/joint1/position
+    parts = [_words(plain_words(part)) for part in reversed(re.split(r"[./:]", name))]
     found = sorted((_found(part) for part in (*parts, beside)), key=lambda one: one[1])  # a letter says least
     quantity, letter = next((one for one in found if one != _NOTHING), _NOTHING)
     of_unit = QUANTITY_OF_UNIT.get(unit or "")

@@ -1,5 +1,6 @@
 """Find how a text file of columns is written: encoding, delimiter, marks of the numbers, and the rows above them."""
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import islice
@@ -8,6 +9,7 @@ from typing import NamedTuple
 
 from hil.errors import InputError
 from hil.files.date_stamps import is_date
+from hil.files.input_file import lines_of
 from hil.importing.header_rows import COMMENT, Header, read_header
 from hil.importing.map_file import CsvOptions
 from hil.importing.number_form import NumberForm, find_form, number_of
@@ -46,6 +48,7 @@ def find_dialect(path: Path) -> CsvDialect:
     head = lines[:SAMPLE_LINES]
     spread = lines[:: max(1, len(lines) // SAMPLE_LINES)]
     body = [line for line in (*head[len(head) // 2 :], *spread[len(spread) // 10 :]) if line.strip()]
+    body = body or [line for line in head if line.strip()]  # rows above a long blank end
     layout = _layout(path, body)
     delimiter, form, width = layout.delimiter, layout.form, len(layout.read)
     first = _first_row(path, head, layout)
@@ -85,7 +88,7 @@ def _lines(path: Path) -> tuple[list[str], str]:
     for encoding in ("utf-16",) if wide else _ENCODINGS:
         try:
             with path.open(encoding="utf-8-sig" if encoding == "utf-8" else encoding) as file:
-                return [line.rstrip("\r\n") for line in islice(file, MOST_LINES)], encoding
+                return [line.rstrip("\r\n") for line in islice(lines_of(path, file), MOST_LINES)], encoding
         except UnicodeDecodeError:
             continue
     raise InputError(f"{path}: is damaged UTF-16 text; export the recording again as UTF-8")
@@ -96,9 +99,9 @@ def _layout(path: Path, body: list[str]) -> _Layout:
     found = _Layout("", NumberForm(), ())
     for delimiter in _DELIMITERS:
         rows = [split_line(line, delimiter) for line in body]
-        widths = [len(row) for row in rows]
-        width = max(widths, key=widths.count, default=0)
-        wide = max((one for one in set(widths) if widths.count(one) > _PAIRED * len(rows)), default=width)
+        widths = Counter(len(row) for row in rows)
+        width = widths.most_common(1)[0][0] if rows else 0
+        wide = max((one for one, times in widths.items() if times > _PAIRED * len(rows)), default=width)
         if wide % 2 == 0 and wide >= width + 2:  # channels of lower rate, with their times, end before the others
             width, rows = wide, [row for row in rows if len(row) == wide]
         if width < 2:

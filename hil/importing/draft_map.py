@@ -9,6 +9,7 @@ import numpy as np
 from hil.arrays import FloatArray
 from hil.channels import CHANNELS
 from hil.errors import InputError
+from hil.files.input_file import bounded
 from hil.importing.channel_clocks import on_one_clock
 from hil.importing.channel_entries import ChannelEntries
 from hil.importing.clock import find_clock
@@ -26,6 +27,8 @@ from hil.importing.slow_gaps import moving_little, with_gaps_filled
 from hil.importing.wraps import unwrapped, wrap_range
 
 
+@bounded
+@np.errstate(invalid="ignore", over="ignore")  # an infinity is refused with its row, after sums and differences
 def draft_map(path: Path, rate_hz: float | None = None, axis: str | None = None) -> MapDraft:
     """Draft the map of `path`; `rate_hz` and `axis` are what the user says beside the file.
 

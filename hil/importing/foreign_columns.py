@@ -3,25 +3,28 @@
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
 from hil.arrays import FloatArray
-from hil.errors import InputError
+from hil.errors import InputError, listed
 from hil.files import json_columns
 from hil.files.date_stamps import seconds_of
 from hil.files.input_file import check_file
+from hil.importing.long_text import long_form
 from hil.importing.map_file import CsvOptions
-from hil.importing.mat_file import load_mat, mat_column, mat_scalar
+from hil.importing.mat_file import mat_column, mat_scalar
 from hil.importing.on_change import held
 from hil.importing.text_rows import Cell, TextRows, header_names, line_of, read_rows, split_line
-from hil.recording.arrow_files import MOST_BYTES, numbers, read_parquet
+from hil.importing.variables import JSON_ENDINGS, TEXT_ENDINGS, VARIABLE_ENDINGS, load_variables
+from hil.recording.arrow_files import numbers, read_parquet
 
-TEXT_ENDINGS = (".csv", ".txt", ".tsv", ".dat", ".asc")
+LARGEST = 1e100  # of a measured number
 FEW_MISSING = 0.05  # share of rows without a value: more is a channel of another rate, or a damaged file
-_ENDINGS = (".csv", ".mat", ".parquet", ".json", *TEXT_ENDINGS[1:])
+_ENDINGS = (".csv", ".mat", ".parquet", *JSON_ENDINGS, *VARIABLE_ENDINGS[1:], *TEXT_ENDINGS[1:])
 
 
 @dataclass(frozen=True)
@@ -36,18 +39,23 @@ class Foreign:
 
 def check_foreign(path: Path) -> None:
     """Refuse what is no file. Raises InputError."""
-    check_file(path, f"the path of a recording: {', '.join(_ENDINGS)}", MOST_BYTES)
+    check_file(path, f"the path of a recording: {', '.join(_ENDINGS)}")
 
 
 def format_of(path: Path) -> str:
-    """Format of a file by its ending: .csv (any text), .mat, .parquet, .json. Raises InputError for another one."""
+    """Format of a file: .csv (any text of rows), .mat (of variables by name), .parquet, .json.
+
+    Raises InputError for another one.
+    """
     ending = path.suffix.lower()
     if ending not in _ENDINGS:
         raise InputError(
             f"{path}: the ending {path.suffix!r} cannot be imported, allowed {', '.join(_ENDINGS)}; "
             "export the recording to one of them"
         )
-    return ".csv" if ending in TEXT_ENDINGS else ending
+    if ending in VARIABLE_ENDINGS or (ending in TEXT_ENDINGS and long_form(path)):
+        return ".mat"
+    return ".csv" if ending in TEXT_ENDINGS else ".json" if ending in JSON_ENDINGS else ending
 
 
 def read_foreign(
@@ -83,7 +91,7 @@ def read_foreign(
             columns, stamps = _chosen(path, rows, wanted, dates)
             lines, notes = rows.lines, rows.notes
         case ".mat":
-            variables = load_mat(path)
+            variables = load_variables(path).arrays
             columns = {name: mat_column(path, variables, name) for name in wanted}
             scalars = {name: mat_scalar(path, variables, name) for name in wanted_scalars}
         case ".parquet":
@@ -95,6 +103,7 @@ def read_foreign(
             columns = {name: content.numbers(path, name) for name in wanted}
             stamps = {name: seconds_of([str(text) for text in content.lists.get(name, [])]) for name in dates}
 
+    columns = {name: as_measured(values) for name, values in columns.items()}
     columns |= {name: held(columns[name]) for name in on_change}
 
     def place(row: int) -> str:
@@ -119,7 +128,7 @@ def _chosen(
     names = (*rows.numbers, *rows.dates)
     for name in (*wanted, *dates):
         if name not in names:
-            raise InputError(f"{path}: column {name!r} is missing; the file has {', '.join(names)}")
+            raise InputError(f"{path}: column {name!r} is missing; the file has {listed(names)}")
         of_kind = name in (rows.dates if name in dates else rows.numbers)
         if name in rows.texts or not of_kind:
             line, text = rows.texts.get(name, Cell(int(rows.lines[0]), "dates" if name in rows.dates else "numbers"))
@@ -130,11 +139,22 @@ def _chosen(
     return {name: rows.numbers[name] for name in wanted}, {name: rows.dates[name] for name in dates}
 
 
+def as_measured(values: NDArray[Any]) -> FloatArray:
+    """Numbers of any type as float64; NaN for one that no sensor gives and whose square has no value."""
+    with np.errstate(invalid="ignore"):  # a damaged number of 4 bytes
+        numbers = values.astype(np.float64)
+        return np.where(np.isfinite(numbers) & (np.abs(numbers) > LARGEST), np.nan, numbers)
+
+
 def parquet_dates(path: Path, name: str) -> FloatArray:
     """A column of time stamps of a Parquet file in seconds (n,) since midnight before the first."""
     column = read_parquet(path, (name,)).column(name)
+    if pa.types.is_dictionary(column.type):
+        codes = column.unify_dictionaries().combine_chunks()
+        words = [*map(str, codes.dictionary.to_pylist()), ""]
+        return seconds_of([words[code] for code in codes.indices.fill_null(-1).to_pylist()])
     if not pa.types.is_timestamp(column.type):
-        return seconds_of([str(text) for text in column.to_pylist()])
+        return seconds_of([str(number) for number in column.to_pylist()])
     nanoseconds = column.cast(pa.timestamp("ns", column.type.tz), safe=False).cast(pa.int64()).to_numpy()
     return np.asarray((nanoseconds - nanoseconds[0]) * 1e-9, dtype=np.float64)
 

@@ -9,20 +9,21 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from hil.arrays import FloatArray
-from hil.errors import InputError
+from hil.errors import InputError, listed
 from hil.files import json_columns
 from hil.files.date_stamps import is_date, seconds_of
 from hil.importing.csv_dialect import MOST_LINES, find_dialect
-from hil.importing.foreign_columns import check_foreign, format_of, parquet_dates
+from hil.importing.foreign_columns import as_measured, check_foreign, format_of, parquet_dates
 from hil.importing.header_values import HeaderValue, header_values
 from hil.importing.lexicon import Constant
 from hil.importing.map_file import CsvOptions
-from hil.importing.mat_file import load_mat
 from hil.importing.text_rows import Cell, read_rows
 from hil.importing.unit_lines import described, told_units
-from hil.recording.arrow_files import numbers, read_parquet, stored_unit
+from hil.importing.variables import load_variables
+from hil.recording.arrow_files import is_number, numbers, parquet_schema, read_parquet, stored_unit
 
 LEAST_NUMBERS = 0.01  # share of rows with a number: with fewer a column is one of text
+MOST_COLUMNS = 1000  # whose names are read, 1 ms each
 WIDEST = 64  # columns of a matrix in a .mat file: a wider one is no table of channels
 
 
@@ -64,8 +65,14 @@ def read_table(path: Path) -> ForeignTable:
     if path.stat().st_size == 0:
         raise InputError(f"{path}: the file is empty; give a file with rows of numbers")
     readers = {".csv": _text, ".mat": _mat, ".parquet": _parquet, ".json": _json}
-    table = _equal_length(readers[format_of(path)](path))
+    read = readers[format_of(path)](path)
+    table = _equal_length(replace(read, columns={name: as_measured(one) for name, one in read.columns.items()}))
     rows = max((values.size for values in table.columns.values()), default=0)
+    if len(read.columns) > MOST_COLUMNS:
+        raise InputError(
+            f"{path}: given {len(read.columns)} columns of numbers, allowed {MOST_COLUMNS}; export the channels of one "
+            "axis, or import them by a map"
+        )
     if len(table.columns) < 2 or rows < 3:
         raise InputError(
             f"{path}: given {len(table.columns)} columns of numbers with {rows} rows, allowed two columns and three "
@@ -110,35 +117,38 @@ def _text(path: Path) -> ForeignTable:
 
 def _mat(path: Path) -> ForeignTable:
     columns, scalars, others = dict[str, FloatArray](), dict[str, float](), []
-    for name, variable in load_mat(path).items():
+    arrays, units = load_variables(path)
+    for name, variable in arrays.items():
         values = np.asarray(variable)
         if values.dtype.kind not in "fiub":
             others.append(name)
         elif values.size == 1:
             scalars[name] = float(values.reshape(-1)[0])
         elif values.size == max(values.shape):
-            columns[name] = values.reshape(-1).astype(np.float64)
+            columns[name] = values.reshape(-1)
         elif values.ndim == 2 and values.shape[1] <= WIDEST and values.shape[0] > values.shape[1]:
-            columns |= {f"{name}[{index}]": values[:, index].astype(np.float64) for index in range(values.shape[1])}
+            columns |= {f"{name}[{index}]": values[:, index] for index in range(values.shape[1])}
         else:
             others.append(name)
     remarks = [f"{name}: neither a number, a vector nor a matrix with a column per channel" for name in others]
     if not columns:
         raise InputError(
-            f"{path}: holds no vector of numbers (there are {', '.join(others) or 'no variables'}), allowed a vector "
+            f"{path}: holds no vector of numbers (there are {listed(others) or 'no variables'}), allowed a vector "
             "per channel or a matrix with a column per channel; save the vectors themselves, not a structure"
         )
-    return ForeignTable(path, columns, {}, scalars, constants=header_values((), scalars), remarks=tuple(remarks))
+    return ForeignTable(path, columns, units, scalars, constants=header_values((), scalars), remarks=tuple(remarks))
 
 
 def _parquet(path: Path) -> ForeignTable:
-    table = read_parquet(path)
+    schema = parquet_schema(path)
+    wanted = [one.name for one in schema if is_number(one.type) or pa.types.is_timestamp(one.type)]
+    table = read_parquet(path, wanted)
     columns, units, remarks = {}, {}, []
     dates = set[str]()
-    for one in table.schema:
-        if pa.types.is_floating(one.type) or pa.types.is_integer(one.type):
+    for one in schema:
+        if is_number(one.type):
             columns[one.name] = numbers(path, table, one.name)
-            unit = stored_unit(table, one.name)
+            unit = stored_unit(schema, one.name)
             if unit:
                 units[one.name] = unit
         elif pa.types.is_timestamp(one.type):

@@ -45,8 +45,10 @@ class CsvOptions(_Strict):
     delimiter: str = Field(default=",", min_length=1, max_length=1, description="between the fields")
     decimal_point: Literal[".", ","] = Field(default=".", description="of the numbers")
     thousands: Literal["", ".", ",", "'", " "] = Field(default="", description="mark between thousands")
-    skip_lines: int = Field(default=0, ge=0, description="lines above the header")
-    skip_rows: int = Field(default=0, ge=0, description="rows between header and numbers, such as one of units")
+    skip_lines: int = Field(default=0, ge=0, le=1_000_000, description="lines above the header")
+    skip_rows: int = Field(
+        default=0, ge=0, le=1_000_000, description="rows between header and numbers, such as one of units"
+    )
     column_names: tuple[str, ...] | None = Field(default=None, description="names for a file without a header")
     encoding: str = Field(default="utf-8", description="of the text")
 

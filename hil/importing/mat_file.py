@@ -7,13 +7,15 @@ from typing import Any
 import numpy as np
 
 from hil.arrays import FloatArray
-from hil.errors import InputError
+from hil.errors import InputError, listed
+from hil.importing.mat_size import check_mat_size
 
 
 def load_mat(path: Path) -> dict[str, Any]:
     """Variables of a .mat file; fields of structures as NAME.FIELD, signals of Simulink by their label."""
     from scipy.io import loadmat
 
+    check_mat_size(path)
     try:
         content = loadmat(path, struct_as_record=False, squeeze_me=False)
         variables: dict[str, Any] = {}
@@ -50,7 +52,9 @@ def _structures(value: Any) -> list[Any]:
     if hasattr(value, "_fieldnames"):
         return [value]
     values = np.asarray(value)
-    return [one for item in values.reshape(-1) for one in _structures(item)] if values.dtype == object else []
+    if values.dtype != object or values.ndim == 0:  # without a dimension: an object that is no array, such as sparse
+        return []
+    return [one for item in values.reshape(-1) for one in _structures(item)]
 
 
 def mat_column(path: Path, variables: dict[str, Any], name: str) -> FloatArray:
@@ -79,7 +83,7 @@ def mat_scalar(path: Path, variables: dict[str, Any], name: str) -> float:
 
 def _mat_variable(path: Path, variables: dict[str, Any], name: str) -> FloatArray:
     if name not in variables:
-        raise InputError(f"{path}: column {name!r} is missing; the file has {', '.join(variables)}")
+        raise InputError(f"{path}: column {name!r} is missing; the file has {listed(variables)}")
     values = np.asarray(variables[name])
     if values.dtype.kind not in "fiub":
         raise InputError(

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from hil.arrays import FloatArray
-from hil.errors import InputError
+from hil.errors import InputError, listed
 from hil.identification.derivatives import MeasuredMotion, motion, smoothed
 from hil.importing.column_names import Label
 from hil.importing.computed_position import computed_one, unanswered_one
@@ -90,9 +90,9 @@ def find_roles(
         roles.left_out |= found.left_out
         roles.unsure += found.unsure
     if roles.motor is None and roles.motor_velocity is None:
-        told = f"; constant are {', '.join(frozen)}" if frozen else ""
+        told = f"; constant are {listed(frozen)}" if frozen else ""
         raise InputError(
-            f"{where}: no column is the measured position of the axis (columns: {', '.join(columns)}{told}); "
+            f"{where}: no column is the measured position of the axis (columns: {listed(columns)}{told}); "
             "record it, or write its column into a map: hil import FILE --map MAP.yaml"
         )
     return roles
@@ -111,7 +111,7 @@ def _of_one_axis(
     ]
     if axis is not None and axis not in numbers:
         raise InputError(
-            f"{where}: given axis {axis!r}, allowed {', '.join(numbers) or 'none: its columns have no numbers'}"
+            f"{where}: given axis {axis!r}, allowed {listed(numbers) or 'none: its columns have no numbers'}"
         )
     if len(both) < 2 and axis is None:
         return labels

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hil.arrays import FloatArray
-from hil.recording.stamps import GAP_STEPS, LEAST_ROWS, span_text
+from hil.recording.clock_notes import LEAST_ROWS, span_text
+from hil.recording.stamps import GAP_STEPS
 
 _LATE = 1.0  # periods by which a stamp comes after the moment that the motion tells
 _NEAR = 0.5  # periods between that moment and the row's turn
@@ -14,6 +15,7 @@ _CLEAR = 3.0  # times the deviation of nearly all rows from the line between the
 _FEW = 0.01  # share of the rows: more are the jitter of a clock
 _SHORT = 0.25  # share of the rows in parts that are too short to be kept
 _SLOW = 0.01  # of the travel, within a gap
+_INVENTED = 10.0  # rows on a line for each measured one: with more there is little but lines
 _FILLED = 2.0  # periods: with more rows their median is less, and more steps would be gaps
 
 
@@ -38,6 +40,8 @@ def moving_little(columns: Mapping[str, FloatArray], positions: Collection[str])
     gaps = steps > GAP_STEPS * period_s
     parts = np.diff(np.r_[0, np.flatnonzero(gaps) + 1, steps.size + 1])
     if not positions or period_s <= 0.0 or parts[parts < LEAST_ROWS].sum() < _SHORT * steps.size:
+        return False
+    if steps[gaps].sum() > _INVENTED * steps.size * period_s:
         return False
     moved = {name: np.abs(np.diff(columns[name]))[gaps].max(initial=0.0) for name in positions}
     return all(change < _SLOW * np.ptp(columns[name]) for name, change in moved.items())

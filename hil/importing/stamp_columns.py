@@ -14,6 +14,7 @@ SLOWEST_HZ, FASTEST_HZ = 5.0, 2e5  # of recordings of an axis: outside lies a wr
 SLOWEST_TOLD_HZ = 2.0  # with a unit in the name
 _SAME = 0.02  # relative deviation of a clock from another one of the same rows
 _FORWARDS = 0.5  # of the way of stamps: less is no clock
+_SHARED = 0.5  # different stamps of whole seconds for each row; a slower recording is none
 _UNEVEN = 3.0  # times the usual step, of stamps that are made of two columns
 # Seconds from the beginning of a clock's count to 1970: of Unix, of Windows (1601), of .NET (year 1).
 _EPOCHS_S = {"s": (0.0,), "ms": (0.0,), "us": (0.0,), "ns": (0.0,), "100 ns": (11644473600.0, 62135596800.0)}
@@ -62,13 +63,20 @@ def growing(stamps: FloatArray) -> bool:
     return bool(steps.sum() > _FORWARDS * np.abs(steps).sum())
 
 
+def whole_seconds(stamps: FloatArray) -> bool:
+    """True for whole numbers (n,) that grow and are seconds since 1970 of this century."""
+    whole = bool(np.isfinite(stamps).all() and np.all(stamps == np.round(stamps)) and np.ptp(stamps) > 0.0)
+    return whole and bool(np.all((stamps > _SINCE) & (stamps < _UNTIL)) and np.all(np.diff(stamps) >= 0.0))
+
+
 def fraction_of(coarse: Stamps, name: str, values: FloatArray, told: Label) -> Stamps | None:
     """Stamps with the fraction of a second in another column (n,), which begins again with each second; else None."""
     ranges = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
     most = float(np.nanmax(values, initial=0.0))
     if np.nanmin(values, initial=0.0) < 0.0 or most <= 0.0 or coarse.time.unit not in ("date", "s"):
         return None
-    if np.any(coarse.seconds != np.floor(coarse.seconds)):
+    shared = coarse.distinct < _SHARED * coarse.seconds.size
+    if not shared or np.any(coarse.seconds != np.floor(coarse.seconds)):
         return None
     unit = told.unit if told.unit in ranges else next((one for one, size in ranges.items() if most < size), None)
     if unit is None or most >= ranges[unit]:

@@ -6,6 +6,7 @@ left out, and said. Any other line that is no row is damaged.
 
 import csv
 import re
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import islice
@@ -13,15 +14,18 @@ from pathlib import Path
 from typing import NamedTuple, TextIO
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.csv as pacsv
 from numpy.typing import NDArray
 
 from hil.arrays import FloatArray
 from hil.errors import InputError
 from hil.files.date_stamps import is_date, read_dates
+from hil.files.input_file import lines_of
 from hil.importing.map_file import CsvOptions
 from hil.importing.number_form import NumberForm, numbers_of
 
-_CHUNK = 20_000  # rows that are converted at once
+_CHUNK = 20_000  # lines that are read at once
 _MOSTLY = 0.5  # share of numbers from which text in a column is out of place
 _LONGEST = 50  # lines of a footer: more are a column that has no numbers any more
 _SHOWN = 60  # characters of a line in a message
@@ -83,12 +87,12 @@ def header_names(path: Path, options: CsvOptions) -> tuple[str, ...]:
     if options.column_names is not None:
         return options.column_names
     with open_text(path, options.encoding) as file:
-        lines = enumerate(islice(file, options.skip_lines, None), options.skip_lines + 1)
+        lines = enumerate(islice(lines_of(path, file), options.skip_lines, None), options.skip_lines + 1)
         number, header = next(((number, line) for number, line in lines if line.strip()), (0, ""))
     names = tuple(split_line(header, options.delimiter))
     if not names:
         raise InputError(f"{path}: the file is empty; give a file with a header and rows of numbers")
-    repeated = next((name for name in names if name and names.count(name) > 1), None)
+    repeated = next((name for name, times in Counter(names).items() if name and times > 1), None)
     if repeated is not None:
         raise InputError(
             f"{path}:{number}: {repeated!r} stands twice in the header, allowed once; give all names in the map: "
@@ -101,11 +105,12 @@ def read_rows(path: Path, names: Sequence[str], options: CsvOptions, most: int |
     """Read all columns, or the first `most` rows of them. Raises InputError: a damaged row, with its line and text."""
     reader = _Reader(path, tuple(names), options)
     with open_text(path, options.encoding) as file:
-        lines = enumerate(islice(file, options.skip_lines, None), options.skip_lines + 1)
+        lines = enumerate(islice(lines_of(path, file), options.skip_lines, None), options.skip_lines + 1)
         below = (one for one in lines if one[1].strip())
         skip = (options.column_names is None) + options.skip_rows
-        for number, line in islice(below, skip, skip + most if most else None):
-            reader.take(number, line, split_line(line, options.delimiter))
+        rows = islice(below, skip, skip + most if most else None)
+        while block := list(islice(rows, _CHUNK)):
+            reader.take(block)
     return reader.finish()
 
 
@@ -123,7 +128,39 @@ class _Reader:
         self.others: list[tuple[int, str, bool]] = []  # lines that are no rows: number, text, damaged
         self.converted = 0
 
-    def take(self, number: int, line: str, fields: list[str]) -> None:
+    def take(self, block: Sequence[tuple[int, str]]) -> None:
+        """Take numbered lines that are not blank."""
+        if not self._take_plain(block):
+            for number, line in block:
+                self._take_line(number, line, split_line(line, self.delimiter))
+            self._convert()
+
+    def _take_plain(self, block: Sequence[tuple[int, str]]) -> bool:
+        """Take lines at once, in a fifth of the time, if all of them are rows of finite numbers; else none of them."""
+        if self.pairs or self.fields or self.form.thousands:
+            return False
+        blanks = self.delimiter == " "
+        text = "\n".join(" ".join(line.split()) if blanks else line.rstrip("\r\n") for _, line in block)
+        kinds = {str(number): pa.float64() for number in range(len(self.names))}
+        try:
+            table = pacsv.read_csv(
+                pa.BufferReader(text.encode()),
+                pacsv.ReadOptions(column_names=list(kinds), use_threads=False),
+                pacsv.ParseOptions(delimiter=self.delimiter, quote_char=False),
+                pacsv.ConvertOptions(column_types=kinds, decimal_point=self.form.decimal, null_values=[]),
+            )
+        except ValueError:  # pa.ArrowInvalid; a delimiter that is no single byte
+            return False
+        columns = [column.to_numpy() for column in table.columns]
+        if table.num_rows != len(block) or not all(np.isfinite(values).all() for values in columns):
+            return False
+        for name, values in zip(self.names, columns, strict=True):
+            self.parts[name].append(values)
+        self.lines += [number for number, _ in block]
+        self.converted += len(block)
+        return True
+
+    def _take_line(self, number: int, line: str, fields: list[str]) -> None:
         """Take a line that is not blank: a row, or another line."""
         width, given = len(self.names), len(fields)
         extra = [field for field in fields[width:] if field]
@@ -136,8 +173,6 @@ class _Reader:
         else:
             self.rows.append(fields[:width] + [""] * (width - given))
             self.lines.append(number)
-        if len(self.rows) == _CHUNK:
-            self._convert()
 
     def _numbers(self, fields: Sequence[str]) -> bool:
         values, _ = numbers_of(fields, self.form)
@@ -147,6 +182,8 @@ class _Reader:
         return bool(numbers_of([field], self.form)[1]) and not is_date(field)
 
     def _convert(self) -> None:
+        if not self.rows:
+            return
         for name, column in zip(self.names, zip(*self.rows, strict=True), strict=True):
             if name in self.fields or (not self.converted and any(is_date(field) for field in column[:3])):
                 self.fields.setdefault(name, []).extend(column)
@@ -158,8 +195,6 @@ class _Reader:
         self.rows = []
 
     def finish(self) -> TextRows:
-        if self.rows:
-            self._convert()
         rows = self.converted
         read = {name: read_dates(fields) for name, fields in self.fields.items()}
         dates = {name: one.seconds for name, one in read.items()}
@@ -219,7 +254,7 @@ class _Reader:
 def line_of(path: Path, number: int, encoding: str) -> str:
     """Text of a line (from 1) of a file."""
     with open_text(path, encoding) as file:
-        return next(islice(file, number - 1, None), "")
+        return next(islice(lines_of(path, file), number - 1, None), "")
 
 
 def shown(line: str) -> str:

@@ -21,7 +21,7 @@ _LONGEST_M, _MOST_RAD = 5.0, 13.0
 _WHOLE = 1e-5  # relative deviation from whole quarters of a turn: that of six digits
 _LEAST_COUNTS = 200.0  # travel in whole numbers from which they are counts of an encoder
 _COORDINATE = r"q(pos)?\d*([_ ].*)?"  # joint angle, as robotics writes it: q, q1, q_ref
-_JOINT_STATE = r"(^|[^a-z])effort(\W|\d|$)"  # effort, effort[0], .effort0, effort.elbow
+_JOINT_STATE = r"(^|[^a-z])effort(\W|_?\d|$)"  # effort, effort[0], .effort0, effort_0, effort.elbow
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@
 import json
 import math
 from collections import Counter
-from collections.abc import Iterator
 from functools import cached_property
+from itertools import chain, islice, repeat
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, Self
 
@@ -73,28 +73,38 @@ class Profile(Part):
         position, duration_s = self.start_m, 0.0
         runs: list[Run] = []
         laps = Counter[FieldPath]()
+        known: dict[tuple[FieldPath, float], tuple[Move, float]] = {}  # laps are often from the same place
         for field, segment in _unrolled(self.segments, ("segments",)):
-            try:
-                move = segment.move(position, self.motion_limits)
-                duration_s += self.slots(move) * self.grid_s
-            except FieldError as error:
-                raise error.inside(*field) from None
-            except (ArithmeticError, HilError) as error:  # numbers such as 1e-320, which are not zero
-                raise FieldError(
-                    field,
-                    f"given values that cannot be computed with ({error}), allowed such as machines have; correct them",
-                ) from None
+            if (field, position) not in known:
+                known[field, position] = self._move(field, segment, position)
+            move, taken_s = known[field, position]
+            duration_s += taken_s
             if duration_s > MAX_DURATION_S or len(runs) == MAX_MOVES:
                 raise FieldError(
                     field,
                     f"given a profile that is longer than {MAX_DURATION_S:.0f} s or "
                     f"{MAX_MOVES} moves here, allowed up to that; shorten it",
                 )
-            self._check_travel(field, move)
             runs.append(Run(field, segment.kind, laps[field], position, move))
             laps[field] += 1
             position = move.end_m
         return tuple(runs)
+
+    def _move(self, field: FieldPath, segment: Any, position_m: float) -> tuple[Move, float]:
+        """The move of a segment from a position, and the time that it takes [s]."""
+        try:
+            move = segment.move(position_m, self.motion_limits)
+            taken_s = self.slots(move) * self.grid_s
+        except FieldError as error:
+            raise error.inside(*field) from None
+        except (ArithmeticError, HilError) as error:  # numbers such as 1e-320, which are not zero
+            raise FieldError(
+                field,
+                f"given values that cannot be computed with ({error}), allowed such as machines have; correct them",
+            ) from None
+        if taken_s <= MAX_DURATION_S:
+            self._check_travel(field, move)
+        return move, taken_s
 
     def slots(self, move: Move) -> int:
         """Multiples of grid_s that a move takes."""
@@ -127,14 +137,17 @@ class Profile(Part):
         return self
 
 
-def _unrolled(segments: tuple[Any, ...], field: FieldPath) -> Iterator[tuple[FieldPath, Any]]:
+def _unrolled(segments: tuple[Any, ...], field: FieldPath) -> list[tuple[FieldPath, Any]]:
+    """The segments with their places, repeats unrolled to the first one above `MAX_MOVES`."""
+    flat: list[tuple[FieldPath, Any]] = []
     for index, segment in enumerate(segments):
         here = (*field, index)
         if isinstance(segment, RepeatSegment):
-            for _ in range(segment.times):
-                yield from _unrolled(segment.segments, (*here, "segments"))
+            lap = _unrolled(segment.segments, (*here, "segments"))
+            flat += islice(chain.from_iterable(repeat(lap, segment.times)), max(0, MAX_MOVES + 1 - len(flat)))
         else:
-            yield here, segment
+            flat.append((here, segment))
+    return flat
 
 
 def write_profile(path: Path, profile: Profile) -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import struct
 from collections.abc import Collection
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -17,11 +18,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from hil.arrays import FloatArray
-from hil.errors import InputError
-from hil.files.input_file import check_file, parsing
+from hil.errors import InputError, listed
+from hil.files.input_file import check_file, check_values, parsing
 
-MOST_VALUES = 50_000_000  # rows x columns of 8 bytes: 400 MB, 75 min at 1 kHz with 11 channels
-MOST_BYTES = 2_000_000_000  # of a file: far above MOST_VALUES without compression
 METADATA_KEY = b"hil"  # of the schema: the metadata as JSON
 FORMATS = "the path of a recording: .parquet, .arrows (a run that was not closed) or .csv"
 _DAMAGED = "it is cut or damaged: read the .arrows file of the run if there is one"
@@ -38,17 +37,40 @@ class StreamRows(NamedTuple):
     closed: bool
 
 
-def read_parquet(path: Path, wanted: Collection[str] | None = None) -> pa.Table:
-    """Columns of a Parquet file, by default all. Raises InputError: damaged, a column missing, too many values."""
-    check_file(path, FORMATS, MOST_BYTES)
+def parquet_schema(path: Path) -> pa.Schema:
+    """Names and types of the columns of a Parquet file. Raises InputError: damaged."""
+    check_file(path, FORMATS)
+    with parsing(path, "Parquet file", _DAMAGED), pq.ParquetFile(path, memory_map=True) as file:
+        return file.schema_arrow
+
+
+def is_number(kind: pa.DataType) -> bool:
+    """True for a type of numbers."""
+    return bool(pa.types.is_floating(kind) or pa.types.is_integer(kind))
+
+
+def read_parquet(path: Path, wanted: Collection[str]) -> pa.Table:
+    """Columns of a Parquet file: numbers, times, or texts, which come as a dictionary.
+
+    Raises InputError: damaged, a column missing or of another type, too many values.
+    """
+    schema = parquet_schema(path)
+    texts = []
+    for name in wanted:
+        if name not in schema.names:
+            raise InputError(f"{path}: column {name!r} is missing; the file has {listed(schema.names)}")
+        with parsing(path, "Parquet file", _DAMAGED):
+            kind = schema.field(name).type
+        if pa.types.is_string(kind) or pa.types.is_large_string(kind):
+            texts.append(name)
+        elif not (is_number(kind) or pa.types.is_timestamp(kind)):
+            raise _other_type(path, name, kind)
     with parsing(path, "Parquet file", _DAMAGED):
-        with pq.ParquetFile(path, memory_map=True) as file:
-            names, rows = file.schema_arrow.names, file.metadata.num_rows
-            missing = [name for name in wanted or () if name not in names]
-            if missing:
-                raise InputError(f"{path}: column {missing[0]!r} is missing; the file has {', '.join(names)}")
-            _refuse_size(path, rows, len(names if wanted is None else wanted))
-            table = file.read(None if wanted is None else list(wanted), use_threads=False)
+        # a text of any length takes a few bytes in each further row; it must do so in memory
+        with pq.ParquetFile(path, memory_map=True, read_dictionary=texts) as file:
+            rows = file.metadata.num_rows
+            check_values(path, rows * len(wanted), f"{rows} rows of {len(wanted)} columns")
+            table = file.read(list(wanted), use_threads=False)
         table.validate()
         if table.num_rows != rows:
             raise ValueError(f"{table.num_rows} rows of {rows}")
@@ -57,17 +79,24 @@ def read_parquet(path: Path, wanted: Collection[str] | None = None) -> pa.Table:
 
 def read_stream(path: Path) -> StreamRows:
     """The complete batches of an Arrow stream, closed or not. Raises InputError: no stream, or too many values."""
-    check_file(path, FORMATS, MOST_BYTES)
+    check_file(path, FORMATS)
     batches, problem = [], ""
-    with parsing(path, "Arrow stream", _UNWRITTEN), pa.OSFile(str(path)) as file, pa.ipc.open_stream(file) as stream:
-        schema = stream.schema
+    with parsing(path, "Arrow stream", _UNWRITTEN), pa.OSFile(str(path)) as file:
+        messages = pa.ipc.MessageReader.open_stream(file)
+        schema = pa.ipc.read_schema(messages.read_next_message())
         _ = schema.names  # raises for names that are no text
         rows = 0
         try:
-            for batch in stream:
+            for message in messages:
+                if _compressed(message.metadata.to_pybytes()):  # a few bytes may stand for gigabytes
+                    raise InputError(
+                        f"{path}: holds compressed blocks, allowed plain ones as a run writes them; "
+                        "convert it to Parquet"
+                    )
+                batch = pa.ipc.read_record_batch(message, schema)
                 batch.validate()
                 rows += batch.num_rows
-                _refuse_size(path, rows, len(schema))
+                check_values(path, rows * len(schema), f"{rows} rows of {len(schema)} columns")
                 batches.append(batch)
         except InputError:
             raise
@@ -80,26 +109,46 @@ def read_stream(path: Path) -> StreamRows:
     return StreamRows(table, len(batches), problem, closed)
 
 
+def _compressed(message: bytes) -> bool:
+    """True for a record batch with the field BodyCompression (Arrow columnar format, Message.fbs; FlatBuffers)."""
+
+    def field(table: int, number: int) -> int | None:
+        """Place of a field of the table at `table`; None if it has its default."""
+        offsets = table - struct.unpack_from("<i", message, table)[0]
+        if 4 + 2 * number >= struct.unpack_from("<H", message, offsets)[0]:
+            return None
+        offset = struct.unpack_from("<H", message, offsets + 4 + 2 * number)[0]
+        return table + offset if offset else None
+
+    header = field(struct.unpack_from("<I", message)[0], 2)
+    return header is not None and field(header + struct.unpack_from("<I", message, header)[0], 3) is not None
+
+
 def numbers(path: Path, table: pa.Table, name: str) -> FloatArray:
     """A column of numbers (n,), NaN where a value is missing. Raises InputError for other values."""
     kind = table.schema.field(name).type
-    if not (pa.types.is_floating(kind) or pa.types.is_integer(kind)):
-        raise InputError(f"{path}: {name}: given {kind} values, allowed numbers; convert the column")
+    if not is_number(kind):
+        raise _other_type(path, name, kind)
     with parsing(path, f"column {name}"):
         return np.asarray(table.column(name).to_numpy().astype(np.float64))
 
 
-def stored_unit(table: pa.Table, name: str) -> str | None:
+def _other_type(path: Path, name: str, kind: pa.DataType) -> InputError:
+    kind = kind.value_type if pa.types.is_dictionary(kind) else kind
+    return InputError(f"{path}: {name}: given {kind} values, allowed numbers; convert the column")
+
+
+def stored_unit(schema: pa.Schema, name: str) -> str | None:
     """The unit that a file gives with a column; None without one."""
-    unit = (table.schema.field(name).metadata or {}).get(b"unit")
+    unit = (schema.field(name).metadata or {}).get(b"unit")
     return None if unit is None else unit.decode(errors="replace")
 
 
-def stored_metadata(path: Path, table: pa.Table) -> dict[str, Any]:
+def stored_metadata(path: Path, schema: pa.Schema) -> dict[str, Any]:
     """Metadata of a recording. Raises InputError where they are no JSON mapping, or a key that is read has another type
     than it is written with."""
     with parsing(path, "recording: its metadata"):
-        metadata = json.loads((table.schema.metadata or {}).get(METADATA_KEY, b"{}"))
+        metadata = json.loads((schema.metadata or {}).get(METADATA_KEY, b"{}"))
         if not isinstance(metadata, dict):
             raise ValueError(f"given {type(metadata).__name__}, allowed a mapping")
         for key, (kind, of) in _KINDS.items():
@@ -121,11 +170,3 @@ _KINDS: dict[str, tuple[type | tuple[type, ...], type | tuple[type, ...]]] = {
     "unknown_columns": (list, str),
     "source": (str, ()),
 }
-
-
-def _refuse_size(path: Path, rows: int, columns: int) -> None:
-    if rows * columns > MOST_VALUES:
-        raise InputError(
-            f"{path}: given {rows} rows of {columns} columns, allowed {MOST_VALUES} values together; "
-            "cut the recording, or record fewer channels"
-        )

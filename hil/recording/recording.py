@@ -19,13 +19,13 @@ import pyarrow.parquet as pq
 
 from hil.arrays import FloatArray
 from hil.channels import AXIS_CHANNELS, CHANNELS, AxisChannels, AxisKind
-from hil.errors import InputError
+from hil.errors import InputError, listed
 from hil.files import csv_columns
-from hil.files.input_file import check_file
+from hil.files.input_file import bounded, check_file, is_file
 from hil.recording.arrow_files import (
     FORMATS,
-    MOST_BYTES,
     numbers,
+    parquet_schema,
     read_parquet,
     read_stream,
     stored_metadata,
@@ -81,7 +81,7 @@ class Recording:
     def __getitem__(self, channel: str) -> FloatArray:
         """The column of a channel; raises InputError, with the channels there are, if it was not recorded."""
         if channel not in self.columns:
-            raise InputError(f"{self.name}: {channel} is not recorded; the recording has {', '.join(self.columns)}")
+            raise InputError(f"{self.name}: {channel} is not recorded; the recording has {listed(self.columns)}")
         return self.columns[channel]
 
     @property
@@ -129,6 +129,7 @@ class Recording:
         return over_time(self.name, self["time_s"], panels)
 
 
+@bounded
 def read_recording(path: str | Path) -> Recording:
     """Read a Parquet, Arrow stream or canonical CSV file; the ending decides.
 
@@ -146,7 +147,7 @@ def read_recording(path: str | Path) -> Recording:
             f"{path}: the ending {path.suffix!r} is no recording, allowed .parquet, .arrows or .csv; "
             "import a foreign file with: hil import FILE --map MAP.yaml"
         )
-    check_file(path, FORMATS, MOST_BYTES)
+    check_file(path, FORMATS)
     recording = readers[path.suffix.lower()](path)
     pa.default_memory_pool().release_unused()  # else it keeps what the table took: twice the recording
     return recording
@@ -162,7 +163,7 @@ def clock_metadata(rows: RegularRows) -> dict[str, Any]:
 def write_parquet(recording: Recording, path: str | Path) -> None:
     """Write a Parquet file, whole or not at all. Raises InputError if `path` exists or cannot be written."""
     path = Path(path)
-    if path.exists():
+    if is_file(path):
         raise InputError(f"{path}: the file exists and is not overwritten; give another name or remove it")
     schema = arrow_schema(recording.columns, recording.metadata | {"period_s": recording.period_s})
     table = pa.Table.from_arrays([pa.array(values) for values in recording.columns.values()], schema=schema)
@@ -208,7 +209,8 @@ def _read_csv(path: Path) -> Recording:
 
 
 def _read_parquet(path: Path) -> Recording:
-    return _from_table(path, read_parquet(path), {})
+    schema = parquet_schema(path)
+    return _from_table(path, schema, read_parquet(path, _known(path, tuple(schema.names))), {})
 
 
 def _read_stream(path: Path) -> Recording:
@@ -218,18 +220,18 @@ def _read_stream(path: Path) -> Recording:
         notes["recovered"] = f"the run was not closed: {table.num_rows} rows in {batches} complete batches" + (
             ", the batch after them is cut and left out" if problem else ""
         )
-    return _from_table(path, table, notes)
+    return _from_table(path, table.schema, table, notes)
 
 
-def _from_table(path: Path, table: pa.Table, notes: dict[str, Any]) -> Recording:
-    known = _known(path, tuple(table.column_names))
+def _from_table(path: Path, schema: pa.Schema, table: pa.Table, notes: dict[str, Any]) -> Recording:
+    known = _known(path, tuple(schema.names))
     for name in known:
-        unit, own = stored_unit(table, name), CHANNELS[name].unit
+        unit, own = stored_unit(schema, name), CHANNELS[name].unit
         if unit not in (None, own):
             raise InputError(f"{path}: {name}: given in {unit}, allowed {own}; import it with a map")
     # an empty value becomes NaN, which the check refuses with its row
     columns = {name: numbers(path, table, name) for name in known}
-    metadata = stored_metadata(path, table)
+    metadata = stored_metadata(path, schema)
     metadata.pop(PARTS, None)  # the rows tell
     stored_s = metadata.pop("period_s", None)
     rows = regular_rows(columns, lambda row: f"{path}: row {row + 1}", period_s=stored_s)
@@ -237,7 +239,7 @@ def _from_table(path: Path, table: pa.Table, notes: dict[str, Any]) -> Recording
     period_s = rows.period_s if rows.rate_hz else stored_s
     if abs(period_s - rows.period_s) > CLOCK_TOLERANCE * rows.period_s:
         raise InputError(f"{path}: period_s: given {period_s} s, the rows have {rows.period_s:g} s; it is damaged")
-    metadata = clock_metadata(rows) | metadata | _unknown(tuple(table.column_names)) | notes
+    metadata = clock_metadata(rows) | metadata | _unknown(tuple(schema.names)) | notes
     return Recording(path.stem, rows.columns, period_s, metadata)
 
 
@@ -252,7 +254,7 @@ def _known(path: Path, names: tuple[str, ...]) -> list[str]:
     if missing:
         linear = " (a linear axis has motor_position_m and force_n)" if kind is AxisKind.ROTARY else ""
         raise InputError(
-            f"{path}: {', '.join(missing)} missing, given the columns {', '.join(names)}; "
+            f"{path}: {', '.join(missing)} missing, given the columns {listed(names)}; "
             f"add them{linear}, or import the file with: hil import FILE --map MAP.yaml"
         )
     return [name for name in names if name in CHANNELS]

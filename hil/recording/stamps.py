@@ -8,6 +8,8 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.errors import InputError
+from hil.files.input_file import MOST_VALUES
+from hil.recording.clock_notes import LEAST_ROWS, of_gaps, of_ticks, of_uneven
 from hil.recording.row_clock import (
     CLOCK_TOLERANCE,
     RowClock,
@@ -20,8 +22,8 @@ from hil.recording.row_clock import (
 )
 
 LARGEST = 1e12  # above every SI value of a channel, and of a clock in microseconds per day
+LEAST_STEP_S = 1e-9  # periods are rounded to 1 ps
 GAP_STEPS = 10.0  # of the clock: above, rows are missing and are not interpolated
-LEAST_ROWS = 50  # of a part: fewer show no motion
 REPEATS = 0.02  # share of repeated stamps from which they have too few digits, and are no duplicate rows
 _TENTHS = 200  # steps from which the median of a tenth is a typical step in spite of jitter
 _TWO_RATES = 1.5  # ratio of typical steps at both ends: more than jitter and drift
@@ -99,6 +101,11 @@ def regular_rows(
     few_digits = bool(time_s.size >= LEAST_ROWS and np.mean(steps == 0.0) > REPEATS and steps.max() > 0.0)
     _refuse_order(time_s, steps, few_digits, place)
     typical = float(np.median(steps[steps > 0.0]))
+    if typical < LEAST_STEP_S:
+        raise InputError(
+            f"{place(0)}: time_s: given steps of {typical:.3g} s, allowed {LEAST_STEP_S:g} s or more; correct the unit "
+            "of the time in the map"
+        )
     at_ticks = bool(period_s and period_s > 0.0 and at_whole_periods(steps, period_s) and steps.min() < 1.5 * period_s)
     if period_s is not None and at_ticks:
         typical = period_s
@@ -116,7 +123,7 @@ def regular_rows(
             f"{place(row)}: time_s: a step of {steps[row - 1]:.6g} s, allowed the period "
             f"{typical:.6g} s +-1 %; rows are missing: cut the recording there, or resample it"
         )
-    notes = _of_gaps(time_s, pieces, kept, typical)
+    notes = of_gaps(time_s, pieces, kept, typical)
     mean_s = float(np.sum(within) / within.size)
     if even and (rate_hz is None or _near(1.0 / rate_hz, mean_s)):
         parts = [{name: values[piece] for name, values in columns.items()} for piece in kept]
@@ -133,16 +140,18 @@ def regular_rows(
     clock, told = row_clock(judged, kept, typical)
     if clock is None:
         period_s = _usual_step(time_s, kept, within, typical) if rate_hz is None else 1.0 / rate_hz
-        notes = (*notes, _of_uneven(within, typical, told, 1.0 / period_s))
+        notes = (*notes, of_uneven(within, typical, told, 1.0 / period_s))
     else:
         columns = _at_their_ticks(columns, kept, clock)
         whole_rate = rate_hz is None or _near(1.0 / rate_hz, clock.period_s)
         period_s = clock.period_s if rate_hz is None or whole_rate else 1.0 / rate_hz
-        notes = (*notes, *_of_ticks(clock, None if whole_rate else rate_hz))
+        notes = (*notes, *of_ticks(clock, None if whole_rate else rate_hz))
         if whole_rate:
             filled_hz = float(f"{1.0 / period_s:.9g}") if clock.missing else None
             return _joined(_at_ticks(columns, kept, clock.ticks, period_s), time_s[0], period_s, filled_hz, notes)
     rate_hz = float(f"{1.0 / period_s:.9g}")
+    span_s = sum(float(time_s[piece.stop - 1] - time_s[piece.start]) for piece in kept)
+    _refuse_many(int(span_s * rate_hz), len(columns), rate_hz)
     parts = [_interpolated(columns, piece, rate_hz) for piece in kept]
     return _joined(parts, time_s[0], round(1.0 / rate_hz, 12), rate_hz, notes)
 
@@ -156,46 +165,6 @@ def _usual_step(time_s: FloatArray, kept: list[slice], within: FloatArray, typic
     most = np.mean(np.abs(within - typical) <= CLOCK_TOLERANCE * typical) > 0.5
     times = [time_s[piece] for piece in kept]
     return float(f"{typical if most else slope(times, [row_ticks(one) for one in times]):.4g}")
-
-
-def _of_uneven(within: FloatArray, typical: float, told: bool, rate_hz: float) -> str:
-    """Note on rows that are interpolated by their stamps."""
-    doubt = "" if told else ", and the motion does not tell whether the rows are equal ticks"
-    return (
-        f"clock: the steps of the stamps are uneven, typically {span_text(typical)}, from {span_text(within.min())} to "
-        f"{span_text(within.max())}{doubt}; the channels are interpolated by the stamps to {rate_hz:.6g} Hz"
-    )
-
-
-def _of_ticks(clock: RowClock, rate_hz: float | None) -> tuple[str, ...]:
-    """Notes on rows that are counted: jitter of the stamps, missing rows, and another rate that the map wants."""
-    notes, missing = [], clock.missing
-    if clock.rounded is not None:
-        notes.append(
-            f"clock: the stamps are rounded to {span_text(clock.rounded.digit_s)}; by all of them rows are equal ticks "
-            f"of {span_text(clock.period_s)} +- {span_text(clock.rounded.error_s)}"
-        )
-    elif clock.jitter_s > CLOCK_TOLERANCE * clock.period_s:
-        notes.append(
-            f"clock: the stamps jitter by {span_text(clock.jitter_s)}, but the rows are equal ticks of "
-            f"{span_text(clock.period_s)}: the row number is the clock"
-        )
-    if missing:
-        notes.append(
-            f"clock: {sum(missing)} rows are missing in {len(missing)} place{'s' if len(missing) > 1 else ''} at a "
-            f"period of {clock.period_s:.6g} s; they are interpolated"
-        )
-    if rate_hz is not None:
-        notes.append(
-            f"clock: the channels are interpolated from ticks of {span_text(clock.period_s)} to {rate_hz:.6g} Hz"
-        )
-    return tuple(notes)
-
-
-def span_text(span_s: float) -> str:
-    """A span of time in us, ms or s, of four digits."""
-    factor, unit = (1e6, "us") if span_s < 1e-3 else (1e3, "ms") if span_s < 1.0 else (1.0, "s")
-    return f"{factor * span_s:.4g} {unit}"
 
 
 def _at_their_ticks(columns: Mapping[str, FloatArray], kept: list[slice], clock: RowClock) -> dict[str, FloatArray]:
@@ -244,28 +213,12 @@ def _refuse_two_rates(steps: FloatArray, place: Callable[[int], str]) -> None:
         )
 
 
-def _of_gaps(time_s: FloatArray, pieces: list[slice], kept: list[slice], typical: float) -> tuple[str, ...]:
-    """Notes on the gaps, and on parts that are too short."""
-    if len(pieces) == 1:
-        return ()
-    gaps = [float(time_s[piece.start] - time_s[piece.start - 1]) for piece in pieces[1:]]
-    sizes = (
-        f"a gap of {gaps[0]:.4g} s" if len(gaps) == 1 else f"{len(gaps)} gaps of {min(gaps):.4g} to {max(gaps):.4g} s"
-    )
-    starts = ", ".join(f"{time_s[piece.start] - time_s[0]:.4g}" for piece in kept[:10])
-    text = (
-        f"clock: {sizes} between steps of {typical:.4g} s, first after row {pieces[1].start} of the numbers: cut into "
-        f"{len(kept)} part{'s' if len(kept) > 1 else ''}, from {starts}{', ...' if len(kept) > 10 else ''} s on"
-    )
-    lost = sum(piece.stop - piece.start for piece in pieces) - sum(piece.stop - piece.start for piece in kept)
-    return (text + (f"; {lost} rows in parts of less than {LEAST_ROWS} are left out" if lost else ""),)
-
-
 def _at_ticks(
     columns: Mapping[str, FloatArray], kept: list[slice], ticks: list[Ticks], period_s: float
 ) -> list[dict[str, FloatArray]]:
     """The rows of each part at each of its ticks, linear where rows are missing."""
     parts = []
+    _refuse_many(sum(int(at[-1]) + 1 for at in ticks), len(columns), 1.0 / period_s)
     for piece, at in zip(kept, ticks, strict=True):
         grid = np.arange(at[-1] + 1)
         part = {name: np.interp(grid, at, values[piece]) for name, values in columns.items()}
@@ -280,6 +233,14 @@ def _interpolated(columns: Mapping[str, FloatArray], piece: slice, rate_hz: floa
     rows = int((time_s[-1] - time_s[0]) * rate_hz + 1e-6) + 1
     grid_s = time_s[0] + np.arange(rows) / rate_hz
     return {name: np.interp(grid_s, time_s, values[piece]) for name, values in columns.items()} | {"time_s": grid_s}
+
+
+def _refuse_many(rows: int, columns: int, rate_hz: float) -> None:
+    if rows * columns > MOST_VALUES:
+        raise InputError(
+            f"time_s: given stamps that need {rows} rows of {columns} channels at {rate_hz:.6g} Hz, allowed "
+            f"{MOST_VALUES} values together; cut the recording, or resample it to a lower rate"
+        )
 
 
 def _joined(

@@ -1,8 +1,8 @@
 """Fuzz everything that is read: `make fuzz`, or `python tests/fuzz/fuzz.py --inputs 20000 --seed 1 --jobs 2`.
 
-An input is a failure if the code that reads it raises anything but an error raised on purpose, takes more than 5 s, or
-lets the process grow by more than 500 MB, or ends it. Prints a table with counts; a failure prints its seed, and
-`--only TARGET --one SEED` repeats it with its trace. Exit code 1 with failures.
+An input is a failure if the code that reads it raises anything but an error raised on purpose, takes more than 5 s of
+processor time, lets the process grow by more than 500 MB, or ends it. Prints a table with counts; a failure prints its
+seed, and `--only TARGET --one SEED` repeats it with its trace. Exit code 1 with failures.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from types import FrameType
 from typing import Any, NamedTuple
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
+sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 sys.path.insert(0, str(Path(__file__).parent))
 
 from targets import EXPECTED, TARGETS, WEIGHTS, rehearse_all
@@ -52,8 +53,8 @@ class Tried(NamedTuple):
 
 def attempt(target: str, seed: str, folder: Path) -> Tried:
     """Give one input to its target."""
-    failure, accepted, before_mb, start_s = "", False, _peak_mb(), time.perf_counter()
-    signal.setitimer(signal.ITIMER_REAL, LONGEST_S)
+    failure, accepted, before_mb, start_s = "", False, _peak_mb(), time.process_time()
+    signal.setitimer(signal.ITIMER_PROF, LONGEST_S)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
@@ -68,8 +69,8 @@ def attempt(target: str, seed: str, folder: Path) -> Tried:
         failure = f"{type(error).__name__}: {str(error).splitlines()[0] if str(error) else ''} "
         failure = f"{failure[:160]} ({Path(frame.filename).name}:{frame.lineno})"
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-    seconds, growth_mb = time.perf_counter() - start_s, _peak_mb() - before_mb
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+    seconds, growth_mb = time.process_time() - start_s, _peak_mb() - before_mb
     if not failure and seconds > LONGEST_S:
         failure = f"longer than {LONGEST_S:g} s"
     if not failure and growth_mb > MOST_GROWTH_MB:
@@ -88,7 +89,7 @@ def too_slow(number: int, frame: FrameType | None) -> None:
 
 def work(target: str, seeds: list[str]) -> None:
     """Try inputs in this process; print a line for each: its seed before, its result after."""
-    signal.signal(signal.SIGALRM, too_slow)
+    signal.signal(signal.SIGPROF, too_slow)
     with tempfile.TemporaryDirectory() as name:
         for k in range(4):  # imports, parsed files and loaded kernels belong to no input
             attempt(target, f"first {k}", Path(name))

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 from fuzz_devices import eds, frames, sdo, serial
+from fuzz_foreign import foreign
 from mutations import damaged_bytes, damaged_text
 
 import hil
@@ -128,6 +129,7 @@ TARGETS: Mapping[str, Callable[[random.Random, Path], None]] = {
     "benches": bench,
     "import maps, .mat": import_map,
     "recordings": recording,
+    "foreign recordings": foreign,
     "EDS": eds,
     "SDO frames": sdo,
     "PDO, EMCY, heartbeat frames": frames,
@@ -135,6 +137,6 @@ TARGETS: Mapping[str, Callable[[random.Random, Path], None]] = {
 }
 # share of the inputs
 WEIGHTS: Mapping[str, int] = {
-    "profiles": 3, "benches": 3, "import maps, .mat": 3, "recordings": 4, "EDS": 1, "SDO frames": 4,
-    "PDO, EMCY, heartbeat frames": 5, "serial frames": 3,
+    "profiles": 3, "benches": 3, "import maps, .mat": 3, "recordings": 4, "foreign recordings": 4, "EDS": 1,
+    "SDO frames": 4, "PDO, EMCY, heartbeat frames": 5, "serial frames": 3,
 }  # fmt: skip

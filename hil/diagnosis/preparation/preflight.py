@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
 from hil.channels import AXIS_CHANNELS
-from hil.errors import InputError
+from hil.errors import InputError, listed
 from hil.identification.derived_channels import DERIVED, completed, torque_is_measured
 from hil.identification.measured import LEAD_IN, Measured, take
 from hil.identification.plain_model import PlainModel, fit_plain_model, motion_data
@@ -90,7 +90,7 @@ def _raw_problems(recording: Recording, bench: Bench) -> Iterator[str]:
         if name not in recording.columns:
             yield (
                 f"{recording.name}: {name} is not recorded, allowed are recordings with it; "
-                f"record it (there are {', '.join(recording.columns)})"
+                f"record it (there are {listed(recording.columns)})"
             )
     if not torque_is_measured(recording) and not bench.has_table_encoder:
         yield (

@@ -127,7 +127,13 @@ def test_a_correct_file_gives_the_model(tmp_path: Path) -> None:
         ("just text\n", ":1: given 'just text', allowed"),
         ("? [a, b]\n: 1\n", ":1: broken YAML"),
         ("name: \x07\n", ": not YAML text"),
-        ("node_id: " + "9" * 5000 + "\n", ": Exceeds the limit"),
+        (
+            "node_id: " + "9" * 5000 + "\n",
+            ":1: given '9999999999999999999999999999999999999999', which is no int (Exceeds the limit",
+        ),
+        ('name: !!bool "x"\n', ":1: given 'x', which is no bool; correct the value"),
+        ("name: !!float x\n", ":1: given 'x', which is no float (could not convert"),
+        ("name: !!timestamp x\n", ":1: given 'x', which is no timestamp; correct the value"),
         ("[" * 3000, ": given hundreds of nested lists"),
     ],
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 from foreign_axis import LEAD_M, axis, renamed, write
 
+from hil.errors import InputError
 from hil.importing.by_map import import_recording
 from hil.importing.draft_map import draft_map
 from hil.importing.map_draft import MapDraft
@@ -234,3 +236,26 @@ def test_two_encoders_in_mm_are_a_screw_with_a_lead_to_correct(tmp_path: Path) -
     assert any("mm per turn are taken: correct scale and lead" in note for note in draft.unsure)
     assert recording["motor_position_rad"] == pytest.approx(AXIS["angle"] * LEAD_M / 0.010, abs=1e-3)
     assert "table_position_m" in recording.columns
+
+
+def test_a_sparse_variable_and_an_element_of_no_type_end_in_no_crash(tmp_path: Path) -> None:
+    from scipy.io import savemat
+    from scipy.sparse import eye_array
+
+    path = tmp_path / "log.mat"
+    savemat(path, renamed(AXIS, **NAMES) | {"sparse": eye_array(3, format="csc")}, do_compression=False)
+    assert "neither a number" in draft_map(path).left_out["sparse"]
+    data = bytearray(path.read_bytes())
+    data[136:140] = (2456).to_bytes(4, "little")  # type of the first element within the first variable
+    path.write_bytes(data)
+    with pytest.raises(InputError, match="an element has the type 2456, allowed those up to 18"):
+        draft_map(path)
+
+
+def test_more_columns_than_an_axis_has_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "log.json"
+    path.write_text(json.dumps([{f"c{k}": 1.0 for k in range(1001)}] * 3))
+    with pytest.raises(
+        InputError, match="given 1001 columns of numbers, allowed 1000; export the channels of one axis"
+    ):
+        draft_map(path)

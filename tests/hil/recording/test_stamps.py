@@ -10,8 +10,9 @@ import pyarrow as pa
 import pytest
 
 from hil.errors import InputError
+from hil.recording.clock_notes import LEAST_ROWS
 from hil.recording.recording import Recording, arrow_schema, read_recording, write_parquet, write_table
-from hil.recording.stamps import LEAST_ROWS, RegularRows, regular_rows
+from hil.recording.stamps import RegularRows, regular_rows
 
 RANDOM = np.random.default_rng(11)
 ROWS, PERIOD_S = 3000, 1e-3
@@ -182,3 +183,17 @@ def test_a_recording_without_gaps_is_its_only_part(tmp_path: Path) -> None:
     recording = read_recording(_csv(tmp_path / "run.csv", np.arange(ROWS)))
     assert isinstance(recording, Recording)
     assert recording.parts() == (recording,)
+
+
+def test_steps_without_digits_are_refused() -> None:
+    with pytest.raises(InputError, match="given steps of 1e-303 s, allowed 1e-09 s or more"):
+        made(TICKS_S * 1e-300, position(TICKS_S))
+
+
+def test_rows_that_would_fill_the_memory_are_refused() -> None:
+    uneven_s = TICKS_S + RANDOM.uniform(-2e-4, 2e-4, ROWS)
+    with pytest.raises(InputError, match=r"rows of 2 channels at 1e\+09 Hz, allowed 50000000 values together"):
+        made(uneven_s, position(TICKS_S), 1e9)
+    columns = {"time_s": np.r_[0.0, 1e-9, 8e-9 * np.arange(1, 7_000_000)], "x": np.zeros(7_000_001)}
+    with pytest.raises(InputError, match=r"rows of 2 channels at 1e\+09 Hz, allowed 50000000 values together"):
+        regular_rows(columns, lambda row: f"row {row}", period_s=1e-9)

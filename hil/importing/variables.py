@@ -1,0 +1,144 @@
+"""Read files that hold variables by name: MATLAB .mat, NumPy .npy and .npz, ASAM MDF 4 (.mf4), XML of records, text of
+one value in each line."""
+
+import zipfile
+from collections import Counter
+from pathlib import Path
+from typing import Any, NamedTuple
+from xml.etree import ElementTree
+
+import numpy as np
+from numpy.lib import format as npy_format
+
+from hil.errors import InputError
+from hil.files.input_file import check_values, parsing
+from hil.importing.long_text import long_form, read_long
+from hil.importing.mat_file import load_mat
+
+TEXT_ENDINGS = (".csv", ".txt", ".tsv", ".tab", ".dat", ".asc", ".log", ".lvm", ".prn")
+JSON_ENDINGS = (".json", ".jsonl", ".ndjson")
+VARIABLE_ENDINGS = (".mat", ".npy", ".npz", ".mf4", ".xml")
+_WHOLE_NAN = 0x7FF0_0000_0000_0000  # an IEEE 754 number without a value, whose bits were written as a whole number
+
+
+class Variables(NamedTuple):
+    """Arrays by name, and their units where the file gives them."""
+
+    arrays: dict[str, Any]
+    units: dict[str, str]
+
+
+def load_variables(path: Path) -> Variables:
+    """Read `path` by its ending. Raises InputError: damaged, too many values, or a library that is not installed."""
+    match path.suffix.lower():
+        case ".mat":
+            return Variables(load_mat(path), {})
+        case ".npy" | ".npz":
+            with parsing(path, "NumPy file"):
+                return Variables(_numpy(path), {})
+        case ".mf4":
+            return _mdf(path)
+        case ending if ending in TEXT_ENDINGS:
+            with parsing(path, "text with a value per line"):
+                form = long_form(path)
+                assert form is not None, "its form has changed"
+                return Variables(read_long(path, form), {"time": "s"})
+        case _:
+            with parsing(path, "XML file of records"):
+                return Variables(_records(path), {})
+
+
+def _numpy(path: Path) -> dict[str, Any]:
+    """Arrays of a .npy or .npz file; fields of a structured array as variables. What it says of its size is checked."""
+    found = dict[str, Any]()
+    if path.suffix.lower() == ".npy":
+        _check_array(path, path.open("rb"))
+        found = {path.stem: np.load(path, allow_pickle=False)}
+    else:
+        with zipfile.ZipFile(path) as archive:
+            names = [name for name in archive.namelist() if name.endswith(".npy")]
+            values = sum(_check_array(path, archive.open(name)) for name in names)
+            check_values(path, values, f"{values} values")
+        with np.load(path, allow_pickle=False) as arrays:  # other members are no arrays and of any size
+            found = {name.removesuffix(".npy"): arrays[name] for name in names}
+    variables = dict[str, Any]()
+    for name, array in found.items():
+        fields = array.dtype.names or ()
+        variables |= {field: array[field] for field in fields} if fields else {name: array}
+    return variables
+
+
+def _check_array(path: Path, file: Any) -> int:
+    """Number of values that the head of an array announces. Raises InputError for too many."""
+    with file:
+        version = npy_format.read_magic(file)
+        read = npy_format.read_array_header_1_0 if version == (1, 0) else npy_format.read_array_header_2_0
+        shape, _, dtype = read(file)
+    values = int(np.prod([float(size) for size in shape])) * max(1, dtype.itemsize // 8)
+    check_values(path, values, f"an array of {' x '.join(map(str, shape))}")
+    return values
+
+
+def _mdf(path: Path) -> Variables:
+    """Channels of an MDF 4 file, with the clock of each group: "time", of the groups after the first "time 2", ..."""
+    try:
+        from asammdf import MDF
+    except ImportError:
+        raise InputError(
+            f"{path}: .mf4 files are read by asammdf, which is not installed; install it: pip install 'hil-servo[mf4]'"
+        ) from None
+    arrays, units = dict[str, Any](), dict[str, str]()
+    with parsing(path, "MDF 4 file"), MDF(path) as file:
+        groups = [group for group in file.groups if group.channel_group.cycles_nr > 0]
+        values = sum(group.channel_group.cycles_nr * len(group.channels) for group in groups)
+        check_values(path, values, f"{values} values")
+        for number, index in enumerate(file.virtual_groups, 1):
+            clock = "time" if number == 1 else f"time {number}"
+            for signal in file.select([(None, *place) for place in _places(file, index)], raw=False):
+                arrays[clock] = signal.timestamps
+                arrays[signal.name], units[signal.name] = signal.samples, signal.unit
+            units[clock] = "s"
+    return Variables(arrays, {name: unit for name, unit in units.items() if unit})
+
+
+def _places(file: Any, index: int) -> list[tuple[int, int]]:
+    """Group and number of each channel of a virtual group, but for its clock."""
+    chosen = file.included_channels(index)[index]
+    return [(group, channel) for group, channels in chosen.items() for channel in channels]
+
+
+def _records(path: Path) -> dict[str, Any]:
+    """Attributes with numbers of the element that stands most often, a record per element; NaN where one has none.
+
+    The name of an attribute is the description or name of an element whose id it is: SINUMERIK Trace writes
+    <dataSignal id="f1" name="..." description="..."/> before <rec time="0" f1="1.5"/>.
+    """
+    records = list[dict[str, str]]()
+    names, tags = dict[str, str](), Counter[str]()
+    for _, element in ElementTree.iterparse(path):
+        tags[element.tag] += 1
+        if "id" in element.attrib:
+            given = (element.get(key, "").strip() for key in ("description", "name"))
+            names[element.attrib["id"]] = next((text for text in given if text), element.attrib["id"])
+        elif element.attrib:
+            records.append({"": element.tag} | element.attrib)
+        element.clear()
+    most = next((tag for tag, _ in tags.most_common() if any(one[""] == tag for one in records[-1:])), "")
+    rows = [one for one in records if one[""] == most]
+    keys = [key for key in dict.fromkeys(key for one in rows for key in one) if key]
+    check_values(path, len(rows) * len(keys), f"{len(rows)} records of {len(keys)} values")
+    titles = Counter(names.get(key, key) for key in keys)
+    return {
+        names.get(key, key) if titles[names.get(key, key)] == 1 else f"{names.get(key, key)} {key}": np.array(
+            [_number(one.get(key, "")) for one in rows]
+        )
+        for key in keys
+    }
+
+
+def _number(text: str) -> float:
+    try:
+        value = float(text.replace(",", "."))
+    except ValueError:
+        return float("nan")
+    return float("nan") if value >= _WHOLE_NAN else value

@@ -145,7 +145,7 @@ class ChannelEntries:
     def _speeds(self) -> list[Label]:
         """Measured velocities with a unit."""
         labels = self.labels.values()
-        return [one for one in labels if one.quantity is Quantity.VELOCITY and one.unit and not one.command]
+        return [one for one in labels if one.quantity is Quantity.VELOCITY and one.unit in UNITS and not one.command]
 
     def _positions(self, name: str) -> None:
         """Add the motor's position `name`, the lead, and the other positions."""
@@ -238,10 +238,10 @@ class ChannelEntries:
 
     def _count_size(self, motor: str, length: str | None, factor: float) -> CountSize:
         """Size of a count of the motor's encoder; `factor` is length over counts."""
-        told = self.draft.table.constants.get(Constant.COUNTS)
-        if told is not None:
-            note = f"{motor}: its counts are taken from the header of the file: {told.text}"
-            return CountSize({"counts_per_rev": told.value}, note)
+        for constant in (Constant.COUNTS, Constant.COUNTS_PER_M):
+            if (told := self.draft.table.constants.get(constant)) is not None:
+                note = f"{motor}: its counts are taken from the header of the file: {told.text}"
+                return CountSize({constant.value: told.value}, note)
         moved = self._motion(motor)
         for one in self._speeds():
             relation = derivative_of(self.live[one.column], moved, self.period_s) if one.column in self.live else None

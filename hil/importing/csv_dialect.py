@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from hil.errors import InputError
 from hil.files.date_stamps import is_date
+from hil.importing.encodings import encoding_of
 from hil.importing.header_rows import COMMENT, Header, read_header
 from hil.importing.map_file import CsvOptions
 from hil.importing.number_form import NumberForm, find_form, number_of
@@ -20,7 +21,6 @@ _LEAST_SHARE = 0.3  # of fields with numbers or dates
 _PAIRED = 0.1  # share of the rows that all channels of a file have, if some end before the others
 _MOSTLY = 0.5  # share of the rows in which a column of numbers has some
 _FOLLOW = 3  # rows of numbers in turn, at which they begin
-_ENCODINGS = ("utf-8", "cp1252", "cp850")  # the last one reads every byte
 
 
 @dataclass(frozen=True)
@@ -82,13 +82,17 @@ def _lines(path: Path) -> tuple[list[str], str]:
     wide = start.startswith((b"\xff\xfe", b"\xfe\xff"))
     if not wide and (b"\x00" in start or sum(byte < 9 or 13 < byte < 32 for byte in start) > len(start) // 50):
         raise InputError(f"{path}: is not text but binary data; export the recording as CSV, .mat, Parquet or JSON")
-    for encoding in ("utf-16",) if wide else _ENCODINGS:
-        try:
-            with path.open(encoding="utf-8-sig" if encoding == "utf-8" else encoding) as file:
-                return [line.rstrip("\r\n") for line in islice(file, MOST_LINES)], encoding
-        except UnicodeDecodeError:
-            continue
-    raise InputError(f"{path}: is damaged UTF-16 text; export the recording again as UTF-8")
+    encoding = "utf-16" if wide else _encoding(path)
+    try:
+        with path.open(encoding="utf-8-sig" if encoding == "utf-8" else encoding) as file:
+            return [line.rstrip("\r\n") for line in islice(file, MOST_LINES)], encoding
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: is damaged {encoding} text; export the recording again as UTF-8") from None
+
+
+def _encoding(path: Path) -> str:
+    with path.open("rb") as file:
+        return encoding_of([line.rstrip(b"\r\n") for line in islice(file, MOST_LINES)])
 
 
 def _layout(path: Path, body: list[str]) -> _Layout:

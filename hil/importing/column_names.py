@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from hil.importing.lexicon import Quantity, lexicon, without_accents
 from hil.importing.units import QUANTITY_OF_UNIT, split_unit, unit_named, unit_of_text, whole_unit
+from hil.quantities import UNITS
 
 _NOTHING = (Quantity.UNKNOWN, False)
 _BRACKET = re.compile(r"[\[({].*[\])}]")
@@ -27,6 +28,7 @@ class Label:
     unit: str | None
     odd_unit: bool = False
     electric: str | None = None  # A or V if the word says current or voltage
+    si: str | None = None  # N m or N if its unit or a word says torque or force
     part: bool = False  # of a torque: friction, gravity
     letter: bool = False  # one letter says its quantity, beside nothing else that is known
 
@@ -75,6 +77,7 @@ def label(column: str, unit_text: str = "", words_beside: str = "") -> Label:
         unit,
         odd,
         _electric(words) if quantity is Quantity.EFFORT else None,
+        _si(words, unit) if quantity is Quantity.EFFORT else None,
         _any(words, known.part),
         not words_beside and quantity is not Quantity.TIME and (len(name.strip()) == 1 or strange),
     )
@@ -85,6 +88,19 @@ def _electric(words: list[str]) -> str | None:
     units = {word: unit for unit, known in lexicon().electric.items() for word in known}
     long = (unit for word, unit in units.items() if len(word) >= LEAST_WITHIN and _any(words, (word,)))
     return next(long, next((units[word] for word in words if word in units), None))
+
+
+def effort_of_words(name: str) -> str | None:
+    """N m or N by the words of a name."""
+    return _si(_words(plain_words(name)), None)
+
+
+def _si(words: list[str], unit: str | None) -> str | None:
+    """N m or N by the unit of an effort, else by a word for torque or force alone."""
+    if (si := UNITS.get(unit or "", ("",))[0]) in ("N m", "N"):
+        return si
+    told = [si for si, known in (("N m", lexicon().torque), ("N", lexicon().force)) if _any(words, known)]
+    return told[0] if len(told) == 1 else None
 
 
 def _unit_after_blank(name: str) -> tuple[str, str | None]:

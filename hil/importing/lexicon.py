@@ -124,6 +124,8 @@ class Lexicon(_Entry):
     attached_after: Words
     attached_before: Words
     electric: dict[Literal["A", "V"], Words]
+    torque: Words
+    force: Words
     angle: Words
     angular_speed: Words
     length: Words

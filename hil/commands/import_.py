@@ -82,6 +82,8 @@ def _drafted(source: Path, target: Path, rate_hz: float | None, axis: str | None
             err.print(f"  - {note}", markup=False)
     if draft.asked:
         questions = [f"{path}:{line}: {question}" for line, question in asked_lines(text)]
-        told = f"{source}: the file does not tell what stands below; write it into the map, then: hil import {source} --map {path}"
+        told = (
+            f"{source}: the file does not tell what follows; write it into the map, then hil import FILE --map {path}"
+        )
         raise InputError("\n".join([told, *questions]))
     return path

@@ -11,9 +11,10 @@ clock                stamp_columns, clock; hil.recording.stamps and row_clock   
                      channel_clocks (stamps of each channel)                     `OwnClocks`
 values that hold     on_change                                                   columns without empty cells
 rows                 wraps, held_samples, spikes, slow_gaps, rows                `KeptRows`
-roles                relations, computed_position, effort_roles, roles           `Roles`
+roles                relations, computed_position, effort_roles, one_axis,       `Roles`
+                     monitor_outputs, roles
 refusal              damage                                                      InputError, notes
-units and signs      unit_choice, usual_values, encoder_counts,                  entries of the map
+units and signs      unit_choice, usual_values, encoder_counts, position_units,  entries of the map
                      effort_entry, speed_unit, channel_entries
 map                  map_file (its keys), map_draft, draft_map, map_text         `MapDraft`, the YAML file
 recording            by_map                                                      `Recording`

@@ -131,7 +131,9 @@ class ChannelEntries:
             )
         else:
             draft.lead_m = LEADS_M[0]
-            draft.asked.append(Asked("", "lead_m", f"{name} is a length, {_SCREW}"))
+            draft.asked.append(
+                Asked("", "lead_m", f"{name} is a length: the metres per revolution of the motor, such as 0.010")
+            )
             return
         draft.unsure.append(f"{name}: is a length; {1e3 * draft.lead_m:g} mm per turn are taken ({draft.lead_how})")
 
@@ -235,9 +237,12 @@ class ChannelEntries:
         name = self.roles.motor_velocity
         assert name
         unit = self.labels[name].unit
-        keys: dict[str, object] = {"unit": unit or "rad/s"}
+        volts = unit in ("V", "mV")
+        given, unit = unit, None if volts else unit
+        keys: dict[str, object] = {"unit": unit or "rad/s"} | ({"scale": 1.0} if volts else {})
         length = is_length(unit or "") or (unit is None and self.effort_si == "N")
         asked = {} if unit else {"unit": _speed_question(length)}
+        asked |= {"scale": f"is in {given}; write how many of this unit are 1 {given}"} if volts else {}
         if unit == "counts/s":
             size = self._count_size(name, None, 0.0)
             keys |= size.entry

@@ -76,7 +76,7 @@ def label(column: str, unit_text: str = "", words_beside: str = "") -> Label:
         number,
         unit,
         odd,
-        _electric(words) if quantity is Quantity.EFFORT else None,
+        _electric(words) if quantity is Quantity.EFFORT and not _any(words, known.torque) else None,
         _si(words, unit) if quantity is Quantity.EFFORT else None,
         _any(words, known.part),
         not words_beside and quantity is not Quantity.TIME and (len(name.strip()) == 1 or strange),

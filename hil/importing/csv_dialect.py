@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import islice
+from itertools import islice, pairwise
 from pathlib import Path
 from typing import NamedTuple
 
@@ -50,7 +50,7 @@ def find_dialect(path: Path) -> CsvDialect:
     delimiter, form, width = layout.delimiter, layout.form, len(layout.read)
     first = _first_row(path, head, layout)
     above = head[:first]
-    header = read_header(above, delimiter, width, form)
+    header = read_header(above, delimiter, width, form, _counts(head[first:], layout))
     if form.thousands:
         header.notes.append(f"numbers: {form.thousands!r} is read as the mark between thousands")
     if header.line is None and delimiter == "," and (split := _split_by_commas(above, width)):
@@ -66,6 +66,14 @@ def find_dialect(path: Path) -> CsvDialect:
         between = sum(bool(line.strip()) for line in above[header.line + 1 :])
         given |= {"skip_lines": header.line, "skip_rows": between}
     return CsvDialect(CsvOptions.model_validate(given), header, tuple(above))
+
+
+def _counts(lines: Sequence[str], layout: _Layout) -> bool:
+    """True if the first column numbers the rows, from any number on."""
+    rows = [split_line(line, layout.delimiter) for line in lines if line.strip()]
+    first = [number_of(row[0], layout.form) for row in rows if len(row) == len(layout.read)]
+    steps = [after - before for before, after in pairwise(one for one in first if one is not None)]
+    return bool(steps) and sum(step == 1.0 for step in steps) > _MOSTLY * len(steps)
 
 
 def _split_by_commas(above: list[str], width: int) -> int:

@@ -126,7 +126,9 @@ def _entry(told: Label, kind: AxisKind, table: ForeignTable) -> EffortEntry:
     constant = "force constant" if linear else "torque constant"
     screw = _OR_SCREW if linear and unit == "A" else ""
     what = (
-        f"the {constant} of the motor" if unit == "A" else "the scale of this output, if it is one of torque or force"
+        f"the {constant} of the motor"
+        if unit == "A"
+        else f"the size of its scale, if it is an output of {'force' if linear else 'torque'},"
     )
     entry.asked[key if unit == "A" else "gain"] = f"is in {unit}{given}; write {what} in {si}/{unit} {_UNKNOWN}{screw}"
     return entry

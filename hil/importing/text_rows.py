@@ -24,6 +24,7 @@ from hil.importing.number_form import NumberForm, numbers_of
 _CHUNK = 20_000  # rows that are converted at once
 _MOSTLY = 0.5  # share of numbers from which text in a column is out of place
 _LONGEST = 50  # lines of a footer: more are a column that has no numbers any more
+_ARROW = "->"
 _SHOWN = 60  # characters of a line in a message
 
 
@@ -60,22 +61,32 @@ def open_text(path: Path, encoding: str) -> TextIO:
 
 def split_line(line: str, delimiter: str) -> list[str]:
     """Fields of a line; the delimiter " " stands for one or more blanks."""
+    if _of_terminal(line):
+        stamp, _, rest = line.partition(_ARROW)
+        return [stamp.strip(), *split_line(rest.strip(), delimiter)]
     if delimiter == " ":
         return line.split()
     if '"' not in line:
         return [field.strip() for field in line.replace("\0", "").rstrip("\r\n").split(delimiter)]
     try:
-        row = next(csv.reader([line.replace("\0", "").rstrip("\r\n")], delimiter=delimiter), [])
+        row = next(csv.reader([line.replace("\0", "").rstrip("\r\n")], delimiter=delimiter, skipinitialspace=True), [])
     except csv.Error:
         return [line]
     return [field.strip() for field in row]
 
 
-def label_of_pairs(fields: Sequence[str]) -> str:
-    """Text of every second field but for its number, if the others have another: Time;x;Time (2);M; "" else."""
+def _of_terminal(line: str) -> bool:
+    """True for a line before which a terminal wrote the time of its host: 12:00:00.123 -> 1.5; it may be cut."""
+    stamp, arrow, _ = line.partition(_ARROW)
+    return bool(arrow) and is_date(stamp)
+
+
+def times_of_groups(fields: Sequence[str]) -> tuple[int, ...]:
+    """Places of the columns of time by a row that has the same text over each: Time;x;Time (2);M;Q; () else."""
     stems = [re.sub(r"[\d.]+| \(\d+\)", "", field) for field in fields]
-    alike = len(stems) > 3 and len(stems) % 2 == 0 and len(set(stems[::2])) == 1 and stems[0] not in stems[1::2]
-    return stems[0] if alike else ""
+    places = tuple(index for index, stem in enumerate(stems) if stem == stems[0])
+    apart = all(second - first > 1 for first, second in zip(places, places[1:], strict=False))
+    return places if len(places) > 1 and stems[0] and apart and places[-1] < len(stems) - 1 else ()
 
 
 def header_names(path: Path, options: CsvOptions) -> tuple[str, ...]:
@@ -113,8 +124,8 @@ class _Reader:
     def __init__(self, path: Path, names: tuple[str, ...], options: CsvOptions) -> None:
         self.path, self.names, self.encoding, self.delimiter = path, names, options.encoding, options.delimiter
         self.form = NumberForm(options.decimal_point, options.thousands)
-        # time beside each channel: those of lower rate end before the others
-        self.pairs = bool(label_of_pairs(names))
+        # time beside each channel or group of channels: those of lower rate end before the others
+        self.groups = bool(times_of_groups(names))
         self.rows: list[list[str]] = []
         self.lines: list[int] = []
         self.parts: dict[str, list[FloatArray]] = {name: [] for name in names}
@@ -131,8 +142,9 @@ class _Reader:
             self.others.append((number, line, False))
         elif given > width and self._numbers(extra):
             self.others.append((number, line, True))
-        elif given < width and not self.pairs:
-            self.others.append((number, line, not any(self._words(field) for field in fields)))
+        elif given < width and not self.groups:
+            cut = not any(self._words(field) for field in fields) and not _of_terminal(line)
+            self.others.append((number, line, cut))
         else:
             self.rows.append(fields[:width] + [""] * (width - given))
             self.lines.append(number)

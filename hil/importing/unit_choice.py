@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import dataclass
+from math import pi
 
 import numpy as np
 
@@ -15,6 +16,8 @@ LENGTHS = ("m", "mm", "um", "in")
 ANGLES = ("rad", "deg", "rev", "mrad")
 LINEAR_SPEEDS = ("m/s", "mm/s", "m/min", "mm/min")
 ANGULAR_SPEEDS = ("rad/s", "deg/s", "rpm", "rev/s")
+_WHOLE = 1e-5  # relative deviation from whole quarters of a turn: that of six digits
+_MOST_QUARTERS = 40  # among more, some are whole by chance
 _LONGEST_M = 5.0  # largest travel read as metres
 _LEAST_COUNTS = 200.0  # travel in whole numbers from which they are counts of an encoder
 _COORDINATE = r"q(pos)?\d*([_ ].*)?"  # joint angle, as robotics writes it: q, q1, q_ref
@@ -96,7 +99,18 @@ def position_unit(
             return UnitChoice(unit, f"{column}: {unit}, by a gear of {round(gear)} to a column in {unit}")
     if are_counts(values):
         return UnitChoice("counts", f"{column}: whole numbers, taken for counts")
-    return UnitChoice("m" if prefers_length or prefers_length is None else "rad", asked=True)
+    if prefers_length is False and (unit := _by_whole_turns(float(np.ptp(values)))):
+        return UnitChoice(unit, f"{column}: {unit}, by its travel of whole quarters of a turn")
+    return UnitChoice("rad" if prefers_length is False else "m", asked=True)
+
+
+def _by_whole_turns(travel: float) -> str:
+    """Unit in which the travel of a set-point is whole quarters of a turn: rad or deg; "" without one."""
+    for unit, quarter in (("rad", 0.5 * pi), ("deg", 90.0)):
+        quarters = travel / quarter
+        if 0 < round(quarters) <= _MOST_QUARTERS and abs(quarters - round(quarters)) < _WHOLE * quarters:
+            return unit
+    return ""
 
 
 def misfit(factor: float, unit: str, other: str) -> float:

@@ -22,6 +22,7 @@ QUANTITY_OF_UNIT = (
 # one letter at the end of a name is a unit only after a word: x_m may be in metres, q_m of the motor
 _BRACKETS = re.compile(r"[\[(<{]\s*([^\])>}]*)\s*[\])>}]\s*$")
 _ANY_BRACKETS = re.compile(r"[\[(<{]\s*([^\[\](){}<>]*?)\s*[\])>}]")
+_FACTOR = re.compile(r"(?:(?P<value>\d+(?:[.,]\d+)?)|1/(?P<part>\d+))\s*[*x·]?\s*(?P<unit>[^\d\s/].*)")
 LEAST_ALONE = 3  # letters of a unit that is a name by itself, or of revolutions: motor_u is a voltage
 _BITS = re.compile(r"(?<=[a-z])\d+(bit)?$")  # counts16bit
 _SLASH = re.compile(r"^\s*[^/\s]+\s*/\s*(\S+)\s*$")  # DIN 461: x/mm
@@ -45,6 +46,15 @@ def unit_of_text(text: str) -> str | None:
     whole = unit_named(text.strip(" []()"))
     bracket = _BRACKETS.search(text)
     return whole or (unit_named(text[: bracket.start()]) or unit_named(bracket[1]) if bracket else None)
+
+
+def factor_and_unit(text: str) -> tuple[float, str] | None:
+    """Factor and unit of a text with a number before a unit: 0.1 Nm, 1/100 deg; None for a unit itself."""
+    match = _FACTOR.fullmatch(text.strip(" []()"))
+    if not match or unit_named(text.strip(" []()")) is not None or unit_named(match["unit"]) is None:
+        return None
+    value = float((match["value"] or match["part"]).replace(",", "."))
+    return (value if match["value"] else 1.0 / value), match["unit"]
 
 
 def split_unit(name: str) -> tuple[str, str | None, bool]:

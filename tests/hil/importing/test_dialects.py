@@ -166,10 +166,10 @@ DIALECTS: dict[str, tuple[list[str], str]] = {
     ),
     "a path of names": (
         [
-            "time,axis.x.angle [deg],pid.x.error,pid.x.output",
+            "time,axis.x.angle [deg],pid.x.error,pid.x.output [Nm]",
             *rows(lambda i: f"{T[i]:.4f},{DEG[i]:.6f},{i % 7},{TORQUE[i]:.6f}"),
         ],
-        "pid.x.output: its name says nothing",
+        "",
     ),
     "a torque beside current and friction": (
         [
@@ -224,7 +224,7 @@ def test_records_in_lines_of_json_are_read_and_a_cut_one_is_named(tmp_path: Path
     ("line", "message"),
     [
         ("0.8980;12.5", r"log\.csv:900: given 2 fields, allowed 3 as in the other rows: '0\.8980;12\.5'"),
-        ("0.8980;#REF!;0.1", r"log\.csv:900: angle \[deg\] has text and no number: given '#REF!'"),
+        ("0.8980;1x2;0.1", r"log\.csv:900: angle \[deg\] has text and no number: given '1x2'"),
         (";12.5;0.1", r"log\.csv:900: time \[s\]: the row has no time stamp"),
     ],
 )

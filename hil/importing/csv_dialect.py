@@ -111,7 +111,7 @@ def _layout(path: Path, body: list[str]) -> _Layout:
         widths = [len(row) for row in rows]
         width = max(widths, key=widths.count, default=0)
         wide = max((one for one in set(widths) if widths.count(one) > _PAIRED * len(rows)), default=width)
-        if wide % 2 == 0 and wide >= width + 2:  # channels of lower rate, with their times, end before the others
+        if wide >= width + 2:  # channels of lower rate, with their times, end before the others
             width, rows = wide, [row for row in rows if len(row) == wide]
         if width < 2:
             continue

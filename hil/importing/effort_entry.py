@@ -122,6 +122,11 @@ def _entry(told: Label, kind: AxisKind, table: ForeignTable) -> EffortEntry:
             entry.asked["unit"] = _UNIT_QUESTION[kind]
         return entry
     entry.keys[key if unit == "A" else "gain"] = 1.0
+    if told.electric == "V":  # of the motor, which a bench in volts drives, and no output that stands for a torque
+        entry.notes.append(
+            f"{column}: the {si} per V are not known, 1 is taken: masses and friction are in multiples of it"
+        )
+        return entry
     given = "" if told.unit else f" (unit {unit} by its name)"
     constant = "force constant" if linear else "torque constant"
     screw = _OR_SCREW if linear and unit == "A" else ""

@@ -21,6 +21,7 @@ from hil.importing.header_values import HeaderValue, header_values
 from hil.importing.lexicon import Constant
 from hil.importing.map_file import SECONDS, CsvOptions
 from hil.importing.mat_file import load_mat
+from hil.importing.row_groups import moving_group
 from hil.importing.text_rows import Cell, read_rows
 from hil.importing.unit_lines import described, told_units
 from hil.recording.arrow_files import numbers, read_parquet, stored_unit
@@ -81,7 +82,10 @@ def read_table(path: Path) -> ForeignTable:
 def _text(path: Path) -> ForeignTable:
     dialect = find_dialect(path)
     header = dialect.header
-    rows = read_rows(path, header.names, dialect.options, MOST_LINES)
+    options, rows = dialect.options, read_rows(path, header.names, dialect.options, MOST_LINES)
+    if group := moving_group(path, header.names, options, rows, MOST_LINES):
+        options, rows = group.options, group.rows
+        header.notes.append(group.note)
     columns, remarks = dict[str, FloatArray](), []
     read = rows.numbers | rows.dates
     for name, values in ((name, read[name]) for name in header.names):
@@ -107,7 +111,7 @@ def _text(path: Path) -> ForeignTable:
         path,
         columns,
         units,
-        csv=dialect.options,
+        csv=options,
         constants=_counted_period(dialect.above, rows.lines.size) | header_values(dialect.above, {}),
         remarks=tuple(remarks),
         dates=frozenset(rows.dates),

@@ -6,6 +6,7 @@ What a row says of a column is kept with the column; a row that is not used is s
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from math import isfinite
 
 from hil.files.date_stamps import is_date
@@ -120,6 +121,8 @@ def _row(index: int, line: str, delimiter: str, width: int, form: NumberForm, co
         fields = ["" if index in times else value for index, value in enumerate(fields)]
     elif kind is None and len(fields) in (width, width + 1) and (kind := _kind_of_label(fields[0])):
         fields = ["", *fields[1:]] if len(fields) == width else fields[1:]
+    elif len(fields) == width + 1 and _kind(fields[1:], form) is RowKind.UNITS and unit_of_text(fields[0]) is None:
+        kind, fields = RowKind.UNITS, fields[1:]
     elif len(fields) > width:
         fields = _regrouped(text, delimiter, width) or fields[: width + (len(fields) > width + 1)]
     fields = _otherwise_split(fields, delimiter, width)
@@ -134,7 +137,7 @@ def _row(index: int, line: str, delimiter: str, width: int, form: NumberForm, co
 def _otherwise_split(fields: list[str], delimiter: str, width: int) -> list[str]:
     """Fields of a line of names whose last field holds others with another delimiter: 12:00:00;names: n [rpm], M."""
     last = re.sub(r"^\s*\w+:\s", "", fields[-1]) if fields else ""
-    stamped = 1 < len(fields) < width - 1 and is_date(fields[0])
+    stamped = 1 < len(fields) < width and is_date(fields[0])
     for other in ",;|\t":
         parts = split_line(last, other) if other != delimiter and stamped else []
         if len(fields) - 1 + len(parts) == width and sum(label(one).sure for one in parts) > len(parts) / 2:
@@ -209,7 +212,7 @@ def _different(named: HeaderRow | None, texts: Sequence[HeaderRow], width: int) 
 def _untitled_times(named: HeaderRow | None) -> list[int]:
     """Places of the columns of time that a row of names leaves empty, before each channel or group of channels."""
     empty = [index for index, field in enumerate(named.fields) if not field] if named else []
-    apart = all(second - first > 1 for first, second in zip(empty, empty[1:], strict=False))
+    apart = all(second - first > 1 for first, second in pairwise(empty))
     return empty if named and len(empty) > 1 and empty[0] == 0 and apart and named.fields[-1] else []
 
 

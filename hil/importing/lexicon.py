@@ -166,7 +166,7 @@ class Lexicon(_Entry):
 def plain_spelling(unit: str) -> str:
     """Text of a unit in lower case, without blanks, multiplication signs and points, with plain digits."""
     key = unicodedata.normalize("NFKC", unit).strip().lower().replace("μ", "µ")
-    return re.sub(r"/se[ck]\b", "/s", re.sub(r"[\s·*⋅.]+", "", key))
+    return re.sub(r"/se[ck]\b", "/s", re.sub(r"[\s·・*⋅.]+", "", key))
 
 
 def without_accents(text: str) -> str:

@@ -7,8 +7,8 @@ left out, and said. Any other line that is no row is damaged.
 import csv
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
-from itertools import islice
+from dataclasses import dataclass, field
+from itertools import islice, pairwise
 from pathlib import Path
 from typing import NamedTuple, TextIO
 
@@ -24,6 +24,7 @@ from hil.importing.number_form import NumberForm, numbers_of
 _CHUNK = 20_000  # rows that are converted at once
 _MOSTLY = 0.5  # share of numbers from which text in a column is out of place
 _LONGEST = 50  # lines of a footer: more are a column that has no numbers any more
+_JOINTS = 20  # most different names in turn
 _ARROW = "->"
 _SHOWN = 60  # characters of a line in a message
 
@@ -39,7 +40,7 @@ class Cell(NamedTuple):
 class TextRows:
     """Columns (n,) of numbers, NaN without one; columns of dates [s]; lines (n,) from 1.
 
-    `texts` is the first text of a column that is no number.
+    `texts` is the first text of a column that is no number, `in_turn` the texts of one whose few texts alternate.
     """
 
     numbers: dict[str, FloatArray]
@@ -47,6 +48,7 @@ class TextRows:
     texts: dict[str, Cell]
     lines: NDArray[np.int64]
     notes: tuple[str, ...]
+    in_turn: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
 
 def open_text(path: Path, encoding: str) -> TextIO:
@@ -85,7 +87,7 @@ def times_of_groups(fields: Sequence[str]) -> tuple[int, ...]:
     """Places of the columns of time by a row that has the same text over each: Time;x;Time (2);M;Q; () else."""
     stems = [re.sub(r"[\d.]+| \(\d+\)", "", field) for field in fields]
     places = tuple(index for index, stem in enumerate(stems) if stem == stems[0])
-    apart = all(second - first > 1 for first, second in zip(places, places[1:], strict=False))
+    apart = all(second - first > 1 for first, second in pairwise(places))
     return places if len(places) > 1 and stems[0] and apart and places[-1] < len(stems) - 1 else ()
 
 
@@ -126,6 +128,7 @@ class _Reader:
         self.form = NumberForm(options.decimal_point, options.thousands)
         # time beside each channel or group of channels: those of lower rate end before the others
         self.groups = bool(times_of_groups(names))
+        self.only = [(self.names.index(name), text) for name, text in options.only.items() if name in self.names]
         self.rows: list[list[str]] = []
         self.lines: list[int] = []
         self.parts: dict[str, list[FloatArray]] = {name: [] for name in names}
@@ -137,6 +140,8 @@ class _Reader:
     def take(self, number: int, line: str, fields: list[str]) -> None:
         """Take a line that is not blank: a row, or another line."""
         width, given = len(self.names), len(fields)
+        if any(given > index and fields[index] != text and given == width for index, text in self.only):
+            return
         extra = [field for field in fields[width:] if field]
         if given != width and not self._numbers(fields[:width]):
             self.others.append((number, line, False))
@@ -201,6 +206,7 @@ class _Reader:
             texts,
             lines[kept],
             (*self._notes(others, lines[kept]), *dict.fromkeys(one.note for one in read.values() if one.note)),
+            {name: told for name in numbers if (told := _in_turn(list(self.texts[name].values()), rows))},
         )
 
     def _refuse_cut(self) -> None:
@@ -226,6 +232,16 @@ class _Reader:
                 many = f"lines {numbers[0]} to {numbers[-1]} ({len(numbers)})" if len(numbers) > 1 else ""
                 notes.append(f"text {what}: {many or f'line {numbers[0]}'} is no row and left out: {text!r}")
         return tuple(notes)
+
+
+def _in_turn(texts: list[str], rows: int) -> tuple[str, ...]:
+    """Different texts of a column of `rows` if they are few, alternate, and stand in as many rows each; () else."""
+    different = tuple(dict.fromkeys(texts))
+    if len(texts) < rows or not 1 < len(different) <= _JOINTS:
+        return ()
+    changes = sum(one != other for one, other in pairwise(texts))
+    counts = [texts.count(one) for one in different]
+    return different if changes > _MOSTLY * rows and max(counts) < 2 * min(counts) else ()
 
 
 def line_of(path: Path, number: int, encoding: str) -> str:

@@ -156,6 +156,70 @@ DIALECTS: dict[str, tuple[list[str], str]] = {
         [*PLAIN[:900], "overrun", *PLAIN[900:], "", "Mean;12.5;0.1", "[END]"],
         "line 901 is no row and left out: 'overrun'",
     ),
+    "groups of channels with their times": (
+        [
+            "Name;M;Name;phi;n",
+            "Unit;Nm;Unit;deg;rad/s",
+            *(
+                f"{ms:.2f};{m:.6f}" + (f";{1e3 * T[i]:.0f};{DEG[i]:.6f};{AXIS['speed'][i]:.4f}" if i < T.size else "")
+                for i, (ms, m) in enumerate(zip(FAST_MS, FAST_TORQUE, strict=True))
+            ),
+        ],
+        "M has its own stamps",
+    ),
+    "lines of a terminal": (
+        [
+            "11:59:58.100 -> ready",
+            "11:59:58.200 -> monitor: angle [deg], torque [Nm]",
+            *rows(lambda i: f"{TIMES[i] + timedelta(seconds=300):%H:%M:%S.%f} -> {DEG[i]:.6f}\t{TORQUE[i]:.6f}"),
+        ],
+        "",
+    ),
+    "a number before each row": (
+        ["Rate: 1 kHz", "angle_deg torque_Nm", *rows(lambda i: f"{512 + i} {DEG[i]:.6f} {TORQUE[i]:.6f} ")],
+        "",
+    ),
+    "a line for each channel": (
+        [
+            "Sampling: 1 kHz",
+            "CH1: Motor angle (0.001 deg)",
+            "CH2: Motor torque (0.0001 Nm)",
+            "CH1\tCH2",
+            *rows(lambda i: f"{1000.0 * DEG[i]:.0f}\t{10000.0 * TORQUE[i]:.0f}"),
+        ],
+        "CH2: the header's factor 0.0001",
+    ),
+    "factors that the values hold": (
+        [
+            "Name;t [s];phi [deg];M [Nm]",
+            "Scale;1;250;0.8",
+            *rows(lambda i: f"{i};{T[i]:.4f};{DEG[i]:.6f};{TORQUE[i]:.6f}"),
+        ],
+        "M [Nm]: its values hold the factor 0.8 of the header already",
+    ),
+    "values beyond the range": (
+        [*PLAIN[:900], f"0.8990;{DEG[899]:.6f};+++++++", PLAIN[901], f"0.9010;#VALUE!;{TORQUE[901]:.6f}", *PLAIN[903:]],
+        "missing: 2 rows have no value",
+    ),
+    "units with their label before them": (
+        ['"SIGNAL", "TIME", "A", "B"', '"VERT", "S", "deg", "N.m"', *(line.replace(";", ", ") for line in PLAIN[1:])],
+        "",
+    ),
+    "rows of two joints in turn": (
+        [
+            "t [s],joint,position_deg,torque_Nm",
+            *(
+                line
+                for i in range(T.size)
+                for line in (f"{T[i]:.4f},a1,{30 + i % 3 * 1e-4},2.5", f"{T[i]:.4f},a2,{DEG[i]:.6f},{TORQUE[i]:.6f}")
+            ),
+        ],
+        "rows: of a1, a2 in turn; those of a2 are taken",
+    ),
+    "rows and their period in a line": (
+        [f"{T.size},1", "angle_deg,torque_Nm", *rows(lambda i: f"{DEG[i]:.6f},{TORQUE[i]:.6f}")],
+        "",
+    ),
     "a sign apart": (
         [PLAIN[0], *rows(lambda i: f"{T[i]:.4f};{DEG[i]:+.6f};{TORQUE[i]:+.6f}".replace("+", "+ ").replace("-", "- "))],
         "",
@@ -209,6 +273,23 @@ def test_characters_of_dos_are_read(tmp_path: Path) -> None:
     lines = [PLAIN[0].replace("angle", "Winkel rückgeführt"), *PLAIN[1:]]
     draft, recording = imported(tmp_path / "log.csv", lines, "cp850")
     assert draft.table.csv.encoding == "cp850"
+    np.testing.assert_allclose(recording["torque_n_m"], TORQUE, atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("names", "encoding"),
+    [
+        ("時間[ms];モータ回転角度[deg];トルク[N・m]", "cp932"),
+        ("temps [s];angle [°];couple [mN·m]", "mac_roman"),
+        ("Zeit [µs];Winkel [°];Drehmoment für Prüfung [Ncm]", "cp1252"),
+    ],
+)
+def test_the_encoding_is_that_in_which_the_words_are_known(tmp_path: Path, names: str, encoding: str) -> None:
+    size = {"[ms]": 1e3, "[µs]": 1e6}.get(names.split(";")[0][-4:], 1.0)
+    torque = {"mac_roman": 1e3, "cp1252": 100.0}.get(encoding, 1.0)
+    lines = [names, *rows(lambda i: f"{size * T[i]:.3f};{DEG[i]:.6f};{torque * TORQUE[i]:.6f}")]
+    draft, recording = imported(tmp_path / "log.csv", lines, encoding)
+    assert draft.table.csv.encoding == encoding
     np.testing.assert_allclose(recording["torque_n_m"], TORQUE, atol=1e-5)
 
 

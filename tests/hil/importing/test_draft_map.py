@@ -146,7 +146,7 @@ def test_a_turned_sign_is_turned_back_and_named(tmp_path: Path, column: str, cha
     ("changed", "asked", "factor"),
     [
         ({"torque": "i_q [A]"}, {"torque_constant_n_m_a": 0.5}, 0.5),
-        ({"torque": "Spannung [V]"}, {"gain": 0.5}, 0.5),
+        ({"torque": "output 2 [V]"}, {"gain": 0.5}, 0.5),
         ({"torque": "Drehmoment [%]"}, {"rated": 2.4}, 0.024),
         ({"torque": "Drehmoment [1/1000]"}, {"rated": 2.4}, 0.0024),
         ({"torque": "torque"}, {"unit": "mN m"}, 1e-3),
@@ -182,7 +182,8 @@ def test_what_the_file_does_not_tell_is_asked_and_taken_from_the_map(
 def test_the_unit_of_a_motion_and_the_constants_of_a_motor_are_asked(
     tmp_path: Path, columns: dict[str, str], asked: dict[str, object]
 ) -> None:
-    counts = {"angle": np.round(AXIS["angle"] * 2048 / (2.0 * np.pi))} if "counts" in str(columns) else {}
+    step = 2.0 * np.pi / 2048 if "counts" in str(columns) else 1e-3  # a step of digits tells no counts per turn
+    counts = {"angle": np.round(AXIS["angle"] / step) * (1.0 if step > 1e-3 else step)}
     path, map_path = write(tmp_path / "log.csv", renamed(AXIS | counts, t="t_s", **columns)), tmp_path / "map.yaml"
     draft = draft_map(path)
     assert [one.key for one in draft.asked] == list(asked)

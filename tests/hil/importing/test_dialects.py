@@ -26,6 +26,8 @@ PLAIN = [
     "time [s];angle [deg];torque [Nm]",
     *(f"{t:.4f};{q:.6f};{m:.6f}" for t, q, m in zip(T, DEG, TORQUE, strict=True)),
 ]
+CALM = int(np.argmin(np.abs(np.diff(DEG, 2)[100:-100]))) + 101  # row without acceleration: the line tells its angle
+MARKS = {CALM - 1: "+++++++", CALM: f"{TORQUE[CALM]:.6f}", CALM + 1: "#VALUE!"}
 
 
 def rows(form: Callable[[int], str]) -> list[str]:
@@ -156,7 +158,7 @@ DIALECTS: dict[str, tuple[list[str], str]] = {
         [*PLAIN[:900], "overrun", *PLAIN[900:], "", "Mean;12.5;0.1", "[END]"],
         "line 901 is no row and left out: 'overrun'",
     ),
-    "groups of channels with their times": (
+    "groups in place of pairs of channels with their times": (
         [
             "Name;M;Name;phi;n",
             "Unit;Nm;Unit;deg;rad/s",
@@ -198,7 +200,7 @@ DIALECTS: dict[str, tuple[list[str], str]] = {
         "M [Nm]: its values hold the factor 0.8 of the header already",
     ),
     "values beyond the range": (
-        [*PLAIN[:900], f"0.8990;{DEG[899]:.6f};+++++++", PLAIN[901], f"0.9010;#VALUE!;{TORQUE[901]:.6f}", *PLAIN[903:]],
+        [*PLAIN[:CALM], *(f"{T[i]:.4f};{DEG[i]:.6f};{mark}" for i, mark in MARKS.items()), *PLAIN[CALM + 3 :]],
         "missing: 2 rows have no value",
     ),
     "units with their label before them": (

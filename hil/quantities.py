@@ -11,24 +11,26 @@ from typing import NamedTuple
 # SI unit -> units of foreign recordings: value [SI unit] = factor x value [unit]
 _PER_SI = {
     "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "100 ns": 1e-7, "ns": 1e-9, "min": 60.0},
-    "m": {"m": 1.0, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "in": 0.0254, "ft": 0.3048},
+    "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "in": 0.0254, "ft": 0.3048},
     "rad": {
         "rad": 1.0, "mrad": 1e-3, "deg": pi / 180, "0.1 deg": pi / 1800, "mdeg": pi / 180e3, "arcmin": pi / 10800,
         "arcsec": pi / 648000, "rev": 2 * pi,
     },
     "m/s": {
-        "m/s": 1.0, "mm/s": 1e-3, "um/s": 1e-6, "m/min": 1 / 60, "mm/min": 1e-3 / 60,
+        "m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3, "um/s": 1e-6, "m/min": 1 / 60, "mm/min": 1e-3 / 60,
         "in/s": 0.0254, "in/min": 0.0254 / 60, "ft/s": 0.3048, "ft/min": 0.3048 / 60,
     },
-    "rad/s": {"rad/s": 1.0, "deg/s": pi / 180, "rev/s": 2 * pi, "rpm": 2 * pi / 60},
+    "rad/s": {
+        "rad/s": 1.0, "mrad/s": 1e-3, "deg/s": pi / 180, "mdeg/s": pi / 180e3, "rev/s": 2 * pi, "rpm": 2 * pi / 60,
+    },
     "m/s^2": {"m/s^2": 1.0, "mm/s^2": 1e-3},
     "rad/s^2": {"rad/s^2": 1.0, "deg/s^2": pi / 180, "rev/s^2": 2 * pi},
     "N m": {
-        "N m": 1.0, "Nm": 1.0, "mN m": 1e-3, "mNm": 1e-3, "N cm": 1e-2, "kN m": 1e3,
-        "kgf m": 9.80665, "kgf cm": 0.0980665,
+        "N m": 1.0, "Nm": 1.0, "mN m": 1e-3, "mNm": 1e-3, "uN m": 1e-6, "N mm": 1e-3, "N cm": 1e-2, "kN m": 1e3,
+        "kgf m": 9.80665, "kgf cm": 0.0980665, "gf cm": 9.80665e-5,
         "lbf ft": 1.3558179483314004, "lbf in": 0.1129848290276167, "ozf in": 0.007061551814226044,
     },
-    "N": {"N": 1.0, "kN": 1e3, "kgf": 9.80665, "lbf": 4.4482216152605},
+    "N": {"N": 1.0, "mN": 1e-3, "kN": 1e3, "kgf": 9.80665, "lbf": 4.4482216152605},
     "1": {"1": 1.0},
 }  # fmt: skip
 UNITS: dict[str, tuple[str, float]] = {
@@ -37,7 +39,7 @@ UNITS: dict[str, tuple[str, float]] = {
 """Unit -> (SI unit, factor): value [SI unit] = factor x value [unit]."""
 
 # units that no map may name, but that a recording may hold by mistake: factor to SI
-_MISREAD = {"km": 1e3, "uN m": 1e-6}
+_MISREAD = {"km": 1e3}
 _SPELLED = {"um": "µm", "um/s": "µm/s", "uN m": "µN m", "deg": "degrees", "rev": "revolutions", "in": "inches"}
 
 ROTARY_LEAD_M = 2.0 * pi

@@ -66,21 +66,28 @@ def import_(
 
 
 def _drafted(source: Path, target: Path, rate_hz: float | None, axis: str | None) -> Path:
-    """Draft a map beside the recording to write; return its path."""
+    """Draft a map beside the recording to write; return its path. Raises InputError: the user must complete it."""
     from hil.errors import InputError
     from hil.files.input_file import is_file
     from hil.files.output import write_text
     from hil.importing.draft_map import draft_map
-    from hil.importing.map_text import map_text
+    from hil.importing.map_text import asked_lines, map_text
 
     path = target.with_name(f"{target.stem}-map.yaml")
     if is_file(path):
         raise InputError(f"{path}: the map exists and is not overwritten; import with --map {path}, or remove it")
     draft = draft_map(source, rate_hz, axis)
-    write_text(path, map_text(draft))
+    text = map_text(draft)
+    write_text(path, text)
     out.print(f"Map: {path}")
     if draft.unsure:
         err.print("Please check in the map:")
         for note in draft.unsure:
             err.print(f"  - {note}", markup=False)
+    if draft.asked:
+        questions = [f"{path}:{line}: {question}" for line, question in asked_lines(text)]
+        told = (
+            f"{source}: the file does not tell what follows; write it into the map, then hil import FILE --map {path}"
+        )
+        raise InputError("\n".join([told, *questions]))
     return path

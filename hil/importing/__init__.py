@@ -2,8 +2,8 @@
 
 step                 modules                                                     result
 text to rows         number_form, text_rows (for draft and import alike)         `TextRows`
-                     header_rows, csv_dialect (for the draft)                    `Header`, `CsvDialect`
-file to table        mat_file, foreign_table (all columns)                       `ForeignTable`
+                     encodings, header_rows, csv_dialect (for the draft)         `Header`, `CsvDialect`
+file to table        mat_file, row_groups, foreign_table (all columns)           `ForeignTable`
                      foreign_columns (those that a map names)                    `Foreign`
 words                lexicon(.yaml), units, column_names, unit_lines,            `Label`, `HeaderValue`
                      header_values
@@ -11,9 +11,10 @@ clock                stamp_columns, clock; hil.recording.stamps and row_clock   
                      channel_clocks (stamps of each channel)                     `OwnClocks`
 values that hold     on_change                                                   columns without empty cells
 rows                 wraps, held_samples, spikes, slow_gaps, rows                `KeptRows`
-roles                relations, computed_position, effort_roles, roles           `Roles`
+roles                relations, computed_position, effort_roles, one_axis,       `Roles`
+                     monitor_outputs, roles
 refusal              damage                                                      InputError, notes
-units and signs      unit_choice, usual_values, encoder_counts,                  entries of the map
+units and signs      unit_choice, usual_values, encoder_counts, position_units,  entries of the map
                      effort_entry, speed_unit, channel_entries
 map                  map_file (its keys), map_draft, draft_map, map_text         `MapDraft`, the YAML file
 recording            by_map                                                      `Recording`

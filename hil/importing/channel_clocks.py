@@ -20,6 +20,7 @@ from hil.importing.lexicon import Constant, Quantity
 from hil.importing.map_file import TimeColumn
 from hil.importing.stamp_columns import growing
 
+_CHANNELS = (Quantity.POSITION, Quantity.VELOCITY, Quantity.EFFORT)
 _ROW = 0.01  # of a step: by which two clocks of the same rows differ at most
 
 
@@ -115,7 +116,10 @@ def _groups(table: ForeignTable, labels: dict[str, Label]) -> list[tuple[list[st
             groups[-1][0].append(name)
         elif groups:
             groups[-1][1].append(name)
-    return [group for group in groups if group[1]]
+    groups = [group for group in groups if group[1]]
+    # a counter of rows between two columns of time is no group of channels
+    useful = [group for group in groups if any(labels[name].quantity in _CHANNELS for name in group[1])]
+    return useful or groups
 
 
 def _clock(table: ForeignTable, labels: dict[str, Label], times: list[str], channels: list[str]) -> StampClock | None:

@@ -10,32 +10,20 @@ from hil.errors import InputError
 from hil.identification.derivatives import MeasuredMotion, motion
 from hil.importing.column_names import Label
 from hil.importing.effort_entry import effort_entry, signs_of
-from hil.importing.encoder_counts import CountSize, angle_unit, assumed, from_length, from_speed, scale_count
-from hil.importing.header_rows import NAMELESS
-from hil.importing.lexicon import Constant, Quantity
-from hil.importing.map_draft import DraftedChannel, MapDraft
+from hil.importing.encoder_counts import CountSize, assumed, from_length, from_speed, scale_count
+from hil.importing.lexicon import Constant
+from hil.importing.map_draft import Asked, DraftedChannel, MapDraft
 from hil.importing.map_file import ChannelSource
+from hil.importing.position_units import PositionUnits, effort_si
 from hil.importing.relations import derivative_of, driven, lateness_s, proportional
 from hil.importing.roles import SAME_POSITION, Roles
 from hil.importing.speed_unit import speed_entry
-from hil.importing.unit_choice import (
-    MATCH,
-    UnitChoice,
-    are_counts,
-    gives_force,
-    is_length,
-    misfit,
-    position_unit,
-    prefers_length,
-    unit_by_convention,
-    unit_of_nameless,
-)
-from hil.importing.units import unit_named
-from hil.importing.usual_values import LEADS_M, improbable, mixed_up, screw_units, usual_lead
+from hil.importing.unit_choice import MATCH, is_length, misfit
+from hil.importing.usual_values import LEADS_M, mixed_up, usual_lead
 from hil.quantities import ROTARY_LEAD_M, UNITS
 
 SAME_COUNTS = 1e-3  # deviation of the factor between motor and set-point, both in counts: following errors are below
-_LEAD_NOT_TOLD = "not told; masses at the table scale with it"
+_SCREW = "and in lead_m the metres per revolution of the motor, such as 0.010"
 LATE_ROWS = 0.5  # by which a set-point may seem late: its rounding and the sampling of the encoder
 
 
@@ -46,9 +34,9 @@ class ChannelEntries:
         self, draft: MapDraft, labels: dict[str, Label], roles: Roles, live: dict[str, FloatArray], period_s: float
     ) -> None:
         self.draft, self.labels, self.roles, self.live, self.period_s = draft, labels, roles, live, period_s
-        effort = roles.effort or roles.effort_command
-        self.effort = labels[effort] if effort else None
-        self.units: dict[str, str] = {}
+        self.positions = PositionUnits(draft, labels, roles, live, period_s)
+        self.units, self.asked = self.positions.units, self.positions.asked
+        self.effort_si = effort_si(self.positions.effort, draft)
         self.kind = AxisKind.ROTARY
         self.motor_sign = 1
         self.per_count = 1.0  # SI units of the motor per count, if it is in counts
@@ -56,96 +44,32 @@ class ChannelEntries:
     def fill(self) -> None:
         """Add the entries. Raises InputError: no column goes with the motion, or two units contradict each other."""
         roles = self.roles
+        if not (roles.effort or roles.effort_command or roles.table):
+            motion_of = f"position {roles.motor}" if roles.motor else f"speed {roles.motor_velocity}"
+            told = "".join(f"{name}: {why}; " for name, why in roles.left_out.items() if "explain" in why)
+            raise InputError(
+                f"{self.draft.table.path}: {told}beside the {motion_of} no torque, force, current, voltage "
+                "or second encoder is found; record one, or write its column into a map: hil import FILE --map MAP.yaml"
+            )
         if roles.motor is None:
             self._velocity_only()
             return
-        self._units_of_positions()
-        # the transmission to a second encoder is judged, and a lead turns a length into an angle
-        table = roles.table and is_length(self.units[roles.table])
-        screw = table or Constant.LEAD in self.draft.table.constants
-        linear = is_length(self.units[roles.motor]) and (gives_force(self.effort) or not screw)
-        self.kind = AxisKind.LINEAR if linear else AxisKind.ROTARY
+        self.positions.choose()
         self._positions(roles.motor)
         self._velocity_command()
-        self._efforts(self._motion(roles.motor))
-        if not (roles.effort or roles.effort_command or roles.table):
-            told = "".join(f"{name}: {why}; " for name, why in roles.left_out.items() if "explain" in why)
-            raise InputError(
-                f"{self.draft.table.path}: {told}beside the position {roles.motor} no torque, force, current, voltage "
-                "or second encoder is found; record one, or write its column into a map: hil import FILE --map MAP.yaml"
-            )
-
-    def _motion(self, column: str) -> MeasuredMotion:
-        return motion(self.live[column], self.period_s)
-
-    def _choose(self, column: str, choice: UnitChoice) -> str:
-        self.units[column] = choice.unit
-        self.draft.unsure += [choice.note] if choice.note else []
-        return choice.unit
+        self._efforts(self.positions.motion(roles.motor))
 
     def _add(self, channel: str, column: str, what: str, keys: dict[str, object]) -> None:
         how = f"{what}; {self.roles.how[column]}" if column in self.roles.how else what
         self.draft.channels.append(DraftedChannel(channel, {"column": column, **keys}, how))
 
-    def _units_of_positions(self) -> None:
-        roles, labels, live = self.roles, self.labels, self.live
-        positions = [name for name in (roles.command, roles.table, roles.motor) if name]
-        far, motor = roles.table or roles.command, roles.motor
-        prefers, by_convention = prefers_length(positions, self.effort), unit_by_convention(self.effort)
-        if prefers is None and by_convention is None and motor and self._says_nothing(motor):
-            by_convention = unit_of_nameless(motor, live[motor])
-        self.draft.unsure += [by_convention.note] if by_convention else []
-        in_counts = "counts" in [labels[name].unit for name in (far, motor) if name]
-        geared = far is not None and labels[far].unit is None and prefers_length([far], None) is False
-        if far and motor and not geared and not by_convention and not in_counts and not are_counts(live[motor]):
-            relation = proportional(live[far], live[motor])
-            pair = screw_units(relation.factor, labels[far].unit, labels[motor].unit)
-            if pair and relation.share > SAME_POSITION and None in (labels[far].unit, labels[motor].unit):
-                note = f"{far} in {pair[0]} and {motor} in {pair[1]}: with them the travel per turn is a usual lead"
-                self._choose(far, UnitChoice(pair[0], note))
-                self._choose(motor, UnitChoice(pair[1]))
-        speeds = [one for one in self._speeds() if one.column in live]
-        untold = (
-            prefers is False and not by_convention and not speeds and all(labels[n].unit is None for n in positions)
-        )
-        for column in [name for name in (motor, roles.table) if name and untold and name not in self.units]:
-            if choice := angle_unit(column, live[column], self._unnamed_speeds(column)):
-                self._choose(column, choice)
-                break
-        # columns with a unit first: they are the hints for the others
-        open_ones = [name for name in positions if name not in self.units]
-        for column in sorted(open_ones, key=lambda name: labels[name].unit is None):
-            others = [(proportional(live[column], live[other]), other) for other in positions if other in self.units]
-            hints = [(one.factor, self.units[other]) for one, other in others if one.share > SAME_POSITION]
-            for speed in speeds:
-                relation = proportional(self._motion(column).velocity, live[speed.column])
-                if relation.share > SAME_POSITION:
-                    si, factor = UNITS[str(speed.unit)]
-                    hints.append((relation.factor / factor, si.removesuffix("/s")))
-            told = labels[column].unit or (by_convention.unit if by_convention else None)
-            told = told or ("rev" if unit_named(column) == "rev" else None)  # U
-            self._choose(column, position_unit(column, live[column], told, hints, prefers))
-        for column, unit in self.units.items():
-            self.draft.unsure += improbable(column, live[column], unit, self.period_s)
-
-    def _says_nothing(self, motor: str) -> bool:
-        """True if no column has a unit, and the file has no names, or a velocity that is the derivative as it is."""
-        if any(one.unit for name, one in self.labels.items() if name in self.live):
-            return False
-        same = [abs(factor - 1.0) < MATCH for _, factor in self._unnamed_speeds(motor)]
-        return motor in self.roles.how and (motor.startswith(NAMELESS) or any(same))
-
-    def _unnamed_speeds(self, column: str) -> list[tuple[str, float]]:
-        """Measured velocities without a unit that are the derivative of `column`, with the derivative over them."""
-        speed = self._motion(column).velocity
-        names = [one.column for one in self.labels.values() if one.quantity is Quantity.VELOCITY and not one.command]
-        found = [(name, proportional(speed, self.live[name])) for name in names if name in self.live]
-        return [(name, relation.factor) for name, relation in found if relation.share > SAME_POSITION]
-
-    def _speeds(self) -> list[Label]:
-        """Measured velocities with a unit."""
-        labels = self.labels.values()
-        return [one for one in labels if one.quantity is Quantity.VELOCITY and one.unit and not one.command]
+    def _kind(self, length: bool) -> AxisKind:
+        """Kind of the axis, whose motor is recorded in a `length` or an angle: a motor with a torque turns a screw."""
+        if not length:
+            return AxisKind.ROTARY
+        far = self.roles.table is not None and is_length(self.units[self.roles.table])
+        screw = self.effort_si == "N m" or Constant.LEAD in self.draft.table.constants or far
+        return AxisKind.ROTARY if screw and self.effort_si != "N" else AxisKind.LINEAR
 
     def _positions(self, name: str) -> None:
         """Add the motor's position `name`, the lead, and the other positions."""
@@ -159,23 +83,25 @@ class ChannelEntries:
             self.motor_sign = -1
             draft.unsure.append(f"{name}: falls while {reference} grows; its sign is turned")
         length = next((other for other in trusted if is_length(self.units[other])), None)
-        if motor == "counts":
+        counted = motor == "counts"
+        if counted:
             size = self._count_size(name, length, relations[length].factor if length else 0.0)
             keys |= size.entry
             draft.unsure += [size.note] if size.note else []
             motor, self.per_count = size.unit, size.per_count
-            self.kind = AxisKind.ROTARY if motor == "rad" else AxisKind.LINEAR
-        if self.kind is AxisKind.ROTARY:
-            told = draft.table.constants.get(Constant.LEAD)
+        self.kind = self._kind(is_length(motor))
+        channel = AXIS_CHANNELS[self.kind].motor_position
+        for key, what in size.asked.items() if counted else {}:
+            draft.asked.append(Asked(channel, key, f"{name}: {what}"))
+        if name in self.asked:
+            draft.asked.append(Asked(channel, "unit", f"{name}: {_unit_question(self.kind)}"))
+        elif self.kind is AxisKind.ROTARY:
             if is_length(motor):
-                draft.lead_m = told.value if told else LEADS_M[0]
-                draft.lead_how = f"header of the file: {told.text}" if told else _LEAD_NOT_TOLD
-                keys |= {"unit": "rad", "scale": UNITS[motor][1] * 2.0 * pi / draft.lead_m}
-                advice = f" ({draft.lead_how})" if told else ": correct scale and lead"
-                draft.unsure.append(f"{name}: is in a length; {1e3 * draft.lead_m:g} mm per turn are taken{advice}")
+                self._lead(name, counted)
             elif length is not None:
                 per_turn = abs(relations[length].factor) * UNITS[self.units[length]][1] / self.per_count
                 lead_m = 2.0 * pi * per_turn / UNITS[motor][1]
+                told = draft.table.constants.get(Constant.LEAD)
                 nominal = told is not None and abs(told.value / lead_m - 1.0) < MATCH
                 draft.lead_m = told.value if told and nominal else float(f"{usual_lead(lead_m):.6g}")
                 draft.lead_how = f"travel of {length} per turn of {name}"
@@ -183,7 +109,7 @@ class ChannelEntries:
                 draft.lead_m = ROTARY_LEAD_M
                 draft.lead_how = "a rotary axis: one metre of the load stands for one radian"
         keys |= {"sign": -1} if self.motor_sign < 0 else {}
-        self._add(AXIS_CHANNELS[self.kind].motor_position, name, "the motor's encoder", keys)
+        self._add(channel, name, "the motor's encoder", keys)
         for other, channel, what in (
             (roles.table, "table_position_m", "the second encoder"),
             (roles.command, "position_command_m", "the set-point"),
@@ -192,16 +118,38 @@ class ChannelEntries:
                 factor, share = relations[other].factor * self.motor_sign, relations[other].share
                 self._far(other, channel, what, factor, share, motor)
 
+    def _lead(self, name: str, counted: bool = False) -> None:
+        """Lead of a motor whose motion `name` is told in a length: of the header, by a speed in turns, else asked."""
+        draft, told = self.draft, self.draft.table.constants.get(Constant.LEAD)
+        by_speed = None if counted or self.roles.motor is None else self.positions.lead_by_speed(name)
+        if told is not None:
+            draft.lead_m, draft.lead_how = told.value, f"header of the file: {told.text}"
+        elif by_speed is not None:
+            draft.lead_m, draft.lead_how = (
+                float(f"{usual_lead(by_speed[0]):.6g}"),
+                f"travel of {name} per turn of {by_speed[1]}",
+            )
+        else:
+            draft.lead_m = LEADS_M[0]
+            draft.asked.append(
+                Asked("", "lead_m", f"{name} is a length: the metres per revolution of the motor, such as 0.010")
+            )
+            return
+        draft.unsure.append(f"{name}: is a length; {1e3 * draft.lead_m:g} mm per turn are taken ({draft.lead_how})")
+
     def _far(self, name: str, channel: str, what: str, factor: float, share: float, motor: str) -> None:
         """Set-point or second encoder: check sign and scale against the motor."""
         unsure, encoder, unit = self.draft.unsure, str(self.roles.motor), self.units[name]
         keys: dict[str, object] = {"unit": unit}
+        unknown = bool({name, encoder} & self.asked)
+        if name in self.asked:
+            self.draft.asked.append(Asked(channel, "unit", f"{name}: {_unit_question(self.kind)}"))
         if share < 0.5:
             unsure.append(f"{name}: does not follow {encoder} (share {share:.2f}); check that it is {what}")
         elif factor < 0.0:
             keys["sign"] = -1
             unsure.append(f"{name}: falls while {encoder} grows; its sign is turned")
-        if share >= 0.5 and "counts" not in (unit, self.units[encoder]):
+        if share >= 0.5 and "counts" not in (unit, self.units[encoder]) and not unknown:
             ratio = misfit(factor, unit, motor) if UNITS[unit][0] == UNITS[motor][0] else 1.0
             mixed = mixed_up(ratio)
             if mixed:
@@ -212,7 +160,7 @@ class ChannelEntries:
             if abs(ratio - 1.0) > 2.0 * MATCH and share > 0.9:
                 unsure.append(f"{name}: moves {ratio:.6g} times as far as {encoder}: a gear, or a wrong unit")
         if channel == "position_command_m" and share > SAME_POSITION:
-            late_s = lateness_s(self.live[name], self._motion(encoder))
+            late_s = lateness_s(self.live[name], self.positions.motion(encoder))
             if late_s > LATE_ROWS * self.period_s:
                 unsure.append(
                     f"{name}: comes {1e3 * late_s:.3g} ms after {encoder}, a set-point comes before: its "
@@ -238,25 +186,25 @@ class ChannelEntries:
 
     def _count_size(self, motor: str, length: str | None, factor: float) -> CountSize:
         """Size of a count of the motor's encoder; `factor` is length over counts."""
-        told = self.draft.table.constants.get(Constant.COUNTS)
-        if told is not None:
-            note = f"{motor}: its counts are taken from the header of the file: {told.text}"
-            return CountSize({"counts_per_rev": told.value}, note)
-        moved = self._motion(motor)
-        for one in self._speeds():
-            relation = derivative_of(self.live[one.column], moved, self.period_s) if one.column in self.live else None
-            if relation and relation.share > SAME_POSITION:
+        for constant in (Constant.COUNTS, Constant.COUNTS_PER_M):
+            if (told := self.draft.table.constants.get(constant)) is not None:
+                note = f"{motor}: its counts are taken from the header of the file: {told.text}"
+                return CountSize({constant.value: told.value}, note)
+        moved = self.positions.motion(motor)
+        for one in self.positions.speeds():
+            relation = derivative_of(self.live[one.column], moved, self.period_s)
+            if relation.share > SAME_POSITION:
                 return from_speed(1.0 / relation.factor, str(one.unit))
         if length:
-            return from_length(motor, 1.0 / factor, self.units[length], length, gives_force(self.effort))
-        return assumed(motor)
+            return from_length(motor, 1.0 / factor, self.units[length], length, self.effort_si == "N")
+        return assumed(self.effort_si != "N")
 
     def _velocity_command(self) -> None:
         name, command = self.roles.velocity_command, self.roles.command
         if name is None:
             return
-        if command is None:
-            self.draft.left_out[name] = "a velocity set-point without a position set-point"
+        if command is None or command in self.asked:
+            self.draft.left_out[name] = "a velocity set-point without a position set-point of known unit"
             return
         entry = next(one.entry for one in self.draft.channels if one.channel == "position_command_m")
         source, live = ChannelSource.model_validate(entry), self.live
@@ -277,16 +225,44 @@ class ChannelEntries:
         efforts = [self.live[column] for column, _ in given]
         causes = [driven(values, moved, self.period_s) for values in efforts]
         for (column, channel), cause, sign in zip(given, causes, signs_of(efforts, causes, moved), strict=True):
-            keys, notes = effort_entry(self.labels[column], self.kind, self.draft.table, cause, sign * self.motor_sign)
-            self.draft.unsure += notes
-            self._add(channel, column, f"inertia and friction explain {100 * max(cause.share, 0):.0f} % of it", keys)
+            entry = effort_entry(self.labels[column], self.kind, self.draft.table, cause, sign * self.motor_sign)
+            self.draft.unsure += entry.notes
+            self.draft.asked += [Asked(channel, key, f"{column}: {what}") for key, what in entry.asked.items()]
+            self._add(
+                channel, column, f"inertia and friction explain {100 * max(cause.share, 0):.0f} % of it", entry.keys
+            )
 
     def _velocity_only(self) -> None:
         """A recording with velocity in place of position."""
         name = self.roles.motor_velocity
         assert name
-        unit = self.labels[name].unit or "rad/s"
-        self.draft.unsure += [] if self.labels[name].unit else [f"{name}: no unit is given; rad/s is taken"]
-        self.kind = AxisKind.LINEAR if is_length(unit) else AxisKind.ROTARY
-        self._add(AXIS_CHANNELS[self.kind].motor_velocity, name, "no position is recorded", {"unit": unit})
+        unit = self.labels[name].unit
+        volts = unit in ("V", "mV")
+        given, unit = unit, None if volts else unit
+        keys: dict[str, object] = {"unit": unit or "rad/s"} | ({"scale": 1.0} if volts else {})
+        length = is_length(unit or "") or (unit is None and self.effort_si == "N")
+        asked = {} if unit else {"unit": _speed_question(length)}
+        asked |= {"scale": f"is in {given}; write how many of this unit are 1 {given}"} if volts else {}
+        if unit == "counts/s":
+            size = self._count_size(name, None, 0.0)
+            keys |= size.entry
+            asked, length = size.asked, size.unit == "m"
+        self.kind = self._kind(length)
+        if self.kind is AxisKind.ROTARY and length:
+            self._lead(name)
+        channel = AXIS_CHANNELS[self.kind].motor_velocity
+        self.draft.asked += [Asked(channel, key, f"{name}: {what}") for key, what in asked.items()]
+        self._add(channel, name, "no position is recorded", keys)
         self._efforts(motion(np.cumsum(self.live[name]) * self.period_s, self.period_s))
+
+
+def _unit_question(kind: AxisKind) -> str:
+    if kind is AxisKind.LINEAR:
+        return (
+            "its unit is not in the file; write m, mm, um or in (of a motor that turns, rename its channels: see above)"
+        )
+    return f"its unit is not in the file; write rad, deg, rev or counts; or a length such as mm, {_SCREW}"
+
+
+def _speed_question(length: bool) -> str:
+    return f"its unit is not in the file; write {'m/s, mm/s or m/min' if length else 'rad/s, deg/s, rpm or rev/s'}"

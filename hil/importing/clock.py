@@ -78,7 +78,8 @@ def clock_of(
 ) -> StampClock | None:
     """The clock that the columns `names` make, of which the others only tell the unit; None without names.
 
-    The one with most different stamps counts; a column of fractions of a second is added to one of whole seconds.
+    The one with most different stamps counts, of equal ones that with the most even steps; a column of fractions of a
+    second is added to one of whole seconds.
     `told` is the rate [Hz] that the file gives elsewhere, with its source.
     """
     stamps = [_stamps(table, labels, name) for name in names]
@@ -89,7 +90,7 @@ def clock_of(
     if not stamps:
         return None
     known = [one for one in stamps if one.sure]
-    best = max(stamps, key=lambda one: (one.distinct, one.sure))
+    best = max(stamps, key=lambda one: (one.distinct, one.sure, -round(one.unevenness, 3)))
     _refuse_missing(table, best)
     note = ""
     if not best.sure:

@@ -1,14 +1,16 @@
 """Read the name of a column: quantity, set-point or measured, motor or table, unit. The words are in `lexicon.yaml`."""
 
 import re
-import unicodedata
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from hil.importing.lexicon import Quantity, lexicon
+from hil.importing.lexicon import Quantity, lexicon, without_accents
 from hil.importing.units import QUANTITY_OF_UNIT, split_unit, unit_named, unit_of_text, whole_unit
+from hil.quantities import UNITS
 
 _NOTHING = (Quantity.UNKNOWN, False)
+_BRACKET = re.compile(r"[\[({].*[\])}]")
+_ADDRESS = re.compile(r"\b0x[0-9a-fA-F]+(:\d+)?")
 LEAST_WITHIN = 4  # letters of a word that is also found within a longer one: shorter ones occur in others by chance
 
 
@@ -26,6 +28,7 @@ class Label:
     unit: str | None
     odd_unit: bool = False
     electric: str | None = None  # A or V if the word says current or voltage
+    si: str | None = None  # N m or N if its unit or a word says torque or force
     part: bool = False  # of a torque: friction, gravity
     letter: bool = False  # one letter says its quantity, beside nothing else that is known
 
@@ -42,6 +45,8 @@ def label(column: str, unit_text: str = "", words_beside: str = "") -> Label:
         unit = unit or whole_unit(name.rpartition(".")[2])
     if unit_text and unit is None:
         unit, odd = unit_of_text(unit_text), unit_of_text(unit_text) is None
+    if unit is None and not odd:
+        unit = split_unit(words_beside)[1] if _BRACKET.search(words_beside) else None
     tokens = plain_words(name)
     beside = _words(plain_words(words_beside))
     words = _words(tokens) + beside
@@ -71,7 +76,8 @@ def label(column: str, unit_text: str = "", words_beside: str = "") -> Label:
         number,
         unit,
         odd,
-        _electric(words) if quantity is Quantity.EFFORT else None,
+        _electric(words) if quantity is Quantity.EFFORT and not _any(words, known.torque) else None,
+        _si(words, unit) if quantity is Quantity.EFFORT else None,
         _any(words, known.part),
         not words_beside and quantity is not Quantity.TIME and (len(name.strip()) == 1 or strange),
     )
@@ -82,6 +88,19 @@ def _electric(words: list[str]) -> str | None:
     units = {word: unit for unit, known in lexicon().electric.items() for word in known}
     long = (unit for word, unit in units.items() if len(word) >= LEAST_WITHIN and _any(words, (word,)))
     return next(long, next((units[word] for word in words if word in units), None))
+
+
+def effort_of_words(name: str) -> str | None:
+    """N m or N by the words of a name."""
+    return _si(_words(plain_words(name)), None)
+
+
+def _si(words: list[str], unit: str | None) -> str | None:
+    """N m or N by the unit of an effort, else by a word for torque or force alone."""
+    if (si := UNITS.get(unit or "", ("",))[0]) in ("N m", "N"):
+        return si
+    told = [si for si, known in (("N m", lexicon().torque), ("N", lexicon().force)) if _any(words, known)]
+    return told[0] if len(told) == 1 else None
 
 
 def _unit_after_blank(name: str) -> tuple[str, str | None]:
@@ -122,11 +141,11 @@ def _quantity(words: list[str]) -> Quantity:
 
 
 def plain_words(name: str) -> list[str]:
-    """Words of a name in lower case without accents: motorPos_Ist2 -> motor, pos, ist2."""
-    plain = name.replace("ß", "ss").replace("ω", "omega").replace("τ", "tau").replace("φ", "phi").replace("θ", "theta")
-    plain = unicodedata.normalize("NFKD", plain).encode("ascii", "ignore").decode()
+    """Words of a name in lower case without accents and addresses: motorPos_Ist2 0x6064 -> motor, pos, ist2."""
+    plain = name.replace("ω", "omega").replace("τ", "tau").replace("φ", "phi").replace("θ", "theta")
+    plain = without_accents(_ADDRESS.sub(" ", plain))
     plain = re.sub(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])|(?<=\d)(?=[A-Za-z])", " ", plain)
-    return [token for token in re.split(r"[^0-9a-zA-Z]+", plain.lower()) if token]
+    return [token for token in re.split(r"[\W_]+", plain.lower()) if token]
 
 
 def _split_suffix(token: str) -> list[str]:
@@ -144,6 +163,8 @@ def _split_suffix(token: str) -> list[str]:
 def _any(words: list[str], known: Iterable[str]) -> bool:
     alone = lexicon().alone
     return any(
-        one in words or (len(one) >= LEAST_WITHIN and one not in alone and any(one in word for word in words))
+        one in words
+        # other scripts write their words without blanks between them
+        or ((len(one) >= LEAST_WITHIN or not one.isascii()) and one not in alone and any(one in word for word in words))
         for one in known
     )

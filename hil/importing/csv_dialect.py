@@ -3,13 +3,14 @@
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import islice
+from itertools import islice, pairwise
 from pathlib import Path
 from typing import NamedTuple
 
 from hil.errors import InputError
 from hil.files.date_stamps import is_date
 from hil.files.input_file import lines_of
+from hil.importing.encodings import encoding_of
 from hil.importing.header_rows import COMMENT, Header, read_header
 from hil.importing.map_file import CsvOptions
 from hil.importing.number_form import NumberForm, find_form, number_of
@@ -22,7 +23,6 @@ _LEAST_SHARE = 0.3  # of fields with numbers or dates
 _PAIRED = 0.1  # share of the rows that all channels of a file have, if some end before the others
 _MOSTLY = 0.5  # share of the rows in which a column of numbers has some
 _FOLLOW = 3  # rows of numbers in turn, at which they begin
-_ENCODINGS = ("utf-8", "cp1252", "cp850")  # the last one reads every byte
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ def find_dialect(path: Path) -> CsvDialect:
     delimiter, form, width = layout.delimiter, layout.form, len(layout.read)
     first = _first_row(path, head, layout)
     above = head[:first]
-    header = read_header(above, delimiter, width, form)
+    header = read_header(above, delimiter, width, form, _counts(head[first:], layout))
     if form.thousands:
         header.notes.append(f"numbers: {form.thousands!r} is read as the mark between thousands")
     if header.line is None and delimiter == "," and (split := _split_by_commas(above, width)):
@@ -71,6 +71,14 @@ def find_dialect(path: Path) -> CsvDialect:
     return CsvDialect(CsvOptions.model_validate(given), header, tuple(above))
 
 
+def _counts(lines: Sequence[str], layout: _Layout) -> bool:
+    """True if the first column numbers the rows, from any number on."""
+    rows = [split_line(line, layout.delimiter) for line in lines if line.strip()]
+    first = [number_of(row[0], layout.form) for row in rows if len(row) == len(layout.read)]
+    steps = [after - before for before, after in pairwise(one for one in first if one is not None)]
+    return bool(steps) and sum(step == 1.0 for step in steps) > _MOSTLY * len(steps)
+
+
 def _split_by_commas(above: list[str], width: int) -> int:
     """Line (from 1) of a header with half as many fields as the rows, 0 without one."""
     last = max((index for index, line in enumerate(above) if line.strip()), default=-1)
@@ -85,13 +93,17 @@ def _lines(path: Path) -> tuple[list[str], str]:
     wide = start.startswith((b"\xff\xfe", b"\xfe\xff"))
     if not wide and (b"\x00" in start or sum(byte < 9 or 13 < byte < 32 for byte in start) > len(start) // 50):
         raise InputError(f"{path}: is not text but binary data; export the recording as CSV, .mat, Parquet or JSON")
-    for encoding in ("utf-16",) if wide else _ENCODINGS:
-        try:
-            with path.open(encoding="utf-8-sig" if encoding == "utf-8" else encoding) as file:
-                return [line.rstrip("\r\n") for line in islice(lines_of(path, file), MOST_LINES)], encoding
-        except UnicodeDecodeError:
-            continue
-    raise InputError(f"{path}: is damaged UTF-16 text; export the recording again as UTF-8")
+    encoding = "utf-16" if wide else _encoding(path)
+    try:
+        with path.open(encoding="utf-8-sig" if encoding == "utf-8" else encoding) as file:
+            return [line.rstrip("\r\n") for line in islice(lines_of(path, file), MOST_LINES)], encoding
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: is damaged {encoding} text; export the recording again as UTF-8") from None
+
+
+def _encoding(path: Path) -> str:
+    with path.open("rb") as file:
+        return encoding_of([line.rstrip(b"\r\n") for line in islice(file, MOST_LINES)])
 
 
 def _layout(path: Path, body: list[str]) -> _Layout:
@@ -102,7 +114,7 @@ def _layout(path: Path, body: list[str]) -> _Layout:
         widths = Counter(len(row) for row in rows)
         width = widths.most_common(1)[0][0] if rows else 0
         wide = max((one for one, times in widths.items() if times > _PAIRED * len(rows)), default=width)
-        if wide % 2 == 0 and wide >= width + 2:  # channels of lower rate, with their times, end before the others
+        if wide >= width + 2:  # channels of lower rate, with their times, end before the others
             width, rows = wide, [row for row in rows if len(row) == wide]
         if width < 2:
             continue

@@ -1,6 +1,7 @@
 """Map entry of a torque, force, current or voltage: unit, constant and sign."""
 
 import re
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -10,34 +11,46 @@ from hil.identification.derivatives import MeasuredMotion
 from hil.identification.least_squares import LinearFit
 from hil.importing.column_names import Label
 from hil.importing.foreign_table import ForeignTable
-from hil.importing.header_values import HeaderValue
 from hil.importing.lexicon import Constant, lexicon
 from hil.importing.relations import proportional
+from hil.importing.unit_choice import is_joint_state
 from hil.quantities import UNITS
 
 CAUSED = 0.3  # share of an effort explained by its motion from which its sign can be judged
 TOGETHER = 0.25  # share of the variance that torque and command have in common, from which they have one cause
-_CONSTANT_KEY = {AxisKind.LINEAR: "force_constant_n_a", AxisKind.ROTARY: "torque_constant_n_m_a"}
+_UNKNOWN = "(1 if nobody knows it: masses and friction are multiples of it)"
+_OR_SCREW = (
+    "; or of a motor with a screw rename motor_position_m to motor_position_rad and force_n to torque_n_m, and write "
+    "torque_constant_n_m_a here and lead_m above"
+)
+_UNIT_QUESTION = {
+    AxisKind.ROTARY: "its unit is not in the file; write N m, mN m; or A and torque_constant_n_m_a, % and rated (N m)",
+    AxisKind.LINEAR: "its unit is not in the file; write N; or A and force_constant_n_a, % and rated (N)",
+}
 PART = 0.1  # of the effort: the inertia's part must exceed it, else the sign of friction decides
 
 
-def effort_entry(
-    told: Label, kind: AxisKind, table: ForeignTable, cause: LinearFit, sign: int
-) -> tuple[dict[str, object], list[str]]:
-    """Keys of the map beside the column, and notes on what is unsure.
+@dataclass
+class EffortEntry:
+    """Keys of the map beside the column, notes on what is unsure, and the keys that are asked, with what they are."""
 
-    `cause` is what `relations.driven` gives for it, `sign` what `signs_of` does; constants are those of `table`.
-    """
-    entry, notes = _unit(told, kind, table)
+    keys: dict[str, object]
+    notes: list[str] = field(default_factory=list)
+    asked: dict[str, str] = field(default_factory=dict)
+
+
+def effort_entry(told: Label, kind: AxisKind, table: ForeignTable, cause: LinearFit, sign: int) -> EffortEntry:
+    """Entry of an effort. `cause` is what `relations.driven` gives for it, `sign` what `signs_of` does."""
+    entry = _entry(told, kind, table)
     if cause.share < CAUSED:
-        notes.append(
+        entry.notes.append(
             f"{told.column}: inertia and friction of the motion explain only {100 * max(cause.share, 0.0):.0f} % "
             "of it; check that it drives this axis"
         )
     if sign < 0:
-        entry["sign"] = -1
-        notes.append(f"{told.column}: positive values accelerate backwards; its sign is turned")
-    return entry, notes
+        entry.keys["sign"] = -1
+        entry.notes.append(f"{told.column}: positive values accelerate backwards; its sign is turned")
+    return entry
 
 
 def signs_of(efforts: list[FloatArray], causes: list[LinearFit], moved: MeasuredMotion) -> list[int]:
@@ -67,44 +80,75 @@ def _sign(coefficients: FloatArray, moved: MeasuredMotion) -> int:
     return -1 if deciding < 0.0 else 1
 
 
-def _unit(told: Label, kind: AxisKind, table: ForeignTable) -> tuple[dict[str, object], list[str]]:
-    unit, column, scalars = told.unit or told.electric, told.column, table.scalars
+def _entry(told: Label, kind: AxisKind, table: ForeignTable) -> EffortEntry:
+    """Unit and constant: of the column, of the file, else asked."""
+    unit, column, constants = told.unit or told.electric, told.column, table.constants
     linear = kind is AxisKind.LINEAR
-    si = "N" if linear else "N m"
-    entry: dict[str, object] = {"unit": unit or si}
+    si, key = ("N", "force_constant_n_a") if linear else ("N m", "torque_constant_n_m_a")
+    entry = EffortEntry({"unit": unit or si})
     if unit in ("mA", "mV"):
-        entry |= {"unit": unit[1:], "scale": 1e-3}
         unit = unit[1:]
-    if unit in UNITS and UNITS[unit][0] != si:
-        entry |= {"unit": si, "scale": UNITS[unit][1]}
-        lever = "a length, and no lead is told; 1 N per N m is" if linear else "an angle; 1 N m per N is"
-        factor = "multiply scale by the radius"
-        if linear:
-            factor = "reports then say N where N m of the motor is meant; multiply scale by 2 pi / lead to get N"
-        return entry, [f"{column}: is in {unit}, the position in {lever} taken: {factor}"]
+        entry.keys |= {"unit": unit, "scale": 1e-3}
     if unit in UNITS:
-        return entry, []
-    multiples = "1 is taken: masses and friction are in multiples of it"
+        if UNITS[unit][0] != si:  # a force on a lever, or a torque beside a motion that is no turn
+            entry.keys |= {"unit": si, "scale": UNITS[unit][1]}
+            entry.asked["scale"] = f"is in {unit}, the axis in {si}; write the {si} per {unit}"
+        return entry
     if unit in ("%", "permille"):
-        rated = table.constants.get(Constant.RATED_FORCE if linear else Constant.RATED_TORQUE)
-        entry["rated"] = rated.value if rated else 1.0
-        return entry, [_from(column, rated) if rated else f"{column}: the rated {si} is not known, {multiples}"]
-    header = table.constants.get(Constant.FORCE if linear else Constant.TORQUE)
+        rated, text = _rated(told, linear, table)
+        entry.keys["rated"] = rated
+        if text:
+            entry.notes.append(f"{column}: its constant is taken from the header of the file: {text}")
+        else:
+            whole = "rated current" if told.electric else "rated force" if linear else "rated torque"
+            entry.asked["rated"] = f"is in {unit} of the {whole}; write the {si} at 100 % {_UNKNOWN}"
+        return entry
+    header = constants.get(Constant.FORCE if linear else Constant.TORQUE)
     if unit == "A" and header is not None:
-        return entry | {_CONSTANT_KEY[kind]: header.value}, [_from(column, header)]
-    named = [name for name in scalars if re.sub(r"[^a-z]", "", name.lower()) in lexicon().scalars.constant]
-    if len(named) != 1:
-        notes = [f"{column}: several scalars may be its constant ({', '.join(named)})"] if named else []
-        if unit is None:
-            return entry, [*notes, f"{column}: no unit is given; {si} is taken: masses and friction scale with it"]
-        entry[_CONSTANT_KEY[kind] if unit == "A" else "gain"] = 1.0
-        return entry, [*notes, f"{column}: the {si} per {unit} are not known, {multiples}"]
-    size = f"{named[0]} = {scalars[named[0]]:g} of the file is taken as {si} per"
+        entry.keys[key] = header.value
+        entry.notes.append(f"{column}: its constant is taken from the header of the file: {header.text}")
+        return entry
+    named = [name for name in table.scalars if re.sub(r"[^a-z]", "", name.lower()) in lexicon().scalars.constant]
+    if len(named) == 1:
+        value = table.scalars[named[0]]
+        entry.notes.append(f"{column}: {named[0]} = {value:g} of the file is taken as {si} per {unit or 'unit'}")
+        if unit == "A":
+            entry.keys[key] = value
+        else:
+            entry.keys |= {"unit": "V", "gain": named[0]}
+        return entry
     if unit is None:
-        return entry | {"unit": "V", "gain": named[0]}, [f"{column}: no unit is given; {size} unit"]
-    key, value = (_CONSTANT_KEY[kind], scalars[named[0]]) if unit == "A" else ("gain", named[0])
-    return entry | {key: value}, [f"{column}: {size} {unit}"]
+        if not is_joint_state(told):
+            entry.asked["unit"] = _UNIT_QUESTION[kind]
+        return entry
+    entry.keys[key if unit == "A" else "gain"] = 1.0
+    if told.electric == "V":  # of the motor, which a bench in volts drives, and no output that stands for a torque
+        entry.notes.append(
+            f"{column}: the {si} per V are not known, 1 is taken: masses and friction are in multiples of it"
+        )
+        return entry
+    given = "" if told.unit else f" (unit {unit} by its name)"
+    constant = "force constant" if linear else "torque constant"
+    screw = _OR_SCREW if linear and unit == "A" else ""
+    what = (
+        f"the {constant} of the motor"
+        if unit == "A"
+        else f"the size of its scale, if it is an output of {'force' if linear else 'torque'},"
+    )
+    entry.asked[key if unit == "A" else "gain"] = f"is in {unit}{given}; write {what} in {si}/{unit} {_UNKNOWN}{screw}"
+    return entry
 
 
-def _from(column: str, constant: HeaderValue) -> str:
-    return f"{column}: its constant is taken from the header of the file: {constant.text}"
+def _rated(told: Label, linear: bool, table: ForeignTable) -> tuple[float, str]:
+    """Rated torque or force of a column in %, with the text that gives it; 1 without one."""
+    constants = table.constants
+    rated = constants.get(Constant.RATED_FORCE if linear else Constant.RATED_TORQUE)
+    current, constant = (
+        constants.get(Constant.RATED_CURRENT),
+        constants.get(Constant.FORCE if linear else Constant.TORQUE),
+    )
+    if told.electric == "A":
+        return (
+            (current.value * constant.value, f"{current.text}, {constant.text}") if current and constant else (1.0, "")
+        )
+    return (rated.value, rated.text) if rated else (1.0, "")

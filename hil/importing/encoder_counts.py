@@ -3,7 +3,7 @@
 And the unit of an angle, in which its steps are counts of an encoder.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import pi
 
 import numpy as np
@@ -15,7 +15,7 @@ from hil.importing.usual_values import COUNTS, LEADS_M
 from hil.quantities import UNITS
 from hil.recording.quantum import count_of, is_decimal
 
-_ASSUMED_PER_M = 1e6  # without any other column: travels of 1e4 to 1e7 counts are then 10 mm to 10 m
+_ASSUMED_PER_M = 1e6
 _USUAL = 0.003  # relative deviation from usual counts, or from a usual pair of counts and lead: smoothing, errors
 
 _SCALE = 0.01  # deviation of the count of a linear scale: the errors of a lead are below
@@ -25,10 +25,11 @@ _DECIMAL = 1e-3  # deviation of a step from a power of ten: of printed digits it
 
 @dataclass(frozen=True)
 class CountSize:
-    """Keys of the map that give the size of a count, and a note if it is not sure."""
+    """Keys of the map that give the size of a count, and a note if it is not sure; keys that are asked, with what."""
 
     entry: dict[str, float]
     note: str = ""
+    asked: dict[str, str] = field(default_factory=dict)
 
     @property
     def unit(self) -> str:
@@ -95,13 +96,9 @@ def angle_unit(column: str, values: FloatArray, speeds: list[tuple[str, float]])
     return None
 
 
-def assumed(column: str) -> CountSize:
-    """Count of a micrometre, where nothing gives its size: lengths and masses are then in multiples of it."""
-    note = (
-        f"{column}: is in counts, and no other column tells their size; 1 um per count is taken: lengths, speeds, "
-        "masses and stiffness are in multiples of it, and nothing is told per revolution. In the map correct "
-        "counts_per_m of each channel in counts; or, of a rotary encoder, give them counts_per_rev instead, rename "
-        "motor_position_m to motor_position_rad and force_n to torque_n_m (N to N m), and add lead_m: 6.283185 (of a "
-        "rotary axis without a gear)"
-    )
-    return CountSize({"counts_per_m": _ASSUMED_PER_M}, note)
+def assumed(turns: bool) -> CountSize:
+    """Count of unknown size, of a motor that turns or of a linear one; the values mean nothing."""
+    what = "is in counts of unknown size; write the counts per"
+    if turns:
+        return CountSize({"counts_per_rev": COUNTS[0]}, asked={"counts_per_rev": f"{what} revolution of the motor"})
+    return CountSize({"counts_per_m": _ASSUMED_PER_M}, asked={"counts_per_m": f"{what} metre, such as 1e6 for 1 um"})

@@ -1,6 +1,8 @@
 """Read all columns of numbers of a foreign file, without a map. What is no number becomes NaN here."""
 
+import re
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -14,9 +16,11 @@ from hil.files import json_columns
 from hil.files.date_stamps import is_date, seconds_of
 from hil.importing.csv_dialect import MOST_LINES, find_dialect
 from hil.importing.foreign_columns import as_measured, check_foreign, format_of, parquet_dates
+from hil.importing.header_rows import read_factor
 from hil.importing.header_values import HeaderValue, header_values
 from hil.importing.lexicon import Constant
-from hil.importing.map_file import CsvOptions
+from hil.importing.map_file import SECONDS, CsvOptions
+from hil.importing.row_groups import moving_group
 from hil.importing.text_rows import Cell, read_rows
 from hil.importing.unit_lines import described, told_units
 from hil.importing.variables import load_variables
@@ -24,6 +28,7 @@ from hil.recording.arrow_files import is_number, numbers, parquet_schema, read_p
 
 LEAST_NUMBERS = 0.01  # share of rows with a number: with fewer a column is one of text
 MOST_COLUMNS = 1000  # whose names are read, 1 ms each
+LEAST_HZ, MOST_HZ = 20.0, 1e5  # of rows whose period has no unit
 WIDEST = 64  # columns of a matrix in a .mat file: a wider one is no table of channels
 
 
@@ -84,7 +89,10 @@ def read_table(path: Path) -> ForeignTable:
 def _text(path: Path) -> ForeignTable:
     dialect = find_dialect(path)
     header = dialect.header
-    rows = read_rows(path, header.names, dialect.options, MOST_LINES)
+    options, rows = dialect.options, read_rows(path, header.names, dialect.options, MOST_LINES)
+    if group := moving_group(path, header.names, options, rows, MOST_LINES):
+        options, rows = group.options, group.rows
+        header.notes.append(group.note)
     columns, remarks = dict[str, FloatArray](), []
     read = rows.numbers | rows.dates
     for name, values in ((name, read[name]) for name in header.names):
@@ -95,14 +103,23 @@ def _text(path: Path) -> ForeignTable:
     titles = {name: header.titles.get(name, name) for name in header.names}
     told = described(dialect.above, list(titles.values()))
     of_lines = {title: unit for title, (_, unit) in told.items()} | told_units(dialect.above, list(titles.values()))
+    applied = [name for name, scale in header.row_scales.items() if not _is_raw(read[name], *scale)]
+    header.scales |= {name: scale for name, scale in header.row_scales.items() if name not in applied}
+    header.notes += [
+        f"{name}: its values hold the factor {header.row_scales[name][0]:g} of the header already"
+        for name in applied
+        if header.row_scales[name][0] != 1.0
+    ]
+    for name, title in titles.items():
+        read_factor(header, name, of_lines.get(title, ""))
     units = {name: of_lines[title] for name, title in titles.items() if title in of_lines} | header.units
     words = {name: told[title][0] for name, title in titles.items() if title in told} | header.words
     return ForeignTable(
         path,
         columns,
         units,
-        csv=dialect.options,
-        constants=header_values(dialect.above, {}),
+        csv=options,
+        constants=_counted_period(dialect.above, rows.lines.size) | header_values(dialect.above, {}),
         remarks=tuple(remarks),
         dates=frozenset(rows.dates),
         texts={name: cell for name, cell in rows.texts.items() if name in columns},
@@ -113,6 +130,27 @@ def _text(path: Path) -> ForeignTable:
         notes=(*header.notes, *rows.notes),
         lines=rows.lines,
     )
+
+
+def _is_raw(values: FloatArray, factor: float, offset: float) -> bool:
+    """True if a factor of the header is still to be applied to a column (n,): to whole numbers, as a drive has them."""
+    given = values[np.isfinite(values)]
+    whole = bool(np.all(given == np.round(given)))
+    multiples = factor > 1.0 and bool(np.all(given % factor == 0.0)) and bool(given.any())
+    return (factor == 1.0 and offset != 0.0) or (factor != 1.0 and whole and not multiples)
+
+
+def _counted_period(lines: Sequence[str], rows: int) -> dict[Constant, HeaderValue]:
+    """Rate by a line of two numbers above the rows: how many follow, and their period in the only unit that fits."""
+    for line in lines:
+        match = re.fullmatch(r"\s*(\d+)\s*[,;\t ]\s*([\d.]+)\s*", line)
+        if match and int(match[1]) == rows and float(match[2]) > 0.0:
+            rates = {unit: 1.0 / (SECONDS[unit] * float(match[2])) for unit in ("s", "ms", "us")}
+            fitting = {unit: rate for unit, rate in rates.items() if LEAST_HZ <= rate <= MOST_HZ}
+            if len(fitting) == 1:
+                ((unit, rate),) = fitting.items()
+                return {Constant.RATE: HeaderValue(rate, f"{line.strip()}: rows, and {unit} from row to row")}
+    return {}
 
 
 def _mat(path: Path) -> ForeignTable:

@@ -6,19 +6,21 @@ What a row says of a column is kept with the column; a row that is not used is s
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
+from math import isfinite
 
+from hil.files.date_stamps import is_date
 from hil.importing.column_names import label, plain_words
-from hil.importing.lexicon import RowKind, lexicon
+from hil.importing.lexicon import Quantity, RowKind, lexicon
 from hil.importing.map_file import SECONDS
 from hil.importing.number_form import NumberForm, number_of
-from hil.importing.text_rows import label_of_pairs, shown, split_line
-from hil.importing.units import unit_named, unit_of_text
+from hil.importing.text_rows import shown, split_line, times_of_groups
+from hil.importing.units import factor_and_unit, unit_named, unit_of_text
 
 COMMENT = re.compile(r"^\s*(#|%|//)+\s?")
 _UNIT = re.compile(r"[\[(]?\s*[a-zA-Zµμ°%‰Ω·/^*\d. _-]{0,14}\s*[\])]?(\s*\(\w*\))?")
 NAMELESS = "column "  # beginning of the name of a column over which nothing stands
 _BRACKET = re.compile(r"[\[(](.*?)[\])]")
-_FACTOR = re.compile(r"(?:(?P<value>\d+(?:[.,]\d+)?)|1/(?P<part>\d+))\s*[*x·]?\s*(?P<unit>[^\d\s/].*)")
 _WORD = re.compile(r"[^\W\d]")
 _NEAR = 4  # lines above the numbers whose text may be that of the columns, where they have none else
 
@@ -44,7 +46,8 @@ class Header:
     """What stands above the columns.
 
     `names` are different for each column; `titles` the text of the file for a column with another name. `scales` are
-    factor and offset with which a column becomes a value in its unit, `periods_s` the periods of its rows. `line` is
+    factor and offset with which a column becomes a value in its unit, `row_scales` those of rows of their own, which
+    the values may hold already; `periods_s` the periods of its rows. `line` is
     the row that alone gives the names.
     """
 
@@ -53,14 +56,16 @@ class Header:
     units: dict[str, str] = field(default_factory=dict)
     words: dict[str, str] = field(default_factory=dict)
     scales: dict[str, tuple[float, float]] = field(default_factory=dict)
+    row_scales: dict[str, tuple[float, float]] = field(default_factory=dict)
     periods_s: dict[str, float] = field(default_factory=dict)
     line: int | None = None
     notes: list[str] = field(default_factory=list)
 
 
-def read_header(lines: Sequence[str], delimiter: str, width: int, form: NumberForm) -> Header:
-    """Read the lines above `width` columns of numbers."""
-    rows = [row for index, line in enumerate(lines) if (row := _row(index, line, delimiter, width, form)) is not None]
+def read_header(lines: Sequence[str], delimiter: str, width: int, form: NumberForm, counted: bool = False) -> Header:
+    """Read the lines above `width` columns of numbers; `counted`: the first one numbers the rows, perhaps nameless."""
+    read = (_row(index, line, delimiter, width, form, counted) for index, line in enumerate(lines))
+    rows = [row for row in read if row is not None]
     # a row that is one field short counts where no other one tells what the columns are
     rows = [row for row in rows if row.whole] if any(row.whole and row.sure for row in rows) else rows
     texts = [row for row in rows if row.kind in (RowKind.NAMES, RowKind.TEXT)]
@@ -93,8 +98,6 @@ def read_header(lines: Sequence[str], delimiter: str, width: int, form: NumberFo
             case _ if row is not named:
                 header.notes.append(f"header: line {row.line + 1} is not used: {shown(row.text)!r}")
         used.add(row.line)
-    for name in header.names:
-        _read_factor(header, name)
     if named is None:
         near = [index for index in range(len(lines)) if lines[index].strip() and index not in used][-_NEAR:]
         if near and len(split_line(COMMENT.sub("", lines[near[-1]]), delimiter)) > 1:
@@ -105,25 +108,41 @@ def read_header(lines: Sequence[str], delimiter: str, width: int, form: NumberFo
     return header
 
 
-def _row(index: int, line: str, delimiter: str, width: int, form: NumberForm) -> HeaderRow | None:
+def _row(index: int, line: str, delimiter: str, width: int, form: NumberForm, counted: bool) -> HeaderRow | None:
     text = COMMENT.sub("", line)
     word, colon, rest = text.partition(":")
     kind = _kind_of_label(word) if colon and delimiter not in word else None
     fields = split_line(rest if kind else text, delimiter)
     while len(fields) > width and not fields[-1]:
         fields.pop()
-    if len(fields) == width and (pair := label_of_pairs(fields)):  # a column of time beside each channel
-        kind = _kind_of_label(pair)
-        fields = [one for value in fields[1::2] for one in ("", value)]
+    times = times_of_groups(fields) if len(fields) == width else ()
+    if times and len({fields[index] for index in times}) == 1 and label(fields[0]).quantity is not Quantity.TIME:
+        kind = _kind_of_label(fields[0])  # what the row tells stands over each column of time
+        fields = ["" if index in times else value for index, value in enumerate(fields)]
     elif kind is None and len(fields) in (width, width + 1) and (kind := _kind_of_label(fields[0])):
         fields = ["", *fields[1:]] if len(fields) == width else fields[1:]
+    elif len(fields) == width + 1 and _kind(fields[1:], form) is RowKind.UNITS and unit_of_text(fields[0]) is None:
+        kind, fields = RowKind.UNITS, fields[1:]
     elif len(fields) > width:
         fields = _regrouped(text, delimiter, width) or fields[: width + (len(fields) > width + 1)]
+    fields = _otherwise_split(fields, delimiter, width)
     given = len(fields)
-    if given not in (width, width - 1) or not any(fields):
+    if given not in (width, width - 1) or given < 2 or not any(fields):
         return None
-    fields += [""] * (width - len(fields))
+    lacking = [""] * (width - given)
+    fields = [*lacking, *fields] if counted else [*fields, *lacking]
     return HeaderRow(index, line, kind or _kind(fields, form), tuple(fields), given == width)
+
+
+def _otherwise_split(fields: list[str], delimiter: str, width: int) -> list[str]:
+    """Fields of a line of names whose last field holds others with another delimiter: 12:00:00;names: n [rpm], M."""
+    last = re.sub(r"^\s*\w+:\s", "", fields[-1]) if fields else ""
+    stamped = 1 < len(fields) < width and is_date(fields[0])
+    for other in ",;|\t":
+        parts = split_line(last, other) if other != delimiter and stamped else []
+        if len(fields) - 1 + len(parts) == width and sum(label(one).sure for one in parts) > len(parts) / 2:
+            return ["time" if is_date(one) else one for one in fields[:-1]] + parts
+    return fields
 
 
 def _regrouped(text: str, delimiter: str, width: int) -> list[str]:
@@ -147,7 +166,9 @@ def _kind(fields: Sequence[str], form: NumberForm) -> RowKind:
         return RowKind.UNKNOWN
     if all(re.sub(r"\d+$", "", one.lower()) in lexicon().types for one in named):
         return RowKind.TYPES
-    units = sum(unit_of_text(one) is not None or one in ("-", "[-]", "[]") or bool(_factor(one)) for one in named)
+    units = sum(
+        unit_of_text(one) is not None or one in ("-", "[-]", "[]") or factor_and_unit(one) is not None for one in named
+    )
     if all(_UNIT.fullmatch(one) for one in named) and units >= max(1, len(named) / 2):
         return RowKind.UNITS
     return RowKind.TEXT if sum(bool(_WORD.search(one)) for one in named) > len(named) / 2 else RowKind.UNKNOWN
@@ -179,30 +200,32 @@ def _title(named: HeaderRow, texts: Sequence[HeaderRow], index: int) -> str:
 def _different(named: HeaderRow | None, texts: Sequence[HeaderRow], width: int) -> tuple[str, ...]:
     """Names of the columns, different from each other: Time, Time (2)."""
     names: list[str] = []
-    pairs = named is not None and width % 2 == 0 and not any(named.fields[::2]) and all(named.fields[1::2])
+    times = _untitled_times(named)
     for index in range(width):
-        title = _title(named, texts, index) if named else ""
-        name = title or (f"time{index // 2 + 1}" if pairs else f"{NAMELESS}{index + 1}")
-        times = 1 + sum(one == name or one.rpartition(" (")[0] == name for one in names)
-        names.append(name if times == 1 else f"{name} ({times})")
+        title = _title(named, texts, index) if named and index not in times else ""
+        name = title or (f"time{times.index(index) + 1}" if index in times else f"{NAMELESS}{index + 1}")
+        again = 1 + sum(one == name or one.rpartition(" (")[0] == name for one in names)
+        names.append(name if again == 1 else f"{name} ({again})")
     return tuple(names)
 
 
-def _read_factor(header: Header, name: str) -> None:
-    """Take the number before a unit as a factor: [0.1 Nm], 1/100 deg."""
-    bracket = _BRACKET.search(header.titles.get(name, name))
-    text = header.units.get(name, bracket[1] if bracket else "").strip(" []()")
-    if match := _factor(text):
-        value = float((match["value"] or match["part"]).replace(",", "."))
+def _untitled_times(named: HeaderRow | None) -> list[int]:
+    """Places of the columns of time that a row of names leaves empty, before each channel or group of channels."""
+    empty = [index for index, field in enumerate(named.fields) if not field] if named else []
+    apart = all(second - first > 1 for first, second in pairwise(empty))
+    return empty if named and len(empty) > 1 and empty[0] == 0 and apart and named.fields[-1] else []
+
+
+def read_factor(header: Header, name: str, told: str = "") -> None:
+    """Take the number before a unit as a factor: [0.1 Nm], 1/100 deg; `told` is the unit that another line gives."""
+    title = header.titles.get(name, name)
+    bracket = _BRACKET.search(title)
+    text = (bracket[1] if bracket else "") if label(title).unit else header.units.get(name, told)
+    text = text or (bracket[1] if bracket else "")
+    if found := factor_and_unit(text):
         factor, offset = header.scales.get(name, (1.0, 0.0))
-        header.scales[name] = factor * (value if match["value"] else 1.0 / value), offset
-        header.units[name] = match["unit"]
-
-
-def _factor(text: str) -> re.Match[str] | None:
-    """Number and unit of a text that is no unit itself."""
-    match = _FACTOR.fullmatch(text.strip(" []()"))
-    return match if match and unit_named(text) is None and unit_named(match["unit"]) else None
+        header.scales[name] = factor * found[0], offset
+        header.units[name] = found[1]
 
 
 def _number(text: str, form: NumberForm) -> float | None:
@@ -213,6 +236,6 @@ def _number(text: str, form: NumberForm) -> float | None:
 def _add_scale(header: Header, kind: RowKind, given: dict[str, str], form: NumberForm) -> None:
     for name, text in given.items():
         value = _number(text, form)
-        if value is not None:
-            factor, offset = header.scales.get(name, (1.0, 0.0))
-            header.scales[name] = (value, offset) if kind is RowKind.SCALE else (factor, value)
+        if value is not None and isfinite(value):
+            factor, offset = header.row_scales.get(name, (1.0, 0.0))
+            header.row_scales[name] = (value, offset) if kind is RowKind.SCALE else (factor, value)

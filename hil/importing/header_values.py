@@ -1,15 +1,17 @@
 """Constants that a file gives beside its columns: in lines above the numbers, or as scalars with a name.
 
-A line is "words [: = ; ,] number [unit]", as loggers and drives write it; a scalar has its unit in its name. The words
-are those of `lexicon.yaml`, compared without accents.
+A line holds one or several of "words [(unit)] [: = ; ,] number [unit]". The words of a constant end those before the
+number; a ratio of units such as N m/A or counts/rev says by itself what it is. Words are those of `lexicon.yaml`,
+compared without accents; a scalar has its unit in its name.
 """
 
 import re
-import unicodedata
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
-from hil.importing.lexicon import Constant, ConstantWords, lexicon
+from hil.importing.lexicon import Constant, ConstantWords, lexicon, without_accents
+from hil.importing.units import unit_named
+from hil.quantities import UNITS
 
 
 @dataclass(frozen=True)
@@ -20,68 +22,162 @@ class HeaderValue:
     text: str
 
 
-_LINE = re.compile(r"^(?P<name>\D*?)[\s:=;,|\t]*(?P<number>[+-]?\d[\d.,]*(e[+-]?\d+)?)(?P<rest>.*)$")
-_BRACKET = re.compile(r"[\[({](.*?)[\])}][\s:=;,|]*$")
-_SIGNS = re.compile(r"[\s·*.]+")  # between the parts of a unit
-_TEXT_OF_NAME = re.compile(r"[^a-z0-9/:]+")
+@dataclass(frozen=True)
+class _Statement:
+    """Words, the number that follows them, the texts that may be its unit, and the whole text."""
+
+    words: str
+    number: float
+    units: tuple[str, ...]
+    text: str
+
+
+_NUMBER = re.compile(r"(?<![\w.])(?<!\d,)[+-]?\d+(?:[.,]\d+)*(?:e[+-]?\d+)?(?!\d*x[0-9a-f])")
+_HEX = re.compile(r"\b0x[0-9a-f]+(:[0-9a-f]+)?|(?<=\w)\[\d+\]")  # addresses, and the index of a parameter
+_BRACKET = re.compile(r"[\[({]([^\[({]*?)[\])}][\s:=;,|\"']*$")
+_SEPARATED = re.compile(r"[\s:=;,|\"']*")
+_SIGNS = re.compile(r"[\s·・*.\"']+")  # between the parts of a unit
+_TEXT_OF_NAME = re.compile(r"[^\w/]+|_")
+_PER = re.compile(r"/|per|pro|je|par")
+_TURN_IS = re.compile(r"^1\s*(\w+)\s*=\s*([\d.,]+)\s*(\w+)$")  # 1 rev = 5 mm
+_PRODUCT = re.compile(r"=\s*([a-z]\w*)\s*[*x·]\s*([a-z]\w*)\s*$")
+_MOST_BITS = 40.0  # of an encoder
 
 
 def header_values(lines: Iterable[str], scalars: Mapping[str, float]) -> dict[Constant, HeaderValue]:
     """Constants of header `lines` and `scalars`. One that is given twice with different values is left out."""
-    texts = [text for line in lines for text in dict.fromkeys([line, *re.split(r"[;,|]\s", line)])]
-    given = [(*reading, text) for text in texts if (match := _split(text)) for reading in _readings(match)]
+    given = [one for line in _without_products(list(lines)) for one in _statements(line)]
     for name, scalar in scalars.items():
         words, unit = _unit_of_name(name)
-        given.append((words, scalar, [unit], f"{name} = {scalar:g}"))
-    found: dict[Constant, list[HeaderValue]] = {}
-    for words, number, units, text in given:
-        one = next((known for unit in units if (known := _constant(words, number, unit))), None)
-        if one is not None:
-            found.setdefault(one[0], []).append(HeaderValue(one[1], text.strip().strip('"#%/; ')))
-    return {one: values[0] for one, values in found.items() if len({value.value for value in values}) == 1}
+        given.append(_Statement(words, scalar, (unit,), f"{name} = {scalar:g}"))
+    found: dict[tuple[bool, Constant], list[HeaderValue]] = {}
+    for one in given:
+        if told := next((known for unit in one.units if (known := _constant(one.words, one.number, unit))), None):
+            by_words, constant, value = told
+            found.setdefault((by_words, constant), []).append(HeaderValue(value, one.text))
+    # what words say goes before what a unit alone says
+    same = {key: values[0] for key, values in found.items() if len({value.value for value in values}) == 1}
+    alone = {
+        constant: value
+        for (by_words, constant), value in same.items()
+        if not by_words and (True, constant) not in found
+    }
+    return alone | {constant: value for (by_words, constant), value in same.items() if by_words}
 
 
-def _split(line: str) -> re.Match[str] | None:
-    match = _LINE.match(_folded(line.strip().strip('"#%/ ')))
-    return match if match and re.search("[a-z]", match["name"]) else None
+def _statements(line: str) -> Iterator[_Statement]:
+    """Statements of a line; numbers that follow the first one without words are those of other channels."""
+    folded = _HEX.sub(" ", _folded(line.strip().strip('"#%/ ')))
+    if turn := _TURN_IS.match(folded):
+        size, unit = _number(turn[2]), f"{turn[3]}/{turn[1]}"
+        yield from [_Statement("", size, (unit,), line.strip())] if size is not None else []
+        return
+    matches = list(_NUMBER.finditer(folded))
+    for index, match in enumerate(matches):
+        before = folded[matches[index - 1].end() if index else 0 : match.start()]
+        end = matches[index + 1].start() if index + 1 < len(matches) else len(folded)
+        value = _number(match[0])
+        if value is None or not re.search(r"[^\W\d]", before) or _is_list(folded, matches[index:], value):
+            continue
+        bracket = _BRACKET.search(before)
+        name, unit = _unit_of_name(before)
+        behind = tuple(_units_behind(folded[match.end() : end]))
+        units = [_SIGNS.sub("", bracket[1])] if bracket else []
+        words = _plain(before[: bracket.start()]) if bracket else _plain(before)
+        if unit and not any(behind) and not bracket:
+            words, units = name, [unit]
+        yield _Statement(words, value, (*units, *behind), _shown(line))
 
 
-def _readings(match: re.Match[str]) -> list[tuple[str, float | None, list[str]]]:
-    """Words of a line, its number, and the texts that may be its unit.
-
-    They are in brackets after the words, or after the number: all up to a bracket or a comma, or its first words; or
-    the words end with it: cycle_time_us.
-    """
-    value, bracket = _number(match["number"]), _BRACKET.search(match["name"])
-    each = [field.strip() for field in re.split(r"[\t;|]", match["rest"])[1:]]
-    if any(_number(field) not in (None, value) for field in each if re.fullmatch(r"[\d.,]+", field)):
-        return []  # another value for each channel
-    if bracket:
-        return [(_plain(match["name"][: bracket.start()]), value, [_SIGNS.sub("", bracket[1])])]
-    repeated = set(re.split(r"[\s;,|]+", match["rest"].strip(" \t;,|"))) == {match["number"]}  # for each channel
-    words = [] if repeated else re.split(r"[\])};,]", match["rest"].strip(' \t;,[("'))[0].split()
-    behind = [_SIGNS.sub("", "".join(words[:take])) for take in (None, 3, 2, 1)]
-    name, unit = _unit_of_name(match["name"])
-    return [(name, value, [unit])] if unit and not words else [(_plain(match["name"]), value, behind)]
+def _is_list(text: str, matches: list[re.Match[str]], value: float) -> bool:
+    """True if another number follows the first of `matches` with nothing but a separator between."""
+    following = matches[1:]
+    at = matches[0].end()
+    for one in following:
+        if not re.fullmatch(r"\s*[\t;,|]+\s*", text[at : one.start()]):
+            return False
+        if _number(one[0]) != value:
+            return True
+        at = one.end()
+    return False
 
 
-def _constant(name: str, value: float | None, unit: str) -> tuple[Constant, float] | None:
-    if value is None or value <= 0.0:
+def _units_behind(text: str) -> Iterator[str]:
+    """Texts after a number that may be its unit: up to three words within brackets or up to a separator, or none."""
+    start = _SEPARATED.match(text)
+    rest = re.split(r"[\])};,|\t\"]", text[start.end() if start else 0 :].lstrip(" [(\"'"))[0].split()
+    for take in (3, 2, 1):
+        if len(rest) >= take:
+            yield _SIGNS.sub("", "".join(rest[:take]))
+    if not rest or re.match(r"\s*[;,|\t\"']", text):
+        yield ""
+
+
+def _constant(words: str, value: float, unit: str) -> tuple[bool, Constant, float] | None:
+    """Constant that words and unit tell, True if the words do, and its value in SI."""
+    if value <= 0.0:
         return None
+    ratio = _of_ratio(value, _amperes(unit))
     for constant, known in lexicon().constants.items():
-        if unit in known.units and re.fullmatch(_pattern(known), name):
+        if not re.search(_pattern(known), words):
+            continue
+        if ratio and ratio[0] is constant:
+            return True, *ratio
+        if unit in known.units:
             si = value * known.units[unit]
-            return (Constant.RATE, 1.0 / si) if constant is Constant.PERIOD else (constant, si)
+            if constant is not Constant.PERIOD:
+                return True, constant, si
+            if unit or si < 1.0:  # a sampling of 1000 is a rate
+                return True, Constant.RATE, 1.0 / si
+    if ratio and not any(re.search(rf"\b{other}\b", words) for other in lexicon().other_constants):
+        return False, *ratio
     return None
 
 
+def _of_ratio(value: float, unit: str) -> tuple[Constant, float] | None:
+    """Constant whose unit is a ratio: N m/A, N/A, counts/rev, bit/rev, counts/mm, mm/rev."""
+    parts = _PER.split(unit)
+    if len(parts) != 2 or not all(parts):
+        return None
+    if parts[0] in ("bit", "bits"):
+        turn = unit_named(parts[1]) in ("rev", None) and value < _MOST_BITS
+        return (Constant.COUNTS, 2.0**value) if turn else None
+    above, below = unit_named(parts[0]), unit_named(parts[1])
+    si, factor = UNITS.get(above or "", ("", 0.0))
+    below_si, below_factor = UNITS.get(below or "", ("", 1.0))
+    if below in ("A", "mA") and si in ("N m", "N"):
+        return (Constant.TORQUE if si == "N m" else Constant.FORCE), value * factor / (1.0 if below == "A" else 1e-3)
+    if above == "counts" and below == "rev":
+        return Constant.COUNTS, value
+    if above == "counts" and below_si == "m":
+        return Constant.COUNTS_PER_M, value / below_factor
+    return (Constant.LEAD, value * factor) if si == "m" and below == "rev" else None
+
+
+def _amperes(unit: str) -> str:
+    """Unit with rms values of a current as A."""
+    return re.sub(r"a_?(rms|eff)$", "a", unit)
+
+
 def _pattern(known: ConstantWords) -> str:
-    words = f"({known.words})"
-    return f"(.* )?{words}( ({'|'.join(lexicon().joints)}))?" if known.ends_a_text else words
+    return rf"(?:^|(?<=[\W])|(?<=[^\x00-\x7f]))({known.words})( ({'|'.join(lexicon().joints)}))?$"
+
+
+def _without_products(lines: list[str]) -> list[str]:
+    """Lines with a product of two named numbers as a number: TS = 90 us; RG = 8; interval = TS * RG."""
+    parts = [part for line in lines for part in re.split(r"[;|]", line)]
+    named = {match[1].lower(): match for part in parts if (match := re.match(r"\W*(\w+)\s*=\s*([\d.]+)\s*(.*)$", part))}
+    for part in parts:
+        factors = _PRODUCT.search(part.lower().strip())
+        if factors and all(name in named for name in factors.groups()):
+            one, other = (named[name] for name in factors.groups())
+            product = f"{part.partition('=')[0]}= {float(one[2]) * float(other[2]):g} {one[3]}{other[3]}"
+            return [rest for rest in parts if rest not in (part, one.string, other.string)] + [product]
+    return lines
 
 
 def _unit_of_name(name: str) -> tuple[str, str]:
-    """Words and unit of the name of a scalar: torque_constant_nm_a -> torque_constant, nma."""
+    """Words and unit of the name of a scalar: torque_constant_nm_a -> torque constant, nm/a."""
     tokens = _plain(re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name)).split()
     units = {unit for known in lexicon().constants.values() for unit in known.units if unit}
     for take in (4, 3, 2, 1):
@@ -91,10 +187,13 @@ def _unit_of_name(name: str) -> tuple[str, str]:
     return " ".join(tokens), ""
 
 
+def _shown(line: str) -> str:
+    return " ".join(line.strip().strip('"#%/; ').split())
+
+
 def _folded(text: str) -> str:
     """Lower case without accents."""
-    plain = text.replace("ß", "ss").replace("µ", "u").replace("μ", "u")
-    return unicodedata.normalize("NFKD", plain).encode("ascii", "ignore").decode().lower()
+    return without_accents(text.replace("µ", "u").replace("μ", "u")).lower()
 
 
 def _plain(name: str) -> str:

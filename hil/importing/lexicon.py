@@ -14,7 +14,16 @@ from hil.files.yaml_model import load_model
 from hil.quantities import UNITS
 
 LEXICON = Path(__file__).with_name("lexicon.yaml")
-UNITS_BY_CONSTANT = ("counts", "A", "mA", "V", "mV", "%", "permille")  # units that become SI by a constant of the axis
+UNITS_BY_CONSTANT = (
+    "counts",
+    "counts/s",
+    "A",
+    "mA",
+    "V",
+    "mV",
+    "%",
+    "permille",
+)  # units that become SI by a constant of the axis
 _LANGUAGE = re.compile("all|[a-z]{2}")
 
 
@@ -52,8 +61,10 @@ class Constant(StrEnum):
     FORCE = "force_constant"  # [N/A]
     LEAD = "lead"  # [m]
     COUNTS = "counts_per_rev"
+    COUNTS_PER_M = "counts_per_m"
     RATED_TORQUE = "rated_torque"  # [N m]
     RATED_FORCE = "rated_force"  # [N]
+    RATED_CURRENT = "rated_current"  # [A]
 
 
 def _lines(given: object) -> list[str]:
@@ -90,7 +101,6 @@ class ConstantWords(_Entry):
 
     words: Annotated[str, BeforeValidator(_pattern)]
     units: dict[str, PositiveFloat]
-    ends_a_text: bool = False
 
 
 class ScalarNames(_Entry):
@@ -114,12 +124,15 @@ class Lexicon(_Entry):
     attached_after: Words
     attached_before: Words
     electric: dict[Literal["A", "V"], Words]
+    torque: Words
+    force: Words
     angle: Words
     angular_speed: Words
     length: Words
     units: dict[str, Words]
     after_unit: Words
     constants: dict[Constant, ConstantWords]
+    other_constants: Words
     joints: Words
     scalars: ScalarNames
     missing: Words
@@ -153,7 +166,13 @@ class Lexicon(_Entry):
 def plain_spelling(unit: str) -> str:
     """Text of a unit in lower case, without blanks, multiplication signs and points, with plain digits."""
     key = unicodedata.normalize("NFKC", unit).strip().lower().replace("μ", "µ")
-    return re.sub(r"/se[ck]\b", "/s", re.sub(r"[\s·*⋅.]+", "", key))
+    return re.sub(r"/se[ck]\b", "/s", re.sub(r"[\s·・*⋅.]+", "", key))
+
+
+def without_accents(text: str) -> str:
+    """Text with plain Latin letters and signs; letters of other scripts stay."""
+    plain = unicodedata.normalize("NFKD", text.replace("ß", "ss"))
+    return unicodedata.normalize("NFC", "".join(one for one in plain if not "\u0300" <= one < "\u0370"))
 
 
 @cache

@@ -1,6 +1,7 @@
 """A drafted map: clock, channels with how they were found, and what is unsure."""
 
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from hil.importing.clock import StampClock
 from hil.importing.foreign_table import ForeignTable
@@ -15,9 +16,20 @@ class DraftedChannel:
     how: str
 
 
+class Asked(NamedTuple):
+    """A key that the file does not tell and that the user writes; `channel` is empty for a key of the map itself."""
+
+    channel: str
+    key: str
+    what: str
+
+
 @dataclass
 class MapDraft:
-    """A drafted map: `unsure` is what the user should check, `left_out` the other columns with the reason."""
+    """A drafted map: `unsure` is what the user should check, `left_out` the other columns with the reason.
+
+    `asked` are the keys without which it cannot be applied; the values that stand for them here mean nothing.
+    """
 
     table: ForeignTable
     clock: StampClock
@@ -28,4 +40,5 @@ class MapDraft:
     rows_per_sample: float | None = None  # of a logger that repeated samples
     missing: bool = False  # rows without a value are left out
     unsure: list[str] = field(default_factory=list)
+    asked: list[Asked] = field(default_factory=list)
     left_out: dict[str, str] = field(default_factory=dict)

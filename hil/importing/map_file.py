@@ -51,6 +51,7 @@ class CsvOptions(_Strict):
     )
     column_names: tuple[str, ...] | None = Field(default=None, description="names for a file without a header")
     encoding: str = Field(default="utf-8", description="of the text")
+    only: dict[str, str] = Field(default={}, description="rows to take, of one joint: column -> its text in them")
 
 
 class TimeColumn(_Strict):

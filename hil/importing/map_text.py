@@ -8,6 +8,7 @@ from hil.importing.map_draft import MapDraft
 
 _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _RESERVED = {"true", "false", "null", "yes", "no", "on", "off"}
+ASKED = "# <-- write:"  # before the question beside a key without a value
 _KEYS = """\
 # Each channel: value [SI] = sign x scale x factor(unit) x column + offset. Keys of a channel:
 #   column  name in the file; NAME[i] is column i (from 0) of the matrix NAME of a .mat file
@@ -24,7 +25,7 @@ _KEYS = """\
 
 
 def map_text(draft: MapDraft) -> str:
-    """The map as text of a YAML file."""
+    """The map as text of a YAML file; a key that is asked has no value, and its question beside it."""
     clock, name = draft.clock, draft.table.path.name
     lines = [f"# Map of {name}, drafted by hil import. Correct it and import again with --map."]
     if draft.unsure:
@@ -46,12 +47,17 @@ def map_text(draft: MapDraft) -> str:
     options = draft.table.csv.model_dump(exclude_defaults=True)
     lines += ["csv:                      # how the text file is written"] if options else []
     lines += [f"  {key}: {_value(value)}" for key, value in options.items()]
-    if draft.lead_m is not None:
+    asked = {(one.channel, one.key): one.what for one in draft.asked}
+    if ("", "lead_m") in asked:
+        lines += [f"lead_m:   {ASKED} {asked['', 'lead_m']}"]
+    elif draft.lead_m is not None:
         lines += [f"lead_m: {draft.lead_m!r}   # m per revolution of the motor; {draft.lead_how}"]
     lines += [*_KEYS.rstrip().splitlines(), "channels:"]
     for one in draft.channels:
         lines += [f"  {one.channel}:   # {CHANNELS[one.channel].meaning} [{CHANNELS[one.channel].unit}]; {one.how}"]
-        lines += [f"    {key}: {_value(value)}" for key, value in one.entry.items()]
+        for key, value in one.entry.items():
+            what = asked.get((one.channel, key))
+            lines += [f"    {key}: {_value(value)}" if what is None else f"    {key}:   {ASKED} {what}"]
     if draft.left_out:
         lines += ["# Columns that are not used:", *(f"#   {name}: {why}" for name, why in draft.left_out.items())]
     return "\n".join(line.replace("\t", " ") if line.startswith("#") else line for line in lines) + "\n"
@@ -66,3 +72,9 @@ def _value(value: object) -> str:
         return repr(value)
     plain = _PLAIN.fullmatch(value) and value.lower() not in _RESERVED
     return value if plain else json.dumps(value, ensure_ascii=False)
+
+
+def asked_lines(text: str) -> list[tuple[int, str]]:
+    """Lines (from 1) of a map's text with a key that is asked, and the key with its question."""
+    lines = [(number, *line.partition(ASKED)) for number, line in enumerate(text.splitlines(), 1)]
+    return [(number, f"{key.strip()} {question.strip()}") for number, key, mark, question in lines if mark]

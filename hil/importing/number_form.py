@@ -10,6 +10,8 @@ import numpy as np
 from hil.arrays import FloatArray
 from hil.importing.lexicon import lexicon
 
+# A value beyond the range of its channel (+++++++, ******, ∞), and an error of a spreadsheet (#VALUE!, #N/A).
+_MARK = re.compile(r"[+*#-]{2,}|[+-]?[∞]|#[a-z/0]+[!?]?")
 _MANY = 20  # fields with a mark that tell thousands from decimals
 _SIGNS = str.maketrans({"\u2212": "-", "\u2019": "'", "\u00a0": " ", "\u202f": " "})
 
@@ -42,7 +44,7 @@ def number_of(text: str, form: NumberForm) -> float | None:
     word = text.lower()
     if word in lexicon().infinite:
         return float(word)
-    return float("nan") if word in ("", *lexicon().missing) else None
+    return float("nan") if word in ("", *lexicon().missing) or _MARK.fullmatch(word) else None
 
 
 def numbers_of(fields: Sequence[str], form: NumberForm) -> tuple[FloatArray, dict[int, str]]:

@@ -14,6 +14,7 @@ from hil.identification.derivatives import MeasuredMotion, smoothed
 from hil.identification.least_squares import LinearFit, least_squares
 from hil.identification.plain_model import plain_columns
 
+SMOOTH = 0.3  # roughness of a motion; rows without order have 1.4
 NO_SPREAD = 0.01  # of the travel: a part of a recording with less motion tells nothing
 
 

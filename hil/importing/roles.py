@@ -12,14 +12,15 @@ from hil.importing.column_names import Label
 from hil.importing.computed_position import computed_one, unanswered_one
 from hil.importing.effort_roles import better_speed, choose_efforts
 from hil.importing.lexicon import Constant, Quantity
-from hil.importing.relations import derivative_of, driven, noise, proportional, roughness
+from hil.importing.monitor_outputs import monitor_outputs
+from hil.importing.one_axis import one_axis
+from hil.importing.relations import SMOOTH, derivative_of, driven, noise, proportional, roughness
 
 SAME_POSITION = 0.98  # share from which a column is another reading of a position: following errors are below 5 %
 FOLLOWED = 0.5  # share of a set-point that a controlled motion follows: less is another axis or no loop
 IS_DERIVATIVE = 0.9  # share from which a column is the velocity of another: counting and filters leave a few per cent
 IS_DRIVEN = 0.4  # share of an unnamed effort that one mass with friction explains: gravity and springs may be more
 SAME_COLUMN = 1e-6  # of the travel: a copy in another unit deviates by printed digits, a second sensor by more
-SMOOTH = 0.3  # roughness of a motion; rows without order have 1.4
 
 
 @dataclass
@@ -60,12 +61,17 @@ def find_roles(
     interchanged.
     """
     roles = Roles()
-    labels = _of_one_axis(where, dict(labels), columns, roles, axis)
+    one = one_axis(where, labels, columns, axis)
+    labels, roles.axis, roles.left_out = one.labels, one.axis, dict(one.left_out)
+    roles.unsure += one.unsure
     frozen = [name for name in columns if name in labels and np.ptp(columns[name]) == 0.0]
     roles.left_out |= {name: f"constant at {columns[name][0]:g}" for name in frozen}
     labels = {name: label for name, label in labels.items() if name not in frozen}
     live = {name: columns[name] for name in columns if name in labels}
     labels = _with_quantities(live, labels, period_s, roles)
+    if outputs := monitor_outputs(live, labels, period_s):
+        labels |= outputs.labels
+        roles.unsure.append(outputs.note)
     of = {kind: [name for name in live if labels[name].quantity is kind] for kind in Quantity}
     for name in of[Quantity.OTHER] + of[Quantity.ACCELERATION]:
         roles.left_out.setdefault(name, f"{labels[name].quantity} by its name, not needed")
@@ -98,38 +104,6 @@ def find_roles(
     return roles
 
 
-def _of_one_axis(
-    where: str, labels: dict[str, Label], columns: dict[str, FloatArray], roles: Roles, axis: str | None
-) -> dict[str, Label]:
-    """Leave out columns of other axes. Numbers in names count axes if two or more of them have position and effort."""
-    numbers = sorted({one.number for one in labels.values() if one.number})
-    both = [
-        number
-        for number in numbers
-        if {Quantity.POSITION, Quantity.EFFORT}
-        <= {one.quantity for name, one in labels.items() if one.number == number and name in columns}
-    ]
-    if axis is not None and axis not in numbers:
-        raise InputError(
-            f"{where}: given axis {axis!r}, allowed {listed(numbers) or 'none: its columns have no numbers'}"
-        )
-    if len(both) < 2 and axis is None:
-        return labels
-    roles.axis = axis or both[0]
-    others = [number for number in both if number != roles.axis]
-    if others:
-        another = "" if axis else f", for another: --axis {others[0]}"
-        roles.unsure.append(
-            f"axis: the file holds the axes {', '.join(both)}; {roles.axis} is taken{another}; what another moving arm "
-            "does to it is not modelled, and may look like a spring, a force or friction"
-        )
-    for name, one in list(labels.items()):
-        if one.number and one.number != roles.axis:
-            roles.left_out[name] = f"of axis {one.number}"
-            labels.pop(name)
-    return {name: replace(one, number="") for name, one in labels.items()}
-
-
 def _with_quantities(
     live: dict[str, FloatArray], labels: dict[str, Label], period_s: float, roles: Roles
 ) -> dict[str, Label]:
@@ -155,7 +129,7 @@ def _with_quantities(
         if named and max(scores.values()) < IS_DRIVEN:
             scores = {name: _as_position(name, live, period_s) for name in smooth}
         best = max(scores, key=lambda name: scores[name], default=None)
-        if best is None or scores[best] < IS_DRIVEN:
+        if best is None or scores[best] < IS_DRIVEN or _better_as_told(best, live, told, period_s):
             return told
         become(best, Quantity.POSITION, "a position: other columns follow from its derivatives")
         positions, unnamed = [best], [name for name in unnamed if name != best]
@@ -175,6 +149,16 @@ def _with_quantities(
         else:
             roles.left_out[name] = "no relation to the motion is found"
     return labels
+
+
+def _better_as_told(best: str, live: dict[str, FloatArray], told: dict[str, Label], period_s: float) -> bool:
+    """True if letters name a speed and an effort, and that speed explains it better than `best` as a position does."""
+    speeds = [name for name in live if told[name].quantity is Quantity.VELOCITY and not told[name].command]
+    efforts = [live[name] for name in live if told[name].quantity is Quantity.EFFORT]
+    by_speed = [motion(np.cumsum(live[name]) * period_s, period_s) for name in speeds]
+    shares = [driven(effort, moved, period_s).share for effort in efforts for moved in by_speed]
+    as_position = [driven(effort, motion(live[best], period_s), period_s).share for effort in efforts]
+    return bool(shares) and max(shares) > max(as_position)
 
 
 def _as_position(name: str, live: dict[str, FloatArray], period_s: float) -> float:

@@ -15,7 +15,8 @@ SLOWEST_TOLD_HZ = 2.0  # with a unit in the name
 _SAME = 0.02  # relative deviation of a clock from another one of the same rows
 _FORWARDS = 0.5  # of the way of stamps: less is no clock
 _SHARED = 0.5  # different stamps of whole seconds for each row; a slower recording is none
-_UNEVEN = 3.0  # times the usual step, of stamps that are made of two columns
+_UNEVEN = 3.0  # times the usual step, of nearly all stamps that are made of two columns; others are gaps
+_NEARLY_ALL = 0.99
 # Seconds from the beginning of a clock's count to 1970: of Unix, of Windows (1601), of .NET (year 1).
 _EPOCHS_S = {"s": (0.0,), "ms": (0.0,), "us": (0.0,), "ns": (0.0,), "100 ns": (11644473600.0, 62135596800.0)}
 _YEAR_S = 365.25 * 86400.0
@@ -51,6 +52,13 @@ class Stamps:
         return float(np.nanmax(self.seconds) - np.nanmin(self.seconds))
 
     @property
+    def unevenness(self) -> float:
+        """Median deviation of the steps from their median, as a share of it."""
+        steps = np.diff(self.seconds)
+        usual = float(np.median(steps))
+        return float(np.median(np.abs(steps - usual))) / usual if usual > 0.0 else np.inf
+
+    @property
     def digit_s(self) -> float:
         """Least step."""
         steps = np.diff(self.seconds)
@@ -83,7 +91,10 @@ def fraction_of(coarse: Stamps, name: str, values: FloatArray, told: Label) -> S
         return None
     seconds = coarse.seconds + SECONDS[unit] * values
     steps = np.diff(seconds)
-    if not growing(seconds) or steps.min() <= 0.0 or steps.max() > _UNEVEN * np.median(steps):
+    again = np.diff(values)[np.diff(coarse.seconds) > 0.0] < 0.0  # but for a gap
+    if not growing(seconds) or steps.min() <= 0.0 or np.mean(again) <= 0.5:
+        return None
+    if np.quantile(steps, _NEARLY_ALL) > _UNEVEN * np.median(steps):
         return None
     time = TimeColumn(column=coarse.time.column, unit=coarse.time.unit, fraction=TimeColumn(column=name, unit=unit))
     return Stamps(time, seconds, 0.0, True)

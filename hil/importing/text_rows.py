@@ -8,8 +8,8 @@ import csv
 import re
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
-from itertools import islice
+from dataclasses import dataclass, field
+from itertools import islice, pairwise
 from pathlib import Path
 from typing import NamedTuple, TextIO
 
@@ -28,6 +28,8 @@ from hil.importing.number_form import NumberForm, numbers_of
 _CHUNK = 20_000  # lines that are read at once
 _MOSTLY = 0.5  # share of numbers from which text in a column is out of place
 _LONGEST = 50  # lines of a footer: more are a column that has no numbers any more
+_JOINTS = 20  # most different names in turn
+_ARROW = "->"
 _SHOWN = 60  # characters of a line in a message
 
 
@@ -42,7 +44,7 @@ class Cell(NamedTuple):
 class TextRows:
     """Columns (n,) of numbers, NaN without one; columns of dates [s]; lines (n,) from 1.
 
-    `texts` is the first text of a column that is no number.
+    `texts` is the first text of a column that is no number, `in_turn` the texts of one whose few texts alternate.
     """
 
     numbers: dict[str, FloatArray]
@@ -50,6 +52,7 @@ class TextRows:
     texts: dict[str, Cell]
     lines: NDArray[np.int64]
     notes: tuple[str, ...]
+    in_turn: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
 
 def open_text(path: Path, encoding: str) -> TextIO:
@@ -64,22 +67,32 @@ def open_text(path: Path, encoding: str) -> TextIO:
 
 def split_line(line: str, delimiter: str) -> list[str]:
     """Fields of a line; the delimiter " " stands for one or more blanks."""
+    if _of_terminal(line):
+        stamp, _, rest = line.partition(_ARROW)
+        return [stamp.strip(), *split_line(rest.strip(), delimiter)]
     if delimiter == " ":
         return line.split()
     if '"' not in line:
         return [field.strip() for field in line.replace("\0", "").rstrip("\r\n").split(delimiter)]
     try:
-        row = next(csv.reader([line.replace("\0", "").rstrip("\r\n")], delimiter=delimiter), [])
+        row = next(csv.reader([line.replace("\0", "").rstrip("\r\n")], delimiter=delimiter, skipinitialspace=True), [])
     except csv.Error:
         return [line]
     return [field.strip() for field in row]
 
 
-def label_of_pairs(fields: Sequence[str]) -> str:
-    """Text of every second field but for its number, if the others have another: Time;x;Time (2);M; "" else."""
+def _of_terminal(line: str) -> bool:
+    """True for a line before which a terminal wrote the time of its host: 12:00:00.123 -> 1.5; it may be cut."""
+    stamp, arrow, _ = line.partition(_ARROW)
+    return bool(arrow) and is_date(stamp)
+
+
+def times_of_groups(fields: Sequence[str]) -> tuple[int, ...]:
+    """Places of the columns of time by a row that has the same text over each: Time;x;Time (2);M;Q; () else."""
     stems = [re.sub(r"[\d.]+| \(\d+\)", "", field) for field in fields]
-    alike = len(stems) > 3 and len(stems) % 2 == 0 and len(set(stems[::2])) == 1 and stems[0] not in stems[1::2]
-    return stems[0] if alike else ""
+    places = tuple(index for index, stem in enumerate(stems) if stem == stems[0])
+    apart = all(second - first > 1 for first, second in pairwise(places))
+    return places if len(places) > 1 and stems[0] and apart and places[-1] < len(stems) - 1 else ()
 
 
 def header_names(path: Path, options: CsvOptions) -> tuple[str, ...]:
@@ -118,8 +131,9 @@ class _Reader:
     def __init__(self, path: Path, names: tuple[str, ...], options: CsvOptions) -> None:
         self.path, self.names, self.encoding, self.delimiter = path, names, options.encoding, options.delimiter
         self.form = NumberForm(options.decimal_point, options.thousands)
-        # time beside each channel: those of lower rate end before the others
-        self.pairs = bool(label_of_pairs(names))
+        # time beside each channel or group of channels: those of lower rate end before the others
+        self.groups = bool(times_of_groups(names))
+        self.only = [(self.names.index(name), text) for name, text in options.only.items() if name in self.names]
         self.rows: list[list[str]] = []
         self.lines: list[int] = []
         self.parts: dict[str, list[FloatArray]] = {name: [] for name in names}
@@ -137,7 +151,7 @@ class _Reader:
 
     def _take_plain(self, block: Sequence[tuple[int, str]]) -> bool:
         """Take lines at once, in a fifth of the time, if all of them are rows of finite numbers; else none of them."""
-        if self.pairs or self.fields or self.form.thousands:
+        if self.groups or self.only or self.fields or self.form.thousands:
             return False
         blanks = self.delimiter == " "
         text = "\n".join(" ".join(line.split()) if blanks else line.rstrip("\r\n") for _, line in block)
@@ -163,13 +177,16 @@ class _Reader:
     def _take_line(self, number: int, line: str, fields: list[str]) -> None:
         """Take a line that is not blank: a row, or another line."""
         width, given = len(self.names), len(fields)
+        if any(given > index and fields[index] != text and given == width for index, text in self.only):
+            return
         extra = [field for field in fields[width:] if field]
         if given != width and not self._numbers(fields[:width]):
             self.others.append((number, line, False))
         elif given > width and self._numbers(extra):
             self.others.append((number, line, True))
-        elif given < width and not self.pairs:
-            self.others.append((number, line, not any(self._words(field) for field in fields)))
+        elif given < width and not self.groups:
+            cut = not any(self._words(field) for field in fields) and not _of_terminal(line)
+            self.others.append((number, line, cut))
         else:
             self.rows.append(fields[:width] + [""] * (width - given))
             self.lines.append(number)
@@ -224,6 +241,7 @@ class _Reader:
             texts,
             lines[kept],
             (*self._notes(others, lines[kept]), *dict.fromkeys(one.note for one in read.values() if one.note)),
+            {name: told for name in numbers if (told := _in_turn(list(self.texts[name].values()), rows))},
         )
 
     def _refuse_cut(self) -> None:
@@ -249,6 +267,16 @@ class _Reader:
                 many = f"lines {numbers[0]} to {numbers[-1]} ({len(numbers)})" if len(numbers) > 1 else ""
                 notes.append(f"text {what}: {many or f'line {numbers[0]}'} is no row and left out: {text!r}")
         return tuple(notes)
+
+
+def _in_turn(texts: list[str], rows: int) -> tuple[str, ...]:
+    """Different texts of a column of `rows` if they are few, alternate, and stand in as many rows each; () else."""
+    different = tuple(dict.fromkeys(texts))
+    if len(texts) < rows or not 1 < len(different) <= _JOINTS:
+        return ()
+    changes = sum(one != other for one, other in pairwise(texts))
+    counts = [texts.count(one) for one in different]
+    return different if changes > _MOSTLY * rows and max(counts) < 2 * min(counts) else ()
 
 
 def line_of(path: Path, number: int, encoding: str) -> str:

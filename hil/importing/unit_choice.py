@@ -1,4 +1,4 @@
-"""Choose the units of columns: by their names, by their relations to columns with a unit, else by their size."""
+"""Choose the units of columns: by their names, by their relations to columns with a unit; else they are asked."""
 
 import re
 from dataclasses import dataclass
@@ -16,9 +16,9 @@ LENGTHS = ("m", "mm", "um", "in")
 ANGLES = ("rad", "deg", "rev", "mrad")
 LINEAR_SPEEDS = ("m/s", "mm/s", "m/min", "mm/min")
 ANGULAR_SPEEDS = ("rad/s", "deg/s", "rpm", "rev/s")
-# Largest travel read in a unit: axes travel metres at most, joints a few turns
-_LONGEST_M, _MOST_RAD = 5.0, 13.0
 _WHOLE = 1e-5  # relative deviation from whole quarters of a turn: that of six digits
+_MOST_QUARTERS = 40  # among more, some are whole by chance
+_LONGEST_M = 5.0  # largest travel read as metres
 _LEAST_COUNTS = 200.0  # travel in whole numbers from which they are counts of an encoder
 _COORDINATE = r"q(pos)?\d*([_ ].*)?"  # joint angle, as robotics writes it: q, q1, q_ref
 _JOINT_STATE = r"(^|[^a-z])effort(\W|_?\d|$)"  # effort, effort[0], .effort0, effort_0, effort.elbow
@@ -26,10 +26,11 @@ _JOINT_STATE = r"(^|[^a-z])effort(\W|_?\d|$)"  # effort, effort[0], .effort0, ef
 
 @dataclass(frozen=True)
 class UnitChoice:
-    """A unit, and a note if it is not sure."""
+    """A unit, and a note if it is not sure; `asked`: nothing tells it, and the user must."""
 
     unit: str
     note: str = ""
+    asked: bool = False
 
 
 def is_length(unit: str) -> bool:
@@ -42,15 +43,10 @@ def are_counts(values: FloatArray) -> bool:
     return bool(np.ptp(values) > _LEAST_COUNTS and np.all(values == np.round(values)))
 
 
-def gives_force(effort: Label | None) -> bool:
-    """True if the motor gives a force."""
-    return effort is not None and effort.unit in ("N", "kN")
-
-
-def prefers_length(positions: list[str], effort: Label | None) -> bool | None:
-    """True for a length, False for an angle, by the names of the positions or the unit of the effort; else None."""
+def prefers_length(positions: list[str], effort: Label | None, turns: bool = False) -> bool | None:
+    """True for a length, False for an angle, by the names of the positions or the effort, which `turns`; else None."""
     words = " ".join(positions).lower()
-    if gives_force(effort):
+    if effort is not None and effort.si == "N":
         return True
     if any(re.fullmatch(_COORDINATE, name.lower()) for name in positions) or any(
         word in words for word in lexicon().angle
@@ -58,12 +54,17 @@ def prefers_length(positions: list[str], effort: Label | None) -> bool | None:
         return False
     if any(word in words for word in lexicon().length):
         return True
-    return False if effort and UNITS.get(effort.unit or "", ("",))[0] == "N m" else None
+    return False if turns else None
+
+
+def is_joint_state(effort: Label) -> bool:
+    """True if a torque without a unit is called effort, as in sensor_msgs/JointState of ROS: rad and N m."""
+    return effort.unit is None and re.search(_JOINT_STATE, effort.column.lower()) is not None
 
 
 def unit_by_convention(effort: Label | None) -> UnitChoice | None:
-    """rad where a torque without a unit is called effort, as in sensor_msgs/JointState of ROS."""
-    if effort is None or effort.unit or not re.search(_JOINT_STATE, effort.column.lower()):
+    """rad beside the effort of a joint state."""
+    if effort is None or not is_joint_state(effort):
         return None
     return UnitChoice("rad", f"{effort.column}: named as in a joint state of ROS; rad and N m are taken")
 
@@ -73,9 +74,7 @@ def unit_of_nameless(column: str, values: FloatArray) -> UnitChoice | None:
     if are_counts(values):
         return None
     unit = "m" if np.ptp(values) < _LONGEST_M else "rad"
-    return UnitChoice(
-        unit, f"{column}: no column has a name or a unit; SI is taken, {unit} for a travel of {np.ptp(values):.4g}"
-    )
+    return UnitChoice(unit, asked=True)
 
 
 def position_unit(
@@ -98,21 +97,20 @@ def position_unit(
         gear = max(abs(factor), 1.0 / abs(factor)) if factor and unit in ANGLES and not prefers_length else 0.0
         if round(gear) > 1 and abs(gear - round(gear)) < MATCH:
             return UnitChoice(unit, f"{column}: {unit}, by a gear of {round(gear)} to a column in {unit}")
-    travel = float(np.ptp(values))
     if are_counts(values):
         return UnitChoice("counts", f"{column}: whole numbers, taken for counts")
-    if prefers_length is None:  # this program is for linear axes first
-        return _by_size(column, travel, length=True, why="angle or length is not said")
-    return _by_size(column, travel, prefers_length, "no unit is given")
+    if prefers_length is False and (unit := _by_whole_turns(float(np.ptp(values)))):
+        return UnitChoice(unit, f"{column}: {unit}, by its travel of whole quarters of a turn")
+    return UnitChoice("rad" if prefers_length is False else "m", asked=True)
 
 
-def _by_size(column: str, travel: float, length: bool, why: str) -> UnitChoice:
-    small, large, most = ("m", "mm", _LONGEST_M) if length else ("rad", "deg", _MOST_RAD)
-    quarters = travel / (0.5 * pi)
-    whole = not length and abs(quarters - round(quarters)) < _WHOLE * quarters  # of a set-point in radians
-    unit = small if travel < most or whole else large
-    asked = "" if length else f"; is it {large if unit == small else small}? Speed, inertia and friction scale with it"
-    return UnitChoice(unit, f"{column}: {why}; {unit} is taken for a travel of {travel:.4g}{asked}")
+def _by_whole_turns(travel: float) -> str:
+    """Unit in which the travel of a set-point is whole quarters of a turn: rad or deg; "" without one."""
+    for unit, quarter in (("rad", 0.5 * pi), ("deg", 90.0)):
+        quarters = travel / quarter
+        if 0 < round(quarters) <= _MOST_QUARTERS and abs(quarters - round(quarters)) < _WHOLE * quarters:
+            return unit
+    return ""
 
 
 def misfit(factor: float, unit: str, other: str) -> float:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from hil.importing.column_names import label
 from hil.importing.lexicon import Quantity, RowKind, lexicon
-from hil.importing.units import QUANTITY_OF_UNIT, unit_named
+from hil.importing.units import QUANTITY_OF_UNIT, factor_and_unit, unit_named
 
 _COMMENT = re.compile(r"^[\s\"#%/;!]+")
 _SEPARATORS = (r"[;,|\t]", r"\s/\s", r"\s+")
@@ -55,7 +55,21 @@ def described(lines: Sequence[str], names: Sequence[str]) -> dict[str, tuple[str
         told = {name: _words_and_unit(line[begin:end]) for (_, begin, name), end in zip(places, ends, strict=False)}
         if len(told) > 1 and sum(bool(unit) for _, unit in told.values()) > len(told) / 2:
             return told
-    return {}
+    each = {name: one for name in names if name for line in lines if (one := _of_one(line, name))}
+    return each if len(each) > 1 else {}
+
+
+def _of_one(line: str, name: str) -> tuple[str, str] | None:
+    """Words and unit of a line that begins with a column's name: "CH1: motor speed (0.1 rpm)", "CH2,Torque,5V,N m"."""
+    match = re.match(rf"[\s\"#%/;!]*{re.escape(name)}\"?\s*[:=;,\t|]\s*(.*)$", line)
+    if match is None:
+        return None
+    fields = [field.strip(' "') for field in re.split(r"[;,\t|]", match[1])]
+    bracket = _BRACKET.search(match[1])
+    if bracket and (unit_named(bracket[1]) or factor_and_unit(bracket[1])):
+        return match[1][: bracket.start()].strip(), bracket[1]
+    units = [field for field in fields[1:] if unit_named(field)]
+    return (fields[0], units[-1]) if units else None
 
 
 def _words_and_unit(text: str) -> tuple[str, str]:

@@ -17,10 +17,12 @@ _QUANTITY_OF_SI = {
 QUANTITY_OF_UNIT = (
     {unit: _QUANTITY_OF_SI.get(si, Quantity.EFFORT) for unit, (si, _) in UNITS.items() if si != "1"}
     | dict.fromkeys(UNITS_BY_CONSTANT, Quantity.EFFORT)
-    | {"counts": Quantity.POSITION}
+    | {"counts": Quantity.POSITION, "counts/s": Quantity.VELOCITY}
 )
 # one letter at the end of a name is a unit only after a word: x_m may be in metres, q_m of the motor
 _BRACKETS = re.compile(r"[\[(<{]\s*([^\])>}]*)\s*[\])>}]\s*$")
+_ANY_BRACKETS = re.compile(r"[\[(<{]\s*([^\[\](){}<>]*?)\s*[\])>}]")
+_FACTOR = re.compile(r"(?:(?P<value>\d+(?:[.,]\d+)?)|1/(?P<part>\d+))\s*[*x·]?\s*(?P<unit>[^\d\s/].*)")
 LEAST_ALONE = 3  # letters of a unit that is a name by itself, or of revolutions: motor_u is a voltage
 _BITS = re.compile(r"(?<=[a-z])\d+(bit)?$")  # counts16bit
 _SLASH = re.compile(r"^\s*[^/\s]+\s*/\s*(\S+)\s*$")  # DIN 461: x/mm
@@ -33,6 +35,9 @@ def unit_named(text: str) -> str | None:
     if key.startswith("%"):  # % of what is told by no spelling
         return "%"
     unit_of = lexicon().unit_of
+    above, slash, below = key.partition("/")
+    if slash and below == "s" and unit_of.get(above) == "counts":
+        return "counts/s"
     return "counts" if unit_of.get(_BITS.sub("", key)) == "counts" else unit_of.get(key)
 
 
@@ -43,8 +48,20 @@ def unit_of_text(text: str) -> str | None:
     return whole or (unit_named(text[: bracket.start()]) or unit_named(bracket[1]) if bracket else None)
 
 
+def factor_and_unit(text: str) -> tuple[float, str] | None:
+    """Factor and unit of a text with a number before a unit: 0.1 Nm, 1/100 deg; None for a unit itself."""
+    match = _FACTOR.fullmatch(text.strip(" []()"))
+    if not match or unit_named(text.strip(" []()")) is not None or unit_named(match["unit"]) is None:
+        return None
+    value = float((match["value"] or match["part"]).replace(",", "."))
+    return (value if match["value"] else 1.0 / value), match["unit"]
+
+
 def split_unit(name: str) -> tuple[str, str | None, bool]:
     """Name without its unit, the unit if it has one, and True if a unit stands there that is not known."""
+    for bracket in reversed(list(_ANY_BRACKETS.finditer(name))):  # Current [A] (Axis 1)
+        if unit := unit_named(bracket[1]):
+            return f"{name[: bracket.start()]} {name[bracket.end() :]}".strip(), unit, False
     for pattern in (_BRACKETS, _SLASH, _WORD_IN):
         match = pattern.search(name)
         if match:

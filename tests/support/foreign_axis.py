@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -75,3 +76,10 @@ def write(path: Path, columns: dict[str, np.ndarray]) -> Path:
 def renamed(columns: dict[str, np.ndarray], **names: str) -> dict[str, np.ndarray]:
     """The columns with other names; those without one are left out."""
     return {new: columns[old] for old, new in names.items()}
+
+
+def answered(map_text: str, **values: object) -> str:
+    """Text of a drafted map with `values` in place of the keys that it asks."""
+    for key, value in values.items():
+        map_text = re.sub(rf"^( *{key}:)   # <-- write:.*$", rf"\1 {value}", map_text, count=1, flags=re.MULTILINE)
+    return map_text

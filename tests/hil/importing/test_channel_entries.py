@@ -94,7 +94,8 @@ def test_the_unit_of_an_angle_follows_from_its_speed_or_its_counts(
 
 def test_where_nothing_tells_the_unit_of_an_angle_it_is_asked(tmp_path: Path) -> None:
     columns = renamed(AXIS | {"angle": np.round(AXIS["angle"], 3)}, t="time_s", angle="phi", torque="i_A")
-    assert any("is it rad?" in note for note in draft_map(write(tmp_path / "log.csv", columns)).unsure)
+    asked = {(one.channel, one.key) for one in draft_map(write(tmp_path / "log.csv", columns)).asked}
+    assert asked == {("motor_position_rad", "unit"), ("torque_n_m", "torque_constant_n_m_a")}
 
 
 def test_a_gear_of_whole_numbers_is_no_lead(tmp_path: Path) -> None:

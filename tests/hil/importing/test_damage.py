@@ -190,15 +190,6 @@ def test_a_damaged_file_is_refused_in_one_sentence(tmp_path: Path, case: str) ->
 
 NOTED: dict[str, tuple[Make, str]] = {
     "the torque has the other sign": (table(torque=-AXIS["torque"]), "its sign is turned"),
-    "counts without a scale": (
-        lambda path: write(
-            path,
-            renamed(
-                AXIS | {"angle": np.round(1000 * AXIS["angle"])}, t="t", angle="encoder [counts]", torque="torque_Nm"
-            ),
-        ),
-        "1 um per count is taken",
-    ),
     "the motor counts the other way": (table(angle=-AXIS["angle"]), "its sign is turned"),
     "stamps with too few digits": (table(t=np.floor(AXIS["t"] * 500) / 500), "too few digits"),
     "milliseconds called seconds": (table(t=1e3 * AXIS["t"]), "no rate of a recording"),

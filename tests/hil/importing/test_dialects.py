@@ -26,6 +26,8 @@ PLAIN = [
     "time [s];angle [deg];torque [Nm]",
     *(f"{t:.4f};{q:.6f};{m:.6f}" for t, q, m in zip(T, DEG, TORQUE, strict=True)),
 ]
+CALM = int(np.argmin(np.abs(np.diff(DEG, 2)[100:-100]))) + 101  # row without acceleration: the line tells its angle
+MARKS = {CALM - 1: "+++++++", CALM: f"{TORQUE[CALM]:.6f}", CALM + 1: "#VALUE!"}
 
 
 def rows(form: Callable[[int], str]) -> list[str]:
@@ -156,6 +158,70 @@ DIALECTS: dict[str, tuple[list[str], str]] = {
         [*PLAIN[:900], "overrun", *PLAIN[900:], "", "Mean;12.5;0.1", "[END]"],
         "line 901 is no row and left out: 'overrun'",
     ),
+    "groups in place of pairs of channels with their times": (
+        [
+            "Name;M;Name;phi;n",
+            "Unit;Nm;Unit;deg;rad/s",
+            *(
+                f"{ms:.2f};{m:.6f}" + (f";{1e3 * T[i]:.0f};{DEG[i]:.6f};{AXIS['speed'][i]:.4f}" if i < T.size else "")
+                for i, (ms, m) in enumerate(zip(FAST_MS, FAST_TORQUE, strict=True))
+            ),
+        ],
+        "M has its own stamps",
+    ),
+    "lines of a terminal": (
+        [
+            "11:59:58.100 -> ready",
+            "11:59:58.200 -> monitor: angle [deg], torque [Nm]",
+            *rows(lambda i: f"{TIMES[i] + timedelta(seconds=300):%H:%M:%S.%f} -> {DEG[i]:.6f}\t{TORQUE[i]:.6f}"),
+        ],
+        "",
+    ),
+    "a number before each row": (
+        ["Rate: 1 kHz", "angle_deg torque_Nm", *rows(lambda i: f"{512 + i} {DEG[i]:.6f} {TORQUE[i]:.6f} ")],
+        "",
+    ),
+    "a line for each channel": (
+        [
+            "Sampling: 1 kHz",
+            "CH1: Motor angle (0.001 deg)",
+            "CH2: Motor torque (0.0001 Nm)",
+            "CH1\tCH2",
+            *rows(lambda i: f"{1000.0 * DEG[i]:.0f}\t{10000.0 * TORQUE[i]:.0f}"),
+        ],
+        "CH2: the header's factor 0.0001",
+    ),
+    "factors that the values hold": (
+        [
+            "Name;t [s];phi [deg];M [Nm]",
+            "Scale;1;250;0.8",
+            *rows(lambda i: f"{i};{T[i]:.4f};{DEG[i]:.6f};{TORQUE[i]:.6f}"),
+        ],
+        "M [Nm]: its values hold the factor 0.8 of the header already",
+    ),
+    "values beyond the range": (
+        [*PLAIN[:CALM], *(f"{T[i]:.4f};{DEG[i]:.6f};{mark}" for i, mark in MARKS.items()), *PLAIN[CALM + 3 :]],
+        "missing: 2 rows have no value",
+    ),
+    "units with their label before them": (
+        ['"SIGNAL", "TIME", "A", "B"', '"VERT", "S", "deg", "N.m"', *(line.replace(";", ", ") for line in PLAIN[1:])],
+        "",
+    ),
+    "rows of two joints in turn": (
+        [
+            "t [s],joint,position_deg,torque_Nm",
+            *(
+                line
+                for i in range(T.size)
+                for line in (f"{T[i]:.4f},a1,{30 + i % 3 * 1e-4},2.5", f"{T[i]:.4f},a2,{DEG[i]:.6f},{TORQUE[i]:.6f}")
+            ),
+        ],
+        "rows: of a1, a2 in turn; those of a2 are taken",
+    ),
+    "rows and their period in a line": (
+        [f"{T.size},1", "angle_deg,torque_Nm", *rows(lambda i: f"{DEG[i]:.6f},{TORQUE[i]:.6f}")],
+        "",
+    ),
     "a sign apart": (
         [PLAIN[0], *rows(lambda i: f"{T[i]:.4f};{DEG[i]:+.6f};{TORQUE[i]:+.6f}".replace("+", "+ ").replace("-", "- "))],
         "",
@@ -166,10 +232,10 @@ DIALECTS: dict[str, tuple[list[str], str]] = {
     ),
     "a path of names": (
         [
-            "time,axis.x.angle [deg],pid.x.error,pid.x.output",
+            "time,axis.x.angle [deg],pid.x.error,pid.x.output [Nm]",
             *rows(lambda i: f"{T[i]:.4f},{DEG[i]:.6f},{i % 7},{TORQUE[i]:.6f}"),
         ],
-        "pid.x.output: its name says nothing",
+        "",
     ),
     "a torque beside current and friction": (
         [
@@ -200,8 +266,10 @@ def test_a_dialect_gives_the_channels_and_says_what_it_took(tmp_path: Path, dial
     assert recording.period_s == pytest.approx(1e-3, rel=2e-3)
     rows = slice(0, min(len(recording), T.size) - 1)
     np.testing.assert_allclose(recording["motor_position_rad"][rows], AXIS["angle"][rows], atol=2e-4)
-    # a torque of another rate is the line between its samples
-    np.testing.assert_allclose(recording["torque_n_m"][rows], TORQUE[rows], atol=0.1 if "pairs" in dialect else 2e-3)
+    # a torque of another rate, or of rows that are left out, is the line between its samples
+    np.testing.assert_allclose(
+        recording["torque_n_m"][rows], TORQUE[rows], atol=0.1 if "pairs" in dialect or "beyond" in dialect else 2e-3
+    )
     assert any(said in note for note in draft.unsure) or not said
 
 
@@ -209,6 +277,23 @@ def test_characters_of_dos_are_read(tmp_path: Path) -> None:
     lines = [PLAIN[0].replace("angle", "Winkel rückgeführt"), *PLAIN[1:]]
     draft, recording = imported(tmp_path / "log.csv", lines, "cp850")
     assert draft.table.csv.encoding == "cp850"
+    np.testing.assert_allclose(recording["torque_n_m"], TORQUE, atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("names", "encoding"),
+    [
+        ("時間[ms];モータ回転角度[deg];トルク[N・m]", "cp932"),
+        ("temps [s];angle [°];couple [mN·m]", "mac_roman"),
+        ("Zeit [µs];Winkel [°];Drehmoment für Prüfung [Ncm]", "cp1252"),
+    ],
+)
+def test_the_encoding_is_that_in_which_the_words_are_known(tmp_path: Path, names: str, encoding: str) -> None:
+    size = {"[ms]": 1e3, "[µs]": 1e6}.get(names.split(";")[0][-4:], 1.0)
+    torque = {"mac_roman": 1e3, "cp1252": 100.0}.get(encoding, 1.0)
+    lines = [names, *rows(lambda i: f"{size * T[i]:.3f};{DEG[i]:.6f};{torque * TORQUE[i]:.6f}")]
+    draft, recording = imported(tmp_path / "log.csv", lines, encoding)
+    assert draft.table.csv.encoding == encoding
     np.testing.assert_allclose(recording["torque_n_m"], TORQUE, atol=1e-5)
 
 
@@ -224,7 +309,7 @@ def test_records_in_lines_of_json_are_read_and_a_cut_one_is_named(tmp_path: Path
     ("line", "message"),
     [
         ("0.8980;12.5", r"log\.csv:900: given 2 fields, allowed 3 as in the other rows: '0\.8980;12\.5'"),
-        ("0.8980;#REF!;0.1", r"log\.csv:900: angle \[deg\] has text and no number: given '#REF!'"),
+        ("0.8980;1x2;0.1", r"log\.csv:900: angle \[deg\] has text and no number: given '1x2'"),
         (";12.5;0.1", r"log\.csv:900: time \[s\]: the row has no time stamp"),
     ],
 )

@@ -8,12 +8,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from foreign_axis import LEAD_M, axis, csv_text, renamed, write
+from foreign_axis import LEAD_M, answered, axis, csv_text, renamed, write
 
 from hil.commands.import_ import import_
+from hil.errors import InputError
+from hil.importing.by_map import import_recording
 from hil.importing.column_names import label
 from hil.importing.draft_map import draft_map
 from hil.importing.map_draft import MapDraft
+from hil.importing.map_text import map_text
 from hil.recording.recording import Recording, read_recording
 
 AXIS = axis()
@@ -140,14 +143,64 @@ def test_a_turned_sign_is_turned_back_and_named(tmp_path: Path, column: str, cha
 
 
 @pytest.mark.parametrize(
-    ("name", "word"),
-    [("i_q [A]", "per A"), ("Spannung [V]", "per V"), ("Drehmoment [%]", "rated"), ("torque", "no unit")],
+    ("changed", "asked", "factor"),
+    [
+        ({"torque": "i_q [A]"}, {"torque_constant_n_m_a": 0.5}, 0.5),
+        ({"torque": "output 2 [V]"}, {"gain": 0.5}, 0.5),
+        ({"torque": "Drehmoment [%]"}, {"rated": 2.4}, 0.024),
+        ({"torque": "Drehmoment [1/1000]"}, {"rated": 2.4}, 0.0024),
+        ({"torque": "torque"}, {"unit": "mN m"}, 1e-3),
+    ],
 )
-def test_what_the_file_does_not_tell_is_named(tmp_path: Path, name: str, word: str) -> None:
-    columns = renamed(AXIS, **(NAMES | {"torque": name}))
-    path = write(tmp_path / "log.csv", columns)
-    assert any(word in note for note in draft_map(path).unsure)
-    assert len(imported(path)) == len(AXIS["t"])
+def test_what_the_file_does_not_tell_is_asked_and_taken_from_the_map(
+    tmp_path: Path, changed: dict[str, str], asked: dict[str, object], factor: float
+) -> None:
+    """The map has the key without a value, the message its line; with the value the file is imported."""
+    path, target = write(tmp_path / "log.csv", renamed(AXIS, **(NAMES | changed))), tmp_path / "log.parquet"
+    (key,) = asked
+    with pytest.raises(InputError, match=rf"log-map\.yaml:\d+: {key}: .*write"):
+        import_(path, None, target, None, None)
+    map_path = tmp_path / "log-map.yaml"
+    with pytest.raises(InputError, match=r"log-map\.yaml:\d+: channels\.torque"):
+        import_(path, str(map_path), target, None, None)
+    map_path.write_text(answered(map_path.read_text(), **asked))
+    import_(path, str(map_path), target, None, None)
+    recording = read_recording(target)
+    np.testing.assert_allclose(np.abs(recording["torque_n_m"]), factor * np.abs(AXIS["torque"]), atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("columns", "asked"),
+    [
+        ({"angle": "encoder [counts]", "torque": "torque_Nm"}, {"counts_per_rev": 2048}),
+        ({"angle": "pos", "torque": "torque_Nm"}, {"unit": "mrad"}),
+        ({"speed": "speed", "torque": "torque_Nm"}, {"unit": "rpm"}),
+        ({"x_act": "stage [mm]", "torque": "current [A]"}, {"force_constant_n_a": 30.0}),
+        ({"x_act": "stage [mm]", "torque": "torque [Nm]"}, {"lead_m": 0.01}),
+    ],
+)
+def test_the_unit_of_a_motion_and_the_constants_of_a_motor_are_asked(
+    tmp_path: Path, columns: dict[str, str], asked: dict[str, object]
+) -> None:
+    step = 2.0 * np.pi / 2048 if "counts" in str(columns) else 1e-3  # a step of digits tells no counts per turn
+    counts = {"angle": np.round(AXIS["angle"] / step) * (1.0 if step > 1e-3 else step)}
+    path, map_path = write(tmp_path / "log.csv", renamed(AXIS | counts, t="t_s", **columns)), tmp_path / "map.yaml"
+    draft = draft_map(path)
+    assert [one.key for one in draft.asked] == list(asked)
+    map_path.write_text(answered(map_text(draft), **asked))
+    assert len(import_recording(path, map_path)) == len(AXIS["t"])
+
+
+def test_volts_of_monitor_outputs_are_told_apart_and_their_scales_asked(tmp_path: Path) -> None:
+    volts = {"speed": AXIS["speed"] / 400.0, "torque": -AXIS["torque"]}
+    path, map_path = tmp_path / "log.csv", tmp_path / "map.yaml"
+    write(path, renamed(AXIS | volts, t="t_s", torque="A [V]", speed="B [V]"))
+    draft = draft_map(path)
+    assert {one.key for one in draft.asked} == {"unit", "scale", "gain"}
+    map_path.write_text(answered(map_text(draft), unit="rad/s", scale=400.0, gain=1.0))
+    recording = import_recording(path, map_path)
+    np.testing.assert_allclose(recording["motor_velocity_rad_s"], AXIS["speed"], atol=1e-4)
+    np.testing.assert_allclose(recording["torque_n_m"], AXIS["torque"], atol=1e-5)
 
 
 def test_of_several_axes_one_is_taken_and_the_others_are_named(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from foreign_axis import LEAD_M, axis, renamed, write
+from foreign_axis import LEAD_M, answered, axis, renamed, write
 
 from hil.errors import InputError
 from hil.importing.by_map import import_recording
@@ -226,15 +226,17 @@ def test_whole_turns_of_a_set_point_tell_its_unit(tmp_path: Path, turn: float, u
     assert found["position_command_m"]["unit"] == found["motor_position_rad"]["unit"] == unit
 
 
-def test_two_encoders_in_mm_are_a_screw_with_a_lead_to_correct(tmp_path: Path) -> None:
+def test_two_encoders_in_mm_are_a_screw_whose_lead_is_asked(tmp_path: Path) -> None:
     columns = renamed(AXIS, t="t_s", torque="torque_Nm") | {
         "PosMotor_mm": AXIS["angle"] * 1e3 * LEAD_M / (2.0 * np.pi),
         "PosScale_mm": AXIS["x_act"],
     }
-    draft, recording = imported(write(tmp_path / "two.csv", columns))
-    assert draft.lead_m == 0.010
-    assert any("mm per turn are taken: correct scale and lead" in note for note in draft.unsure)
-    assert recording["motor_position_rad"] == pytest.approx(AXIS["angle"] * LEAD_M / 0.010, abs=1e-3)
+    path, map_path = write(tmp_path / "two.csv", columns), tmp_path / "map.yaml"
+    draft = draft_map(path)
+    assert [(one.channel, one.key) for one in draft.asked] == [("", "lead_m")]
+    map_path.write_text(answered(map_text(draft), lead_m=LEAD_M))
+    recording = import_recording(path, map_path)
+    assert recording["motor_position_rad"] == pytest.approx(AXIS["angle"], abs=1e-3)
     assert "table_position_m" in recording.columns
 
 

@@ -30,6 +30,18 @@ AXIS = axis()
         ("Encoder counts per rev,10000", Constant.COUNTS, 10000.0),
         ("Nennmoment (Nm): 1,27", Constant.RATED_TORQUE, 1.27),
         ("Rated torque,1.27,Nm,,", Constant.RATED_TORQUE, 1.27),
+        ("Motor\tX-075\tRated torque 2.39 [N·m]\tRated speed 3000 [min-1]", Constant.RATED_TORQUE, 2.39),
+        ("torque in % of Mn = 4,10 Nm", Constant.RATED_TORQUE, 4.1),
+        ("Motor rated torque (0x6076)\t85000 uNm", Constant.RATED_TORQUE, 0.085),
+        ('"モータ","定格トルク 1.3[N・m] 定格回転速度 3000[r/min]"', Constant.RATED_TORQUE, 1.3),
+        ("MOTOR.KT = 0.530 [Nm/Arms]", Constant.TORQUE, 0.53),
+        ("motor 8 pole, 92 mNm/A", Constant.TORQUE, 0.092),
+        ("CA[18] = 4000 [counts/rev]", Constant.COUNTS, 4000.0),
+        ("Encoder 23 bit/rev", Constant.COUNTS, 2.0**23),
+        ("linear encoder, 1000 cnt/mm", Constant.COUNTS_PER_M, 1e6),
+        ("1 Umdr = 5 mm", Constant.LEAD, 0.005),
+        ("Sampling: 8 kHz (125 us)", Constant.RATE, 8000.0),
+        ("TS = 90 [usec] ; RG = 8 ; interval = TS * RG", Constant.RATE, 1.0 / 720e-6),
     ],
 )
 def test_a_line_gives_a_constant_in_si(line: str, constant: Constant, value: float) -> None:
@@ -43,6 +55,9 @@ def test_a_line_gives_a_constant_in_si(line: str, constant: Constant, value: flo
     [
         "Fecha;12/03/2026",
         "pole pitch 24 mm",
+        "voltage constant 0.8 Nm/A",
+        "rated torque 0x6076",
+        "Sampling interval [ms];1;2;2",
         "Torque constant: 0.8 mm",
         "Torque constant: 0 Nm/A",
         "Torque constant: see manual",

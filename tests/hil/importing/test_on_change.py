@@ -46,7 +46,7 @@ def columns_at(values: np.ndarray) -> dict[str, np.ndarray]:
     """An axis that follows `values` [mm] exactly, in the columns of a log."""
     speed = np.gradient(values, T)
     torque = 1e-3 * np.gradient(speed, T) + 0.4 * np.sign(speed) + np.random.default_rng(3).normal(0.0, 0.01, T.size)
-    return {"time_s": T, "set_mm": values, "motor_mm": values + 1e-4 * torque, "torque_Nm": torque}
+    return {"time_s": T, "set_mm": values, "motor_mm": values + 1e-4 * torque, "force_N": torque}
 
 
 def text_with_empty_cells(columns: dict[str, np.ndarray]) -> str:

@@ -62,7 +62,7 @@ def staircase() -> dict[str, np.ndarray]:
         now += float(RANDOM.uniform(0.2, 0.6))
     q = np.array(angle)
     current = 0.1 * np.sin(12 * q) + 0.05 + RANDOM.normal(0.0, 0.01, q.size)
-    return {"time_s": np.array(time_s), "set_rad": q, "motor_rad": q + 2e-3 * current, "current_A": current}
+    return {"time_s": np.array(time_s), "set_rad": q, "motor_rad": q + 2e-3 * current, "torque_Nm": current}
 
 
 def test_a_quasi_static_measurement_stays_in_one_part(tmp_path: Path) -> None:

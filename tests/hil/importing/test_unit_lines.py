@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 from foreign_axis import LEAD_M, axis, csv_text, renamed
 
@@ -88,12 +87,12 @@ def test_a_lead_within_a_comment_turns_a_length_into_the_motor_s_angle(tmp_path:
     draft = draft_map(path)
     found = {one.channel: one.entry for one in draft.channels}
     assert draft.lead_m == LEAD_M
-    assert found["motor_position_rad"]["scale"] == pytest.approx(2e-3 * np.pi / LEAD_M)
+    assert found["motor_position_rad"]["unit"] == "mm"
     assert found["torque_n_m"]["unit"] == "N m"
 
 
-def test_without_a_lead_the_unit_of_the_reports_is_said(tmp_path: Path) -> None:
+def test_without_a_lead_it_is_asked(tmp_path: Path) -> None:
     columns = renamed(AXIS, t="time_s", x_set="pos_set_mm", x_act="pos_mm", torque="torque_Nm")
     path = tmp_path / "log.csv"
     path.write_text(csv_text(columns))
-    assert any("say N where N m of the motor is meant" in note for note in draft_map(path).unsure)
+    assert [(one.channel, one.key) for one in draft_map(path).asked] == [("", "lead_m")]

@@ -13,6 +13,7 @@ import signal
 import stat
 import threading
 import time
+import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -63,6 +64,14 @@ def check_values(path: Path, values: int, given: str) -> None:
         )
 
 
+def inflated(data: bytes, most: int) -> bytes:
+    """The first `most` bytes of a zlib stream; none where it is damaged, or is no stream."""
+    try:
+        return zlib.decompressobj().decompress(data, most)
+    except zlib.error:
+        return b""
+
+
 def is_file(path: Path) -> bool:
     """True for a file that is there; False also for a path that cannot be one, such as a name of 300 characters."""
     try:
@@ -96,7 +105,8 @@ def parsing(path: Path, what: str, advice: str = "it is cut or damaged") -> Iter
     except InputError:
         raise
     except Exception as error:
-        text = (str(error) or type(error).__name__).splitlines()[0]
+        text = "" if isinstance(error, LookupError) else str(error)  # a key or number that says nothing to the reader
+        text = (text or type(error).__name__).splitlines()[0]
         raise InputError(f"{path}: is no readable {what} ({text}); {advice}") from None
 
 

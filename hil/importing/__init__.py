@@ -3,7 +3,8 @@
 step                 modules                                                     result
 text to rows         number_form, text_rows (for draft and import alike)         `TextRows`
                      encodings, header_rows, csv_dialect (for the draft)         `Header`, `CsvDialect`
-file to table        mat_file, row_groups, foreign_table (all columns)           `ForeignTable`
+file to variables    mat_size, mat_file, mdf_file, long_text, variables          arrays by name
+file to table        row_groups, foreign_table (all columns)                     `ForeignTable`
                      foreign_columns (those that a map names)                    `Foreign`
 words                lexicon(.yaml), units, column_names, unit_lines,            `Label`, `HeaderValue`
                      header_values

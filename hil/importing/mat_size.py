@@ -4,12 +4,11 @@ The layout is that of "MAT-File Format" (MathWorks). Version 4 has plain matrice
 type, a number of bytes and data; a matrix has elements within, and one of the type miCOMPRESSED is a zlib stream.
 """
 
-import zlib
 from pathlib import Path
 from typing import Literal
 
 from hil.errors import InputError
-from hil.files.input_file import MOST_BYTES, check_values
+from hil.files.input_file import MOST_BYTES, check_values, inflated
 
 _HEADER_BYTES = 128
 _MATRIX, _COMPRESSED = 14, 15
@@ -35,19 +34,11 @@ def check_mat_size(path: Path) -> None:
         kind, size = (int.from_bytes(content[at + k : at + k + 4], order) for k in (0, 4))
         data = content[at : at + 8 + size]
         if kind == _COMPRESSED:
-            data = _inflated(data[8:], MOST_BYTES - expanded + 1)
+            data = inflated(data[8:], MOST_BYTES - expanded + 1)
             expanded += len(data)
-            check_values(path, expanded // 8, f"{len(content)} bytes that expand to more than {MOST_BYTES}")
+            check_values(path, -(-expanded // 8), f"{len(content)} bytes that expand to more than {MOST_BYTES}")
         values = _count(path, data, order, values)
         at += 8 + size + (-size % 8 if kind != _COMPRESSED else 0)
-
-
-def _inflated(data: bytes, most: int) -> bytes:
-    """The first `most` bytes of a zlib stream, or fewer where it is damaged."""
-    try:
-        return zlib.decompressobj().decompress(data, most)
-    except zlib.error:
-        return b""
 
 
 def _count(path: Path, data: bytes, order: Literal["big", "little"], values: int) -> int:

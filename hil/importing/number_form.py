@@ -40,7 +40,7 @@ def number_of(text: str, form: NumberForm) -> float | None:
     text = text.strip().translate(_SIGNS)
     if _pattern(form).fullmatch(text):
         plain = text.replace(form.thousands, "") if form.thousands else text
-        return float(plain.replace(form.decimal, ".").replace(" ", ""))
+        return float("".join(plain.replace(form.decimal, ".").split()))
     word = text.lower()
     if word in lexicon().infinite:
         return float(word)

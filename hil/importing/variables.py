@@ -10,10 +10,10 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.lib import format as npy_format
 
-from hil.errors import InputError
 from hil.files.input_file import check_values, parsing
 from hil.importing.long_text import long_form, read_long
 from hil.importing.mat_file import load_mat
+from hil.importing.mdf_file import load_mdf
 
 TEXT_ENDINGS = (".csv", ".txt", ".tsv", ".tab", ".dat", ".asc", ".log", ".lvm", ".prn")
 JSON_ENDINGS = (".json", ".jsonl", ".ndjson")
@@ -37,7 +37,7 @@ def load_variables(path: Path) -> Variables:
             with parsing(path, "NumPy file"):
                 return Variables(_numpy(path), {})
         case ".mf4":
-            return _mdf(path)
+            return Variables(*load_mdf(path))
         case ending if ending in TEXT_ENDINGS:
             with parsing(path, "text with a value per line"):
                 form = long_form(path)
@@ -77,34 +77,6 @@ def _check_array(path: Path, file: Any) -> int:
     values = int(np.prod([float(size) for size in shape])) * max(1, dtype.itemsize // 8)
     check_values(path, values, f"an array of {' x '.join(map(str, shape))}")
     return values
-
-
-def _mdf(path: Path) -> Variables:
-    """Channels of an MDF 4 file, with the clock of each group: "time", of the groups after the first "time 2", ..."""
-    try:
-        from asammdf import MDF
-    except ImportError:
-        raise InputError(
-            f"{path}: .mf4 files are read by asammdf, which is not installed; install it: pip install 'hil-servo[mf4]'"
-        ) from None
-    arrays, units = dict[str, Any](), dict[str, str]()
-    with parsing(path, "MDF 4 file"), MDF(path) as file:
-        groups = [group for group in file.groups if group.channel_group.cycles_nr > 0]
-        values = sum(group.channel_group.cycles_nr * len(group.channels) for group in groups)
-        check_values(path, values, f"{values} values")
-        for number, index in enumerate(file.virtual_groups, 1):
-            clock = "time" if number == 1 else f"time {number}"
-            for signal in file.select([(None, *place) for place in _places(file, index)], raw=False):
-                arrays[clock] = signal.timestamps
-                arrays[signal.name], units[signal.name] = signal.samples, signal.unit
-            units[clock] = "s"
-    return Variables(arrays, {name: unit for name, unit in units.items() if unit})
-
-
-def _places(file: Any, index: int) -> list[tuple[int, int]]:
-    """Group and number of each channel of a virtual group, but for its clock."""
-    chosen = file.included_channels(index)[index]
-    return [(group, channel) for group, channels in chosen.items() for channel in channels]
 
 
 def _records(path: Path) -> dict[str, Any]:

@@ -24,6 +24,7 @@ from command_line import hil
 from hil.errors import InputError
 from hil.files import input_file
 from hil.files.input_file import MOST_IN_LINE, bounded, check_file
+from hil.importing import mdf_file
 
 MOST_MB = 1500.0
 LONGEST_S = 20.0
@@ -251,6 +252,22 @@ def _opened(pid: int, path: Path) -> bool:
         return any(os.readlink(f"/proc/{pid}/fd/{one}") == str(path) for one in os.listdir(f"/proc/{pid}/fd"))
     except OSError:
         return False
+
+
+def test_compressed_blocks_of_mdf_are_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(mdf_file, "MOST_BYTES", 8000)
+    monkeypatch.setattr(input_file, "MOST_VALUES", 1000)
+    path = tmp_path / "a.mf4"
+
+    def block(size: int) -> bytes:
+        data = zlib.compress(bytes(size))
+        return b"##DZ" + bytes(36) + struct.pack("<Q", len(data)) + data
+
+    path.write_bytes(block(4000) + b"##DZ" + block(4000))
+    mdf_file.check_mdf_size(path)
+    path.write_bytes(block(4000) + block(4001))
+    with pytest.raises(InputError, match="expand to more than 8000, allowed 1000 values"):
+        mdf_file.check_mdf_size(path)
 
 
 def test_a_message_cuts_long_names(tmp_path: Path) -> None:

@@ -83,6 +83,14 @@ def test_values_that_are_printed_late_are_put_in_order(tmp_path: Path) -> None:
     np.testing.assert_array_equal(arrays["speed"], np.arange(20.0))
 
 
+def test_stamps_without_a_time_in_common_are_refused(tmp_path: Path) -> None:
+    rows = (f"{k};{np.sin(k / 9):.4f};{0.5 * k + 5000};{np.cos(k / 9):.4f}" for k in range(1000))
+    path = tmp_path / "pairs.csv"
+    path.write_text("\n".join(["time [ms];angle [rad];time 2 [ms];torque [Nm]", *rows]))
+    with pytest.raises(InputError, match=r"stamps of time \[ms\], time 2 \[ms\] have no time in common"):
+        draft_map(path)
+
+
 def test_an_extra_that_is_not_installed_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "asammdf", None)
     path = tmp_path / "run.mf4"

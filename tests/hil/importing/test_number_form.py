@@ -35,6 +35,10 @@ def test_a_form_reads_what_it_writes(values: list[float], form: NumberForm, deci
     np.testing.assert_allclose(read, values, atol=10.0**-decimals)
 
 
+def test_any_white_space_may_follow_a_sign() -> None:
+    assert number_of("- 1.5", NumberForm()) == number_of("-\x1d1.5", NumberForm()) == -1.5
+
+
 @pytest.mark.parametrize("form", FORMS)
 def test_the_fields_tell_the_form(form: NumberForm) -> None:
     values = np.linspace(-5000.0, 20000.0, 200)

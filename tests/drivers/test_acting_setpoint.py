@@ -59,6 +59,12 @@ def test_a_torque_beyond_the_limit_of_the_drive_acts_as_the_limit() -> None:
     assert watch(CST, [1500], limit=1000.0).differs(frame(CST, 900))
 
 
+def test_before_the_first_set_point_any_demand_may_act() -> None:
+    acting = watch(CST, [])
+    assert not acting.differs(frame(CST, 500))
+    assert acting.text == ""
+
+
 def test_set_points_older_than_the_cycles_do_not_count() -> None:
     acting = watch(CST, [-500, 0, 100, 200, 300, 400, 500])
     assert acting.differs(frame(CST, -500))

@@ -47,9 +47,8 @@ def race(base: Fit, candidates: Sequence[Candidate]) -> list[Fit]:
 
     The best is converged in all its variants, others only if their cost is near it.
     """
-    return _Race(
-        base, [one for one in candidates[:_STARTED] if one.share >= CRITERIA.hopeless * candidates[0].share]
-    ).run()
+    hopeful = [one for one in candidates[:_STARTED] if one.share >= CRITERIA.hopeless * candidates[0].share]
+    return _Race(base, hopeful).run()
 
 
 def given_points(base: Fit) -> list[FloatArray]:
@@ -179,7 +178,6 @@ class _Race:
         return robust_loss(vector + slopes @ step, SOFT)[0]
 
     def _given_start(self, candidate: Candidate) -> Fit:
-        """Return the best start of a candidate at the parameters of the bench."""
         return min((self._best_start(candidate, x) for x in self.given), key=_soft)
 
     def _followers(self, leader: Fit, before: Fit, others: Sequence[Fit]) -> list[Fit]:
@@ -230,8 +228,8 @@ class _Race:
         for alike in likenesses(terms, fit.bench):
             if offered(alike[0], self.base.hypothesis, terms[:-1]):
                 begun = in_parallel([partial(fit.estimator.evaluate, rebased.replaced(-1, term)) for term in alike])
-                nearest = min(begun, key=lambda other: other.cost).hypothesis
-                jobs.append(partial(_fit_fast_first, fit.estimator, nearest))
+                nearest = min(begun, key=lambda other: other.cost)
+                jobs.append(partial(_fit_fast_first, fit.estimator, nearest.hypothesis))
         return in_parallel(jobs)
 
     def _gain(self, fit: Fit) -> float:

@@ -8,6 +8,7 @@ from hil.drafting.sensor_values import noise_of, torque_delay_s
 from hil.errors import InputError
 from hil.identification.friction import identify_friction
 from hil.identification.law.result import sure
+from hil.quantities import digits
 from hil.recording.recording import Recording
 
 MUCH_LEFT = 0.3  # share of the torque unexplained, from which it is as large as a usual friction
@@ -82,10 +83,10 @@ def _of_torque(
         unsure.append("the inertia is not identifiable from this motion: record moves with more acceleration")
     if plant.left > MUCH_LEFT:
         unsure.append(
-            f"{explained} leave {100 * plant.left:.2g} % of the {effort}: something else acts "
+            f"{explained} leave {digits(100.0 * plant.left, 2)} % of the {effort}: something else acts "
             "(a flexible load, gravity, a late channel), and their values may be off by more than their errors"
         )
-    notes.append(f"{explained} leave {100 * plant.left:.2g} % of the {effort} (share of its standard deviation)")
+    notes.append(f"{explained} leave {digits(100.0 * plant.left, 2)} % of the {effort} (share of its standard deviation)")
     if plant.one_way is not None:
         unsure.append(
             f"motion one way tells Coulomb friction and load together, {plant.one_way.value:.3g} {noise_unit} "

@@ -86,7 +86,8 @@ def _of_torque(
             f"{explained} leave {digits(100.0 * plant.left, 2)} % of the {effort}: something else acts "
             "(a flexible load, gravity, a late channel), and their values may be off by more than their errors"
         )
-    notes.append(f"{explained} leave {digits(100.0 * plant.left, 2)} % of the {effort} (share of its standard deviation)")
+    left = digits(100.0 * plant.left, 2)
+    notes.append(f"{explained} leave {left} % of the {effort} (share of its standard deviation)")
     if plant.one_way is not None:
         unsure.append(
             f"motion one way tells Coulomb friction and load together, {plant.one_way.value:.3g} {noise_unit} "

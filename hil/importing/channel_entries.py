@@ -40,6 +40,7 @@ class ChannelEntries:
         self.kind = AxisKind.ROTARY
         self.motor_sign = 1
         self.per_count = 1.0  # SI units of the motor per count, if it is in counts
+        self.unsized: dict[str, str] = {}  # keys of the size of its count that are asked
 
     def fill(self) -> None:
         """Add the entries. Raises InputError: no column goes with the motion, or two units contradict each other."""
@@ -88,7 +89,7 @@ class ChannelEntries:
             size = self._count_size(name, length, relations[length].factor if length else 0.0)
             keys |= size.entry
             draft.unsure += [size.note] if size.note else []
-            motor, self.per_count = size.unit, size.per_count
+            motor, self.per_count, self.unsized = size.unit, size.per_count, dict(size.asked)
         self.kind = self._kind(is_length(motor))
         channel = AXIS_CHANNELS[self.kind].motor_position
         for key, what in size.asked.items() if counted else {}:
@@ -166,8 +167,12 @@ class ChannelEntries:
                     f"{name}: comes {1e3 * late_s:.3g} ms after {encoder}, a set-point comes before: its "
                     "stamps are late, or the drive leads it; the control law cannot be judged with it as it is"
                 )
-        if unit == "counts":  # of the motor's encoder, as in the set-points of a drive
-            same = abs(abs(factor) - 1.0) < SAME_COUNTS
+        same = abs(abs(factor) - 1.0) < SAME_COUNTS
+        if unit == "counts" and self.unsized:  # its counts are told when those of the encoder are
+            given = f"write the same as for {encoder}" if same else f"1 of them is {abs(factor):.6g} of {encoder}"
+            keys |= dict.fromkeys(self.unsized, self.per_count)
+            self.draft.asked += [Asked(channel, key, f"{name}: is in counts; {given}") for key in self.unsized]
+        elif unit == "counts":  # of the motor's encoder, as in the set-points of a drive
             per_count = self.per_count / (1.0 if same else abs(factor))
             lever = (self.draft.lead_m or 0.0) / (2.0 * pi) if motor == "rad" else 1.0
             per_m = scale_count(1.0 / (per_count * lever)) if lever and channel == "table_position_m" else None
@@ -203,7 +208,7 @@ class ChannelEntries:
         name, command = self.roles.velocity_command, self.roles.command
         if name is None:
             return
-        if command is None or command in self.asked:
+        if command is None or command in self.asked or (self.unsized and self.units[command] == "counts"):
             self.draft.left_out[name] = "a velocity set-point without a position set-point of known unit"
             return
         entry = next(one.entry for one in self.draft.channels if one.channel == "position_command_m")

@@ -116,3 +116,14 @@ def test_counts_of_a_second_encoder_have_the_size_of_a_linear_scale(tmp_path: Pa
 def test_a_travel_that_no_machine_has_is_asked(tmp_path: Path, name: str, factor: float) -> None:
     columns = renamed(AXIS | {"x_act": factor * AXIS["x_act"]}, t="time_s", x_act=name, torque="torque_A")
     assert any("is its unit" in note for note in draft_map(write(tmp_path / "log.csv", columns)).unsure)
+
+
+def test_a_set_point_in_counts_of_unknown_size_is_asked_with_those_of_the_encoder(tmp_path: Path) -> None:
+    """A size that is taken until the user tells it would leave the set-point another size."""
+    counts = {"angle": np.round(AXIS["angle"] * 40000 / (2 * np.pi))}
+    counts["x_set"] = np.round(AXIS["x_set"] / LEAD_M * 40000)
+    names = {"t": "time_s", "x_set": "Cmd Pos", "angle": "Act Pos", "torque": "torque_Nm"}
+    draft = draft_map(write(tmp_path / "log.csv", renamed(AXIS | counts, **names)))
+    asked = [(one.channel, one.key) for one in draft.asked]
+    assert asked == [(name, "counts_per_rev") for name in ("motor_position_rad", "position_command_m")]
+    assert channels(draft)["position_command_m"]["unit"] == "counts"

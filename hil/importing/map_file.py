@@ -158,9 +158,13 @@ class RecordingMap(_Strict):
 
     @property
     def travel_per_turn_m(self) -> float | None:
-        """Lead [m]; of a load whose encoder tells an angle 2 pi, one metre for one radian. None: not told."""
-        table = self.channels.get(self.axis.table_position)
-        return ROTARY_LEAD_M if table is not None and table.turns else self.lead_m
+        """Lead [m]; of a load that turns 2 pi, one metre for one radian. None: not told.
+
+        A load turns whose encoder tells an angle, or whose set-points and motor do where no lead is given.
+        """
+        names = (self.axis.table_position, self.axis.motor_position, "position_command_m")
+        table, motor, command = (name in self.channels and self.channels[name].turns for name in names)
+        return ROTARY_LEAD_M if table or (motor and command and self.lead_m is None) else self.lead_m
 
     @property
     def axis(self) -> AxisChannels:

@@ -280,3 +280,13 @@ def test_a_gain_by_name_needs_a_mat_file(tmp_path: Path) -> None:
     content = changed(torque_n_m={"column": "i", "unit": "V", "gain": "k"})
     with pytest.raises(InputError, match=r"log\.csv: the map takes k from the file by name"):
         import_recording(write_csv(tmp_path), write_map(tmp_path, content))
+
+
+def test_a_set_point_that_is_an_angle_of_the_motor_needs_no_lead(tmp_path: Path) -> None:
+    """One metre of the load stands for one radian, as in a draft of an axis that turns."""
+    content = {**changed(position_command_m={"column": "x_set", "unit": "deg"}), "lead_m": None}
+    recording = import_recording(write_csv(tmp_path), write_map(tmp_path, content))
+    np.testing.assert_allclose(recording["position_command_m"], np.radians(COLUMNS["x_set"]))
+    content["channels"]["motor_position_rad"] = {"column": "enc", "unit": "mm"}
+    with pytest.raises(InputError, match="if lead_m is given"):
+        import_recording(tmp_path / "log.csv", write_map(tmp_path, content))

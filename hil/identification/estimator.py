@@ -81,10 +81,10 @@ class Fit:
         """Number of weighted residuals."""
         return self.residuals.vector.size
 
-    @property
+    @cached_property
     def noise_energy(self) -> float:
-        """Energy of the noise that is there, in units of noise^2."""
-        return sum(one.noise for one in self.residuals.by_channel.values())
+        """Energy of the noise that is there, in units of noise^2: that of each residual, up to one for each row."""
+        return sum(min(float(part @ part), float(part.size)) for part in self.residuals.parts.values())
 
     @property
     def reduced(self) -> float:

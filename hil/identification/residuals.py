@@ -24,7 +24,7 @@ class ChannelEnergy(NamedTuple):
     """Energy of the weighted residuals of a channel, its rows, and the energy of the noise that is there, in noise^2.
 
     That is the energy of each residual, up to one for each row: the noise of a channel is an upper bound where its
-    inputs are open.
+    inputs are open. A channel far below its noise beside others has the mean of all: what is left of it tells nothing.
     """
 
     energy: float
@@ -74,7 +74,8 @@ class Residuals:
             energy, rows, noise = found.get(channel, ChannelEnergy(0.0, 0, 0.0))
             own = float(part @ part)
             found[channel] = ChannelEnergy(energy + own, rows + part.size, noise + min(own, float(part.size)))
-        return found
+        mean = sum(one.noise for one in found.values()) / max(sum(one.rows for one in found.values()), 1)
+        return {name: one._replace(noise=max(one.noise, mean * one.rows)) for name, one in found.items()}
 
     @cached_property
     def splits(self) -> tuple[int, ...]:

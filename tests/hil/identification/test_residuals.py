@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from hil.diagnosis.preparation.preflight import preflight
 from hil.identification.compare import compare
 from hil.identification.dataset import FASTEST_OBSERVER_S
 from hil.identification.hypothesis import Hypothesis
-from hil.identification.residuals import differences
+from hil.identification.residuals import Residuals, differences
 from hil.identification.terms import Term
 from hil.twin.axis import Response
 
@@ -130,3 +131,12 @@ def test_the_energy_of_each_channel_is_counted_once_and_a_hidden_one_has_none() 
     assert all(one.noise <= one.rows for one in residuals.by_channel.values())
     hidden = SimpleNamespace(observability=SimpleNamespace(hidden={"table"}), runs=data.runs, scales=data.scales)
     assert "table" not in replace(residuals, data=hidden).by_channel
+
+
+def test_a_channel_far_below_its_noise_counts_with_the_mean_of_all() -> None:
+    """Nine tenths of hardly anything are no evidence."""
+    parts = {(0, "motor"): np.full(100, 0.1), (0, "table"): np.full(100, 2.0)}
+    residuals: Any = SimpleNamespace(parts=parts, data=SimpleNamespace(observability=SimpleNamespace(hidden=set())))
+    motor, table = (Residuals.by_channel.func(residuals)[name] for name in ("motor", "table"))
+    assert motor.noise == pytest.approx(50.5)
+    assert (table.energy, table.noise) == pytest.approx((400.0, 100.0))

@@ -106,7 +106,7 @@ class Criteria:
 
     @property
     def material_alone(self) -> float:
-        """Least energy per row that a term removes from one channel: two simulations of one axis differ by 0.03."""
+        """Least energy per row that a term removes from one channel: in one, two simulations differ by up to 0.03."""
         return 2.0 * self.material
 
     @property

@@ -81,13 +81,13 @@ def _of_torque(
     explained = f"inertia, friction and {over_position}" if over_position else "inertia and friction"
     if not plant.inertia.significant:
         unsure.append("the inertia is not identifiable from this motion: record moves with more acceleration")
+    left = f"{explained} leave {digits(100.0 * plant.left, 2)} % of the {effort}"
     if plant.left > MUCH_LEFT:
         unsure.append(
-            f"{explained} leave {digits(100.0 * plant.left, 2)} % of the {effort}: something else acts "
+            f"{left}: something else acts "
             "(a flexible load, gravity, a late channel), and their values may be off by more than their errors"
         )
-    left = digits(100.0 * plant.left, 2)
-    notes.append(f"{explained} leave {left} % of the {effort} (share of its standard deviation)")
+    notes.append(f"{left} (share of its standard deviation)")
     if plant.one_way is not None:
         unsure.append(
             f"motion one way tells Coulomb friction and load together, {plant.one_way.value:.3g} {noise_unit} "

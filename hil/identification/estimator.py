@@ -28,7 +28,7 @@ from hil.identification.levenberg_marquardt import broyden, damped_step, normal_
 from hil.identification.noise_floor import COLOURED, FLOOR, noise_ratios
 from hil.identification.parallel import POOL
 from hil.identification.residual_scales import TORQUE_ACCURACY, inertia
-from hil.identification.residuals import Residuals
+from hil.identification.residuals import Residuals, noise_there
 from hil.identification.terms import Term
 
 _FIRST_DAMPING = 1e-3  # relative to diag(J)^2: for a moderately good start (Madsen, Nielsen and Tingleff 2004)
@@ -83,8 +83,8 @@ class Fit:
 
     @cached_property
     def noise_energy(self) -> float:
-        """Energy of the noise that is there, in units of noise^2: that of each residual, up to one for each row."""
-        return sum(min(float(part @ part), float(part.size)) for part in self.residuals.parts.values())
+        """Energy of the noise in all residuals, in units of noise^2."""
+        return sum(noise_there(part) for part in self.residuals.parts.values())
 
     @property
     def reduced(self) -> float:

@@ -23,13 +23,21 @@ _LOST = 1e6  # bound of weighted residuals: beyond, an unstable hypothesis is no
 class ChannelEnergy(NamedTuple):
     """Energy of the weighted residuals of a channel, its rows, and the energy of the noise that is there, in noise^2.
 
-    That is the energy of each residual, up to one for each row: the noise of a channel is an upper bound where its
-    inputs are open. A channel far below its noise beside others has the mean of all: what is left of it tells nothing.
+    The noise is that of `noise_there`, and per row at least the mean of all channels: a share of a residual far below
+    its noise is no evidence.
     """
 
     energy: float
     rows: int
     noise: float
+
+
+def noise_there(part: FloatArray) -> float:
+    """Energy of the noise in a weighted residual (n,): all of it, up to one for each row.
+
+    The noise of a channel is an upper bound where its inputs are open.
+    """
+    return min(float(part @ part), float(part.size))
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +81,7 @@ class Residuals:
         for channel, part in parts:
             energy, rows, noise = found.get(channel, ChannelEnergy(0.0, 0, 0.0))
             own = float(part @ part)
-            found[channel] = ChannelEnergy(energy + own, rows + part.size, noise + min(own, float(part.size)))
+            found[channel] = ChannelEnergy(energy + own, rows + part.size, noise + noise_there(part))
         mean = sum(one.noise for one in found.values()) / max(sum(one.rows for one in found.values()), 1)
         return {name: one._replace(noise=max(one.noise, mean * one.rows)) for name, one in found.items()}
 

@@ -1,4 +1,4 @@
-"""What hinders a drive from being enabled, the objects read meanwhile, the time of its transitions."""
+"""Arming: why a drive is not enabled, which objects are read meanwhile, how long its transitions take."""
 
 from __future__ import annotations
 

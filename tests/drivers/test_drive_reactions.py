@@ -1,4 +1,4 @@
-"""What a drive is told to do by itself, and what it may keep: cycle times, reactions, watchdogs, reset of a fault."""
+"""Set-up of the reactions of a drive: cycle time, quick stop and fault reaction, watchdogs, fault reset."""
 
 from __future__ import annotations
 

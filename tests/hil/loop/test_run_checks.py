@@ -1,4 +1,4 @@
-"""What is checked before the drive is armed, each at its bound, and who stops a run."""
+"""Checks before the drive is armed, each at its bound; the causes that stop a run."""
 
 from __future__ import annotations
 

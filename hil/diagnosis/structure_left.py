@@ -185,7 +185,7 @@ def channels(data: Dataset) -> list[str]:
 def left_in_channel(hypothesis: Hypothesis, data: Dataset, channel: str, plain: PlainModel) -> list[ResidualSeries]:
     """Residuals of a channel and the rows in which the axis slides, for each run."""
     if channel == TORQUE:
-        return needed_torque(hypothesis, data, plain.slowest)
+        return needed_torque(hypothesis, data, plain)
     return [
         ResidualSeries(hypothesis.blocks(run, data.observer_s)["table"], measured_motion(run).sliding(plain.slowest))
         for run in data.runs

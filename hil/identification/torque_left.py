@@ -6,21 +6,23 @@ The residual is that of held-out motion, the deviation that of all recordings: a
 needs hardly any torque of its own.
 
 The twin is held on the measured motion by its observer and fed the measured torque. Its innovation e tells the torque
-that its mechanics lack. The scale is that of the twin itself: its innovation is computed a second time, with a constant
-torque added. Nothing is simulated in closed loop, where a controller hides what a model lacks. The plain model is that
-of `hil.identification.plain_model`, fitted to the training recordings: [a, v, sign(v), 1] on the rows that slide. Its
-residual passes the same filter as the innovation, so that both are compared in one band; between stretches that slide,
-where the sign of the velocity is not known, it goes on from one to the next:
+that its mechanics lack. The scale is that of the twin itself: its innovation is computed a second time, with a torque
+added along the motion. Nothing is simulated in closed loop, where a controller hides what a model lacks.
+
+The plain model is that of `hil.identification.plain_model`, fitted to the training recordings: [a, v, sign(v), 1] on
+the rows that slide. Its residual passes the same filter as the innovation, so that both are compared in one band;
+between stretches that slide, where the sign of the velocity is not known, it goes on from one to the next:
 
     e(z) = a^2 z^-1 / (1 - (2 - 2 a - a^2) z^-1 + (1 - 2 a) z^-2),   a = T / tau      of a rigid axis
 """
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d
 from scipy.signal import lfilter
 
 from hil.arrays import FloatArray
@@ -34,6 +36,9 @@ from hil.identification.structure import ResidualSeries
 from hil.identification.twin_deviation import held_on_motor
 
 _ADDED = 0.01  # of the torque's standard deviation: far above rounding, and an axis that slides goes on sliding
+# Some rows that slide by the measured motion may not by that of a twin: quantile of the others; share of them that is
+# nothing; rounds in which they get more torque, each twice that of the one before, at first the noise.
+_SLIDE, _FEW, _AGAIN = 0.9, 0.01, 6
 
 
 @lru_cache(maxsize=8)
@@ -59,7 +64,7 @@ def torque_missed(fit: Fit, data: Dataset) -> float | None:
     deviation = torque_deviation([data], plain.slowest) if plain else 0.0
     if plain is None or not deviation:
         return None
-    left = left_by_twin(fit.hypothesis, data, plain.slowest, deviation)
+    left = left_by_twin(fit.hypothesis, data, plain, deviation)
     return math.inf if left is None else left
 
 
@@ -96,36 +101,60 @@ def left_by_plain(model: PlainModel, data: Dataset, deviation: float | None = No
 
 
 @lru_cache(maxsize=16)
-def left_by_twin(hypothesis: Hypothesis, data: Dataset, slowest: float, deviation: float | None = None) -> float | None:
-    """Share of the torque's standard `deviation` that a twin leaves where the motor is faster than `slowest`, or None.
+def left_by_twin(
+    hypothesis: Hypothesis, data: Dataset, plain: PlainModel, deviation: float | None = None
+) -> float | None:
+    """Share of the torque's standard `deviation` that a twin leaves where the axis slides; None where nothing does.
 
     Without a deviation it is that of the data set.
     """
-    found = zip(needed_torque(hypothesis, data, slowest), data.runs, strict=True)
+    found = zip(needed_torque(hypothesis, data, plain), data.runs, strict=True)
     left = [matched(series.left, measured_motion(run).window)[series.rows] for series, run in found]
-    return _share(left, data, slowest, deviation)
+    return _share(left, data, plain.slowest, deviation)
 
 
-def needed_torque(hypothesis: Hypothesis, data: Dataset, slowest: float) -> list[ResidualSeries]:
+def needed_torque(hypothesis: Hypothesis, data: Dataset, plain: PlainModel) -> list[ResidualSeries]:
     """Torque (n,) that the measured motion of each run needs beyond that of a twin; NaN where it does not hold it.
 
-    Rows in which the motor is faster than `slowest` count.
+    Rows in which the axis slides count.
     """
     found = []
     for run in data.runs:
-        rows = measured_motion(run).sliding(slowest)
-        added = _ADDED * float(np.std(run.torque))
-        innovation = _innovation(hypothesis, run, data.observer_s)
-        moved = _innovation(hypothesis, replace(run, torque=run.torque + added), data.observer_s) - innovation
-        scale = float(np.median(moved[rows])) if rows.any() else 0.0
-        left = -innovation * added / scale if scale else np.full(run.motor.size, np.nan)
-        found.append(ResidualSeries(left, rows))
+        motion = measured_motion(run)
+        rows = motion.sliding(plain.slowest)
+        found.append(ResidualSeries(_lacking(hypothesis, run, data.observer_s, motion, rows), rows))
     return found
 
 
-def _innovation(hypothesis: Hypothesis, run: Measured, observer_s: float) -> FloatArray:
-    """Measured less simulated motor position (n,) of a twin held on it."""
-    measured, held = held_on_motor(hypothesis, run, observer_s)
+def _lacking(
+    hypothesis: Hypothesis, run: Measured, observer_s: float, motion: MotionData, rows: NDArray[np.bool_]
+) -> FloatArray:
+    """Torque (n,) that a twin lacks to make the motion of a run in the rows (n,); NaN where no torque moves it.
+
+    The innovation of a twin that slides tells it. Where a torque less by its noise stops one that creeps, it gets more,
+    which counts as lacking, as long as fewer rows stick then.
+    """
+    way, deviation = motion.moved.direction, float(np.std(run.torque))
+    more, added, noise = np.zeros(run.motor.size), _ADDED * deviation * way, run.noise.torque
+    found, before = np.full(run.motor.size, np.nan), np.count_nonzero(rows) + 1
+    for _ in range(_AGAIN):
+        innovation = _innovation(hypothesis, run, observer_s, more)
+        moved = (innovation - _innovation(hypothesis, run, observer_s, more + added)) * way
+        scale = float(np.quantile(moved[rows], _SLIDE)) if rows.any() else 0.0
+        sticks = rows & (moved < 0.5 * scale)
+        if not scale > 0.0 or np.count_nonzero(sticks) >= before:
+            break
+        found, before = innovation * _ADDED * deviation / scale + more, np.count_nonzero(sticks)
+        if before <= _FEW * np.count_nonzero(rows):
+            break
+        more = np.where(maximum_filter1d(sticks, motion.window), more + noise * way, more)
+        noise *= 2.0
+    return np.asarray(found, dtype=np.float64)
+
+
+def _innovation(hypothesis: Hypothesis, run: Measured, observer_s: float, more: FloatArray) -> FloatArray:
+    """Measured less simulated motor position (n,) of a twin held on it, with more torque (n,) than the measured one."""
+    measured, held = held_on_motor(hypothesis, run, observer_s, more)
     return np.asarray(measured.motor_position - held.motor_position, dtype=np.float64)
 
 

@@ -119,15 +119,19 @@ def compare_blocks(hypothesis: Hypothesis, data: Dataset) -> tuple[BlockDeviatio
     return tuple(blocks)
 
 
-def held_on_motor(hypothesis: Hypothesis, run: Measured, observer_s: float) -> tuple[Response, Response]:
-    """Measured channels, lateness undone, and those of the twin held on the motor, with the measured torque as input.
+def held_on_motor(
+    hypothesis: Hypothesis, run: Measured, observer_s: float, more: FloatArray | float = 0.0
+) -> tuple[Response, Response]:
+    """Measured channels, lateness undone, and those of the twin held on the motor, driven by the measured torque.
 
+    It gets `more` torque (n,), by default none.
     Mechanisms of the drive and of the recorded channels are omitted: the measured torque already contains them.
     """
     twin = hypothesis.twin(observer_s, run=run)
     measured = hypothesis.undelayed(twin, run)
     mechanical = tuple(active for active in twin.active if not in_measured_torque(active))
-    inputs = measured._replace(torque_command=measured.torque)
+    driven = measured.torque + more
+    inputs = measured._replace(torque=driven, torque_command=driven)
     held = replace(twin, active=mechanical).observe(run.position_command_m, run.velocity_command_m_s, inputs, run.start)
     return measured, held
 

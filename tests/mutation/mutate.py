@@ -36,8 +36,8 @@ LIBRARIES = ("hypothesis", "numba", "pyarrow.parquet", "pydantic", "canopen", "s
              "scipy.optimize", "typer.testing", "rich.console", "msgpack", "yaml")  # fmt: skip
 
 
-BROKEN = 70  # exit code where pytest itself could not be run
-HANG_S = 1200.0  # of all tests by the wall clock: one waits for something that does not come
+BROKEN = 70  # exit code where pytest itself failed, as by an exception in a thread after the last test
+HANG_S = 300.0  # of all tests by the wall clock: one waits for something that does not come
 
 
 class Run(NamedTuple):
@@ -80,8 +80,6 @@ def mutate(copy: Path, module: str, sample: int, seed: int) -> str:
     for mutant in drawn:
         source.write_text(mutant.text(text), encoding="utf-8")
         run = run_tests(copy, suite)
-        if run.code == BROKEN:
-            raise SystemExit("the tests could not be run")
         by_time += run.code is None or run.code < 0
         killed += run.code != 0
         print(f"{'survived' if run.code == 0 else 'killed'} {module} {mutant.change(text)} [{run.failed}, "

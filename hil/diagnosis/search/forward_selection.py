@@ -138,7 +138,7 @@ def less_torque(plain: PlainModel, *fits: Fit) -> Fit:
     """The fit that leaves least of the torque: the noise of its torque may have led a fit astray."""
 
     def left(fit: Fit) -> float:
-        share = left_by_twin(fit.hypothesis, fit.data, plain.slowest)
+        share = left_by_twin(fit.hypothesis, fit.data, plain)
         return math.inf if share is None else share
 
     return min(fits, key=left)

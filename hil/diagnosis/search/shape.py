@@ -10,6 +10,9 @@ many degrees of freedom as independent rows. Thousands of rows together tell wha
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,18 +20,23 @@ from scipy.stats import t as student
 
 from hil.arrays import FloatArray
 from hil.diagnosis.criteria import CRITERIA
+from hil.diagnosis.search.initial_values import axis_facts
 from hil.diagnosis.search.score_test import Candidate
 from hil.diagnosis.structure_left import TORQUE, channels, least_energy, left_in_channel
+from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
+from hil.identification.hypothesis import Hypothesis
 from hil.identification.noise_apart import smoothed_runs
-from hil.identification.plain_model import MOTION, plain_columns
+from hil.identification.plain_model import MOTION, PlainModel, plain_columns
 from hil.identification.structure import ResidualSeries, autocovariance
 from hil.identification.torque_left import fit_plain, measured_motion
-from hil.twin.library import LIBRARY
+from hil.twin.library import BY_ID, LIBRARY
+from hil.twin.mechanism import Stage
 from hil.twin.parameter import Role
 
 _FEWEST_ROWS = 100
 _MANY = (Role.EDGE, Role.LINE, Role.PERIOD, Role.FREQUENCY)
+_FAINT = 0.1  # of the strength of a friction
 _RANK = 1e-9  # share of a column, beside the others, below which it is not told
 
 
@@ -43,36 +51,103 @@ def chance_of_shape(fit: Fit, without: Fit, fitted: bool = True) -> float:
     By the number of values that were searched, see `_searched`. 1 where nothing tells, for a `fitted` shape of the
     opposite sign, and for less than what correct simulations of one axis differ by.
     """
-    plain, best = fit_plain(fit.data), 1.0
-    if plain is None:
+    asked, best = _asked(without), 1.0
+    if asked is None:
         return best
-    searched = _searched(fit) - _searched(without)
-    quiet = fit.data.over([one.smooth for one in fit.data.apart] or smoothed_runs(fit.data.runs, plain))
-    motions = [measured_motion(run).moved for run in fit.data.runs]
-    for channel in channels(fit.data):
-        measured, before, after = (
-            left_in_channel(one.hypothesis, data, channel, plain)
-            for one, data in ((without, fit.data), (without, quiet), (fit, quiet))
-        )
-        rows = [one.rows for one in measured]
-        left, there, other = (
-            np.concatenate([one.left[at] for one, at in zip(each, rows, strict=True)])
-            for each in (measured, before, after)
-        )
-        if left.size < _FEWEST_ROWS or not all(np.isfinite(one).all() for one in (left, there, other)):
+    searched, shaped = _searched(fit) - _searched(without), _faint(fit, without)
+    for channel, own in asked.channels.items():
+        after = _joined(left_in_channel(shaped, asked.quiet, channel, asked.plain), own.rows)
+        shape = own.quiet - after
+        if not np.isfinite(shape).all():
             continue
-        columns = [there - other, np.ones_like(left)]
-        if channel == TORQUE:
-            plains = [plain_columns(moved) for moved in motions]
-            columns += [
-                np.concatenate([one[name][at] for one, at in zip(plains, rows, strict=True)]) for name in MOTION
-            ]
-        size, ratio, free = _first_coefficient(np.column_stack(columns), left, rows)
-        least = least_energy(fit.data, channel, plain) * (1.0 if channel == TORQUE else CRITERIA.material)
-        if free > 0.0 and size**2 * float(np.mean((there - other) ** 2)) > least:
+        size, ratio, free = _first_coefficient(np.column_stack([shape, own.beside]), own.measured, own.rows)
+        if free > 0.0 and size**2 * float(np.mean(shape**2)) > own.least:
             chance = student.sf(ratio if fitted else abs(ratio), free) * (1.0 if fitted else 2.0)
             best = min(best, len(LIBRARY) * free**searched * float(chance))
     return best
+
+
+def _faint(fit: Fit, without: Fit) -> Hypothesis:
+    """The fit without it and little of the friction that its term adds, if it does: of more the twin would stick."""
+    known = {term.key for term in without.terms}
+    added = [term for term in fit.terms if term.key not in known]
+    mechanism = BY_ID[added[-1].effect] if added else None
+    if mechanism is None or mechanism.variants[added[-1].variant].stage is not Stage.COULOMB:
+        return fit.hypothesis
+    values, none = list(added[-1].values), 0.0
+    if mechanism.neutral is not None:
+        none = mechanism.neutral(axis_facts(without.bench, without.data.runs))
+    for index in mechanism.indices(Role.STRENGTH):
+        values[index] = none + _FAINT * (values[index] - none)
+    return without.hypothesis.with_term(replace(added[-1], values=tuple(values)))
+
+
+class _Channel(NamedTuple):
+    """What a fit leaves of a channel on the rows (m,) that slide: measured, and of the smoothed motion.
+
+    `beside` (m, q): what other parameters make. `least` is the energy of a shape that counts.
+    """
+
+    rows: list[NDArray[np.bool_]]
+    measured: FloatArray
+    quiet: FloatArray
+    beside: FloatArray
+    least: float
+
+
+class _Asked(NamedTuple):
+    """The channels of a fit that a shape may be in, the plain model, and its recordings without noise."""
+
+    channels: dict[str, _Channel]
+    plain: PlainModel
+    quiet: Dataset
+
+
+@lru_cache(maxsize=2)
+def _asked(without: Fit) -> _Asked | None:
+    """What a fit leaves, for the shapes of all mechanisms; None where nothing slides."""
+    data, hypothesis = without.data, without.hypothesis
+    plain = fit_plain(data)
+    if plain is None:
+        return None
+    quiet = data.over([one.smooth for one in data.apart] or smoothed_runs(data.runs, plain))
+    moved = [measured_motion(run).moved for run in data.runs]
+    steps, found = without.estimator.steps(hypothesis), dict[str, _Channel]()
+    free = [
+        index
+        for index, one in enumerate(hypothesis.coordinates)
+        if index >= len(hypothesis.bench.axis.NOMINAL) and not one.edge
+    ]
+    for channel in channels(data):
+        parts = left_in_channel(hypothesis, data, channel, plain)
+        rows = [one.rows for one in parts]
+
+        def at(x: FloatArray, rows: list[NDArray[np.bool_]] = rows, channel: str = channel) -> FloatArray:
+            return _joined(left_in_channel(hypothesis.moved(x), quiet, channel, plain), rows)
+
+        measured, own = _joined(parts, rows), at(hypothesis.x)
+        if measured.size < _FEWEST_ROWS or not (np.isfinite(measured).all() and np.isfinite(own).all()):
+            continue
+        beside = [np.ones_like(measured)]
+        if channel == TORQUE:
+            columns = [plain_columns(one) for one in moved]
+            beside += [
+                np.concatenate([one[name][at_] for one, at_ in zip(columns, rows, strict=True)]) for name in MOTION
+            ]
+        for index in free:
+            x = hypothesis.x.copy()
+            x[index] += steps[index]
+            changed = at(x) - own
+            if np.isfinite(changed).all():
+                beside.append(changed)
+        least = least_energy(data, channel, plain) * (1.0 if channel == TORQUE else CRITERIA.material)
+        found[channel] = _Channel(rows, measured, own, np.column_stack(beside), least)
+    return _Asked(found, plain, quiet)
+
+
+def _joined(parts: Sequence[ResidualSeries], rows: Sequence[NDArray[np.bool_]]) -> FloatArray:
+    """Residuals (m,) of all runs on the rows (n,) of each that count."""
+    return np.concatenate([one.left[at] for one, at in zip(parts, rows, strict=True)])
 
 
 def _searched(fit: Fit) -> float:
@@ -127,7 +202,7 @@ def shown(base: Fit, candidates: Sequence[Candidate]) -> list[Candidate]:
     """Candidates whose shape, at the values where their search begins, is in what a base leaves, the clearest first."""
     found = []
     for one in candidates:
-        begun = base.estimator.evaluate(base.hypothesis.with_term(one.term))
-        found.append((chance_of_shape(begun, base, fitted=False), one))
+        begun = (base.estimator.evaluate(base.hypothesis.with_term(term)) for term in (one.term, *one.others))
+        found.append((min(chance_of_shape(start, base, fitted=False) for start in begun), one))
     level = [(chance, one) for chance, one in found if chance < CRITERIA.significance]
     return [one for _, one in sorted(level, key=lambda pair: pair[0])]

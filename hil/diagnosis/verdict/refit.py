@@ -29,7 +29,7 @@ def reported_refit(nominal: Fit) -> Refit:
         found = rms_of_channels(hypothesis, data)
         at_floor = {name for name in found if name.endswith(BLOCK) and found[name] <= floors[name]}
         told = {name: 0.0 if name.replace(CLOSED, BLOCK) in at_floor else value for name, value in found.items()}
-        left = None if plain is None else left_by_twin(hypothesis, data, plain.slowest)
+        left = None if plain is None else left_by_twin(hypothesis, data, plain)
         return told if left is None or by_plain is None else told | {_TORQUE: left}
 
     return never_worse(nominal, figures, floors)
@@ -47,7 +47,7 @@ def torque_left(given: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> Torq
     if by_plain is None:
         return None
     of = {
-        name: left_by_twin(fit.hypothesis, held_out, plain.slowest, deviation)
+        name: left_by_twin(fit.hypothesis, held_out, plain, deviation)
         for name, fit in (("owner", given), ("refitted", nominal), ("final", final))
     }
     told = {name: None if left is None or not np.isfinite(left) else left for name, left in of.items()}

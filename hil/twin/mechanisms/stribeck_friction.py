@@ -61,7 +61,7 @@ MECHANISM = Mechanism(
         "Friction falls from {static_torque_n_m} at rest as speed passes {stribeck_velocity_rad_s}.", Picture.FRICTION
     ),
     search=SearchHints(
-        lambda s: [(1.3 * s.coulomb, f * s.peak_speed) for f in (0.003, 0.01, 0.04)],
+        lambda s: [(1.3 * s.coulomb, f * s.peak_speed) for f in (0.003, 0.01, 0.04, 0.13)],
         lambda a: (1.5 * a.friction, 2e-3 / a.ratio),
         proportional=False,
     ),

@@ -120,7 +120,7 @@ def paying(channels: Mapping[str, Harm], c: Criteria = CRITERIA) -> set[str]:
 
 
 def _not_behind(of: RivalFit, c: Criteria) -> Answer:
-    stands = not (of.evidence >= c.tied and of.more >= c.alike)
+    stands = not (of.evidence >= c.tied and (of.by_shape or of.more >= c.alike))
     return stands, {"against": of.evidence, "more": of.more}
 
 
@@ -244,7 +244,7 @@ ADDED: tuple[Rule[Addition], ...] = (
 HARMLESS: tuple[Rule[Addition | Ablation], ...] = (_CHANNELS,)
 NEEDED: tuple[Rule[Addition | Need], ...] = (_EVIDENCE, _MATERIAL, _SHAPE)
 COMPARED: tuple[Rule[RivalFit], ...] = (
-    # a rival is refuted by very strong evidence and by more than the model discrepancy
+    # a rival is refuted by very strong evidence and, above the noise, by more than the model discrepancy
     Rule(
         "beside the named one",
         "the recordings do not separate them: evidence against it {against:.0f}, {more:.3g} noise² per row more",

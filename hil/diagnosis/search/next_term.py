@@ -53,7 +53,7 @@ def next_term(search: SearchRound, candidates: Sequence[Candidate], step: Progre
     def valid(fits: Sequence[Fit]) -> list[Addition]:
         begun = [search.addition(fit) for fit in fits]
         considered.extend(one.considered for one in begun if not one.valid)
-        return [one for one in begun if one.valid]
+        return ordered([one for one in begun if one.valid])
 
     if base.within_noise:
         promising = shown(base, candidates)
@@ -75,7 +75,7 @@ def next_term(search: SearchRound, candidates: Sequence[Candidate], step: Progre
         and may_hide(base)
     ):
         step("fitting mechanisms that springs may hide from the springs of the bench file")
-        additions = _ordered([*additions, search.addition(unbent(base))])
+        additions = ordered([*additions, search.addition(unbent(base))])
         best = first_standing(additions)
     if best is None and not base.at_floor and search.unfinished:
         step("searching again beside the parameters of the bench file")
@@ -87,7 +87,7 @@ def next_term(search: SearchRound, candidates: Sequence[Candidate], step: Progre
         pairs = valid(together(base, best.fit, other))
         clear = [pair for pair in pairs if pair.fit.cost < CRITERIA.clear * best.fit.cost]
         considered += [pair.considered for pair in pairs if pair not in clear]
-        additions = _ordered([*additions, *clear])
+        additions = ordered([*additions, *clear])
         best = first_standing(additions)
     return Additions(additions, best, tuple(considered))
 
@@ -98,5 +98,6 @@ def first_standing(additions: Sequence[Addition]) -> Addition | None:
     return next((one for one in standing if accepted(one.harmless)), standing[0] if standing else None)
 
 
-def _ordered(additions: Sequence[Addition]) -> list[Addition]:
-    return sorted(additions, key=lambda one: one.fit.cost)
+def ordered(additions: Sequence[Addition]) -> list[Addition]:
+    """Additions, best first: by what they leave; below the noise by the chance of their shape."""
+    return sorted(additions, key=lambda one: (one.chance or 0.0, one.fit.cost))

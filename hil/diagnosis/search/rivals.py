@@ -6,8 +6,10 @@ is an objection to it: a reason beside its evidence.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -15,7 +17,7 @@ from hil.diagnosis.acceptance import COMPARED, FORM, paying
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.ledger import Considered, Ledger, accepted, examine, refusal
 from hil.diagnosis.search.addition import Addition
-from hil.diagnosis.search.next_term import SearchRound, first_standing
+from hil.diagnosis.search.next_term import SearchRound, first_standing, ordered
 from hil.identification.coordinates import LAST_EDGE_STEP_S
 from hil.identification.estimator import Fit, FitStatus
 from hil.identification.inference import Filter, bic_gain, bic_margin, refuted, whitening
@@ -23,6 +25,7 @@ from hil.identification.terms import Term, is_frequent
 from hil.twin.library import BY_ID
 
 _NEAR = 1.1  # cost over that of the chosen explanation, up to which the fit of a rival is ended before it is compared
+_LEAST = 1e-300  # chance: less is no number
 ENDED = 40  # evaluations: a fit that starts near its minimum converges within them
 
 
@@ -31,7 +34,8 @@ class RivalFit:
     """Another explanation of the same residual and the evidence against it (BIC difference; < 0 favours it).
 
     `reduced` is its mean squared weighted residual, `more` its energy per row in units of noise^2 less that of the
-    named explanation, whose mean square is `named`. `objection` is why it cannot be the cause, `behind` why the other
+    named explanation, whose mean square is `named`; `by_shape`: the evidence is that of the shapes below the noise, of
+    which the energy says nothing. `objection` is why it cannot be the cause, `behind` why the other
     is named though the evidence favours this one. The fit itself is not kept: its residuals and derivatives grow with
     the recordings.
     """
@@ -43,6 +47,7 @@ class RivalFit:
     named: float = np.nan
     objection: str = ""
     behind: str = ""
+    by_shape: bool = False
 
     @classmethod
     def of(cls, fit: Fit, evidence: float, more: float = np.inf) -> RivalFit:
@@ -88,7 +93,7 @@ def chosen(best: Addition, additions: Sequence[Addition], search: SearchRound) -
     converged = _ended(started, search)
     best = converged if converged.valid else started
     others = [_ended(one, search) if one.fit.cost < _NEAR * best.fit.cost else one for one in begun]
-    order = sorted([best, *(one for one in others if one.valid)], key=lambda one: one.fit.cost)
+    order = ordered([best, *(one for one in others if one.valid)])
     best = first_standing([one for one in order if one.fit.jacobian.size]) or best
     standing = [one for one in order if one is not best and not objection(one, best)]
     named = _on_fewest_parts(_simplest(best, standing), [best, *standing])
@@ -123,7 +128,7 @@ def _simplest(best: Addition, others: Sequence[Addition]) -> Addition:
 
     Of two mechanisms with the same torque on every motion the more frequent cause is preferred.
     """
-    near = [one for one in others if one.fit.jacobian.size and bic_gain(best.fit, one.fit) < CRITERIA.tied]
+    near = [one for one in others if one.fit.jacobian.size and _evidence(best, one, bic_gain) < CRITERIA.tied]
     return min([best, *near], key=lambda one: (one.fit.hypothesis.free, not is_frequent(one.fit.terms[-1])))
 
 
@@ -132,14 +137,14 @@ def _on_fewest_parts(best: Addition, others: Sequence[Addition]) -> Addition:
 
     What a part does that is found already needs no second cause elsewhere.
     """
-    filters = whitening(best.fit)
+    margin = partial(bic_margin, filters=whitening(best.fit))
     near = [
         one
         for one in others
         if one is not best
         and one.fit.jacobian.size
         and one.fit.hypothesis.free <= best.fit.hypothesis.free
-        and not refuted(bic_margin(best.fit, one.fit, filters), _more(one, best))
+        and not _refuted(_evidence(best, one, margin), one, best)
     ]
     return min([best, *near], key=_parts)
 
@@ -152,12 +157,29 @@ def _more(one: Addition, named: Addition) -> float:
     return (one.fit.cost - named.fit.cost) / named.fit.rows
 
 
+def _by_shape(one: Addition, named: Addition) -> bool:
+    """True below the noise, where a term may only pass less noise than another."""
+    return one.chance is not None and named.chance is not None
+
+
+def _evidence(named: Addition, one: Addition, margin: Callable[[Fit, Fit], float]) -> float:
+    """Evidence for an explanation against another: the margin of their fits, below the noise that of their shapes."""
+    if one.chance is None or named.chance is None:
+        return margin(named.fit, one.fit)
+    return 2.0 * math.log(max(one.chance, _LEAST) / max(named.chance, _LEAST))
+
+
+def _refuted(evidence: float, one: Addition, named: Addition) -> bool:
+    return evidence >= CRITERIA.tied if _by_shape(one, named) else refuted(evidence, _more(one, named))
+
+
 def _compared(one: Addition, named: Addition, filters: Sequence[Filter]) -> RivalFit:
     """Compare an explanation with the named one; what is refuted by its evidence needs no other reason."""
-    evidence, more = bic_margin(named.fit, one.fit, filters), _more(one, named)
-    reason = "" if refuted(evidence, more) else objection(one, named)
+    evidence, more = _evidence(named, one, partial(bic_margin, filters=filters)), _more(one, named)
+    reason = "" if _refuted(evidence, one, named) else objection(one, named)
     behind = _behind(one, named) if evidence < 0.0 else ""
-    return RivalFit(one.fit.terms, one.fit.reduced, evidence, more, named.fit.reduced, reason, behind)
+    by_shape = _by_shape(one, named)
+    return RivalFit(one.fit.terms, one.fit.reduced, evidence, more, named.fit.reduced, reason, behind, by_shape)
 
 
 def _behind(one: Addition, named: Addition) -> str:

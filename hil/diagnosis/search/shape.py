@@ -1,6 +1,7 @@
 """Test whether the shape that a term adds to the torque, or to the difference of the encoders, is in what a fit leaves.
 
-    r = c s + inertia, friction and offset,      s = r of the fit without the term - r of the fit with it,
+    r = c s + inertia, friction, offset, and what other parameters of the fit change,
+    s = r of the fit without the term - r of the fit with it,
 
 s of the smoothed motion and of the torque that the plain model needs for it: what a term makes of the noise of position
 and torque, which is in r too, is no evidence.

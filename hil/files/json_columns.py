@@ -27,8 +27,8 @@ _STAMP_KEYS = (("secs", "sec"), ("nsecs", "nanosec", "nsec"))
 
 
 @dataclass(frozen=True)
-class JsonContent:
-    """Lists of values, scalars and units of a JSON file, by name."""
+class RecordColumns:
+    """Lists of values, scalars and units of a file of records, by name."""
 
     lists: dict[str, list[Any]]
     scalars: dict[str, float]
@@ -47,7 +47,7 @@ class JsonContent:
             return np.array([np.nan if value is None else value for value in self.lists[name]], dtype=np.float64)
 
 
-def read_json(path: Path) -> JsonContent:
+def read_json(path: Path) -> RecordColumns:
     """Read `path`. Raises InputError: no JSON, or no lists in it."""
     check_file(path, "a JSON file up to this size, or the recording as CSV or Parquet", MOST_JSON_BYTES)
     with parsing(path, "JSON file"):
@@ -59,7 +59,7 @@ def read_json(path: Path) -> JsonContent:
         raise InputError(
             f"{path}: holds no list of numbers, allowed lists by name or a record per row; export the channels as lists"
         )
-    return JsonContent(lists, scalars, units)
+    return RecordColumns(lists, scalars, units)
 
 
 def _loaded(path: Path, text: str) -> Any:

@@ -11,20 +11,20 @@ from numpy.typing import NDArray
 
 from hil.arrays import FloatArray
 from hil.errors import InputError, listed
-from hil.files import json_columns
 from hil.files.date_stamps import seconds_of
 from hil.files.input_file import check_file
 from hil.importing.long_text import long_form
 from hil.importing.map_file import CsvOptions
 from hil.importing.mat_file import mat_column, mat_scalar
 from hil.importing.on_change import held
+from hil.importing.records import read_records
 from hil.importing.text_rows import Cell, TextRows, header_names, line_of, read_rows, split_line
-from hil.importing.variables import JSON_ENDINGS, TEXT_ENDINGS, VARIABLE_ENDINGS, load_variables
+from hil.importing.variables import RECORD_ENDINGS, TEXT_ENDINGS, VARIABLE_ENDINGS, load_variables
 from hil.recording.arrow_files import numbers, read_parquet
 
 LARGEST = 1e100  # of a measured number
 FEW_MISSING = 0.05  # share of rows without a value: more is a channel of another rate, or a damaged file
-_ENDINGS = (".csv", ".mat", ".parquet", *JSON_ENDINGS, *VARIABLE_ENDINGS[1:], *TEXT_ENDINGS[1:])
+_ENDINGS = (".csv", ".mat", ".parquet", *RECORD_ENDINGS, *VARIABLE_ENDINGS[1:], *TEXT_ENDINGS[1:])
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ def check_foreign(path: Path) -> None:
 
 
 def format_of(path: Path) -> str:
-    """Format of a file: .csv (any text of rows), .mat (of variables by name), .parquet, .json.
+    """Format of a file: .csv (any text of rows), .mat (of variables by name), .parquet, .json (of records).
 
     Raises InputError for another one.
     """
@@ -55,7 +55,7 @@ def format_of(path: Path) -> str:
         )
     if ending in VARIABLE_ENDINGS or (ending in TEXT_ENDINGS and long_form(path)):
         return ".mat"
-    return ".csv" if ending in TEXT_ENDINGS else ".json" if ending in JSON_ENDINGS else ending
+    return ".csv" if ending in TEXT_ENDINGS else ".json" if ending in RECORD_ENDINGS else ending
 
 
 def read_foreign(
@@ -99,7 +99,7 @@ def read_foreign(
             columns = {name: numbers(path, table, name) for name in wanted}
             stamps = {name: parquet_dates(path, name) for name in dates}
         case _:
-            content = json_columns.read_json(path)
+            content = read_records(path)
             columns = {name: content.numbers(path, name) for name in wanted}
             stamps = {name: seconds_of([str(text) for text in content.lists.get(name, [])]) for name in dates}
 

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from hil.arrays import FloatArray
 from hil.errors import InputError, listed
-from hil.files import json_columns
 from hil.files.date_stamps import is_date, seconds_of
 from hil.importing.csv_dialect import MOST_LINES, find_dialect
 from hil.importing.foreign_columns import as_measured, check_foreign, format_of, parquet_dates
@@ -20,6 +19,7 @@ from hil.importing.header_rows import read_factor
 from hil.importing.header_values import HeaderValue, header_values
 from hil.importing.lexicon import Constant
 from hil.importing.map_file import SECONDS, CsvOptions
+from hil.importing.records import read_records
 from hil.importing.row_groups import moving_group
 from hil.importing.text_rows import Cell, read_rows
 from hil.importing.unit_lines import described, told_units
@@ -69,7 +69,7 @@ def read_table(path: Path) -> ForeignTable:
     check_foreign(path)
     if path.stat().st_size == 0:
         raise InputError(f"{path}: the file is empty; give a file with rows of numbers")
-    readers = {".csv": _text, ".mat": _mat, ".parquet": _parquet, ".json": _json}
+    readers = {".csv": _text, ".mat": _mat, ".parquet": _parquet, ".json": _records}
     read = readers[format_of(path)](path)
     table = _equal_length(replace(read, columns={name: as_measured(one) for name, one in read.columns.items()}))
     rows = max((values.size for values in table.columns.values()), default=0)
@@ -197,8 +197,8 @@ def _parquet(path: Path) -> ForeignTable:
     return ForeignTable(path, columns, units, remarks=tuple(remarks), dates=frozenset(dates))
 
 
-def _json(path: Path) -> ForeignTable:
-    content = json_columns.read_json(path)
+def _records(path: Path) -> ForeignTable:
+    content = read_records(path)
     columns, remarks = {}, []
     dates = set[str]()
     for name, values in content.lists.items():

@@ -62,6 +62,9 @@ class TimeColumn(_Strict):
         description="of the stamps; d: days, date: text such as 2024-03-01 12:00:00.001 or 12:00:00.001"
     )
     scale: PositiveFloat = Field(default=1.0, description="factor beside the unit")
+    wraps_at: PositiveFloat | None = Field(
+        default=None, description="range of a counter that starts again, in the unit of the column"
+    )
     fraction: Self | None = Field(default=None, description="column of the part of a second, added to this one")
 
     @property

@@ -81,7 +81,9 @@ def split_unit(name: str) -> tuple[str, str | None, bool]:
 
 
 def whole_unit(name: str) -> str | None:
-    """Unit of a time, a torque, an angle or its speed that is the whole name of a column: ms, Nm, turns, rpm."""
+    """Unit that is the whole name of a column: of a time, torque, current, angle, its speed, or counts."""
     unit, letters = unit_named(name), len(name.strip())
     si = UNITS.get(unit or "", ("",))[0]
-    return unit if (si in ("rad", "rad/s") and letters >= LEAST_ALONE) or (si in ("s", "N m") and letters > 1) else None
+    turns = si in ("rad", "rad/s") and letters >= LEAST_ALONE
+    several = unit == "counts" and re.search(r"(?<!tick)s\s*$", name.lower())  # one is the number of a row
+    return unit if turns or several or ((si in ("s", "N m") or unit in ("A", "mA")) and letters > 1) else None

@@ -81,11 +81,7 @@ def range_of(stamps: FloatArray) -> float | None:
         return None
     usual, span = float(np.median(rises)), float(np.ptp(good))
     least, most = -float(falls.max()), -float(falls.min())
-    fitting = [
-        size
-        for size in _RANGES
-        if size > span and (falls + size).min() > 0.0 and (falls + size).max() < GAP_STEPS * usual
-    ]
+    fitting = [size for size in _RANGES if max(span, most) < size < least + GAP_STEPS * usual]
     return min(fitting, key=lambda size: abs(float(np.median(falls)) + size - usual), default=None)
 
 

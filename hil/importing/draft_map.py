@@ -97,6 +97,11 @@ def draft_map(path: Path, rate_hz: float | None = None, axis: str | None = None)
                 for name in used
                 if name in on_change
             ),
+            *(
+                f"{name}: its cells hold their units; they are read in {table.cell_units[name]}"
+                for name in used
+                if name in table.cell_units
+            ),
             *roles.unsure,
             *(f"{name}: its unit is not known" for name, one in labels.items() if one.odd_unit and name in used),
         ],
@@ -113,7 +118,8 @@ def draft_map(path: Path, rate_hz: float | None = None, axis: str | None = None)
 
 def _labels(table: ForeignTable) -> dict[str, Label]:
     """Meaning of the columns by all that the file says of them."""
-    told = {name: (table.units.get(name, ""), table.words.get(name, "")) for name in table.columns}
+    units = table.units | table.cell_units
+    told = {name: (units.get(name, ""), table.words.get(name, ""), name in table.cell_units) for name in table.columns}
     return {name: replace(label(table.titles.get(name, name), *of), column=name) for name, of in told.items()}
 
 

@@ -72,7 +72,7 @@ class Stamps:
 def range_of(stamps: FloatArray) -> float | None:
     """Range of a counter of time (n,) that starts again, such as 2^32; None where stamps fall by anything else.
 
-    Over each fall it goes on by one step of the rows, or by some where rows are missing.
+    Over each fall, of more than half of it, it goes on by one step of the rows, or by some where rows are missing.
     """
     good = stamps[np.isfinite(stamps)]
     steps = np.diff(good)
@@ -81,7 +81,7 @@ def range_of(stamps: FloatArray) -> float | None:
         return None
     usual, span = float(np.median(rises)), float(np.ptp(good))
     least, most = -float(falls.max()), -float(falls.min())
-    fitting = [size for size in _RANGES if max(span, most) < size < least + GAP_STEPS * usual]
+    fitting = [size for size in _RANGES if max(span, most) < size < min(least + GAP_STEPS * usual, 2.0 * least)]
     return min(fitting, key=lambda size: abs(float(np.median(falls)) + size - usual), default=None)
 
 
@@ -91,7 +91,7 @@ def counted_on(stamps: FloatArray, size: float | None) -> FloatArray:
         return stamps
     good = np.flatnonzero(np.isfinite(stamps))
     counted = stamps.copy()
-    counted[good[1:]] += size * np.cumsum(np.diff(stamps[good]) < 0.0)
+    counted[good[1:]] += size * np.cumsum(np.diff(stamps[good]) < -0.5 * size)
     return counted
 
 

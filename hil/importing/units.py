@@ -41,6 +41,13 @@ def unit_named(text: str) -> str | None:
     return "counts" if unit_of.get(_BITS.sub("", key)) == "counts" else unit_of.get(key)
 
 
+def base_of(unit: str) -> tuple[str, float]:
+    """Unit in which all units of the quantity of `unit` can be told, SI where there is one, and the factor to it."""
+    if unit in ("mA", "mV"):
+        return unit[1:], 1e-3
+    return ("%", 0.1) if unit == "permille" else UNITS.get(unit, (unit, 1.0))
+
+
 def unit_of_text(text: str) -> str | None:
     """Unit of a text that says nothing else, with a quantity before or behind it: Nm (Torque), Angle [deg]."""
     whole = unit_named(text.strip(" []()"))

@@ -1,5 +1,4 @@
-"""Read files that hold variables by name: MATLAB .mat, NumPy .npy and .npz, ASAM MDF 4 (.mf4), text of one value
-in each line."""
+"""Read files that hold variables by name: MATLAB .mat, NumPy .npy and .npz, ASAM MDF 4 (.mf4)."""
 
 import zipfile
 from pathlib import Path
@@ -9,12 +8,9 @@ import numpy as np
 from numpy.lib import format as npy_format
 
 from hil.files.input_file import check_values, parsing
-from hil.importing.long_text import long_form, read_long
 from hil.importing.mat_file import load_mat
 from hil.importing.mdf_file import load_mdf
 
-TEXT_ENDINGS = (".csv", ".txt", ".tsv", ".tab", ".dat", ".asc", ".log", ".lvm", ".prn")
-RECORD_ENDINGS = (".json", ".jsonl", ".ndjson", ".xml")
 VARIABLE_ENDINGS = (".mat", ".npy", ".npz", ".mf4")
 
 
@@ -33,13 +29,8 @@ def load_variables(path: Path) -> Variables:
         case ".npy" | ".npz":
             with parsing(path, "NumPy file"):
                 return Variables(_numpy(path), {})
-        case ".mf4":
-            return Variables(*load_mdf(path))
         case _:
-            with parsing(path, "text with a value per line"):
-                form = long_form(path)
-                assert form is not None, "its form has changed"
-                return Variables(read_long(path, form), {"time": "s"})
+            return Variables(*load_mdf(path))
 
 
 def _numpy(path: Path) -> dict[str, Any]:

@@ -1,0 +1,80 @@
+"""Read columns whose cells hold a number with its unit: 12.3 mm, 145 mN·m, 1.02 N·m. All become one unit."""
+
+import re
+from collections import Counter
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from hil.arrays import FloatArray
+from hil.importing.number_form import NumberForm, numbers_of
+from hil.importing.units import base_of, unit_named
+
+_CELL = re.compile(r"([+\-−]?[\d.,'’\s]*\d[.,]?(?:[eE][+-]?\d+)?)\s*((?:1/)?[^\d\s.,'’/+-].{0,20})")
+_LONGEST = 60  # characters of such a cell
+_MOSTLY = 0.5  # share of the cells with a unit from which a column has units
+
+
+class Cells(NamedTuple):
+    """Numbers (n,), NaN without one; the texts that are none, by row; the unit of the numbers, "" if cells have none.
+
+    None: no cell says anything yet.
+    """
+
+    values: FloatArray
+    texts: dict[int, str]
+    unit: str | None
+
+
+class _Part(NamedTuple):
+    number: str
+    unit: str
+    factor: float
+
+
+def number_part(field: str) -> str:
+    """Text of a cell before a unit that is known; the whole text without one."""
+    return _part(field).number
+
+
+def has_unit(field: str) -> bool:
+    """True for a cell that ends with a unit that is known."""
+    return bool(_part(field).unit)
+
+
+def read_cells(fields: Sequence[str], form: NumberForm, unit: str | None = None) -> Cells:
+    """Read the cells of one column. `unit` is that of the cells before, as this function returned it.
+
+    In a column with units a number without one is a text like a unit of another quantity, but for 0.
+    """
+    values, texts = numbers_of(fields, form)
+    if unit == "" or (unit is None and not texts):
+        return Cells(values, texts, unit if unit is not None or not np.isfinite(values).any() else "")
+    parts = [_part(field) for field in fields]
+    if unit is None:
+        unit, count = Counter(part.unit for part in parts).most_common(1)[0]
+        filled = len(texts) + int(np.isfinite(values).sum())
+        if count <= _MOSTLY * filled or not unit:
+            return Cells(values, texts, "")
+    values, wrong = numbers_of([part.number for part in parts], form)
+    strange = [row for row, part in enumerate(parts) if part.unit != unit and (part.unit or values[row])]
+    rows = sorted({*wrong, *(row for row in strange if not np.isnan(values[row]))})
+    values = values * np.array([part.factor for part in parts])
+    values[rows] = np.nan
+    return Cells(values, {row: fields[row] for row in rows}, unit)
+
+
+def _part(field: str) -> _Part:
+    match = _CELL.fullmatch(field) if len(field) <= _LONGEST else None
+    base = _base(match[2]) if match else None
+    return _Part(match[1], *base) if match and base else _Part(field, "", 1.0)
+
+
+@lru_cache(maxsize=1000)
+def _base(text: str) -> tuple[str, float] | None:
+    """Unit to which a unit in a cell is converted, and the factor; None for an unknown one, or M that may be mega."""
+    unit = unit_named(text)
+    mega = text.startswith("M") and unit is not None and unit.startswith("m") and unit not in ("m", "min", "m/min")
+    return None if unit is None or mega else base_of(unit)

@@ -28,7 +28,7 @@ class Cells(NamedTuple):
     unit: str | None
 
 
-class _Part(NamedTuple):
+class _CellPart(NamedTuple):
     number: str
     unit: str
     factor: float
@@ -66,10 +66,10 @@ def read_cells(fields: Sequence[str], form: NumberForm, unit: str | None = None)
     return Cells(values, {row: fields[row] for row in rows}, unit)
 
 
-def _part(field: str) -> _Part:
+def _part(field: str) -> _CellPart:
     match = _CELL.fullmatch(field) if len(field) <= _LONGEST else None
     base = _base(match[2]) if match else None
-    return _Part(match[1], *base) if match and base else _Part(field, "", 1.0)
+    return _CellPart(match[1], *base) if match and base else _CellPart(field, "", 1.0)
 
 
 @lru_cache(maxsize=1000)

@@ -20,7 +20,7 @@ from hil.importing.held_samples import rows_per_slowest_sample
 from hil.importing.lexicon import Quantity
 from hil.importing.map_draft import DraftedChannel, MapDraft
 from hil.importing.map_file import ChannelSource
-from hil.importing.on_change import held, written_on_change
+from hil.importing.on_change import columns_on_change, held
 from hil.importing.roles import find_roles
 from hil.importing.rows import at_regular_times, complete_rows, filled_in, without_duplicates
 from hil.importing.slow_gaps import moving_little, with_gaps_filled
@@ -37,7 +37,7 @@ def draft_map(path: Path, rate_hz: float | None = None, axis: str | None = None)
     table = read_table(path)
     own = on_one_clock(table, _labels(table))
     table = own.table
-    on_change = [name for name, values in table.columns.items() if written_on_change(values)]
+    on_change = columns_on_change(table.columns)
     filled_up = {name: held(table.columns[name]) for name in on_change}
     distinct = without_duplicates(table.columns | filled_up)
     lines = table.lines[distinct.rows] if table.lines is not None else None

@@ -116,6 +116,7 @@ class SeriesWords(_Entry):
 
     name: Words
     value: Words
+    unit: Words
     quality: Words
     bad: Words
 

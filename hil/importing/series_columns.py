@@ -24,15 +24,19 @@ def find_series(names: Sequence[str], rows: Sequence[Sequence[str]], form: Numbe
     One column holds values that differ within a channel; columns of words name the channel: those that are needed so
     that its stamps go forwards. A single channel in the sample is one only if the header says so.
     """
+    known = lexicon().series
     columns = {name: [row[index].strip() for row in rows] for index, name in enumerate(names)}
     numbers = [name for name, column in columns.items() if _most(column, lambda one: _number(one, form) is not None)]
     dates = [name for name, column in columns.items() if _most(column, is_date)]
     times = dates or [name for name in numbers if label(name).quantity is Quantity.TIME] or numbers[:1]
     words = [name for name, column in columns.items() if name not in (*numbers, *dates) and any(column)]
-    units = [name for name in words if all(not text or unit_named(text) for text in columns[name])]
-    quality = [name for name in columns if _says(name, lexicon().series.quality) and name not in (*times, *units)]
+    units = [
+        name for name in words if _says(name, known.unit) or _most(columns[name], lambda one: bool(unit_named(one)))
+    ]
+    units = [] if len(units) == len(words) else units  # channels whose names are units
+    quality = [name for name in columns if _says(name, known.quality) and name not in (*times, *units)]
     named = [name for name in words if name not in (*units, *quality)]
-    told = [name for name in named if _says(name, lexicon().series.name)]
+    told = [name for name in named if _says(name, known.name)]
     if not times or not named:
         return None
     time = max(times, key=lambda name: len(set(columns[name])))
@@ -47,6 +51,7 @@ def find_series(names: Sequence[str], rows: Sequence[Sequence[str]], form: Numbe
             channel = [name] if len(set(columns[name])) > 1 else channel
         elif _forwards(stamps, channels([*channel, name]), 0.0) > _forwards(stamps, channels(channel), 0.0) + _MORE:
             channel = [*channel, name]
+    channel.sort(key=names.index)
     groups = channels(channel)
     several = len(set(groups)) > 1
     if len(set(groups)) > len(rows) / _FEWEST or _forwards(stamps, groups) < _FORWARDS:
@@ -56,10 +61,10 @@ def find_series(names: Sequence[str], rows: Sequence[Sequence[str]], form: Numbe
         for name in numbers
         if name not in (*times, *quality) and _differs(columns[name], groups) and not _counts(columns[name], form)
     ]
-    spoken = [name for name in values if _says(name, lexicon().series.value)]
-    known = len(spoken) == 1 and channel[0] in told
-    values = spoken if known else values
-    if len(values) != 1 or not (several or known):
+    spoken = [name for name in values if _says(name, known.value)]
+    by_words = len(spoken) == 1 and bool(set(channel) & set(told))
+    values = spoken if by_words else values
+    if len(values) != 1 or not (several or by_words):
         return None
     unit, status = (next(iter(found), None) for found in (units, quality))
     return SeriesColumns(time=time, names=tuple(channel), value=values[0], unit=unit, quality=status)
@@ -69,6 +74,10 @@ def _most(column: Sequence[str], test: Callable[[str], bool]) -> bool:
     """True if most of the cells that are not empty are of a kind."""
     filled = [one for one in column if one]
     return sum(map(test, filled)) > _MOSTLY * len(filled) if filled else False
+
+
+def _is_unit(text: str) -> bool:
+    return unit_named(text) is not None
 
 
 def _number(text: str, form: NumberForm) -> float | None:

@@ -134,7 +134,8 @@ class _Reader:
         elif given > width and self._numbers(extra):
             self.others.append((number, line, True))
         elif given < width and not self.groups:
-            cut = not any(self._words(field) for field in fields) and not of_terminal(line)
+            cut = self._stamped(fields) or not any(self._words(field) for field in fields)
+            cut = cut and not of_terminal(line)
             self.others.append((number, line, cut))
         else:
             self.rows.append(fields[:width] + [""] * (width - given))
@@ -143,6 +144,11 @@ class _Reader:
     def _numbers(self, fields: Sequence[str]) -> bool:
         values, _ = numbers_of(fields, self.form)
         return bool(np.isfinite(values).any()) or any(is_date(field) for field in fields)
+
+    def _stamped(self, fields: Sequence[str]) -> bool:
+        """True for a line of a series that has a stamp where its rows have it."""
+        place = self.names.index(self.series.time) if self.series and self.series.time in self.names else len(fields)
+        return self._numbers(fields[place : place + 1])
 
     def _words(self, field: str) -> bool:
         return bool(numbers_of([field], self.form)[1]) and not is_date(field)

@@ -13,6 +13,7 @@ from hil.importing.number_form import NumberForm, numbers_of
 from hil.importing.units import base_of, unit_named
 
 _CELL = re.compile(r"([+\-−]?[\d.,'’\s]*\d[.,]?(?:[eE][+-]?\d+)?)\s*((?:1/)?[^\d\s.,'’/+-].{0,20})")
+_FIRST = 20  # cells that tell at once that a column has units
 _LONGEST = 60  # characters of such a cell
 _MOSTLY = 0.5  # share of the cells with a unit from which a column has units
 
@@ -49,15 +50,15 @@ def read_cells(fields: Sequence[str], form: NumberForm, unit: str | None = None)
 
     In a column with units a number without one is a text like a unit of another quantity, but for 0.
     """
-    values, texts = numbers_of(fields, form)
-    if unit == "" or (unit is None and not texts):
-        return Cells(values, texts, unit if unit is not None or not np.isfinite(values).any() else "")
+    if unit == "" or not (unit or any(map(has_unit, fields[:_FIRST]))):
+        values, texts = numbers_of(fields, form)
+        if unit == "" or not texts:
+            return Cells(values, texts, "" if unit == "" or np.isfinite(values).any() else None)
     parts = [_part(field) for field in fields]
-    if unit is None:
+    if not unit:
         unit, count = Counter(part.unit for part in parts).most_common(1)[0]
-        filled = len(texts) + int(np.isfinite(values).sum())
-        if count <= _MOSTLY * filled or not unit:
-            return Cells(values, texts, "")
+        if count <= _MOSTLY * sum(map(bool, fields)) or not unit:
+            return Cells(*numbers_of(fields, form), "")
     values, wrong = numbers_of([part.number for part in parts], form)
     strange = [row for row, part in enumerate(parts) if part.unit != unit and (part.unit or values[row])]
     rows = sorted({*wrong, *(row for row in strange if not np.isnan(values[row]))})

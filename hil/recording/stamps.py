@@ -191,7 +191,7 @@ def _refuse_order(time_s: FloatArray, steps: FloatArray, few_digits: bool, place
     elif not steps[row - 1]:
         problem = "repeats (a duplicate row, or stamps with too few digits)"
     elif again:
-        problem = f"falls by {-np.median(falls):.6g} s in {back} places"
+        problem = f"runs back by {-np.median(falls):.6g} s in {back} places"
         advice = "if it is a counter that starts again, write its range into a map: time.wraps_at"
     elif back > max(3, time_s.size // 100):
         problem, advice = f"runs back in {back} places, the rows are out of order", "sort the file by its time"

@@ -73,7 +73,5 @@ def test_other_falls_are_refused_with_their_row(tmp_path: Path, stamps: np.ndarr
     path = tmp_path / "log.csv"
     path.write_text(text(stamps))
     assert range_of(stamps) is None
-    with pytest.raises(
-        InputError, match=r"row \d+ of the numbers: time_s: (runs back|repeats|falls by 1\.23\d* s in 3 places)"
-    ):
+    with pytest.raises(InputError, match=r"row \d+ of the numbers: time_s: (runs back|repeats)"):
         draft_map(path)

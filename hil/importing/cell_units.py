@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hil.arrays import FloatArray
+from hil.importing.lexicon import lexicon
 from hil.importing.number_form import NumberForm, numbers_of
 from hil.importing.units import base_of, unit_named
 
@@ -65,6 +66,14 @@ def read_cells(fields: Sequence[str], form: NumberForm, unit: str | None = None)
     values = values * np.array([part.factor for part in parts])
     values[rows] = np.nan
     return Cells(values, {row: fields[row] for row in rows}, unit)
+
+
+def tell_units(title: str, units: Sequence[str], cells: Sequence[str], form: NumberForm) -> bool:
+    """True if texts are the units of the numbers in the cells beside them; a single letter may be a state."""
+    given = {one for one in units if one}
+    known = bool(given) and all(unit_named(one) for one in given)
+    named = any(word in lexicon().series.unit for word in re.split(r"[\W\d_]+", title.lower()))
+    return known and (named or all(len(one) > 1 for one in given)) and read_cells(cells, form).unit == ""
 
 
 def _part(field: str) -> _CellPart:

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Collection, Sequence
 from itertools import pairwise
 
-from hil.arrays import FloatArray
 from hil.files.date_stamps import is_date, seconds_of
 from hil.importing.cell_units import number_part
 from hil.importing.column_names import label, plain_words
@@ -30,9 +29,7 @@ def find_series(names: Sequence[str], rows: Sequence[Sequence[str]], form: Numbe
     dates = [name for name, column in columns.items() if _most(column, is_date)]
     times = dates or [name for name in numbers if label(name).quantity is Quantity.TIME] or numbers[:1]
     words = [name for name, column in columns.items() if name not in (*numbers, *dates) and any(column)]
-    units = [
-        name for name in words if _says(name, known.unit) or _most(columns[name], lambda one: bool(unit_named(one)))
-    ]
+    units = [name for name in words if _says(name, known.unit) or _most(columns[name], _is_unit)]
     units = [] if len(units) == len(words) else units  # channels whose names are units
     quality = [name for name in columns if _says(name, known.quality) and name not in (*times, *units)]
     named = [name for name in words if name not in (*units, *quality)]
@@ -40,7 +37,7 @@ def find_series(names: Sequence[str], rows: Sequence[Sequence[str]], form: Numbe
     if not times or not named:
         return None
     time = max(times, key=lambda name: len(set(columns[name])))
-    stamps = seconds_of(columns[time]) if dates else [_number(one, form) or 0.0 for one in columns[time]]
+    stamps = list(seconds_of(columns[time]) if dates else (_number(one, form) or 0.0 for one in columns[time]))
 
     def channels(of: Sequence[str]) -> list[tuple[str, ...]]:
         return list(zip(*(columns[name] for name in of), strict=True))
@@ -88,15 +85,16 @@ def _says(name: str, words: Collection[str]) -> bool:
     return any(word in words for word in plain_words(name))
 
 
-def _forwards(stamps: Sequence[float] | FloatArray, groups: Sequence[tuple[str, ...]], least: float = -1e-12) -> float:
-    """Share of the steps of stamps within a channel that are greater than `least`."""
+def _forwards(stamps: Sequence[float], groups: Sequence[tuple[str, ...]], least: float = -1e-12) -> float:
+    """Share of the steps of stamps within a channel that are greater than `least`, from the first row or the last."""
     last = dict[tuple[str, ...], float]()
-    forwards = []
+    steps = []
     for stamp, group in zip(stamps, groups, strict=True):
         if group in last:
-            forwards.append(stamp - last[group] > least)
+            steps.append(stamp - last[group])
         last[group] = stamp
-    return sum(forwards) / len(forwards) if forwards else 0.0
+    ways = [sum(way * step > least for step in steps) for way in (1.0, -1.0)]
+    return max(ways) / len(steps) if steps else 0.0
 
 
 def _differs(column: Sequence[str], groups: Sequence[tuple[str, ...]]) -> bool:

@@ -19,7 +19,7 @@ from hil.arrays import FloatArray
 from hil.errors import InputError
 from hil.files.date_stamps import is_date, read_dates
 from hil.files.input_file import lines_of
-from hil.importing.cell_units import read_cells
+from hil.importing.cell_units import read_cells, tell_units
 from hil.importing.map_file import CsvOptions, SeriesColumns
 from hil.importing.number_form import NumberForm, numbers_of
 from hil.importing.series import series_rows
@@ -87,6 +87,7 @@ class _Reader:
         self.fields: dict[str, list[str]] = {name: [] for name in (self.series.columns if self.series else ())}
         self.texts: dict[str, dict[int, str]] = {name: {} for name in names}  # by row
         self.units = dict[str, str | None].fromkeys(names)
+        self.units_of: dict[str, str] = {}  # column of the units beside each column
         self.others: list[tuple[int, str, bool]] = []  # lines that are no rows: number, text, damaged
         self.converted = 0
 
@@ -156,13 +157,24 @@ class _Reader:
     def _convert(self) -> None:
         if not self.rows:
             return
-        for name, column in zip(self.names, zip(*self.rows, strict=True), strict=True):
+        columns = dict(zip(self.names, zip(*self.rows, strict=True), strict=True))
+        if not self.converted and not self.series:
+            self.units_of = {
+                name: beside
+                for name, beside in pairwise(self.names)
+                if tell_units(beside, columns[beside], columns[name], self.form)
+            }
+        for name, column in columns.items():
             if self.series and name not in self.fields:
                 continue
             if name in self.fields or (not self.converted and any(is_date(field) for field in column[:3])):
                 self.fields.setdefault(name, []).extend(column)
                 continue
-            values, texts, self.units[name] = read_cells(column, self.form, self.units[name])
+            cells: Sequence[str] = column
+            if name in self.units_of:
+                both = zip(column, columns[self.units_of[name]], strict=True)
+                cells = [f"{one} {unit}".strip() for one, unit in both]
+            values, texts, self.units[name] = read_cells(cells, self.form, self.units[name])
             self.parts[name].append(values)
             self.texts[name] |= {self.converted + row: text for row, text in texts.items()}
         self.converted += len(self.rows)

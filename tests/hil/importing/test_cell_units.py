@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -79,6 +80,13 @@ VARIANTS = {
         "torque (mNm)\tposition [deg]\ttime [s]",
         *(f"{m:.5f} N·m\t{a / 2 / np.pi:.7f} rev\t{1e3 * t:.1f} ms" for t, a, m in zip(T, ANGLE, TORQUE, strict=True)),
     ],
+    "units beside the values": [
+        "t;angle;unit;torque;unit",
+        *(
+            f"{t:.4f};{np.rad2deg(a):.5f};deg;" + (f"{1e3 * m:.2f};mNm" if abs(m) < 1 else f"{m:.5f};Nm")
+            for t, a, m in zip(T, ANGLE, TORQUE, strict=True)
+        ),
+    ],
     "units by size": [
         "t;angle;torque",
         *(
@@ -102,6 +110,30 @@ def test_a_file_of_cells_with_units_is_imported(tmp_path: Path, variant: str) ->
     assert recording.period_s == pytest.approx(1e-3)
     np.testing.assert_allclose(recording["motor_position_rad"], ANGLE, atol=1e-4)
     np.testing.assert_allclose(recording["torque_n_m"], TORQUE, atol=1e-3)
+
+
+def test_a_state_beside_a_value_is_no_unit(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    rows = (f"{t:.4f},{a:.6f},{m:.5f},N" for t, a, m in zip(T, ANGLE, TORQUE, strict=True))
+    path.write_text("\n".join(["t,angle_rad,torque_Nm,fault", *rows]))
+    draft = draft_map(path)
+    assert not draft.table.cell_units
+    assert draft.left_out["fault"] == "text such as 'N', no numbers"
+
+
+def test_texts_of_records_are_read_with_their_units(tmp_path: Path) -> None:
+    path, map_path = tmp_path / "log.json", tmp_path / "map.yaml"
+    rows = [
+        {"t": f"{1e3 * t:.0f} ms", "angle": f"{a:.6f} rad", "torque": f"{m:.5f} Nm"}
+        for t, a, m in zip(T, ANGLE, TORQUE, strict=True)
+    ]
+    path.write_text(json.dumps(rows))
+    map_path.write_text(map_text(draft_map(path)))
+    np.testing.assert_allclose(import_recording(path, map_path)["torque_n_m"], TORQUE, atol=1e-5)
+    rows[900]["torque"] = "1.0 rpm"
+    path.write_text(json.dumps(rows))
+    with pytest.raises(InputError, match=r"log\.json:901: torque: given '1\.0 rpm', allowed a finite number"):
+        import_recording(path, map_path)
 
 
 def test_a_unit_of_the_map_is_that_to_which_cells_are_converted(tmp_path: Path) -> None:

@@ -51,6 +51,10 @@ TABLES = {
         in_turn(lambda k, name, value, unit: f"{name}_{unit.replace(' ', '')},{1_714_550_400_000 + k},{value:.5f}"),
         key=lambda line: line[0],
     ),
+    "the newest first": [
+        "time,tag,value",
+        *in_turn(lambda k, name, value, unit: f"{STAMPS[k]},{name}_{unit.replace(' ', '')},{value:.5f}")[::-1],
+    ],
     "a unit that changes from row to row": [
         "time_s,sensor,value,uom",
         *(
